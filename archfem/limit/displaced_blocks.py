@@ -322,7 +322,7 @@ def largest_speed(blocks: PlacedBlocks, motion: Array) -> float:
 
 
 def find_mechanism(
-    blocks: PlacedBlocks, joints: Sequence[int], friction: Array
+    blocks: PlacedBlocks, joints: Sequence[int], friction: Array, *, flat: bool = False
 ) -> Mechanism | None:
     """Find the mechanism of least factor by limit analysis of the blocks at their present places.
 
@@ -333,6 +333,8 @@ def find_mechanism(
         blocks: at their present places.
         joints: numbers of the joints that may open or slip; the others are welded.
         friction: coefficients μ of all joints, infinite where nothing slides (n_joints,).
+        flat: whether contacts slide without dilatancy: |T| <= μ N₀ with N₀ of the solution before,
+            until it repeats (Gilbert, Casapulla and Ahmed, Comput. Struct. 84 (2006) 873-887).
 
     Returns:
         The mechanism; None where no factor sets the blocks in motion.
@@ -350,17 +352,42 @@ def find_mechanism(
     solution = _solve_static(bodies, contacts, coefficient)
     if solution is None:
         return None
-    factor, velocity = solution
+    factor, velocity, forces = solution
+    if flat:
+        factor, velocity = _solve_flat(bodies, contacts, coefficient, forces)
     motion = (bodies.expansion @ velocity).reshape(-1, 3)
     return classify_motion(
         blocks, joints, motion / largest_speed(blocks, motion), coefficient, contacts, factor
     )
 
 
+def _solve_flat(
+    bodies: Bodies, contacts: Sequence[Contact], coefficient: Array, forces: Array
+) -> tuple[float, Array]:
+    """Return factor and velocities of sliding without dilatancy, from first normal forces."""
+    before = np.inf
+    for _ in range(40):
+        solution = _solve_static(bodies, contacts, coefficient, forces)
+        if solution is None:
+            raise NoEquilibrium("sliding without dilatancy has no least factor here")
+        factor, velocity, found = solution
+        if abs(factor - before) <= 1e-7 * abs(factor):
+            return factor, velocity
+        # half steps: whole ones may alternate between two states
+        before, forces = factor, 0.5 * (forces + found)
+    raise NoEquilibrium("no state of sliding without dilatancy was found")
+
+
 def _solve_static(
-    bodies: Bodies, contacts: Sequence[Contact], coefficient: Array
-) -> tuple[float, Array] | None:
-    """Return the largest factor in equilibrium, and the bodies' velocities by duality."""
+    bodies: Bodies,
+    contacts: Sequence[Contact],
+    coefficient: Array,
+    held: Array | None = None,
+) -> tuple[float, Array, Array] | None:
+    """Return the largest factor, velocities by duality and normal forces [mean body weights].
+
+    With `held` normal forces, friction is limited by these.
+    """
     normal, along = bodies.rates(contacts)
     dead, live = (bodies.generalised(load) for load in (bodies.blocks.dead, bodies.blocks.live))
     # forces in mean body weights and lengths in metres over the size keep coefficients near one
@@ -371,11 +398,15 @@ def _solve_static(
     cone = np.hstack([np.diag(-np.where(slides, coefficient, 0.0)), np.eye(count)])[slides]
     mirrored = np.hstack([cone[:, :count], -cone[:, count:]])
     limits = np.hstack([np.vstack([cone, mirrored]), np.zeros((2 * len(cone), 1))])
+    strength = np.zeros(len(limits))
+    if held is not None:
+        limits[:, :count] = 0.0
+        strength = np.tile((coefficient * held)[slides], 2)
     for presolve in (False, True):  # where round-off stops the solver presolve changes its path
         result = linprog(
             np.append(np.zeros(2 * count), -1.0),
             A_ub=csr_matrix(limits),
-            b_ub=np.zeros(len(limits)),
+            b_ub=strength,
             A_eq=csr_matrix(balance),
             b_eq=-lengths * dead / unit,
             bounds=[(0.0, None)] * count + [(None, None)] * (count + 1),
@@ -390,7 +421,8 @@ def _solve_static(
         raise NoEquilibrium("the blocks cannot rest here under any horizontal force")
     if result.status != 0:
         raise DidNotConverge(f"the linear programme found no mechanism: {result.message}")
-    return float(result.x[-1]), -lengths * np.array(result.eqlin.marginals)
+    velocity = -lengths * np.array(result.eqlin.marginals)
+    return float(result.x[-1]), velocity, result.x[:count]
 
 
 def classify_motion(

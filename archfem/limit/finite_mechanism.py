@@ -312,16 +312,15 @@ class PathFollower:
 
     def follow(self, mechanism: Mechanism, max_events: int = 20) -> MechanismPath:
         """Follow a mechanism until it falls, locks, collides, or the path is cut off."""
-        mechanisms, state = [mechanism], self._start(self.blocks, mechanism)
-        velocity = state.velocity(state.linkage.first_velocity)
-        bodies = Bodies(self.blocks, mechanism.body)
-        first = np.zeros(3 * bodies.count) if velocity is None else velocity
+        mechanisms: list[Mechanism] = [mechanism]
+        motion = np.zeros_like(self.blocks.displacement)
         try:
+            mechanisms[0], state, velocity = self._start(self.blocks, mechanism)
+            motion = (state.bodies.expansion @ velocity).reshape(-1, 3)
             while len(mechanisms) <= max_events:
                 blocks = self._follow_linkage(state, velocity)
-                mechanisms.append(self._renew(blocks))
-                state = self._start(blocks, mechanisms[-1])
-                velocity = state.velocity(state.linkage.first_velocity)
+                renewed, state, velocity = self._start(blocks, self._renew(blocks))
+                mechanisms.append(renewed)
             raise DidNotConverge(
                 f"the mechanism changed {max_events} times before it fell, the last time as "
                 f"{self.events[-1].text}: check the joints there, or assess fewer blocks"
@@ -332,26 +331,45 @@ class PathFollower:
             self.blocks,
             np.array(self.factors),
             np.array(self.displacements),
-            (bodies.expansion @ first).reshape(-1, 3),
+            motion,
             tuple(mechanisms),
             tuple(self.events),
             end,
         )
 
-    @staticmethod
-    def _start(blocks: PlacedBlocks, mechanism: Mechanism) -> LinkageState:
-        """Return the first state of the linkage of a mechanism."""
-        return LinkageState(Linkage(blocks, mechanism), blocks)
+    def _start(
+        self, blocks: PlacedBlocks, mechanism: Mechanism
+    ) -> tuple[Mechanism, LinkageState, Array]:
+        """Return a mechanism that can slide flat, with the first state and velocity of its path."""
+        for trial in (mechanism, None):
+            if trial is None:  # associated flow opens joints that would close if faces slid flat
+                trial = self._renew(blocks, flat=True)
+            state = LinkageState(Linkage(blocks, trial), blocks)
+            velocity = state.velocity(state.linkage.first_velocity)
+            if velocity is not None and self._opens_joints(state, velocity):
+                return trial, state, velocity
+        self._record(blocks, mechanism.factor)
+        raise _Stop(PathEnd.LOCKS)
+
+    def _opens_joints(self, state: LinkageState, velocity: Array) -> bool:
+        """Return whether no contact closes."""
+        body = state.bodies.body
+        contacts = [
+            contact
+            for contact in state.blocks.touching(self.joints)
+            if body[contact.corner] != body[contact.face]
+        ]
+        return bool((state.bodies.rates(contacts)[0] @ velocity >= -10.0 * STILL).all())
 
     def _record(self, blocks: PlacedBlocks, factor: float) -> None:
         """Append a place to the path."""
         self.factors.append(factor)
         self.displacements.append(blocks.displacement)
 
-    def _renew(self, blocks: PlacedBlocks) -> Mechanism:
+    def _renew(self, blocks: PlacedBlocks, *, flat: bool = False) -> Mechanism:
         """Return the mechanism of limit analysis at the present places."""
         try:
-            mechanism = find_mechanism(blocks, self.joints, self.friction)
+            mechanism = find_mechanism(blocks, self.joints, self.friction, flat=flat)
         except NoEquilibrium as error:
             self._record(blocks, 0.0)
             raise _Stop(PathEnd.FALLS) from error
@@ -362,20 +380,17 @@ class PathFollower:
             raise _Stop(PathEnd.FALLS)
         return mechanism
 
-    def _follow_linkage(self, state: LinkageState, velocity: Array | None) -> PlacedBlocks:
+    def _follow_linkage(self, state: LinkageState, velocity: Array) -> PlacedBlocks:
         """Follow a linkage to its next event and return the blocks there."""
         size = self.blocks.structure.size
-        if velocity is None:
-            self._record(state.blocks, state.linkage.mechanism.factor)
-            raise _Stop(PathEnd.LOCKS)
         factor = state.balance(velocity, self.friction)[0]
         self._record(state.blocks, factor)
         step = 1e-3 * size
         while self.travel <= size:
             trial = state.advanced(velocity, step)
             ahead = None if trial is None else trial[0].balance(trial[1], self.friction)[0]
-            # a factor that changes by less than 2 % a step keeps the curve smooth
-            if ahead is None or abs(ahead - factor) > 0.02 * max(abs(self.factors[0]), 1e-3):
+            # a factor that changes by less than 4 % a step keeps the curve smooth
+            if ahead is None or abs(ahead - factor) > 0.04 * max(abs(self.factors[0]), 1e-3):
                 step *= 0.5
                 if step > 1e-9 * size:
                     continue
@@ -403,6 +418,8 @@ class PathFollower:
         if trial is None or not (event := self._event(*trial, step)):
             raise _Stop(PathEnd.LOCKS)
         self.travel += step
+        if event.endswith("closes"):  # just before, where the corner is within the tolerance
+            trial = state.advanced(velocity, shortest) or trial
         blocks = trial[0].blocks
         self._record(blocks, max(trial[0].balance(trial[1], self.friction)[0], 0.0))
         self.events.append(PathEvent(len(self.factors) - 1, event))

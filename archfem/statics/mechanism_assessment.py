@@ -492,15 +492,16 @@ def _find_first_mechanism(
         f"{placed.structure.name} does not stand under its own weight and the attached loads: "
         "af.stands and `archfem check` say why"
     )
+    # At rest constant forces may be missing: a tie pulls only once the mechanism moves.
+    weights = tuple(replace(load, force=(0.0, 0.0)) for load in placed.loads)
+    opposite = replace(placed, loads=weights, direction=-placed.direction)
     try:
         mechanism = find_mechanism(placed, joints, coefficient)
         # The least factor in the other direction is below zero where it stands only if pushed.
-        opposite = find_mechanism(
-            replace(placed, direction=-placed.direction), joints, coefficient
-        )
+        others = [find_mechanism(opposite, joints, coefficient)]
     except NoEquilibrium as error:
         raise refusal from error
-    if any(found is not None and found.factor <= 1e-9 for found in (mechanism, opposite)):
+    if any(found is not None and found.factor <= 1e-9 for found in (mechanism, *others)):
         raise refusal
     if mechanism is None or friction != "nonassociated" or not mechanism.sliding_joints:
         return mechanism
@@ -580,6 +581,11 @@ class _Oscillator:
         if self.path is None:
             return []
         found, collapse = [], self.path.mechanisms[0].factor
+        if any(any(load.force) for load in self.placed.loads):
+            found.append(
+                "constant forces count from the start of the motion to its end: attach only those "
+                "whose presence is verified up to collapse"
+            )
         if factor < (1.0 - 1e-3) * collapse:
             found.append(
                 f"sliding that dilates (associated flow) would raise alpha_0 to {collapse:.4g}; "

@@ -1,0 +1,261 @@
+"""Finite motion of mechanisms: closed forms of rocking, sliding and linkages, and their events."""
+
+from math import atan2, cos, hypot, sin, tan
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.limit.displaced_blocks import PlacedBlocks, find_corners, find_mechanism
+from archfem.limit.finite_mechanism import PathEnd, PathFollower
+
+RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+
+
+def contact(friction):
+    return af.Contact(1.48e9, 0.30e9, friction)
+
+
+def box(left, right, low, high, name, **options):
+    outline = ((left, low), (right, low), (right, high), (left, high))
+    return af.Block(outline, af.STONE, name, **options)
+
+
+def bed(pair, left, right, level, friction=0.6):
+    name = f"bed {pair[0]}-{pair[1]}"
+    return af.Joint(pair, (left, level), (right, level), contact(friction), name)
+
+
+def follow(structure, *, direction=1.0, friction=True, loads=(), joints=None):
+    placed = PlacedBlocks.at_rest(structure, loads, direction)
+    joints = list(range(len(structure.joints))) if joints is None else joints
+    coefficient = structure.friction if friction else np.full(len(structure.joints), np.inf)
+    mechanism = find_mechanism(placed, joints, coefficient)
+    return PathFollower(placed, joints, coefficient).follow(mechanism)
+
+
+@pytest.mark.parametrize(
+    "structure",
+    [
+        RING,
+        af.circular_arch(radius=2.95, thickness=0.9, embrace=159.0, voussoirs=9, contact=contact(0.3)),
+        af.arch_on_piers(radius=3, thickness=0.6, voussoirs=7, pier_breadth=1.2, courses=[1.5]),
+        af.column(breadth=0.6, heights=[0.3, 1.1, 0.4], contact=contact(0.2)),
+    ],
+    ids=["ring", "sliding ring", "arch on piers", "column"],
+)
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_the_factor_at_rest_is_that_of_limit_analysis(structure, direction):
+    """Two linear programmes, of joint resultants and of contacts: the same factor to 1e-7."""
+    placed = PlacedBlocks.at_rest(structure, (), direction)
+    found = find_mechanism(placed, range(len(structure.joints)), structure.friction)
+    expected = af.collapse_factor(structure, live=af.BodyForce(direction)).factor
+    assert found.factor == pytest.approx(expected, rel=1e-7)
+
+
+def test_a_rocking_block_follows_its_circle():
+    """α = tan(β - θ) and centroid at angle β - θ above its corner, at every place (round-off)."""
+    path = follow(af.column(breadth=0.6, heights=[2.4]))
+    turn = -path.displacements[:, 1, 2]
+    beta, radius = atan2(0.3, 1.2), hypot(0.3, 1.2)
+    np.testing.assert_allclose(path.factors, np.tan(beta - turn), atol=1e-8)
+    np.testing.assert_allclose(
+        path.displacements[:, 1, 0], 0.3 - radius * np.sin(beta - turn), atol=1e-10
+    )
+    assert path.end is PathEnd.FALLS
+    assert turn[-1] == pytest.approx(beta, abs=1e-7)
+
+
+def test_a_sliding_block_tips_over_the_edge_that_it_slides_to():
+    """It slides at α = μ until its resultant leaves the bed at b/2 - μ h/2, then rocks."""
+    path = follow(af.column(breadth=0.6, heights=[1.2], contact=contact(0.2)))
+    first = path.events[0]
+    assert "opens" in first.text
+    np.testing.assert_allclose(path.factors[: first.place], 0.2, atol=1e-9)
+    moved = path.displacements[first.place, 1]
+    np.testing.assert_allclose(moved, [0.3 - 0.2 * 0.6, 0.0, 0.0], atol=1e-4)
+    # It falls where its centroid is above the edge of the base, 0.3 m from the middle.
+    assert path.end is PathEnd.FALLS
+    assert path.displacements[-1, 1, 0] == pytest.approx(0.3, abs=1e-6)
+
+
+def test_a_block_on_a_wide_block_slides_on_all_of_it():
+    blocks = (
+        box(-3.0, 3.0, -0.5, 0.0, "base", fixed=True),
+        box(-0.3, 0.3, 0.0, 0.4, "stone"),
+    )
+    structure = af.Structure(blocks, (bed((0, 1), -0.3, 0.3, 0.0, 0.3),))
+    np.testing.assert_allclose(find_corners(structure)[0, 0], [[-3.0, 0.0], [3.0, 0.0]])
+    path = follow(structure)
+    # its corner passes the edge of the base after 2.7 m; its resultant after 3 m - μ h/2
+    off, opens = path.events[:2]
+    assert "slides off" in off.text
+    assert path.displacements[off.place, 1, 0] == pytest.approx(2.7, abs=1e-3)
+    assert "opens" in opens.text
+    assert path.displacements[opens.place, 1, 0] == pytest.approx(3.0 - 0.3 * 0.2, abs=1e-3)
+
+
+def test_faces_that_both_extend_beyond_their_joint_touch_on_the_joint_only():
+    blocks = (box(-1.0, 1.0, -0.5, 0.0, "base", fixed=True), box(-0.5, 1.5, 0.0, 1.0, "stone"))
+    structure = af.Structure(blocks, (bed((0, 1), -0.2, 0.4, 0.0),))
+    np.testing.assert_allclose(find_corners(structure)[:, 0, :, 0], [[-0.2, 0.4], [-0.2, 0.4]])
+
+
+def test_a_slender_block_overturns_on_the_block_below():
+    blocks = (
+        box(-1.0, 1.0, -0.5, 0.0, "base", fixed=True),
+        box(-0.5, 0.5, 0.0, 0.5, "lower"),
+        box(-0.15, 0.15, 0.5, 1.7, "upper"),
+    )
+    joints = (bed((0, 1), -0.5, 0.5, 0.0), bed((1, 2), -0.15, 0.15, 0.5))
+    path = follow(af.Structure(blocks, joints))
+    assert path.factors[0] == pytest.approx(0.3 / 1.2, abs=1e-9)
+    assert not path.displacements[:, 1].any()
+    assert path.displacements[-1, 2, 0] == pytest.approx(0.15, abs=1e-7)
+
+
+def test_a_wall_held_at_its_top_bends_with_three_hinges():
+    """Two stones under a cap that moves along a smooth wall: α = 2 (W + P) / W tan(β - φ)."""
+    b, h, cap = 0.4, 1.5, 0.6
+    blocks = (
+        box(-b / 2, b / 2, -0.3, 0.0, "base", fixed=True),
+        box(-b / 2, b / 2, 0.0, h, "lower"),
+        box(-b / 2, b / 2, h, 2 * h, "upper"),
+        box(-b / 2, b / 2, 2 * h, 2 * h + cap, "cap"),
+        box(b / 2, b, 2 * h + 0.2, 2 * h + 2.0, "wall", fixed=True),
+    )
+    joints = (
+        *(bed((k, k + 1), -b / 2, b / 2, k * h, 5.0) for k in range(3)),
+        af.Joint((3, 4), (b / 2, 2 * h + 0.2), (b / 2, 2 * h + cap), contact(0.0), "guide"),
+    )
+    path = follow(af.Structure(blocks, joints))
+    weight, load = b * h, b * cap
+    turn, beta = -path.displacements[:, 1, 2], atan2(b, h)
+    expected = 2.0 * (weight + load) / weight * np.tan(beta - turn)
+    np.testing.assert_allclose(path.factors, expected, atol=1e-7)
+    np.testing.assert_allclose(path.displacements[:, 2, 2], turn, atol=1e-9)
+    assert path.end is PathEnd.FALLS
+
+
+def test_a_block_runs_into_a_wall_that_it_has_no_joint_with():
+    gap = 0.05
+    blocks = (
+        box(-0.3, 0.3, -0.5, 0.0, "base", fixed=True),
+        box(-0.3, 0.3, 0.0, 2.4, "stone"),
+        box(0.3 + gap, 1.0, -0.5, 3.0, "wall", fixed=True),
+    )
+    path = follow(af.Structure(blocks, (bed((0, 1), -0.3, 0.3, 0.0),)))
+    assert path.end is PathEnd.COLLIDES
+    # the upper right corner moves by 2.4 sin θ
+    turn = -path.displacements[-1, 1, 2]
+    assert 2.4 * sin(turn) == pytest.approx(gap, abs=1e-3)
+
+
+def test_a_joint_that_closes_again_turns_no_further():
+    """A ring of four stones: joint 0 first opens and slides, then closes; the factor jumps up."""
+    ring = af.circular_arch(
+        radius=3.0,
+        thickness=0.78356905700281,
+        embrace=124.408398708437,
+        voussoirs=4,
+        contact=contact(0.648639421293),
+    )
+    path = follow(ring)
+    assert [event.text for event in path.events] == [
+        "a contact of joint 4 opens",
+        "joint 0 closes",
+        PathEnd.FALLS,
+    ]
+    closes = path.events[1].place
+    assert path.factors[closes + 1] > 1.2 * path.factors[closes]
+    gaps = [path.blocks.moved(moved).gaps for moved in path.displacements]
+    # Both faces touch from then on, within the tolerance of 1e-6 of the size; before, they gape.
+    assert np.abs(gaps[closes][:, 0]).min() < 1e-5 < gaps[closes - 10][:, 0].max()
+    assert min(gap.min() for gap in gaps) > -1e-5
+
+
+def circles_meet(one, r_one, two, r_two, near):
+    """Intersection of two circles that is nearer to a point."""
+    gap = two - one
+    d = np.linalg.norm(gap)
+    along = (r_one**2 - r_two**2 + d**2) / (2.0 * d)
+    across = np.sqrt(r_one**2 - along**2)
+    foot, side = one + along * gap / d, np.array([-gap[1], gap[0]]) / d
+    return min((foot + across * side, foot - across * side), key=lambda p: np.linalg.norm(p - near))
+
+
+def four_bar(structure, found, turn):
+    """Centroids of the blocks when the first body of a four-hinge mechanism has turned."""
+    a, b, c, d = (
+        structure.joints[j].ends[0 if side == "intrados" else 1] for j, side in found.hinges
+    )
+    matrix = np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]])
+    b_now = a + matrix @ (b - a)
+    c_now = circles_meet(b_now, np.linalg.norm(c - b), d, np.linalg.norm(d - c), c)
+
+    def moved(point, base, tip, base_now, tip_now):
+        before, after = complex(*(tip - base)), complex(*(tip_now - base_now))
+        now = complex(*base_now) + complex(*(point - base)) * after / before
+        return np.array([now.real, now.imag])
+
+    first, second, third, last = (j for j, _ in found.hinges)
+    places = []
+    for number, block in enumerate(structure.blocks):
+        at = block.centroid
+        if first < number <= second:
+            at = moved(at, a, b, a, b_now)
+        elif second < number <= third:
+            at = moved(at, b, c, b_now, c_now)
+        elif third < number <= last:
+            at = moved(at, c, d, c_now, d)
+        places.append(at)
+    return np.array(places)
+
+
+@pytest.mark.parametrize(
+    "structure",
+    [
+        RING,
+        af.arch_on_piers(radius=3, thickness=0.6, voussoirs=11, pier_breadth=1.2, courses=[1.5] * 2),
+    ],
+    ids=["ring", "arch on piers"],
+)
+def test_four_hinges_move_as_a_four_bar(structure, verified):
+    """Closure by circles that meet, and α = -dV/dφ / (dU/dφ) by central differences (1e-6)."""
+    found = af.collapse_factor(structure, live=af.BodyForce(1.0))
+    path = follow(structure, friction=False)
+    weights = np.array([b.area * b.material.unit_weight for b in structure.blocks])
+    body = found.hinges[0][0] + 1
+
+    def energies(turn):
+        places = four_bar(structure, found, turn)
+        return weights @ places[:, 1], weights @ places[:, 0]
+
+    for place in (0, len(path.factors) // 2, len(path.factors) - 1):
+        turn, step = path.displacements[place, body, 2], 1e-5
+        (v_1, u_1), (v_0, u_0) = energies(turn + step), energies(turn - step)
+        assert path.factors[place] == pytest.approx((v_1 - v_0) / (u_1 - u_0), abs=1e-6)
+        np.testing.assert_allclose(
+            path.displacements[place, :, :2],
+            four_bar(structure, found, turn) - [block.centroid for block in structure.blocks],
+            atol=1e-8,
+        )
+    assert path.factors[-1] == 0.0
+
+
+def test_attached_loads_move_with_their_block():
+    """Weight P at the top corner of a block, and a tie T at its top: moments about the edge."""
+    wall = af.column(breadth=0.6, heights=[2.4])
+    weight = wall.weight
+    floor = af.masonry.AttachedLoad("block 1", (-0.1, 2.4), weight=0.5 * weight)
+    tie = af.masonry.AttachedLoad("block 1", (-0.3, 2.0), force=(-0.1 * weight, 0.0))
+    path = follow(wall, loads=[floor, tie])
+    turn = -path.displacements[:, 1, 2]
+
+    def arms(x, y):  # of a point about the edge (0.3, 0), turned clockwise
+        return (0.3 - x) * np.cos(turn) - y * np.sin(turn), y * np.cos(turn) + (0.3 - x) * np.sin(turn)
+
+    (x_1, y_1), (x_2, y_2), (_, y_3) = arms(0.0, 1.2), arms(-0.1, 2.4), arms(-0.3, 2.0)
+    expected = (x_1 + 0.5 * x_2 + 0.1 * y_3) / (y_1 + 0.5 * y_2)
+    np.testing.assert_allclose(path.factors, expected, atol=1e-8)
+    assert tan(turn[-1]) > 0.0

@@ -1,0 +1,336 @@
+"""Kinematic assessment: six cases worked by hand, the checks of the codes, and refused input."""
+
+from dataclasses import replace
+from math import atan2, pi, sqrt
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.statics.mechanism_assessment import LIMIT_STATES, LimitState, spectral_acceleration
+
+G = 9.81
+SPECTRUM = af.motion.Ntc2018(ag=0.25, f0=2.4, tc_star=0.32, site="B")
+RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+STONE = af.STONE.unit_weight
+
+
+def box(left, right, low, high, name, **options):
+    outline = ((left, low), (right, low), (right, high), (left, high))
+    return af.Block(outline, af.STONE, name, **options)
+
+
+def bed(pair, left, right, level, friction=0.6):
+    contact = af.Contact(1.48e9, 0.30e9, friction)
+    return af.Joint(pair, (left, level), (right, level), contact, f"bed {pair}")
+
+
+def oscillator(weights, speeds, factor):
+    """e* and a0* [m/s²] of weights with virtual displacements."""
+    weights, speeds = np.array(weights), np.array(speeds)
+    share = (weights @ speeds) ** 2 / (weights.sum() * (weights @ speeds**2))
+    return share, factor * G / share
+
+
+def check_values(found, expected, verified, case, tolerance=1e-3):
+    """Compare with values worked by hand, within 1e-3 of each."""
+    for name, value in expected.items():
+        computed = getattr(found, name)
+        verified(f"{case}: {name}", value, "closed form", computed)
+        assert computed == pytest.approx(value, rel=tolerance), name
+
+
+def test_a_rigid_block(verified):
+    """α0 = b/h, e* = 1; the centroid is above the corner at d0* = b/2."""
+    found = af.kinematic_assessment(af.column(breadth=0.6, heights=[2.4]), SPECTRUM)
+    a, d = 0.25 * G, 0.3
+    # T_s at d_s* = 0.16 d0* from the circle of the centroid, radius R, about the corner
+    beta, radius = atan2(0.3, 1.2), sqrt(0.3**2 + 1.2**2)
+    turn = beta - np.arcsin((0.3 - 0.16 * d) / radius)
+    secant = 2.0 * pi * sqrt(0.16 * d / (G * np.tan(beta - turn)))
+    expected = {"alpha_0": 0.25, "e_star": 1.0, "a_0_star": a, "d_0_star": d, "T_s": secant}
+    expected["M_star"] = 0.6 * 2.4 * STONE / G
+    check_values(found, expected, verified, "rigid block 0.6 x 2.4 m")
+
+
+def two_storeys():
+    """A wall of two storeys, 0.5 and 0.4 m thick, flush on its left face, with two floors."""
+    blocks = (
+        box(0.0, 0.5, -0.5, 0.0, "base", fixed=True),
+        box(0.0, 0.5, 0.0, 3.0, "first storey"),
+        box(0.0, 0.4, 3.0, 6.0, "second storey"),
+    )
+    joints = (bed((0, 1), 0.0, 0.5, 0.0), bed((1, 2), 0.0, 0.4, 3.0))
+    floors = [
+        af.masonry.AttachedLoad("first storey", (0.2, 3.0), weight=15e3),
+        af.masonry.AttachedLoad("second storey", (0.2, 6.0), weight=10e3),
+    ]
+    weights = [0.5 * 3.0 * STONE, 0.4 * 3.0 * STONE, 15e3, 10e3]
+    points = [(0.25, 1.5), (0.2, 4.5), (0.2, 3.0), (0.2, 6.0)]
+    return af.Structure(blocks, joints), floors, weights, points
+
+
+def overturning(weights, points, edge=0.0):
+    """α0 and the turn at the fall of points that turn about (edge, 0), to the left."""
+    arms = np.array([x - edge for x, _ in points])
+    heights = np.array([y for _, y in points])
+    factor = weights @ arms / (weights @ heights)
+    return factor, np.arctan(factor), arms, heights
+
+
+def test_a_wall_of_two_storeys_with_floors(verified):
+    structure, floors, weights, points = two_storeys()
+    found = af.kinematic_assessment(structure, SPECTRUM, direction=-1.0, loads=floors)
+    factor, turn, arms, heights = overturning(np.array(weights), points)
+    share, acceleration = oscillator(weights, heights, factor)
+    # control point: centroid of the second storey, the fastest of a block
+    moved = arms[1] - (arms[1] * np.cos(turn) - heights[1] * np.sin(turn))
+    weights = np.array(weights)
+    d_0 = moved * (weights @ heights**2) / (heights[1] * (weights @ heights))
+    expected = {"alpha_0": factor, "e_star": share, "a_0_star": acceleration, "d_0_star": d_0}
+    check_values(found, expected, verified, "wall of two storeys with floors")
+    assert found.control == "second storey"
+
+
+def test_a_wall_with_a_tie(verified):
+    """A constant tie force T at 5.8 m adds its moment; it turns with the wall."""
+    structure, floors, weights, points = two_storeys()
+    pull, level = 6e3, 5.8
+    tie = af.masonry.AttachedLoad("second storey", (0.0, level), force=(pull, 0.0))
+    found = af.kinematic_assessment(structure, SPECTRUM, direction=-1.0, loads=[*floors, tie])
+    free = af.kinematic_assessment(structure, SPECTRUM, direction=-1.0, loads=floors)
+    weights, (_, _, arms, heights) = np.array(weights), overturning(np.array(weights), points)
+    factor = (weights @ arms + pull * level) / (weights @ heights)
+    # α = 0: Σ P (x cos θ - y sin θ) + T y_t cos θ = 0
+    turn = np.arctan((weights @ arms + pull * level) / (weights @ heights))
+    share, acceleration = oscillator(weights, heights, factor)
+    moved = arms[1] - (arms[1] * np.cos(turn) - heights[1] * np.sin(turn))
+    d_0 = moved * (weights @ heights**2) / (heights[1] * (weights @ heights))
+    expected = {"alpha_0": factor, "e_star": share, "a_0_star": acceleration, "d_0_star": d_0}
+    check_values(found, expected, verified, "the same wall with a tie")
+    assert found.alpha_0 > 1.5 * free.alpha_0
+
+
+def test_a_portal(verified):
+    """Columns b x h rock about their corners, the lintel moves with their tops: α = tan(β - θ)."""
+    b, h, span = 0.5, 2.5, 3.0
+    blocks = (
+        box(0.0, b, -0.5, 0.0, "left base", fixed=True),
+        box(0.0, b, 0.0, h, "left column"),
+        box(span, span + b, -0.5, 0.0, "right base", fixed=True),
+        box(span, span + b, 0.0, h, "right column"),
+        box(0.0, span + b, h, h + 0.4, "lintel"),
+    )
+    joints = (
+        *(bed((0, 1), 0.0, b, 0.0), bed((2, 3), span, span + b, 0.0)),
+        *(bed((1, 4), 0.0, b, h), bed((3, 4), span, span + b, h)),
+    )
+    found = af.kinematic_assessment(af.Structure(blocks, joints), SPECTRUM)
+    weights = np.array([b * h, b * h, (span + b) * 0.4])
+    share, acceleration = oscillator(weights, [h / 2, h / 2, h], b / h)
+    beta, radius = atan2(b, h), sqrt(b**2 + h**2)
+    d_0 = b * (weights @ np.array([0.25, 0.25, 1.0])) / (weights @ np.array([0.5, 0.5, 1.0]))
+    expected = {"alpha_0": b / h, "e_star": share, "a_0_star": acceleration, "d_0_star": d_0}
+    check_values(found, expected, verified, "portal")
+    # along the whole path; the lintel moves by b - R sin(β - θ)
+    turn = beta - np.arcsin((b - found.curve["d_control"].values) / radius)
+    np.testing.assert_allclose(found.curve["alpha"], np.tan(beta - turn), atol=1e-7)
+
+
+def test_the_ring_of_the_readme(verified):
+    """Values of its four hinges moved as a four-bar by another program."""
+    found = af.kinematic_assessment(RING, SPECTRUM)
+    expected = {"alpha_0": 0.4571, "e_star": 0.809, "a_0_star": 0.565 * G, "d_0_star": 0.2785}
+    check_values(found, expected | {"T_s": 0.629}, verified, "README ring as a four-bar")
+    assert [joint for joint, _ in found.hinges] == [0, 6, 12, 17]
+    assert found.sliding == ()
+    assert found.curve["a"].values[0] == found.a_0_star
+    assert found.curve["d"].values[-1] == found.d_0_star
+
+
+def test_an_arch_on_piers_has_the_mass_of_what_moves(verified):
+    """Hinges at joints 3, 7, 11 and the right pier's base: bodies by instantaneous centres."""
+    structure = af.arch_on_piers(
+        radius=3.0, thickness=0.6, voussoirs=11, pier_breadth=1.2, courses=[1.5, 1.5]
+    )
+    found = af.kinematic_assessment(structure, SPECTRUM)
+    ends = {"intrados": 0, "extrados": 1}
+    a, b, c, d = (structure.joints[j].ends[ends[side]] for j, side in found.hinges)
+    # the middle body turns about the point where lines ab and dc meet
+    s, _ = np.linalg.solve(np.column_stack([b - a, d - c]), d - a)
+    centre = a + s * (b - a)
+    ratio = np.linalg.norm(b - a) / np.linalg.norm(b - centre) * np.sign((b - a) @ (b - centre))
+    last = ratio * ((c - centre) @ (c - d)) / ((c - d) @ (c - d))
+    centres, turns = (a, centre, d), (1.0, ratio, last)
+    joints = [joint for joint, _ in found.hinges]
+    blocks = [number for number in structure.free if found.path.mechanisms[0].body[number] >= 0]
+    weights, across, up = [], [], []
+    for number in blocks:
+        block = structure.blocks[number]
+        body = int(np.searchsorted(joints[1:3], number - 0.5))
+        body = 2 if block.part == "right pier" else body
+        x, y = block.centroid - centres[body]
+        weights.append(block.area * block.material.unit_weight)
+        across.append(-turns[body] * y)
+        up.append(turns[body] * x)
+    factor = np.dot(weights, up) / np.dot(weights, across)
+    share, acceleration = oscillator(weights, across, factor)
+    expected = {"alpha_0": factor, "e_star": share, "a_0_star": acceleration}
+    check_values(found, expected, verified, "arch on piers by instantaneous centres")
+
+
+def test_the_linear_check_multiplies_by_q_and_divides_by_confidence():
+    found = af.kinematic_assessment(RING, SPECTRUM, q=3.0, confidence_factor=1.2)
+    ground = float(SPECTRUM.horizontal(0.0)) * 9.80665
+    assert found.linear.capacity == pytest.approx(3.0 * found.a_0_star / 1.2)
+    assert found.linear.demand == pytest.approx(ground, rel=1e-9)
+    assert found.linear.ratio == pytest.approx(found.linear.capacity / ground)
+    assert "C8.7.1.2.1.7" in found.linear.source
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "factor", "secant", "damping"),
+    [
+        ("NTC-2018 SLV", 0.4, 1.68, 1.0, 0.08),
+        ("NTC-2018 SLC", 0.6, 1.56, 1.0, 0.10),
+        ("NTC-2008 SLV", 0.4, 2.0, 0.4, 0.05),
+    ],
+)
+def test_displacement_checks_of_a_rigid_block(name, share, factor, secant, damping):
+    """Capacity, period and demand by the formulas of the code, to 1e-3."""
+    block = af.column(breadth=0.6, heights=[2.4])
+    check = af.kinematic_assessment(block, SPECTRUM, limit_state=name).displacement
+    d, radius = share * 0.3, sqrt(0.3**2 + 1.2**2)
+    acceleration = G * np.tan(np.arcsin((0.3 - secant * d) / radius)) / 1.35
+    period = factor * pi * sqrt(secant * d / acceleration)
+    assert check.capacity == pytest.approx(d, rel=1e-3)
+    assert check.period == pytest.approx(period, rel=1e-3)
+    demand = replace(SPECTRUM, damping=damping).horizontal(period) * G * (period / 2 / pi) ** 2
+    assert check.demand == pytest.approx(float(demand), rel=1e-3)
+    assert check.ratio == pytest.approx(d / float(demand), rel=2e-3)
+    assert check.source == LIMIT_STATES[name].source
+
+
+def test_a_mechanism_that_the_ground_does_not_start_passes():
+    """a0*/FC above the ground acceleration passes, whatever the displacement spectrum."""
+    weak = af.motion.TableSpectrum([0.0, 4.0], [0.05, 3.0])
+    found = af.kinematic_assessment(af.column(breadth=0.6, heights=[2.4]), weak)
+    assert found.displacement.demand > found.displacement.capacity
+    assert found.displacement.ratio == pytest.approx(0.25 / 1.35 / 0.05, rel=1e-3)
+    assert found.passes
+
+
+def test_rules_of_another_code_and_motions():
+    rules = LimitState("of our own", 0.5, 2.0, 1.0, 0.05, "a test")
+    block = af.column(breadth=0.6, heights=[2.4])
+    motion = af.Motion.synthetic(duration=4.0, pga=2.0, seed=1)
+    check = af.kinematic_assessment(block, motion, limit_state=rules).displacement
+    assert (check.name, check.capacity) == ("of our own", pytest.approx(0.15, rel=1e-4))
+    periods = check.period * np.linspace(0.0, 1.0, 41)[1:]
+    spectrum = af.response_spectrum(motion, periods, 0.05) * (periods / 2 / pi) ** 2
+    assert check.demand == pytest.approx(spectrum.max())
+
+
+def test_spectra_at_another_damping_and_beyond_four_seconds():
+    eta = sqrt(10.0 / 13.0)
+    five = af.Tbec2018(ss=1.0, s1=0.3, site="ZC")
+    np.testing.assert_allclose(
+        spectral_acceleration(five, np.array([1.0]), 0.08), G * eta * five.horizontal([1.0]), rtol=1e-3
+    )
+    four, eight = spectral_acceleration(SPECTRUM, np.array([4.0, 8.0]), 0.08)
+    assert eight == pytest.approx(four / 4.0)
+
+
+def test_parts_and_blocks_by_themselves():
+    blocks = (
+        box(0.0, 3.0, -0.5, 0.0, "base", fixed=True, part="ground", role="other"),
+        box(0.0, 0.5, 0.0, 1.0, "low", part="low pier"),
+        box(2.0, 2.3, 0.0, 0.6, "foot", part="tall pier"),
+        box(2.0, 2.3, 0.6, 1.8, "head", part="tall pier"),
+    )
+    joints = (bed((0, 1), 0.0, 0.5, 0.0), bed((0, 2), 2.0, 2.3, 0.0), bed((2, 3), 2.0, 2.3, 0.6))
+    structure = af.Structure(blocks, joints)
+    found = af.statics.assess_parts(structure, SPECTRUM)
+    assert {name: round(each.alpha_0, 6) for name, each in found.items()} == {
+        "low pier": 0.5,
+        "tall pier": round(0.3 / 1.8, 6),
+    }
+    # only the joints of the head may move
+    head = af.kinematic_assessment(structure, SPECTRUM, blocks=["head"])
+    assert head.alpha_0 == pytest.approx(0.25)
+    whole = af.kinematic_assessment(structure, SPECTRUM)
+    assert whole.alpha_0 == pytest.approx(0.3 / 1.8)
+
+
+@pytest.mark.slow
+def test_sliding_with_and_without_dilatancy():
+    contact = af.Contact(1.48e9, 0.30e9, 0.5)
+    ring = af.circular_arch(
+        radius=2.95, thickness=0.9, embrace=159.0, voussoirs=9, contact=contact
+    )
+    both = {
+        law: af.kinematic_assessment(ring, SPECTRUM, friction=law)
+        for law in ("coulomb", "nonassociated", None)
+    }
+    flat = af.collapse_factor(ring, live=af.BodyForce(1.0), friction="nonassociated")
+    assert both["nonassociated"].alpha_0 == pytest.approx(flat.factor, rel=1e-4)
+    assert both["coulomb"].sliding == (9,)
+    assert both[None].sliding == ()
+    assert both[None].alpha_0 > both["coulomb"].alpha_0
+
+
+def test_words_table_and_a_mechanism_that_never_moves():
+    found = af.kinematic_assessment(RING, SPECTRUM)
+    text = str(found)
+    assert "joint 6 at the extrados" in text
+    assert "NTC-2018 SLV: capacity 0.1114 m" in text
+    assert "note: beyond d* = " in text  # joints that the mechanism keeps closed
+    assert "d_0_star" in found.table()
+    assert "alpha_0 0.4571" in repr(found)
+    piers = af.arch_on_piers(
+        radius=3.0, thickness=0.6, voussoirs=7, pier_breadth=1.2, courses=[1.5]
+    )
+    locked = af.kinematic_assessment(piers, SPECTRUM, part="left pier")
+    assert (locked.alpha_0, locked.displacement, locked.passes) == (np.inf, None, True)
+    assert "no horizontal force makes it a mechanism" in str(locked)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"direction": 0.5}, "direction 0.5: give 1 to the right or -1 to the left"),
+        ({"friction": "dry"}, "friction 'dry' is not known: use 'coulomb'"),
+        ({"limit_state": "SLV"}, "limit_state 'SLV' is not known: use one of"),
+        ({"q": 0.5}, "q 0.5 is not between 1 and 10"),
+        ({"confidence_factor": 13.5}, "confidence_factor 13.5 is not between 1 and 2"),
+        ({"part": "tower"}, "there is no part 'tower' that moves: use one of"),
+        ({"blocks": []}, "has none that moves: name some of voussoir 1"),
+        ({"blocks": ["voussoir 99"]}, "there is no block 'voussoir 99'"),
+        ({"part": "arch", "blocks": [1]}, "part and blocks are both given"),
+        ({"spectrum": 0.3}, "spectrum = 0.3 is a float"),
+    ],
+)
+def test_refused_arguments(options, message):
+    given = {"spectrum": SPECTRUM} | options
+    with pytest.raises(af.InvalidInput, match=message):
+        af.kinematic_assessment(RING, given.pop("spectrum"), **given)
+
+
+def test_refused_structures_and_rules():
+    thin = af.circular_arch(radius=1.0, thickness=0.05, embrace=180.0, voussoirs=11)
+    with pytest.raises(af.InvalidInput, match="does not stand under its own weight"):
+        af.kinematic_assessment(thin, SPECTRUM)
+    wall = af.column(breadth=0.6, heights=[2.4])
+    push = af.masonry.AttachedLoad(1, (0.0, 2.4), force=(2e4, 0.0))
+    with pytest.raises(af.InvalidInput, match="does not stand"):
+        af.kinematic_assessment(wall, SPECTRUM, loads=[push])
+    with pytest.raises(af.InvalidInput, match="share = 40 is not above 0 and up to 1"):
+        LimitState("x", 40, 2.0, 1.0, 0.05, "")
+    bond = af.Contact(1e9, 1e9, 0.6, cohesion=1e5, tension=1e5)
+    bonded = af.column(breadth=0.6, heights=[2.4], contact=bond)
+    with pytest.raises(af.InvalidInput, match="tensile strength"):
+        af.kinematic_assessment(bonded, SPECTRUM)
+    with pytest.raises(af.InvalidInput, match="attached load, weight .* = -1"):
+        af.masonry.AttachedLoad(1, (0.0, 1.0), weight=-1.0)
+    with pytest.raises(af.InvalidInput, match="above 1e.09 N: give newtons"):
+        af.masonry.AttachedLoad(1, (0.0, 1.0), weight=1e12)
