@@ -218,7 +218,7 @@ class AssessmentSettings:
                 "an assessment needs a spectrum: write [assessment] with spectrum = { code = "
                 '"NTC-2018", ag = 0.25, f0 = 2.4, tc_star = 0.32, site = "B" }, or a motion'
             )
-        found = {}
+        found: dict[str, KinematicAssessment] = {}
         for direction in self.directions:
             side, options = ("right", "left")[direction < 0.0], dict(self.options)
             if parts:
@@ -262,4 +262,6 @@ def _build(key: str, kind: Callable[..., Any], table: Table, keys: Table) -> Any
     try:
         return kind(**check_table(table, keys, section))
     except TypeError as error:
-        raise InvalidInput(f"{section} = {dict(table)}: {error}; its keys are {list(keys)}") from error
+        raise InvalidInput(
+            f"{section} = {dict(table)}: {error}; its keys are {list(keys)}"
+        ) from error

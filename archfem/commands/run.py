@@ -94,9 +94,8 @@ def modes(options: argparse.Namespace) -> None:
 def assess(options: argparse.Namespace) -> None:
     """Assess the collapse mechanisms of a case against a design spectrum, in both directions."""
     case = Case.read(options.case, options.changes)
-    demand = case.target
-    if demand is None and case.motion is not None:
-        demand = case.ground_motion()
+    motion = case.ground_motion() if case.motion is not None else None
+    demand = case.target if case.target is not None else motion
     found = case.assessment.solve(case.structure, demand, options.parts)
     text = "\n\n".join(f"{name}: {result}" for name, result in found.items())
     print(f"{case.title}\n{text}")

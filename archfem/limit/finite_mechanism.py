@@ -213,7 +213,9 @@ class LinkageState:
         Normal forces that equilibrium does not determine are undefined (NaN).
         """
         normal, along = self.rates
-        dead, live = (self.bodies.generalised(load) for load in (self.blocks.dead, self.blocks.live))
+        dead, live = (
+            self.bodies.generalised(load) for load in (self.blocks.dead, self.blocks.live)
+        )
         slipping = np.flatnonzero(~self.sticks)
         coefficient = friction[[contact.joint for contact in self.contacts]]
         forces = normal.copy()

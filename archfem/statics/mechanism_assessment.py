@@ -121,7 +121,7 @@ class AssessmentCheck:
         demand: of the spectrum, in the same unit.
         unit: "m/s²" or "m".
         ratio: factor on the spectrum at which the check is just passed [-].
-        period: of the equivalent oscillator [s]; None for the check of accelerations.
+        period: of the equivalent oscillator [s]; undefined (NaN) where accelerations are checked.
         source: clause of the code.
     """
 
@@ -130,7 +130,7 @@ class AssessmentCheck:
     demand: float
     unit: str
     ratio: float
-    period: float | None
+    period: float
     source: str
 
     @property
@@ -140,7 +140,7 @@ class AssessmentCheck:
 
     def __str__(self) -> str:
         """Describe capacity, demand and outcome in one line."""
-        period = "" if self.period is None else f" at T = {self.period:.3f} s"
+        period = "" if np.isnan(self.period) else f" at T = {self.period:.3f} s"
         return (
             f"{self.name}: capacity {self.capacity:.4g} {self.unit}, demand {self.demand:.4g} "
             f"{self.unit}{period}: {'passes' if self.passes else 'fails'}, the spectrum may be "
@@ -216,7 +216,12 @@ class KinematicAssessment(ResultDisplay):
             return []
         ends = self.structure.ends
         return [
-            (c, ("intrados", "extrados")[int(np.linalg.norm(ends[c.joint] - c.point, axis=1).argmin())])
+            (
+                c,
+                ("intrados", "extrados")[
+                    int(np.linalg.norm(ends[c.joint] - c.point, axis=1).argmin())
+                ],
+            )
             for c in self.path.mechanisms[0].contacts
         ]
 
@@ -400,9 +405,7 @@ def assess_parts(
         InvalidInput: as for `kinematic_assessment`.
     """
     parts = dict.fromkeys(structure.blocks[number].part for number in structure.free)
-    return {
-        part: kinematic_assessment(structure, spectrum, part=part, **options) for part in parts
-    }
+    return {part: kinematic_assessment(structure, spectrum, part=part, **options) for part in parts}
 
 
 def spectral_acceleration(
@@ -626,7 +629,7 @@ def _check(
         ground,
         "m/s²",
         q * a_0 / confidence_factor / ground,
-        None,
+        np.nan,
         f"{CIRCOLARE}, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8",
     )
     mass = oscillator.weights[0].sum() / structure.gravity if moves else 0.0

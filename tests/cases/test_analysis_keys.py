@@ -7,7 +7,7 @@ import pytest
 from backfilled import arch_bridge
 
 import archfem as af
-from archfem.cases.analysis_keys import parse_limit
+from archfem.cases.analysis_keys import parse_assessment, parse_limit
 from archfem.cases.run import expected_damping
 from archfem.dynamics.schemes import EffectiveDamping
 
@@ -172,3 +172,40 @@ def test_command(small, capsys):
     assert (out / "modes.txt").read_text(encoding="utf-8") in said
     assert "damping: 5 % at" in said
     assert {path.name for path in out.iterdir()} == {"modes.txt", "modes.png", "modes.gif"}
+
+
+def test_assessment_of_a_case_has_the_arguments_of_python():
+    table = {
+        "spectrum": {"code": "EC8", "ag": 0.2, "ground": "B"},
+        "friction": "none",
+        "direction": -1,
+        "loads": [{"block": 1, "point": ["0 m", "2 m"], "weight": "5 kN"}],
+        "limit_state": {
+            **{"name": "own", "share": 0.5, "period_factor": 2.0, "secant_share": 1.0},
+            **{"damping": 0.05, "source": "a test"},
+        },
+    }
+    settings = parse_assessment(table)
+    assert settings.spectrum == af.Eurocode8(ag=0.2, ground="B")
+    assert settings.directions == (-1.0,)
+    assert settings.options == {
+        "friction": None,
+        "loads": [af.masonry.AttachedLoad(1, (0.0, 2.0), weight=5e3)],
+        "limit_state": af.statics.LimitState("own", 0.5, 2.0, 1.0, 0.05, "a test"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"spectrum": {"ag": 0.2}}, "assessment.spectrum.code = None is not known"),
+        ({"direction": 2}, "assessment.direction = 2: give 1 for right or -1 for left"),
+        ({"loads": [{"block": 1}]}, "assessment.loads = .*missing.*its keys are"),
+        ({"limit_state": {"share": 0.5}}, "assessment.limit_state = .*missing"),
+        ({"friction": "dry"}, "assessment.friction = 'dry' is not known"),
+        ({"qq": 2}, "unknown key 'assessment.qq'"),
+    ],
+)
+def test_refused_assessments_of_a_case(table, message):
+    with pytest.raises(af.InvalidInput, match=message):
+        parse_assessment(table)

@@ -247,6 +247,46 @@ def test_limit_analysis_of_a_case(tmp_path, ring, capsys):
     assert f"at a factor of {found.factor:.4g}" in capsys.readouterr().out
 
 
+ASSESSMENT = """
+[assessment]
+spectrum = { code = "NTC-2018", ag = 0.25, f0 = 2.4, tc_star = "0.32 s", site = "B" }
+limit_state = "NTC-2018 SLC"
+q = 1.5
+"""
+
+
+def test_assessment_of_a_case_and_its_page(tmp_path, ring, capsys):
+    path, out = tmp_path / "ring.toml", tmp_path / "out"
+    path.write_text(LIMIT + ASSESSMENT)
+    assert af.commands.main(["assess", str(path), "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    spectrum = af.motion.Ntc2018(ag=0.25, f0=2.4, tc_star=0.32, site="B")
+    found = af.kinematic_assessment(ring, spectrum, limit_state="NTC-2018 SLC", q=1.5)
+    assert str(found.displacement) in said
+    assert str(found.linear) in said
+    assert "pushed to the left" in said
+    assert (out / "assessment.txt").read_text().strip() in said
+    assert sorted(file.name for file in out.glob("*.png")) == [
+        "assessment_0.png",
+        "assessment_1.png",
+    ]
+    assert af.commands.main(["report", str(out)]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "Kinematic assessment" in page
+    assert "NTC-2018 SLC: capacity" in page
+    capsys.readouterr()
+    # without a spectrum, and by parts
+    path.write_text(LIMIT)
+    assert af.commands.main(["assess", str(path)]) == 1
+    assert "an assessment needs a spectrum: write [assessment]" in capsys.readouterr().err
+    given = ["--parts", "--set", "assessment.direction=1"]
+    path.write_text(LIMIT + ASSESSMENT)
+    assert af.commands.main(["assess", str(path), *given]) == 0
+    said = capsys.readouterr().out
+    assert "arch, right:" in said
+    assert "pushed to the left" not in said
+
+
 def test_limit_analysis_refuses_soil_before_all_else(tmp_path, capsys):
     options = ["--set", "limit.horizontal=1", "--out", str(tmp_path)]
     assert af.commands.main(["run", str(RING.with_name("prusias.toml")), *options]) == 1

@@ -80,6 +80,9 @@ resample = 0.005
 [limit]
 horizontal = 1.0
 friction = "coulomb"
+[assessment]
+spectrum = { code = "EC8", ag = 0.2, ground = "B" }
+loads = [ { block = "voussoir 1", point = ["0 m", "1 m"], weight = "5 kN" } ]
 [dead_load]
 stages = "usual"
 """,

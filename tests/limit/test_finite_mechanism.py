@@ -38,7 +38,9 @@ def follow(structure, *, direction=1.0, friction=True, loads=(), joints=None):
     "structure",
     [
         RING,
-        af.circular_arch(radius=2.95, thickness=0.9, embrace=159.0, voussoirs=9, contact=contact(0.3)),
+        af.circular_arch(
+            radius=2.95, thickness=0.9, embrace=159.0, voussoirs=9, contact=contact(0.3)
+        ),
         af.arch_on_piers(radius=3, thickness=0.6, voussoirs=7, pier_breadth=1.2, courses=[1.5]),
         af.column(breadth=0.6, heights=[0.3, 1.1, 0.4], contact=contact(0.2)),
     ],
@@ -121,20 +123,23 @@ def test_a_wall_held_at_its_top_bends_with_three_hinges():
         box(-b / 2, b / 2, -0.3, 0.0, "base", fixed=True),
         box(-b / 2, b / 2, 0.0, h, "lower"),
         box(-b / 2, b / 2, h, 2 * h, "upper"),
-        box(-b / 2, b / 2, 2 * h, 2 * h + cap, "cap"),
-        box(b / 2, b, 2 * h + 0.2, 2 * h + 2.0, "wall", fixed=True),
+        box(-b / 2, b / 2 + 0.1, 2 * h, 2 * h + cap, "cap"),  # wider: the stones do not touch
+        box(b / 2 + 0.1, b, 2 * h, 2 * h + 2.0, "wall", fixed=True),
     )
     joints = (
         *(bed((k, k + 1), -b / 2, b / 2, k * h, 5.0) for k in range(3)),
-        af.Joint((3, 4), (b / 2, 2 * h + 0.2), (b / 2, 2 * h + cap), contact(0.0), "guide"),
+        af.Joint((3, 4), (b / 2 + 0.1, 2 * h), (b / 2 + 0.1, 2 * h + cap), contact(0.0), "guide"),
     )
     path = follow(af.Structure(blocks, joints))
-    weight, load = b * h, b * cap
-    turn, beta = -path.displacements[:, 1, 2], atan2(b, h)
+    weight, load = b * h, (b + 0.1) * cap
+    # until the cap, which its corner carries off-centre, tips away from its guide
+    assert path.events[0].text == "a contact of guide opens"
+    places = slice(0, path.events[0].place)
+    turn, beta = -path.displacements[places, 1, 2], atan2(b, h)
     expected = 2.0 * (weight + load) / weight * np.tan(beta - turn)
-    np.testing.assert_allclose(path.factors, expected, atol=1e-7)
-    np.testing.assert_allclose(path.displacements[:, 2, 2], turn, atol=1e-9)
-    assert path.end is PathEnd.FALLS
+    np.testing.assert_allclose(path.factors[places], expected, atol=1e-7)
+    np.testing.assert_allclose(path.displacements[places, 2, 2], turn, atol=1e-9)
+    assert 0.05 < turn[-1] < beta
 
 
 def test_a_block_runs_into_a_wall_that_it_has_no_joint_with():
@@ -216,7 +221,9 @@ def four_bar(structure, found, turn):
     "structure",
     [
         RING,
-        af.arch_on_piers(radius=3, thickness=0.6, voussoirs=11, pier_breadth=1.2, courses=[1.5] * 2),
+        af.arch_on_piers(
+            radius=3, thickness=0.6, voussoirs=11, pier_breadth=1.2, courses=[1.5] * 2
+        ),
     ],
     ids=["ring", "arch on piers"],
 )
@@ -253,7 +260,9 @@ def test_attached_loads_move_with_their_block():
     turn = -path.displacements[:, 1, 2]
 
     def arms(x, y):  # of a point about the edge (0.3, 0), turned clockwise
-        return (0.3 - x) * np.cos(turn) - y * np.sin(turn), y * np.cos(turn) + (0.3 - x) * np.sin(turn)
+        return (0.3 - x) * np.cos(turn) - y * np.sin(turn), y * np.cos(turn) + (0.3 - x) * np.sin(
+            turn
+        )
 
     (x_1, y_1), (x_2, y_2), (_, y_3) = arms(0.0, 1.2), arms(-0.1, 2.4), arms(-0.3, 2.0)
     expected = (x_1 + 0.5 * x_2 + 0.1 * y_3) / (y_1 + 0.5 * y_2)

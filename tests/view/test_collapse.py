@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.view.collapse import draw_capacity, draw_collapse
+from archfem.view.collapse import draw_capacity, draw_collapse, draw_kinematic_assessment
 
 
 def lines_of(axes):
@@ -64,3 +64,27 @@ def test_the_load_is_drawn_and_told(ring):
     assert axes.get_title().replace("\n", " ").startswith(f"{ring.name}: the load turns it")
     arrow = next(text for text in axes.texts if text.arrow_patch is not None)
     assert arrow.xy == pytest.approx(found.live[0].place(ring)[1])  # it points at the extrados
+
+
+def test_an_assessment_shows_moved_blocks_curve_and_demand(ring, tmp_path):
+    found = af.kinematic_assessment(ring, af.Eurocode8(ag=0.3, ground="B"), confidence_factor=1.2)
+    figure = draw_kinematic_assessment(found)
+    left, right = figure.axes
+    stones, moved = left.collections
+    assert (len(stones.get_paths()), len(moved.get_paths())) == (19, 17)
+    hinges = lines_of(left)["hinge at rest"]
+    np.testing.assert_allclose(hinges[0], ring.joints[0].intrados)
+    lines, check = lines_of(right), found.displacement
+    curve = lines["capacity a*(d*), FC = 1.2"]
+    np.testing.assert_allclose(curve[0], [0.0, found.a_0_star / 1.2])
+    np.testing.assert_allclose(curve[-1], [found.d_0_star, 0.0], atol=1e-12)
+    point = lines[f"demand {check.demand:.3f} m"][0]
+    np.testing.assert_allclose(
+        point, [check.demand, check.demand * (2 * np.pi / check.period) ** 2]
+    )
+    assert f"ratio {check.ratio:.2f}" in right.get_title()
+    figure.savefig(tmp_path / "assessment.png")
+    piers = af.arch_on_piers(radius=3, thickness=0.6, voussoirs=7, pier_breadth=1.2, courses=[1.5])
+    locked = af.kinematic_assessment(piers, found.spectrum, part="left pier")
+    with pytest.raises(af.InvalidInput, match="no mechanism moves under horizontal forces"):
+        draw_kinematic_assessment(locked)
