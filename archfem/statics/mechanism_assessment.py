@@ -30,10 +30,12 @@ from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import check_fields, check_number, is_one_of, validate_arguments
 from archfem.errors import InvalidInput
+from archfem.limit.backfill import FillProfile
 from archfem.limit.collapse import collapse_factor
 from archfem.limit.displaced_blocks import Mechanism, PlacedBlocks, classify_motion, find_mechanism
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
 from archfem.limit.linear_programme import NoEquilibrium
+from archfem.limit.rigid_regions import find_rigid_regions
 from archfem.masonry.loads import AttachedLoad, BodyForce
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_joint_names, join_names
@@ -153,7 +155,7 @@ class KinematicAssessment(ResultDisplay):
     """Kinematic assessment of a mechanism.
 
     Attributes:
-        structure: assessed structure.
+        structure: assessed structure, without a fill.
         spectrum: design spectrum or ground motion of the demand.
         direction: sense of the horizontal forces along x, 1 or -1.
         alpha_0: factor α₀ of the horizontal forces that sets the mechanism in motion [-]; infinite
@@ -326,8 +328,9 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
       limit state, with the accelerations of the curve divided by FC. A mechanism that the ground
       acceleration does not set in motion, a₀* / FC above it, passes as well.
 
-    The mechanism must stand on the ground: spectra at a height of a building are not built here;
-    give one as a `TableSpectrum`, or a `Motion`.
+    A fill, bodies softer than their joints, counts by its weight and mass on the stones below,
+    column by column, without its pressure. The mechanism must stand on the ground: spectra at a
+    height of a building are not built here; give one as a `TableSpectrum`, or a `Motion`.
 
     Args:
         structure: supports are its fixed blocks.
@@ -352,8 +355,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         Oscillator, capacity curve and checks.
 
     Raises:
-        InvalidInput: an argument is unknown or out of range, the structure does not stand, or it
-            has bodies that are too soft to be rigid.
+        InvalidInput: an argument is unknown or out of range, or the structure does not stand.
         DidNotConverge: the mechanism changes without end.
 
     Note:
@@ -376,15 +378,16 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         if not 1.0 <= check_number(value, f"{name} [-]") <= most:
             raise InvalidInput(f"{name} {value:.4g} is not between 1 and {most:g}")
     _check_structure(structure, friction, loads)
-    joints = _select_joints(structure, part, blocks)
-    placed = PlacedBlocks.at_rest(structure, loads, float(direction))
-    coefficient = structure.friction if friction else np.full(len(structure.joints), np.inf)
+    stones, fill = _take_fill_as_loads(structure)
+    joints = _select_joints(stones, part, blocks)
+    placed = PlacedBlocks.at_rest(stones, (*fill, *loads), float(direction))
+    coefficient = stones.friction if friction else np.full(len(stones.joints), np.inf)
     mechanism = _find_first_mechanism(placed, joints, coefficient, friction)
-    oscillator = _Oscillator(placed, None, 0)
+    oscillator = _Oscillator(placed, None, 0, bool(fill))
     if mechanism is not None:
         follower = PathFollower(placed, joints, coefficient)
         path = follower.follow(mechanism)
-        oscillator = _Oscillator(placed, path, follower.last_equilibrium(path))
+        oscillator = _Oscillator(placed, path, follower.last_equilibrium(path), bool(fill))
     return _check(oscillator, spectrum, rules, q, confidence_factor)
 
 
@@ -446,22 +449,32 @@ def _check_structure(
         raise InvalidInput(
             f"friction {friction!r} is not known: use 'coulomb', 'nonassociated' or None"
         )
-    if friction == "nonassociated" and loads:
+    if friction == "nonassociated" and (loads or find_yielding_blocks(structure)):
         raise InvalidInput(
-            "friction 'nonassociated' is not searched with attached loads: use 'coulomb'"
+            "friction 'nonassociated' is not searched with attached loads or a fill: use 'coulomb'"
         )
     if (structure.tension > 0.0).any():
         raise InvalidInput(
             "joints have tensile strength, which breaks before a mechanism forms: give contacts "
             "with tension 0"
         )
-    soft = find_yielding_blocks(structure)
-    if soft:
-        names = [structure.blocks[number].name for number in sorted(soft)]
-        raise InvalidInput(
-            f"bodies are too soft to be rigid ({join_names(names)}): leave the fill out and attach "
-            "its weight to the stones as loads, or cut it into pieces (jointed_fill)"
-        )
+
+
+def _take_fill_as_loads(structure: Structure) -> tuple[Structure, tuple[AttachedLoad, ...]]:
+    """Return the stones without yielding bodies, and the weight of these on each stone."""
+    if not find_yielding_blocks(structure):
+        return structure, ()
+    regions = find_rigid_regions(structure)
+    stones = np.isin(np.arange(len(structure.blocks)), regions.blocks)
+    stone, foot, weight = FillProfile(structure, stones).columns
+    loads = []
+    for number in np.unique(stone):
+        own = stone == number
+        if not structure.blocks[number].fixed and weight[own].sum() > 0.0:
+            x, y = np.average(foot[own], axis=0, weights=weight[own])
+            name = structure.blocks[number].name
+            loads.append(AttachedLoad(name, (float(x), float(y)), float(weight[own].sum())))
+    return regions.structure, tuple(loads)
 
 
 def _select_joints(
@@ -530,6 +543,7 @@ class _Oscillator:
     placed: PlacedBlocks
     path: MechanismPath | None
     holds: int  # last place at which the joints that do not move hold
+    fill: bool  # whether some of the loads are the weight of a fill
 
     @cached_property
     def weights(self) -> tuple[Array, Array]:
@@ -584,6 +598,11 @@ class _Oscillator:
         if self.path is None:
             return []
         found, collapse = [], self.path.mechanisms[0].factor
+        if self.fill:
+            found.append(
+                "the fill counts as weight and mass on the stones; its pressure on them, which "
+                "may hold an arch back or push a wall out, is left out"
+            )
         if any(any(load.force) for load in self.placed.loads):
             found.append(
                 "constant forces count from the start of the motion to its end: attach only those "

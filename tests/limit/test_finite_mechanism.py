@@ -221,8 +221,11 @@ def four_bar(structure, found, turn):
     "structure",
     [
         RING,
-        af.arch_on_piers(
-            radius=3, thickness=0.6, voussoirs=11, pier_breadth=1.2, courses=[1.5] * 2
+        pytest.param(
+            af.arch_on_piers(
+                radius=3, thickness=0.6, voussoirs=11, pier_breadth=1.2, courses=[1.5] * 2
+            ),
+            marks=pytest.mark.slow,
         ),
     ],
     ids=["ring", "arch on piers"],

@@ -5,6 +5,7 @@ from math import atan2, pi, sqrt
 
 import numpy as np
 import pytest
+from backfilled import arch_bridge
 
 import archfem as af
 from archfem.statics.mechanism_assessment import LIMIT_STATES, LimitState, spectral_acceleration
@@ -13,6 +14,11 @@ G = 9.81
 SPECTRUM = af.motion.Ntc2018(ag=0.25, f0=2.4, tc_star=0.32, site="B")
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 STONE = af.STONE.unit_weight
+
+
+@pytest.fixture(scope="module")
+def ring():
+    return af.kinematic_assessment(RING, SPECTRUM)
 
 
 def box(left, right, low, high, name, **options):
@@ -137,9 +143,9 @@ def test_a_portal(verified):
     np.testing.assert_allclose(found.curve["alpha"], np.tan(beta - turn), atol=1e-7)
 
 
-def test_the_ring_of_the_readme(verified):
+def test_the_ring_of_the_readme(ring, verified):
     """Values of its four hinges moved as a four-bar by another program."""
-    found = af.kinematic_assessment(RING, SPECTRUM)
+    found = ring
     expected = {"alpha_0": 0.4571, "e_star": 0.809, "a_0_star": 0.565 * G, "d_0_star": 0.2785}
     check_values(found, expected | {"T_s": 0.629}, verified, "README ring as a four-bar")
     assert [joint for joint, _ in found.hinges] == [0, 6, 12, 17]
@@ -180,7 +186,8 @@ def test_an_arch_on_piers_has_the_mass_of_what_moves(verified):
 
 
 def test_the_linear_check_multiplies_by_q_and_divides_by_confidence():
-    found = af.kinematic_assessment(RING, SPECTRUM, q=3.0, confidence_factor=1.2)
+    block = af.column(breadth=0.6, heights=[2.4])
+    found = af.kinematic_assessment(block, SPECTRUM, q=3.0, confidence_factor=1.2)
     ground = float(SPECTRUM.horizontal(0.0)) * 9.80665
     assert found.linear.capacity == pytest.approx(3.0 * found.a_0_star / 1.2)
     assert found.linear.demand == pytest.approx(ground, rel=1e-9)
@@ -279,8 +286,21 @@ def test_sliding_with_and_without_dilatancy():
     assert both[None].alpha_0 > both["coulomb"].alpha_0
 
 
-def test_words_table_and_a_mechanism_that_never_moves():
-    found = af.kinematic_assessment(RING, SPECTRUM)
+@pytest.mark.slow
+def test_a_fill_is_weight_on_the_stones():
+    """The factor is that of limit analysis with a fill that presses on nothing, to 1e-6."""
+    bridge = arch_bridge()
+    found = af.kinematic_assessment(bridge, SPECTRUM)
+    fill = af.limit.Fill(friction_angle=35.0, mobilisation=0.0, active=0.0)
+    expected = af.collapse_factor(bridge, live=af.BodyForce(1.0), fill=fill).factor
+    assert found.path.mechanisms[0].factor == pytest.approx(expected, rel=1e-6)
+    assert "the fill counts as weight" in found.notes[0]
+    with pytest.raises(af.InvalidInput, match="attached loads or a fill: use 'coulomb'"):
+        af.kinematic_assessment(bridge, SPECTRUM, friction="nonassociated")
+
+
+def test_words_table_and_a_mechanism_that_never_moves(ring):
+    found = ring
     text = str(found)
     assert "joint 6 at the extrados" in text
     assert "NTC-2018 SLV: capacity 0.1114 m" in text
