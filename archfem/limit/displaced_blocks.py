@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.optimize import linprog
 from scipy.sparse import csgraph, csr_matrix
 
@@ -277,37 +278,79 @@ class Bodies:
     @cached_property
     def references(self) -> Array:
         """Reference point of each body, the mean of its centroids (n_bodies, 2) [m]."""
-        centroids = self.blocks.centroids
-        return np.array([centroids[self.body == k].mean(axis=0) for k in range(self.count)])
+        moving = self.body >= 0
+        body = self.body[moving]
+        total = np.zeros((self.count, 2))
+        np.add.at(total, body, self.blocks.centroids[moving])
+        return total / np.bincount(body, minlength=self.count)[:, None]
 
     @cached_property
-    def expansion(self) -> Array:
-        """Matrix from velocities of the bodies to those of all blocks (3 n_blocks, 3 n_bodies)."""
-        matrix = np.zeros((len(self.body), 3, max(self.count, 1), 3))
-        for block, body in enumerate(self.body):
-            if body >= 0:
-                matrix[block, :2, body] = self._point_rows(self.blocks.centroids[block], body)
-                matrix[block, 2, body, 2] = 1.0
-        return matrix.reshape(3 * len(self.body), -1)
+    def moving(self) -> NDArray[np.intp]:
+        """Numbers of the blocks that move."""
+        return np.flatnonzero(self.body >= 0)
 
-    def _point_rows(self, point: Array, body: int) -> Array:
-        """Return the velocity of a point for unit velocities of its body (2, 3)."""
-        x, y = point - self.references[body]
-        return np.array([[1.0, 0.0, -y], [0.0, 1.0, x]])
+    @cached_property
+    def arms(self) -> Array:
+        """Centroids of the blocks that move, from the reference of their body (n_moving, 2) [m]."""
+        return self.blocks.centroids[self.moving] - self.references[self.body[self.moving]]
 
-    def rates(self, contacts: Sequence[Contact]) -> Array:
-        """Return rates of the contacts' gaps and slips (2, n_contacts, 3 n_bodies)."""
-        rows = np.zeros((2, len(contacts), self.count, 3))
-        for k, contact in enumerate(contacts):
-            axes = np.array([contact.normal, tangent(contact.normal)])
-            for block, sign in ((contact.corner, 1.0), (contact.face, -1.0)):
-                if (body := self.body[block]) >= 0:
-                    rows[:, k, body] += sign * axes @ self._point_rows(contact.point, body)
-        return rows.reshape(2, len(contacts), -1)
+    def spread(self, velocity: Array) -> Array:
+        """Return the velocities of all blocks from those of the bodies (n_blocks, 3)."""
+        motion = np.zeros((len(self.body), 3))
+        own, (x, y) = velocity.reshape(-1, 3)[self.body[self.moving]], self.arms.T
+        turn = own[:, 2]
+        motion[self.moving] = np.stack([own[:, 0] - turn * y, own[:, 1] + turn * x, turn], axis=1)
+        return motion
+
+    def gather(self, motion: Array) -> Array:
+        """Return the velocities of the bodies from those of all blocks (3 n_bodies,)."""
+        (u, v, turn), (x, y) = motion[self.moving].T, self.arms.T
+        velocity = np.zeros((self.count, 3))
+        velocity[self.body[self.moving]] = np.stack([u + turn * y, v - turn * x, turn], axis=1)
+        return velocity.ravel()
 
     def generalised(self, loads: Array) -> Array:
         """Return generalised forces of the bodies from those of the blocks (3 n_bodies,)."""
-        return self.expansion.T @ loads.ravel()
+        (f_x, f_y, moment), (x, y) = loads[self.moving].T, self.arms.T
+        total = np.zeros((self.count, 3))
+        own = np.stack([f_x, f_y, moment + x * f_y - y * f_x], axis=1)
+        np.add.at(total, self.body[self.moving], own)
+        return total.ravel()
+
+    def rates(self, contacts: Sequence[Contact]) -> Array:
+        """Return rates of the contacts' gaps and slips (2, n_contacts, 3 n_bodies)."""
+        rows, columns, values = self._rate_entries(contacts)
+        rates = np.zeros((2, len(contacts), 3 * self.count))
+        # the bodies of a contact differ, or the contact has no rate: no entry is met twice
+        rates[:, rows, columns] = values
+        return rates
+
+    def sparse_rates(self, contacts: Sequence[Contact]) -> tuple[csr_matrix, csr_matrix]:
+        """Return the rates of gaps and of slips, each (n_contacts, 3 n_bodies)."""
+        rows, columns, values = self._rate_entries(contacts)
+        shape = (len(contacts), 3 * self.count)
+        gaps, slips = (csr_matrix((each, (rows, columns)), shape) for each in values)
+        return gaps, slips
+
+    def _rate_entries(
+        self, contacts: Sequence[Contact]
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+        """Return rows, columns and values (2, n) of the rates of gaps and slips."""
+        points = np.array([contact.point for contact in contacts]).reshape(-1, 2)
+        normal = np.array([contact.normal for contact in contacts]).reshape(-1, 2)
+        along = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
+        pairs = np.array([(c.corner, c.face) for c in contacts], dtype=np.intp).reshape(-1, 2)
+        body = self.body[pairs]
+        # first the corners' blocks, then the faces'
+        number, side = np.nonzero((body >= 0) & (body[:, :1] != body[:, 1:]))
+        own, sign = body[number, side], np.where(side == 0, 1.0, -1.0)
+        x, y = (points[number] - self.references[own]).T
+        values = []
+        for axis in (normal[number], along[number]):
+            turn = x * axis[:, 1] - y * axis[:, 0]
+            values.append((sign * np.stack([axis[:, 0], axis[:, 1], turn])).T.ravel())
+        columns = (3 * own[:, None] + np.arange(3)).ravel()
+        return np.repeat(number, 3), columns, np.array(values)
 
 
 def largest_speed(blocks: PlacedBlocks, motion: Array) -> float:
@@ -355,7 +398,7 @@ def find_mechanism(
     factor, velocity, forces = solution
     if flat:
         factor, velocity = _solve_flat(bodies, contacts, coefficient, forces)
-    motion = (bodies.expansion @ velocity).reshape(-1, 3)
+    motion = bodies.spread(velocity)
     return classify_motion(
         blocks, joints, motion / largest_speed(blocks, motion), coefficient, contacts, factor
     )
@@ -388,26 +431,27 @@ def _solve_static(
 
     With `held` normal forces, friction is limited by these.
     """
-    normal, along = bodies.rates(contacts)
+    normal, along = bodies.sparse_rates(contacts)
     dead, live = (bodies.generalised(load) for load in (bodies.blocks.dead, bodies.blocks.live))
     # forces in mean body weights and lengths in metres over the size keep coefficients near one
     unit = np.abs(bodies.blocks.dead[:, 1]).sum() / bodies.count
     lengths = np.tile([1.0, 1.0, 1.0 / bodies.blocks.structure.size], bodies.count)
     count, slides = len(contacts), np.isfinite(coefficient)
-    balance = lengths[:, None] * np.hstack([normal.T, along.T, (live / unit)[:, None]])
-    cone = np.hstack([np.diag(-np.where(slides, coefficient, 0.0)), np.eye(count)])[slides]
-    mirrored = np.hstack([cone[:, :count], -cone[:, count:]])
-    limits = np.hstack([np.vstack([cone, mirrored]), np.zeros((2 * len(cone), 1))])
-    strength = np.zeros(len(limits))
+    coefficient_or_zero = np.where(slides, coefficient, 0.0)
+    balance = sparse.diags(lengths) @ sparse.hstack([normal.T, along.T, (live / unit)[:, None]])
+    slope, one = (sparse.diags(v).tocsr()[slides] for v in (coefficient_or_zero, np.ones(count)))
+    strength = np.zeros(2 * int(slides.sum()))
     if held is not None:
-        limits[:, :count] = 0.0
-        strength = np.tile((coefficient * held)[slides], 2)
+        strength = np.tile((coefficient_or_zero * held)[slides], 2)
+        slope = 0.0 * slope
+    none = csr_matrix((slope.shape[0], 1))
+    limits = sparse.bmat([[-slope, one, none], [-slope, -one, none]], format="csr")
     for presolve in (False, True):  # where round-off stops the solver presolve changes its path
         result = linprog(
             np.append(np.zeros(2 * count), -1.0),
-            A_ub=csr_matrix(limits),
+            A_ub=limits,
             b_ub=strength,
-            A_eq=csr_matrix(balance),
+            A_eq=balance,
             b_eq=-lengths * dead / unit,
             bounds=[(0.0, None)] * count + [(None, None)] * (count + 1),
             method="highs-ds",
@@ -435,7 +479,7 @@ def classify_motion(
 ) -> Mechanism:
     """Weld joints that do not move, and select the contacts that a motion keeps."""
     every = Bodies(blocks, np.arange(len(motion)))
-    normal, along = every.rates(contacts) @ motion.ravel()
+    normal, along = (rates @ motion.ravel() for rates in every.sparse_rates(contacts))
     slip = np.where(np.abs(along) > STILL, np.sign(along), 0.0)
     # associated flow opens a sliding contact by μ |slip|; flat sliding by nothing
     dilation = np.where(np.isfinite(coefficient), coefficient, 0.0) * np.abs(along)

@@ -91,8 +91,7 @@ class Linkage:
     @cached_property
     def first_velocity(self) -> Array:
         """Velocities of the bodies at the start (3 n_bodies,)."""
-        expansion = Bodies(self.start, self.mechanism.body).expansion
-        return np.linalg.lstsq(expansion, self.mechanism.motion.ravel(), rcond=None)[0]
+        return Bodies(self.start, self.mechanism.body).gather(self.mechanism.motion)
 
     def place(self, blocks: PlacedBlocks, motion: Array) -> "LinkageState":
         """Return the state after a finite motion of the bodies from other places of the blocks."""
@@ -174,11 +173,9 @@ class LinkageState:
         rank = int(np.sum(singular > 1e-9 * max(singular.max(initial=0.0), 1.0)))
         free = basis[rank:]
         velocity = self.units * (free.T @ (free @ (previous / self.units)))
-        motion = (self.bodies.expansion @ velocity).reshape(-1, 3)
+        motion = self.bodies.spread(velocity)
         speed = largest_speed(self.blocks, motion)
-        if speed <= STILL * largest_speed(
-            self.blocks, (self.bodies.expansion @ previous).reshape(-1, 3)
-        ):
+        if speed <= STILL * largest_speed(self.blocks, self.bodies.spread(previous)):
             return None
         return velocity / speed
 
@@ -318,7 +315,7 @@ class PathFollower:
         motion = np.zeros_like(self.blocks.displacement)
         try:
             mechanisms[0], state, velocity = self._start(self.blocks, mechanism)
-            motion = (state.bodies.expansion @ velocity).reshape(-1, 3)
+            motion = state.bodies.spread(velocity)
             while len(mechanisms) <= max_events:
                 blocks = self._follow_linkage(state, velocity)
                 renewed, state, velocity = self._start(blocks, self._renew(blocks))

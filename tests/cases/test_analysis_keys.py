@@ -188,6 +188,7 @@ def test_assessment_of_a_case_has_the_arguments_of_python():
     settings = parse_assessment(table)
     assert settings.spectrum == af.Eurocode8(ag=0.2, ground="B")
     assert settings.directions == (-1.0,)
+    assert parse_assessment({}).directions == (1.0, -1.0)
     assert settings.options == {
         "friction": None,
         "loads": [af.masonry.AttachedLoad(1, (0.0, 2.0), weight=5e3)],
