@@ -53,12 +53,14 @@ class Mechanism:
             fastest corner has 1 m/s.
         body: number of the body of each block; -1 for blocks at rest (n_blocks,).
         contacts: contacts that persist.
+        is_flat: whether contacts were found to slide without dilatancy.
     """
 
     factor: float
     motion: Array
     body: NDArray[np.intp]
     contacts: tuple[Contact, ...]
+    is_flat: bool = False
 
     @property
     def sliding_joints(self) -> frozenset[int]:
@@ -399,9 +401,9 @@ def find_mechanism(
     if flat:
         factor, velocity = _solve_flat(bodies, contacts, coefficient, forces)
     motion = bodies.spread(velocity)
-    return classify_motion(
-        blocks, joints, motion / largest_speed(blocks, motion), coefficient, contacts, factor
-    )
+    speed = largest_speed(blocks, motion)
+    found = classify_motion(blocks, joints, motion / speed, coefficient, contacts, factor)
+    return replace(found, is_flat=flat)
 
 
 def _solve_flat(
@@ -410,15 +412,21 @@ def _solve_flat(
     """Return factor and velocities of sliding without dilatancy, from first normal forces."""
     before = np.inf
     for _ in range(40):
-        solution = _solve_static(bodies, contacts, coefficient, forces)
+        try:
+            solution = _solve_static(bodies, contacts, coefficient, forces)
+        except NoEquilibrium:
+            break
         if solution is None:
-            raise NoEquilibrium("sliding without dilatancy has no least factor here")
+            break
         factor, velocity, found = solution
         if abs(factor - before) <= 1e-7 * abs(factor):
             return factor, velocity
         # half steps: whole ones may alternate between two states
         before, forces = factor, 0.5 * (forces + found)
-    raise NoEquilibrium("no state of sliding without dilatancy was found")
+    raise DidNotConverge(
+        "no mechanism was found whose faces slide without dilatancy: assess fewer blocks, or "
+        "forbid sliding (friction=None)"
+    )
 
 
 def _solve_static(

@@ -15,7 +15,7 @@ not. Where a joint slides and others hinge, α at rest can therefore be below th
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 
@@ -49,6 +49,7 @@ class PathEnd(StrEnum):
     LOCKS = "locks"
     COLLIDES = "collides"
     ENDURES = "endures"
+    UNRESOLVED = "unresolved"
 
     @property
     def sentence(self) -> str:
@@ -60,6 +61,7 @@ _END_SENTENCES = {
     PathEnd.FALLS: "at the end it falls without any horizontal force",
     PathEnd.LOCKS: "at the end its contacts permit no further motion",
     PathEnd.COLLIDES: "at the end it runs into blocks that it has no joint with",
+    PathEnd.UNRESOLVED: "at the end no mechanism was found whose faces slide flat",
     PathEnd.ENDURES: "it still needs a horizontal force where the path is cut off",
 }
 
@@ -312,20 +314,26 @@ class PathFollower:
     def follow(self, mechanism: Mechanism, max_events: int = 20) -> MechanismPath:
         """Follow a mechanism until it falls, locks, collides, or the path is cut off."""
         mechanisms: list[Mechanism] = [mechanism]
-        motion = np.zeros_like(self.blocks.displacement)
+        motion, stuck = np.zeros_like(self.blocks.displacement), 0
         try:
             mechanisms[0], state, velocity = self._start(self.blocks, mechanism)
             motion = state.bodies.spread(velocity)
             while len(mechanisms) <= max_events:
+                before = self.travel
                 blocks = self._follow_linkage(state, velocity)
+                moved = self.travel - before > TOUCHING * self.blocks.structure.size
+                stuck = 0 if moved else stuck + 1
+                if stuck > 2:
+                    break
                 renewed, state, velocity = self._start(blocks, self._renew(blocks))
                 mechanisms.append(renewed)
-            raise DidNotConverge(
-                f"the mechanism changed {max_events} times before it fell, the last time as "
-                f"{self.events[-1].text}: check the joints there, or assess fewer blocks"
-            )
+            end = PathEnd.UNRESOLVED
         except _Stop as stop:
             end = stop.end
+        except DidNotConverge:
+            if not self.factors:
+                raise
+            end = PathEnd.UNRESOLVED
         return MechanismPath(
             self.blocks,
             np.array(self.factors),
@@ -341,14 +349,46 @@ class PathFollower:
     ) -> tuple[Mechanism, LinkageState, Array]:
         """Return a mechanism that can slide flat, with the first state and velocity of its path."""
         for trial in (mechanism, None):
-            if trial is None:  # associated flow opens joints that would close if faces slid flat
+            if trial is None:
+                # With the dilatancy of associated flow joints open that would close if faces slid
+                # flat, and contacts are in compression that would need tension.
                 trial = self._renew(blocks, flat=True)
+            trial = self._without_grazing(blocks, trial)
             state = LinkageState(Linkage(blocks, trial), blocks)
             velocity = state.velocity(state.linkage.first_velocity)
-            if velocity is not None and self._opens_joints(state, velocity):
+            if velocity is None or not self._opens_joints(state, velocity):
+                continue
+            if trial.is_flat or self._presses(state, velocity):
                 return trial, state, velocity
         self._record(blocks, mechanism.factor)
         raise _Stop(PathEnd.LOCKS)
+
+    def _without_grazing(self, blocks: PlacedBlocks, mechanism: Mechanism) -> Mechanism:
+        """Return a mechanism without sliding contacts that open although their rate is zero."""
+        # A corner that leaves a face along a circle keeps it to first order only: as a constraint,
+        # redundant beside the others, it would lock the linkage.
+        for contact in [each for each in mechanism.contacts if each.slip]:
+            others = tuple(each for each in mechanism.contacts if each is not contact)
+            freed = replace(mechanism, contacts=others)
+            whole, state = (
+                LinkageState(Linkage(blocks, each), blocks) for each in (mechanism, freed)
+            )
+            ranks = [np.linalg.matrix_rank(each.jacobian, tol=1e-9) for each in (whole, state)]
+            if ranks[0] == ranks[1] and self._leaves(whole, state, contact):
+                mechanism = freed
+        return mechanism
+
+    def _leaves(self, whole: LinkageState, freed: LinkageState, contact: Contact) -> bool:
+        """Return whether a contact has a gap after a small step of a linkage without it."""
+        velocity = freed.velocity(whole.linkage.first_velocity)
+        step = 1e-3 * self.blocks.structure.size
+        trial = None if velocity is None else freed.advanced(velocity, step)
+        if trial is None:
+            return False
+        moved = LinkageState(whole.linkage, trial[0].blocks)
+        contacts = whole.linkage.mechanism.contacts
+        place = next(k for k, each in enumerate(contacts) if each is contact)
+        return bool(moved.misfits[place] > 1e-9 * self.blocks.structure.size)
 
     def _opens_joints(self, state: LinkageState, velocity: Array) -> bool:
         """Return whether no contact closes."""
@@ -359,6 +399,16 @@ class PathFollower:
             if body[contact.corner] != body[contact.face]
         ]
         return bool((state.bodies.rates(contacts)[0] @ velocity >= -10.0 * STILL).all())
+
+    def _presses(self, state: LinkageState, velocity: Array) -> bool:
+        """Return whether no contact needs tension."""
+        forces = state.balance(velocity, self.friction)[1]
+        return not bool((forces < -1e-5 * self._force_unit).any())
+
+    @property
+    def _force_unit(self) -> float:
+        """Mean weight of a block that moves [N]."""
+        return float(np.abs(self.blocks.dead[:, 1]).sum() / len(self.blocks.structure.free))
 
     def _record(self, blocks: PlacedBlocks, factor: float) -> None:
         """Append a place to the path."""
@@ -439,9 +489,10 @@ class PathFollower:
         closes = closed.any(axis=(0, 2)) & (body[pairs[:, 0]] != body[pairs[:, 1]])
         if closes.any():
             return f"{join_joint_names([names[k] for k in np.flatnonzero(closes)])} closes"
-        unit = np.abs(blocks.dead[:, 1]).sum() / len(blocks.structure.free)
         for contact, force in zip(state.contacts, normal_forces, strict=True):
-            if force < -1e-5 * unit:  # well above the tolerance of the programme that follows
+            if (
+                force < -1e-5 * self._force_unit
+            ):  # well above the tolerance of the programme that follows
                 return f"a contact of {names[contact.joint]} opens"
             if contact.slip and self._is_off(blocks, contact, near):
                 return f"a corner slides off its face at {names[contact.joint]}"

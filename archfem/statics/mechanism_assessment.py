@@ -29,7 +29,7 @@ from archfem._display import ResultDisplay
 from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import check_fields, check_number, is_one_of, validate_arguments
-from archfem.errors import InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import FillProfile
 from archfem.limit.collapse import collapse_factor
 from archfem.limit.displaced_blocks import Mechanism, PlacedBlocks, classify_motion, find_mechanism
@@ -356,7 +356,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
 
     Raises:
         InvalidInput: an argument is unknown or out of range, or the structure does not stand.
-        DidNotConverge: the mechanism changes without end.
+        DidNotConverge: no mechanism was found that moves without the dilatancy of sliding faces.
 
     Note:
         EN 1998-3 and ASCE 41 have checks of their own, whose texts could not be read: give their
@@ -387,6 +387,12 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     if mechanism is not None:
         follower = PathFollower(placed, joints, coefficient)
         path = follower.follow(mechanism)
+        if not path.displacements[-1].any():
+            raise DidNotConverge(
+                f"the mechanism of limit analysis, at a factor of {mechanism.factor:.4g}, cannot "
+                "move if its faces slide without dilatancy: assess fewer blocks, or forbid sliding "
+                "(friction=None)"
+            )
         oscillator = _Oscillator(placed, path, follower.last_equilibrium(path), bool(fill))
     return _check(oscillator, spectrum, rules, q, confidence_factor)
 
@@ -636,7 +642,7 @@ def _check(
 ) -> KinematicAssessment:
     """Return the assessment of an oscillator under a spectrum."""
     curve, path, structure = oscillator.curve, oscillator.path, oscillator.placed.structure
-    moves = path is not None and len(curve["d"]) > 1
+    moves = path is not None
     alpha_0 = float(curve["alpha"][0]) if path is not None else np.inf
     a_0 = float(curve["a"][0]) if moves else np.inf
     falls = moves and path is not None and path.end is PathEnd.FALLS

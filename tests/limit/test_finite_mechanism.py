@@ -179,6 +179,41 @@ def test_a_joint_that_closes_again_turns_no_further():
     assert min(gap.min() for gap in gaps) > -1e-5
 
 
+def bonded_wall(rows, columns, breadth=0.5, height=0.25):
+    """Courses of stones in running bond on rock."""
+    length = columns * breadth
+    blocks = [box(-0.5, length + 0.5, -0.5, 0.0, "rock", fixed=True)]
+    for row in range(rows):
+        cuts = np.arange(columns + 1) * breadth
+        if row % 2:
+            cuts = np.array([0.0, *(cuts[:-1] + 0.5 * breadth), length])
+        level = row * height
+        blocks += [
+            box(left, right, level, level + height, f"stone {row} {k}")
+            for k, (left, right) in enumerate(zip(cuts[:-1].tolist(), cuts[1:].tolist()))
+        ]
+    return af.masonry.assembled(blocks, lambda a, b: contact(0.6))
+
+
+@pytest.mark.slow
+def test_a_corner_of_a_bonded_wall_turns_away_from_the_stones_it_slides_on():
+    """At rest the factor without dilatancy; then the corner leaves what it slid on along a circle."""
+    wall = bonded_wall(6, 4)
+    flat = af.collapse_factor(wall, live=af.BodyForce(1.0), friction="nonassociated")
+    path = follow(wall)
+    assert path.factors[0] == pytest.approx(flat.factor, rel=1e-6)
+    assert path.end is PathEnd.FALLS
+    assert [c.slip for c in path.mechanisms[0].contacts] == [0]
+
+
+@pytest.mark.slow
+def test_a_mechanism_that_slides_in_forty_joints_is_refused():
+    with pytest.raises(
+        af.DidNotConverge, match="without dilatancy: assess fewer blocks, or forbid"
+    ):
+        follow(bonded_wall(12, 6))
+
+
 def circles_meet(one, r_one, two, r_two, near):
     """Intersection of two circles that is nearer to a point."""
     gap = two - one
