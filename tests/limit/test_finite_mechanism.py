@@ -1,5 +1,6 @@
 """Finite motion of mechanisms: closed forms of rocking, sliding and linkages, and their events."""
 
+from itertools import pairwise
 from math import atan2, cos, hypot, sin, tan
 
 import numpy as np
@@ -190,14 +191,14 @@ def bonded_wall(rows, columns, breadth=0.5, height=0.25):
         level = row * height
         blocks += [
             box(left, right, level, level + height, f"stone {row} {k}")
-            for k, (left, right) in enumerate(zip(cuts[:-1].tolist(), cuts[1:].tolist()))
+            for k, (left, right) in enumerate(pairwise(cuts.tolist()))
         ]
     return af.masonry.assembled(blocks, lambda a, b: contact(0.6))
 
 
 @pytest.mark.slow
 def test_a_corner_of_a_bonded_wall_turns_away_from_the_stones_it_slides_on():
-    """At rest the factor without dilatancy; then the corner leaves what it slid on along a circle."""
+    """The factor without dilatancy; then the corner leaves what it slid on along a circle."""
     wall = bonded_wall(6, 4)
     flat = af.collapse_factor(wall, live=af.BodyForce(1.0), friction="nonassociated")
     path = follow(wall)
