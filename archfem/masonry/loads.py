@@ -177,10 +177,11 @@ class AttachedLoad:
             pair = check_numbers(getattr(self, name), f"attached load, {name} (x, y) [{unit}]", 2)
             object.__setattr__(self, name, pair)
         check_number(self.weight, "attached load, weight [N]", minimum=0.0)
-        if max(self.weight, *map(abs, self.force)) > MAX_POINT_LOAD:
+        max_load = 1e9  # larger ones [N] must be a mistake of units
+        if max(self.weight, *map(abs, self.force)) > max_load:
             raise InvalidInput(
-                f"an attached load of {self.weight} N and {self.force} N is above "
-                f"{MAX_POINT_LOAD:g} N: give newtons"
+                f"an attached load of {self.weight} N and {self.force} N is above {max_load:g} N: "
+                "give newtons"
             )
 
 
