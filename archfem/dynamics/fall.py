@@ -1,19 +1,26 @@
 """Fall of separated blocks to the ground, and the state of collapse at the end of a run.
 
 While joints hold, forces are those of `joints.large`. Once a joint has turned or slid so far that
-its blocks are loose, they continue as free rigid blocks (`dynamics.rigid_body`), with the positions
-and the momentum of the model, until they rest. The final positions classify the collapse.
+its blocks are loose, or stones meet that share no joint, all blocks continue as free rigid blocks
+(`dynamics.rigid_body`), with the positions and the momentum of the model, until they rest. The
+final positions classify the collapse.
 """
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
-from archfem.dynamics.rigid_body.bodies import LooseBlocks, make_bodies
+from archfem.dynamics.rigid_body.bodies import Bodies, LooseBlocks, make_bodies
+from archfem.dynamics.rigid_body.contact_detection import (
+    allocate_pieces,
+    find_meeting,
+    measure_gaps,
+)
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
 from archfem.dynamics.state import Batch, State
 from archfem.errors import InvalidInput
@@ -24,6 +31,9 @@ from archfem.motion.motion import Motion
 
 # Kinds of collapse, in order of severity
 COLLAPSE_STATES = ("stands", "dislocated", "partly fallen", "fallen")
+
+# Coordinates x and y as one complex number
+_PLANE = np.array([1.0, 1.0j])
 
 # Kinds of collapse with lost blocks
 FALLEN_STATES = COLLAPSE_STATES[2:]
@@ -211,6 +221,121 @@ class SeparationMonitor:
         if rotation[k, joint] > self.max_rotation:
             return k, f"'{name}' had turned by {rotation[k, joint]:.2g} rad"
         return k, f"'{name}' had slid by {slip[k, joint]:.2g} m, off its face"
+
+
+@dataclass(frozen=True, eq=False)
+class MeetingMonitor:
+    """Detection of the step at which stones meet that share no joint.
+
+    A model has contact forces in its joints alone. Fill does not count, since it adapts.
+    """
+
+    model: Model
+    start: State  # overlaps at the start of the run do not count
+    # beyond those; stones that touch as built press their joints by less, and none may be deeper
+    # than 1 mm [m]
+    tolerance: float = 5e-4
+
+    def find_first(self, batch: Batch) -> tuple[int, str] | None:
+        """Return the first step of a batch with stones in each other and their names, or None."""
+        observer = self.model.observer()
+        corners = observer.corners(batch.read(observer))
+        if not self._may_meet(corners):
+            return None
+        limits = np.minimum(self._gaps, 0.0) - self.tolerance
+        limits[np.isinf(self._gaps)] = -np.inf
+        world = allocate_pieces(self._bodies)
+        k, *pair = find_meeting(self._bodies, world, self._fit_motions(corners), limits)
+        if k < 0:
+            return None
+        names = [*(f"'{block.name}'" for block in self.model.structure.blocks), "the ground"]
+        return k, f"{names[min(pair)]} met {names[max(pair)]}"
+
+    def _may_meet(self, corners: Array) -> bool:
+        """Return whether any blocks have moved by more than is between them."""
+        # distances of corners are those of their farthest point at least by half: an arc bulges
+        # by half of its chord at most, and displacements of a rigid block are linear
+        squares = np.square(corners - self._corners).sum(axis=-1).max(axis=0)
+        reach = np.zeros(len(self._gaps))
+        reach[self._owner[self._first]] = 2.0 * np.sqrt(np.maximum.reduceat(squares, self._first))
+        return bool(np.any(reach[:, None] + reach > self._room))
+
+    @cached_property
+    def _room(self) -> Array:
+        """Sum of the displacements of two blocks below which they cannot meet (b + 1, b + 1)."""
+        return np.maximum(self._gaps, 0.0) + self.tolerance
+
+    @cached_property
+    def _bodies(self) -> Bodies:
+        """Convex pieces of all blocks."""
+        structure = self.model.structure
+        if self.model.large_displacements:
+            return make_bodies(structure, 0.0)
+        # the level of the ground matters to loose stones alone
+        return make_bodies(structure, 0.0, min(block.points[:, 1].min() for block in structure.blocks))
+
+    @cached_property
+    def _gaps(self) -> Array:
+        """Gaps at the start of blocks and the ground, infinite for exempt pairs (b + 1, b + 1)."""
+        structure, world = self.model.structure, allocate_pieces(self._bodies)
+        gaps = measure_gaps(self._bodies, world, self._fit_motions(self._corners[None])[0])
+        gaps[tuple(structure.pairs.T)] = gaps[tuple(structure.pairs.T[::-1])] = np.inf
+        fill = list(find_yielding_blocks(structure))
+        gaps[fill] = gaps[:, fill] = np.inf
+        fixed = [n for n, block in enumerate(structure.blocks) if block.fixed] + [-1]
+        gaps[np.ix_(fixed, fixed)] = np.inf
+        return gaps
+
+    @cached_property
+    def _owner(self) -> NDArray[np.intp]:
+        """Number of the block of each corner, block by block (c,)."""
+        return self.model.observer().corner_blocks
+
+    @cached_property
+    def _first(self) -> NDArray[np.intp]:
+        """First corner of each free block."""
+        return np.flatnonzero(np.diff(self._owner, prepend=-1))
+
+    @cached_property
+    def _places(self) -> NDArray[np.complex128]:
+        """Corners as built, x + i y, so that a rotation is a product (c,) [m]."""
+        cells = self.model.cells
+        places: NDArray[np.complex128] = cells.places[cells.corners(self.model.structure)] @ _PLANE
+        return places
+
+    @cached_property
+    def _corners(self) -> Array:
+        """Displacements of the corners at the start (c, 2) [m]."""
+        observer = self.model.observer()
+        return observer.corners(observer.read(self.start.q))
+
+    def _fit_motions(self, corners: Array) -> Array:
+        """Return the rigid motions of all blocks that fit displacements of corners best.
+
+        Args:
+            corners: displacements (steps, c, 2) [m].
+
+        Returns:
+            Poses (steps, n_blocks, 3) [m, m, rad].
+        """
+        structure, places = self.model.structure, self._places
+        first, counts = self._first, np.diff(self._first, append=len(self._owner))
+        free = self._owner[first]
+
+        def mean(values: Array) -> Array:
+            means: Array = np.add.reduceat(values, first, axis=-1) / counts
+            return means
+
+        middle, moved = mean(places), mean(corners @ _PLANE)
+        arms = places - np.repeat(middle, counts)
+        after = arms + corners @ _PLANE - np.repeat(moved, counts, axis=-1)
+        # least squares: the angle of the sum of the products
+        turn = np.angle(mean(np.conj(arms) * after))
+        centroids = np.array([structure.blocks[k].centroid for k in free]) @ _PLANE
+        motion = moved + (np.exp(1.0j * turn) - 1.0) * (centroids - middle)
+        poses = np.tile(self.model.support_motion, (len(corners), 1, 1))
+        poses[:, free] = np.stack([motion.real, motion.imag, turn], axis=-1)
+        return poses
 
 
 def _between_stones(structure: Structure) -> NDArray[np.bool_]:
