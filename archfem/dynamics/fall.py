@@ -1,14 +1,16 @@
 """Fall of separated blocks to the ground, and the state of collapse at the end of a run.
 
 While joints hold, forces are those of `joints.large`. Once a joint has turned or slid so far that
-its blocks are loose, or stones meet that share no joint, all blocks continue as free rigid blocks
+its blocks are loose, or stones meet outside their joints, all blocks continue as free rigid blocks
 (`dynamics.rigid_body`), with the positions and the momentum of the model, until they rest. The
 final positions classify the collapse.
 """
 
+import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -17,20 +19,26 @@ from numpy.typing import NDArray
 from archfem._typing import Array
 from archfem.dynamics.rigid_body.bodies import Bodies, LooseBlocks, make_bodies
 from archfem.dynamics.rigid_body.contact_detection import (
+    PlacedPieces,
     allocate_pieces,
     find_meeting,
     measure_gaps,
 )
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
 from archfem.dynamics.state import Batch, State
-from archfem.errors import InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Model, check_model
 from archfem.motion.motion import Motion
 
+logger = logging.getLogger("archfem")
+
 # Kinds of collapse, in order of severity
 COLLAPSE_STATES = ("stands", "dislocated", "partly fallen", "fallen")
+
+# Time steps of loose blocks, each tried where those before failed [s]
+FALL_STEPS = (5e-4, 2.5e-4, 1.25e-4)
 
 # Coordinates x and y as one complex number
 _PLANE = np.array([1.0, 1.0j])
@@ -225,45 +233,84 @@ class SeparationMonitor:
 
 @dataclass(frozen=True, eq=False)
 class MeetingMonitor:
-    """Detection of the step at which stones meet that share no joint.
+    """Detection of the step at which stones meet outside their joints.
 
-    A model has contact forces in its joints alone. Fill does not count, since it adapts.
+    A model has contact forces in its joints alone. Once faces have slid these end with the overlap,
+    although one of the faces may be longer. Fill does not count, since it adapts.
     """
 
     model: Model
     start: State  # overlaps at the start of the run do not count
-    # beyond those; stones that touch as built press their joints by less, and none may be deeper
-    # than 1 mm [m]
+    # deepest overlap beyond that at the start and the compression of joints [m]: stones that touch
+    # as built press each other by less, and none may be deeper than 1 mm
     tolerance: float = 5e-4
 
     def find_first(self, batch: Batch) -> tuple[int, str] | None:
         """Return the first step of a batch with stones in each other and their names, or None."""
         observer = self.model.observer()
-        corners = observer.corners(batch.read(observer))
-        if not self._may_meet(corners):
+        readings = batch.read(observer)
+        corners, structure = observer.corners(readings), self.model.structure
+        gap, rotation, slip = np.moveaxis(observer.faces(readings)[..., self._joints], -2, 0)
+        # beyond its overlap a joint is open; a longer face is entered there by slip × rotation
+        overruns = self.model.large_displacements and self._overruns(rotation, slip)
+        if not overruns and not self._may_meet(corners):
             return None
-        limits = np.minimum(self._gaps, 0.0) - self.tolerance
-        limits[np.isinf(self._gaps)] = -np.inf
-        world = allocate_pieces(self._bodies)
-        k, *pair = find_meeting(self._bodies, world, self._fit_motions(corners), limits)
+        overlap = np.maximum(structure.depths[self._joints] - np.abs(slip), 0.0)
+        depths = np.maximum(0.5 * overlap * np.abs(rotation) - gap, 0.0)
+        pairs = structure.pairs[self._joints]
+        limits = self._limits.copy()
+        if not overruns:
+            limits[tuple(pairs.T)] = limits[tuple(pairs.T[::-1])] = -np.inf
+        k, *pair = find_meeting(
+            self._bodies, self._world, self._fit_motions(corners), limits, pairs, depths
+        )
         if k < 0:
             return None
-        names = [*(f"'{block.name}'" for block in self.model.structure.blocks), "the ground"]
+        names = [*(f"'{block.name}'" for block in structure.blocks), "the ground"]
         return k, f"{names[min(pair)]} met {names[max(pair)]}"
 
+    def _overruns(self, rotation: Array, slip: Array) -> bool:
+        """Return whether a face has slid over its end and turned."""
+        return bool(np.any(np.abs(rotation * slip) > self.tolerance))
+
     def _may_meet(self, corners: Array) -> bool:
-        """Return whether any blocks have moved by more than is between them."""
-        # distances of corners are those of their farthest point at least by half: an arc bulges
-        # by half of its chord at most, and displacements of a rigid block are linear
+        """Return whether any blocks without a joint have moved by more than is between them."""
         squares = np.square(corners - self._corners).sum(axis=-1).max(axis=0)
-        reach = np.zeros(len(self._gaps))
+        reach = np.zeros(len(self._room))
+        # displacements of a rigid block are linear, and arcs bulge by half of a chord at most
         reach[self._owner[self._first]] = 2.0 * np.sqrt(np.maximum.reduceat(squares, self._first))
         return bool(np.any(reach[:, None] + reach > self._room))
 
     @cached_property
+    def _joints(self) -> NDArray[np.intp]:
+        """Numbers of the joints between stones."""
+        return np.flatnonzero(_between_stones(self.model.structure))
+
+    @cached_property
+    def _gaps(self) -> Array:
+        """Gaps at the start of blocks and the ground; infinite with fill (b + 1, b + 1) [m]."""
+        gaps = measure_gaps(self._bodies, self._world, self._fit_motions(self._corners[None])[0])
+        fill = list(find_yielding_blocks(self.model.structure))
+        gaps[fill] = gaps[:, fill] = np.inf
+        return gaps
+
+    @cached_property
+    def _limits(self) -> Array:
+        """Gaps below which blocks have met, apart from compression in joints (b + 1, b + 1) [m]."""
+        # arcs are chords here, so that blocks may be in each other as built
+        return np.where(np.isinf(self._gaps), -np.inf, np.minimum(self._gaps, 0.0) - self.tolerance)
+
+    @cached_property
     def _room(self) -> Array:
-        """Sum of the displacements of two blocks below which they cannot meet (b + 1, b + 1)."""
-        return np.maximum(self._gaps, 0.0) + self.tolerance
+        """Sum of displacements without which two blocks cannot meet (b + 1, b + 1) [m]."""
+        pairs, room = self.model.structure.pairs, np.maximum(self._gaps, 0.0) + self.tolerance
+        room[tuple(pairs.T)] = room[tuple(pairs.T[::-1])] = np.inf
+        return room
+
+    @cached_property
+    def _world(self) -> PlacedPieces:
+        """Workspace of the pieces."""
+        return allocate_pieces(self._bodies)
 
     @cached_property
     def _bodies(self) -> Bodies:
@@ -272,19 +319,9 @@ class MeetingMonitor:
         if self.model.large_displacements:
             return make_bodies(structure, 0.0)
         # the level of the ground matters to loose stones alone
-        return make_bodies(structure, 0.0, min(block.points[:, 1].min() for block in structure.blocks))
-
-    @cached_property
-    def _gaps(self) -> Array:
-        """Gaps at the start of blocks and the ground, infinite for exempt pairs (b + 1, b + 1)."""
-        structure, world = self.model.structure, allocate_pieces(self._bodies)
-        gaps = measure_gaps(self._bodies, world, self._fit_motions(self._corners[None])[0])
-        gaps[tuple(structure.pairs.T)] = gaps[tuple(structure.pairs.T[::-1])] = np.inf
-        fill = list(find_yielding_blocks(structure))
-        gaps[fill] = gaps[:, fill] = np.inf
-        fixed = [n for n, block in enumerate(structure.blocks) if block.fixed] + [-1]
-        gaps[np.ix_(fixed, fixed)] = np.inf
-        return gaps
+        return make_bodies(
+            structure, 0.0, min(block.points[:, 1].min() for block in structure.blocks)
+        )
 
     @cached_property
     def _owner(self) -> NDArray[np.intp]:
@@ -322,8 +359,8 @@ class MeetingMonitor:
         first, counts = self._first, np.diff(self._first, append=len(self._owner))
         free = self._owner[first]
 
-        def mean(values: Array) -> Array:
-            means: Array = np.add.reduceat(values, first, axis=-1) / counts
+        def mean(values: NDArray[Any]) -> NDArray[Any]:
+            means: NDArray[Any] = np.add.reduceat(values, first, axis=-1) / counts
             return means
 
         middle, moved = mean(places), mean(corners @ _PLANE)
@@ -356,15 +393,28 @@ def simulate_fall(
 ) -> tuple[xr.Dataset, CollapseState]:
     """Follow loose blocks until they rest, or until `settling_time` after the motion has ended [s].
 
-    Displacements count from the start of the run.
+    Displacements count from the start of the run. Steps are shortened where they fail.
     """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + settling_time
-    simulation = RigidBlockSimulation(_with_sliding_joints(model.structure))
-    frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
-    poses, _ = model.rigid_motions(start.q, start.velocity)
-    fall = classify_collapse(model.structure, frames, poses)
-    return _fall_dataset(frames, motion, released), fall
+    loose = _with_sliding_joints(model.structure)
+    failure = None
+    for dt in FALL_STEPS:
+        simulation = RigidBlockSimulation(loose, dt=dt)
+        try:
+            frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
+        except DidNotConverge as error:
+            logger.info("the fall is repeated with shorter steps: %s", error)
+            failure = error
+            continue
+        poses, _ = model.rigid_motions(start.q, start.velocity)
+        fall = classify_collapse(model.structure, frames, poses)
+        return _fall_dataset(frames, motion, released).assign_attrs(fall_step=dt), fall
+    raise DidNotConverge(
+        f"loose blocks could not be followed from {state.time:.4g} s on, by steps of "
+        f"{1e3 * FALL_STEPS[0]:g} to {1e3 * FALL_STEPS[-1]:g} ms ('{failure}'): compare with "
+        "another dt of time_history, or with archfem.dynamics.RigidBlockSimulation from the start"
+    ) from failure
 
 
 def _fall_dataset(

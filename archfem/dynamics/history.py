@@ -57,7 +57,7 @@ class Ending(StrEnum):
         INTERRUPTED: by Ctrl-C.
         FAILED: at a step without equilibrium.
         PARTED: by separation of blocks, whose fall was then followed to the ground.
-        MET: by a meeting of stones that share no joint; loose blocks were followed from before it.
+        MET: by stones that met outside their joints; loose blocks were followed from before that.
     """
 
     FINISHED = "finished"

@@ -310,9 +310,7 @@ def _run_steps(
     return Ending.FINISHED, "reached the end of the motion"
 
 
-def _find_end(
-    monitors: Monitors, batch: Batch, before: float
-) -> tuple[Ending, str | None, int]:
+def _find_end(monitors: Monitors, batch: Batch, before: float) -> tuple[Ending, str | None, int]:
     """Return how and why a run ends within a batch, if it does, and after how many steps."""
     event, loosening = monitors
     ending, reason, last = _find_loosening(loosening, batch)
@@ -333,7 +331,7 @@ def _find_loosening(
     loose, met = (monitor.find_first(batch) for monitor in monitors)
     # loose blocks start from before they meet: a joint does not know of the other stone
     if met is not None and (loose is None or met[0] <= loose[0]):
-        return Ending.MET, f"stones meeting that share no joint: {met[1]}", met[0]
+        return Ending.MET, f"stones meeting outside their joints: {met[1]}", met[0]
     if loose is not None:
         return Ending.PARTED, f"the blocks coming loose: {loose[1]}", loose[0] + 1
     return Ending.FINISHED, None, len(batch.times)

@@ -344,19 +344,27 @@ def measure_gaps(bodies, world, q):  # type: ignore
 
 
 @numba.njit(cache=True)
-def find_meeting(bodies, world, motions, limits):  # type: ignore
+def find_meeting(bodies, world, motions, limits, pairs, depths):  # type: ignore
     """Return the first of many poses (steps, b, 3) at which a gap is below its limit, and the pair.
 
-    A limit of minus infinity exempts a pair; none may be positive. The step is -1 for no meeting.
+    Limits (b + 1, b + 1) are never positive, and minus infinity exempts a pair. Those of `pairs`
+    (j, 2) are lower at each step by `depths` (steps, j). The step is -1 for no meeting.
     """
-    ground = len(bodies.mass)
+    ground, limit = len(bodies.mass), limits.copy()
     for step in range(len(motions)):
+        # two blocks may have several joints: the deepest counts
+        for j in range(len(pairs)):
+            limit[pairs[j, 0], pairs[j, 1]] = limits[pairs[j, 0], pairs[j, 1]]
+        for j in range(len(pairs)):
+            one, two = pairs[j]
+            limit[one, two] = min(limit[one, two], limits[one, two] - depths[step, j])
+            limit[two, one] = limit[one, two]
         place_pieces(bodies, motions[step], world)
         order, boxes = world.order, world.boxes
         for k in range(len(order)):
             one = order[k]
             body = bodies.owner[one]
-            if boxes[one, 2] - bodies.level < limits[body, ground]:
+            if boxes[one, 2] - bodies.level < limit[body, ground]:
                 return step, body, ground
             for later in range(k + 1, len(order)):
                 two = order[later]
@@ -365,7 +373,7 @@ def find_meeting(bodies, world, motions, limits):  # type: ignore
                     break
                 if boxes[one, 2] > boxes[two, 3] or boxes[two, 2] > boxes[one, 3]:
                     continue
-                limit = limits[body, bodies.owner[two]]
-                if limit > -np.inf and _widest_gap(bodies, world, one, two) < limit:
+                deepest = limit[body, bodies.owner[two]]
+                if deepest > -np.inf and _widest_gap(bodies, world, one, two) < deepest:
                     return step, body, bodies.owner[two]
     return -1, 0, 0
