@@ -249,37 +249,43 @@ class MeetingMonitor:
         """Return the first step of a batch with stones in each other and their names, or None."""
         observer = self.model.observer()
         readings = batch.read(observer)
-        corners, structure = observer.corners(readings), self.model.structure
-        gap, rotation, slip = np.moveaxis(observer.faces(readings)[..., self._joints], -2, 0)
-        # beyond its overlap a joint is open; a longer face is entered there by slip × rotation
-        overruns = self.model.large_displacements and self._overruns(rotation, slip)
+        corners, faces = observer.corners(readings), observer.faces(readings)
+        overruns = self._may_overrun(faces)
         if not overruns and not self._may_meet(corners):
             return None
-        overlap = np.maximum(structure.depths[self._joints] - np.abs(slip), 0.0)
-        depths = np.maximum(0.5 * overlap * np.abs(rotation) - gap, 0.0)
-        pairs = structure.pairs[self._joints]
-        limits = self._limits.copy()
+        limits, pairs = self._limits.copy(), self.model.structure.pairs[self._joints]
         if not overruns:
             limits[tuple(pairs.T)] = limits[tuple(pairs.T[::-1])] = -np.inf
-        k, *pair = find_meeting(
-            self._bodies, self._world, self._fit_motions(corners), limits, pairs, depths
-        )
+        poses, depths = self._fit_motions(corners), self._compressions(faces)
+        k, *pair = find_meeting(self._bodies, self._world, poses, limits, pairs, depths)
         if k < 0:
             return None
-        names = [*(f"'{block.name}'" for block in structure.blocks), "the ground"]
+        names = [*(f"'{block.name}'" for block in self.model.structure.blocks), "the ground"]
         return k, f"{names[min(pair)]} met {names[max(pair)]}"
 
-    def _overruns(self, rotation: Array, slip: Array) -> bool:
-        """Return whether a face has slid over its end and turned."""
-        return bool(np.any(np.abs(rotation * slip) > self.tolerance))
+    def _may_overrun(self, faces: Array) -> bool:
+        """Return whether a face has slid over its end and turned, with large displacements."""
+        # beyond the overlap a joint is open, and slip × rotation is how deep a longer face is there
+        _, rotation, slip = np.abs(faces).max(axis=0)
+        return self.model.large_displacements and bool(np.any(rotation * slip > self.tolerance))
 
     def _may_meet(self, corners: Array) -> bool:
         """Return whether any blocks without a joint have moved by more than is between them."""
-        squares = np.square(corners - self._corners).sum(axis=-1).max(axis=0)
+        farthest = np.maximum(
+            corners.max(axis=0) - self._corners, self._corners - corners.min(axis=0)
+        )
+        distances = np.hypot(*farthest.T)
         reach = np.zeros(len(self._room))
         # displacements of a rigid block are linear, and arcs bulge by half of a chord at most
-        reach[self._owner[self._first]] = 2.0 * np.sqrt(np.maximum.reduceat(squares, self._first))
+        reach[self._owner[self._first]] = 2.0 * np.maximum.reduceat(distances, self._first)
         return bool(np.any(reach[:, None] + reach > self._room))
+
+    def _compressions(self, faces: Array) -> Array:
+        """Return how deep stones are in each other at their joints (steps, joints) [m]."""
+        gap, rotation, slip = np.moveaxis(faces[..., self._joints], -2, 0)
+        overlap = np.maximum(self.model.structure.depths[self._joints] - np.abs(slip), 0.0)
+        depths: Array = np.maximum(0.5 * overlap * np.abs(rotation) - gap, 0.0)
+        return depths
 
     @cached_property
     def _joints(self) -> NDArray[np.intp]:
