@@ -27,7 +27,7 @@ from archfem.dynamics.rigid_body.contact_detection import (
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
 from archfem.dynamics.state import Batch, State
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.masonry.stiffness_ratio import find_yielding_blocks
+from archfem.masonry.stiffness_ratio import find_soft_blocks, find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Model, check_model
 from archfem.motion.motion import Motion
@@ -296,7 +296,7 @@ class MeetingMonitor:
     def _gaps(self) -> Array:
         """Gaps at the start of blocks and the ground; infinite with fill (b + 1, b + 1) [m]."""
         gaps = measure_gaps(self._bodies, self._world, self._fit_motions(self._corners[None])[0])
-        fill = list(find_yielding_blocks(self.model.structure))
+        fill = _find_fill(self.model.structure)
         gaps[fill] = gaps[:, fill] = np.inf
         return gaps
 
@@ -383,7 +383,15 @@ class MeetingMonitor:
 
 def _between_stones(structure: Structure) -> NDArray[np.bool_]:
     """Return whether joints have no fill on either side (j,)."""
-    return ~np.isin(structure.pairs, find_yielding_blocks(structure)).any(axis=1)
+    return ~np.isin(structure.pairs, _find_fill(structure)).any(axis=1)
+
+
+def _find_fill(structure: Structure) -> list[int]:
+    """Return the blocks that adapt to others: pieces of a fill, and blocks soft in themselves."""
+    # stones of no role on stiff joints yield before these open, and are stones
+    soft = find_soft_blocks(structure)
+    blocks = structure.blocks
+    return [k for k in find_yielding_blocks(structure) if blocks[k].grain or k in soft]
 
 
 def is_overturning(model: Model, state: State, min_rotation: float = 0.05) -> bool:

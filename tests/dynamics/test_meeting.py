@@ -1,5 +1,6 @@
 """Stones that share no joint meet: loose blocks are followed from before they touch."""
 
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -202,6 +203,18 @@ def test_stones_with_a_joint_and_fill_are_exempt(pair):
     filled = af.build(on_floor(*stones), fidelity="rigid", displacements="large")
     monitor = MeetingMonitor(filled, at_rest(filled, np.zeros(6)))
     assert monitor.find_first(steps([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])) is None
+
+
+def test_stones_without_a_role_are_no_fill():
+    """Stones on joints stiffer than themselves meet too, whatever part they belong to."""
+    stiff = replace(CONTACT, normal_stiffness=1e11)
+    stones = (stone("one", 0.0, 0.0, 0.6, 2.4), stone("two", 0.65, 0.0, 1.25, 2.4))
+    built = on_floor(*stones)
+    joints = tuple(replace(joint, contact=stiff, part="", role="") for joint in built.joints)
+    model = af.build(replace(built, joints=joints), fidelity="rigid", displacements="large")
+    monitor = MeetingMonitor(model, at_rest(model, np.zeros(6)))
+    moved = steps([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert monitor.find_first(moved) == (0, "'one' met 'two'")
 
 
 def test_a_face_that_goes_on_beyond_its_joint_is_met(pair):
