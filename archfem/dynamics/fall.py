@@ -1,30 +1,48 @@
 """Fall of separated blocks to the ground, and the state of collapse at the end of a run.
 
 While joints hold, forces are those of `joints.large`. Once a joint has turned or slid so far that
-its blocks are loose, they continue as free rigid blocks (`dynamics.rigid_body`), with the positions
-and the momentum of the model, until they rest. The final positions classify the collapse.
+its blocks are loose, or stones meet outside their joints, all blocks continue as free rigid blocks
+(`dynamics.rigid_body`), with the positions and the momentum of the model, until they rest. The
+final positions classify the collapse.
 """
 
+import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
-from archfem.dynamics.rigid_body.bodies import LooseBlocks, make_bodies
+from archfem.dynamics.rigid_body.bodies import Bodies, LooseBlocks, make_bodies
+from archfem.dynamics.rigid_body.contact_detection import (
+    PlacedPieces,
+    allocate_pieces,
+    find_meeting,
+    measure_gaps,
+)
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
 from archfem.dynamics.state import Batch, State
-from archfem.errors import InvalidInput
-from archfem.masonry.stiffness_ratio import find_yielding_blocks
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.masonry.stiffness_ratio import find_soft_blocks, find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Model, check_model
 from archfem.motion.motion import Motion
 from archfem.units import G
 
+logger = logging.getLogger("archfem")
+
 # Kinds of collapse, in order of severity
 COLLAPSE_STATES = ("stands", "dislocated", "partly fallen", "fallen")
+
+# Time steps of loose blocks, each tried where those before failed [s]
+FALL_STEPS = (5e-4, 2.5e-4, 1.25e-4)
+
+# Coordinates x and y as one complex number
+_PLANE = np.array([1.0, 1.0j])
 
 # Kinds of collapse with lost blocks
 FALLEN_STATES = COLLAPSE_STATES[2:]
@@ -220,9 +238,167 @@ class SeparationMonitor:
         return k, f"'{name}' had slid by {slip[k, joint]:.2g} m, off its face"
 
 
+@dataclass(frozen=True, eq=False)
+class MeetingMonitor:
+    """Detection of the step at which stones meet outside their joints.
+
+    A model has contact forces in its joints alone. Once faces have slid these end with the overlap,
+    although one of the faces may be longer. Fill does not count, since it adapts.
+    """
+
+    model: Model
+    start: State  # overlaps at the start of the run do not count
+    # deepest overlap beyond that at the start and the compression of joints [m]: stones that touch
+    # as built press each other by less, and none may be deeper than 1 mm
+    tolerance: float = 5e-4
+
+    def find_first(self, batch: Batch) -> tuple[int, str] | None:
+        """Return the first step of a batch with stones in each other and their names, or None."""
+        observer = self.model.observer()
+        readings = batch.read(observer)
+        corners, faces = observer.corners(readings), observer.faces(readings)
+        overruns = self._may_overrun(faces)
+        if not overruns and not self._may_meet(corners):
+            return None
+        limits, pairs = self._limits.copy(), self.model.structure.pairs[self._joints]
+        if not overruns:
+            limits[tuple(pairs.T)] = limits[tuple(pairs.T[::-1])] = -np.inf
+        poses, depths = self._fit_motions(corners), self._compressions(faces)
+        k, *pair = find_meeting(self._bodies, self._world, poses, limits, pairs, depths)
+        if k < 0:
+            return None
+        names = [*(f"'{block.name}'" for block in self.model.structure.blocks), "the ground"]
+        return k, f"{names[min(pair)]} met {names[max(pair)]}"
+
+    def _may_overrun(self, faces: Array) -> bool:
+        """Return whether a face has slid over its end and turned, with large displacements."""
+        # beyond the overlap a joint is open, and slip × rotation is how deep a longer face is there
+        _, rotation, slip = np.abs(faces).max(axis=0)
+        return self.model.large_displacements and bool(np.any(rotation * slip > self.tolerance))
+
+    def _may_meet(self, corners: Array) -> bool:
+        """Return whether any blocks without a joint have moved by more than is between them."""
+        farthest = np.maximum(
+            corners.max(axis=0) - self._corners, self._corners - corners.min(axis=0)
+        )
+        distances = np.hypot(*farthest.T)
+        reach = np.zeros(len(self._room))
+        # displacements of a rigid block are linear, and arcs bulge by half of a chord at most
+        reach[self._owner[self._first]] = 2.0 * np.maximum.reduceat(distances, self._first)
+        return bool(np.any(reach[:, None] + reach > self._room))
+
+    def _compressions(self, faces: Array) -> Array:
+        """Return how deep stones are in each other at their joints (steps, joints) [m]."""
+        gap, rotation, slip = np.moveaxis(faces[..., self._joints], -2, 0)
+        overlap = np.maximum(self.model.structure.depths[self._joints] - np.abs(slip), 0.0)
+        depths: Array = np.maximum(0.5 * overlap * np.abs(rotation) - gap, 0.0)
+        return depths
+
+    @cached_property
+    def _joints(self) -> NDArray[np.intp]:
+        """Numbers of the joints between stones."""
+        return np.flatnonzero(_between_stones(self.model.structure))
+
+    @cached_property
+    def _gaps(self) -> Array:
+        """Gaps at the start of blocks and the ground; infinite with fill (b + 1, b + 1) [m]."""
+        gaps = measure_gaps(self._bodies, self._world, self._fit_motions(self._corners[None])[0])
+        fill = _find_fill(self.model.structure)
+        gaps[fill] = gaps[:, fill] = np.inf
+        return gaps
+
+    @cached_property
+    def _limits(self) -> Array:
+        """Gaps below which blocks have met, apart from compression in joints (b + 1, b + 1) [m]."""
+        # arcs are chords here, so that blocks may be in each other as built
+        return np.where(np.isinf(self._gaps), -np.inf, np.minimum(self._gaps, 0.0) - self.tolerance)
+
+    @cached_property
+    def _room(self) -> Array:
+        """Sum of displacements without which two blocks cannot meet (b + 1, b + 1) [m]."""
+        pairs, room = self.model.structure.pairs, np.maximum(self._gaps, 0.0) + self.tolerance
+        room[tuple(pairs.T)] = room[tuple(pairs.T[::-1])] = np.inf
+        return room
+
+    @cached_property
+    def _world(self) -> PlacedPieces:
+        """Workspace of the pieces."""
+        return allocate_pieces(self._bodies)
+
+    @cached_property
+    def _bodies(self) -> Bodies:
+        """Convex pieces of all blocks."""
+        structure = self.model.structure
+        if self.model.large_displacements:
+            return make_bodies(structure, 0.0)
+        # the level of the ground matters to loose stones alone
+        return make_bodies(
+            structure, 0.0, min(block.points[:, 1].min() for block in structure.blocks)
+        )
+
+    @cached_property
+    def _owner(self) -> NDArray[np.intp]:
+        """Number of the block of each corner, block by block (c,)."""
+        return self.model.observer().corner_blocks
+
+    @cached_property
+    def _first(self) -> NDArray[np.intp]:
+        """First corner of each free block."""
+        return np.flatnonzero(np.diff(self._owner, prepend=-1))
+
+    @cached_property
+    def _places(self) -> NDArray[np.complex128]:
+        """Corners as built, x + i y, so that a rotation is a product (c,) [m]."""
+        cells = self.model.cells
+        places: NDArray[np.complex128] = cells.places[cells.corners(self.model.structure)] @ _PLANE
+        return places
+
+    @cached_property
+    def _corners(self) -> Array:
+        """Displacements of the corners at the start (c, 2) [m]."""
+        observer = self.model.observer()
+        return observer.corners(observer.read(self.start.q))
+
+    def _fit_motions(self, corners: Array) -> Array:
+        """Return the rigid motions of all blocks that fit displacements of corners best.
+
+        Args:
+            corners: displacements (steps, c, 2) [m].
+
+        Returns:
+            Poses (steps, n_blocks, 3) [m, m, rad].
+        """
+        structure, places = self.model.structure, self._places
+        first, counts = self._first, np.diff(self._first, append=len(self._owner))
+        free = self._owner[first]
+
+        def mean(values: NDArray[Any]) -> NDArray[Any]:
+            means: NDArray[Any] = np.add.reduceat(values, first, axis=-1) / counts
+            return means
+
+        middle, moved = mean(places), mean(corners @ _PLANE)
+        arms = places - np.repeat(middle, counts)
+        after = arms + corners @ _PLANE - np.repeat(moved, counts, axis=-1)
+        # least squares: the angle of the sum of the products
+        turn = np.angle(mean(np.conj(arms) * after))
+        centroids = np.array([structure.blocks[k].centroid for k in free]) @ _PLANE
+        motion = moved + (np.exp(1.0j * turn) - 1.0) * (centroids - middle)
+        poses = np.tile(self.model.support_motion, (len(corners), 1, 1))
+        poses[:, free] = np.stack([motion.real, motion.imag, turn], axis=-1)
+        return poses
+
+
 def _between_stones(structure: Structure) -> NDArray[np.bool_]:
     """Return whether joints have no fill on either side (j,)."""
-    return ~np.isin(structure.pairs, find_yielding_blocks(structure)).any(axis=1)
+    return ~np.isin(structure.pairs, _find_fill(structure)).any(axis=1)
+
+
+def _find_fill(structure: Structure) -> list[int]:
+    """Return the blocks that adapt to others: pieces of a fill, and blocks soft in themselves."""
+    # stones of no role on stiff joints yield before these open, and are stones
+    soft = find_soft_blocks(structure)
+    blocks = structure.blocks
+    return [k for k in find_yielding_blocks(structure) if blocks[k].grain or k in soft]
 
 
 def is_overturning(model: Model, state: State, min_rotation: float = 0.05) -> bool:
@@ -243,15 +419,28 @@ def simulate_fall(
 ) -> tuple[xr.Dataset, CollapseState]:
     """Follow loose blocks until they rest, or until `settling_time` after the motion has ended [s].
 
-    Displacements count from the start of the run.
+    Displacements count from the start of the run. Steps are shortened where they fail.
     """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + settling_time
-    simulation = RigidBlockSimulation(_with_sliding_joints(model.structure))
-    frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
-    poses, _ = model.rigid_motions(start.q, start.velocity)
-    fall = classify_collapse(model.structure, frames, poses)
-    return _fall_dataset(frames, motion, released), fall
+    loose = _with_sliding_joints(model.structure)
+    failure = None
+    for dt in FALL_STEPS:
+        simulation = RigidBlockSimulation(loose, dt=dt)
+        try:
+            frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
+        except DidNotConverge as error:
+            logger.info("the fall is repeated with shorter steps: %s", error)
+            failure = error
+            continue
+        poses, _ = model.rigid_motions(start.q, start.velocity)
+        fall = classify_collapse(model.structure, frames, poses)
+        return _fall_dataset(frames, motion, released).assign_attrs(fall_step=dt), fall
+    raise DidNotConverge(
+        f"loose blocks could not be followed from {state.time:.4g} s on, by steps of "
+        f"{1e3 * FALL_STEPS[0]:g} to {1e3 * FALL_STEPS[-1]:g} ms ('{failure}'): compare with "
+        "another dt of time_history, or with archfem.dynamics.RigidBlockSimulation from the start"
+    ) from failure
 
 
 def _fall_dataset(

@@ -57,6 +57,7 @@ class Ending(StrEnum):
         INTERRUPTED: by Ctrl-C.
         FAILED: at a step without equilibrium.
         PARTED: by separation of blocks, whose fall was then followed to the ground.
+        MET: by stones that met outside their joints; loose blocks were followed from before that.
     """
 
     FINISHED = "finished"
@@ -64,11 +65,12 @@ class Ending(StrEnum):
     INTERRUPTED = "interrupted"
     FAILED = "failed"
     PARTED = "parted"
+    MET = "met"
 
     @property
     def is_complete(self) -> bool:
         """Whether the run was neither interrupted nor failed."""
-        return self in (Ending.FINISHED, Ending.EVENT, Ending.PARTED)
+        return self not in (Ending.INTERRUPTED, Ending.FAILED)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

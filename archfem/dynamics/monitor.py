@@ -16,12 +16,14 @@ step of a batch.
 """
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 from scipy import sparse
 from scipy.integrate import trapezoid
 
 from archfem._typing import Array
+from archfem.dynamics.fall import MeetingMonitor
 from archfem.dynamics.state import Batch, State
 from archfem.errors import DidNotConverge
 from archfem.models.model import Doubt, Model, Observer
@@ -143,6 +145,8 @@ class RunMonitor:
         self._drift_error: tuple[float, float] | None = None  # first time [s] and drift beyond it
         self._observer = model.observer()
         self._small = not model.large_displacements
+        self._meeting = MeetingMonitor(model, start.state(0))
+        self._met: tuple[float, str] | None = None  # first time [s], and which stones
         self._mismatch = (0.0, "")  # slip over facet length, and the joint
         self._depth = float(model.structure.depths.min())
         self._last, self._before = start.state(0), start.state(0)
@@ -193,6 +197,7 @@ class RunMonitor:
         if self._small:
             rotation = float(np.abs(self._observer.faces(readings)[:, 1]).max())
             self.largest_turn = max(self.largest_turn, rotation)
+            self._watch_meeting(replace(batch, readings=readings))
         # facets cost a sparse product, hence not at every step
         for k in range(-self._steps % facet_check_interval, len(batch.times), facet_check_interval):
             slip = self.model.face_mismatch(batch.state(k).q)
@@ -200,6 +205,11 @@ class RunMonitor:
         self._steps += len(batch.times)
         self._before, self._last = self._last, batch.state(len(batch.times) - 1)
         return drift
+
+    def _watch_meeting(self, batch: Batch) -> None:
+        """Store the first meeting of stones outside their joints."""
+        if self._met is None and (met := self._meeting.find_first(batch)):
+            self._met = float(batch.times[met[0]]), met[1]
 
     def check_run(self) -> None:
         """Raise an error if the steps added are wrong, and warn if they are doubtful."""
@@ -250,6 +260,13 @@ class RunMonitor:
                 f"by t = {time:.4g} s a joint had turned by {self.largest_turn:.2g} rad: to take "
                 "displacements as small errs by 0.01 and more in |e| there",
                 "compare with build(…, displacements='large')",
+            )
+        if self._met is not None:
+            self._add_doubt(
+                "meeting",
+                f"at t = {self._met[0]:.4g} s {self._met[1]}, with which it shares no joint: small "
+                "displacements let stones pass through each other",
+                "follow them with build(…, displacements='large')",
             )
         if self.largest_displacement > self._depth:
             self._add_doubt(

@@ -21,7 +21,13 @@ from archfem.dynamics.events import (
     resolve_criteria,
     start_monitor,
 )
-from archfem.dynamics.fall import SeparationMonitor, is_overturning, simulate_fall, standing_state
+from archfem.dynamics.fall import (
+    MeetingMonitor,
+    SeparationMonitor,
+    is_overturning,
+    simulate_fall,
+    standing_state,
+)
 from archfem.dynamics.history import Ending, History, with_fall
 from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.recorder import Recorder
@@ -171,7 +177,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     adaptive = None if dt else AdaptiveStepper(stepper, tolerance, first)
     try:
         recorder.add(first)
-        monitors = event, SeparationMonitor(model) if model.large_displacements else None
+        loosening = SeparationMonitor(model), MeetingMonitor(model, start)
+        monitors = event, loosening if model.large_displacements else None
         ending, outcome = _run_steps(adaptive or stepper, recorder, monitors, motion.duration)
     except KeyboardInterrupt:
         ending, outcome = Ending.INTERRUPTED, f"interrupted at {recorder.state.time:.4g} s"
@@ -192,9 +199,9 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
 def _follow_fall(
     history: History, model: Model, start: State, state: State, motion: Motion
 ) -> History:
-    """Add the fall of separated or overturning blocks, and the state of collapse, to a history."""
+    """Add the fall of loose or overturning blocks, and the state of collapse, to a history."""
     tilts = history.ending is Ending.FINISHED and is_overturning(model, state)
-    if history.ending is not Ending.PARTED and not tilts:
+    if history.ending not in (Ending.PARTED, Ending.MET) and not tilts:
         shaken = history.ending is not Ending.FINISHED
         return with_fall(history, standing_state(model, start, state, shaken))
     try:
@@ -278,11 +285,12 @@ def _make_recorder(
     )
 
 
+# What may end a run: an event, and separation and meeting of blocks where displacements are large
+Monitors = tuple[EventMonitor | None, tuple[SeparationMonitor, MeetingMonitor] | None]
+
+
 def _run_steps(
-    stepper: Stepper | AdaptiveStepper,
-    recorder: Recorder,
-    monitors: tuple[EventMonitor | None, SeparationMonitor | None],
-    end: float,
+    stepper: Stepper | AdaptiveStepper, recorder: Recorder, monitors: Monitors, end: float
 ) -> tuple[Ending, str]:
     """Record steps up to an event or the end of the motion; return how and why the run ended."""
     start = recorder.state
@@ -295,28 +303,39 @@ def _run_steps(
     with tqdm(total=duration, unit="s", disable=None, leave=False) as bar:
         for batch in batches:
             ending, reason, size = _find_end(monitors, batch, recorder.state.time)
-            recorder.add(batch.cut(size), last=reason is not None)
+            if size:
+                recorder.add(batch.cut(size), last=reason is not None)
             bar.update(round(recorder.state.time - start.time - bar.n, 4))
             if reason is not None:
                 return ending, f"ended at {recorder.state.time:.4g} s by {reason}"
     return Ending.FINISHED, "reached the end of the motion"
 
 
-def _find_end(
-    monitors: tuple[EventMonitor | None, SeparationMonitor | None], batch: Batch, before: float
-) -> tuple[Ending, str | None, int]:
+def _find_end(monitors: Monitors, batch: Batch, before: float) -> tuple[Ending, str | None, int]:
     """Return how and why a run ends within a batch, if it does, and after how many steps."""
-    event, separation = monitors
-    loose = separation.find_first(batch) if separation is not None else None
-    last = len(batch.times) if loose is None else loose[0] + 1
-    # an event at the step of separation or before has precedence
-    if event is not None:
+    event, loosening = monitors
+    ending, reason, last = _find_loosening(loosening, batch)
+    # an event at that step or before has precedence
+    if event is not None and last:
         steps = np.diff(batch.times[:last], prepend=before).tolist()
         if met := first_event(event, batch.resultants[:last], steps):
             return Ending.EVENT, met[1], met[0] + 1
+    return ending, reason, last
+
+
+def _find_loosening(
+    monitors: tuple[SeparationMonitor, MeetingMonitor] | None, batch: Batch
+) -> tuple[Ending, str | None, int]:
+    """Return how and why blocks become loose within a batch, and after how many steps."""
+    if monitors is None:
+        return Ending.FINISHED, None, len(batch.times)
+    loose, met = (monitor.find_first(batch) for monitor in monitors)
+    # loose blocks start from before they meet: a joint does not know of the other stone
+    if met is not None and (loose is None or met[0] <= loose[0]):
+        return Ending.MET, f"stones meeting outside their joints: {met[1]}", met[0]
     if loose is not None:
-        return Ending.PARTED, f"the blocks coming loose: {loose[1]}", last
-    return Ending.FINISHED, None, last
+        return Ending.PARTED, f"the blocks coming loose: {loose[1]}", loose[0] + 1
+    return Ending.FINISHED, None, len(batch.times)
 
 
 def last_state(history: History) -> State:

@@ -102,7 +102,7 @@ def _run(
     """A run, the limit states it reaches, and its demands, infinite if it is incomplete."""
     try:
         run = run_motion(result, motion)
-        complete = run.ending is not Ending.PARTED
+        complete = run.ending not in (Ending.PARTED, Ending.MET)
     except DidNotConverge as error:
         run, complete = partial_history(error), False
     mechanisms, demands = first_mechanisms(run), dict.fromkeys(DEMAND_NAMES, inf)

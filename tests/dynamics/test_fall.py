@@ -108,7 +108,7 @@ def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypat
     calls = []
 
     class Simulation:
-        def __init__(self, structure):
+        def __init__(self, structure, *, dt):
             calls.append(structure)
 
         def frames(self, start, end, motion, *, spacing):
@@ -130,6 +130,35 @@ def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypat
         assert count == 1
     assert dataset["fall_ground"].values == pytest.approx(np.array([[0.1, 0.0]]))
     assert dataset.attrs["handover_kinetic"].tolist() == [2.0, 1.5]
+
+
+@pytest.mark.parametrize("longest", [5e-4, 3e-4, 1.25e-4, 1e-4])
+def test_a_fall_that_fails_is_repeated_with_shorter_steps(tower, monkeypatch, longest):
+    """Down to an eighth of a millisecond, beyond which the error says what a user can do."""
+
+    class Simulation:
+        def __init__(self, structure, *, dt):
+            self.dt = dt
+
+        def frames(self, start, end, motion, *, spacing):
+            yield start
+            if self.dt > longest:
+                raise af.errors.DidNotConverge(f"overlap by {self.dt} s")
+
+    monkeypatch.setattr(fall, "RigidBlockSimulation", Simulation)
+    rest = State(1.0, *np.zeros((3, tower.size)))
+    still = af.Motion(np.zeros(3), 1.0)
+    if longest < 1.25e-4:
+        with pytest.raises(
+            af.errors.DidNotConverge, match=r"1 s on, by steps of 0\.5 to 0\.125 ms"
+        ):
+            fall.simulate_fall(tower, rest, rest, still)
+        return
+    dataset, found = fall.simulate_fall(tower, rest, rest, still)
+    assert found.kind == "stands"
+    expected = {5e-4: 5e-4, 3e-4: 2.5e-4, 1.25e-4: 1.25e-4}[longest]
+    assert dataset.attrs["fall_step"] == expected
+    assert dataset.sizes["fall_frame"] == 1
 
 
 def test_loose_stones_rub_as_their_joints_did_or_by_six_tenths():

@@ -165,27 +165,36 @@ def test_steps_are_those_asked_for_or_foreseen_or_chosen_by_a_tolerance(model):
 
 
 @pytest.mark.parametrize(
-    ("event", "parting", "said"),
+    ("event", "parting", "meeting", "said"),
     [
-        (None, None, (Ending.FINISHED, None, 4)),
-        (2, None, (Ending.EVENT, "enough", 3)),
-        (2, 1, (Ending.PARTED, "the blocks coming loose: apart", 2)),
-        (2, 2, (Ending.EVENT, "enough", 3)),
-        (0, 3, (Ending.EVENT, "enough", 1)),
-        (None, 0, (Ending.PARTED, "the blocks coming loose: apart", 1)),
+        (None, None, None, (Ending.FINISHED, None, 4)),
+        (2, None, None, (Ending.EVENT, "enough", 3)),
+        (2, 1, None, (Ending.PARTED, "the blocks coming loose: apart", 2)),
+        (2, 2, None, (Ending.EVENT, "enough", 3)),
+        (0, 3, None, (Ending.EVENT, "enough", 1)),
+        (None, 0, None, (Ending.PARTED, "the blocks coming loose: apart", 1)),
+        (2, None, 2, (Ending.MET, "stones meeting outside their joints: together", 2)),
+        (1, None, 2, (Ending.EVENT, "enough", 2)),
+        (0, None, 0, (Ending.MET, "stones meeting outside their joints: together", 0)),
+        (None, 1, 2, (Ending.PARTED, "the blocks coming loose: apart", 2)),
+        (None, 2, 2, (Ending.MET, "stones meeting outside their joints: together", 2)),
     ],
 )
-def test_what_comes_first_ends_a_run_within_a_batch(event, parting, said):
-    """Each step has its length, the first from where the batch before ended."""
+def test_what_comes_first_ends_a_run_within_a_batch(event, parting, meeting, said):
+    """Each step has its length, the first from where the batch before ended.
+
+    A run ends after the step of a separation, and before that of a meeting.
+    """
     lengths = []
 
     def watch(resultants, step):
         lengths.append(step)
         return "enough" if resultants == event else None
 
-    apart = SimpleNamespace(
-        find_first=lambda batch: None if parting is None else (parting, "apart")
+    apart, together = (
+        SimpleNamespace(find_first=lambda batch, found=found: None if found[0] is None else found)
+        for found in ((parting, "apart"), (meeting, "together"))
     )
     batch = SimpleNamespace(times=np.array([1.1, 1.2, 1.4, 1.5]), resultants=[0, 1, 2, 3])
-    assert _find_end((watch, apart), batch, 1.0) == said
+    assert _find_end((watch, (apart, together)), batch, 1.0) == said
     assert lengths == pytest.approx([0.1, 0.1, 0.2, 0.1][: len(lengths)])

@@ -306,3 +306,74 @@ def _tangential_position(bodies, q, contacts, k):  # type: ignore
     rx = contacts.point[k, 0] - bodies.centre[body, 0] - q[body, 0]
     ry = contacts.point[k, 1] - bodies.centre[body, 1] - q[body, 1]
     return ry * contacts.normal[k, 0] - rx * contacts.normal[k, 1]
+
+
+@numba.njit(cache=True)
+def _widest_gap(bodies, world, one, two):  # type: ignore
+    """Return a lower bound of the distance of two pieces; negative, their depth of overlap [m]."""
+    widest = -np.inf
+    for first, second in ((one, two), (two, one)):
+        for k in range(bodies.piece_starts[first], bodies.piece_starts[first + 1]):
+            nx, ny = world.normals[k, 0], world.normals[k, 1]
+            nearest = np.inf
+            for j in range(bodies.piece_starts[second], bodies.piece_starts[second + 1]):
+                nearest = min(nearest, nx * world.points[j, 0] + ny * world.points[j, 1])
+            nearest -= nx * world.points[k, 0] + ny * world.points[k, 1]
+            # cuts separate pieces too, but do not measure how deep they are in each other
+            if nearest > widest and (bodies.outer[k] or nearest > 0.0):
+                widest = nearest
+    return widest
+
+
+@numba.njit(cache=True)
+def measure_gaps(bodies, world, q):  # type: ignore
+    """Return lower bounds of the distances of all bodies and the ground (b + 1, b + 1) [m]."""
+    ground = len(bodies.mass)
+    gaps = np.full((ground + 1, ground + 1), np.inf)
+    place_pieces(bodies, q, world)
+    for one in range(len(bodies.owner)):
+        body = bodies.owner[one]
+        gaps[body, ground] = min(gaps[body, ground], world.boxes[one, 2] - bodies.level)
+        gaps[ground, body] = gaps[body, ground]
+        for two in range(one):
+            other = bodies.owner[two]
+            if other != body:
+                gap = min(gaps[body, other], _widest_gap(bodies, world, one, two))
+                gaps[body, other] = gaps[other, body] = gap
+    return gaps
+
+
+@numba.njit(cache=True)
+def find_meeting(bodies, world, motions, limits, pairs, depths):  # type: ignore
+    """Return the first of many poses (steps, b, 3) at which a gap is below its limit, and the pair.
+
+    Limits (b + 1, b + 1) are never positive, and minus infinity exempts a pair. Those of `pairs`
+    (j, 2) are lower at each step by `depths` (steps, j). The step is -1 for no meeting.
+    """
+    ground, limit = len(bodies.mass), limits.copy()
+    for step in range(len(motions)):
+        # two blocks may have several joints: the deepest counts
+        for j in range(len(pairs)):
+            limit[pairs[j, 0], pairs[j, 1]] = limits[pairs[j, 0], pairs[j, 1]]
+        for j in range(len(pairs)):
+            one, two = pairs[j]
+            limit[one, two] = min(limit[one, two], limits[one, two] - depths[step, j])
+            limit[two, one] = limit[one, two]
+        place_pieces(bodies, motions[step], world)
+        order, boxes = world.order, world.boxes
+        for k in range(len(order)):
+            one = order[k]
+            body = bodies.owner[one]
+            if boxes[one, 2] - bodies.level < limit[body, ground]:
+                return step, body, ground
+            for later in range(k + 1, len(order)):
+                two = order[later]
+                # all further pieces begin beyond this one
+                if boxes[two, 0] > boxes[one, 1]:
+                    break
+                if boxes[one, 2] > boxes[two, 3] or boxes[two, 2] > boxes[one, 3]:
+                    continue
+                deepest = limit[body, bodies.owner[two]]
+                if deepest > -np.inf and _widest_gap(bodies, world, one, two) < deepest:
+                    return step, body, bodies.owner[two]
+    return -1, 0, 0

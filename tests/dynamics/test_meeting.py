@@ -1,0 +1,256 @@
+"""Stones that share no joint meet: loose blocks are followed from before they touch."""
+
+from dataclasses import replace
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import shapely
+from loose_blocks import G
+
+import archfem as af
+from archfem.dynamics.fall import MeetingMonitor
+from archfem.dynamics.state import State
+
+CONTACT = af.Contact(1e10, 4e9, 0.6)
+
+DEEPEST = 1e-3
+"""Deepest admissible overlap of stones that share no joint [m]: they are handed over at half of
+it, and steps of 0.5 ms of approach speeds below 1 m/s add less than the other half."""
+
+
+def stone(name, left, low, right, high, **told):
+    outline = ((left, low), (right, low), (right, high), (left, high))
+    return af.Block(outline, af.STONE, name, **told)
+
+
+def on_floor(*stones, joints=()):
+    """Stones on a fixed floor, free ones on joints of their own, and joints among them."""
+    floor = stone("floor", -6.0, -1.0, 9.0, 0.0, fixed=True, part="floor", role="other")
+    blocks, all_joints = (floor, *stones), []
+    for k, block in enumerate(stones, 1):
+        (left, low), right = block.points[0], block.points[1, 0]
+        if low == 0.0 and not block.fixed:
+            all_joints.append(((0, k), (left, 0.0), (right, 0.0)))
+    all_joints += joints
+    return af.Structure(
+        blocks,
+        tuple(
+            af.Joint(pair, start, end, CONTACT, f"joint {k}", "stones", "pier")
+            for k, (pair, start, end) in enumerate(all_joints)
+        ),
+        gravity=G,
+    )
+
+
+def column(name, left, breadth=0.6, height=2.4):
+    return stone(name, left, 0.0, left + breadth, height, part=name, role="pier")
+
+
+def beside_a_wall():
+    """A column of 0.6 × 2.4 m, 5 cm from a fixed wall."""
+    wall = stone("wall", 0.65, 0.0, 1.65, 3.0, fixed=True, part="wall", role="other")
+    return on_floor(column("column", 0.0), wall)
+
+
+def two_columns():
+    """A slender column 5 cm from a stout one, which rocks less."""
+    return on_floor(column("slender", 0.0), column("stout", 0.65, 1.2, 2.0))
+
+
+def running_bond(length=3, courses=3, breadth=0.4, height=0.2):
+    """A wall whose stones have no joints in their courses."""
+    stones, joints, below = [], [], []
+    for course in range(courses):
+        inner = (np.arange(length + 1) if course % 2 == 0 else np.arange(length) + 0.5).tolist()
+        ends = [x * breadth for x in (inner if course % 2 == 0 else [0.0, *inner, length])]
+        low, row = course * height, []
+        for left, right in pairwise(ends):
+            name = f"stone {len(stones) + 1}"
+            stones.append(stone(name, left, low, right, low + height, part="wall", role="pier"))
+            row.append((len(stones), left, right))
+            for number, start, end in below:
+                shared = max(left, start), min(right, end)
+                if shared[1] - shared[0] > 1e-9:
+                    joints.append(((number, len(stones)), (shared[0], low), (shared[1], low)))
+        below = row
+    return on_floor(*stones, joints=joints)
+
+
+def sine(peak, duration=1.0):
+    times = np.arange(0.0, duration + 1e-9, 0.005)
+    return af.Motion(peak * G * np.sin(2.0 * np.pi * times), 0.005)
+
+
+def deepest_overlap(structure, frames):
+    """Deepest overlap of convex blocks that share no joint, by separating axes [m]."""
+    joined, deepest = {tuple(pair) for pair in structure.pairs.tolist()}, 0.0
+    for poses in frames:
+        shapes = []
+        for block, (x, y, turn) in zip(structure.blocks, poses, strict=True):
+            c, s = np.cos(turn), np.sin(turn)
+            arms = (np.asarray(block.points) - block.centroid) @ np.array([[c, s], [-s, c]])
+            shapes.append(shapely.Polygon(arms + block.centroid + [x, y]))
+        for k, j in shapely.STRtree(shapes).query(shapes, predicate="intersects").T.tolist():
+            fixed = structure.blocks[k].fixed and structure.blocks[j].fixed
+            if k < j and (k, j) not in joined and not fixed:
+                deepest = max(deepest, overlap_depth(shapes[k], shapes[j]))
+    return deepest
+
+
+def overlap_depth(one, two):
+    """Least width of the overlap across any edge of two convex polygons [m]."""
+    both, widths = [np.asarray(shape.exterior.coords) for shape in (one, two)], []
+    for edge in np.concatenate([np.diff(points, axis=0) for points in both]):
+        across = np.array([edge[1], -edge[0]]) / np.linalg.norm(edge)
+        (a, b) = (points @ across for points in both)
+        widths.append(min(a.max() - b.min(), b.max() - a.min()))
+    return min(widths)
+
+
+@pytest.mark.parametrize(
+    ("build", "peak", "met"),
+    [
+        (beside_a_wall, 0.3, "'column' met 'wall'"),
+        (two_columns, 0.3, "'slender' met 'stout'"),
+        (running_bond, 1.2, "met 'stone"),
+    ],
+)
+def test_stones_without_a_joint_do_not_pass_through_each_other(build, peak, met):
+    """The verdict is that of rigid blocks from the start, which know all contacts."""
+    structure, motion = build(), sine(peak)
+    model = af.build(structure, fidelity="rigid", displacements="large")
+    run = af.time_history(model, motion, dt=0.005, record=af.Record(fields_every=1))
+    assert run.ending is af.dynamics.Ending.MET
+    assert run.ending.is_complete
+    assert "by stones meeting outside their joints: " in run.outcome
+    assert met in run.outcome
+    assert f"the run {run.outcome}" in run.verdict.remarks
+    assert not run.doubts
+    frames = [model.rigid_motions(q, q)[0] for q in run.dataset["q"].values]
+    frames += list(run.dataset["fall_pose"].values)
+    assert deepest_overlap(structure, frames) < DEEPEST
+    assert abs(run.dataset.attrs["energy_drift"]) < 1e-6
+    simulation = af.dynamics.RigidBlockSimulation(structure)
+    start = af.dynamics.LooseBlocks.as_built(structure)
+    rigid = list(simulation.frames(start, motion.duration + 20.0, motion))
+    fallen = ("partly fallen", "fallen")
+    expected = af.dynamics.classify_collapse(structure, rigid).kind
+    assert (run.fall.kind in fallen) == (expected in fallen)
+
+
+@pytest.fixture(scope="module")
+def pair():
+    """Two columns; coordinates are the motions of their centroids."""
+    return af.build(two_columns(), fidelity="rigid", displacements="large")
+
+
+def steps(*states):
+    """Steps that end in some states."""
+
+    def read(observer):
+        return np.array([observer.read(np.array(q, dtype=float)) for q in states])
+
+    return SimpleNamespace(times=0.01 * np.arange(len(states)), read=read)
+
+
+def at_rest(model, q):
+    return State(0.0, np.array(q, dtype=float), np.zeros(6), np.zeros(6))
+
+
+def test_a_meeting_is_found_half_a_millimetre_deep(pair):
+    monitor = MeetingMonitor(pair, at_rest(pair, np.zeros(6)))
+    apart, touching, inside = (
+        [0.05 + more, 0.0, 0.0, 0.0, 0.0, 0.0] for more in (-1e-3, 4e-4, 6e-4)
+    )
+    assert monitor.find_first(steps(apart, touching)) is None
+    assert monitor.find_first(steps(apart, touching, inside, inside)) == (
+        2,
+        "'slender' met 'stout'",
+    )
+
+
+def test_an_overlap_at_the_start_does_not_count(pair):
+    monitor = MeetingMonitor(pair, at_rest(pair, [0.06, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    deeper, deepest = ([0.06 + more, 0.0, 0.0, 0.0, 0.0, 0.0] for more in (4e-4, 6e-4))
+    assert monitor.find_first(steps(deeper)) is None
+    assert monitor.find_first(steps(deeper, deepest)) == (1, "'slender' met 'stout'")
+
+
+def test_a_turned_corner_meets_where_it_is(pair):
+    """The upper right corner moves by (cos θ - 1) b - sin θ h from the centroid, θ < 0."""
+    monitor = MeetingMonitor(pair, at_rest(pair, np.zeros(6)))
+    # half of the breadth, and a height that lies below the top of the stout column
+    turns = [-0.035 - 1e-3 * k for k in range(20)]
+    states = [[0.0, -0.4, turn, 0.0, 0.0, 0.0] for turn in turns]
+    reach = [0.3 * np.cos(turn) - 1.2 * np.sin(turn) - 0.3 for turn in turns]
+    # depth across the vertical face of the other, which has not turned
+    first = int(np.argmax(np.array(reach) > 0.05 + 5e-4))
+    assert first > 0
+    assert monitor.find_first(steps(*states))[0] == first
+
+
+def test_stones_with_a_joint_and_fill_are_exempt(pair):
+    """A joint has its own contact, and fill adapts."""
+    monitor = MeetingMonitor(pair, at_rest(pair, np.zeros(6)))
+    assert monitor.find_first(steps([0.0, -0.01, 0.0, 0.0, 0.0, 0.0])) is None
+    fill = af.Material(young=1e6, poisson=0.3, unit_weight=18e3)
+    stones = (
+        column("column", 0.0),
+        af.Block(stone("", 0.65, 0.0, 1.65, 2.0).outline, fill, "fill", part="fill", role="other"),
+    )
+    filled = af.build(on_floor(*stones), fidelity="rigid", displacements="large")
+    monitor = MeetingMonitor(filled, at_rest(filled, np.zeros(6)))
+    assert monitor.find_first(steps([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])) is None
+
+
+def test_stones_without_a_role_are_no_fill():
+    """Stones on joints stiffer than themselves meet too, whatever part they belong to."""
+    stiff = replace(CONTACT, normal_stiffness=1e11)
+    stones = (stone("one", 0.0, 0.0, 0.6, 2.4), stone("two", 0.65, 0.0, 1.25, 2.4))
+    built = on_floor(*stones)
+    joints = tuple(replace(joint, contact=stiff, part="", role="") for joint in built.joints)
+    model = af.build(replace(built, joints=joints), fidelity="rigid", displacements="large")
+    monitor = MeetingMonitor(model, at_rest(model, np.zeros(6)))
+    moved = steps([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert monitor.find_first(moved) == (0, "'one' met 'two'")
+
+
+def test_a_face_that_goes_on_beyond_its_joint_is_met(pair):
+    """Slid by s, a column that tilts enters the floor by s sin θ beyond the end of its joint."""
+    monitor, slid, turns = MeetingMonitor(pair, at_rest(pair, np.zeros(6))), 0.02, (0.024, 0.026)
+    states = []
+    for turn in turns:
+        # about the left end of the overlap, at a distance of slid from the corner
+        arm = np.array([0.3 - slid, 1.2])
+        c, s = np.cos(turn), np.sin(turn)
+        x, y = np.array([[c, -s], [s, c]]) @ arm - arm
+        states.append([x - slid, y, turn, 0.0, 0.0, 0.0])
+    assert [slid * np.sin(turn) > 5e-4 for turn in turns] == [False, True]
+    assert monitor.find_first(steps(*states)) == (1, "'floor' met 'slender'")
+
+
+def test_a_stone_meets_the_ground():
+    """The ground is level with the lowest foot of the fixed blocks, a metre below."""
+    lintel = stone("lintel", 0.0, 0.0, 1.0, 0.4, part="lintel", role="pier")
+    model = af.build(on_floor(lintel), fidelity="rigid", displacements="large")
+    start = State(0.0, *np.zeros((3, 3)))
+    monitor = MeetingMonitor(model, start)
+    assert monitor.find_first(steps([20.0, -1.0, 0.0])) is None
+    assert monitor.find_first(steps([20.0, -1.001, 0.0])) == (0, "'lintel' met the ground")
+
+
+def test_small_displacements_doubt_a_closed_gap():
+    """The column beside the wall is 5 cm from it, and rocks further."""
+    model = af.build(beside_a_wall(), fidelity="rigid")
+    found = [
+        doubt
+        for doubt in af.time_history(model, sine(0.3), dt=0.005).doubts
+        if "met" in doubt.cause
+    ]
+    assert len(found) == 1
+    assert "'column' met 'wall', with which it shares no joint" in found[0].cause
+    assert "displacements='large'" in found[0].remedy
+    calm = af.time_history(model, sine(0.1), dt=0.005)
+    assert not calm.doubts
