@@ -133,7 +133,9 @@ def newton_driver(evaluate_residual: Any, find_correction: Any, search_line: Any
             suffices = error**2 <= previous * tolerances.residual
             reuse = suffices or error <= tolerances.reduction * previous
             reuse = reuse and reusable and not hold
-            if evaluations > 150 or not find_correction(system, work, iteration, reuse, hold):
+            if evaluations > 5 * max_iterations or not find_correction(
+                system, work, iteration, reuse, hold
+            ):
                 return -evaluations - 1
             whole, reusable, previous = hold or iteration < full_steps, not hold, error
             found, change, tried = search_line(system, work, iteration + 1, norm, whole)
@@ -620,18 +622,21 @@ def _correction_work(work):  # type: ignore
 def _search_large(system, work, iteration, before, whole):  # type: ignore
     """Go the share of the correction where the residual does no more work along it.
 
-    But for friction the residual is the negative gradient of an energy, which is least there.
-    Stiff joints that open or close make it far shorter than the correction, and the norm of the
-    residual tells nothing: Newton's method would alternate.
+    But for friction the residual is the negative gradient of an energy, which is least there. With
+    stiff joints that open or close it is a small share, and the norm of the residual tells nothing.
     """
     start, share, evaluations = _correction_work(work), 1.0, 0
+    if start < 0.0 and not whole:  # uphill, by friction: the other way leads down
+        for k in range(len(work.correction)):
+            work.correction[k] = -work.correction[k]
+        start = -start
     low, high, low_slope, high_slope = 0.0, np.inf, start, 0.0
     largest = _large_move(work, share)
     while True:
         found = _large_residual(system, work, iteration)
         evaluations += 1
         slope = _correction_work(work)
-        if whole or not abs(slope) > 0.1 * start or start <= 0.0 or evaluations >= 14:
+        if whole or not abs(slope) > 0.5 * start or evaluations >= 14:
             break
         if slope > 0.0:
             # short of the place: go on where a longer way is worth it

@@ -170,7 +170,10 @@ class SnesSolver:
                 return matrix
 
             searches = SLIDING_SEARCHES if equation.remembers else CONVEX_SEARCHES
-            return self._solver.solve(residual, tangent, guess, self._scale, searches)
+            try:
+                return self._solver.solve(residual, tangent, guess, self._scale, searches)
+            except DidNotConverge:  # an impact of stiff joints: the velocity leads too far
+                return self._solver.solve(residual, tangent, state.q, self._scale, ("cp",))
 
         passage = model.begin_step(state.q, equation.lag / dt)
         passage, solution = _solve_with_teeth(passage, solve_passage, state.q + dt * state.velocity)
