@@ -257,10 +257,10 @@ def stop_reason(path: Path, stop: Stop, criteria: Criteria, step: Array) -> str 
         count = int((joints["hinge"] != 0).sum())
         if count >= stop.hinges:
             return f"{count} joints hinge"
-    share = 0.01  # of all displacement, by which the path must progress
+    share = 0.1  # of all displacement, by which the path must progress
     if (
         len(path.states) > STAGNATION_STEPS
-        and _is_stagnating(path, share)
+        and _is_stagnating(path, stop, share)
         and sliding_joints(path, criteria)
     ):
         return (
@@ -271,12 +271,19 @@ def stop_reason(path: Path, stop: Stop, criteria: Criteria, step: Array) -> str 
     return f"{stop.steps} steps were taken" if len(path.states) > stop.steps else None
 
 
-def _is_stagnating(path: Path, share: float) -> bool:
-    """Return whether displacement and factor change too little, although each step has a state."""
+def _is_stagnating(path: Path, stop: Stop, share: float) -> bool:
+    """Return whether the factor rests, and the load will not move far in the steps that are left.
+
+    How fast a path crawls hangs on round-off, and whether it arrives does not.
+    """
     before, after = path.displacements[[-STAGNATION_STEPS, -1]]
     first, last = np.array(path.factors)[[-STAGNATION_STEPS, -1]]
     change = abs(last - first) / max(abs(last), np.finfo(float).tiny)
-    return bool(after - before <= share * after and change <= MIN_RELAXATION_LOAD_STEP)
+    steps_left = stop.steps - len(path.states) + 1
+    reached = after + (after - before) / (STAGNATION_STEPS - 1) * steps_left
+    arrives = reached >= stop.displacement * path.model.structure.size
+    rests = change <= MIN_RELAXATION_LOAD_STEP and after - before <= share * after
+    return bool(rests and not arrives)
 
 
 def sliding_joints(path: Path, criteria: Criteria) -> list[str]:
