@@ -17,10 +17,10 @@ from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.snes import SnesSolver
 
 DAMPING = af.StiffnessDamping(0.05, 11.0)
-CROWN = 9
+CROWN, FRICTION = 9, np.tan(np.radians(35.0))
 
 
-def arch(stiffness, friction=np.tan(np.radians(35.0))):
+def arch(stiffness, friction=FRICTION):
     return af.circular_arch(
         radius=4.0,
         thickness=0.5,
