@@ -222,10 +222,10 @@ def _find_carried_part(
             part = float(carried @ weight) / float(weight @ weight)
         else:
             return tried
-        # steps of the load are too coarse to find a small part
+        # steps of the load, a sixty-fourth of it, are too coarse to find a small part
         if part >= precise * tried:
             return part
-        tried = max(part, 0.0) + MIN_LOAD_STEP * tried
+        tried = max(part, 0.0) + tried / 64.0
     return None
 
 
