@@ -12,6 +12,7 @@ from math import hypot
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from archfem._typing import Array
@@ -142,17 +143,36 @@ class LoadPath:
         # when a hinge moves from one joint to the next. Lengths are mass-weighted means.
         if len(self.states) < 2:
             return self.advance(np.array([1.0, 1.0]) / np.sqrt(2.0), distance)
-        mass = self.model.structure.weight / self.model.structure.gravity
-        motion, increment = self.states[-1] - self.states[-2], self.factors[-1] - self.factors[-2]
-        weighted = np.append(
-            self.model.mass @ motion / (mass * self.unit[0] ** 2), increment / self.unit[1] ** 2
-        )
-        step = np.append(motion, increment)
+        step, weighted = self._last_steps(1)
         length = np.sqrt(weighted @ step)
         row = weighted / length
         x = np.append(self.states[-1], self.factors[-1])
-        target = float(row @ x) + distance
-        return self._solve_step(row, target, distance, 0.0, x + distance / length * step)
+        target, straight = float(row @ x) + distance, x + distance / length * step
+        # Blocks turn between stiff joints, which straight steps would open: bend with the path.
+        guesses = [straight]
+        if len(self.states) > 2:
+            before, weighted = self._last_steps(2)
+            earlier = np.sqrt(weighted @ before)
+            bend = (step / length - before / earlier) / (length + earlier)
+            guesses.insert(0, straight + distance * (distance + length) * bend)
+        sense = self._sense(self.model, x, step)
+        return any(self._solve_step(row, target, distance, 0.0, guess, sense) for guess in guesses)
+
+    def _sense(self, model: Model, x: Array, step: Array) -> float:
+        """Return 1 or -1: it changes where a path turns back on itself, never where it bends."""
+        live, rate = self.load.forces(x[:-1]), self.load.rate(x[:-1])
+        tangent = model.tangent(x[:-1])
+        return _determinant_sign(tangent if rate is None else tangent - x[-1] * rate, live, step)
+
+    def _last_steps(self, number: int) -> tuple[Array, Array]:
+        """Return change of (q, λ) in the last step but some, and the same weighted (n + 1,)."""
+        mass = self.model.structure.weight / self.model.structure.gravity
+        motion = self.states[-number] - self.states[-number - 1]
+        increment = self.factors[-number] - self.factors[-number - 1]
+        weighted = np.append(
+            self.model.mass @ motion / (mass * self.unit[0] ** 2), increment / self.unit[1] ** 2
+        )
+        return np.append(motion, increment), weighted
 
     def advance_by_relaxation(self, increment: float, farthest: float) -> bool:
         """Add the relaxed equilibrium under a larger factor, unless the load moves too far."""
@@ -171,10 +191,17 @@ class LoadPath:
         return True
 
     def _solve_step(
-        self, row: Array, target: float, distance: float, share: float, guess: Array | None = None
+        self,
+        row: Array,
+        target: float,
+        distance: float,
+        share: float,
+        guess: Array | None = None,
+        sense: float | None = None,
     ) -> bool:
         """Add the equilibrium with row·(q, λ) = target, once joint memory is stationary."""
-        x = np.append(self.states[-1], self.factors[-1]) if guess is None else guess
+        last = np.append(self.states[-1], self.factors[-1])
+        x = last if guess is None else guess
         model, iterations = self.model, 0
         for number in range(MAX_IRREVERSIBLE_ITERATIONS):
             solution = self._iterate(model, x, (row, target, distance), share)
@@ -184,6 +211,8 @@ class LoadPath:
             if not has_irreversible_joints(model) or (
                 number > 0 and is_stationary(model, x[:-1], solution[1])
             ):
+                if sense is not None and self._sense(model, x, x - last) != sense:
+                    return False
                 self._add_state(model, x, iterations)
                 return True
             model = model.with_memory(model.updated_memory(x[:-1]))
@@ -234,18 +263,41 @@ def _solve_bordered(
     tangent: sparse.csr_matrix, load: Array, row: Array, right: Array
 ) -> Array | None:
     """Solve for steps of q and λ; None where their matrix is exactly singular."""
-    size = len(load)
     try:
-        if size < 400:  # LAPACK is faster than SuperLU up to here
-            matrix = np.empty((size + 1, size + 1))
-            matrix[:size, :size] = tangent.toarray()
-            matrix[:size, size], matrix[size] = -load, row
+        matrix = _bordered(tangent, load, row)
+        if isinstance(matrix, np.ndarray):
             return np.asarray(np.linalg.solve(matrix, right))
-        column = sparse.csr_matrix(-load[:, None])
-        bordered = sparse.vstack([sparse.hstack([tangent, column]), sparse.csr_matrix(row)], "csc")
-        return np.asarray(splu(bordered).solve(right))
+        return np.asarray(splu(matrix).solve(right))
     except (RuntimeError, np.linalg.LinAlgError):  # from SuperLU, from LAPACK
         return None
+
+
+def _bordered(tangent: sparse.csr_matrix, load: Array, row: Array) -> Array | sparse.csc_matrix:
+    """Return the matrix of the steps of q and λ; dense up to where LAPACK is faster."""
+    size = len(load)
+    if size < 400:
+        matrix = np.empty((size + 1, size + 1))
+        matrix[:size, :size] = tangent.toarray()
+        matrix[:size, size], matrix[size] = -load, row
+        return matrix
+    column = sparse.csr_matrix(-load[:, None])
+    return sparse.vstack([sparse.hstack([tangent, column]), sparse.csr_matrix(row)], "csc")
+
+
+def _determinant_sign(tangent: sparse.csr_matrix, load: Array, row: Array) -> float:
+    """Return the sign of the determinant of the matrix of steps; 0 where it is singular."""
+    matrix = _bordered(tangent, load, row)
+    if isinstance(matrix, np.ndarray):
+        return float(np.linalg.slogdet(matrix)[0])
+    try:
+        factors = splu(matrix)
+    except RuntimeError:
+        return 0.0
+    sign, places = float(np.prod(np.sign(factors.U.diagonal()))), np.arange(len(row))
+    for order in (factors.perm_r, factors.perm_c):  # a cycle of even length changes the sign
+        cycles = connected_components(sparse.csr_matrix((np.ones(len(row)), (places, order))))[0]
+        sign *= (-1.0) ** (len(row) - cycles)
+    return sign
 
 
 @dataclass(eq=False)

@@ -162,7 +162,9 @@ def dead_load(
         try:
             return equilibrium_under(model, self_weight(model), newton)
         except DidNotConverge as error:
-            raise DidNotConverge(_describe_failure(model, error), last=error.last) from error
+            raise DidNotConverge(
+                _describe_failure(model, error, newton), last=error.last
+            ) from error
     # blocks are placed by small displacements on supports that have not moved
     small = model.small_displacement_model()
     if not isinstance(small, LinearBlockModel):
@@ -180,7 +182,7 @@ def dead_load(
     return _move_supports(solver, built, self_weight(model), model.support_motion)
 
 
-def _describe_failure(model: Model, error: DidNotConverge) -> str:
+def _describe_failure(model: Model, error: DidNotConverge, newton: Newton | None) -> str:
     """Return the message of a failed dead load, with its cause by limit analysis."""
     try:
         cause = explain_instability(model.structure)
@@ -188,10 +190,43 @@ def _describe_failure(model: Model, error: DidNotConverge) -> str:
         return str(error)
     if cause is not None:
         return f"'{model.structure.name}' does not stand under its own weight: {cause}"
-    return (
-        f"{error}; as rigid blocks it stands, so that its joints or blocks are too soft for its "
-        "depth: compare with stiffer joints"
-    )
+    soft = "joints are" if model.fidelity == "rigid" else "joints and blocks are"
+    text = f"{error}; as rigid blocks it stands, but its {soft} too soft for its depth"
+    part = _find_carried_part(model, newton)
+    if part is None:
+        return f"{text}: compare with stiffer joints"
+    # rounded up to two digits
+    factor = float(f"{1.05 / part:.2g}")
+    least = factor * min(joint.contact.normal_stiffness for joint in model.structure.joints)
+    return f"{text}: it stands if they are {factor:g} times as stiff, k_n from {least:.2g} Pa/m on"
+
+
+def _find_carried_part(
+    model: Model, newton: Newton | None, precise: float = 0.25, rounds: int = 6
+) -> float | None:
+    """Return a part of the weight that the structure carries, near the largest; None without one.
+
+    Where nothing but weight and stiffness has the dimension of a force, only their ratio matters: a
+    structure that carries a part of its weight carries the whole with that much stiffer joints.
+    """
+    if any(joint.contact.cohesion > 0.0 for joint in model.structure.joints):
+        return None
+    weight, tried = self_weight(model), 1.0
+    for _ in range(rounds):
+        try:
+            equilibrium_under(model, tried * weight, newton)
+        except DidNotConverge as error:
+            if error.last is None:
+                return None
+            carried = error.last.model.force(error.last.q)
+            part = float(carried @ weight) / float(weight @ weight)
+        else:
+            return tried
+        # steps of the load, a sixty-fourth of it, are too coarse to find a small part
+        if part >= precise * tried:
+            return part
+        tried = max(part, 0.0) + tried / 64.0
+    return None
 
 
 def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -> Equilibrium:

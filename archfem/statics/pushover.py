@@ -6,7 +6,7 @@ limit.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -44,7 +44,8 @@ class Stop:
     """Rules that end a pushover, the first one that is met.
 
     Attributes:
-        slope: tangent of the curve relative to its initial tangent [-].
+        slope: tangent of the curve relative to its initial tangent [-]; with large displacements
+            control by "path" goes on past the peak, and the slope does not end it.
         displacement: displacement of the loaded point, relative to the structure's size [-].
         hinges: number of hinged joints, or None not to count them.
         steps: number of steps.
@@ -197,7 +198,9 @@ def follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
     # normals (displacement, factor) of the added equation; that of arc length turns with the curve
     fixed = {"displacement": np.array([1.0, 0.0]), "force": np.array([0.0, 1.0])}
     min_distance, easy_iterations, easy_growth = 1e-3, 4, 1.4
-    distance, direction = 1.0, np.array([1.0, 1.0]) / np.sqrt(2.0)
+    distance, direction, taken = 1.0, np.array([1.0, 1.0]) / np.sqrt(2.0), [1.0]
+    if control == "path" and path.model.large_displacements:
+        stop = replace(stop, slope=0.0)
     relaxation = _StepRelaxation(path, criteria, stop.displacement * path.model.structure.size)
     while True:
         border = fixed.get(control, direction)
@@ -215,8 +218,25 @@ def follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
         direction = step / np.linalg.norm(step)
         if reason := stop_reason(path, stop, criteria, step):
             return reason
+        taken.append(distance)
         is_easy = control == "path" and path.iterations[-1] <= easy_iterations
         distance *= easy_growth if is_easy else STEP_GROWTH
+        if control == "path":
+            distance = min(distance, _resolve_peak(path.factors, taken))
+
+
+def _resolve_peak(
+    factors: Sequence[float] | Array, taken: list[float], accuracy: float = 5e-4
+) -> float:
+    """Return the longest step that does not miss the peak by more than a share of it."""
+    highest = max(factors)
+    if len(factors) < 3 or factors[-1] < 0.97 * highest:
+        return np.inf
+    # a parabola through both ends of a step d rises above them by its second derivative × d²/8
+    slopes = np.diff(factors[-3:]) / taken[-2:]
+    bend = 2.0 * abs(slopes[1] - slopes[0]) / sum(taken[-2:])
+    longest = float(np.sqrt(8.0 * accuracy * highest / max(bend, np.finfo(float).tiny)))
+    return max(longest, 0.5 * taken[-1])
 
 
 def _last_step(path: Path) -> Array:
@@ -239,18 +259,19 @@ def stop_reason(path: Path, stop: Stop, criteria: Criteria, step: Array) -> str 
         count = int((joints["hinge"] != 0).sum())
         if count >= stop.hinges:
             return f"{count} joints hinge"
-    share = 0.01  # of all displacement, by which the path must progress
+    # Share of all displacement by which the path must progress. How fast it crawls hangs on
+    # round-off, so that most paths that take all their steps crawl.
+    is_last = len(path.states) > stop.steps
     if (
         len(path.states) > STAGNATION_STEPS
-        and _is_stagnating(path, share)
+        and _is_stagnating(path, 0.1 if is_last else 0.01)
         and sliding_joints(path, criteria)
     ):
         return (
-            f"it crawls: in {STAGNATION_STEPS} steps the {path.moving} moved by no more than "
-            f"{share:.0%} of {displacement:.3g} m, and the factor went no further than "
-            f"{path.factors[-1]:.5g}"
+            f"it crawls: in {STAGNATION_STEPS} steps the {path.moving} moved by less than a tenth "
+            f"of {displacement:.3g} m, and the factor went no further than {path.factors[-1]:.5g}"
         )
-    return f"{stop.steps} steps were taken" if len(path.states) > stop.steps else None
+    return f"{stop.steps} steps were taken" if is_last else None
 
 
 def _is_stagnating(path: Path, share: float) -> bool:
@@ -369,6 +390,8 @@ def _extrapolate_limit(displacements: Array, factors: Array) -> tuple[float, flo
         return float("nan"), float("nan")
     half = min(int(np.searchsorted(displacements, 0.5 * displacements[-1])), len(factors) - 2)
     x = np.maximum(displacements, displacements[1]) ** -0.5
+    if x[half] <= x[-1]:  # the load moves back
+        return float("nan"), float("nan")
     beyond = (last - float(factors[half])) * x[-1] / (x[half] - x[-1])
     if abs(beyond) > 0.2 * abs(last):  # too far for the asymptote to hold
         return float("nan"), float("nan")

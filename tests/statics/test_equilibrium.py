@@ -1,5 +1,6 @@
 """Dead load: equilibrium, failures, and warnings of results that dry stone cannot have."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -223,3 +224,50 @@ def test_check_says_so(embrace, code, tmp_path, capsys):
     said = capsys.readouterr().out
     assert ("in doubt: under dead load |V| / N is" in said) == bool(code)
     assert ("toml: ready" in said) != bool(code)
+
+
+def thin_ring(stiffness, unit_weight=20e3):
+    """1.03 times as thick as limit analysis asks, 0.19568 m, in large displacements."""
+    ring = af.circular_arch(
+        radius=2.95,
+        thickness=1.03 * 0.19568,
+        embrace=159.0,
+        voussoirs=17,
+        contact=af.Contact(stiffness, 0.2 * stiffness, 0.6),
+        material=af.Material(30e9, 0.2, unit_weight),
+    )
+    return af.build(ring, fidelity="rigid", displacements="large")
+
+
+def test_what_is_too_soft_in_large_displacements_is_told_how_stiff_it_must_be(verified):
+    """By a path along which the weight grows past its peak, whose steps resolve it to 0.05 %."""
+    light = 0.02  # of the weight that is there at the start of the path
+    path = af.pushover(thin_ring(1e11, light * 20e3), af.BodyForce(0.0, -1.0), control="path")
+    factors = path.curve["factor"].values
+    least = 1e11 / (light * (1.0 + factors.max()))
+    assert factors[-1] < 0.999 * factors.max()
+    with pytest.raises(af.DidNotConverge, match="joints are too soft for its depth") as caught:
+        dead_load(thin_ring(1e11))
+    told = float(re.search(r"k_n from (\S+) Pa/m on", str(caught.value))[1])
+    verified("stiffness at which a thin ring stands [Pa/m]", least, "path past its peak", told)
+    # a step of the load is a sixty-fourth, and what is told is rounded up to two digits
+    assert least < told < 1.12 * least
+    assert dead_load(thin_ring(told)).steps >= 1
+    assert dead_load(thin_ring(1.01 * least)).steps >= 1
+    with pytest.raises(af.DidNotConverge):
+        dead_load(thin_ring(0.97 * least))
+
+
+def test_a_ring_that_carries_a_thousandth_of_its_weight_is_told_so_too():
+    """The first step of the load is longer than what it carries."""
+    with pytest.raises(af.DidNotConverge, match=r"(39|4[01])0 times as stiff, k_n from [56]\.\de"):
+        dead_load(thin_ring(1.48e9))
+
+
+def test_cohesion_has_no_stiffness_that_would_do():
+    contact = af.Contact(1e11, 0.2e11, 0.6, cohesion=1.0)
+    ring = thin_ring(1e11).structure
+    joints = tuple(replace(joint, contact=contact) for joint in ring.joints)
+    glued = af.build(replace(ring, joints=joints), fidelity="rigid", displacements="large")
+    with pytest.raises(af.DidNotConverge, match="compare with stiffer joints"):
+        dead_load(glued)

@@ -71,3 +71,49 @@ def test_exact_joints_are_followed_until_nothing_is_borne(verified):
     assert end == pytest.approx(0.118, rel=0.02)
     case = "ring pushed far, exact joints: way at which nothing is borne [m]"
     verified(case, 0.118, "trial programme apart from archfem", end)
+
+
+@cache
+def followed(stiff, farthest):
+    """README's ring with friction, along its path."""
+    contact = af.Contact(1.48e9 * stiff, 0.3e9 * stiff, friction=0.6)
+    ring = af.circular_arch(
+        radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, contact=contact
+    )
+    built = af.build(ring, fidelity="rigid", displacements="large")
+    stop = af.statics.Stop(displacement=farthest)
+    return ring, af.pushover(built, SIDEWAYS, control="path", stop=stop)
+
+
+def test_the_peak_of_stiff_joints_tends_to_that_of_rigid_blocks(verified):
+    """Within 0.1 %: the peak is resolved to 0.05 %, and k^(-1/3) left over is a tenth of a step."""
+    (ring, softer), (_, stiffer) = (followed(stiff, 4e-4) for stiff in (100.0, 1000.0))
+    low, high = (float(found.curve["factor"].max()) for found in (softer, stiffer))
+    tends = high + (high - low) / (np.cbrt(10.0) - 1.0)
+    limit = af.collapse_factor(ring, live=SIDEWAYS).factor
+    verified("ring pushed far: peak of stiff joints [g]", limit, "limit analysis", tends)
+    assert tends == pytest.approx(limit, rel=1e-3)
+    assert high < 0.99 * limit
+
+
+def test_the_steps_resolve_the_peak():
+    """A parabola through the highest step and its neighbours rises above it by 0.1 % at most."""
+    for stiff in (100.0, 1000.0):
+        curve = followed(stiff, 4e-4)[1].curve
+        factors, way = curve["factor"].values, curve["displacement"].values
+        top = int(factors.argmax())
+        assert 0 < top < len(factors) - 1
+        near = slice(top - 1, top + 2)
+        a, b, c = np.polyfit(way[near] - way[top], factors[near], 2)
+        assert c - b**2 / (4.0 * a) < 1.001 * factors[top]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stiff", [100.0, 1000.0])
+def test_stiff_joints_are_followed_until_nothing_is_borne(stiff):
+    """In 206 and 296 steps of 400; hinges move from joint to joint, and the load back at times."""
+    found = followed(stiff, 0.1)[1]
+    assert "bears no load" in found.outcome
+    way = found.curve["displacement"].values
+    assert way[-1] == pytest.approx(0.16, rel=0.03)
+    assert np.diff(way).min() < 0.0

@@ -107,20 +107,22 @@ def _solve(tangent, vector):  # type: ignore
     return lambda tangent, vector: solve_panels(tangent, vector)
 
 
-def newton_driver(evaluate_residual: Any, find_correction: Any, apply_correction: Any) -> Any:
+def newton_driver(evaluate_residual: Any, find_correction: Any, search_line: Any) -> Any:
     """Return the compiled driver of iterations for small or for large displacements."""
 
     @kernel
-    def newton_solve(system, work, tolerances, full_steps):  # type: ignore
+    def newton_solve(system, work, tolerances, limits):  # type: ignore
         """Iterate until the residual vanishes; returns evaluations, negative if it does not.
 
         Semismooth Newton: a point that the first correction takes from sliding one way to sliding
         the other is held in the second, as no derivative sees the range in which it sticks.
-        The first `full_steps` iterations take whole corrections, later ones use a line search.
+        `limits` are the number of iterations, and that of the first ones with whole corrections;
+        later ones use a line search.
         """
+        max_iterations, full_steps = limits
         error, norm, reverses = evaluate_residual(system, work, 0)
         previous, change, evaluations, reusable = np.inf, np.inf, 0, False
-        for iteration in range(60):
+        for iteration in range(max_iterations):
             stalled = error >= previous and error <= tolerances.stalled
             rounded = change <= tolerances.round_off and error <= tolerances.rounded
             if iteration > 0 and (error <= tolerances.residual or stalled or rounded):
@@ -131,18 +133,14 @@ def newton_driver(evaluate_residual: Any, find_correction: Any, apply_correction
             suffices = error**2 <= previous * tolerances.residual
             reuse = suffices or error <= tolerances.reduction * previous
             reuse = reuse and reusable and not hold
-            if evaluations > 150 or not find_correction(system, work, iteration, reuse, hold):
+            if evaluations > 5 * max_iterations or not find_correction(
+                system, work, iteration, reuse, hold
+            ):
                 return -evaluations - 1
-            share, reusable, before = 1.0, not hold, norm
-            change, previous = apply_correction(system, work, share), error
-            while True:
-                error, norm, reverses = evaluate_residual(system, work, iteration + 1)
-                evaluations += 1
-                if norm < before or hold or iteration < full_steps or share <= 1.0 / 64.0:
-                    break
-                share *= 0.5
-                apply_correction(system, work, share)
-            change *= share
+            whole, reusable, previous = hold or iteration < full_steps, not hold, error
+            found, change, tried = search_line(system, work, iteration + 1, norm, whole)
+            error, norm, reverses = found
+            evaluations += tried
             if not error < np.inf:
                 return -evaluations
         return -evaluations
@@ -438,10 +436,22 @@ def _small_move(system, work, share):  # type: ignore
         system.balanced[row] = system.balanced_origin[row] + share * system.move[row]
     for k in range(contact.shape[1]):
         contact[0, k] = contact[1, k] + share * contact[2, k]
-    return 1.0
 
 
-_solve_small = newton_driver(_small_residual, _small_correction, _small_move)
+@kernel
+def _halve_small(system, work, iteration, before, whole):  # type: ignore
+    """Go the share of the correction that reduces the residual, by halving unless it is `whole`."""
+    share, evaluations = 1.0, 0
+    while True:
+        _small_move(system, work, share)
+        error, norm, reverses = _small_residual(system, work, iteration)
+        evaluations += 1
+        if norm < before or whole or share <= 1.0 / 64.0:
+            return (error, norm, reverses), share, evaluations
+        share *= 0.5
+
+
+_solve_small = newton_driver(_small_residual, _small_correction, _halve_small)
 
 
 @overload(solve_contact, jit_options=KERNEL_OPTIONS)
@@ -457,7 +467,7 @@ def _solve_small_step(system):  # type: ignore
     tolerances = Tolerances(error, 10.0 * error, 0.0, 0.0, system.reduction)
     for full_steps in (4, 1):
         predict_gaps(law, work.gap, work.gap_before)
-        iterations = _solve_small(system, work, tolerances, full_steps)
+        iterations = _solve_small(system, work, tolerances, (60, full_steps))
         total += abs(iterations)
         if iterations > 0:
             for row in range(len(law.guess)):
@@ -589,28 +599,73 @@ def _large_correction(system, work, iteration, reuse, hold):  # type: ignore
 
 
 @kernel
-def _large_move(system, work, share):  # type: ignore
-    """Add the correction, or for a share below one subtract half of the last addition."""
+def _large_move(work, share):  # type: ignore
+    """Add a share of the correction; returns the largest entry of the whole correction."""
     move, correction, largest = work.move, work.correction, 0.0
-    factor = 1.0 if share == 1.0 else -share
     for k in range(len(move)):
-        move[k] += factor * correction[k]
+        move[k] += share * correction[k]
         if not abs(correction[k]) <= largest:  # also where it is not a number
             largest = abs(correction[k])
     return largest
 
 
-_solve_large = newton_driver(_large_residual, _large_correction, _large_move)
+@kernel
+def _correction_work(work):  # type: ignore
+    """Return the work of the residual along the correction."""
+    total = 0.0
+    for k in range(len(work.correction)):
+        total += work.correction[k] * work.residual[k]
+    return total
+
+
+@kernel
+def _search_large(system, work, iteration, before, whole):  # type: ignore
+    """Go the share of the correction where the residual does no more work along it.
+
+    But for friction the residual is the negative gradient of an energy, which is least there. With
+    stiff joints that open or close it is a small share, and the norm of the residual tells nothing.
+    """
+    start, share, evaluations = _correction_work(work), 1.0, 0
+    if start < 0.0 and not whole:  # uphill, by friction: the other way leads down
+        for k in range(len(work.correction)):
+            work.correction[k] = -work.correction[k]
+        start = -start
+    low, high, low_slope, high_slope = 0.0, np.inf, start, 0.0
+    largest = _large_move(work, share)
+    while True:
+        found = _large_residual(system, work, iteration)
+        evaluations += 1
+        slope = _correction_work(work)
+        if whole or not abs(slope) > 0.5 * start or evaluations >= 14:
+            break
+        if slope > 0.0:
+            # short of the place: go on where a longer way is worth it
+            if high == np.inf and (slope < 0.5 * start or share >= 4.0):
+                break
+            low, low_slope, following = share, slope, 2.0 * share
+        else:
+            high, high_slope = share, slope
+        if high < np.inf:  # by the secant, and a tenth of the interval at least
+            following = low + (high - low) * low_slope / (low_slope - high_slope)
+            margin = 0.1 * (high - low)
+            following = min(max(following, low + margin), high - margin)
+        _large_move(work, following - share)
+        share = following
+    return found, largest * share, evaluations
+
+
+_solve_large = newton_driver(_large_residual, _large_correction, _search_large)
 
 
 def _solve_large_step(system, step, states, ground):  # type: ignore
-    """Solve a step; a second try restarts from the guess, with a line search from its begin."""
+    """Solve a step from where the velocity leads; a second try starts where the blocks are."""
+    # an impact between stiff joints leads far into the other block, or away from it
     (old, new), total, dt, work = states, 0, system.step[0], system.work
     _sum_loads(system, work, old, ground)
-    for full_steps in (3, 0):
+    for share, limits in ((1.0, (12, 3)), (0.0, (60, 0))):
         for k in range(len(work.move)):
-            work.move[k] = dt * old[1, k]
-        iterations = _solve_large(system, work, system.tolerances, full_steps)
+            work.move[k] = share * dt * old[1, k]
+        iterations = _solve_large(system, work, system.tolerances, limits)
         total += abs(iterations)
         if iterations > 0:
             # the midpoint rule: velocity and acceleration from the change of coordinates

@@ -11,10 +11,11 @@ import numpy as np
 from scipy import sparse
 
 from archfem._typing import Array
+from archfem.dynamics.schemes import HHT, check_friction_scheme
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.newmark import StepNumbers
 from archfem.dynamics.state import Batch, State, Step
-from archfem.errors import DidNotConverge
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.model import ModelStep
 from archfem.statics.newton import (
     CONVEX_SEARCHES,
@@ -169,7 +170,10 @@ class SnesSolver:
                 return matrix
 
             searches = SLIDING_SEARCHES if equation.remembers else CONVEX_SEARCHES
-            return self._solver.solve(residual, tangent, guess, self._scale, searches)
+            try:
+                return self._solver.solve(residual, tangent, guess, self._scale, searches)
+            except DidNotConverge:  # an impact of stiff joints: the velocity leads too far
+                return self._solver.solve(residual, tangent, state.q, self._scale, ("cp",))
 
         passage = model.begin_step(state.q, equation.lag / dt)
         passage, solution = _solve_with_teeth(passage, solve_passage, state.q + dt * state.velocity)
@@ -208,13 +212,24 @@ class SnesSolver:
             if halvings == 8:  # 1/256 of the step
                 raise DidNotConverge(
                     f"the step from t = {state.time:.6g} s failed, down to {dt:.3g} s ({error}): "
-                    "the structure may have fallen apart; try a smaller dt or HHT",
+                    f"the structure may have fallen apart; {self._remedy()}",
                     last=state,
                 ) from error
             first = self._advance(state, state.time + dt / 2.0, halvings + 1)
             second = self._advance(first.state, target, halvings + 1)
             return second.appended_to(first, mean=self.equation.conserving)
         return replace(step, state=replace(step.state, time=target))
+
+    def _remedy(self) -> str:
+        """Return what may help where steps fail: damping by the scheme only where it applies."""
+        model, scheme = self.equation.model, HHT()
+        try:
+            check_friction_scheme(scheme, model.structure)
+        except InvalidInput:
+            return "try a smaller dt"
+        if model.large_displacements or isinstance(self.equation.scheme, HHT):
+            return "try a smaller dt"
+        return f"try a smaller dt, or scheme={scheme}"
 
 
 def _solve_with_teeth(

@@ -32,6 +32,9 @@ from archfem.joints.operator import SLIP_LIMIT_TOLERANCE
 
 delete_stale_cache(Path(__file__).parent)
 
+# Slip, relative to the depth of the joint, below which |s| in the overlap is rounded [-]
+ROUNDED_SLIP = 1e-5
+
 
 @inlined_kernel
 def point_means(a, b, first, second):  # type: ignore
@@ -187,12 +190,23 @@ class FaceLaw(NamedTuple):
 
 
 @inlined_kernel
+def lost_overlap(depth, slip):  # type: ignore
+    """Return |s|, by which the overlap is shorter than the depth, and its derivative by s."""
+    # Rounded where it is below 1e-5 of the depth. The force that pushes a face off an edge would
+    # jump where the slip changes its sign, and Newton's method would alternate there.
+    size, bend = abs(slip), ROUNDED_SLIP * depth
+    if size < bend:
+        return 0.5 * slip * slip / bend, slip / bend
+    return size - 0.5 * bend, np.sign(slip)
+
+
+@inlined_kernel
 def overlap(depth, slip):  # type: ignore
     """Return the length on which the faces overlap, and its derivative by the slip."""
-    length = depth - abs(slip)
-    if length <= 0.0:
+    lost, rate = lost_overlap(depth, slip)
+    if lost >= depth:
         return 0.0, 0.0
-    return length, -np.sign(slip)
+    return depth - lost, -rate
 
 
 @inlined_kernel
@@ -257,15 +271,20 @@ def mean_closings(ends, lag, facet):  # type: ignore
 
 
 @inlined_kernel
-def overlap_slope(before, after, first, last):  # type: ignore
+def overlap_slope(depth, before, after, first, last):  # type: ignore
     """Return Δℓ/Δs over a step, and its derivative by the slip at the end."""
     (l0, r0), (l1, r1) = first, last
-    moved = after - before
-    # on one side of zero slip, or without slip, it is the derivative
-    same = r0 == r1 and l0 > 0.0 and l1 > 0.0 and before * after > 0.0
+    moved, bend = after - before, ROUNDED_SLIP * depth
+    if max(abs(before), abs(after)) < bend:
+        return -0.5 * (before + after) / bend, -0.5 / bend
+    # beyond, on one side of zero slip, or without slip, it is the derivative
+    same = r0 == r1 and l0 > 0.0 and l1 > 0.0
     if same or abs(moved) <= 1e-12 * (abs(before) + abs(after)):
         return r1, 0.0
-    slope = (l1 - l0) / moved
+    slope = l1 - l0
+    if l0 > 0.0 and l1 > 0.0:  # small lengths round less
+        slope = lost_overlap(depth, before)[0] - lost_overlap(depth, after)[0]
+    slope /= moved
     return slope, (r1 - slope) / moved
 
 
@@ -344,7 +363,7 @@ def _edge_force(law, segment, ends, laps, moments):  # type: ignore
     mean, turn = 0.5 * (l0 + l1), 0.5 * (t0 + t1)
     before = closing_energy(law, segment, l0, g0, t0)[0]
     after, whole, tilted = closing_energy(law, segment, l1, g1, t1)
-    slope, bends = overlap_slope(s0, s1, first, last)
+    slope, bends = overlap_slope(law.depth[segment], s0, s1, first, last)
     push, stiff = 0.5 * (before + after) - mean * turn * moment, law.normal_stiffness[segment]
     # derivatives by opening, slip and rotation at the end
     by_opening = 0.5 * whole - mean * turn * leans[0]
