@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kernels import from_python
 
-from archfem.dynamics.solvers import active_compliance, active_rows, newton
+from archfem.dynamics.solvers import active_compliance, active_rows, joint_law
 from archfem.dynamics.solvers.active_compliance import ActiveRows
 from archfem.dynamics.solvers.active_rows import MAX_DIRECT_ROWS
 
@@ -14,7 +14,7 @@ begin_problem = from_python(active_compliance.begin_problem)
 update_columns = from_python(active_compliance.update_columns)
 prepare_equations = from_python(active_rows.prepare_equations)
 solve_equations = from_python(active_rows.solve_equations)
-hold_reversed = from_python(newton.hold_reversed)
+hold_reversed = from_python(joint_law.hold_reversed)
 
 FEW, MANY = MAX_DIRECT_ROWS // 2, 2 * MAX_DIRECT_ROWS
 """Rows that are solved for by a factor, and by minimal residuals."""

@@ -486,3 +486,23 @@ def largest_force(law, gap):  # type: ignore
         round_off = (4.0 * 2.2e-16 / 1e-12) * abs(gap[row])
         largest = max(largest, law.stiffness[row] * round_off)
     return largest
+
+
+@kernel
+def hold_reversed(last, released, entries, count):  # type: ignore
+    """Hold points that reversed their slip: they release nothing, whatever their gaps."""
+    rows, values = entries
+    for k in range(count):
+        if last[rows[k, 0]] * released[rows[k, 0]] < 0.0:
+            values[k] = 0.0
+    for row in range(len(released)):
+        if last[row] * released[row] < 0.0:
+            released[row] = 0.0
+
+
+@kernel
+def add_derivatives(entries, count, along, result):  # type: ignore
+    """Add the change of λ with that of the gaps, by the derivatives in the factor."""
+    rows, values = entries
+    for k in range(count):
+        result[rows[k, 0]] += values[k] * along[rows[k, 1]]

@@ -9,6 +9,7 @@ K with all joints closed and stuck, y and x from the state before, λ the releas
 under M, K and R follow by Newmark's formulas and give energies without further products.
 """
 
+import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -79,6 +80,26 @@ class JointRows(NamedTuple):
     weight: Array
     law: JointLaw
     pairs: Any
+
+
+def pair_blocks(gaps: SparseRows, pairs: NDArray[np.int64]) -> tuple[NDArray[np.int64], Any, Any]:
+    """Return begin of the block of each pair of gap rows, and rows and columns of all blocks.
+
+    Rows that move with the same coordinates, as those of one joint, share a block.
+    """
+    indptr, indices, _ = gaps
+    moved = [tuple(indices[a:b].tolist()) for a, b in itertools.pairwise(indptr)]
+    blocks: dict[Any, int] = {}
+    begin, ends, count = [], [], 0
+    for i, j in pairs:
+        key = moved[i], moved[j]
+        if key not in blocks:
+            blocks[key] = count
+            ends.append([end.ravel() for end in np.meshgrid(*key, indexing="ij")])
+            count += len(ends[-1][0])
+        begin.append(blocks[key])
+    rows, columns = np.concatenate(ends, axis=1).astype(np.int64)
+    return np.array(begin), rows, columns
 
 
 def tangent_pattern(equation: Equation) -> sparse.csr_matrix:

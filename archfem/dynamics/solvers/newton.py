@@ -12,7 +12,6 @@ solve for Δq, with f̄ the mean force of the joints over the step (`joints.larg
     (2 M/Δt² + C/Δt + (½ + β/Δt) K) Δq - 2 M v/Δt + K q + f̄(q, q + Δq) = p - M r a_g.
 """
 
-import itertools
 from copy import deepcopy
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -33,7 +32,9 @@ from archfem.dynamics.solvers.band_lu import (
 from archfem.dynamics.solvers.base import evaluate_step, is_system, solve_step, start_run
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.joint_law import (
+    add_derivatives,
     collect_derivatives,
+    hold_reversed,
     largest_force,
     predict_gaps,
 )
@@ -45,6 +46,7 @@ from archfem.dynamics.solvers.linear_step import (
     joint_rows,
     linear_system,
     linear_workspace,
+    pair_blocks,
     solve_contact,
     tangent_pattern,
 )
@@ -191,7 +193,7 @@ class NewtonSolver:
         linear = linear_system(self._equation, self.order, dt)
         effective, law = effective_matrix(self._equation, self.order, dt), linear.law
         pairs = joint_rows(self._equation, dt).pairs
-        begin, *ends = _pair_blocks(linear.gaps, pairs)
+        begin, *ends = pair_blocks(linear.gaps, pairs)
         tangent, places = self._tangent(effective, *ends)
         widest = int(np.diff(linear.gaps[0]).max(initial=0))
         blocks = np.zeros(widest), np.zeros(widest**2)
@@ -250,26 +252,6 @@ class NewtonSolver:
             (dt, lag),
             tolerances,
         )
-
-
-def _pair_blocks(gaps: SparseRows, pairs: Indices) -> tuple[Indices, Any, Any]:
-    """Return begin of the block of each pair of gap rows, and rows and columns of all blocks.
-
-    Rows that move with the same coordinates, as those of one joint, share a block.
-    """
-    indptr, indices, _ = gaps
-    moved = [tuple(indices[a:b].tolist()) for a, b in itertools.pairwise(indptr)]
-    blocks: dict[Any, int] = {}
-    begin, ends, count = [], [], 0
-    for i, j in pairs:
-        key = moved[i], moved[j]
-        if key not in blocks:
-            blocks[key] = count
-            ends.append([end.ravel() for end in np.meshgrid(*key, indexing="ij")])
-            count += len(ends[-1][0])
-        begin.append(blocks[key])
-    rows, columns = np.concatenate(ends, axis=1).astype(np.int64)
-    return np.array(begin), rows, columns
 
 
 # ---- small displacements
@@ -337,7 +319,7 @@ def _small_correction(system, work, iteration, reuse, hold):  # type: ignore
         move[row] = released[row] - origin[row]
         along[row] = law.offset[row] - law.guess[row]
     if begin:
-        _add_derivatives(system.entries, system.factored[2][0], along, move)
+        add_derivatives(system.entries, system.factored[2][0], along, move)
     for k in range(len(change)):
         contact[1, k] = 0.0 if begin else contact[0, k]
         change[k] = right[k] if begin else 0.0
@@ -348,7 +330,7 @@ def _small_correction(system, work, iteration, reuse, hold):  # type: ignore
         moved = row_times(gaps, row, change)
         along[row] = moved + along[row] if begin else moved
         move[row] = released[row] - origin[row]
-    _add_derivatives(system.entries, system.factored[2][0], along, move)
+    add_derivatives(system.entries, system.factored[2][0], along, move)
     return True
 
 
@@ -405,26 +387,6 @@ def _subtract_derivatives(system, count):  # type: ignore
                 place += width
         for m in range(size):
             entries[places[begin + m]] -= dense[m]
-
-
-@kernel
-def hold_reversed(last, released, entries, count):  # type: ignore
-    """Hold points that reversed their slip: they release nothing, whatever their gaps."""
-    rows, values = entries
-    for k in range(count):
-        if last[rows[k, 0]] * released[rows[k, 0]] < 0.0:
-            values[k] = 0.0
-    for row in range(len(released)):
-        if last[row] * released[row] < 0.0:
-            released[row] = 0.0
-
-
-@kernel
-def _add_derivatives(entries, count, along, result):  # type: ignore
-    """Add the change of λ with that of the gaps, by the derivatives in the factor."""
-    rows, values = entries
-    for k in range(count):
-        result[rows[k, 0]] += values[k] * along[rows[k, 1]]
 
 
 @kernel
