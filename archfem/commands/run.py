@@ -172,8 +172,10 @@ def _read_records(
 
 def compile_steps(options: argparse.Namespace) -> None:
     """Compile the kernels of time steps, so that no run waits for it."""
+    from archfem._numba import delete_damaged_files
     from archfem.dynamics.warm_up import compile_all
 
+    delete_damaged_files()
     for kind, seconds in compile_all(options.jobs):
         print(f"{seconds:5.0f} s: {kind}", flush=True)
 

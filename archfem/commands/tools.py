@@ -210,7 +210,12 @@ def _diagnose_compiled_code() -> Diagnosis:
     count, folders = _numba.count_cached_functions(), _numba.cache_folders()
     if not count:
         return Diagnosis("compiled code", "none yet: the first run, or 'archfem compile', makes it")
-    return Diagnosis("compiled code", f"{count} functions in {', '.join(map(str, folders))}")
+    state = f"{count} functions in {', '.join(map(str, folders))}"
+    if damaged := _numba.find_damaged_files():
+        remedy = "'archfem compile' makes them anew, as the next run does"
+        state += f"; {len(damaged)} damaged files, the first {damaged[0]}"
+        return Diagnosis("compiled code", state, remedy)
+    return Diagnosis("compiled code", state)
 
 
 def _numbers(version: str) -> list[int]:
