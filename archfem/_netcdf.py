@@ -13,7 +13,7 @@ from typing import Any
 import netCDF4
 import xarray as xr
 
-from archfem._files import atomic_write, read_bytes
+from archfem._files import atomic_write, check_listed, read_bytes
 from archfem.errors import InvalidInput
 
 # Precedes the digest at the end of a file.
@@ -39,7 +39,7 @@ def write_dataset(
 
 
 def read_dataset(path: str | Path, what: str) -> xr.Dataset:
-    """Read a NetCDF file and verify its checksum."""
+    """Read a NetCDF file and verify its checksum; in a result folder also that of the list."""
     # a history has no other limit of size than the disk's
     content = read_bytes(path, what, max_bytes=2**40)
     before, mark, digest = content.rpartition(CHECKSUM_MARK)
@@ -48,6 +48,7 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     )
     if mark and digest != _digest(before):
         raise damaged
+    check_listed(Path(path), content)
     try:
         file = netCDF4.Dataset(Path(path).name, memory=before if mark else content)
         store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]

@@ -107,8 +107,8 @@ class HealingCache(FunctionCache):
 def _warn_unsaved(folder: str, reason: str) -> None:
     """Warn that compiled code cannot be stored, once a folder."""
     logger.warning(
-        "compiled code cannot be stored in %s (%s): this run needs no file, but the next one compiles again; "
-        "make room there, or set %s to another folder",
+        "compiled code cannot be stored in %s (%s): this run needs no file, but the next one "
+        "compiles again; make room there, or set %s to another folder",
         *(folder, reason, CACHE_VARIABLE),
     )
 

@@ -1,6 +1,5 @@
 """Files of result folders."""
 
-import os
 
 import pytest
 
@@ -13,18 +12,6 @@ def test_more_pairs_than_colours_share_several_pictures(small, tmp_path):
     runs = {str(number): run.history for number in range(7)}
     files = results.write_pairs(runs, rest, "a table", tmp_path)
     assert [path.name for path in files] == ["suite.txt", "envelope.png", "envelope_2.png"]
-
-
-def test_files_of_a_run_are_written_again_where_the_run_is_newer(small, undrawn, tmp_path):
-    rest, _, run = af.cases.run_case(af.Case.read(small), tmp_path, pairs=["first"])
-    assert not results.is_written(run)
-    files = results.write_run(run, rest, "a table", run.path.parent)
-    assert files[-1].name == "summary.txt"
-    assert files[-1].read_text() == "a table\n"
-    assert results.is_written(run)
-    later = files[-1].stat().st_mtime_ns + 1
-    os.utime(run.path, ns=(later, later))
-    assert not results.is_written(run)
 
 
 @pytest.mark.slow

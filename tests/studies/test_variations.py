@@ -283,7 +283,7 @@ def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, undrawn,
     path.write_text(CASE)
     assert af.commands.main(["verdict", str(path), "--out", str(out), "--samples", "2"]) == 0
     said = capsys.readouterr().out
-    names = {"verdict_range.nc", "verdict_range.txt", "verdict_range.png"}
+    names = {"archfem.json", "verdict_range.nc", "verdict_range.txt", "verdict_range.png"}
     assert names == {each.name for each in out.iterdir()}
     found = af.dynamics.VerdictRange.read(out / "verdict_range.nc")
     assert str(found) in said

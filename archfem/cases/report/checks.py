@@ -140,7 +140,7 @@ def build_source_section(data: ReportData) -> Section:
     rows.append(("SHA-256 of the case", hash_bytes(data.case.text().encode())))
     blocks: list[Any] = [Grid((), rows)]
     if data.folder is not None:
-        files = sorted(path for path in data.folder.rglob("*") if _is_source(path))
+        files = sorted(path for path in data.files.values() if _is_source(path))
         table = [
             [
                 str(path.relative_to(data.folder)),
@@ -164,4 +164,4 @@ def _is_source(path: Path) -> bool:
     """Return whether a report is written from a file."""
     figures = ("dead", "dead_stress", "free_body", "modes", "collapse", "accuracy", "verdict_range")
     text = path.suffix in (".nc", ".toml", ".txt")
-    return path.is_file() and (text or (path.suffix == ".png" and path.stem in figures))
+    return text or (path.suffix == ".png" and path.stem in figures)
