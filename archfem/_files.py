@@ -176,7 +176,7 @@ def is_locked(folder: Path) -> bool:
 def write_sealed_json(path: Path, content: Any) -> None:
     """Write a JSON file with the SHA-256 of its content."""
     with atomic_write(path) as draft:
-        sealed = {"content": content, "sha256": _hash_json(content)}
+        sealed = {"content": content, "sha256": hash_json(content)}
         draft.write_text(json.dumps(sealed), encoding="utf-8")
 
 
@@ -188,12 +188,12 @@ def read_sealed_json(path: Path, what: str) -> Any:
         content, digest = sealed["content"], sealed["sha256"]
     except (ValueError, KeyError, TypeError, RecursionError):
         content, digest = None, ""
-    if digest != _hash_json(content):
+    if digest != hash_json(content):
         raise InvalidInput(f"{path} is damaged: it is not what was written there; run again")
     return content
 
 
-def _hash_json(content: Any) -> str:
+def hash_json(content: Any) -> str:
     """Return the SHA-256 of what JSON can represent."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
@@ -227,30 +227,40 @@ def check_listed(path: Path, content: bytes) -> None:
 @contextmanager
 def replace_results(folder: Path, command: str, inputs: str) -> Iterator[Path]:
     """Yield a draft folder whose files replace those of a command when the block ends."""
-    with lock_folder(folder):
-        draft = start_draft(folder, command)
-        try:
-            yield draft
-        except BaseException:
-            shutil.rmtree(draft, ignore_errors=True)
-            raise
+    with lock_folder(folder), stage_results(folder, command, inputs) as draft:
+        yield draft
+
+
+@contextmanager
+def stage_results(folder: Path, command: str, inputs: str) -> Iterator[Path]:
+    """Yield a draft folder as `replace_results` does, in a folder that is locked already."""
+    draft = start_draft(folder, command)
+    try:
+        yield draft
         publish_draft(folder, command, inputs)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
 
 
 def start_draft(folder: Path, command: str) -> Path:
-    """Return the draft folder of a command, and remove what killed commands have left.
+    """Return the draft folder of a command, which is locked.
 
     Only a draft of "run" may have files: the pairs of a suite that was interrupted.
     """
+    remove_leftovers(folder)
+    draft = folder / f"{DRAFT_PREFIX}{command}"
+    draft.mkdir(exist_ok=True)
+    return draft
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove what killed commands have left in a folder, which is locked."""
     complete_publication(folder)
     for leftover in folder.glob(f"{DRAFT_PREFIX}*"):
         if leftover.name != f"{DRAFT_PREFIX}run":
             shutil.rmtree(leftover, ignore_errors=True)
     for part in folder.glob(".*.part*"):
         part.unlink(missing_ok=True)
-    draft = folder / f"{DRAFT_PREFIX}{command}"
-    draft.mkdir(exist_ok=True)
-    return draft
 
 
 def publish_draft(folder: Path, command: str, inputs: str) -> None:

@@ -31,7 +31,7 @@ from archfem._files import (
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, list_input_files
 from archfem.cases.run import HISTORY_FILE, CaseResult, DeadLoadResult, Run
-from archfem.cases.toml_file import parse_tables, read_tables
+from archfem.cases.toml_file import read_tables
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import VerdictRange
@@ -186,8 +186,6 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
         for name, path in files.items()
         if path.is_file() and path.relative_to(place).as_posix() in listed
     }
-    for name, run in runs.items():
-        _check_case_of_history(files[name], run, case if case.suite is None else case.alone(name))
     # A single motion without a history is no missing pair: the case may have dead load only.
     missing = () if case.suite is None else tuple(name for name in files if name not in runs)
     return ResultFolder(place, case, runs, missing)
@@ -205,15 +203,6 @@ def _check_files(place: Path) -> FileGroup:
         if path.is_file() and path.suffix != ".nc":  # histories are checked as they are read
             check_listed(path, read_bytes(path, "result"))
     return run
-
-
-def _check_case_of_history(path: Path, run: History, case: Case) -> None:
-    """Refuse a history of another case."""
-    text = run.dataset.attrs.get("case")
-    if text is not None and parse_tables(str(text)) != parse_tables(case.text()):
-        raise InvalidInput(
-            f"{path} is of another case than {CASE_FILE} in the folder: run the case again"
-        )
 
 
 def _motion_name(case: Case) -> str:

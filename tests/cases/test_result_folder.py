@@ -1,6 +1,5 @@
 """Files of result folders."""
 
-
 import pytest
 
 import archfem as af
