@@ -32,9 +32,10 @@ def write_dataset(
         store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
         dataset.assign_attrs({CHECKSUM_ATTRIBUTE: 1}).dump_to_store(store, encoding=dict(encoding))
     finally:
-        content = bytes(file.close())
-    with atomic_write(path) as draft:
-        draft.write_bytes(content + CHECKSUM_MARK + _digest(content))
+        content = file.close()  # a view of memory, which is not copied: a history may be large
+    with atomic_write(path) as draft, draft.open("wb") as target:
+        target.write(content)
+        target.write(CHECKSUM_MARK + _digest(content))
     return path
 
 
@@ -61,6 +62,6 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     return dataset
 
 
-def _digest(content: bytes) -> bytes:
+def _digest(content: bytes | memoryview) -> bytes:
     """Compute the SHA-256 digest of a file's content, as hexadecimal text."""
     return hashlib.sha256(content).hexdigest().encode()
