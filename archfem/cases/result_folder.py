@@ -192,16 +192,21 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
 
 
 def _check_files(place: Path) -> FileGroup:
-    """Return the files of the run in a folder; refuse one that was changed or is of another run."""
-    run = read_file_list(place).get("run")
+    """Return the files of the run in a folder; refuse any that was changed or is of another run."""
+    groups = read_file_list(place)
+    run = groups.get("run")
     if run is None:
         raise InvalidInput(
             f"{place} has no finished run, whose files `archfem run` lists in {LIST_FILE}: run the "
             "case again"
         )
-    for path in (place / name for name in run.files):
-        if path.is_file() and path.suffix != ".nc":  # histories are checked as they are read
-            check_listed(path, read_bytes(path, "result"))
+    # histories are checked as they are read, and an earlier report is replaced
+    listed = [
+        name for command, group in groups.items() if command != "report" for name in group.files
+    ]
+    for path in (place / name for name in listed):
+        if path.is_file() and path.name != HISTORY_FILE:
+            check_listed(path, read_bytes(path, "result", max_bytes=2**40))
     return run
 
 
