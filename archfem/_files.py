@@ -1,18 +1,34 @@
-"""Text and binary files: checked before reading, written atomically; columns of text."""
+"""Text and binary files: checked before reading, written atomically; folders of results.
+
+Results of a command replace earlier ones together. They are written to a draft folder, which is
+renamed when all of them exist, and then moved. A list in the folder has the SHA-256 of each file
+and that of the command's inputs, so that a file of another run is recognised when it is read.
+"""
 
 import errno
+import fcntl
+import hashlib
+import json
 import os
+import shutil
 import stat
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from archfem._validation import short_repr
 from archfem.errors import DiskFull, InvalidInput
 
 # Errors of the operating system for a full disk, an exceeded quota, a file too large
 DISK_FULL_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+# List of the files of a result folder
+LIST_FILE = "archfem.json"
+
+# Folders in a result folder: drafts of commands, and the draft whose files are being moved
+DRAFT_PREFIX = ".unfinished-"
+FINISHED_FOLDER = ".finished"
 
 # Limit for files that are read at once: a record of 10⁷ samples is smaller.
 MAX_FILE_BYTES = 2**28
@@ -100,6 +116,212 @@ def create_result_folder(path: str | Path) -> Path:
             f"the folder {folder} cannot be made ({error.strerror}): name another with --out"
         ) from error
     return folder
+
+
+class FileGroup(NamedTuple):
+    """Files of a result folder that one command has written."""
+
+    inputs: str  # SHA-256 of case, input files and program
+    files: Mapping[str, str]  # SHA-256 by path relative to the folder
+
+
+@contextmanager
+def lock_folder(folder: Path) -> Iterator[None]:
+    """Refuse other commands that write to a folder while this one does."""
+    path = create_result_folder(folder) / ".lock"
+    while True:
+        try:
+            lock = path.open("ab+", buffering=0)
+        except OSError as error:
+            raise InvalidInput(
+                f"{folder} cannot be written to ({error.strerror}): name another folder"
+            ) from error
+        try:
+            # the kernel releases the lock of a process that is killed
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            lock.seek(0)
+            with lock:
+                raise InvalidInput(
+                    f"another driver runs in {folder} ({lock.read().decode()}): wait for it to "
+                    "end, or name another folder"
+                ) from error
+        # the previous owner may have deleted the file after it was opened here
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(lock.fileno()), path.stat()):
+                break
+        lock.close()
+    with lock:
+        with suppress(OSError):  # a full disk; the lock needs no content
+            lock.truncate(0)
+            lock.write(f"process {os.getpid()} on {os.uname().nodename}".encode())
+        try:
+            yield
+        finally:
+            path.unlink(missing_ok=True)
+
+
+def is_locked(folder: Path) -> bool:
+    """Return whether a command writes to a folder."""
+    try:
+        with (folder / ".lock").open("rb") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except FileNotFoundError:
+        return False
+    except BlockingIOError:
+        return True
+    return False
+
+
+def write_sealed_json(path: Path, content: Any) -> None:
+    """Write a JSON file with the SHA-256 of its content."""
+    with atomic_write(path) as draft:
+        sealed = {"content": content, "sha256": hash_json(content)}
+        draft.write_text(json.dumps(sealed), encoding="utf-8")
+
+
+def read_sealed_json(path: Path, what: str) -> Any:
+    """Read the content of a JSON file that `write_sealed_json` has written."""
+    text = read_text(path, what)
+    try:
+        sealed = json.loads(text)
+        content, digest = sealed["content"], sealed["sha256"]
+    except (ValueError, KeyError, TypeError, RecursionError):
+        content, digest = None, ""
+    if digest != hash_json(content):
+        raise InvalidInput(f"{path} is damaged: it is not what was written there; run again")
+    return content
+
+
+def hash_json(content: Any) -> str:
+    """Return the SHA-256 of what JSON can represent."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def read_file_list(folder: Path) -> dict[str, FileGroup]:
+    """Return the files of a result folder by command; none if it has no list."""
+    path = folder / LIST_FILE
+    if not path.is_file():
+        return {}
+    return {
+        command: FileGroup(str(group["inputs"]), dict(group["files"]))
+        for command, group in read_sealed_json(path, "list of results").items()
+    }
+
+
+def check_listed(path: Path, content: bytes) -> None:
+    """Refuse a file of a result folder that is not the one which archfem wrote there."""
+    path = path.absolute()
+    # the history of a pair is in a folder within the result folder
+    for folder in (path.parent, path.parent.parent):
+        name = path.relative_to(folder).as_posix()
+        for group in read_file_list(folder).values():
+            listed = group.files.get(name)
+            if listed is not None and listed != hashlib.sha256(content).hexdigest():
+                raise InvalidInput(
+                    f"{path} is not the file that archfem wrote there, by the digest in "
+                    f"{LIST_FILE}: it was changed, or is of another run; run again"
+                )
+
+
+@contextmanager
+def replace_results(folder: Path, command: str, inputs: str) -> Iterator[Path]:
+    """Yield a draft folder whose files replace those of a command when the block ends."""
+    with lock_folder(folder), stage_results(folder, command, inputs) as draft:
+        yield draft
+
+
+@contextmanager
+def stage_results(folder: Path, command: str, inputs: str) -> Iterator[Path]:
+    """Yield a draft folder as `replace_results` does, in a folder that is locked already."""
+    draft = start_draft(folder, command)
+    try:
+        yield draft
+        publish_draft(folder, command, inputs)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def start_draft(folder: Path, command: str) -> Path:
+    """Return the draft folder of a command, which is locked.
+
+    Only a draft of "run" may have files: the pairs of a suite that was interrupted.
+    """
+    remove_leftovers(folder)
+    draft = folder / f"{DRAFT_PREFIX}{command}"
+    draft.mkdir(exist_ok=True)
+    return draft
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove what killed commands have left in a folder, which is locked."""
+    complete_publication(folder)
+    for leftover in folder.glob(f"{DRAFT_PREFIX}*"):
+        if leftover.name != f"{DRAFT_PREFIX}run":
+            shutil.rmtree(leftover, ignore_errors=True)
+    for part in folder.glob(".*.part*"):
+        part.unlink(missing_ok=True)
+
+
+def publish_draft(folder: Path, command: str, inputs: str) -> None:
+    """Replace the files that a command has written earlier by those of its draft."""
+    draft = folder / f"{DRAFT_PREFIX}{command}"
+    paths = [path for path in draft.rglob("*") if path.is_file()]
+    files = {path.relative_to(draft).as_posix(): _hash_content(path) for path in paths}
+    # a report is of the run that it was written from
+    replaced = {command, "report"} if command == "run" else {command}
+    groups: dict[str, Any] = {command: {"inputs": inputs, "files": files}}
+    for name, group in intact_file_list(folder).items():
+        if name not in replaced:
+            others = {file: digest for file, digest in group.files.items() if file not in files}
+            groups[name] = {"inputs": group.inputs, "files": others}
+    write_sealed_json(draft / LIST_FILE, groups)
+    os.rename(draft, folder / FINISHED_FOLDER)  # from here on the new results are those that count
+    complete_publication(folder)
+
+
+def complete_publication(folder: Path) -> None:
+    """Move finished results to their places; an interrupted call can be repeated."""
+    finished = folder / FINISHED_FOLDER
+    if not finished.is_dir():
+        return
+    if (finished / LIST_FILE).is_file():
+        listed = {name for group in read_file_list(finished).values() for name in group.files}
+        earlier = {name for group in intact_file_list(folder).values() for name in group.files}
+        for name in earlier - listed:
+            _delete_within(folder, name)
+        for path in [path for path in finished.rglob("*") if path.is_file()]:
+            target = folder / path.relative_to(finished)
+            if target.name != LIST_FILE:
+                target.parent.mkdir(parents=True, exist_ok=True)
+                os.replace(path, target)
+        os.replace(finished / LIST_FILE, folder / LIST_FILE)  # last: it says that all are there
+    shutil.rmtree(finished)
+
+
+def intact_file_list(folder: Path) -> dict[str, FileGroup]:
+    """Return the files of a result folder by command; none if its list is damaged."""
+    try:
+        return read_file_list(folder)
+    except InvalidInput:
+        return {}
+
+
+def _delete_within(folder: Path, name: str) -> None:
+    """Delete a file of a result folder, and its own folder if that is empty then."""
+    path = folder / name
+    if folder.resolve() not in path.resolve().parents:  # a list that was made up
+        return
+    path.unlink(missing_ok=True)
+    with suppress(OSError):
+        if path.parent != folder:
+            path.parent.rmdir()
+
+
+def _hash_content(path: Path) -> str:
+    """Return the SHA-256 of a file, read in parts."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def align_columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

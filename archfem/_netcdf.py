@@ -13,7 +13,7 @@ from typing import Any
 import netCDF4
 import xarray as xr
 
-from archfem._files import atomic_write, read_bytes
+from archfem._files import atomic_write, check_listed, read_bytes
 from archfem.errors import InvalidInput
 
 # Precedes the digest at the end of a file.
@@ -32,14 +32,15 @@ def write_dataset(
         store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
         dataset.assign_attrs({CHECKSUM_ATTRIBUTE: 1}).dump_to_store(store, encoding=dict(encoding))
     finally:
-        content = bytes(file.close())
-    with atomic_write(path) as draft:
-        draft.write_bytes(content + CHECKSUM_MARK + _digest(content))
+        content = file.close()  # a view of memory, which is not copied: a history may be large
+    with atomic_write(path) as draft, draft.open("wb") as target:
+        target.write(content)
+        target.write(CHECKSUM_MARK + _digest(content))
     return path
 
 
 def read_dataset(path: str | Path, what: str) -> xr.Dataset:
-    """Read a NetCDF file and verify its checksum."""
+    """Read a NetCDF file and verify its checksum; in a result folder also that of the list."""
     # a history has no other limit of size than the disk's
     content = read_bytes(path, what, max_bytes=2**40)
     before, mark, digest = content.rpartition(CHECKSUM_MARK)
@@ -48,6 +49,7 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     )
     if mark and digest != _digest(before):
         raise damaged
+    check_listed(Path(path), content)
     try:
         file = netCDF4.Dataset(Path(path).name, memory=before if mark else content)
         store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
@@ -60,6 +62,6 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     return dataset
 
 
-def _digest(content: bytes) -> bytes:
+def _digest(content: bytes | memoryview) -> bytes:
     """Compute the SHA-256 digest of a file's content, as hexadecimal text."""
     return hashlib.sha256(content).hexdigest().encode()

@@ -6,17 +6,20 @@ slices one, by atomic operations that take longer than the arithmetic of small f
 not check for zero.
 
 Numba stores compiled code beside the sources. Where these are read-only, as in an installation for
-all users, it goes to the user's cache, and where that is read-only too, to a temporary folder.
+all users, it goes to the user's cache, and where that is read-only too, to a temporary folder. Each
+file ends with a checksum: a function whose file is damaged is compiled anew.
 """
 
 import atexit
 import hashlib
+import io
 import logging
 import os
 import shutil
 import sys
 import tempfile
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from multiprocessing import parent_process
 from pathlib import Path
@@ -24,6 +27,9 @@ from typing import Any
 
 import numba
 from numba.core import event
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+# mypy: disable-error-code="no-untyped-call"
 
 logger = logging.getLogger("archfem")
 
@@ -38,8 +44,98 @@ CACHE_VARIABLE = "NUMBA_CACHE_DIR"
 
 KERNEL_OPTIONS: Any = {"error_model": "numpy", "_nrt": False}
 
+
+class CheckedCacheFile(IndexDataCacheFile):
+    """Index and data files of a function, each followed by the SHA-256 of its content.
+
+    Unpickling ignores the checksum. Without it, a flipped bit in compiled code would not be noticed
+    before that code runs.
+    """
+
+    def _load_index(self) -> Any:
+        """Return the data files by signature; none if the index is damaged or unreadable."""
+        try:
+            return super()._load_index() if _is_intact(Path(self._index_path)) else {}
+        except OSError:
+            return {}
+
+    def _load_data(self, name: str) -> Any:
+        """Return the content of a data file; an OSError makes numba compile anew."""
+        path = Path(self._data_path(name))
+        if not _is_intact(path):
+            raise OSError(f"{path} is damaged")
+        return super()._load_data(name)
+
+    @contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[Any]:
+        """Yield a file that replaces another when the block ends, then with its checksum."""
+        content = io.BytesIO()
+        yield content
+        with super()._open_for_write(filepath) as file:
+            file.write(content.getvalue() + hashlib.sha256(content.getvalue()).digest())
+
+
+class HealingCache(FunctionCache):
+    """Compiled code of a function on disk; what cannot be loaded is discarded."""
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        file = self._cache_file
+        self._cache_file = CheckedCacheFile(
+            self._cache_path, self._impl.filename_base, file._source_stamp
+        )
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the code for a signature, or None, upon which numba compiles it."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception as error:  # an intact file of another LLVM or processor, for instance
+            logger.info("compiled code in %s cannot be loaded: %s", self._cache_path, error)
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Store the code for a signature; a run does not need the file."""
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            _warn_unsaved(self._cache_path, error.strerror or str(error))
+
+
+@cache
+def _warn_unsaved(folder: str, reason: str) -> None:
+    """Warn that compiled code cannot be stored, once a folder."""
+    logger.warning(
+        "compiled code cannot be stored in %s (%s): this run needs no file, but the next one "
+        "compiles again; make room there, or set %s to another folder",
+        *(folder, reason, CACHE_VARIABLE),
+    )
+
+
+def _is_intact(path: Path) -> bool:
+    """Return whether a file ends with its checksum."""
+    content = path.read_bytes()
+    return hashlib.sha256(content[:-32]).digest() == content[-32:]
+
+
+def store_compiled(compile_function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a decorator that compiles as another one does, and stores the code on disk."""
+
+    def decorate(function: Any) -> Any:
+        dispatcher = compile_function(function)
+        with suppress(RuntimeError):  # there is no folder that numba may write to
+            dispatcher._cache = HealingCache(function)
+        return dispatcher
+
+    return decorate
+
+
 # Compiles a kernel that Python calls, and stores it on disk.
-entry: Any = numba.njit(**KERNEL_OPTIONS, cache=True)
+entry: Any = store_compiled(numba.njit(**KERNEL_OPTIONS))
+
+# Compiles a function that may allocate arrays, and stores it on disk.
+allocating_entry: Any = store_compiled(numba.njit())
 
 # Kernels that only kernels call are part of the callers' code. They need no wrappers for Python,
 # which would convert every array of their arguments and take a fifth of the compile time. A call
@@ -89,7 +185,7 @@ def prepare_cache() -> None:
         os.environ[CACHE_VARIABLE] = str(folder)
         numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
     if parent_process() is None:
-        event.register("numba:compile", CompilationNotice())  # type: ignore[no-untyped-call]
+        event.register("numba:compile", CompilationNotice())
 
 
 def cache_folders() -> list[Path]:
@@ -107,6 +203,27 @@ def count_cached_functions() -> int:
         newest = max(path.stat().st_mtime for path in _source_files())
     cached = [path for folder in cache_folders() for path in folder.glob("*.nbi")]
     return sum(path.stat().st_mtime >= newest for path in cached)
+
+
+def find_damaged_files() -> list[Path]:
+    """Return the files of compiled code that cannot be read or have no valid checksum."""
+    damaged = []
+    for path in (path for folder in cache_folders() for path in folder.glob("*.nb[ic]")):
+        try:
+            intact = _is_intact(path)
+        except FileNotFoundError:  # another process has deleted it
+            continue
+        except OSError:
+            intact = False
+        damaged += [] if intact else [path]
+    return damaged
+
+
+def delete_damaged_files() -> None:
+    """Delete damaged files of compiled code; those in use are replaced by the next compilation."""
+    for path in find_damaged_files():
+        with suppress(OSError):  # a folder, or read-only
+            path.unlink()
 
 
 def delete_stale_cache(folder: Path, *others: Path) -> None:
@@ -137,7 +254,11 @@ def _cache_folder() -> Path | None:
     for place in places:
         if _is_writable(place):
             return place
-    temporary = Path(tempfile.mkdtemp(prefix="archfem-"))
+    try:
+        temporary = Path(tempfile.mkdtemp(prefix="archfem-"))
+    except OSError as error:  # a full disk: the run compiles, and stores nothing
+        _warn_unsaved(tempfile.gettempdir(), error.strerror or str(error))
+        return None
     atexit.register(shutil.rmtree, temporary, ignore_errors=True)
     logger.warning(
         "compiled code cannot be stored: neither beside %s nor in %s may be written, so that every "

@@ -1,9 +1,11 @@
-"""Where compiled code is kept."""
+"""Where compiled code is kept, and what becomes of damaged files."""
 
+import errno
 import logging
 import os
 from pathlib import Path
 
+import numba
 import pytest
 
 from archfem import _numba
@@ -69,3 +71,97 @@ def test_that_it_compiles_is_said_once(capsys):
     _numba._announce_compilation()
     _numba._announce_compilation()
     assert capsys.readouterr().err.count("takes about a minute") == 1
+
+
+def add_half(value):
+    return value + 0.5
+
+
+def compiled(hits):
+    """Compile a small function, or load it; `hits` is how often it must come from its files."""
+    function = _numba.entry(add_half)
+    assert function(2.0) == 2.5
+    assert sum(function.stats.cache_hits.values()) == hits
+    return function
+
+
+@pytest.fixture
+def stored(monkeypatch, tmp_path):
+    """Index and code of a small function, in a folder of their own."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv(_numba.CACHE_VARIABLE, str(tmp_path))
+    compiled(hits=0)
+    (index,), (code,) = tmp_path.rglob("*.nbi"), tmp_path.rglob("*.nbc")
+    monkeypatch.setattr(_numba, "cache_folders", lambda: [index.parent])
+    return {"index": index, "code": code}
+
+
+def flip(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+DAMAGES = {
+    "truncated": lambda path: path.write_bytes(path.read_bytes()[:-40]),
+    "empty": lambda path: path.write_bytes(b""),
+    "flipped": flip,
+    "unreadable": lambda path: (path.unlink(), path.mkdir()),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("which", ["index", "code"])
+def test_damaged_code_is_found_and_compiled_anew(which, damage, stored):
+    compiled(hits=1)
+    assert not _numba.find_damaged_files()
+    DAMAGES[damage](stored[which])
+    assert _numba.find_damaged_files() == [stored[which]]
+    compiled(hits=0)
+    if damage != "unreadable":  # no file replaces a folder
+        assert not _numba.find_damaged_files()
+        compiled(hits=1)
+
+
+def test_code_that_is_intact_but_cannot_be_loaded_is_compiled_anew(stored, monkeypatch):
+    def refuse(*_):
+        raise RuntimeError("made by another LLVM")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("numba.core.compiler.CompileResult._rebuild", refuse)
+        compiled(hits=0)
+    compiled(hits=1)
+
+
+def test_a_full_disk_stops_no_run(monkeypatch, tmp_path, caplog):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(os, "replace", full)
+    compiled(hits=0)
+    assert "No space left on device" in caplog.text
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_a_full_disk_leaves_no_folder_for_code(closed, monkeypatch, tmp_path, caplog):
+    def full(**_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    closed.add(tmp_path / "cache")
+    monkeypatch.setattr(_numba.tempfile, "mkdtemp", full)
+    assert _numba._cache_folder() is None
+    assert "compiled code cannot be stored" in caplog.text
+
+
+def test_damaged_files_are_deleted_before_all_is_compiled(stored):
+    flip(stored["code"])
+    _numba.delete_damaged_files()
+    assert not stored["code"].exists()
+    assert stored["index"].exists()
+
+
+def test_every_stored_function_is_checked():
+    package = Path(_numba.__file__).parent
+    modules = [path for path in package.rglob("*.py") if "cache=True" in path.read_text("utf-8")]
+    assert not modules, "numba's own cache does not notice damage: use entry or allocating_entry"

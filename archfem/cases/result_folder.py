@@ -1,16 +1,37 @@
-"""Result folders: tables and pictures that `archfem run` writes, and folders opened again."""
+"""Result folders: tables and pictures that `archfem run` writes, and folders opened again.
 
-from collections.abc import Mapping, Sequence
+The files of a run appear in its folder together, when all of them exist (`archfem._files`).
+"""
+
+import logging
+import os
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import xarray as xr
 
-from archfem._files import atomic_write
+from archfem._files import (
+    FINISHED_FOLDER,
+    LIST_FILE,
+    FileGroup,
+    atomic_write,
+    check_listed,
+    complete_publication,
+    intact_file_list,
+    lock_folder,
+    publish_draft,
+    read_bytes,
+    read_file_list,
+    replace_results,
+    start_draft,
+)
 from archfem.cases.case import Case
-from archfem.cases.provenance import list_input_files
+from archfem.cases.provenance import hash_inputs, list_input_files
 from archfem.cases.run import HISTORY_FILE, CaseResult, DeadLoadResult, Run
-from archfem.cases.toml_file import parse_tables, read_tables
+from archfem.cases.toml_file import read_tables
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import VerdictRange
@@ -32,8 +53,9 @@ from archfem.view.structure import draw_during, draw_names
 from archfem.view.studies import draw_accuracy, draw_verdict_range
 from archfem.view.style import LINE_COLOURS, save
 
+logger = logging.getLogger("archfem")
+
 CASE_FILE = "case.toml"
-# The summary of a run is written last: if it exists, all other files of the run do.
 SUMMARY_FILE = "summary.txt"
 
 
@@ -62,7 +84,74 @@ class ResultFolder(CaseResult):
         Returns:
             The file.
         """
-        return super().report(self.folder / "report.html" if path is None else path)
+        if path is not None:
+            return super().report(path)
+        inputs = read_file_list(self.folder)["run"].inputs
+        with replace_results(self.folder, "report", inputs) as draft:
+            super().report(draft / "report.html")
+        return self.folder / "report.html"
+
+
+@contextmanager
+def replace_run(case: Case, folder: Path) -> Iterator[Path]:
+    """Yield a draft folder whose files replace those of an earlier run when the block ends.
+
+    The draft has the case, and of a suite the histories of earlier calls. If the block fails, the
+    folder keeps the results of an earlier run; without any it gets what was computed.
+    """
+    with lock_folder(folder):
+        draft, inputs = start_draft(folder, "run"), hash_inputs(case.settings, case.folder)
+        _prepare_draft(case, folder, draft)
+        try:
+            yield draft
+        except BaseException:
+            _keep_partial_results(folder, draft, inputs)
+            raise
+        publish_draft(folder, "run", inputs)
+
+
+def _prepare_draft(case: Case, folder: Path, draft: Path) -> None:
+    """Write the case to a draft, and add the histories of its pairs that earlier calls computed."""
+    pairs = {f"{name}/{HISTORY_FILE}" for name in (case.suite or {}).get("pairs", ())}
+    left = draft / CASE_FILE
+    same = left.is_file() and left.read_bytes() == case.text().encode()
+    for path in [path for path in draft.rglob("*") if path.is_file()]:
+        if not same or path.relative_to(draft).as_posix() not in pairs:
+            path.unlink()
+    for name in pairs:
+        if (folder / name).is_file() and not (draft / name).exists():
+            _link(folder / name, draft / name)
+    with atomic_write(left) as part:
+        part.write_text(case.text(), encoding="utf-8")
+
+
+def _keep_partial_results(folder: Path, draft: Path, inputs: str) -> None:
+    """Publish the results of a run that failed, unless the folder has those of another run."""
+    files = [path for path in draft.rglob("*") if path.is_file() and path.name != CASE_FILE]
+    new = [path for path in files if not _is_linked(path, folder / path.relative_to(draft))]
+    if new and "run" not in intact_file_list(folder):
+        publish_draft(folder, "run", inputs)
+        logger.warning("what was computed is kept in %s", folder)
+    elif any(path.name == HISTORY_FILE for path in new):
+        logger.warning(
+            "%s keeps the results of an earlier run; what was computed now is in %s", folder, draft
+        )
+    else:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _link(source: Path, target: Path) -> None:
+    """Link a file, or copy it where the disk has no links."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copy2(source, target)
+
+
+def _is_linked(path: Path, other: Path) -> bool:
+    """Return whether two paths are of the same file."""
+    return other.is_file() and path.samefile(other)
 
 
 def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> ResultFolder:
@@ -76,37 +165,50 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
         Case and histories of the folder.
 
     Raises:
-        InvalidInput: it is no result folder, the drawing does not exist, or a history is that of
-            another structure or case.
+        InvalidInput: it is no result folder, the drawing does not exist, or a file was changed or
+            is of another run.
     """
     place = Path(folder)
     if not place.is_dir():
         raise InvalidInput(f"there is no folder {place}: give one that `archfem run` has written")
+    if (place / FINISHED_FOLDER).is_dir():  # of a command that was killed
+        with lock_folder(place):
+            complete_publication(place)
     if not (place / CASE_FILE).is_file():
         raise InvalidInput(_missing_case_message(place))
     case = _read_case(place, None if inputs is None else Path(inputs))
+    listed = _check_files(place).files
     if case.suite is not None:
         files = {name: place / name / HISTORY_FILE for name in case.suite["pairs"]}
     else:
         files = {_motion_name(case): place / HISTORY_FILE}
     runs = {
-        name: History.read(path, case.structure) for name, path in files.items() if path.is_file()
+        name: History.read(path, case.structure)
+        for name, path in files.items()
+        if path.is_file() and path.relative_to(place).as_posix() in listed
     }
-    for name, run in runs.items():
-        _check_case_of_history(files[name], run, case if case.suite is None else case.alone(name))
     # A single motion without a history is no missing pair: the case may have dead load only.
     missing = () if case.suite is None else tuple(name for name in files if name not in runs)
     return ResultFolder(place, case, runs, missing)
 
 
-def _check_case_of_history(path: Path, run: History, case: Case) -> None:
-    """Refuse a history of another case, as a command that was broken off leaves in its folder."""
-    text = run.dataset.attrs.get("case")
-    if text is not None and parse_tables(str(text)) != parse_tables(case.text()):
+def _check_files(place: Path) -> FileGroup:
+    """Return the files of the run in a folder; refuse any that was changed or is of another run."""
+    groups = read_file_list(place)
+    run = groups.get("run")
+    if run is None:
         raise InvalidInput(
-            f"{path} is of another case than {CASE_FILE} in the folder: a later command ended "
-            "before it had computed this run; run the case again"
+            f"{place} has no finished run, whose files `archfem run` lists in {LIST_FILE}: run the "
+            "case again"
         )
+    # histories are checked as they are read, and an earlier report is replaced
+    listed = [
+        name for command, group in groups.items() if command != "report" for name in group.files
+    ]
+    for path in (place / name for name in listed):
+        if path.is_file() and path.name != HISTORY_FILE:
+            check_listed(path, read_bytes(path, "result", max_bytes=2**40))
+    return run
 
 
 def _motion_name(case: Case) -> str:
@@ -201,12 +303,28 @@ def write_run(run: Run, at_rest: DeadLoadResult, text: str, folder: Path) -> lis
     return [*files, _write_text(text, folder / SUMMARY_FILE)]
 
 
-def is_written(run: Run) -> bool:
-    """Return whether the files of a run exist and are not older than its history."""
-    if run.path is None or not (summary := run.path.with_name(SUMMARY_FILE)).is_file():
+def adopt_files(run: Run) -> bool:
+    """Add the files of a pair that an earlier call has finished to the draft of its history.
+
+    Returns False, and adds none, if they are not those of this history.
+    """
+    assert run.path is not None
+    pair, draft, folder = run.path.parents[0].name, run.path.parents[1], run.path.parents[2]
+    listed = intact_file_list(folder).get("run")
+    names = [] if listed is None else [n for n in listed.files if n.startswith(f"{pair}/")]
+    if f"{pair}/{SUMMARY_FILE}" not in names or not _is_linked(
+        run.path, folder / pair / HISTORY_FILE
+    ):
         return False
-    # After an interruption between history and figures, all files are written again.
-    return summary.stat().st_mtime_ns >= run.path.stat().st_mtime_ns
+    try:
+        for name in names:
+            check_listed(folder / name, read_bytes(folder / name, "result"))
+    except InvalidInput:
+        return False
+    for name in names:
+        if not (draft / name).exists():
+            _link(folder / name, draft / name)
+    return True
 
 
 def _critical_instant(run: History) -> xr.Dataset:

@@ -400,7 +400,8 @@ def _run_motion(
     doubts = (*at_rest.doubts, *history.doubts, *doubt_fidelity(at_rest, motion, history))
     history = history.with_doubts(doubts)
     if path is not None:
-        history.save(path)
+        # as later calls read it, so that their tables have the same digits
+        history = History.read(history.save(path), case.structure)
     return Run(case, motion, history, path, seconds=seconds, error=failure)
 
 

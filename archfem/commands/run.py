@@ -4,11 +4,12 @@ import argparse
 import io
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import redirect_stdout
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 
-from archfem._files import create_result_folder
+from archfem._files import DRAFT_PREFIX, create_result_folder, replace_results
 from archfem.cases.case import Case
+from archfem.cases.provenance import hash_inputs
 from archfem.cases.result_text import (
     describe_accuracy,
     describe_collapse,
@@ -31,31 +32,57 @@ from archfem.statics.modes import Modes
 # Modules that import matplotlib or pyvista, which are slow, are imported where they are needed.
 
 
+class FailedPairs(DidNotConverge):
+    """Some pairs of a suite failed; the results of the suite are complete nevertheless."""
+
+
 def run(options: argparse.Namespace) -> int:
     """Carry out a case: limit analysis, dead load and time histories, tables and pictures."""
-    case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
-    if options.workers > 1 and case.suite is not None:
-        from archfem.studies.comparison_run import run_pairs
+    from archfem.cases.result_folder import replace_run
 
-        # Workers save the histories, which `run_case` reuses below.
-        run_pairs(case, folder, workers=options.workers)
-    headline, output = "", io.StringIO()
+    case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
+    headline, failure = "", None
+    output = io.StringIO()
     try:
         # All else is printed after the verdict, which is known last.
-        with redirect_stdout(output):
-            headline, doubtful = print_results(case, _run_and_write_case(case, folder), folder)
+        with replace_run(case, folder) as draft, redirect_stdout(output):
+            if options.workers > 1 and case.suite is not None:
+                from archfem.studies.comparison_run import run_pairs
+
+                # Workers save the histories, which `run_case` reuses below.
+                run_pairs(case, draft, workers=options.workers)
+            try:
+                headline, doubtful = print_results(case, run_case(case, draft), draft)
+            except FailedPairs as error:
+                failure = error
     finally:
         print(f"{case.title}: {headline}" if headline else case.title)
-        print(output.getvalue(), end="")
+        print(_name_published_files(output.getvalue(), folder, "run"), end="")
+    if failure is not None:
+        raise failure
     return EXIT_DOUBTFUL if doubtful else 0
 
 
-def _run_and_write_case(case: Case, folder: Path) -> Iterator[Result]:
-    """Yield the results of a case, whose file is written with the first of them."""
-    for number, result in enumerate(run_case(case, folder)):
-        if number == 0:  # a case that is refused leaves the folder as it was
-            (folder / "case.toml").write_text(case.text(), encoding="utf-8")
-        yield result
+@contextmanager
+def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
+    """Yield the draft folder of a command; its output is printed when the results are in place."""
+    output = io.StringIO()
+    try:
+        inputs = hash_inputs(case.settings, case.folder)
+        with replace_results(folder, command, inputs) as draft, redirect_stdout(output):
+            yield draft
+    finally:
+        print(_name_published_files(output.getvalue(), folder, command), end="")
+
+
+def _name_published_files(text: str, folder: Path, command: str) -> str:
+    """Replace the names of files of a draft by those of the result folder, unless it is left."""
+    draft = folder / f"{DRAFT_PREFIX}{command}"
+    if draft.exists():
+        return text
+    lines = text.replace(str(draft), str(folder)).splitlines(keepends=True)
+    # a draft that failed may have been deleted
+    return "".join(x for x in lines if x[:6] != "wrote " or Path(x[6:].strip()).exists())
 
 
 def check(options: argparse.Namespace) -> int:
@@ -84,11 +111,12 @@ def modes(options: argparse.Namespace) -> None:
 
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     print(case.title)
-    at_rest = DeadLoadResult.of(case)
-    print(describe_dead_load(at_rest))
-    computed = print_modes(at_rest, options.count, folder)
-    first = range(1, min(len(computed.frequencies), 2) + 1)
-    print_written([film_modes(computed, folder / "modes.gif", first)])
+    with _replace_results("modes", case, folder) as draft:
+        at_rest = DeadLoadResult.of(case)
+        print(describe_dead_load(at_rest))
+        computed = print_modes(at_rest, options.count, draft)
+        first = range(1, min(len(computed.frequencies), 2) + 1)
+        print_written([film_modes(computed, draft / "modes.gif", first)])
 
 
 def assess(options: argparse.Namespace) -> None:
@@ -102,10 +130,8 @@ def assess(options: argparse.Namespace) -> None:
     if options.out is not None:
         from archfem.cases.result_folder import write_assessments
 
-        folder = create_result_folder(options.out)
-        if not (folder / "case.toml").is_file():  # a report reads the case from the folder
-            (folder / "case.toml").write_text(case.text(), encoding="utf-8")
-        print_written(write_assessments(found, text, folder))
+        with _replace_results("assess", case, create_result_folder(options.out)) as draft:
+            print_written(write_assessments(found, text, draft))
 
 
 def mesh(options: argparse.Namespace) -> None:
@@ -124,9 +150,10 @@ def accuracy(options: argparse.Namespace) -> None:
 
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     compared = case_accuracy(case, folder / "settings", workers=options.workers)
-    text = describe_accuracy(compared)
-    print(text)
-    print_written(write_accuracy(compared, text, folder))
+    with _replace_results("accuracy", case, folder) as draft:
+        text = describe_accuracy(compared)
+        print(text)
+        print_written(write_accuracy(compared, text, draft))
 
 
 def verdict(options: argparse.Namespace) -> None:
@@ -139,7 +166,8 @@ def verdict(options: argparse.Namespace) -> None:
     computed = verdict_range_of_case(case, workers=options.workers, samples=options.samples)
     print(computed)
     if options.out is not None:
-        print_written(write_verdict_range(computed, create_result_folder(options.out)))
+        with _replace_results("verdict", case, create_result_folder(options.out)) as draft:
+            print_written(write_verdict_range(computed, draft))
 
 
 def report(options: argparse.Namespace) -> None:
@@ -189,8 +217,10 @@ def _read_records(
 
 def compile_steps(options: argparse.Namespace) -> None:
     """Compile the kernels of time steps, so that no run waits for it."""
+    from archfem._numba import delete_damaged_files
     from archfem.dynamics.warm_up import compile_all
 
+    delete_damaged_files()
     for kind, seconds in compile_all(options.jobs):
         print(f"{seconds:5.0f} s: {kind}", flush=True)
 
@@ -249,16 +279,15 @@ def print_modes(at_rest: DeadLoadResult, count: int, folder: Path) -> Modes:
 
 def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
     """Print the result of a run and write its files, unless an earlier command has."""
-    from archfem.cases.result_folder import is_written, write_run
+    from archfem.cases.result_folder import adopt_files, write_run
 
     assert run.path is not None  # `archfem run` always has a folder
     motion, history = run.motion, run.history
     if run.reused:
         print(f"{motion.name}: finished before, kept {run.path}")
-        if is_written(run):
+        if adopt_files(run):
             return
     elif run.error is not None:
-        print(f"what was computed is kept in {run.path}", file=sys.stderr)
         if run.case.suite is None:
             raise run.error
         # The other pairs of a suite are run nevertheless.
@@ -292,7 +321,7 @@ def _print_pairs(
         raise KeyboardInterrupt
     failed = [name for name, run in runs.items() if not run.ending.is_complete]
     if failed:
-        raise DidNotConverge(
+        raise FailedPairs(
             f"{len(failed)} of {len(runs)} pairs have no equilibrium at some step: "
             f"{', '.join(failed)}; what was computed is kept"
         )

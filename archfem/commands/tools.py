@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from archfem import _numba, _optional
+from archfem._files import check_listed, read_bytes
 from archfem.cases.case import Case
 from archfem.cases.examples import copy_example, list_example_titles, read_example
 from archfem.cases.run import dead_load_of_case
@@ -43,6 +44,7 @@ def _find_case(path: Path, name: str = "case.toml") -> Path:
     """Return the case of a run: beside its history, or beside the folder of its pair."""
     for folder in (path.parent, path.absolute().parent.parent):
         if (folder / name).is_file():
+            check_listed(folder / name, read_bytes(folder / name, "case file"))
             return folder / name
     raise InvalidInput(
         f"there is no {name} beside {path}, as `archfem run` writes one: give the case of the "
@@ -210,7 +212,12 @@ def _diagnose_compiled_code() -> Diagnosis:
     count, folders = _numba.count_cached_functions(), _numba.cache_folders()
     if not count:
         return Diagnosis("compiled code", "none yet: the first run, or 'archfem compile', makes it")
-    return Diagnosis("compiled code", f"{count} functions in {', '.join(map(str, folders))}")
+    state = f"{count} functions in {', '.join(map(str, folders))}"
+    if damaged := _numba.find_damaged_files():
+        remedy = "'archfem compile' makes them anew, as the next run does"
+        state += f"; {len(damaged)} damaged files, the first {damaged[0]}"
+        return Diagnosis("compiled code", state, remedy)
+    return Diagnosis("compiled code", state)
 
 
 def _numbers(version: str) -> list[int]:

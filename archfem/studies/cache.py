@@ -12,6 +12,7 @@ import os
 import tempfile
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -76,13 +77,15 @@ class SharedStepper(Stepper):
 def preload() -> None:
     """Load the compiled code of a usual run; on each machine one process compiles it first."""
     digest = source_digest()
-    with open(Path(tempfile.gettempdir()) / f"archfem-{os.getuid()}-{digest}.warm", "a") as file:
+    path = Path(tempfile.gettempdir()) / f"archfem-{os.getuid()}-{digest}.warm"
+    # a full disk stops no study: the points compile what they need
+    with suppress(OSError), path.open("ab", buffering=0) as file:
         compiled = file.tell() > 0
         if not compiled:  # many workers of a cluster would compile the same for a minute
             fcntl.flock(file, fcntl.LOCK_EX)
         compile_variant("compliance, Conserving")
         if not compiled:
-            file.write("compiled\n")
+            file.write(b"compiled\n")
 
 
 def dead_load_of(case: Case) -> DeadLoadResult:

@@ -3,9 +3,7 @@
 The table is an `xarray.Dataset`, written as NetCDF, CSV and Parquet.
 """
 
-import fcntl
-import json
-import os
+import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
@@ -18,11 +16,22 @@ import numpy as np
 import xarray as xr
 from tqdm import tqdm
 
-from archfem._files import DISK_FULL_ERRORS, atomic_write
+from archfem._files import (
+    DISK_FULL_ERRORS,
+    atomic_write,
+    is_locked,
+    lock_folder,
+    read_sealed_json,
+    remove_leftovers,
+    stage_results,
+    write_sealed_json,
+)
 from archfem._netcdf import read_dataset, write_dataset
 from archfem.errors import InvalidInput, StudyStopped
 from archfem.studies.parameter_space import Axis
 from archfem.studies.process_pool import Row
+
+logger = logging.getLogger("archfem")
 
 # Files of the table
 NETCDF_FILE = "results.nc"
@@ -39,43 +48,23 @@ class Store:
 
     @contextmanager
     def lock(self) -> Iterator[None]:
-        """Refuse other drivers while this one runs."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with self._lock.open("a+") as lock:
-            try:
-                # the kernel releases the lock of a driver that is killed
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                lock.seek(0)
-                raise InvalidInput(
-                    f"another driver runs in {self.folder} ({lock.read().strip()}): wait for it to "
-                    "end, or give this study a folder of its own"
-                ) from error
-            lock.truncate(0)
-            lock.write(f"process {os.getpid()} on {os.uname().nodename}")
-            lock.flush()
-            for draft in self.folder.rglob(".*.part*"):  # of a driver that was killed
+        """Refuse other drivers while this one runs, and remove what a killed one has left."""
+        with lock_folder(self.folder):
+            for draft in self._points.rglob(".*.part*"):
                 draft.unlink()
+            remove_leftovers(self.folder)
             yield
 
     @property
     def busy(self) -> bool:
         """Whether a driver is running."""
-        try:
-            with self._lock.open() as lock:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except FileNotFoundError:
-            return False
-        except BlockingIOError:
-            return True
-        return False
+        return is_locked(self.folder)
 
     def read_plan(self) -> dict[str, Any]:
         """Read the title, version and points of the study in the folder."""
-        try:
-            plan: dict[str, Any] = json.loads(self._plan.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InvalidInput(f"there is no study in {self.folder}: {error}") from error
+        if not self._plan.is_file():
+            raise InvalidInput(f"there is no study in {self.folder}: it has no {self._plan.name}")
+        plan: dict[str, Any] = read_sealed_json(self._plan, "study")
         return plan
 
     def write_plan(self, plan: dict[str, Any]) -> None:
@@ -86,6 +75,11 @@ class Store:
         """Return the stored rows, without those of errors that may not occur again."""
         stored = self.digests()
         rows = {digest: self._read_row(digest) for digest in digests if digest in stored}
+        if damaged := [digest for digest, row in rows.items() if row is None]:
+            logger.warning(
+                "%d of the stored points in %s are damaged or were changed: computed again; %s",
+                *(len(damaged), self.folder, self._row_path(damaged[0])),
+            )
         return {
             digest: row for digest, row in rows.items() if row and (row["ours"] or not row["error"])
         }
@@ -95,8 +89,8 @@ class Store:
         return {path.stem for path in self._points.glob("??/*.json")}
 
     def write_row(self, digest: str, row: Row) -> None:
-        """Write the row of a point."""
-        self._write(self._row_path(digest), row)
+        """Write the row of a point, with the digest of the point."""
+        self._write(self._row_path(digest), {"point": digest, **row})
 
     def write_progress(self, status: "Status") -> None:
         """Write the progress, for another process to read."""
@@ -105,17 +99,17 @@ class Store:
     def read_rate(self) -> float:
         """Read the points per second of the latest driver; 0 if unknown."""
         try:
-            return float(json.loads(self._progress.read_text(encoding="utf-8"))["rate"])
-        except (OSError, ValueError, KeyError):
+            return float(read_sealed_json(self._progress, "progress")["rate"])
+        except InvalidInput:
             return 0.0
 
     def _read_row(self, digest: str) -> Row | None:
-        """Read a row; None if its file is damaged."""
+        """Read a row; None if its file is damaged or of another point."""
         try:
-            row: Row = json.loads(self._row_path(digest).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            row: Row = read_sealed_json(self._row_path(digest), "row of a study")
+        except InvalidInput:
             return None
-        return row
+        return row if row.pop("point") == digest else None
 
     def _row_path(self, digest: str) -> Path:
         """Path of a row; subfolders keep the number of files in a folder small."""
@@ -123,8 +117,8 @@ class Store:
 
     def _write(self, path: Path, content: dict[str, Any]) -> None:
         """Write a JSON file whole or not at all."""
-        with explain_full_disk(self.folder), atomic_write(path) as draft:
-            draft.write_text(json.dumps(content), encoding="utf-8")
+        with explain_full_disk(self.folder):
+            write_sealed_json(path, content)
 
 
 @contextmanager
@@ -260,16 +254,19 @@ def load_table_libraries() -> None:
         frame.to_parquet()
 
 
-def write_table(table: xr.Dataset, folder: Path) -> None:
-    """Write a table as NetCDF and CSV, and as Parquet if pyarrow is installed."""
+def write_table(table: xr.Dataset, folder: Path, inputs: str) -> None:
+    """Write a table as NetCDF and CSV, and as Parquet if pyarrow is installed.
+
+    The folder is locked; `inputs` is the digest of the points.
+    """
     flat = table.drop_dims("entry", errors="ignore")  # rows of numbers are in NetCDF alone
     frame = flat.to_dataframe(dim_order=list(flat.dims) or None).reset_index()
-    with explain_full_disk(folder):
-        write_dataset(table, folder / NETCDF_FILE)
-        with atomic_write(folder / CSV_FILE) as draft:
-            frame.map(_quote_formula).rename(columns=_quote_formula).to_csv(draft, index=False)
-        with suppress(ImportError), atomic_write(folder / "results.parquet") as draft:
-            frame.to_parquet(draft, index=False)
+    with explain_full_disk(folder), stage_results(folder, "study", inputs) as draft:
+        write_dataset(table, draft / NETCDF_FILE)
+        with atomic_write(draft / CSV_FILE) as part:
+            frame.map(_quote_formula).rename(columns=_quote_formula).to_csv(part, index=False)
+        with suppress(ImportError), atomic_write(draft / "results.parquet") as part:
+            frame.to_parquet(part, index=False)
 
 
 def _quote_formula(value: Any) -> Any:
@@ -285,7 +282,7 @@ def read_table(path: str | Path) -> xr.Dataset:
         path: path of the NetCDF file.
 
     Raises:
-        InvalidInput: the file is missing or damaged.
+        InvalidInput: the file is missing, damaged, or of another study than its folder.
     """
     return read_dataset(path, "table")
 

@@ -11,6 +11,7 @@ from typing import Any
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
+from archfem._files import hash_json
 from archfem._validation import check_integer
 from archfem.cases.case import Case
 from archfem.cases.provenance import describe_version
@@ -163,7 +164,7 @@ class Study:
             rows = self._collect_rows(store, workers, client)
             table = build_table(self.axes, rows, self._attributes)
             if store is not None:
-                write_table(table, store.folder)
+                write_table(table, store.folder, hash_json(store.read_plan()["points"]))
         return table
 
     status = staticmethod(status)

@@ -177,7 +177,7 @@ def verdict_range_of_case(case: Case, **options: Any) -> VerdictRange:
     motion, damping = ground_motion(case), expected_damping(case)
     if callable(damping):
         damping = damping(build(case.structure, fidelity="rigid"))
-    options = {"damping": damping, "dt": case.analysis["dt"] or 0.005, **options}
+    options = {"damping": damping, "dt": case.analysis.get("dt") or 0.005, **options}
     return verdict_range(case.structure, motion, **options)
 
 

@@ -1,15 +1,22 @@
-"""A study whose processes are killed at random moments gives the same bits as an undisturbed one.
+"""A command whose processes are killed at random moments gives the same bits as an undisturbed one.
 
     python tests/benchmarks/study_kills.py --points 160 --kills 30
+    python tests/benchmarks/study_kills.py --what run --kills 15
+    python tests/benchmarks/study_kills.py --what suite --kills 15
 
 The study varies thickness and scale of a rigid ring, on two processes. The driver, its workers and
-the fork server are killed in turn with SIGKILL, ten times each, after a time drawn evenly; a killed
-driver is started again. Should the study end before, it begins anew in another folder, which is
-compared as well. At the end no process is left.
+the fork server are killed in turn with SIGKILL, equally often, after a time drawn evenly; a killed
+driver is started again. Should the command end before, it begins anew in another folder, which is
+compared as well. At the end no process is left, and no draft of a file.
+
+The run has one motion and one process; the suite has four pairs on two. Their folders hold another
+run before. After each kill of a driver they hold all files of one run, the earlier or the new one.
 """
 
+import hashlib
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,6 +26,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from setting import plain_options
+
+import archfem as af
 
 CASE = """
 title = "a small ring"
@@ -36,16 +45,21 @@ damping = { ratio = 0.05, frequency = 8.0 }
 [motion]
 synthetic = { seed = 1, duration = 4.0, pga = 3.0 }
 """
-SAME = ("results.nc", "results.csv")
+PAIRS = "".join(
+    f"pair{seed} = {{ synthetic = {{ seed = {seed}, duration = 4.0, pga = 3.0 }} }}\n"
+    for seed in range(1, 5)
+)
 
 
-def driver(folder: Path, out: Path, workers: int = 2) -> "subprocess.Popen[bytes]":
-    """Start the command of the study."""
-    command = [sys.executable, "-m", "archfem", "study", "--own-code", str(folder / "study.toml")]
+def driver(
+    folder: Path, out: Path, what: str = "study", workers: int = 2, change: str = ""
+) -> "subprocess.Popen[bytes]":
+    """Start the command."""
+    command = [sys.executable, "-m", "archfem", "study" if what == "study" else "run"]
+    command += [str(folder / f"{what}.toml"), "--out", str(out), "--workers", str(workers)]
+    command += ["--set", change] if change else []
     with (folder / "log.txt").open("a") as log:
-        return subprocess.Popen(
-            [*command, "--out", str(out), "--workers", str(workers)], stdout=log, stderr=log
-        )
+        return subprocess.Popen(command, stdout=log, stderr=log)
 
 
 def servers(process: int) -> list[int]:
@@ -77,14 +91,40 @@ def read(process: int, name: str) -> bytes:
 
 
 def rows(out: Path) -> int:
-    """Points of a study that are finished."""
-    return len(list(out.glob("points/*/*.json")))
+    """Points or pairs that are finished."""
+    return len(list(out.glob("points/*/*.json"))) or len(list(out.rglob("history.nc")))
 
 
-def disturbed(folder: Path, out: Path, kills: dict[str, int], most: float, chance: random.Random):
-    """Carry out a study, killing for as long as there is something left; return who was met."""
+def visible(out: Path) -> dict[str, str]:
+    """Digests of the files of a folder, without drafts and without the progress of a study."""
+    files = (path for path in out.rglob("*") if path.is_file())
+    names = {path.relative_to(out).as_posix(): path for path in files}
+    return {
+        name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for name, path in names.items()
+        if not name.startswith(".") and name not in ("progress.json", "workers.log")
+    }
+
+
+def check_between(out: Path, allowed: Sequence[dict[str, str]]) -> None:
+    """End the script unless a folder holds one of some runs, as whoever reads it finds it."""
+    af.cases.open_results(out)  # completes what a killed command had finished
+    if visible(out) not in allowed:
+        raise SystemExit(f"{out} holds files of several runs")
+
+
+def disturbed(
+    folder: Path,
+    out: Path,
+    what: str,
+    kills: dict[str, int],
+    most: float,
+    chance: random.Random,
+    allowed: Sequence[dict[str, str]],
+) -> set[int]:
+    """Carry out a command, killing for as long as there is something left; return who was met."""
     met: set[int] = set()
-    process = driver(folder, out)
+    process = driver(folder, out, what)
     while process.poll() is None:
         left = [kind for kind, count in kills.items() if count]
         if not left:
@@ -99,54 +139,74 @@ def disturbed(folder: Path, out: Path, kills: dict[str, int], most: float, chanc
             continue
         os.kill(chance.choice(victims), signal.SIGKILL)
         kills[kind] -= 1
-        print(f"killed a {kind} with {rows(out)} points done", flush=True)
+        print(f"killed a {kind} with {rows(out)} finished", flush=True)
         if kind == "driver":
             process.wait()
-            process = driver(folder, out)
+            if allowed:
+                check_between(out, allowed)
+            process = driver(folder, out, what)
     if process.returncode:
         log = (folder / "log.txt").read_text()[-3000:]
-        raise SystemExit(f"{log}\nthe study ended with {process.returncode}")
+        raise SystemExit(f"{log}\nthe command ended with {process.returncode}")
     return met
 
 
+def write_cases(folder: Path, points: int) -> None:
+    """Write the files of a case, a suite and a study."""
+    (folder / "run.toml").write_text(CASE)
+    suite = CASE.split("[motion]")[0] + f"[suite.pairs]\n{PAIRS}"
+    (folder / "suite.toml").write_text(suite)
+    scales = [round(0.5 + 0.01 * k, 2) for k in range(points // 4)]
+    (folder / "study.toml").write_text(
+        f'case = "run.toml"\n[vary]\nstructure.thickness = [0.5, 0.55, 0.6, 0.05]\n'
+        f"motion.scale = {scales}\n"
+    )
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Compare a study left alone with others that were not."""
+    """Compare a command left alone with others that were not."""
     parser = plain_options(__doc__)
+    parser.add_argument("--what", choices=("study", "run", "suite"), default="study")
     parser.add_argument("--points", type=int, default=160)
     parser.add_argument("--kills", type=int, default=30)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args(arguments)
     if given.quick:
         given.points, given.kills = 4, 0
-    chance = random.Random(given.seed)
-    each = given.kills // 3
-    kills = {"driver": each, "worker": given.kills - 2 * each, "server": each}
+    what, chance = given.what, random.Random(given.seed)
+    each = 0 if what == "run" else given.kills // 3
+    kills = {"driver": given.kills - 2 * each, "worker": each, "server": each}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "ring.toml").write_text(CASE)
-        scales = [round(0.5 + 0.01 * k, 2) for k in range(given.points // 4)]
-        (folder / "study.toml").write_text(
-            f'case = "ring.toml"\n[vary]\nstructure.thickness = [0.5, 0.55, 0.6, 0.05]\n'
-            f"motion.scale = {scales}\n"
-        )
+        write_cases(folder, given.points)
+        alone, before = folder / "alone", folder / "before"
+        if what != "study":
+            assert driver(folder, before, what, change="structure.thickness=0.62").wait() == 0
         begun = time.monotonic()
-        assert driver(folder, folder / "alone", 1 if given.quick else 2).wait() == 0
+        assert driver(folder, alone, what, 1 if given.quick else 2).wait() == 0
         spent = time.monotonic() - begun
-        print(f"left alone: {rows(folder / 'alone')} points in {spent:.1f} s", flush=True)
-        studies, total = 0, given.kills
+        print(f"left alone: {rows(alone)} in {spent:.1f} s", flush=True)
+        commands, total = 0, given.kills
         while any(kills.values()):
-            out = folder / f"disturbed {studies}"
-            met = disturbed(folder, out, kills, 0.25 * spent, chance)
-            same = [
-                (folder / "alone" / name).read_bytes() == (out / name).read_bytes() for name in SAME
-            ]
-            studies += 1
-            print(f"study {studies}: {rows(out)} points, the same bits: {all(same)}", flush=True)
-            if not all(same):
-                raise SystemExit("a study that was killed and gone on with differs")
-            if left := [each for each in met if is_fork_server(each)]:
-                raise SystemExit(f"processes {left} are left of it")
-    print(f"{total} kills over {studies} studies: the same bits in all, and nobody left")
+            out = folder / f"disturbed {commands}"
+            allowed = []
+            if what != "study":
+                shutil.copytree(before, out)
+                allowed = [visible(before), visible(alone)]
+            # a study goes on where it was, a run of one motion begins anew
+            most = {"study": 0.25, "suite": 0.6, "run": 1.1}[what] * spent
+            met = disturbed(folder, out, what, kills, most, chance, allowed)
+            commands += 1
+            differing = sorted({name for name, _ in visible(alone).items() ^ visible(out).items()})
+            print(f"{what} {commands}: {rows(out)} finished, differing: {differing}", flush=True)
+            if differing or list(out.rglob(".*")):  # drafts
+                raise SystemExit(f"this {what} is not as if it had been left alone")
+            deadline = time.monotonic() + 30.0  # they end when they notice that the driver has
+            while left := [each for each in met if is_fork_server(each)]:
+                if time.monotonic() > deadline:
+                    raise SystemExit(f"processes {left} are left of it")
+                time.sleep(0.1)
+    print(f"{total} kills over {commands} commands: the same bits in all, and nothing left")
 
 
 if __name__ == "__main__":

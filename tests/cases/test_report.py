@@ -10,8 +10,10 @@ import pytest
 from pages import read_page
 
 import archfem as af
+from archfem._files import read_file_list, replace_results
 from archfem.cases.report.checks import hash_bytes, supported_weight_ratio
 from archfem.cases.report.report_data import rebuild_motion
+from archfem.cases.result_folder import replace_run
 
 CASE = """
 title = "a column <b>& more</b> under two pairs"
@@ -37,8 +39,8 @@ def carried_out(tmp_path_factory):
     """Folder of a suite of two pairs, with what a report reads of it."""
     folder = tmp_path_factory.mktemp("suite")
     case = af.Case.of(tomllib.loads(CASE))
-    (folder / "case.toml").write_text(case.text())
-    list(af.cases.run_case(case, folder))
+    with replace_run(case, folder) as draft:
+        list(af.cases.run_case(case, draft))
     return folder
 
 
@@ -49,7 +51,8 @@ def kept(carried_out, undrawn, tmp_path):
 
 
 def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
-    (kept / "modes.txt").write_text("mode 1 at 3.14 Hz")
+    with replace_results(kept, "modes", read_file_list(kept)["run"].inputs) as draft:
+        (draft / "modes.txt").write_text("mode 1 at 3.14 Hz")
     page = kept / "page.html"
     assert af.commands.main(["report", str(kept), "--out", str(page)]) == 0
     assert f"wrote {page}" in capsys.readouterr().out
@@ -81,7 +84,7 @@ def test_pairs_that_lack_are_said_and_cases_that_differ_refused(kept):
     assert "Not among the results: runs of second" in words
     text = (kept / "case.toml").read_text()
     (kept / "case.toml").write_text(text.replace("reduction = 2.0", "reduction = 3.0"))
-    with pytest.raises(af.InvalidInput, match=r"is of another case than case\.toml in the folder"):
+    with pytest.raises(af.InvalidInput, match=r"case\.toml is not the file that archfem wrote"):
         af.cases.open_results(kept)
 
 
@@ -128,10 +131,13 @@ def test_a_history_has_them_too(kept, tmp_path):
 
 
 def test_a_case_without_motion_has_a_report_too(small, undrawn, tmp_path):
-    text = small.read_text().split("[suite]")[0]
-    (tmp_path / "case.toml").write_text(text)
-    (tmp_path / "limit.txt").write_text("it stands")
-    words = " ".join(read_page(af.cases.open_results(tmp_path).report().read_text()).words)
+    case, folder = (
+        af.Case.of(tomllib.loads(small.read_text().split("[suite]")[0])),
+        tmp_path / "out",
+    )
+    with replace_run(case, folder) as draft:
+        (draft / "limit.txt").write_text("it stands")
+    words = " ".join(read_page(af.cases.open_results(folder).report().read_text()).words)
     assert "Not among the results: the dead load" in words
     assert "Not among the results: a run." in words
     assert "it stands" in words

@@ -1,10 +1,12 @@
 """Files of result folders."""
 
-import os
+import shutil
+from pathlib import Path
 
 import pytest
 
 import archfem as af
+from archfem._files import read_file_list, replace_results
 from archfem.cases import result_folder as results
 
 
@@ -15,16 +17,172 @@ def test_more_pairs_than_colours_share_several_pictures(small, tmp_path):
     assert [path.name for path in files] == ["suite.txt", "envelope.png", "envelope_2.png"]
 
 
-def test_files_of_a_run_are_written_again_where_the_run_is_newer(small, undrawn, tmp_path):
-    rest, _, run = af.cases.run_case(af.Case.read(small), tmp_path, pairs=["first"])
-    assert not results.is_written(run)
-    files = results.write_run(run, rest, "a table", run.path.parent)
-    assert files[-1].name == "summary.txt"
-    assert files[-1].read_text() == "a table\n"
-    assert results.is_written(run)
-    later = files[-1].stat().st_mtime_ns + 1
-    os.utime(run.path, ns=(later, later))
-    assert not results.is_written(run)
+CASE = """
+[structure]
+shape = "column"
+breadth = 1.0
+heights = [1.0, 1.0]
+[model]
+fidelity = "rigid"
+[suite.pairs]
+first = { synthetic = { seed = 1, duration = 0.3, pga = 1.0 } }
+second = { synthetic = { seed = 2, duration = 0.3, pga = 1.0 } }
+"""
+
+
+def run_into(folder, small, change):
+    """Carry out a suite of two pairs as `archfem run` does; its figures are texts."""
+    case = af.Case.read(small, [change, "output.save_fields_every=10"])
+    with results.replace_run(case, folder) as draft:
+        for result in af.cases.run_case(case, draft):
+            if isinstance(result, af.cases.Run):
+                result.path.with_name("summary.txt").write_text(f"{change}: {result.motion.name}")
+                result.path.with_name("envelope.png").write_text(change)
+        (draft / "suite.txt").write_text(change)
+        (draft / "limit.txt").write_text(change)
+    inputs = read_file_list(folder)["run"].inputs
+    with replace_results(folder, "modes", inputs) as draft:
+        (draft / "modes.txt").write_text(change)
+    return case
+
+
+@pytest.fixture(scope="module")
+def carried_out(tmp_path_factory):
+    """Folder with the folders of two runs that differ in the scale of the motions."""
+    folder = tmp_path_factory.mktemp("runs")
+    case = folder / "small.toml"
+    case.write_text(CASE)
+    for scale in (1, 2):
+        run_into(folder / f"scale {scale}", case, f"suite.scale={scale}")
+    return folder
+
+
+@pytest.fixture
+def two_runs(carried_out, tmp_path):
+    """Copies of them."""
+    folder = Path(shutil.copytree(carried_out, tmp_path / "runs"))
+    return [folder / f"scale {scale}" for scale in (1, 2)]
+
+
+def files_below(folder):
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_no_reader_takes_a_file_of_another_run(two_runs, capsys):
+    """Each file in turn is replaced by that of the other run."""
+    folder, other = two_runs
+    names = sorted(files_below(folder))
+    assert len(names) == 11
+    for name in names:
+        kept = (folder / name).read_bytes()
+        (folder / name).write_bytes((other / name).read_bytes())
+        assert af.commands.main(["report", str(folder)]) == 1
+        said = capsys.readouterr().err
+        assert "is not the file that archfem wrote" in said, name
+        if name.endswith(("history.nc", ".json")):
+            path = folder / name if name.endswith("history.nc") else folder / "first" / "history.nc"
+            with pytest.raises(af.InvalidInput, match="is not the file that archfem wrote"):
+                af.History.read(path)
+            assert af.commands.main(["animate", str(path)]) == 1
+        elif name == "case.toml":
+            assert af.commands.main(["animate", str(folder / "first" / "history.nc")]) == 1
+        (folder / name).write_bytes(kept)
+    assert af.cases.open_results(folder).missing == ()
+
+
+def test_a_run_redoes_what_is_of_another_run(two_runs):
+    folder, other = two_runs
+    for name in ("first/history.nc", "second/summary.txt"):
+        (folder / name).write_bytes((other / name).read_bytes())
+    case = af.Case.read(folder / "case.toml")
+    found = {}
+    with results.replace_run(case, folder) as draft:
+        for result in af.cases.run_case(case, draft):
+            if isinstance(result, af.cases.Run):
+                found[result.motion.name] = result.reused, results.adopt_files(result)
+        assert not (draft / "second" / "summary.txt").exists()
+    # the history of the first is computed again, the summary of the second written again
+    assert found == {"first": (False, False), "second": (True, False)}
+
+
+def test_what_an_earlier_call_finished_is_taken_over(two_runs):
+    folder, _ = two_runs
+    before = {name: (folder / name).read_bytes() for name in files_below(folder)}
+    case = af.Case.read(folder / "case.toml")
+    with results.replace_run(case, folder) as draft:
+        for result in af.cases.run_case(case, draft):
+            if isinstance(result, af.cases.Run):
+                assert results.adopt_files(result)
+    for name in ("first/history.nc", "first/summary.txt", "second/envelope.png"):
+        assert (folder / name).read_bytes() == before[name]
+    assert "suite.txt" not in files_below(folder)
+
+
+def test_a_second_run_in_a_folder_is_refused(two_runs, small, capsys):
+    folder, _ = two_runs
+    case = af.Case.read(small)
+    before = files_below(folder)
+    with results.replace_run(case, folder):
+        assert af.commands.main(["run", str(small), "--out", str(folder)]) == 1
+        assert "another driver runs in" in capsys.readouterr().err
+        assert af.cases.open_results(folder).missing == ()  # the earlier run, until the end
+    assert files_below(folder) < before
+
+
+def fail_after(draft, **histories):
+    for name, text in histories.items():
+        (draft / name).mkdir(exist_ok=True)
+        (draft / name / "history.nc").unlink(missing_ok=True)  # linked to that of the folder
+        (draft / name / "history.nc").write_text(text)
+    raise af.DidNotConverge("no equilibrium")
+
+
+@pytest.mark.parametrize("earlier", [False, True])
+def test_a_run_that_fails_replaces_no_other(earlier, two_runs, small, tmp_path, caplog):
+    folder = two_runs[0] if earlier else tmp_path / "new"
+    before = {name: (folder / name).read_bytes() for name in files_below(folder)}
+    case = af.Case.read(small)
+
+    def run(**histories):
+        with results.replace_run(case, folder) as draft:
+            fail_after(draft, **histories)
+
+    with pytest.raises(af.DidNotConverge):
+        run()  # before any result
+    assert files_below(folder) == set(before)
+    with pytest.raises(af.DidNotConverge):
+        run(first="part of a run")
+    if earlier:
+        assert {name: (folder / name).read_bytes() for name in before} == before
+        assert "keeps the results of an earlier run; what was computed now is in" in caplog.text
+        assert (folder / ".unfinished-run" / "first" / "history.nc").read_text() == "part of a run"
+    else:
+        assert f"what was computed is kept in {folder}" in caplog.text
+        assert files_below(folder) == {"archfem.json", "case.toml", "first/history.nc"}
+
+
+def test_pairs_of_a_run_that_was_killed_are_used_again_for_the_same_case(two_runs, small):
+    folder, _ = two_runs
+    draft, case = folder / ".unfinished-run", af.Case.read(small)
+    for name in ("first", "other"):
+        (draft / name).mkdir(parents=True)
+        (draft / name / "history.nc").write_text("of the killed run")
+    (draft / "dead.png").touch()
+    (draft / "case.toml").write_text(case.text())
+    results._prepare_draft(case, folder, draft)
+    assert files_below(draft) == {"case.toml", "first/history.nc", "second/history.nc"}
+    assert (draft / "first" / "history.nc").read_text() == "of the killed run"
+    results._prepare_draft(af.Case.read(small, ["suite.scale=3"]), folder, draft)
+    assert (draft / "first" / "history.nc").samefile(folder / "first" / "history.nc")
+
+
+def test_disks_without_links_get_copies(two_runs, tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError("no links")
+
+    monkeypatch.setattr("os.link", refuse)
+    results._link(two_runs[0] / "suite.txt", tmp_path / "new" / "suite.txt")
+    assert (tmp_path / "new" / "suite.txt").read_text() == "suite.scale=1"
 
 
 @pytest.mark.slow

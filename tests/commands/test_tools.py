@@ -109,3 +109,12 @@ def test_a_case_gives_its_title_to_its_structure(kept):
     untitled = CASE.replace('title = "A $5 column"', "")
     (kept / "untitled.toml").write_text(untitled, encoding="utf-8")
     assert af.Case.read(kept / "untitled.toml").structure.name == "column"
+
+
+def test_damaged_code_is_told(monkeypatch, tmp_path):
+    monkeypatch.setattr(tools._numba, "count_cached_functions", lambda: 1)
+    monkeypatch.setattr(tools._numba, "cache_folders", lambda: [tmp_path])
+    (tmp_path / "a.nbi").write_bytes(b"cut off")
+    diagnosis = tools._diagnose_compiled_code()
+    assert "1 damaged files" in diagnosis.state
+    assert "archfem compile" in diagnosis.remedy

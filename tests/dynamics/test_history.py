@@ -55,8 +55,16 @@ def test_a_file_of_an_earlier_version(run, tmp_path):
 def test_file_and_back(run, tmp_path):
     path = run.save(tmp_path / "deep" / "run.nc")
     again = History.read(path, run.structure)
-    assert again.joints["eccentricity"].equals(run.joints["eccentricity"])
+    # single precision has 24 bits
+    xr.testing.assert_allclose(again.joints, run.joints, rtol=2.0**-24, atol=1e-37)
+    assert again.joints["N"].dtype == np.float64
+    for flag in ("hinge", "slide", "open", "judged"):
+        assert again.joints[flag].equals(run.joints[flag])
+    assert again.dataset["last_q"].equals(run.dataset["last_q"])
     assert again.mechanism == run.mechanism
+    # what was read is written again as it is
+    twice = History.read(again.save(tmp_path / "twice.nc"), run.structure)
+    assert twice.dataset.identical(again.dataset)
     with xr.open_dataset(path) as plain:
         assert plain["N"].attrs["units"] == "N"
         assert plain.attrs["outcome"] == run.outcome
@@ -172,6 +180,12 @@ def test_corners_of_a_rigid_block_move_with_it():
     centre = model.structure.blocks[model.structure.free[0]].centroid
     expected = [0.01 - 0.003 * (y - centre[1]), -0.02 + 0.003 * (x - centre[0])]
     np.testing.assert_allclose(u[1].T, expected, atol=1e-12)
+
+
+def test_ratios_beyond_single_precision_are_infinite(run, tmp_path):
+    huge = run.dataset.assign(friction=run.dataset["friction"] * 0.0 + 1e300)
+    again = History.read(History(huge).save(tmp_path / "huge.nc"))
+    assert np.isinf(again.joints["friction"].values[np.isfinite(huge["friction"].values)]).all()
 
 
 def test_a_run_gives_displacements_over_time_point_and_direction(tmp_path):

@@ -143,6 +143,41 @@ def test_a_changed_case_is_told_apart(
     assert "6 points of other cases" in caplog.text
 
 
+@pytest.mark.parametrize("what", ["a digit", "found", "no table", "another point"])
+def test_rows_that_were_changed_are_computed_again(what, study_file, tmp_path, caplog):
+    study, folder = af.Study.read(study_file, own_code=True), tmp_path / "out"
+    first = study.run(folder, workers=1)
+    paths = sorted(folder.glob("points/*/*.json"))
+    row, other, *_ = (path for path in paths if '"twice"' in path.read_text())
+    before, content = row.read_text(), json.loads(row.read_text())
+    done = af.studies.status(folder).done
+    if what == "a digit":
+        number = content["content"]["found"]["twice"]
+        row.write_text(before.replace(f'"twice": {number}', f'"twice": {number + 0.1}'))
+        assert row.read_text() != before
+    elif what == "found":
+        row.write_text(json.dumps({"found": "x", "error": "", "ours": True}))
+    elif what == "no table":
+        row.write_text("[1]")
+    else:
+        row.write_text(other.read_text())
+    assert af.studies.status(folder).done == done - 1
+    again = study.run(folder, workers=1)
+    assert "1 of the stored points" in caplog.text
+    assert again.identical(first)
+    assert json.loads(row.read_text()) == content
+
+
+def test_a_table_of_another_study_is_refused(study_file, tmp_path):
+    for name, change in (("a", "motion.scale=1"), ("b", "structure.voussoirs=11")):
+        af.Study.read(study_file, [change], own_code=True).run(tmp_path / name, workers=1)
+    table = tmp_path / "a" / "results.nc"
+    assert af.studies.read_table(table).identical(af.studies.read_table(table))
+    table.write_bytes((tmp_path / "b" / "results.nc").read_bytes())
+    with pytest.raises(af.InvalidInput, match="is not the file that archfem wrote there"):
+        af.studies.read_table(table)
+
+
 def test_a_second_driver_is_refused(study_file, tmp_path):
     folder = tmp_path / "out"
     with (
@@ -171,8 +206,8 @@ def test_a_full_disk_is_named_and_what_was_finished_stays(study_file, tmp_path, 
             af.Study.read(study_file, own_code=True).run(folder, workers=1)
     kept = list(folder.glob("points/*/*.json"))
     assert 1 <= len(kept) < 6
-    assert all(json.loads(path.read_text())["ours"] for path in kept)
-    assert not list(folder.rglob(".*.part*"))
+    assert all(json.loads(path.read_text())["content"]["ours"] for path in kept)
+    assert not list(folder.rglob(".*"))
     found = af.Study.read(study_file, own_code=True).run(folder, workers=1)
     assert found.identical(
         af.Study.read(study_file, own_code=True).run(tmp_path / "other", workers=1)

@@ -276,6 +276,9 @@ def test_a_case_gives_its_damping_and_its_step(tmp_path, calls):
     assert base.damping == af.effective_damping(model, 0.03)
     assert dt == 0.004
     assert np.array_equal(motion.horizontal, case.ground_motion().horizontal)
+    path.write_text(CASE.replace('dt = "4 ms"', ""))
+    verdict_range_of_case(af.Case.read(path), samples=1)
+    assert calls[-1][2] == 0.005  # without one
 
 
 def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, undrawn, calls):
@@ -283,7 +286,7 @@ def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, undrawn,
     path.write_text(CASE)
     assert af.commands.main(["verdict", str(path), "--out", str(out), "--samples", "2"]) == 0
     said = capsys.readouterr().out
-    names = {"verdict_range.nc", "verdict_range.txt", "verdict_range.png"}
+    names = {"archfem.json", "verdict_range.nc", "verdict_range.txt", "verdict_range.png"}
     assert names == {each.name for each in out.iterdir()}
     found = af.dynamics.VerdictRange.read(out / "verdict_range.nc")
     assert str(found) in said

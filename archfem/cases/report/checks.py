@@ -140,7 +140,7 @@ def build_source_section(data: ReportData) -> Section:
     rows.append(("SHA-256 of the case", hash_bytes(data.case.text().encode())))
     blocks: list[Any] = [Grid((), rows)]
     if data.folder is not None:
-        files = sorted(path for path in data.folder.rglob("*") if _is_source(path))
+        files = sorted(path for path in data.files.values() if _is_source(path))
         table = [
             [
                 str(path.relative_to(data.folder)),
@@ -165,4 +165,4 @@ def _is_source(path: Path) -> bool:
     figures = ("dead", "dead_stress", "free_body", "modes", "collapse", "accuracy", "verdict_range")
     text = path.suffix in (".nc", ".toml", ".txt")
     drawn = path.stem in figures or path.stem.startswith("assessment_")
-    return path.is_file() and (text or (path.suffix == ".png" and drawn))
+    return text or (path.suffix == ".png" and drawn)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from archfem._files import check_listed, read_file_list
 from archfem.cases.case import Case
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError
@@ -50,17 +51,29 @@ class ReportData:
             return [missing]
         return [TextBlock(lines, "lines"), *self.read_figure(figure, caption)]
 
+    @cached_property
+    def files(self) -> dict[str, Path]:
+        """Files of the folder by name that have the inputs of its run; the others are left out."""
+        listed = {} if self.folder is None else read_file_list(self.folder)
+        if self.folder is None or "run" not in listed:
+            return {}
+        groups = [group for group in listed.values() if group.inputs == listed["run"].inputs]
+        paths = {name: self.folder / name for group in groups for name in sorted(group.files)}
+        return {name: path for name, path in paths.items() if path.is_file()}
+
     def read_text(self, name: str) -> str | None:
         """Return the text of a file of the folder, or None."""
-        if self.folder is None or not (path := self.folder / name).is_file():
+        if name not in self.files:
             return None
-        return path.read_text(encoding="utf-8").strip()
+        check_listed(self.files[name], content := self.files[name].read_bytes())
+        return content.decode("utf-8").strip()
 
     def read_figure(self, name: str, caption: str) -> list[FigureBlock]:
         """Return the picture of a file of the folder, or an empty list."""
-        if self.folder is None or not (path := self.folder / name).is_file():
+        if name not in self.files:
             return []
-        return [FigureBlock.read(path, caption)]
+        check_listed(self.files[name], self.files[name].read_bytes())
+        return [FigureBlock.read(self.files[name], caption)]
 
 
 def rebuild_motion(run: History, name: str) -> Motion:

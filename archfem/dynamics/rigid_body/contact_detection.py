@@ -11,10 +11,10 @@ Impulses of a step are stored by the pair of pieces in a hash table, as initial 
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from archfem._numba import allocating_entry
 from archfem._typing import Array
 from archfem.dynamics.rigid_body.bodies import Bodies
 
@@ -85,7 +85,7 @@ def allocate_stored_impulses(contacts: Contacts) -> StoredImpulses:
     )
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def place_pieces(bodies, q, world):  # type: ignore
     """Move the pieces to the poses of their bodies, and sort them along x."""
     points, normals, boxes, _ = world
@@ -108,7 +108,7 @@ def place_pieces(bodies, q, world):  # type: ignore
     _sort(world)
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _sort(world):  # type: ignore
     """Sort the pieces by their smallest x."""
     order, boxes = world.order, world.boxes
@@ -123,7 +123,7 @@ def _sort(world):  # type: ignore
         order[place + 1] = piece
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def find_contacts(bodies, world, contacts):  # type: ignore
     """Find all contact points; return their number, or -1 where the workspace is too small."""
     count, capacity = 0, len(contacts.key) - 4  # a pair and the ground add up to four points
@@ -149,7 +149,7 @@ def find_contacts(bodies, world, contacts):  # type: ignore
     return count
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _touch_ground(bodies, world, piece, contacts, count):  # type: ignore
     """Add the outermost vertices of a piece that touch the ground, one or two."""
     left, right = -1, -1
@@ -174,7 +174,7 @@ def _touch_ground(bodies, world, piece, contacts, count):  # type: ignore
     return count
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _separation(bodies, world, one, two):  # type: ignore
     """Return the largest separation of two pieces along normals of the first, and its edge."""
     best, edge = -np.inf, -1
@@ -193,7 +193,7 @@ def _separation(bodies, world, one, two):  # type: ignore
     return best, edge
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _touch(bodies, world, one, two, contacts, count):  # type: ignore
     """Add the contact points of two pieces."""
     here, edge = _separation(bodies, world, one, two)
@@ -208,13 +208,13 @@ def _touch(bodies, world, one, two, contacts, count):  # type: ignore
     return _clip(bodies, world, one, edge, two, 1.0, contacts, count)
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _next_vertex(bodies, piece, k):  # type: ignore
     """Return the vertex after one of a piece."""
     return k + 1 if k + 1 < bodies.piece_starts[piece + 1] else bodies.piece_starts[piece]
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _clip(bodies, world, one, edge, two, sign, contacts, count):  # type: ignore
     """Add the end points of the incident edge, clipped to the reference edge, that touch it."""
     n, start = world.normals[edge], world.points[edge]
@@ -256,7 +256,7 @@ def _clip(bodies, world, one, edge, two, sign, contacts, count):  # type: ignore
     return count
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def store_impulses(bodies, q, contacts, count, stored):  # type: ignore
     """Store the impulses of a step."""
     slots = stored.slots
@@ -272,7 +272,7 @@ def store_impulses(bodies, q, contacts, count, stored):  # type: ignore
         slots[slot] = k
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def restore_impulses(bodies, q, contacts, count, stored):  # type: ignore
     """Set impulses to those of the nearest contacts of the same pieces, each used once."""
     slots = stored.slots
@@ -292,14 +292,14 @@ def restore_impulses(bodies, q, contacts, count, stored):  # type: ignore
             stored.key[best] = -1
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _hash_slot(key, size):  # type: ignore
     """Return the first slot of a key, by multiplicative hashing."""
     # the multiplier is 2³² over the golden ratio
     return ((key * 0x9E3779B1) >> 16) & (size - 1)
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _tangential_position(bodies, q, contacts, k):  # type: ignore
     """Return the position of a contact along its tangent, from the first body's centroid [m]."""
     body = contacts.bodies[k, 0]

@@ -17,10 +17,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from archfem._numba import delete_stale_cache
+from archfem._numba import allocating_entry, delete_stale_cache
 from archfem._typing import Array
 from archfem._validation import check_number, check_type
 from archfem.dynamics.rigid_body.bodies import (
@@ -291,7 +290,7 @@ class _Run:
             )
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def advance_steps(bodies, parameters, workspace, state):  # type: ignore
     """Advance poses and velocities by steps, with their energies.
 
@@ -327,7 +326,7 @@ def advance_steps(bodies, parameters, workspace, state):  # type: ignore
     return overlap, unconverged, exchanged
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _kinetic_energy(bodies, v):  # type: ignore
     """Return the kinetic energy of all bodies [J]."""
     kinetic = 0.0
@@ -337,7 +336,7 @@ def _kinetic_energy(bodies, v):  # type: ignore
     return kinetic
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def take_step(bodies, parameters, workspace, q, v, ground):  # type: ignore
     """Advance by one step; return the number of sweeps, -1 for too many contacts, and overlap."""
     contacts, stored, middle, speeds = (
@@ -381,7 +380,7 @@ def take_step(bodies, parameters, workspace, q, v, ground):  # type: ignore
     return sweeps, overlap
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
     """Compute the rows of H, their inverse effective masses, and the target velocities."""
     contacts, rows = workspace.contacts, workspace.rows
@@ -412,7 +411,7 @@ def _prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
         rows[k, 8] = bodies.friction[a, b]
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _arm(bodies, q, point, body):  # type: ignore
     """Return the vector from a body's centroid to a point; zero for the ground, which is fixed."""
     if body == len(q):
@@ -421,7 +420,7 @@ def _arm(bodies, q, point, body):  # type: ignore
     return x, point[1] - bodies.centre[body, 1] - q[body, 1]
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _relative_speed(speeds, pair, direction, arms):  # type: ignore
     """Return the velocity of the second body relative to the first along a direction."""
     one, two = speeds[pair[0]], speeds[pair[1]]
@@ -429,7 +428,7 @@ def _relative_speed(speeds, pair, direction, arms):  # type: ignore
     return translation + arms[1] * two[2] - arms[0] * one[2]
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _apply_impulse(bodies, speeds, pair, direction, arms, impulse):  # type: ignore
     """Apply an impulse along a direction to the second body, and its reaction to the first."""
     for side in range(2):
@@ -440,7 +439,7 @@ def _apply_impulse(bodies, speeds, pair, direction, arms, impulse):  # type: ign
         body[2] += inertia * arms[side] * signed
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _adds_energy(bodies, parameters, before, after, ground):  # type: ignore
     """Return whether the impulses of a step have done positive work, beyond the tolerance."""
     work = kinetic = 0.0
@@ -457,7 +456,7 @@ def _adds_energy(bodies, parameters, before, after, ground):  # type: ignore
     return work > parameters.tolerance * kinetic
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _apply_initial_impulses(bodies, workspace, touching):  # type: ignore
     """Apply the impulses of the step before, as initial guess of the sweeps."""
     contacts, speeds = workspace.contacts, workspace.speeds
@@ -469,7 +468,7 @@ def _apply_initial_impulses(bodies, workspace, touching):  # type: ignore
         _apply_impulse(bodies, speeds, (a, b), (-ny, nx), (ta, tb), contacts.impulse[k, 1])
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _sweep_contacts(bodies, parameters, workspace, touching):  # type: ignore
     """Sweep over the contacts until impulses converge; return the number of sweeps."""
     contacts, speeds = workspace.contacts, workspace.speeds

@@ -7,10 +7,9 @@ those of statics, and twice the derivative is the tangent.
 
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 
-from archfem._numba import entry, inlined_kernel, kernel
+from archfem._numba import allocating_entry, entry, inlined_kernel, kernel
 from archfem._typing import Array
 from archfem.joints.large.face_kinematics import (
     FaceKinematics,
@@ -112,7 +111,7 @@ def _add_initial_measures(joints, segment, measures):  # type: ignore
     )
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def measure_states(joints, states):  # type: ignore
     """Return opening, slip and rotation of the structure's joints (k, n_joints, 3) [m, m, -]."""
     measures = np.zeros((len(states), joints.joint_count, 3))
@@ -152,7 +151,7 @@ def _measure_state(joints, q, sums, measures):  # type: ignore
         measures[joint, 2] = turn
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def facet_slips(joints, q):  # type: ignore
     """Return the slip of segments whose places stay opposite, over their length (j,) [-]."""
     slips, law = np.zeros(len(joints.normal_angle)), joints.face_law
