@@ -2,6 +2,7 @@
 
 import inspect
 import os
+import unicodedata
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
 from functools import cache, wraps
 from math import inf, isfinite
@@ -37,6 +38,19 @@ def check_number(value: Any, name: str, *, minimum: float = -inf) -> float:
     if value < minimum:
         raise InvalidInput(f"{name} = {short_repr(value)} is below {minimum:g}, the least allowed")
     return float(value)
+
+
+def check_words(value: Any, name: str, remedy: str = "give words") -> None:
+    """Refuse all but text, and text with characters that no terminal prints and no file holds."""
+    check_type(value, str, name, remedy)
+    if value.isprintable():
+        return
+    # Control characters and halves of surrogate pairs; spaces and marks of any script are fine.
+    if bad := [each for each in value if unicodedata.category(each) in ("Cc", "Cs")]:
+        raise InvalidInput(
+            f"{name} = {short_repr(value)} has {short_repr(bad[0])}, which cannot be printed: "
+            "write it without"
+        )
 
 
 def is_one_of(value: Any, known: Collection[Any]) -> bool:
@@ -149,7 +163,11 @@ def validate_methods(cls: Class) -> Class:
 def check_fields(instance: Any) -> None:
     """Refuse fields of a dataclass that do not match their annotations, in `__post_init__`."""
     hints = _hints(instance.__class__)
-    _check_values({name: getattr(instance, name) for name in hints}, hints)
+    values = {name: getattr(instance, name) for name in hints}
+    _check_values(values, hints)
+    for name, value in values.items():
+        if isinstance(value, str):  # names are printed, and written to files
+            check_words(value, name)
 
 
 def _check_values(values: Mapping[str, Any], hints: Mapping[str, Any]) -> None:

@@ -117,7 +117,7 @@ def ready() -> None:
         (af.Case.read, {"path": "case.toml", "changes": ()}),
         (af.Motion.read, {"path": "record.txt", "column": None, "units": "g", "dt": 0.01}),
         (af.History.read, {"path": "history.nc", "structure": None}),
-        (af.read_outlines, {"path": "drawing.geojson", "unit": "m"}),
+        (af.read_outlines, {"path": "drawing.geojson", "unit": "m", "snap": 1e-3, "layers": None}),
         (af.units.in_unit, {"value": "1 m", "unit": "m", "key": "x"}),
     ):
         name = f"{len(CALLS)}: {getattr(function, '__qualname__', function)}"

@@ -91,9 +91,9 @@ def test_files_that_are_no_drawings(tmp_path):
         ("a.shp", "", "is no drawing: give a .geojson, a .dxf or a .msh"),
         ("a.geojson", "{", "it is not JSON"),
         ("b.geojson", "[]", "no GeoJSON FeatureCollection"),
-        ("d.geojson", '{"features": [3]}', "feature 1 is not as GeoJSON has it"),
+        ("d.geojson", '{"features": [3]}', "feature 1 is 3, where GeoJSON has an object"),
         ("c.geojson", '{"type": "FeatureCollection", "features": []}', "no closed outlines"),
-        ("a.dxf", "nonsense", "it is not DXF"),
+        ("a.dxf", "nonsense", "it is no DXF drawing that ezdxf reads"),
     ):
         (tmp_path / name).write_text(text)
         with pytest.raises(af.errors.InvalidInput, match=says):
