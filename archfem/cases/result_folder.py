@@ -7,6 +7,7 @@ from pathlib import Path
 import xarray as xr
 
 from archfem._files import atomic_write
+from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
 from archfem.cases.run import HISTORY_FILE, CaseResult, DeadLoadResult, Run
@@ -64,6 +65,7 @@ class ResultFolder(CaseResult):
         return super().report(self.folder / "report.html" if path is None else path)
 
 
+@validate_arguments
 def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> ResultFolder:
     """Open a folder that `archfem run` has written.
 

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from archfem._typing import Array
-from archfem._validation import check_integer, check_number, check_type
+from archfem._validation import check_integer, check_number, check_type, validate_arguments
 from archfem.dynamics.schemes import (
     DAMPING_KINDS,
     EFFECTIVE_MASS_SHARE,
@@ -161,6 +161,7 @@ def _modes_with_share(
     return computed, shares
 
 
+@validate_arguments
 def effective_damping(
     model: Model,
     ratio: float = 0.05,
@@ -220,10 +221,11 @@ class _RockingBlock:
     def __post_init__(self) -> None:
         check_type(self.contact, Contact, "contact", "give a Contact")
         check_type(self.material, Material, "material", "give a Material")
-        breadth = check_number(self.breadth, "breadth [m]")
-        height = check_number(self.height, "height [m]")
+        # from pebbles to mountains: squares of lengths beyond leave the range of floats
+        breadth = check_number(self.breadth, "breadth [m]", minimum=1e-3, maximum=1e4)
+        height = check_number(self.height, "height [m]", maximum=1e4)
         min_slenderness = 1.2  # a block as broad as high barely rocks
-        if breadth <= 0.0 or height < min_slenderness * breadth:
+        if height < min_slenderness * breadth:
             raise InvalidInput(
                 f"a block {breadth} m broad and {height} m high does not rock: its height must be "
                 f"{min_slenderness} times its breadth at least"
@@ -310,6 +312,7 @@ def _restitution_from_energies(angle: Array, energy: Array, impacts: int = 2) ->
     return float((energy[turns[-1]] / energy[turns[0]]) ** (0.5 / impacts))
 
 
+@validate_arguments
 def restitution(
     damping: Viscous | None,
     breadth: float,
@@ -341,6 +344,7 @@ def restitution(
     return _RockingBlock(breadth, height, contact, material).measure_restitution(damping)
 
 
+@validate_arguments
 def restitution_damping(
     coefficient: float | None,
     breadth: float,

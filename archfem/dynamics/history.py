@@ -416,6 +416,7 @@ def with_fall(history: History, fall: CollapseState) -> History:
     return History(dataset, history.structure)
 
 
+@validate_arguments
 def partial_history(error: DidNotConverge) -> History:
     """Return the history up to the failed step of a run.
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block
 from archfem.masonry.materials import Contact
@@ -20,6 +21,7 @@ ContactOf = Callable[[Block, Block], Contact]
 Touch = tuple[int, int, Array]
 
 
+@validate_arguments
 def assembled(
     blocks: Sequence[Block],
     contact: Contact | ContactOf,

@@ -13,6 +13,7 @@ import xarray as xr
 
 from archfem._files import align_columns, atomic_write
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.toml_file import check_table, read_tables, refuse_unknown
 from archfem.dynamics.fall import FALLEN_STATES
@@ -89,6 +90,7 @@ def write_finding(finding: Finding, path: Path) -> None:
         draft.write_text(json.dumps(asdict(finding), indent=1), encoding="utf-8")
 
 
+@validate_arguments
 def study_table(findings: Mapping[str, Finding]) -> str:
     """Return two tables with a line for each case.
 

@@ -31,7 +31,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._files import align_columns
-from archfem._validation import check_number
+from archfem._validation import check_number, validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.toml_file import check_choice
 from archfem.errors import InvalidInput
@@ -86,6 +86,7 @@ class JointStiffness:
         return "\n".join([align_columns(["MPa/mm", "low", "usual", "high"], rows), *self.sources])
 
 
+@validate_arguments
 def joint_stiffness(
     young: float,
     spacing: float,
@@ -156,6 +157,7 @@ def joint_stiffness(
     return JointStiffness((normals[0], normals[1], normals[2]), (shears[0], shears[1], shears[2]))
 
 
+@validate_arguments
 def stiffness_report(
     case: Case,
     stiffness: JointStiffness,

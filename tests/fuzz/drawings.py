@@ -154,7 +154,7 @@ def _changed(content: bytes, rng: np.random.Generator) -> bytes:
         table = json.loads(content)
         mutate(table, rng)
         return json.dumps(table).encode()
-    except (TypeError, ValueError, RecursionError):  # damaged before
+    except (TypeError, ValueError, OverflowError, RecursionError):  # damaged before
         return content
 
 

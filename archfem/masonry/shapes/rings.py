@@ -13,7 +13,13 @@ from math import acos, asin, atan2, degrees, isfinite, pi, radians, sin, tan
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import check_integer, check_number, check_numbers, check_sequence
+from archfem._validation import (
+    check_integer,
+    check_number,
+    check_numbers,
+    check_sequence,
+    validate_arguments,
+)
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
@@ -368,6 +374,7 @@ def _build_abutment(
     return Block(outline, material, name, fixed=True, corners=(0, 1, 2, 3), part=name, role="other")
 
 
+@validate_arguments
 def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
     span: float,
@@ -424,6 +431,7 @@ def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     return ring.assemble(_mirror_stones(left, voussoirs), "pointed arch")
 
 
+@validate_arguments
 def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
     span: float,
@@ -472,6 +480,7 @@ def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ri
     return ring.assemble(ring.divide(section), "elliptical arch")
 
 
+@validate_arguments
 def flat_arch(
     *,
     span: float,
@@ -515,6 +524,7 @@ def flat_arch(
     return ring.assemble(ring.divide(section), "flat arch")
 
 
+@validate_arguments
 def arch_along(
     intrados: Sequence[Point] | Array,
     *,

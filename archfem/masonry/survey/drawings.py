@@ -231,7 +231,7 @@ def _load_dxf(path: Path) -> tuple[list[Entity], float | None]:
     from ezdxf.enums import InsertUnits
     from ezdxf.filemanagement import readfile
 
-    drawing = readfile(path)
+    drawing: Any = readfile(path)
     entities = []
     for entity in drawing.modelspace():
         kind = entity.dxftype()

@@ -113,6 +113,7 @@ def read_outlines(
     return survey
 
 
+@validate_arguments
 def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how they touch)
     path: str | Path,
     *,
@@ -251,6 +252,7 @@ def _find_corners(block: Block, direction: Direction | None) -> tuple[int, int, 
     return a, b, c, d
 
 
+@validate_arguments
 def write_outlines(structure: Structure, path: str | Path) -> None:
     """Write the blocks of a structure as GeoJSON that `read_outlines` reads.
 

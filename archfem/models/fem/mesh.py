@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archfem._optional import require_package
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, MeshError
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 from archfem.models.discretisation import Discretisation
@@ -46,6 +47,7 @@ def generate_mesh(structure: Structure, settings: Discretisation | None = None) 
         return _import_tagged(structure)
 
 
+@validate_arguments
 def write_mesh(
     structure: Structure, path: str | Path, settings: Discretisation | None = None
 ) -> None:
@@ -64,6 +66,7 @@ def write_mesh(
         gmsh.write(str(path))
 
 
+@validate_arguments
 def read_mesh(structure: Structure, path: str | Path) -> Mesh:
     """Read the mesh of a structure from a gmsh file, by `write_mesh` or another program.
 

@@ -5,6 +5,7 @@ from html import escape
 from pathlib import Path
 
 from archfem._files import atomic_write
+from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.models.model import Model
@@ -57,6 +58,7 @@ class Player:
         return f'<iframe srcdoc="{escape(self.page)}" style="{style}"></iframe>'
 
 
+@validate_arguments
 def player(run: History, model: Model | None = None, *, title: str = "") -> Player:
     """Return a player of a run.
 
