@@ -215,7 +215,8 @@ def matches_annotation(value: Any, hint: Any) -> bool:
     if origin is np.ndarray:
         return _is_array(value)
     if origin is Iterable:  # a generator is not consumed
-        return isinstance(value, Iterable) and not isinstance(value, str | bytes)
+        whole = isinstance(value, str | bytes) or (isinstance(value, np.ndarray) and not value.ndim)
+        return isinstance(value, Iterable) and not whole
     if isinstance(origin, type) and issubclass(origin, Mapping):
         return isinstance(value, origin) and all(
             matches_annotation(each, hint)
@@ -286,7 +287,9 @@ def _describe(hint: Any) -> str:
         return "an array of finite numbers"
     if origin is Callable:
         return "a function"
-    if isinstance(origin, type) and issubclass(origin, Iterable) and origin not in (Mapping, dict):
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return f"a table of {' and '.join(_describe(each) for each in inner)}"
+    if isinstance(origin, type) and issubclass(origin, Iterable):
         items = [_describe(each) for each in inner if each is not ...]
         return f"a row of {', '.join(items)}"
     if hint in (None, NoneType):

@@ -7,7 +7,7 @@ from pathlib import Path
 import xarray as xr
 
 from archfem._files import atomic_write
-from archfem._validation import validate_arguments
+from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
 from archfem.cases.run import HISTORY_FILE, CaseResult, DeadLoadResult, Run
@@ -37,6 +37,7 @@ CASE_FILE = "case.toml"
 SUMMARY_FILE = "summary.txt"
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False)
 class ResultFolder(CaseResult):
     """A folder that `archfem run` has written, opened again.

@@ -221,11 +221,11 @@ class _RockingBlock:
     def __post_init__(self) -> None:
         check_type(self.contact, Contact, "contact", "give a Contact")
         check_type(self.material, Material, "material", "give a Material")
-        # from pebbles to mountains: squares of lengths beyond leave the range of floats
-        breadth = check_number(self.breadth, "breadth [m]", minimum=1e-3, maximum=1e4)
+        # squares of lengths that nobody means leave the range of floats
+        breadth = check_number(self.breadth, "breadth [m]", maximum=1e4)
         height = check_number(self.height, "height [m]", maximum=1e4)
         min_slenderness = 1.2  # a block as broad as high barely rocks
-        if height < min_slenderness * breadth:
+        if breadth <= 0.0 or height < min_slenderness * breadth:
             raise InvalidInput(
                 f"a block {breadth} m broad and {height} m high does not rock: its height must be "
                 f"{min_slenderness} times its breadth at least"
@@ -312,7 +312,6 @@ def _restitution_from_energies(angle: Array, energy: Array, impacts: int = 2) ->
     return float((energy[turns[-1]] / energy[turns[0]]) ** (0.5 / impacts))
 
 
-@validate_arguments
 def restitution(
     damping: Viscous | None,
     breadth: float,
@@ -344,7 +343,6 @@ def restitution(
     return _RockingBlock(breadth, height, contact, material).measure_restitution(damping)
 
 
-@validate_arguments
 def restitution_damping(
     coefficient: float | None,
     breadth: float,

@@ -17,7 +17,7 @@ import xarray as xr
 
 from archfem._files import align_columns
 from archfem._typing import Array
-from archfem._validation import check_array, validate_arguments
+from archfem._validation import check_array, validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.run import expected_damping
 from archfem.dynamics.accuracy import (
@@ -98,6 +98,7 @@ def _solve_order(changes: float, ratio: float, coarser: float) -> float:
     return order
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False)
 class MeshSensitivity:
     """Sensitivity of a finding to mesh, time step, joint quadrature and fidelity.

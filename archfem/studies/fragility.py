@@ -24,8 +24,10 @@ from archfem._validation import (
     check_integer,
     check_number,
     check_numbers,
+    check_type,
     short_repr,
     validate_arguments,
+    validate_methods,
 )
 from archfem.errors import InvalidInput
 
@@ -33,6 +35,7 @@ from archfem.errors import InvalidInput
 DISPERSION_RANGE = (0.005, 5.0)
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False)
 class Fragility:
     """A lognormal fragility curve, P = Φ(ln(x / median) / dispersion).
@@ -130,6 +133,8 @@ def spread(curves: Iterable[Fragility]) -> Spread:
         InvalidInput: there are fewer than two variants.
     """
     curves = list(curves)
+    for curve in curves:
+        check_type(curve, Fragility, "curves", "give what stripe_fragility returns")
     if len(curves) < 2:
         raise InvalidInput(f"{len(curves)} curve: the spread of variants needs two or more")
     medians = np.log([curve.median for curve in curves])

@@ -31,7 +31,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._files import align_columns
-from archfem._validation import check_number, validate_arguments
+from archfem._validation import check_number, validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.toml_file import check_choice
 from archfem.errors import InvalidInput
@@ -49,6 +49,7 @@ FACE_CONDITIONS = {
 }
 
 
+@validate_methods
 @dataclass(frozen=True)
 class JointStiffness:
     """Low, usual and high value of the normal and shear stiffness of a joint.
@@ -140,6 +141,7 @@ def joint_stiffness(
         raise InvalidInput(
             f"stress {stress!r} Pa is not between 0 and the strength {strength!r} Pa"
         )
+    check_number(poisson, "poisson", minimum=0.0, maximum=0.499)
     roughness = np.linspace(least, most, 21)
     # the stiffness is not monotonic in the roughness
     normal = [_normal(jrc, strength, strength * weathering, stress) for jrc in roughness]

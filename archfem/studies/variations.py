@@ -95,7 +95,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     damping: Viscous | None = None,
     dt: float = 0.005,
     fidelity: str = "rigid",
-    vary: Mapping[str, Sequence[Any]] | None = None,
+    vary: Mapping[str, Any] | None = None,
     samples: int = 26,
     seed: int = 0,
     workers: int = 1,

@@ -43,7 +43,7 @@ NUMBERS = (
     *(b"9223372036854775808", b"1" * 400, b"1" * 5000, b"0x10", b"1_0", b"1,0", b"", b"4294967295"),
 )
 LUMPS = (
-    *(b"\xff\xfe", b"\xef\xbb\xbf", b"\0", b"\r", b"\n", b" ", b"[" * 3000, b"{", b"\"", b"\xc3"),
+    *(b"\xff\xfe", b"\xef\xbb\xbf", b"\0", b"\r", b"\n", b" ", b"[" * 3000, b"{", b'"', b"\xc3"),
     *(b"\\U+D800", b"\\M+1FFFF", b"%%p", b"\\P{\\fArial|b0;", b"null", b"true", b"-", b"e9"),
     *(b"\n0\nEOF\n", b"\n0\nENDSEC\n", b"\n0\nSEQEND\n", b"\n0\nLINE\n8\nwall\n", b"$End"),
     *(b"\xff" * 8, b"\x00\x00\x00\x80", b"\x00\x00\x00\x00\x00\x00\xf8\x7f", b"\xff\xff\xff\x7f"),

@@ -22,7 +22,7 @@ import numpy as np
 
 from archfem._numba import delete_stale_cache
 from archfem._typing import Array
-from archfem._validation import check_number, check_type
+from archfem._validation import check_number, check_type, validate_methods
 from archfem.dynamics.rigid_body.bodies import (
     Bodies,
     FallEnergy,
@@ -86,6 +86,7 @@ class StepWorkspace(NamedTuple):
     speeds: Array  # velocities during the sweeps, the ground's last (b + 1, 3)
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False)
 class RigidBlockSimulation:
     """Free rigid blocks with impacts and friction, by the scheme of Moreau and Jean.

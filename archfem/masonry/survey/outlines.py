@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from archfem._files import atomic_write
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
@@ -276,4 +277,5 @@ def write_outlines(structure: Structure, path: str | Path) -> None:
         features.append({"type": "Feature", "properties": properties, "geometry": geometry})
     lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
     text = f'{{"type": "FeatureCollection", "features": [\n{lines}\n]}}\n'
-    Path(path).write_text(text, encoding="utf-8")
+    with atomic_write(Path(path)) as draft:
+        draft.write_text(text, encoding="utf-8")

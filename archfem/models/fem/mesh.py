@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from archfem._files import atomic_write
 from archfem._optional import require_package
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, MeshError
@@ -63,7 +64,12 @@ def write_mesh(
     """
     with _gmsh_model(structure.name):
         _generate(structure, settings or Discretisation())
-        gmsh.write(str(path))
+        with atomic_write(Path(path)) as draft:
+            draft.touch()  # gmsh does not say why a file cannot be written
+            try:
+                gmsh.write(str(draft))
+            except Exception as error:  # gmsh raises nothing more specific
+                raise InvalidInput(f"gmsh does not write {path}: {error}; name it .msh") from error
 
 
 @validate_arguments

@@ -9,7 +9,7 @@ import pyvista as pv
 
 from archfem._optional import check_drawing
 from archfem._typing import Array
-from archfem._validation import validate_arguments
+from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.history import History
 from archfem.models.model import Model
 from archfem.view.films.film import check_film
@@ -21,6 +21,7 @@ from archfem.view.stress import Triangles
 from archfem.view.style import Colour
 
 
+@validate_methods
 class Viewer:
     """A run in pyvista's viewer; `show()` opens it, in a window or in a notebook.
 
