@@ -99,9 +99,8 @@ def exit_code(command: Callable[[], int | None]) -> int:
     except BrokenPipeError:  # the reader of the output has ended, as in `archfem … | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:  # a folder that cannot be made, a full disk
-        place = "a file" if error.filename is None else error.filename
-        reason = describe_os_error(error)
-        print(f"archfem: {place} cannot be read or written: {reason}", file=sys.stderr)
+        place = error.filename and f"{error.filename} cannot be read or written: "
+        print(f"archfem: {place or ''}{describe_os_error(error)}", file=sys.stderr)
         return 1
     return 0
 

@@ -430,9 +430,11 @@ def _trace_outline(cells: list[NDArray[np.intp]], points: Array, name: str) -> l
     loop = [rim[0][0]] if rim else []
     while rim and (following := after.get(loop[-1], loop[0])) != loop[0] and len(loop) <= len(rim):
         loop.append(following)
-    if not rim or len(loop) != len(rim) or len(after) != len(rim):
+    # an edge in one direction twice is of cells that overlap
+    if not rim or len(loop) != len(rim) or len(after) != len(rim) or max(ends.values()) > 1:
         raise InvalidInput(
-            f"physical surface '{name}' is in pieces or has a hole: tag each block by itself"
+            f"physical surface '{name}' is in pieces or has a hole, or its cells overlap: tag "
+            "each block by itself"
         )
     places = points[loop]
     before, ahead = places - np.roll(places, 1, axis=0), np.roll(places, -1, axis=0) - places
