@@ -43,8 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = _build_parser().parse_args(arguments)
     if isinstance(sys.stdout, TextIOWrapper):
-        # Lines are printed at once, also into a pipe. What the terminal has no character for is
-        # printed as its code.
+        # Lines are printed without delay, also into a pipe. Characters that the terminal does not
+        # know are printed as their codes.
         sys.stdout.reconfigure(line_buffering=True, errors="backslashreplace")
     # Warnings of the library are logged, and printed to stderr.
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)

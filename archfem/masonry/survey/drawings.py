@@ -97,7 +97,7 @@ def _foreign_reader(library: str, kind: str) -> Iterator[None]:
 
 @contextmanager
 def _limit_memory(more: int = 2**30) -> Iterator[None]:
-    """Limit the memory that the process takes beyond what it has [bytes]."""
+    """Limit the additional memory of the process [bytes]."""
     # a damaged number of nodes makes meshio fill arrays of any size, and the kernel kills
     limits, statistics = resource.getrlimit(resource.RLIMIT_AS), Path("/proc/self/statm")
     if not statistics.exists():  # elsewhere than on Linux
