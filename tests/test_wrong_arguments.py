@@ -130,6 +130,19 @@ MADE = [
         r"name = 'a\\ud800' has '\\ud800', wh",
     ),
     (lambda: af.Motion(np.zeros(5), 0.01, name="a\x1b[31m"), r"name of a motion = .* has '\\x1b'"),
+    (lambda: af.motion.Ntc2018(0.3, 2.5, 0.3, site=[]), r"subsoil \[\] is unknown: use A"),
+    (
+        lambda: af.shapes.pointed_arch(span=3, rise=2, thickness=0.4, voussoirs=2**31),
+        "voussoirs = 2147483648 is above 10000, the most there is room for",
+    ),
+    (
+        lambda: af.shapes.pointed_arch(span=3, rise=2, thickness=0.4, voussoirs=9999, chords=9999),
+        "voussoirs times chords = 99980001 is above 1000000",
+    ),
+    (
+        lambda: af.masonry.assembled(af.column(breadth=1.0, heights=[1.0]).blocks, lambda *_: 0.6),
+        "contact of two blocks is a float: return a Contact from the function",
+    ),
     (lambda: af.Material(30e9, 0.2, 2e4, name=3), "name of a material is a int: give words"),
 ]
 

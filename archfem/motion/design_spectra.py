@@ -6,7 +6,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import check_array, check_fields, check_number
+from archfem._validation import check_array, check_fields, check_number, is_one_of
 from archfem.errors import InvalidInput
 from archfem.motion.response_spectra import as_periods, check_oscillators
 from archfem.units import STANDARD_GRAVITY
@@ -367,7 +367,7 @@ class Ntc2018:
     damping: float = 0.05
 
     def __post_init__(self) -> None:
-        if self.site not in _SUBSOIL_FACTORS:
+        if not is_one_of(self.site, _SUBSOIL_FACTORS):
             raise InvalidInput(f"subsoil {self.site!r} is unknown: use A, B, C, D or E")
         if not (
             _check_positive(self.ag, "a_g [g]") < 2.0

@@ -44,8 +44,10 @@ class RingGeometry:
 
     def check(self, **lengths: float) -> None:
         """Check the numbers of stones and chords, the thickness, and further lengths [m]."""
-        check_integer(self.voussoirs, "voussoirs")
-        check_integer(self.chords, "chords")
+        check_integer(self.voussoirs, "voussoirs", maximum=MAX_VOUSSOIRS)
+        check_integer(self.chords, "chords", maximum=MAX_VOUSSOIRS)
+        # both may be within bounds, and their product beyond the memory
+        check_integer(self.voussoirs * self.chords, "voussoirs times chords", maximum=10**6)
         for key, value in {"thickness": self.thickness, **lengths}.items():
             # A ring of a kilometre is a mistake of units.
             if not 0.0 < check_number(value, f"{key} [m]") < 1e3:
@@ -524,7 +526,6 @@ def flat_arch(
     return ring.assemble(ring.divide(section), "flat arch")
 
 
-@validate_arguments
 def arch_along(
     intrados: Sequence[Point] | Array,
     *,
