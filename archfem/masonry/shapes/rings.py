@@ -44,8 +44,8 @@ class RingGeometry:
 
     def check(self, **lengths: float) -> None:
         """Check the numbers of stones and chords, the thickness, and further lengths [m]."""
-        check_integer(self.voussoirs, "voussoirs", maximum=MAX_VOUSSOIRS)
-        check_integer(self.chords, "chords", maximum=MAX_VOUSSOIRS)
+        check_integer(self.voussoirs, "voussoirs", maximum=10_000)
+        check_integer(self.chords, "chords", maximum=10_000)
         # both may be within bounds, and their product beyond the memory
         check_integer(self.voussoirs * self.chords, "voussoirs times chords", maximum=10**6)
         for key, value in {"thickness": self.thickness, **lengths}.items():
