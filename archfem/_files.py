@@ -12,6 +12,7 @@ import json
 import os
 import shutil
 import stat
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -67,8 +68,7 @@ def read_bytes(path: str | os.PathLike[str], what: str, max_bytes: int = MAX_FIL
 
 def _read_error(path: Any, what: str, error: Exception) -> str:
     """Return the message of a file that cannot be read."""
-    reason = getattr(error, "strerror", None) or str(error)
-    return f"cannot read the {what} {short_repr(path)}: {reason}"
+    return f"cannot read the {what} {short_repr(path)}: {describe_os_error(error)}"
 
 
 def read_text(path: str | os.PathLike[str], what: str, max_bytes: int = MAX_FILE_BYTES) -> str:
@@ -85,27 +85,54 @@ def atomic_write(path: Path) -> Iterator[Path]:
 
     An error or a kill leaves the old file or the new one, never a part of it.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
+    if "\0" in str(path):
+        raise InvalidInput(f"{short_repr(str(path))} is no path, for it has a null character")
     draft = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         yield draft
         with draft.open("rb+") as file:
             os.fsync(file.fileno())
         os.replace(draft, path)
+    except DiskFull:
+        raise
     except OSError as error:
-        if error.errno not in DISK_FULL_ERRORS:
-            raise
-        raise DiskFull(
-            error.errno, f"{path} could not be written, for the disk is full: make room there"
-        ) from error
+        if error.errno in DISK_FULL_ERRORS:
+            raise DiskFull(
+                error.errno, f"{path} could not be written, for the disk is full: make room there"
+            ) from error
+        raise InvalidInput(_write_error(path, error)) from error
     finally:
-        draft.unlink(missing_ok=True)
+        with suppress(OSError):  # the folder may be none, which was said above
+            draft.unlink(missing_ok=True)
+
+
+def _write_error(path: Path, error: Exception) -> str:
+    """Return the message of a file or folder that cannot be written."""
+    reason = describe_os_error(error)
+    if isinstance(error, FileExistsError | NotADirectoryError):
+        reason = "a folder of its path is a file, or a link to nowhere"
+    return f"{short_repr(str(path))} cannot be written: {reason}; name another place"
+
+
+def describe_os_error(error: Exception) -> str:
+    """Describe why the operating system refused a file, without its number."""
+    reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return f"{reason[:1].lower()}{reason[1:]}"
 
 
 def create_result_folder(path: str | Path) -> Path:
     """Return a folder for results, created if it is missing."""
     folder = Path(path)
+    if "\0" in str(folder):
+        raise InvalidInput(f"{short_repr(str(folder))} is no path, for it has a null character")
     try:
+        for place in (folder, *folder.parents):
+            if place.is_symlink() and not place.exists():
+                raise InvalidInput(
+                    f"--out {folder}: {place} is a link to {os.readlink(place)}, which does not "
+                    "exist: make that folder, or name another"
+                )
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError as error:
         raise InvalidInput(
@@ -115,6 +142,12 @@ def create_result_folder(path: str | Path) -> Path:
         raise InvalidInput(
             f"the folder {folder} cannot be made ({error.strerror}): name another with --out"
         ) from error
+    try:
+        # tried before a run of hours; permissions do not say what a file system allows
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        if error.errno not in DISK_FULL_ERRORS:  # said where a file does not fit
+            raise InvalidInput(_write_error(folder, error)) from error
     return folder
 
 

@@ -2,15 +2,17 @@
 
 import inspect
 import os
+import unicodedata
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
 from functools import cache, wraps
 from math import inf, isfinite
 from numbers import Integral
-from types import NoneType, UnionType
+from types import NoneType, SimpleNamespace, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from archfem._typing import Array
 from archfem.errors import InvalidInput
 
 # Length of a value that an error quotes, in characters
@@ -30,13 +32,28 @@ def short_repr(value: Any) -> str:
     return f"{text[: MAX_REPR_LENGTH - 20]} … {text[-17:]}"
 
 
-def check_number(value: Any, name: str, *, minimum: float = -inf) -> float:
-    """Return a finite number of at least a minimum as a float."""
+def check_number(value: Any, name: str, *, minimum: float = -inf, maximum: float = inf) -> float:
+    """Return a finite number within bounds as a float."""
     if not is_number(value):
         raise InvalidInput(f"{name} = {short_repr(value)} is not a finite number")
     if value < minimum:
         raise InvalidInput(f"{name} = {short_repr(value)} is below {minimum:g}, the least allowed")
+    if value > maximum:
+        raise InvalidInput(f"{name} = {short_repr(value)} is above {maximum:g}, the most allowed")
     return float(value)
+
+
+def check_words(value: Any, name: str, remedy: str = "give words") -> None:
+    """Refuse all but text, and text with characters that no terminal prints and no file holds."""
+    check_type(value, str, name, remedy)
+    if value.isprintable():
+        return
+    # Control characters and halves of surrogate pairs; spaces and marks of any script are fine.
+    if bad := [each for each in value if unicodedata.category(each) in ("Cc", "Cs")]:
+        raise InvalidInput(
+            f"{name} = {short_repr(value)} has {short_repr(bad[0])}, which cannot be printed: "
+            "write it without"
+        )
 
 
 def is_one_of(value: Any, known: Collection[Any]) -> bool:
@@ -79,6 +96,14 @@ def check_numbers(value: Any, name: str, count: int | None = None) -> tuple[floa
     """Return a sequence of finite numbers as a tuple of floats."""
     values = check_sequence(value, name, count)
     return tuple(check_number(each, f"{name}[{k}]") for k, each in enumerate(values))
+
+
+def check_array(value: Any, name: str) -> Array:
+    """Return an array, or nested sequences, of finite unmasked numbers as an array of floats."""
+    check_unmasked(value, name)
+    if not _is_array(value):
+        raise InvalidInput(f"{name} = {short_repr(value)} is no array of finite numbers")
+    return np.asarray(value, dtype=float)
 
 
 def check_unmasked(value: Any, name: str) -> None:
@@ -149,7 +174,11 @@ def validate_methods(cls: Class) -> Class:
 def check_fields(instance: Any) -> None:
     """Refuse fields of a dataclass that do not match their annotations, in `__post_init__`."""
     hints = _hints(instance.__class__)
-    _check_values({name: getattr(instance, name) for name in hints}, hints)
+    values = {name: getattr(instance, name) for name in hints}
+    _check_values(values, hints)
+    for name, value in values.items():
+        if isinstance(value, str):  # names are printed, and written to files
+            check_words(value, name)
 
 
 def _check_values(values: Mapping[str, Any], hints: Mapping[str, Any]) -> None:
@@ -163,9 +192,13 @@ def _check_values(values: Mapping[str, Any], hints: Mapping[str, Any]) -> None:
 
 
 @cache
-def _hints(annotated: Hashable) -> dict[str, Any]:
-    """Evaluate the annotations of a function or class, once."""
-    return get_type_hints(annotated)
+def _hints(annotated: Any) -> dict[str, Any]:
+    """Evaluate the annotations of a function's arguments or a class's fields, once."""
+    if isinstance(annotated, type):
+        return get_type_hints(annotated)
+    # what is returned may be of a package that is imported late
+    arguments = {key: hint for key, hint in annotated.__annotations__.items() if key != "return"}
+    return get_type_hints(SimpleNamespace(__annotations__=arguments), annotated.__globals__)
 
 
 def matches_annotation(value: Any, hint: Any) -> bool:
@@ -176,12 +209,21 @@ def matches_annotation(value: Any, hint: Any) -> bool:
     if origin in (Union, UnionType):
         return any(matches_annotation(value, each) for each in inner)
     if origin is Literal:
-        return value in inner
+        return is_one_of(value, inner)
     if origin is Callable:
         return callable(value)
     if origin is np.ndarray:
         return _is_array(value)
-    if isinstance(origin, type) and issubclass(origin, os.PathLike | Mapping | type):
+    if origin is Iterable:  # a generator is not consumed
+        whole = isinstance(value, str | bytes) or (isinstance(value, np.ndarray) and not value.ndim)
+        return isinstance(value, Iterable) and not whole
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return isinstance(value, origin) and all(
+            matches_annotation(each, hint)
+            for pair in value.items()
+            for each, hint in zip(pair, inner, strict=True)
+        )
+    if isinstance(origin, type) and issubclass(origin, os.PathLike | type):
         return isinstance(value, origin)
     if isinstance(origin, type) and issubclass(origin, Iterable):
         return _is_sequence(value, origin, inner)
@@ -245,7 +287,9 @@ def _describe(hint: Any) -> str:
         return "an array of finite numbers"
     if origin is Callable:
         return "a function"
-    if isinstance(origin, type) and issubclass(origin, Iterable) and origin not in (Mapping, dict):
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return f"a table of {' and '.join(_describe(each) for each in inner)}"
+    if isinstance(origin, type) and issubclass(origin, Iterable):
         items = [_describe(each) for each in inner if each is not ...]
         return f"a row of {', '.join(items)}"
     if hint in (None, NoneType):

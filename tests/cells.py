@@ -1,7 +1,5 @@
 """A model of one cell, for tests of stress."""
 
-from types import SimpleNamespace
-
 import numpy as np
 from scipy import sparse
 
@@ -17,4 +15,4 @@ def one_cell(stack, stress):
     cells = af.models.Cells(
         np.array(SQUARE), block, (np.arange(4),), sparse.csr_matrix((8, 1)), stresses
     )
-    return SimpleNamespace(structure=stack, size=1, cells=cells)
+    return af.build(stack, fidelity="rigid").copy_with(size=1, cells=cells)

@@ -1,5 +1,8 @@
 """Arguments of a wrong kind end in an error of ours that says what was given, and what to give."""
 
+import importlib
+import inspect
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -108,6 +111,39 @@ MADE = [
     (lambda: af.first_mechanisms(None), "run is a NoneType: give what time_history returns"),
     (lambda: af.dead_load(RING), "model is a Structure: build one"),
     (lambda: af.modes(RING, 3), "model is a Structure: build one"),
+    (lambda: af.joint_stiffness(3e10, 0.5, rigid=np.zeros(3)), "rigid = array.* is a ndarray"),
+    (lambda: af.joint_stiffness(3e10, 0.5, poisson=RING), "poisson = .* is a Structure: give a n"),
+    (lambda: af.joint_stiffness(3e10, 0.5, poisson=0.7), "poisson = 0.7 is above 0.499"),
+    (
+        lambda: af.dead_load(af.build(RING, fidelity="rigid"), stages=10**400),
+        "stages = 10+ … 0+ is",
+    ),
+    (lambda: af.dynamics.restitution_damping(None, 0.5, 1e308), r"height \[m\] = 1e\+308 is above"),
+    (lambda: af.motion.TableSpectrum("aaaa", [1.0]), "periods of a spectrum table = 'aaaa' is no"),
+    (lambda: af.motion.TableSpectrum([1, [2]], [1.0]), r"periods .* \[1, \[2\]\] is no array"),
+    (lambda: af.matched(QUAKE, np.zeros(3)), "spectrum = array.* give DesignSpectrum"),
+    (lambda: af.read_outlines(np.zeros(3)), "path = array.* give words or Path"),
+    (lambda: af.read_outlines("x.dxf", layers={"a": 3}), r"layers = \{'a': 3\} is a dict: give"),
+    (lambda: af.masonry.usual_stages(np.zeros(3)), "structure = array.* give Structure"),
+    (
+        lambda: af.Block(SQUARE.tolist(), af.STONE, "a\ud800"),
+        r"name = 'a\\ud800' has '\\ud800', wh",
+    ),
+    (lambda: af.Motion(np.zeros(5), 0.01, name="a\x1b[31m"), r"name of a motion = .* has '\\x1b'"),
+    (lambda: af.motion.Ntc2018(0.3, 2.5, 0.3, site=[]), r"subsoil \[\] is unknown: use A"),
+    (
+        lambda: af.shapes.pointed_arch(span=3, rise=2, thickness=0.4, voussoirs=2**31),
+        "voussoirs = 2147483648 is above 10000, the most there is room for",
+    ),
+    (
+        lambda: af.shapes.pointed_arch(span=3, rise=2, thickness=0.4, voussoirs=9999, chords=9999),
+        "voussoirs times chords = 99980001 is above 1000000",
+    ),
+    (
+        lambda: af.masonry.assembled(af.column(breadth=1.0, heights=[1.0]).blocks, lambda *_: 0.6),
+        "contact of two blocks is a float: return a Contact from the function",
+    ),
+    (lambda: af.Material(30e9, 0.2, 2e4, name=3), "name of a material is a int: give words"),
 ]
 
 
@@ -115,6 +151,42 @@ MADE = [
 def test_what_is_made_of_wrong_arguments(make, says):
     with pytest.raises(af.InvalidInput, match=says):
         make()
+
+
+ROOMS = ("motion", "masonry", "masonry.shapes", "joints", "limit", "models", "statics")
+ROOMS += ("dynamics", "view", "cases", "studies")
+
+# those of arrays in which undefined or unbounded values have a meaning, so that none is refused
+WITH_GAPS = {"failure_flags", "joint_dataset", "draw_capacity", "draw_convergence"}
+WITH_GAPS |= {"draw_fragility", "draw_ida", "draw_study", "draw_tornado"}
+
+
+def public_functions():
+    """Functions that the package and its rooms export, by name."""
+    rooms = [af, *(importlib.import_module(f"archfem.{room}") for room in ROOMS)]
+    found = {name: getattr(room, name) for room in rooms for name in dir(room)}
+    return {
+        name: each
+        for name, each in found.items()
+        if inspect.isfunction(each) and name not in WITH_GAPS | {"parameter_axes"}
+    }
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [object(), np.zeros(3), 10**400, "\ud800", None, [object()], np.ma.masked, {"a": np.zeros(2)}],
+    ids=["object", "array", "huge", "surrogate", "none", "list", "masked", "table"],
+)
+def test_every_public_function_refuses_what_it_cannot_use(bad, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    functions = public_functions()
+    assert len(functions) > 100
+    for function in functions.values():
+        parameters = inspect.signature(function).parameters.values()
+        needed = [each.name for each in parameters if each.default is each.empty]
+        with pytest.raises(af.ArchfemError):  # the traceback names the function
+            function(**dict.fromkeys(needed, bad))
+    assert not os.listdir(tmp_path)
 
 
 @pytest.mark.parametrize("fidelity", ["rigid", "faces"])

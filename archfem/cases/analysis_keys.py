@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from archfem._validation import validate_methods
 from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.toml_file import Table, check_choice, check_table
 from archfem.dynamics.schemes import (
@@ -111,6 +112,7 @@ def check_scheme(analysis: Table, structure: Structure, displacements: str = "sm
         ) from error
 
 
+@validate_methods
 @dataclass(frozen=True)
 class LimitAnalysis:
     """Limit analysis of a case: the live load, the friction law and the strength of a fill.

@@ -12,7 +12,7 @@ from typing import Any
 
 import tomli_w
 
-from archfem._validation import check_type, validate_arguments
+from archfem._validation import check_words, validate_arguments
 from archfem.cases.analysis_keys import (
     AssessmentSettings,
     LimitAnalysis,
@@ -142,7 +142,7 @@ class Case:
             InvalidStructure: the lengths of the structure contradict each other.
         """
         refuse_unknown(settings, ("title", *TABLE_SECTIONS))
-        check_type(settings.get("title", ""), str, "title", 'write words in quotes: title = "…"')
+        check_words(settings.get("title", ""), "title", 'write words in quotes: title = "…"')
         for key in TABLE_SECTIONS:
             if not isinstance(settings.get(key, {}), dict):
                 raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")

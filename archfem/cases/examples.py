@@ -5,6 +5,7 @@ import shutil
 import tomllib
 from pathlib import Path
 
+from archfem._files import create_result_folder
 from archfem.errors import InvalidInput
 
 # Name of a file beside a case, as the case writes it.
@@ -47,7 +48,7 @@ def copy_example(name: str, folder: Path) -> list[Path]:
     existing = [str(copy) for copy in copies if copy.exists()]
     if existing:
         raise InvalidInput(f"{', '.join(existing)}: there already; give another folder")
-    folder.mkdir(parents=True, exist_ok=True)
+    create_result_folder(folder)
     for file, copy in zip(files, copies, strict=True):
         shutil.copyfile(file, copy)
     return copies

@@ -28,6 +28,7 @@ from archfem._files import (
     replace_results,
     start_draft,
 )
+from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, list_input_files
 from archfem.cases.run import HISTORY_FILE, CaseResult, DeadLoadResult, Run
@@ -59,6 +60,7 @@ CASE_FILE = "case.toml"
 SUMMARY_FILE = "summary.txt"
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False)
 class ResultFolder(CaseResult):
     """A folder that `archfem run` has written, opened again.
@@ -154,6 +156,7 @@ def _is_linked(path: Path, other: Path) -> bool:
     return other.is_file() and path.samefile(other)
 
 
+@validate_arguments
 def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> ResultFolder:
     """Open a folder that `archfem run` has written.
 

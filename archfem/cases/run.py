@@ -18,6 +18,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._display import call_late_bound
+from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs
 from archfem.dynamics.damping import effective_mode_range, first_effective_mode
@@ -180,6 +181,7 @@ class Run(CaseResult):
 Result = Collapse | DeadLoadResult | Suite | Run
 
 
+@validate_arguments
 def run_case(
     case: Case,
     folder: str | Path | None = None,
@@ -231,6 +233,7 @@ def run_case(
         yield _run_motion(case, case.ground_motion(), at_rest, path, run_motion)
 
 
+@validate_arguments
 def dead_load_of_case(case: Case) -> Equilibrium:
     """Compute the equilibrium of a case under dead load, built in the stages of the case.
 
@@ -275,6 +278,7 @@ def expected_damping(case: Case) -> DampingChoice:
     return case.damping
 
 
+@validate_arguments
 def damping_of(case: Case, dead: Equilibrium) -> tuple[Viscous | None, str]:
     """Return the damping of a case, whose frequencies may be those of modes about the dead load.
 
@@ -306,6 +310,7 @@ def damping_of(case: Case, dead: Equilibrium) -> tuple[Viscous | None, str]:
     return damping, f"{text} {low:.2f} and {high:.2f} Hz{reason}"
 
 
+@validate_arguments
 def run_time_history(
     case: Case,
     motion: Motion,

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from archfem._files import read_text
-from archfem._validation import short_repr
+from archfem._validation import is_one_of, short_repr
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import suggest_name
 from archfem.units import in_degrees, in_unit
@@ -187,8 +187,8 @@ def refuse_unknown(table: Table, keys: Iterable[str], section: str = "") -> None
 def check_choice(value: Any, choices: Iterable[str], key: str) -> str:
     """Return a word that must be one of several."""
     words = list(choices)
-    if value not in words:
-        raise InvalidInput(f"{key} = {value!r} is not known: use one of {words}")
+    if not is_one_of(value, words):
+        raise InvalidInput(f"{key} = {short_repr(value)} is not known: use one of {words}")
     return str(value)
 
 

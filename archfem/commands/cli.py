@@ -12,6 +12,7 @@ from importlib import import_module
 from io import TextIOWrapper
 from typing import Any
 
+from archfem._files import describe_os_error
 from archfem.errors import ArchfemError, InvalidInput
 
 Command = Callable[[argparse.Namespace], int | None]
@@ -41,8 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if the arguments are not understood.
     """
     options = _build_parser().parse_args(arguments)
-    if isinstance(sys.stdout, TextIOWrapper):  # print lines at once, also into a pipe
-        sys.stdout.reconfigure(line_buffering=True)
+    if isinstance(sys.stdout, TextIOWrapper):
+        # Lines are printed without delay, also into a pipe. Characters that the terminal does not
+        # know are printed as their codes.
+        sys.stdout.reconfigure(line_buffering=True, errors="backslashreplace")
     # Warnings of the library are logged, and printed to stderr.
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     with _interrupt_on_sigterm() as signals:
@@ -96,7 +99,8 @@ def exit_code(command: Callable[[], int | None]) -> int:
     except BrokenPipeError:  # the reader of the output has ended, as in `archfem … | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:  # a folder that cannot be made, a full disk
-        print(f"archfem: {error}", file=sys.stderr)
+        place = error.filename and f"{error.filename} cannot be read or written: "
+        print(f"archfem: {place or ''}{describe_os_error(error)}", file=sys.stderr)
         return 1
     return 0
 

@@ -162,11 +162,13 @@ def verdict(options: argparse.Namespace) -> None:
     from archfem.studies.variations import verdict_range_of_case
 
     case = Case.read(options.case, options.changes)
+    # A folder that cannot be written is refused before the runs.
+    folder = None if options.out is None else create_result_folder(options.out)
     print(case.title)
     computed = verdict_range_of_case(case, workers=options.workers, samples=options.samples)
     print(computed)
-    if options.out is not None:
-        with _replace_results("verdict", case, create_result_folder(options.out)) as draft:
+    if folder is not None:
+        with _replace_results("verdict", case, folder) as draft:
             print_written(write_verdict_range(computed, draft))
 
 

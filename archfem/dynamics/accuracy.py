@@ -9,6 +9,7 @@ from tqdm import tqdm
 
 from archfem._files import align_columns
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.dynamics.error_estimation import largest_difference, run_peaks
 from archfem.dynamics.model_selection import (
     DampingChoice,
@@ -110,6 +111,7 @@ class Accuracy:
         return align_columns(head, rows)
 
 
+@validate_arguments
 def accuracy(
     structure: Structure,
     motion: Motion,

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from archfem._typing import Array
-from archfem._validation import check_integer, check_number, check_type
+from archfem._validation import check_integer, check_number, check_type, validate_arguments
 from archfem.dynamics.schemes import (
     DAMPING_KINDS,
     EFFECTIVE_MASS_SHARE,
@@ -161,6 +161,7 @@ def _modes_with_share(
     return computed, shares
 
 
+@validate_arguments
 def effective_damping(
     model: Model,
     ratio: float = 0.05,
@@ -220,8 +221,9 @@ class _RockingBlock:
     def __post_init__(self) -> None:
         check_type(self.contact, Contact, "contact", "give a Contact")
         check_type(self.material, Material, "material", "give a Material")
-        breadth = check_number(self.breadth, "breadth [m]")
-        height = check_number(self.height, "height [m]")
+        # squares of lengths that nobody means leave the range of floats
+        breadth = check_number(self.breadth, "breadth [m]", maximum=1e4)
+        height = check_number(self.height, "height [m]", maximum=1e4)
         min_slenderness = 1.2  # a block as broad as high barely rocks
         if breadth <= 0.0 or height < min_slenderness * breadth:
             raise InvalidInput(

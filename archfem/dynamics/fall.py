@@ -17,6 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.dynamics.rigid_body.bodies import Bodies, LooseBlocks, make_bodies
 from archfem.dynamics.rigid_body.contact_detection import (
     PlacedPieces,
@@ -58,6 +59,7 @@ class ReleasedBlocks:
     kinetic_after: float  # of the rigid blocks [J]
 
 
+@validate_arguments
 def release_blocks(model: Model, state: State) -> ReleasedBlocks:
     """Return the blocks of a model as loose rigid blocks with the same positions and momentum.
 
@@ -126,6 +128,7 @@ class CollapseState:
         return f"{self.kind}, first at {self.time:.2f} s; lost: {join_names(self.blocks)}{still}"
 
 
+@validate_arguments
 def classify_collapse(
     structure: Structure, frames: Iterable[LooseBlocks], start: Array | None = None
 ) -> CollapseState:

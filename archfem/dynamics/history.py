@@ -13,7 +13,7 @@ import xarray as xr
 from archfem._display import ResultDisplay, call_late_bound
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._typing import Array
-from archfem._validation import check_type, validate_arguments
+from archfem._validation import check_type, validate_arguments, validate_methods
 from archfem.dynamics.export import write_vtk, write_xdmf
 from archfem.dynamics.fall import CollapseState
 from archfem.dynamics.verdict import (
@@ -73,6 +73,7 @@ class Ending(StrEnum):
         return self not in (Ending.INTERRUPTED, Ending.FAILED)
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False, repr=False)
 class History(ResultDisplay):
     """Record of one run.
@@ -429,6 +430,7 @@ def with_fall(history: History, fall: CollapseState) -> History:
     return History(dataset, history.structure)
 
 
+@validate_arguments
 def partial_history(error: DidNotConverge) -> History:
     """Return the history up to the failed step of a run.
 

@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from archfem._display import call_late_bound
 from archfem._files import align_columns
-from archfem._validation import validate_arguments
+from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.fall import FALLEN_STATES, CollapseState
 from archfem.dynamics.history import (
@@ -299,6 +299,7 @@ def _next_scale(
     return None
 
 
+@validate_methods
 @dataclass(frozen=True)
 class CollapseScale:
     """Scales of a motion between which a structure falls, searched with several time steps.

@@ -13,7 +13,7 @@ import numpy as np
 from tqdm import tqdm
 
 from archfem._threads import single_threaded
-from archfem._validation import check_integer, check_number, check_type
+from archfem._validation import check_integer, check_number, check_type, validate_arguments
 from archfem.dynamics.events import (
     EventMonitor,
     StopCondition,
@@ -338,6 +338,7 @@ def _find_loosening(
     return Ending.FINISHED, None, len(batch.times)
 
 
+@validate_arguments
 def last_state(history: History) -> State:
     """Return the state at the end of a run, from which another run can start.
 

@@ -14,9 +14,11 @@ from archfem._display import ResultDisplay
 from archfem._files import align_columns
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._typing import Array
+from archfem._validation import validate_methods
 from archfem.dynamics.fall import COLLAPSE_STATES, FALLEN_STATES
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False, repr=False)
 class VerdictRange(ResultDisplay):
     """Verdicts over a range of properties.

@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
-from archfem._validation import check_integer, check_number, check_type
+from archfem._validation import check_integer, check_number, check_type, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.parts import select_assessed_parts
 
@@ -285,6 +285,7 @@ def envelope(joints: xr.Dataset) -> xr.Dataset:
     )
 
 
+@validate_arguments
 def part_roles(joints: xr.Dataset) -> dict[str, str]:
     """Return the role of each part, by its name, in the order of the joints.
 
@@ -297,6 +298,7 @@ def part_roles(joints: xr.Dataset) -> dict[str, str]:
     return dict(zip(parts, roles, strict=True))
 
 
+@validate_arguments
 def assessed_joints(joints: xr.Dataset) -> xr.Dataset:
     """Return the joints of rings and piers, or all where there are neither, with their numbers.
 

@@ -18,7 +18,7 @@ from scipy import sparse
 
 from archfem._files import atomic_write
 from archfem._typing import Array
-from archfem._validation import check_type
+from archfem._validation import check_type, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     TENSION_COORDINATE,
@@ -181,6 +181,7 @@ def check_instant(structure: Structure, joints: xr.Dataset) -> None:
         )
 
 
+@validate_arguments
 def select_joint(joints: xr.Dataset, joint: str | int) -> xr.Dataset:
     """Return the variables of one joint, at one instant or over time.
 
@@ -195,6 +196,7 @@ def select_joint(joints: xr.Dataset, joint: str | int) -> xr.Dataset:
     return joints.isel(joint=find_number("joint", names, joint))
 
 
+@validate_arguments
 def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
     """Return the points where the resultant crosses each joint, in space.
 
@@ -225,6 +227,7 @@ def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
     return line.transpose(..., "joint", "axis")
 
 
+@validate_arguments
 def joint_table(joints: xr.Dataset) -> "pd.DataFrame":
     """Return joint variables as a table with a row for each joint, at each instant if several.
 
@@ -245,6 +248,7 @@ def joint_table(joints: xr.Dataset) -> "pd.DataFrame":
     return frame[[*first, *(key for key in frame if key not in first)]]
 
 
+@validate_arguments
 def write_joint_table(joints: xr.Dataset, path: str | Path) -> Path:
     """Write joint variables as a table.
 

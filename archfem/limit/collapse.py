@@ -20,7 +20,7 @@ import xarray as xr
 
 from archfem._display import ResultDisplay
 from archfem._typing import Array
-from archfem._validation import check_type
+from archfem._validation import check_type, validate_arguments
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
 from archfem.limit.linear_programme import Optimum, Programme
@@ -229,6 +229,7 @@ def stands(
     return is_balanced(dead.minimise_residual(), dead)
 
 
+@validate_arguments
 def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
     """Restrict the cohesion of joints to the part that is closed in a state.
 

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     Criteria,
@@ -91,6 +92,7 @@ def mechanism_kind(roles: Collection[str]) -> str:
     return "semi-global" if carrying == ["pier", "ring"] else "global"
 
 
+@validate_arguments
 def counted_mechanism(
     joints: xr.Dataset, criteria: Criteria | None = None, *, kinds: Sequence[str] = MECHANISM_KINDS
 ) -> Mechanism | None:
@@ -129,6 +131,7 @@ def counted_mechanism(
     return _mechanism(flags, instant, mechanism_kind([roles[name] for name in group]), group)
 
 
+@validate_arguments
 def demirel_aldemir_mechanism(
     joints: xr.Dataset, criteria: Criteria | None = None
 ) -> Mechanism | None:
@@ -171,6 +174,7 @@ def demirel_aldemir_mechanism(
     return _mechanism(flags, instant, MECHANISM_KINDS[min(len(piers), 2)], group)
 
 
+@validate_arguments
 def mechanism_over_record(joints: xr.Dataset, criteria: Criteria | None = None) -> Mechanism | None:
     """Find the instant at which enough joints of one ring or one pier have failed so far.
 
@@ -201,6 +205,7 @@ def mechanism_over_record(joints: xr.Dataset, criteria: Criteria | None = None) 
     return _mechanism(flags, instants[part], "local", [part])
 
 
+@validate_arguments
 def counted_mechanisms(
     joints: xr.Dataset, criteria: Criteria | None = None
 ) -> dict[str, Mechanism | None]:
@@ -227,6 +232,7 @@ def counted_mechanisms(
     }
 
 
+@validate_arguments
 def episode(joints: xr.Dataset, found: Mechanism) -> Episode:
     """Follow a mechanism from its instant on, for as long as its joints stay failed.
 

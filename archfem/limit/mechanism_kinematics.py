@@ -23,7 +23,7 @@ from scipy.optimize import linprog, nnls
 from scipy.sparse.csgraph import dijkstra
 
 from archfem._typing import Array
-from archfem._validation import check_type
+from archfem._validation import check_type, validate_arguments
 from archfem.errors import DidNotConverge
 from archfem.joints.criteria import Criteria, find_lasting, merge_criteria, with_failure_flags
 from archfem.joints.resultants import check_instant
@@ -117,6 +117,7 @@ def verified_mechanism(
     return get_verifier(structure).verify(joints)
 
 
+@validate_arguments
 def first_verified_mechanism(
     structure: Structure, joints: xr.Dataset, criteria: Criteria | None = None
 ) -> VerifiedMechanism | None:

@@ -25,7 +25,7 @@ import numpy as np
 from scipy import sparse
 
 from archfem._typing import Array
-from archfem._validation import check_number, check_type
+from archfem._validation import check_number, check_type, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import SELF_WEIGHT
 from archfem.limit.collapse import stands
@@ -140,6 +140,7 @@ class Movement:
         return "\n".join([head, *map(str, self.sequence)])
 
 
+@validate_arguments
 def largest_movement(
     structure: Structure,
     settlement: Settlement,

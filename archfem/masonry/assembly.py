@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from archfem._typing import Array
+from archfem._validation import check_type, validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block
 from archfem.masonry.materials import Contact
@@ -20,6 +21,7 @@ ContactOf = Callable[[Block, Block], Contact]
 Touch = tuple[int, int, Array]
 
 
+@validate_arguments
 def assembled(
     blocks: Sequence[Block],
     contact: Contact | ContactOf,
@@ -67,6 +69,7 @@ def assembled(
             part = owner.part
             (x0, y0), (x1, y1) = ends.tolist()
             law = of(blocks[a], blocks[b])
+            check_type(law, Contact, "contact of two blocks", "return a Contact from the function")
             joint = Joint((a, b), (x0, y0), (x1, y1), law, "", part, owner.role)  # named below
             if part in directions and part not in numbered and directions[part].separates(ends):
                 across[part].append(joint)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import check_number, check_type
+from archfem._validation import check_number, check_type, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.assembly import assembled
 from archfem.masonry.block import Block
@@ -44,6 +44,7 @@ class _Piece:
     centre: tuple[float, float]
 
 
+@validate_arguments
 def jointed_fill(
     structure: Structure, size: float, *, angle: float | str, cohesion: float = 0.0
 ) -> Structure:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from archfem._validation import check_integer, check_type
+from archfem._validation import check_integer, check_sequence, check_type, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, find_supported_blocks, suggest_name
@@ -37,6 +37,7 @@ class Stage:
             raise InvalidInput(f"'{self.name}' has centring, and no block that stands on it")
 
 
+@validate_arguments
 def usual_stages(structure: Structure, layers: int = 4) -> tuple[Stage, ...]:
     """Return the usual construction stages of a bridge.
 
@@ -95,7 +96,7 @@ def resolve_stages(structure: Structure, stages: Sequence[Stage]) -> list[set[in
     """Resolve the stages to the numbers of the blocks that each places."""
     done: set[int] = set()
     placed, centred = [], False
-    for stage in stages:
+    for stage in check_sequence(stages, "stages"):
         check_type(
             stage, Stage, "stages", "give some of Stage(blocks=…), or usual_stages(structure)"
         )

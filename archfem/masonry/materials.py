@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import inf
 
-from archfem._validation import check_number, is_one_of
+from archfem._validation import check_number, check_words, is_one_of
 from archfem.errors import InvalidInput
 from archfem.units import G, GPa, MPa, kN
 
@@ -34,6 +34,7 @@ class Material:
 
     def __post_init__(self) -> None:
         """Check that the values are possible, which detects wrong units."""
+        check_words(self.name, "name of a material")
         of = f"of '{self.name}'"
         for key in ("young", "poisson", "unit_weight"):
             check_number(getattr(self, key), f"{key} {of}")
@@ -110,6 +111,7 @@ class Contact:
 
     def __post_init__(self) -> None:
         """Check that the values are possible, which detects wrong units."""
+        check_words(self.name, "name of a contact")
         if is_one_of(self.friction, (None, inf)):
             object.__setattr__(self, "friction", inf)
         else:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from archfem._files import atomic_write
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import rigid_motion_matrix
 from archfem.masonry.survey.drawings import write_dxf
@@ -175,6 +176,7 @@ def _array(name: str, values: NDArray[Any]) -> str:
     )
 
 
+@validate_arguments
 def write_state(model: Model, q: Array, path: str | Path, *, magnification: float = 1.0) -> Path:
     """Write a displaced state of a model for programs that draw or mesh.
 

@@ -6,7 +6,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import check_fields, check_number, check_unmasked
+from archfem._validation import check_array, check_fields, check_number, is_one_of
 from archfem.errors import InvalidInput
 from archfem.motion.response_spectra import as_periods, check_oscillators
 from archfem.units import STANDARD_GRAVITY
@@ -246,8 +246,7 @@ class TableSpectrum:
     vertical_values: Array | None = None
 
     def __post_init__(self) -> None:
-        check_unmasked(self.periods, "periods of a spectrum table")
-        periods = np.asarray(self.periods, dtype=float)
+        periods = check_array(self.periods, "periods of a spectrum table")
         object.__setattr__(self, "periods", periods)
         grows = periods.ndim == 1 and len(periods) > 1 and bool(np.all(np.diff(periods) > 0.0))
         if not grows or periods[0] < 0.0:
@@ -255,9 +254,8 @@ class TableSpectrum:
         for name in ("values", "vertical_values"):
             if getattr(self, name) is None and name == "vertical_values":
                 continue
-            check_unmasked(getattr(self, name), f"{name} of a spectrum table")
-            row = np.asarray(getattr(self, name), dtype=float)
-            if row.shape != periods.shape or not np.all((row > 0.0) & np.isfinite(row)):
+            row = check_array(getattr(self, name), f"{name} of a spectrum table")
+            if row.shape != periods.shape or not np.all(row > 0.0):
                 raise InvalidInput(
                     f"{name} of a spectrum table: expected {len(periods)} positive values in g"
                 )
@@ -369,7 +367,7 @@ class Ntc2018:
     damping: float = 0.05
 
     def __post_init__(self) -> None:
-        if self.site not in _SUBSOIL_FACTORS:
+        if not is_one_of(self.site, _SUBSOIL_FACTORS):
             raise InvalidInput(f"subsoil {self.site!r} is unknown: use A, B, C, D or E")
         if not (
             _check_positive(self.ag, "a_g [g]") < 2.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from archfem._display import ResultDisplay
 from archfem._typing import Array
-from archfem._validation import check_type, is_number, short_repr, validate_methods
+from archfem._validation import check_words, is_number, short_repr, validate_methods
 from archfem.errors import InvalidInput
 from archfem.motion import signal_processing
 from archfem.motion.records.reader import read_components
@@ -46,7 +46,7 @@ class Motion(ResultDisplay):
     def __post_init__(self) -> None:
         if not (is_number(self.dt) and self.dt >= 1e-6):
             raise InvalidInput(f"dt {short_repr(self.dt)} s is no positive number from 1e-6 on")
-        check_type(self.name, str, "name of a motion", "give words")
+        check_words(self.name, "name of a motion")
         for component in COMPONENTS:
             samples = getattr(self, component)
             if samples is not None or component == "horizontal":

@@ -5,7 +5,13 @@ import scipy  # loads scipy.signal, which is slow, when it is first used
 from scipy import linalg
 
 from archfem._typing import Array
-from archfem._validation import check_number, check_type, check_unmasked, short_repr
+from archfem._validation import (
+    check_number,
+    check_type,
+    check_unmasked,
+    short_repr,
+    validate_arguments,
+)
 from archfem.errors import InvalidInput
 from archfem.motion.motion import Motion
 
@@ -142,6 +148,7 @@ def response_spectrum(
     return spectrum.reshape(natural.shape)
 
 
+@validate_arguments
 def scaled_to_spectrum(
     motion: Motion, value: float, period: float, *, damping: float = 0.05
 ) -> Motion:

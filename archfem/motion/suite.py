@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import check_fields
+from archfem._validation import check_fields, validate_methods
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.matching import Match, matched
@@ -14,6 +14,7 @@ from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import response_spectrum
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False)
 class Suite:
     """A named set of motions, each with its vertical, with one scale and reduction factor.

@@ -20,7 +20,7 @@ import xarray as xr
 from archfem._display import ResultDisplay
 from archfem._threads import single_threaded
 from archfem._typing import Array
-from archfem._validation import check_type
+from archfem._validation import check_type, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.joints.resultants import joint_dataset, select_joint
@@ -111,6 +111,7 @@ class Equilibrium(ResultDisplay):
         return select_joint(self.joints, joint)
 
 
+@validate_arguments
 def self_weight(model: Model) -> Array:
     """Return the generalised forces of gravity (n,) [N, N m].
 
@@ -229,6 +230,7 @@ def _find_carried_part(
     return None
 
 
+@validate_arguments
 def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -> Equilibrium:
     """Find the equilibrium under a load that is applied from rest.
 

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.resultants import check_instant, thrust_line
 from archfem.masonry.block import Block
@@ -53,6 +54,7 @@ class FreeBody:
         return float(np.linalg.norm(self.sum) / self.sizes.max())
 
 
+@validate_arguments
 def forces_on(
     structure: Structure, joints: xr.Dataset, block: int | str, cells: Cells | None = None
 ) -> FreeBody:

@@ -19,6 +19,7 @@ from scipy import sparse
 
 from archfem._files import align_columns
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.models.model import Cells, Model
@@ -31,6 +32,7 @@ def cell_stress(model: Model, q: Array) -> Array:
     return (_cell_stress_operator(model.cells) @ q).reshape(-1, 3)
 
 
+@validate_arguments
 def principal_stresses(model: Model, q: Array) -> xr.Dataset:
     """Compute the principal stresses at the centres of all cells.
 
@@ -73,6 +75,7 @@ def principal_values(across: Array, up: Array, shear: Array) -> tuple[Array, Arr
     return middle + radius, middle - radius
 
 
+@validate_arguments
 def strength_use(model: Model, q: Array) -> xr.Dataset:
     """Compute the largest compression and tension in each block, and the use of its strength.
 
@@ -91,6 +94,7 @@ def strength_use(model: Model, q: Array) -> xr.Dataset:
     return _label_use(model.structure, _peak_stresses(model, q[None])[0])
 
 
+@validate_arguments
 def strength_use_over(model: Model, run: xr.Dataset) -> xr.Dataset:
     """Compute the largest compression and tension in each block over a run, and their use.
 
@@ -121,6 +125,7 @@ def strength_use_over(model: Model, run: xr.Dataset) -> xr.Dataset:
     return result
 
 
+@validate_arguments
 def joint_stress(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
     """Compute the largest compression at the edge of each joint, from N and e, without tension.
 
@@ -152,6 +157,7 @@ def joint_stress(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
     return edge.rename("stress").assign_attrs(units="Pa", long_name="largest edge compression")
 
 
+@validate_arguments
 def utilisation(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
     """Compute the share of the blocks' compressive strength used at the edge of each joint.
 
@@ -174,6 +180,7 @@ def utilisation(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
     return share.rename("utilisation").assign_attrs(units="1")
 
 
+@validate_arguments
 def strength_use_table(use: xr.Dataset) -> str:
     """Return a line for each part: largest compression and tension in its blocks, and their blocks.
 

@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 
 from archfem._numba import source_digest
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_file, list_input_files
 from archfem.cases.run import DeadLoadResult, damping_of, dead_load_of_case
@@ -88,6 +89,7 @@ def preload() -> None:
             file.write(b"compiled\n")
 
 
+@validate_arguments
 def dead_load_of(case: Case) -> DeadLoadResult:
     """Return the dead-load result of a case, with its damping; the model is reused if cached.
 
@@ -115,6 +117,7 @@ def first_mode(result: DeadLoadResult) -> Modes:
     )
 
 
+@validate_arguments
 def ground_motion(case: Case) -> Motion:
     """Return the motion of a case, or that of the only pair of its suite.
 

@@ -13,6 +13,7 @@ import xarray as xr
 
 from archfem._files import align_columns, atomic_write
 from archfem._typing import Array
+from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.toml_file import check_table, read_tables, refuse_unknown
 from archfem.dynamics.fall import FALLEN_STATES
@@ -36,6 +37,7 @@ def read_study_tables(path: Path) -> dict[str, Any]:
     return read_tables(path, "study")
 
 
+@validate_methods
 @dataclass
 class Finding:
     """Findings of one case of a comparison.
@@ -89,6 +91,7 @@ def write_finding(finding: Finding, path: Path) -> None:
         draft.write_text(json.dumps(asdict(finding), indent=1), encoding="utf-8")
 
 
+@validate_arguments
 def study_table(findings: Mapping[str, Finding]) -> str:
     """Return two tables with a line for each case.
 
@@ -171,6 +174,7 @@ def _range_text(scales: Array) -> str:
     return f"{middle} ({low} to {high})"
 
 
+@validate_methods
 @dataclass(frozen=True)
 class Comparison:
     """Cases to compare, each under the motions of its suite.

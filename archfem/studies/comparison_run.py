@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from archfem._files import atomic_write
+from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.run import Run, run_case
 from archfem.dynamics.history import Ending
@@ -98,6 +99,7 @@ def _select(row: Mapping[str, Any], prefix: str) -> dict[str, Any]:
     }
 
 
+@validate_arguments
 def run_pairs(
     case: Case, folder: str | Path, *, workers: int | None = None, client: Any = None
 ) -> list[str]:

@@ -17,6 +17,7 @@ import xarray as xr
 
 from archfem._files import align_columns
 from archfem._typing import Array
+from archfem._validation import check_array, validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.run import expected_damping
 from archfem.dynamics.accuracy import (
@@ -57,7 +58,8 @@ class Convergence:
     error: float
 
 
-def converged(sizes: Any, values: Any) -> Convergence:
+@validate_arguments
+def converged(sizes: Sequence[float] | Array, values: Sequence[float] | Array) -> Convergence:
     """Return observed order, extrapolated limit and error bar of a value.
 
     Args:
@@ -68,8 +70,8 @@ def converged(sizes: Any, values: Any) -> Convergence:
         InvalidInput: there are fewer than three sizes, they do not decrease, or a value is not
             finite.
     """
-    h, f = np.array(sizes, dtype=float), np.array(values, dtype=float)
-    if len(h) < 3 or h.shape != f.shape or (np.diff(h) >= 0.0).any() or not np.isfinite(f).all():
+    h, f = check_array(sizes, "sizes"), check_array(values, "values")
+    if h.ndim != 1 or len(h) < 3 or h.shape != f.shape or (np.diff(h) >= 0.0).any() or h[-1] <= 0.0:
         raise InvalidInput(
             f"values {f.tolist()} at sizes {h.tolist()}: give three or more, the coarsest first"
         )
@@ -96,6 +98,7 @@ def _solve_order(changes: float, ratio: float, coarser: float) -> float:
     return order
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False)
 class MeshSensitivity:
     """Sensitivity of a finding to mesh, time step, joint quadrature and fidelity.
@@ -145,6 +148,7 @@ class MeshSensitivity:
         return align_columns([self.quantity, "value", "order", "limit", "error bar"], rows)
 
 
+@validate_arguments
 def mesh_sensitivity(  # noqa: PLR0913  (each varied setting is a keyword with its usual values)
     case: Case,
     quantity: str = "eccentricity",
@@ -227,6 +231,7 @@ def _sensitivity(table: xr.Dataset, quantity: str) -> MeshSensitivity:
     )
 
 
+@validate_arguments
 def case_accuracy(
     case: Case, folder: str | Path | None = None, *, workers: int | None = 1, client: Any = None
 ) -> Accuracy:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.run import DeadLoadResult, log_prefix, run_time_history
 from archfem.dynamics.history import Ending, History, first_mechanisms
@@ -44,6 +45,7 @@ def evaluate_history(case: Case) -> Findings:
     return of_history(run_motion(dead_load_of(case), ground_motion(case)))
 
 
+@validate_arguments
 def run_motion(result: DeadLoadResult, motion: Motion) -> History:
     """Return the time history of a case under a motion, independent of earlier runs.
 
@@ -62,6 +64,7 @@ def run_motion(result: DeadLoadResult, motion: Motion) -> History:
     return run
 
 
+@validate_arguments
 def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None = None) -> Findings:
     """Return the findings of a run.
 

@@ -9,7 +9,7 @@ References:
     471-489. Dempster, Laird and Rubin, J. R. Stat. Soc. B 39 (1977) 1-38, for censored samples.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import hypot
 from typing import Any
@@ -19,13 +19,23 @@ from scipy import stats
 from scipy.special import ndtr
 
 from archfem._typing import Array
-from archfem._validation import check_integer, check_number, check_numbers
+from archfem._validation import (
+    check_array,
+    check_integer,
+    check_number,
+    check_numbers,
+    check_type,
+    short_repr,
+    validate_arguments,
+    validate_methods,
+)
 from archfem.errors import InvalidInput
 
 # Smallest and largest dispersion of a fit [-]
 DISPERSION_RANGE = (0.005, 5.0)
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False)
 class Fragility:
     """A lognormal fragility curve, P = Φ(ln(x / median) / dispersion).
@@ -51,7 +61,7 @@ class Fragility:
         Args:
             intensity: intensities above 0, of any shape.
         """
-        return _curve(np.asarray(intensity, dtype=float), self.median, self.dispersion)
+        return _curve(check_array(intensity, "intensity"), self.median, self.dispersion)
 
     def band(self, intensity: Any, share: float = 0.9) -> tuple[Array, Array]:
         """Return the confidence band of the probability.
@@ -64,7 +74,7 @@ class Fragility:
             The lower and the upper end (n,) [-].
         """
         medians, dispersions = self.resampled.T[:, :, None]
-        curves = _curve(np.asarray(intensity, dtype=float), medians, dispersions)
+        curves = _curve(check_array(intensity, "intensity"), medians, dispersions)
         low, high = np.quantile(curves, [0.5 - 0.5 * share, 0.5 + 0.5 * share], axis=0)
         return low, high
 
@@ -108,6 +118,7 @@ class Spread:
         return hypot(self.record, self.epistemic)
 
 
+@validate_arguments
 def spread(curves: Iterable[Fragility]) -> Spread:
     """Return the record-to-record and the epistemic dispersion of variants of a structure.
 
@@ -122,6 +133,8 @@ def spread(curves: Iterable[Fragility]) -> Spread:
         InvalidInput: there are fewer than two variants.
     """
     curves = list(curves)
+    for curve in curves:
+        check_type(curve, Fragility, "curves", "give what stripe_fragility returns")
     if len(curves) < 2:
         raise InvalidInput(f"{len(curves)} curve: the spread of variants needs two or more")
     medians = np.log([curve.median for curve in curves])
@@ -129,7 +142,13 @@ def spread(curves: Iterable[Fragility]) -> Spread:
     return Spread(float(np.exp(medians.mean())), float(record), float(medians.std(ddof=1)))
 
 
-def fragility(upper: Any, lower: Any = None, *, resamples: int = 500, seed: int = 0) -> Fragility:
+def fragility(
+    upper: Iterable[float],
+    lower: Iterable[float] | None = None,
+    *,
+    resamples: int = 500,
+    seed: int = 0,
+) -> Fragility:
     """Fit a fragility curve to capacities of motions, each in a bracket from lower to upper."""
     high = np.array([float(value) for value in upper])
     low = high.copy() if lower is None else np.array(check_numbers(lower, "lower", len(high)))
@@ -160,8 +179,14 @@ def fragility(upper: Any, lower: Any = None, *, resamples: int = 500, seed: int 
     return Fragility(median, dispersion, goodness, misfit, resampled)
 
 
+@validate_arguments
 def stripe_fragility(
-    levels: Any, failures: Any, motions: Any, *, resamples: int = 500, seed: int = 0
+    levels: Sequence[float] | Array,
+    failures: Sequence[float] | Array,
+    motions: float | Sequence[float] | Array,
+    *,
+    resamples: int = 500,
+    seed: int = 0,
 ) -> Fragility:
     """Fit a fragility curve to multiple stripes: numbers of failing motions at intensity levels.
 
@@ -180,7 +205,10 @@ def stripe_fragility(
             determine the dispersion: no motion fails up to one level, and all from the next.
     """
     x = np.array(check_numbers(levels, "levels"))
-    count = np.broadcast_to(np.asarray(motions, dtype=float), x.shape)
+    count = check_array(motions, "motions")
+    if count.shape not in ((), x.shape):
+        raise InvalidInput(f"motions = {short_repr(motions)}: give one number, or {len(x)} of them")
+    count = np.broadcast_to(count, x.shape)
     failed = np.array(check_numbers(failures, "failures", len(x)))
     if len(x) < 3 or (x <= 0.0).any() or (failed > count).any() or (failed < 0.0).any():
         raise InvalidInput(

@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._typing import Array
+from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.run import DeadLoadResult
 from archfem.cases.toml_file import check_choice
@@ -141,6 +142,7 @@ def _applicable_limits(result: DeadLoadResult, limits: Sequence[str] | None) -> 
     return chosen
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False)
 class Ida:
     """Result of incremental dynamic analysis.
@@ -264,6 +266,7 @@ class Ida:
         return [str(name) for name in self.table["motion"].values[above > 0.0]]
 
 
+@validate_arguments
 def ida(
     case: Case,
     motions: Sequence[Any] | Mapping[str, Any] | None = None,

@@ -31,7 +31,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._files import align_columns
-from archfem._validation import check_number
+from archfem._validation import check_number, validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.toml_file import check_choice
 from archfem.errors import InvalidInput
@@ -49,6 +49,7 @@ FACE_CONDITIONS = {
 }
 
 
+@validate_methods
 @dataclass(frozen=True)
 class JointStiffness:
     """Low, usual and high value of the normal and shear stiffness of a joint.
@@ -86,6 +87,7 @@ class JointStiffness:
         return "\n".join([align_columns(["MPa/mm", "low", "usual", "high"], rows), *self.sources])
 
 
+@validate_arguments
 def joint_stiffness(
     young: float,
     spacing: float,
@@ -139,6 +141,7 @@ def joint_stiffness(
         raise InvalidInput(
             f"stress {stress!r} Pa is not between 0 and the strength {strength!r} Pa"
         )
+    check_number(poisson, "poisson", minimum=0.0, maximum=0.499)
     roughness = np.linspace(least, most, 21)
     # the stiffness is not monotonic in the roughness
     normal = [_normal(jrc, strength, strength * weathering, stress) for jrc in roughness]
@@ -156,6 +159,7 @@ def joint_stiffness(
     return JointStiffness((normals[0], normals[1], normals[2]), (shears[0], shears[1], shears[2]))
 
 
+@validate_arguments
 def stiffness_report(
     case: Case,
     stiffness: JointStiffness,

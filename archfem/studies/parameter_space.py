@@ -100,7 +100,8 @@ def check_points(axes: Sequence[Axis]) -> list[int]:
 
 
 def _is_list(value: Any) -> bool:
-    return isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+    row = isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim == 1)
+    return row and not isinstance(value, str)
 
 
 def _flatten(over: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

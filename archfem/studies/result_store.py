@@ -27,6 +27,7 @@ from archfem._files import (
     write_sealed_json,
 )
 from archfem._netcdf import read_dataset, write_dataset
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, StudyStopped
 from archfem.studies.parameter_space import Axis
 from archfem.studies.process_pool import Row
@@ -202,6 +203,7 @@ class Progress:
             self._store.write_progress(Status(self._total, done, self._failed, rate))
 
 
+@validate_arguments
 def status(folder: str | Path) -> Status:
     """Return the progress of the study in a folder, whether a driver is running or not.
 
@@ -275,6 +277,7 @@ def _quote_formula(value: Any) -> Any:
     return f"'{value}" if is_formula else value
 
 
+@validate_arguments
 def read_table(path: str | Path) -> xr.Dataset:
     """Read the table of a study.
 

@@ -12,7 +12,7 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 from archfem._files import hash_json
-from archfem._validation import check_integer
+from archfem._validation import check_integer, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import describe_version
 from archfem.cases.toml_file import check_table, refuse_unknown
@@ -40,6 +40,7 @@ from archfem.studies.result_store import (
 logger = logging.getLogger("archfem")
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False)
 class Study:
     """Points, each a case, and the function that is evaluated at each.

@@ -15,7 +15,7 @@ import xarray as xr
 from scipy.stats import qmc
 from tqdm import tqdm
 
-from archfem._validation import check_integer, check_number, check_type
+from archfem._validation import check_integer, check_number, check_type, validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.run import expected_damping
 from archfem.dynamics.damping import effective_damping
@@ -87,6 +87,7 @@ class Variation:
         return self
 
 
+@validate_arguments
 def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that may vary)
     structure: Structure,
     motion: Motion,
@@ -94,7 +95,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     damping: Viscous | None = None,
     dt: float = 0.005,
     fidelity: str = "rigid",
-    vary: Mapping[str, Sequence[Any]] | None = None,
+    vary: Mapping[str, Any] | None = None,
     samples: int = 26,
     seed: int = 0,
     workers: int = 1,

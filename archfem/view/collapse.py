@@ -14,6 +14,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.resultants import thrust_line
@@ -42,6 +43,7 @@ from archfem.view.style import (
 )
 
 
+@validate_arguments
 def draw_collapse(structure: Structure, found: Collapse) -> Figure:
     """Draw the thrust line in the undeformed structure, and the collapse mechanism over it.
 
@@ -237,6 +239,7 @@ def _mark_reference_values(axes: Axes, known: Mapping[tuple[float, float], float
         annotate(axes, text, point, (-8, 3), ha="right", zorder=6, path_effects=white_halo(2.0))
 
 
+@validate_arguments
 def draw_fall(run: History) -> Figure:
     """Draw the blocks at four instants of a collapse, over their original positions.
 

@@ -16,6 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
@@ -43,6 +44,7 @@ from archfem.view.style import (
 )
 
 
+@validate_arguments
 def draw_envelope(
     runs: Mapping[str, History],
     *,
@@ -96,6 +98,7 @@ def draw_envelope(
     return _finish_panels(panels)
 
 
+@validate_arguments
 def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[str] = ()) -> Figure:
     """Draw the eccentricity of each joint at one instant of each of several structures.
 
@@ -228,6 +231,7 @@ def _finish_panels(panels: Mapping[str, Axes]) -> Figure:
     return figure
 
 
+@validate_arguments
 def draw_joints(run: History, joints: Sequence[str | int] | None = None) -> Figure:
     """Draw eccentricity and mobilised friction of joints over time, below the ground acceleration.
 
@@ -268,6 +272,7 @@ def draw_joints(run: History, joints: Sequence[str | int] | None = None) -> Figu
     return figure
 
 
+@validate_arguments
 def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     """Draw mobilised friction and eccentricity of one joint over time, a column for each run.
 

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import COMPONENTS, Motion
@@ -28,6 +29,7 @@ from archfem.view.style import (
 SPECTRUM_PERIODS = np.geomspace(0.02, 3.0, 150)
 
 
+@validate_arguments
 def draw_motion(motion: Motion) -> Figure:
     """Draw acceleration, velocity and displacement over time, with their peaks.
 
@@ -55,6 +57,7 @@ def draw_motion(motion: Motion) -> Figure:
     return figure
 
 
+@validate_arguments
 def draw_spectra(motions: Sequence[Motion], *, damping: float = 0.05) -> Figure:
     """Draw the acceleration response spectra of motions, a panel for each component.
 
@@ -85,6 +88,7 @@ def draw_spectra(motions: Sequence[Motion], *, damping: float = 0.05) -> Figure:
     return figure
 
 
+@validate_arguments
 def draw_suite(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
     """Draw the response spectra of a suite, their mean, and the design spectrum.
 

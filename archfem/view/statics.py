@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, assessed_joints
 from archfem.masonry.structure import Structure, join_joint_names
@@ -45,6 +46,7 @@ from archfem.view.style import (
 MODE_AMPLITUDE = 0.04
 
 
+@validate_arguments
 def draw_dead_load(dead: Equilibrium, *, criteria: Criteria | None = None) -> Figure:
     """Draw a structure under its dead load: its thrust lines, and extreme values at the joints.
 
@@ -105,6 +107,7 @@ def _extremes(dead: Equilibrium) -> dict[int, list[str]]:
     return extremes
 
 
+@validate_arguments
 def draw_modes(modes: Modes, numbers: Sequence[int] | None = None) -> Figure:
     """Draw mode shapes over the undeformed outline; soil is paler than stone.
 
@@ -169,6 +172,7 @@ class ModePanel:
         self._blocks.move(self._places + factor * self._displacements)
 
 
+@validate_arguments
 def draw_free_body(
     structure: Structure, joints: xr.Dataset, block: int | str, *, cells: Cells | None = None
 ) -> Figure:
@@ -305,6 +309,7 @@ def _number_force(axes: Axes, index: int, place: Array, colour: str) -> None:
     axes.text(x, y, str(index + 1), color=colour, **style)
 
 
+@validate_arguments
 def draw_pushover(
     pushes: Pushover | Mapping[str, Pushover],
     *,

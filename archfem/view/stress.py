@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.resultants import joint_dataset
 from archfem.masonry.block import triangulate_polygon
@@ -67,6 +68,7 @@ class Triangles:
         return (self._interpolation @ values)[self._corners]
 
 
+@validate_arguments
 def draw_stress(
     model: Model,
     q: Equilibrium | Array,

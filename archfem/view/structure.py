@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.joints.criteria import Criteria, with_failure_flags
 from archfem.joints.resultants import check_instant
@@ -46,6 +47,7 @@ from archfem.view.style import (
 Action = BodyForce | PointLoad | Settlement
 
 
+@validate_arguments
 def draw_structure(
     structure: Structure,
     joints: xr.Dataset | None = None,
@@ -83,6 +85,7 @@ def draw_structure(
     return cast(Figure, axes.figure)
 
 
+@validate_arguments
 def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> Figure:
     """Draw several structures, one below the other, with thrust lines and failed joints.
 
@@ -192,6 +195,7 @@ def short_name(name: str, part: str) -> str:
     return own.removeprefix("joint ") or own
 
 
+@validate_arguments
 def draw_names(structure: Structure) -> Figure:
     """Draw the blocks, with the short name of each joint beside its intrados.
 
@@ -248,6 +252,7 @@ def _name_part(axes: Axes, joints: Sequence[Joint], inch: float) -> None:
     annotate(axes, joints[0].part, place, (0.0, -1.4 * LABEL_SIZE), **style)
 
 
+@validate_arguments
 def draw_displaced(
     model: Model,
     q: Equilibrium | Array,

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.view.style import (
@@ -224,6 +225,7 @@ def draw_tornado(
     return figure
 
 
+@validate_arguments
 def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     """Draw the residual displacement over each varied property; falls lie above a line.
 
@@ -315,6 +317,7 @@ def draw_convergence(
     return figure
 
 
+@validate_arguments
 def draw_accuracy(found: Accuracy) -> Figure:
     """Draw error over computing time of all settings on logarithmic axes, with the Pareto front.
 

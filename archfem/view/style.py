@@ -20,6 +20,7 @@ from matplotlib.ticker import LogFormatter, MaxNLocator
 
 from archfem._files import atomic_write
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 
@@ -202,6 +203,7 @@ def structure_figure(structure: Structure) -> Figure:
     return new_figure(max(0.5 * COLUMN_WIDTH, width), max(0.35 * COLUMN_WIDTH, height))
 
 
+@validate_arguments
 def save(figure: Figure, path: str | Path) -> Path:
     """Write a figure to a file atomically; the suffix selects the format (.pdf, .svg, .png, …).
 

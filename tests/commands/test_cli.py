@@ -1,14 +1,22 @@
 """Command line: arguments, exit codes, signals and full disks."""
 
+import errno
+import io
 import os
 import resource
 import signal
+import sys
 from pathlib import Path
 
 import pytest
 
 import archfem as af
+from archfem import _files
 from archfem.commands.cli import exit_code
+
+COLUMN = (
+    '[structure]\nshape = "column"\nbreadth = 1.0\nheights = [1.0]\n[model]\nfidelity = "rigid"\n'
+)
 
 RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
 
@@ -18,6 +26,65 @@ def test_an_output_that_is_no_folder_is_an_error_of_one_line(tmp_path, capsys):
     given = ["run", str(RING), "--set", "model.fidelity=rigid", "--out", str(tmp_path / "out")]
     assert af.commands.main(given) == 1
     assert "out is a file, and results go into a folder: name another" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("out", "says"),
+    [
+        ("link", "link is a link to nowhere, which does not exist: make that folder, or name an"),
+        ("link/results", "link is a link to nowhere, which does not exist"),
+        ("file/results", "cannot be made (Not a directory): name another with --out"),
+        ("/proc/results", "cannot be made (No such file or directory): name another with --out"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "modes", "accuracy", "verdict"])
+def test_a_folder_that_cannot_be_made_is_refused_at_once(command, out, says, tmp_path, capsys):
+    (tmp_path / "link").symlink_to("nowhere")
+    (tmp_path / "file").write_text("")
+    given = [command, str(RING), "--set", "model.fidelity=rigid", "--out", str(tmp_path / out)]
+    assert af.commands.main(given) == 1
+    said = capsys.readouterr()
+    assert says in said.err
+    assert said.err.count("\n") == 1
+    assert "Errno" not in said.err
+    assert said.out == ""
+
+
+def test_a_file_system_that_is_read_only_is_told_before_the_run(tmp_path, capsys, monkeypatch):
+    def refuse(**_):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(_files.tempfile, "TemporaryFile", refuse)
+    assert af.commands.main(["run", str(RING), "--out", str(tmp_path)]) == 1
+    said = f"archfem: '{tmp_path}' cannot be written: read-only file system; name another place\n"
+    assert capsys.readouterr().err == said
+
+
+@pytest.mark.parametrize(
+    ("title", "says"),
+    [
+        (
+            r"a \u001b[31mred\u001b[0m ring",
+            "has '\\x1b', which cannot be printed: write it without",
+        ),
+        (r"two\nlines", "has '\\n', which cannot be printed"),
+    ],
+)
+def test_a_title_that_moves_the_cursor_is_refused(title, says, tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(f'title = "{title}"\n{COLUMN}')
+    assert af.commands.main(["check", str(tmp_path / "case.toml")]) == 1
+    assert says in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_a_title_is_printed_as_far_as_the_terminal_has_letters(encoding, tmp_path, monkeypatch):
+    (tmp_path / "case.toml").write_text(f'title = "Brücke Ω"\n{COLUMN}', encoding="utf-8")
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    monkeypatch.setattr(sys, "stdout", terminal)
+    assert af.commands.main(["check", str(tmp_path / "case.toml")]) == 0
+    printed = terminal.buffer.getvalue().decode(encoding)
+    expected = {"ascii": r"Br\xfccke \u03a9", "latin-1": r"Brücke \u03a9", "utf-8": "Brücke Ω"}
+    assert printed.startswith(expected[encoding])
 
 
 def test_check_command(capsys):

@@ -15,7 +15,7 @@ from pathlib import Path
 from fuzz.staff import carried_out
 from fuzz.trial import BAD, KINDS, Came
 
-COUNTS = {"case_files": 10_000, "records": 10_000, "calls": 2000, "shakes": 500}
+COUNTS = {"case_files": 10_000, "records": 10_000, "drawings": 30_000, "calls": 2000, "shakes": 500}
 """Campaigns, and how many trials they have unless told otherwise."""
 
 

@@ -117,8 +117,45 @@ def ready() -> None:
         (af.Case.read, {"path": "case.toml", "changes": ()}),
         (af.Motion.read, {"path": "record.txt", "column": None, "units": "g", "dt": 0.01}),
         (af.History.read, {"path": "history.nc", "structure": None}),
-        (af.read_outlines, {"path": "drawing.geojson", "unit": "m"}),
+        (af.read_outlines, {"path": "drawing.geojson", "unit": "m", "snap": 1e-3, "layers": None}),
         (af.units.in_unit, {"value": "1 m", "unit": "m", "key": "x"}),
+        (
+            af.joint_stiffness,
+            {"young": 3e10, "spacing": 0.5, "strength": 5e7, "poisson": 0.2, "rigid": False},
+        ),
+        (af.motion.TableSpectrum, {"periods": [0.1, 1.0], "values": [0.5, 0.2]}),
+        (af.motion.scaled_to_spectrum, {"motion": quake, "value": 1.0, "period": 0.5}),
+        (af.motion.Ntc2018, {"ag": 0.3, "f0": 2.5, "tc_star": 0.3, "site": "B"}),
+        (af.motion.Asce2022, {"sds": 1.0, "sd1": 0.5, "tl": 6.0}),
+        (af.masonry.fitted_circle, {"points": [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)]}),
+        (af.masonry.usual_stages, {**at, "layers": 2}),
+        (af.masonry.assembled, {"blocks": column.blocks, "contact": af.Contact(1e9, 1e9)}),
+        (
+            af.shapes.pointed_arch,
+            {"span": 3.0, "rise": 2.0, "thickness": 0.4, "voussoirs": 8, "chords": 2},
+        ),
+        (
+            af.shapes.elliptical_arch,
+            {"span": 3.0, "rise": 1.0, "thickness": 0.4, "voussoirs": 8, "chords": 2},
+        ),
+        (
+            af.shapes.flat_arch,
+            {"span": 2.0, "thickness": 0.4, "voussoirs": 7, "skewback": 30.0, "width": 1.0},
+        ),
+        (af.limit.Fill, {"friction_angle": 35.0, "cohesion": 0.0, "active": 1.0, "spread": 30.0}),
+        (af.limit.counted_mechanism, {"joints": dead.joints, "kinds": ("local",)}),
+        (af.joints.thrust_line, {**at, "joints": dead.joints}),
+        (af.joints.joint_table, {"joints": dead.joints}),
+        (af.statics.forces_on, {**at, "joints": dead.joints, "block": 1}),
+        (af.statics.Stop, {"slope": 1e-6, "displacement": 0.1, "hinges": None, "steps": 10}),
+        (af.models.Discretisation, {"fidelity": "rigid", "cells": (2, 1), "points": None}),
+        (af.effective_damping, {"model": model, "ratio": 0.05, "about": dead}),
+        (af.studies.converged, {"sizes": [4.0, 2.0, 1.0], "values": [1.0, 1.1, 1.12]}),
+        (
+            af.studies.stripe_fragility,
+            {"levels": [1.0, 2.0, 3.0], "failures": [1, 3, 7], "motions": 10, "resamples": 20},
+        ),
+        (af.studies.parameter_axes, {"over": {"model.cells": [1, 2]}, "samples": None}),
     ):
         name = f"{len(CALLS)}: {getattr(function, '__qualname__', function)}"
         CALLS[name] = function, dict(given).copy

@@ -180,7 +180,7 @@ def trial(seed: int, number: int, folder: Path) -> Came:
     settings = tomllib.loads(BASES[number % len(BASES)])
     try:
         for _ in range(rng.choice([1, 1, 2, 3])):
-            _mutate(settings, rng)
+            mutate(settings, rng)
         content = tomli_w.dumps(settings).encode()
     except (TypeError, ValueError, OverflowError, RecursionError):
         content = BASES[0].encode()
@@ -202,7 +202,7 @@ def checked(path: Path) -> str | None:
     return found and found[0]
 
 
-def _mutate(settings: dict[str, Any], rng: np.random.Generator) -> None:
+def mutate(settings: dict[str, Any], rng: np.random.Generator) -> None:
     """Change one place of a case."""
     places = list(_places(settings))
     table, key = places[int(rng.integers(len(places)))]

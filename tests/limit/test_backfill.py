@@ -208,6 +208,19 @@ def test_a_fan_on_an_arch_brings_all_of_the_load_straight_down():
         assert part[block == number].sum() == pytest.approx(expected, abs=1e-6)
 
 
+def test_a_back_that_points_at_the_load_is_met_at_its_upper_corner():
+    """All its rays have one slope: a middle ray between those to its ends is undefined."""
+    rock = af.Block(((0.0, -4.0), (4.0, -4.0), (4.0, -3.0), (0.0, -3.0)), af.STONE, "rock", True)
+    outline = ((1.0, -3.0), (2.0, -3.0), (2.0, -1.0), (1.0, 0.0))
+    stone = af.Block(outline, af.STONE, "stone", part="pier", role="pier")
+    structure = af.masonry.assembled([rock, stone], af.masonry.STONE_TO_STONE)
+    fill = Fill(friction_angle=35.0, dispersal="uniform", spread=60.0)
+    block, points, part = profile(structure).fan(np.array([0.0, 1.0]), fill)
+    share = np.diff(fill.share(np.array([0.25, 1.0])))  # steeper rays meet the rock before it
+    np.testing.assert_allclose(part[block == 1].sum(), share[0], rtol=ROUND_OFF)
+    np.testing.assert_allclose(points[block == 1], [(1.0, 0.0)], atol=ROUND_OFF)
+
+
 def test_more_cover_spreads_a_load_wider():
     fill = af.limit.Fill(friction_angle=35.0)
     spread, peak = [], []

@@ -265,3 +265,15 @@ def test_a_block_on_ice_slides_away_from_a_wall(side, wall, moves):
     screen = LoopCheck(RigidBlocks(af.Structure(blocks, joints)), ("pier",))
     freedoms = np.array([0.0, wall[0], 0.0, wall[1], 2.0, 0.0])  # openings at both ends, slips
     assert screen.permits_motion(freedoms) is moves
+
+
+def test_a_joint_without_friction_or_shear_slides_to_either_side():
+    """A stone on a level joint under its weight alone: nothing prefers a side, nothing holds it."""
+    smooth = af.Contact(1e9, 1e9, friction=0.0)
+    structure = af.column(breadth=1.0, heights=[1.0, 1.0], contact=smooth)
+    found = verified_mechanism(structure, failing(structure))
+    assert found.kind != "none"
+    number = found.moved.joints[0]
+    jump = kinematics.jumps(structure, found.motion)[number]
+    assert np.abs(jump @ structure.joints[number].tangent).min() > 1e-3
+    assert jump @ structure.normals[number] == pytest.approx([0.0, 0.0], abs=1e-7)

@@ -1,6 +1,8 @@
 """Drawings read: GeoJSON and DXF, units and layers; and files that are none."""
 
 import json
+import resource
+import struct
 
 import ezdxf
 import pytest
@@ -91,9 +93,9 @@ def test_files_that_are_no_drawings(tmp_path):
         ("a.shp", "", "is no drawing: give a .geojson, a .dxf or a .msh"),
         ("a.geojson", "{", "it is not JSON"),
         ("b.geojson", "[]", "no GeoJSON FeatureCollection"),
-        ("d.geojson", '{"features": [3]}', "feature 1 is not as GeoJSON has it"),
+        ("d.geojson", '{"features": [3]}', "feature 1 is 3, where GeoJSON has an object"),
         ("c.geojson", '{"type": "FeatureCollection", "features": []}', "no closed outlines"),
-        ("a.dxf", "nonsense", "it is not DXF"),
+        ("a.dxf", "nonsense", "it is no DXF drawing that ezdxf reads"),
     ):
         (tmp_path / name).write_text(text)
         with pytest.raises(af.errors.InvalidInput, match=says):
@@ -159,3 +161,57 @@ def test_small_blocks_within_the_globe_may_be_in_degrees(tmp_path, place, said):
     with pytest.raises(af.InvalidInput) as caught:
         read_drawing(path)
     assert ("degrees (CRS84)" in str(caught.value)) is said
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"geometry": 3}, r"'geometry' of 'a' is 3, where GeoJSON has an object in braces"),
+        ({"properties": [1]}, r"'properties' of feature 1 is \[1\], where GeoJSON has an object"),
+        ({"properties": {"material": ["stone"]}}, r"material = \['stone'\] is a table: give words"),
+        ({"geometry": {"type": "Polygon", "coordinates": "x"}}, "give each block as one Polygon"),
+        (
+            {"geometry": {"type": "Polygon", "coordinates": [[[0, 0], [1e300, 0], [1, 1]]]}},
+            r"a coordinate of 1e\+300 m, and there is room up to 1e\+09 m",
+        ),
+        (
+            {"geometry": {"type": "Polygon", "coordinates": [[[0, 0], [10**400, 0], [1, 1]]]}},
+            "no list of points",
+        ),
+        ({"properties": {"name": "a\x1b[2J"}}, r"has '\\x1b', which cannot be printed"),
+    ],
+)
+def test_values_that_no_program_exports(change, says, tmp_path):
+    feature = {"geometry": {"type": "Polygon", "coordinates": [square(0, 0)]}}
+    feature = {"properties": {"name": "a"}} | feature | change
+    path = tmp_path / "a.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    with pytest.raises(af.InvalidInput, match=says):
+        af.read_outlines(path)
+
+
+def test_a_drawing_of_too_many_vertices_or_too_rough_a_tolerance_takes_no_time(tmp_path):
+    """Every edge is compared with every vertex, and pairs of vertices within snap are listed."""
+    fine = [[0.001 * k, 0.0] for k in range(20_001)] + [[10.0, 3.0]]
+    with pytest.raises(af.InvalidInput, match="it has 20002 vertices, and there is room for 20000"):
+        read_drawing(geojson(tmp_path / "a.geojson", {"a": fine}))
+    many = {f"{k}": square(0.5 * (k % 20), 0.5 * (k // 20), 0.5) for k in range(400)}
+    with pytest.raises(af.errors.InvalidStructure, match="would merge 1600 vertices at each place"):
+        af.read_outlines(geojson(tmp_path / "b.geojson", many), snap=20.0)
+
+
+def test_a_failure_of_the_library_that_reads_dxf_is_told_with_its_cause(tmp_path, monkeypatch):
+    def fail(path):
+        raise struct.error("unpack_from requires a buffer")
+
+    monkeypatch.setattr("ezdxf.filemanagement.readfile", fail)
+    (tmp_path / "a.dxf").write_text("0")
+    says = r"a.dxf: it is no DXF drawing that ezdxf reads \(error: unpack_from .*\): save it again"
+    with pytest.raises(af.InvalidInput, match=says):
+        read_drawing(tmp_path / "a.dxf")
+
+
+def test_reading_a_drawing_leaves_the_limits_of_the_process_as_they_were(viaduct, tmp_path):
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    read_drawing(dxf(tmp_path / "viaduct.dxf", viaduct))
+    assert resource.getrlimit(resource.RLIMIT_AS) == before

@@ -132,3 +132,50 @@ def test_a_joint_has_the_name_of_a_curve_that_lies_on_it(stack, monkeypatch, end
     monkeypatch.setattr(outlines, "read_physical_curves", lambda path, factor: [("mine", middles)])
     found = outlines._name_joints(stack, Path("any.msh"), None)
     assert [joint.name == "mine" for joint in found.joints] == [False, named]
+
+
+WORDS = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+1
+2 1 "stone"
+$EndPhysicalNames
+$Nodes
+4
+1 0 0 0
+2 1 0 0
+3 1 1 0
+4 0 1 0
+$EndNodes
+$Elements
+2
+1 2 2 1 1 1 2 3
+2 2 2 1 1 1 3 4
+$EndElements
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "says"),
+    [
+        ("\n4 0 1 0\n", "\n7 0 1 0\n", r"cells \(triangle\) have nodes that are not in the file"),
+        ("1 1 3 4\n", "1 1 3 9\n", "no mesh of gmsh that meshio reads"),
+        ("1 1 3 4\n", "1 1 3 2\n", "'stone' is in pieces or has a hole"),
+        ("3 1 1 0\n4 0 1 0\n", "3 2 0 0\n4 3 0 0\n", "'stone' has no area"),
+        ("3 1 1 0\n", "3 1 nan 0\n", "the mesh has coordinates that are no finite points"),
+        ("3 1 1 0\n", "3 1 1e300 0\n", "a coordinate of 1e"),
+        ("3 1 1 0\n", "3 1 1 1\n", "does not lie in the plane of x and y"),
+        ("$Nodes\n4\n", "$Nodes\n40000000000\n", "no mesh of gmsh that meshio reads"),
+        ("\n3 1 1 0\n", "\n300000000 1 1 0\n", r"meshio reads \(MemoryError: .* save it again"),
+    ],
+)
+def test_a_damaged_mesh_is_refused_in_words(before, after, says, tmp_path):
+    path = tmp_path / "stone.msh"
+    path.write_text(WORDS)
+    (name, outline), *_ = read_physical_surfaces(path)
+    assert (name, len(outline)) == ("stone", 4)
+    assert before in WORDS
+    path.write_text(WORDS.replace(before, after))
+    with pytest.raises(af.InvalidInput, match=says):
+        read_physical_surfaces(path)

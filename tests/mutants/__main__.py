@@ -30,7 +30,7 @@ KEPT = ROOT / "out" / "reached.json"
 KNOWN = Path(__file__).with_name("known.toml")
 ROOMS = ("motion", "masonry", "joints", "limit", "models", "statics", "dynamics")
 COMPILED = ("joints/large", "dynamics/solvers", "dynamics/rigid_body")
-IDLE = ("dynamics/compiling",)
+IDLE = ("dynamics/warm_up",)
 """Modules whose numbers nobody sees: runs that are made to compile what steps need."""
 
 TESTS = [f"tests/{room}" for room in (*ROOMS, "validation", "verification", "cases", "studies")]

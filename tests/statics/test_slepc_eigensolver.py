@@ -56,3 +56,10 @@ def test_negative_stiffness_is_no_frequency():
     stiffness = sparse.diags([-1e6, 2.0, 3.0]).tocsr()
     with pytest.raises(af.DidNotConverge, match="singular or negative"):
         find_lowest_modes(stiffness, sparse.identity(3, format="csr"), 2)
+
+
+def test_a_negative_stiffness_far_from_all_modes_that_are_sought_is_no_frequency_either():
+    """The search comes to the nearest modes alone, and the factor tells of the others."""
+    stiffness = sparse.diags([-1e6, *np.linspace(1.0, 1e3, 500)]).tocsr()
+    with pytest.raises(af.DidNotConverge, match=r"singular or negative, with ω² = 1\.0e"):
+        find_lowest_modes(stiffness, sparse.identity(501, format="csr"), 2)

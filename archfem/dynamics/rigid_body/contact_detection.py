@@ -308,7 +308,7 @@ def _tangential_position(bodies, q, contacts, k):  # type: ignore
     return ry * contacts.normal[k, 0] - rx * contacts.normal[k, 1]
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def _widest_gap(bodies, world, one, two):  # type: ignore
     """Return a lower bound of the distance of two pieces; negative, their depth of overlap [m]."""
     widest = -np.inf
@@ -325,7 +325,7 @@ def _widest_gap(bodies, world, one, two):  # type: ignore
     return widest
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def measure_gaps(bodies, world, q):  # type: ignore
     """Return lower bounds of the distances of all bodies and the ground (b + 1, b + 1) [m]."""
     ground = len(bodies.mass)
@@ -343,7 +343,7 @@ def measure_gaps(bodies, world, q):  # type: ignore
     return gaps
 
 
-@numba.njit(cache=True)
+@allocating_entry
 def find_meeting(bodies, world, motions, limits, pairs, depths):  # type: ignore
     """Return the first of many poses (steps, b, 3) at which a gap is below its limit, and the pair.
 

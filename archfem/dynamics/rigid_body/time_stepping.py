@@ -21,7 +21,7 @@ import numpy as np
 
 from archfem._numba import allocating_entry, delete_stale_cache
 from archfem._typing import Array
-from archfem._validation import check_number, check_type
+from archfem._validation import check_number, check_type, validate_methods
 from archfem.dynamics.rigid_body.bodies import (
     Bodies,
     FallEnergy,
@@ -85,6 +85,7 @@ class StepWorkspace(NamedTuple):
     speeds: Array  # velocities during the sweeps, the ground's last (b + 1, 3)
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False)
 class RigidBlockSimulation:
     """Free rigid blocks with impacts and friction, by the scheme of Moreau and Jean.

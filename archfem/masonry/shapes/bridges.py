@@ -134,6 +134,7 @@ def _check_cover(bottom: Sequence[Point], surface: Sequence[Point]) -> None:
 Numbers = float | Sequence[float]
 
 
+@validate_arguments
 def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one structure)
     *,
     span: float,
@@ -189,6 +190,7 @@ def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one st
     )
 
 
+@validate_arguments
 def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
     *,
     spans: Sequence[float],

@@ -13,7 +13,13 @@ from math import acos, asin, atan2, degrees, isfinite, pi, radians, sin, tan
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import check_integer, check_number, check_numbers, check_sequence
+from archfem._validation import (
+    check_integer,
+    check_number,
+    check_numbers,
+    check_sequence,
+    validate_arguments,
+)
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
@@ -38,8 +44,10 @@ class RingGeometry:
 
     def check(self, **lengths: float) -> None:
         """Check the numbers of stones and chords, the thickness, and further lengths [m]."""
-        check_integer(self.voussoirs, "voussoirs")
-        check_integer(self.chords, "chords")
+        check_integer(self.voussoirs, "voussoirs", maximum=10_000)
+        check_integer(self.chords, "chords", maximum=10_000)
+        # both may be within bounds, and their product beyond the memory
+        check_integer(self.voussoirs * self.chords, "voussoirs times chords", maximum=10**6)
         for key, value in {"thickness": self.thickness, **lengths}.items():
             # A ring of a kilometre is a mistake of units.
             if not 0.0 < check_number(value, f"{key} [m]") < 1e3:
@@ -368,6 +376,7 @@ def _build_abutment(
     return Block(outline, material, name, fixed=True, corners=(0, 1, 2, 3), part=name, role="other")
 
 
+@validate_arguments
 def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
     span: float,
@@ -424,6 +433,7 @@ def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     return ring.assemble(_mirror_stones(left, voussoirs), "pointed arch")
 
 
+@validate_arguments
 def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
     span: float,
@@ -472,6 +482,7 @@ def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ri
     return ring.assemble(ring.divide(section), "elliptical arch")
 
 
+@validate_arguments
 def flat_arch(
     *,
     span: float,

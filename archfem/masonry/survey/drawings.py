@@ -1,13 +1,16 @@
 """Drawings with one closed outline for each block: GeoJSON, DXF and tagged gmsh files.
 
-A drawing is an elevation: x to the right, y upwards. meshio reads gmsh files; nothing in them is
-executed.
+A drawing is an elevation: x to the right, y upwards. ezdxf reads DXF files and meshio gmsh files;
+nothing in them is executed. Only calls of these two are within `_foreign_reader`, since files that
+are damaged raise errors of any class there.
 """
 
 import json
 import re
+import resource
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +20,7 @@ from numpy.typing import NDArray
 
 from archfem._files import atomic_write, check_file, read_text
 from archfem._typing import Array
+from archfem._validation import short_repr
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import suggest_name
 from archfem.units import in_unit
@@ -27,8 +31,19 @@ MAX_DRAWING_BYTES = 2**25
 # Range of the median diagonal of the blocks [m]; beyond it the unit is wrong
 BLOCK_SIZE_RANGE = (0.02, 20.0)
 
+# Largest coordinate [m]: round-off beyond it moves vertices by more than a micrometre
+MAX_COORDINATE = 1e9
+
+# Largest number of vertices of a drawing: every edge is compared with every vertex
+MAX_VERTICES = 20_000
+
 # Properties of a GeoJSON feature that are read; others are ignored
 FEATURE_PROPERTIES = ("name", "part", "role", "material", "fixed")
+
+# Entities of a DXF file that are read; with other curves stones are drawn too, but not outlined
+POLYLINES = ("LWPOLYLINE", "POLYLINE")
+TEXTS = ("TEXT", "MTEXT")
+OTHER_CURVES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT")
 
 # Cells of a mesh that belong to blocks, and the number of their corners
 CORNERS_PER_CELL = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
@@ -64,10 +79,48 @@ def read_drawing(
     return outlines
 
 
+@contextmanager
+def _foreign_reader(library: str, kind: str) -> Iterator[None]:
+    """Turn any error of a library that reads a file into one that names its cause."""
+    try:
+        with _limit_memory():
+            yield
+    # Damaged files end in errors of all classes there, and in SystemExit. No code of ours runs
+    # inside, whose mistakes would be hidden.
+    except (Exception, SystemExit) as error:
+        cause = f"{type(error).__name__}: {error}".removesuffix(": ")
+        raise InvalidInput(
+            f"it is no {kind} that {library} reads ({cause}): save it again from the program that "
+            "wrote it"
+        ) from error
+
+
+@contextmanager
+def _limit_memory(more: int = 2**30) -> Iterator[None]:
+    """Limit the additional memory of the process [bytes]."""
+    # a damaged number of nodes makes meshio fill arrays of any size, and the kernel kills
+    limits, statistics = resource.getrlimit(resource.RLIMIT_AS), Path("/proc/self/statm")
+    if not statistics.exists():  # elsewhere than on Linux
+        yield
+        return
+    taken = int(statistics.read_text().split()[0]) * resource.getpagesize()
+    allowed = min(each for each in (taken + more, *limits) if each != resource.RLIM_INFINITY)
+    resource.setrlimit(resource.RLIMIT_AS, (allowed, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)
+
+
 def _check_sizes(outlines: list[Outline]) -> None:
-    """Refuse a drawing without outlines, or one whose unit is evidently wrong."""
+    """Refuse a drawing without outlines, with too many, or whose unit is evidently wrong."""
     if not outlines:
         raise InvalidInput("it has no closed outlines to read")
+    if (count := sum(len(each.points) for each in outlines)) > MAX_VERTICES:
+        raise InvalidInput(
+            f"it has {count} vertices, and there is room for {MAX_VERTICES}: leave out those along "
+            "straight edges"
+        )
     # the median is insensitive to a few long blocks, such as a fill
     typical = float(np.median([np.hypot(*np.ptp(each.points, axis=0)) for each in outlines]))
     if BLOCK_SIZE_RANGE[0] <= typical <= BLOCK_SIZE_RANGE[1]:
@@ -90,28 +143,32 @@ def _read_geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Ite
         raise InvalidInput("it is no GeoJSON FeatureCollection: export the outlines as one")
     factor = in_unit(f"1 {unit or 'm'}", "m", "unit")
     for number, feature in enumerate(found["features"], 1):
-        try:
-            outline = _read_feature(feature, f"outline {number}", factor)
-        except (AttributeError, TypeError) as error:
-            raise InvalidInput(f"feature {number} is not as GeoJSON has it: {error}") from error
+        outline = _read_feature(_as_table(feature, f"feature {number}"), number, factor)
         if outline.layer not in ignored:
             yield outline
 
 
-def _read_feature(feature: dict[str, Any], name: str, factor: float) -> Outline:
-    """Read the polygon of a feature; the given name is used if it has none."""
-    data = feature.get("properties") or {}
-    name = str(data.get("name") or name)
+def _as_table(value: Any, name: str) -> dict[str, Any]:
+    """Return a JSON object; null is an empty one."""
+    if not isinstance(value, dict | None):
+        raise InvalidInput(f"{name} is {short_repr(value)}, where GeoJSON has an object in braces")
+    return value or {}
+
+
+def _read_feature(feature: dict[str, Any], number: int, factor: float) -> Outline:
+    """Read the polygon of a feature, named by its number if it has no name."""
+    data = _as_table(feature.get("properties"), f"'properties' of feature {number}")
+    name = str(data.get("name") or f"outline {number}")
     _check_properties(data, name)
-    geometry = feature.get("geometry") or {}
+    geometry = _as_table(feature.get("geometry"), f"'geometry' of '{name}'")
     rings = geometry.get("coordinates")
-    if geometry.get("type") != "Polygon" or not rings:
+    if geometry.get("type") != "Polygon" or not isinstance(rings, list) or not rings:
         raise InvalidInput(f"'{name}' is a {geometry.get('type')}: give each block as one Polygon")
     if len(rings) > 1:
         raise InvalidInput(f"'{name}' has a hole: cut it into blocks without holes")
     points = _check_polygon(rings[0], f"'{name}'", factor)
-    own = (data.get(key) for key in ("material", "fixed", "role"))
-    return Outline(points, name, str(data.get("part") or ""), *own)
+    part, material, role = (str(data.get(key) or "") for key in ("part", "material", "role"))
+    return Outline(points, name, part, material or None, data.get("fixed"), role or None)
 
 
 def _check_properties(data: dict[str, Any], name: str) -> None:
@@ -119,76 +176,105 @@ def _check_properties(data: dict[str, Any], name: str) -> None:
     for key in set(data) - set(FEATURE_PROPERTIES):
         if hint := suggest_name(key.lower(), FEATURE_PROPERTIES, 0.8):
             raise InvalidInput(f"'{name}' has a property '{key}': {hint}")
-    if data.get("fixed") not in (None, True, False):
-        raise InvalidInput(f"'{name}': fixed = {data['fixed']!r} is not true or false")
+    if data.get("fixed") not in (None, True, False):  # 0 and 1 too, as many programs export
+        raise InvalidInput(f"'{name}': fixed = {short_repr(data['fixed'])} is not true or false")
+    for key in ("name", "part", "role", "material"):
+        # numbers are names too, of blocks and parts
+        if not isinstance(data.get(key), str | int | float | None):
+            raise InvalidInput(f"'{name}': {key} = {short_repr(data[key])} is a table: give words")
+
+
+@dataclass(frozen=True, eq=False)
+class Entity:
+    """What a DXF file says of a polyline, a text or another curve."""
+
+    kind: str
+    layer: str
+    points: list[tuple[float, ...]]  # vertices, or the place of a text, in drawing units
+    text: str = ""
+    closed: bool = False
+    has_arc: bool = False
+    is_mesh: bool = False
 
 
 def _read_dxf(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
     """Read the closed polylines of a DXF file, named by the texts inside them."""
-    from ezdxf.filemanagement import readfile  # slow to import
-    from ezdxf.lldxf.const import DXFError
-
-    try:
-        drawing = readfile(path)
-    except (OSError, UnicodeDecodeError, DXFError) as error:
-        raise InvalidInput(f"it is not DXF: {error}") from error
-    read = [entity for entity in drawing.modelspace() if entity.dxf.layer not in ignored]
-    polylines = [entity for entity in read if entity.dxftype() in ("LWPOLYLINE", "POLYLINE")]
-    layers = {entity.dxf.layer for entity in polylines}
-    # entities with which stones are drawn, but which are not closed outlines
-    curves = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT")
+    with _foreign_reader("ezdxf", "DXF drawing"):
+        entities, own_unit = _load_dxf(path)
+    read = [entity for entity in entities if entity.layer not in ignored]
+    polylines = [entity for entity in read if entity.kind in POLYLINES]
+    layers = {entity.layer for entity in polylines}
     for entity in read:
-        if entity.dxftype() in curves and entity.dxf.layer in layers:
+        if entity.kind in OTHER_CURVES and entity.layer in layers:
             raise InvalidInput(
-                f"layer '{entity.dxf.layer}' has a {entity.dxftype()} beside its polylines: make "
+                f"layer '{entity.layer}' has a {entity.kind} beside its polylines: make "
                 "a closed polyline of each stone, and leave out layers of other things"
             )
-    factor = _dxf_unit(drawing, unit)
+    if unit is None and own_unit is None:
+        raise InvalidInput('the drawing does not say its unit ($INSUNITS): give one, e.g. "mm"')
+    factor = in_unit(f"1 {unit}", "m", "unit") if unit is not None else float(own_unit or 1.0)
     outlines = [_read_polyline(entity, factor) for entity in polylines]
-    texts = [text for entity in read if (text := _read_text(entity, factor))]
-    counts: Counter[str] = Counter()
+    texts = [
+        (entity.text, _check_coordinates(entity.points, f"the text '{entity.text}'", factor)[0])
+        for entity in read
+        if entity.text
+    ]
+    counts = Counter[str]()
     for outline in outlines:
         counts[outline.layer] += 1
         yield replace(outline, name=_block_name(outline, texts, counts[outline.layer]))
 
 
-def _dxf_unit(drawing: Any, unit: str | None) -> float:
-    """Return the unit of a DXF drawing [m]."""
-    from ezdxf import units
+def _load_dxf(path: Path) -> tuple[list[Entity], float | None]:
+    """Load polylines, texts and other curves of a DXF file, and its unit [m] if it has one."""
+    from ezdxf import units  # slow to import
     from ezdxf.enums import InsertUnits
+    from ezdxf.filemanagement import readfile
 
-    if unit is not None:
-        return in_unit(f"1 {unit}", "m", "unit")
-    if not drawing.units:
-        raise InvalidInput('the drawing does not say its unit ($INSUNITS): give one, e.g. "mm"')
-    return float(units.conversion_factor(drawing.units, InsertUnits.Meters))
+    drawing: Any = readfile(path)
+    entities = []
+    for entity in drawing.modelspace():
+        kind = entity.dxftype()
+        if kind in POLYLINES:
+            entities.append(_load_polyline(entity))
+        elif kind in TEXTS:
+            place = entity.dxf.insert if kind == "MTEXT" else entity.get_placement()[1]
+            text = " ".join(entity.plain_text().split())
+            entities.append(Entity(kind, entity.dxf.layer, [(place.x, place.y)], text))
+        elif kind in OTHER_CURVES:
+            entities.append(Entity(kind, entity.dxf.layer, []))
+    known = drawing.units  # 0 where the drawing has none
+    factor = units.conversion_factor(known, InsertUnits.Meters) if known else None
+    return entities, factor
 
 
-def _read_polyline(entity: Any, factor: float) -> Outline:
-    """Read a closed polyline."""
+def _load_polyline(entity: Any) -> Entity:
+    """Load a polyline, in the coordinates of the drawing."""
     light = entity.dxftype() == "LWPOLYLINE"
-    given = [tuple(p) for p in (entity.vertices_in_wcs() if light else entity.points_in_wcs())]
-    layer = entity.dxf.layer
+    points = [tuple(p) for p in (entity.vertices_in_wcs() if light else entity.points_in_wcs())]
+    return Entity(
+        entity.dxftype(),
+        entity.dxf.layer,
+        points,
+        closed=entity.is_closed,
+        has_arc=entity.has_arc,
+        is_mesh=not (light or entity.is_2d_polyline or entity.is_3d_polyline),
+    )
+
+
+def _read_polyline(entity: Entity, factor: float) -> Outline:
+    """Return the outline of a closed polyline."""
+    given, layer = entity.points, entity.layer
+    if not given:
+        raise InvalidInput(f"a polyline on layer '{layer}' has no vertices: take it out")
     where = f"a polyline at ({given[0][0]:.6g}, {given[0][1]:.6g}) on layer '{layer}'"
-    if not (light or entity.is_2d_polyline or entity.is_3d_polyline):
+    if entity.is_mesh:
         raise InvalidInput(f"{where} is a mesh: draw the block as a closed polyline")
     if entity.has_arc:
         raise InvalidInput(f"{where} has arcs, and joints are straight: draw chords instead")
-    if not entity.is_closed and given[0] != given[-1]:
+    if not entity.closed and given[0] != given[-1]:
         raise InvalidInput(f"{where} is not closed: close it, or leave its layer out")
     return Outline(_check_polygon(given, where, factor), where, layer)
-
-
-def _read_text(entity: Any, factor: float) -> tuple[str, Array] | None:
-    """Read a text and its position (2,) [m]; None for other entities."""
-    if entity.dxftype() == "MTEXT":
-        place = entity.dxf.insert
-    elif entity.dxftype() == "TEXT":
-        place = entity.get_placement()[1]
-    else:
-        return None
-    words = " ".join(entity.plain_text().split())
-    return words, factor * np.array([place.x, place.y])
 
 
 def _block_name(outline: Outline, texts: list[tuple[str, Array]], number: int) -> str:
@@ -207,12 +293,7 @@ def _block_name(outline: Outline, texts: list[tuple[str, Array]], number: int) -
 
 def _check_polygon(given: Any, name: str, factor: float) -> Array:
     """Return the vertices of a polygon without a repeated last one (n, 2) [m]."""
-    try:
-        points = factor * np.array(given, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(f"{name} has coordinates that are no list of points") from error
-    if points.ndim != 2 or points.shape[1] < 2 or not np.all(np.isfinite(points)):
-        raise InvalidInput(f"{name} has coordinates that are no finite points in the plane")
+    points = _check_coordinates(given, name, factor)
     if np.any(np.ptp(points[:, 2:], axis=0) > 1e-6 * np.ptp(points[:, :2])):
         raise InvalidInput(f"{name} does not lie in the plane of x and y: draw an elevation in it")
     points = points[:, :2]
@@ -220,6 +301,25 @@ def _check_polygon(given: Any, name: str, factor: float) -> Array:
     if len(points) < 3:
         raise InvalidInput(f"{name} has {len(points)} vertices: a block has at least 3")
     return points
+
+
+def _check_coordinates(given: Any, name: str, factor: float) -> Array:
+    """Return points in the plane or in space (n, 2 or more) [m]."""
+    try:
+        points = np.array(given, dtype=float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInput(f"{name} has coordinates that are no list of points") from error
+    if points.ndim != 2 or points.shape[1] < 2 or not np.all(np.isfinite(points)):
+        raise InvalidInput(f"{name} has coordinates that are no finite points in the plane")
+    if not len(points):
+        raise InvalidInput(f"{name} has no points")
+    far = float(np.abs(points).max())
+    if far * factor > MAX_COORDINATE:
+        raise InvalidInput(
+            f"{name} has a coordinate of {far * factor:.3g} m, and there is room up to "
+            f"{MAX_COORDINATE:.0e} m: move the drawing, or give its unit"
+        )
+    return factor * points
 
 
 def _read_msh(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
@@ -232,13 +332,11 @@ def _read_msh(path: Path, unit: str | None, ignored: Collection[str]) -> Iterato
 
 def read_physical_surfaces(path: Path, factor: float = 1.0) -> list[tuple[str, Array]]:
     """Read names and outlines (n, 2) [m] of the physical surfaces, ordered by tag."""
-    mesh = _read_mesh(path)
-    names = _group_names(mesh, 2)
-    points = _check_plane(mesh.points) * factor
+    mesh = _load_msh(path)
+    names, points = mesh.group_names(2), _check_plane(mesh.points, factor)
     found: dict[int, list[NDArray[np.intp]]] = {}
-    for cells, tags in _tagged_cells(mesh, set(CORNERS_PER_CELL)):
-        for cell, tag in zip(cells.data[:, : CORNERS_PER_CELL[cells.type]], tags, strict=True):
-            found.setdefault(int(tag), []).append(cell)
+    for tag, cell in mesh.tagged_cells(CORNERS_PER_CELL):
+        found.setdefault(tag, []).append(cell)
     if not found:
         raise InvalidInput("it has no physical surface: tag each block with one, in gmsh")
     surfaces = []
@@ -250,13 +348,12 @@ def read_physical_surfaces(path: Path, factor: float = 1.0) -> list[tuple[str, A
 
 def read_physical_curves(path: Path, factor: float = 1.0) -> list[tuple[str, Array]]:
     """Read name and edge mid-points (n, 2) [m] of each named physical curve."""
-    mesh = _read_mesh(path)
-    names, points = _group_names(mesh, 1), mesh.points[:, :2] * factor
+    mesh = _load_msh(path)
+    names, points = mesh.group_names(1), _check_plane(mesh.points, factor)
     found: dict[str, list[Array]] = {}
-    for cells, tags in _tagged_cells(mesh, {"line", "line3"}):
-        for edge, tag in zip(cells.data[:, :2], tags, strict=True):
-            if int(tag) in names:
-                found.setdefault(names[int(tag)], []).append(points[edge].mean(axis=0))
+    for tag, edge in mesh.tagged_cells({"line": 2, "line3": 2}):
+        if tag in names:
+            found.setdefault(names[tag], []).append(points[edge].mean(axis=0))
     return [(name, np.array(middles)) for name, middles in found.items()]
 
 
@@ -266,37 +363,56 @@ def infer_part(name: str) -> str:
     return head.strip() if comma else re.sub(r"\s*\d+$", "", name)
 
 
-def _read_mesh(path: Path) -> Any:
-    """Read a mesh file with meshio."""
+@dataclass(frozen=True, eq=False)
+class TaggedMesh:
+    """Points, cells and physical groups of a gmsh file."""
+
+    points: Array  # (n, 2 or 3), in drawing units
+    cells: list[tuple[str, NDArray[np.intp], NDArray[np.intp]]]  # kind, points and tag of each
+    groups: dict[str, tuple[int, int]]  # tag and dimension by name
+
+    def group_names(self, dimension: int) -> dict[int, str]:
+        """Return the names of the physical groups of one dimension by tag."""
+        return {tag: name for name, (tag, size) in self.groups.items() if size == dimension}
+
+    def tagged_cells(self, corners: Mapping[str, int]) -> Iterator[tuple[int, NDArray[np.intp]]]:
+        """Yield tag and corners of each cell of some kinds, whose numbers of corners are given."""
+        for kind, cells, tags in self.cells:
+            for cell, tag in zip(cells[:, : corners.get(kind, 0)], tags, strict=True):
+                if len(cell):
+                    yield int(tag), cell
+
+
+def _load_msh(path: Path) -> TaggedMesh:
+    """Load a gmsh file with meshio."""
     try:
         import meshio
     except ImportError as error:
         raise InvalidInput(
             "meshes are read with meshio, which is not installed: pip install 'archfem[exchange]'"
         ) from error
-    try:
-        return meshio.gmsh.read(path)
-    except (Exception, SystemExit) as error:  # meshio and its formats raise all sorts
-        raise InvalidInput(f"it is no mesh of gmsh that meshio reads: {error}") from error
+    with _foreign_reader("meshio", "mesh of gmsh"):
+        read = meshio.gmsh.read(path)
+        tags = read.cell_data.get("gmsh:physical", [np.empty(0)] * len(read.cells))
+        cells = [
+            (each.type, np.array(each.data, dtype=np.intp), np.array(tag, dtype=np.intp))
+            for each, tag in zip(read.cells, tags, strict=True)
+        ]
+        groups = {name: (int(tag), int(size)) for name, (tag, size) in read.field_data.items()}
+        mesh = TaggedMesh(np.array(read.points, dtype=float), cells, groups)
+    for kind, numbers, _ in cells:
+        # a negative number would silently count from the end
+        if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(mesh.points):
+            raise InvalidInput(
+                f"cells ({kind}) have nodes that are not in the file: save the whole mesh"
+            )
+    return mesh
 
 
-def _group_names(mesh: Any, dimension: int) -> dict[int, str]:
-    """Return the names of the physical groups of one dimension by tag."""
-    return {
-        int(tag): name for name, (tag, size) in mesh.field_data.items() if int(size) == dimension
-    }
-
-
-def _tagged_cells(mesh: Any, kinds: set[str]) -> list[tuple[Any, Any]]:
-    """Return blocks of cells of some kinds, each with the physical tags of its cells."""
-    tags = mesh.cell_data.get("gmsh:physical", [])
-    pairs = zip(mesh.cells, tags, strict=True) if tags else ()
-    return [(cells, tag) for cells, tag in pairs if cells.type in kinds]
-
-
-def _check_plane(points: Array) -> Array:
-    """Return the points of a mesh in the plane of x and y (n, 2)."""
-    if points.shape[1] > 2 and np.ptp(points[:, 2]) > 1e-6 * np.ptp(points[:, :2]):
+def _check_plane(given: Array, factor: float) -> Array:
+    """Return the points of a mesh in the plane of x and y (n, 2) [m]."""
+    points = _check_coordinates(given, "the mesh", factor)
+    if np.any(np.ptp(points[:, 2:], axis=0) > 1e-6 * np.ptp(points[:, :2])):
         raise InvalidInput("it does not lie in the plane of x and y: mesh an elevation in it")
     return points[:, :2]
 
@@ -311,21 +427,24 @@ def _trace_outline(cells: list[NDArray[np.intp]], points: Array, name: str) -> l
     # an edge between two cells occurs in both directions, one on the boundary in one
     rim = [(a, b) for a, b in ends if (b, a) not in ends]
     after = dict(rim)
-    loop = [rim[0][0]]
-    while (following := after[loop[-1]]) != loop[0] and len(loop) <= len(rim):
+    loop = [rim[0][0]] if rim else []
+    while rim and (following := after.get(loop[-1], loop[0])) != loop[0] and len(loop) <= len(rim):
         loop.append(following)
-    if len(loop) != len(rim) or len(after) != len(rim):
+    # an edge in one direction twice is of cells that overlap
+    if not rim or len(loop) != len(rim) or len(after) != len(rim) or max(ends.values()) > 1:
         raise InvalidInput(
-            f"physical surface '{name}' is in pieces or has a hole: tag each block by itself"
+            f"physical surface '{name}' is in pieces or has a hole, or its cells overlap: tag "
+            "each block by itself"
         )
     places = points[loop]
     before, ahead = places - np.roll(places, 1, axis=0), np.roll(places, -1, axis=0) - places
     # a point lies on a straight edge if the sine of the turn there vanishes to round-off
     turn = before[:, 0] * ahead[:, 1] - before[:, 1] * ahead[:, 0]
     lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(ahead, axis=1)
-    return [
-        point for point, bends in zip(loop, np.abs(turn) > 1e-9 * lengths, strict=True) if bends
-    ]
+    bends = np.abs(turn) > 1e-9 * lengths
+    if np.count_nonzero(bends) < 3:
+        raise InvalidInput(f"physical surface '{name}' has no area: tag each block with its own")
+    return [point for point, bent in zip(loop, bends, strict=True) if bent]
 
 
 def write_dxf(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from archfem._files import atomic_write
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
@@ -113,6 +114,7 @@ def read_outlines(
     return survey
 
 
+@validate_arguments
 def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how they touch)
     path: str | Path,
     *,
@@ -251,6 +253,7 @@ def _find_corners(block: Block, direction: Direction | None) -> tuple[int, int, 
     return a, b, c, d
 
 
+@validate_arguments
 def write_outlines(structure: Structure, path: str | Path) -> None:
     """Write the blocks of a structure as GeoJSON that `read_outlines` reads.
 
@@ -274,4 +277,5 @@ def write_outlines(structure: Structure, path: str | Path) -> None:
         features.append({"type": "Feature", "properties": properties, "geometry": geometry})
     lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
     text = f'{{"type": "FeatureCollection", "features": [\n{lines}\n]}}\n'
-    Path(path).write_text(text, encoding="utf-8")
+    with atomic_write(Path(path)) as draft:
+        draft.write_text(text, encoding="utf-8")

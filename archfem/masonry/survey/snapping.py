@@ -23,6 +23,9 @@ from archfem.masonry.structure import CONTACT_TOLERANCE
 # Gaps and contacts up to this multiple of the tolerance are taken for errors of the survey [-]
 AMBIGUOUS_GAP_RATIO = 5.0
 
+# Vertices within the tolerance of one another, on average [-]
+MAX_NEIGHBOURS = 100.0
+
 Edge = tuple[int, int]
 Boundaries = list[list[int]]
 
@@ -85,7 +88,15 @@ def _project(places: Array, a: int, b: int) -> tuple[Array, Array, float]:
 def _merge_vertices(outlines: Sequence[Array], snap: float) -> tuple[Array, Any]:
     """Return merged vertices, the places (n, 2) [m], and the place number of each vertex."""
     points = np.concatenate(outlines)
-    pairs = [cKDTree(points).query_pairs(snap, output_type="ndarray")]
+    tree = cKDTree(points)
+    # pairs are counted before memory is taken for them; a few touch at each corner
+    near = tree.count_neighbors(tree, snap) / len(points)
+    if near > MAX_NEIGHBOURS:
+        raise InvalidStructure(
+            f"snap = {snap:.3g} m would merge {near:.0f} vertices at each place on average: lower "
+            "snap below the shortest side of a block"
+        )
+    pairs = [tree.query_pairs(snap, output_type="ndarray")]
     starts = np.cumsum([0, *map(len, outlines)])
     owner = np.repeat(np.arange(len(outlines)), [len(points) for points in outlines])
     vertices = [list(range(a, b)) for a, b in pairwise(starts)]

@@ -17,7 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from archfem._files import atomic_write
 from archfem._optional import require_package
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, MeshError
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 from archfem.models.discretisation import Discretisation
@@ -46,6 +48,7 @@ def generate_mesh(structure: Structure, settings: Discretisation | None = None) 
         return _import_tagged(structure)
 
 
+@validate_arguments
 def write_mesh(
     structure: Structure, path: str | Path, settings: Discretisation | None = None
 ) -> None:
@@ -61,9 +64,15 @@ def write_mesh(
     """
     with _gmsh_model(structure.name):
         _generate(structure, settings or Discretisation())
-        gmsh.write(str(path))
+        with atomic_write(Path(path)) as draft:
+            draft.touch()  # gmsh does not say why a file cannot be written
+            try:
+                gmsh.write(str(draft))
+            except Exception as error:  # gmsh raises nothing more specific
+                raise InvalidInput(f"gmsh does not write {path}: {error}; name it .msh") from error
 
 
+@validate_arguments
 def read_mesh(structure: Structure, path: str | Path) -> Mesh:
     """Read the mesh of a structure from a gmsh file, by `write_mesh` or another program.
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from archfem._typing import Array
+from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
@@ -39,6 +40,7 @@ from archfem.view.positions import FallingBlocks, fields_at, recorded_fields
 from archfem.view.statics import ModePanel, mode_panels
 
 
+@validate_arguments
 def film(  # noqa: PLR0913  (a film has many settings)
     model: Model,
     run: History,
@@ -101,6 +103,7 @@ def film(  # noqa: PLR0913  (a film has many settings)
     return write_film(target, _draw_frames(setup, run, timing, falls, size), timing.fps)
 
 
+@validate_arguments
 def picture(
     model: Model,
     q: Equilibrium | Array,
@@ -186,6 +189,7 @@ def _check_options(
         )
 
 
+@validate_arguments
 def film_modes(
     modes: Modes, path: str | Path, numbers: Sequence[int] | None = None, *, swings: int = 1
 ) -> Path:

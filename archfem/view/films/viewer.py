@@ -9,6 +9,7 @@ import pyvista as pv
 
 from archfem._optional import check_drawing
 from archfem._typing import Array
+from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.history import History
 from archfem.models.model import Model
 from archfem.view.films.film import check_film
@@ -20,6 +21,7 @@ from archfem.view.stress import Triangles
 from archfem.view.style import Colour
 
 
+@validate_methods
 class Viewer:
     """A run in pyvista's viewer; `show()` opens it, in a window or in a notebook.
 
@@ -125,6 +127,7 @@ class Viewer:
         return np.column_stack([points, np.full(len(points), layer * height)])
 
 
+@validate_arguments
 def viewer(
     run: History, model: Model, *, magnification: float | None = None, colour: str = "displacement"
 ) -> Viewer:

@@ -5,6 +5,7 @@ from html import escape
 from pathlib import Path
 
 from archfem._files import atomic_write
+from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.models.model import Model
@@ -12,6 +13,7 @@ from archfem.view.pages.document import render
 from archfem.view.pages.player_data import Scene
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False)
 class Player:
     """Interactive page of a run, shown in a notebook or written by `save`.
@@ -57,6 +59,7 @@ class Player:
         return f'<iframe srcdoc="{escape(self.page)}" style="{style}"></iframe>'
 
 
+@validate_arguments
 def player(run: History, model: Model | None = None, *, title: str = "") -> Player:
     """Return a player of a run.
 
