@@ -45,7 +45,7 @@ class Stop:
 
     Attributes:
         slope: tangent of the curve relative to its initial tangent [-]; with large displacements
-            control by "path" goes on past the peak, and the slope does not end it.
+            control by "path" continues past the peak, and the slope does not end it.
         displacement: displacement of the loaded point, relative to the structure's size [-].
         hinges: number of hinged joints, or None not to count them.
         steps: number of steps.
@@ -260,7 +260,7 @@ def stop_reason(path: Path, stop: Stop, criteria: Criteria, step: Array) -> str 
         count = int((joints["hinge"] != 0).sum())
         if count >= stop.hinges:
             return f"{count} joints hinge"
-    # Share of all displacement by which the path must progress. How fast it crawls hangs on
+    # Share of all displacement by which the path must progress. How fast it crawls depends on
     # round-off, so that most paths that take all their steps crawl.
     is_last = len(path.states) > stop.steps
     if (

@@ -415,3 +415,33 @@ def evaluate_released(law, places, released):  # type: ignore
     evaluate_openings(law, law.guess, segments)
     evaluate_slips(law, law.guess, slips)
     collect_released(law, (places, segments, slips), released)
+
+
+@summing_kernel
+def subtract_derivatives(system, count):  # type: ignore
+    """Subtract Gᵀ λ′ G from the tangent, block by block of gaps with the same coordinates."""
+    (rows, values), (indptr, _, data), k = system.entries, system.linear.gaps, 0
+    entries, places, (line, dense) = system.tangent.entries, system.places, system.blocks
+    while k < count:
+        begin = system.begin[rows[k, 2]]
+        width = indptr[rows[k, 1] + 1] - indptr[rows[k, 1]]
+        size = width * (indptr[rows[k, 0] + 1] - indptr[rows[k, 0]])
+        for m in range(size):
+            dense[m] = 0.0
+        while k < count and system.begin[rows[k, 2]] == begin:
+            # one row of λ′ G, then its product with the gap whose force changes
+            row = rows[k, 0]
+            for j in range(width):
+                line[j] = 0.0
+            while k < count and rows[k, 0] == row and system.begin[rows[k, 2]] == begin:
+                first = indptr[rows[k, 1]]
+                for j in range(width):
+                    line[j] += values[k] * data[first + j]
+                k += 1
+            place = 0
+            for entry in range(indptr[row], indptr[row + 1]):
+                for j in range(width):
+                    dense[place + j] += data[entry] * line[j]
+                place += width
+        for m in range(size):
+            entries[places[begin + m]] -= dense[m]

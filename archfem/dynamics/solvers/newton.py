@@ -19,7 +19,7 @@ import numpy as np
 from numba.extending import overload
 from scipy import sparse
 
-from archfem._numba import KERNEL_OPTIONS, kernel, summing_kernel
+from archfem._numba import KERNEL_OPTIONS, kernel
 from archfem._typing import Array
 from archfem.dynamics.solvers.band_lu import (
     Band,
@@ -48,6 +48,7 @@ from archfem.dynamics.solvers.linear_step import (
     linear_workspace,
     pair_blocks,
     solve_contact,
+    subtract_derivatives,
     tangent_pattern,
 )
 from archfem.dynamics.solvers.sparse_products import (
@@ -353,40 +354,10 @@ def _renew_factor(system, hold):  # type: ignore
     entries, base = tangent.entries, tangent.base
     for k in range(len(entries)):
         entries[k] = base[k]
-    _subtract_derivatives(system, count)
+    subtract_derivatives(system, count)
     regular = factorise(tangent)
     number[0] = count if regular else -1
     return regular
-
-
-@summing_kernel
-def _subtract_derivatives(system, count):  # type: ignore
-    """Subtract Gᵀ λ′ G from the tangent, block by block of gaps with the same coordinates."""
-    (rows, values), (indptr, _, data), k = system.entries, system.linear.gaps, 0
-    entries, places, (line, dense) = system.tangent.entries, system.places, system.blocks
-    while k < count:
-        begin = system.begin[rows[k, 2]]
-        width = indptr[rows[k, 1] + 1] - indptr[rows[k, 1]]
-        size = width * (indptr[rows[k, 0] + 1] - indptr[rows[k, 0]])
-        for m in range(size):
-            dense[m] = 0.0
-        while k < count and system.begin[rows[k, 2]] == begin:
-            # one row of λ′ G, then its product with the gap whose force changes
-            row = rows[k, 0]
-            for j in range(width):
-                line[j] = 0.0
-            while k < count and rows[k, 0] == row and system.begin[rows[k, 2]] == begin:
-                first = indptr[rows[k, 1]]
-                for j in range(width):
-                    line[j] += values[k] * data[first + j]
-                k += 1
-            place = 0
-            for entry in range(indptr[row], indptr[row + 1]):
-                for j in range(width):
-                    dense[place + j] += data[entry] * line[j]
-                place += width
-        for m in range(size):
-            entries[places[begin + m]] -= dense[m]
 
 
 @kernel
