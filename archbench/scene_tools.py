@@ -1,0 +1,87 @@
+"""Helpers that adapters of several programs share; standard library only."""
+
+from collections.abc import Callable
+from math import cos, sin
+from typing import Any
+
+
+def bisect(
+    holds: Callable[[float], bool], low: float, high: float, width: float
+) -> tuple[float, float]:
+    """Return a bracket of the value at which a property ceases to hold, by bisection.
+
+    Args:
+        holds: true at `low`, false at `high`.
+        low: lower end.
+        high: upper end.
+        width: of the final bracket, relative to its upper end.
+
+    Raises:
+        ValueError: the property does not change between the ends.
+    """
+    if not holds(low) or holds(high):
+        raise ValueError(f"no change between {low:g} and {high:g}: there is nothing to bracket")
+    while high - low > width * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low, high
+
+
+def bracketed(name: str, bracket: tuple[float, float], said: str = "") -> dict[str, Any]:
+    """Return an answer at the middle of a bracket."""
+    return {"values": {name: 0.5 * sum(bracket)}, "brackets": {name: bracket}, "said": said}
+
+
+def turned(scene: dict[str, Any], angle: float) -> dict[str, Any]:
+    """Return a scene turned clockwise about the origin: gravity then pulls toward +x [rad]."""
+    c, s = cos(angle), sin(angle)
+
+    def place(points: list[list[float]]) -> list[list[float]]:
+        return [[c * x + s * y, -s * x + c * y] for x, y in points]
+
+    blocks = [{**block, "outline": place(block["outline"])} for block in scene["blocks"]]
+    joints = [{**joint, "ends": place(joint["ends"])} for joint in scene["joints"]]
+    return {**scene, "blocks": blocks, "joints": joints}
+
+
+def at_thickness(scene: dict[str, Any], value: float) -> dict[str, Any]:
+    """Return the member of a family of structures: points are outline + value × growth."""
+
+    def moved(thing: dict[str, Any], key: str) -> list[list[float]]:
+        pairs = zip(thing[key], thing["growth"], strict=True)
+        return [[x + value * dx, y + value * dy] for (x, y), (dx, dy) in pairs]
+
+    blocks = [{**block, "outline": moved(block, "outline")} for block in scene["blocks"]]
+    joints = [{**joint, "ends": moved(joint, "ends")} for joint in scene["joints"]]
+    return {**scene, "blocks": blocks, "joints": joints}
+
+
+def area_and_centroid(outline: list[list[float]]) -> tuple[float, float, float]:
+    """Return the area of a polygon and its centroid."""
+    area = x = y = 0.0
+    for (x0, y0), (x1, y1) in zip(outline, [*outline[1:], outline[0]], strict=True):
+        twice = x0 * y1 - x1 * y0
+        area += 0.5 * twice
+        x += (x0 + x1) * twice / 6.0
+        y += (y0 + y1) * twice / 6.0
+    return area, x / area, y / area
+
+
+def polar_moment(outline: list[list[float]]) -> float:
+    """Return the second polar moment of a polygon about its centroid [m⁴]."""
+    area, cx, cy = area_and_centroid(outline)
+    total = 0.0
+    for (x0, y0), (x1, y1) in zip(outline, [*outline[1:], outline[0]], strict=True):
+        twice = x0 * y1 - x1 * y0
+        total += twice * (x0 * x0 + x0 * x1 + x1 * x1 + y0 * y0 + y0 * y1 + y1 * y1) / 12.0
+    return total - area * (cx * cx + cy * cy)
+
+
+def is_convex(outline: list[list[float]], tolerance: float = 1e-9) -> bool:
+    """Return whether an anticlockwise polygon is convex."""
+    count = len(outline)
+    for k in range(count):
+        (ax, ay), (bx, by), (cx, cy) = (outline[(k + i) % count] for i in range(3))
+        if (bx - ax) * (cy - by) - (by - ay) * (cx - bx) < -tolerance:
+            return False
+    return True

@@ -1,0 +1,38 @@
+"""Run one adapter on one scene in this process, and write its answer: started by `run.py`.
+
+`python worker.py ADAPTER.py SCENE.json SETTINGS.json ANSWER.json`. The Python is that of the
+program's environment, so nothing beyond the standard library is imported here. As a script it puts
+its own folder on the path, where adapters find `scene_tools`.
+"""
+
+import importlib.util
+import json
+import sys
+import time
+from pathlib import Path
+from types import ModuleType
+
+
+def load(path: Path) -> ModuleType:
+    """Import an adapter by its path."""
+    spec = importlib.util.spec_from_file_location(f"adapter_{path.stem}", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def main(adapter: str, scene: str, settings: str, answer: str) -> None:
+    """Run an adapter and write its answer, with the processor time of the call alone."""
+    module = load(Path(adapter))
+    given = json.loads(Path(scene).read_text(encoding="utf-8"))
+    chosen = json.loads(Path(settings).read_text(encoding="utf-8"))
+    start = time.process_time()
+    found = module.run(given, chosen)
+    found["cpu_s"] = time.process_time() - start
+    found["version"] = module.version()
+    Path(answer).write_text(json.dumps(found), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
