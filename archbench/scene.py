@@ -19,14 +19,19 @@ ACTIONS: dict[str, set[str]] = {
     "thickness": {"between"},
     "sideways": set(),
     "spread": {"block", "direction"},
-    "load": {"patch", "fill"},
+    "load": {"patch", "fill", "strength"},
     "motion": {"times", "accelerations", "end"},
     "scaled motion": {"times", "accelerations", "end", "between"},
     "rocking": {"tilt", "impacts"},
 }
 
 KINDS = {"E": "measured", "A": "closed form", "P": "program"}
-GRADES = {"a": "read in its source", "b": "read in a stored repository", "m": "from memory"}
+GRADES = {
+    "a": "read in its source",
+    "b": "read in a file of a repository",
+    "c": "computed by another method in the tests",
+    "m": "from memory",
+}
 
 
 class BenchError(Exception):
@@ -42,7 +47,8 @@ class Reference:
         number: the value, in the unit of the quantity.
         uncertainty: half of the range within which the value is known, in the same unit.
         kind: "E" measured, "A" closed form or exact, "P" by a program.
-        grade: "a" read in its source, "b" read in a file of a repository, "m" from memory.
+        grade: "a" read in its source, "b" read in a file of a repository, "c" computed by another
+            method in the tests, "m" from memory.
         source: author, title, place.
         url: DOI or address.
         licence: terms on which the number is used.

@@ -1,8 +1,8 @@
 """Run one adapter on one scene in this process, and write its answer: started by `run.py`.
 
 `python worker.py ADAPTER.py SCENE.json SETTINGS.json ANSWER.json`. The Python is that of the
-program's environment, so nothing beyond the standard library is imported here. As a script it puts
-its own folder on the path, where adapters find `scene_tools`.
+program's environment, so nothing beyond the standard library is imported here. Adapters find
+`scene_tools` beside this file.
 """
 
 import importlib.util
@@ -15,6 +15,8 @@ from types import ModuleType
 
 def load(path: Path) -> ModuleType:
     """Import an adapter by its path."""
+    if (here := str(Path(__file__).parent)) not in sys.path:
+        sys.path.append(here)
     spec = importlib.util.spec_from_file_location(f"adapter_{path.stem}", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

@@ -1,15 +1,22 @@
 """OpenSees: rigid stones on rows of springs without tension, small displacements."""
 
 from importlib.metadata import version as installed
-from math import cos, sin
+from math import pi
 from typing import Any
 
 import openseespy.opensees as ops
-from scene_tools import area_and_centroid, polar_moment
+from scene_tools import area_and_centroid, history, polar_moment
 
 needs = ["openseespy"]
 settings: dict[str, list[dict[str, Any]]] = {
     "sideways": [{"springs": 2, "stiffness": 1e11}, {"springs": 5, "stiffness": 1e12}],
+    "motion": [{"dt": 1e-3}, {"dt": 2e-3}],
+}
+
+cannot = {
+    "S10": "springs of this adapter do not slide, and these walls do",
+    "S06": "displacements are small: nothing falls",
+    "S08": "displacements are small: nothing falls",
 }
 
 
@@ -103,7 +110,8 @@ def solver(tolerance: float = 1e-10, iterations: int = 100) -> None:
 
 def run(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]:
     """Answer a scene."""
-    return {"sideways": find_factor}[scene["action"]["kind"]](scene, settings)
+    questions = {"sideways": find_factor, "motion": find_displacement}
+    return questions[scene["action"]["kind"]](scene, settings)
 
 
 def find_factor(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]:
@@ -130,3 +138,37 @@ def find_factor(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, An
         peak = max(peak, ops.getLoadFactor(2))
     said = f"pushed until the crown had moved by {1e3 * moved:.2g} mm; joints do not slide"
     return {"values": {"factor": peak}, "said": said}
+
+
+def find_displacement(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]:
+    """Shake the base, and find the largest displacements of the observed point to both sides."""
+    (law,) = scene["laws"].values()
+    stones = build(scene, law.get("points", 2), None)
+    load_weight(scene, stones)
+    action, dt = scene["action"], settings["dt"]
+    ops.timeSeries("Path", 2, "-time", *action["times"], "-values", *action["accelerations"])
+    ops.pattern("UniformExcitation", 2, 1, "-accel", 2)
+    if damping := scene.get("damping"):
+        # proportional to the present stiffness, so that open joints are not damped
+        ops.rayleigh(0.0, 0.0, 0.0, damping["ratio"] / (pi * damping["frequency"]))
+    solver(1e-9, 50)
+    ops.integrator("Newmark", 0.5, 0.25)
+    ops.analysis("Transient")
+    tag, arm = _observed_point(scene)
+    start = ops.nodeDisp(tag)
+    times, moved = [0.0], [0.0]
+    for step in range(round(action["end"] / dt)):
+        if ops.analyze(1, dt) != 0:
+            raise RuntimeError(f"no equilibrium at {step * dt:.3f} s")
+        x, _, turn = (a - b for a, b in zip(ops.nodeDisp(tag), start, strict=True))
+        times.append((step + 1) * dt)
+        moved.append(1e3 * (x - turn * arm))
+    return history(times, moved, "small displacements; joints do not slide")
+
+
+def _observed_point(scene: dict[str, Any]) -> tuple[int, float]:
+    """Return the tag of the observed stone, and the height of the point above its centroid."""
+    block = scene["blocks"][scene["observe"]["block"]]
+    points = [block["outline"][k] for k in scene["observe"]["points"]]
+    _, _, y = area_and_centroid(block["outline"])
+    return scene["observe"]["block"] + 1, sum(point[1] for point in points) / len(points) - y
