@@ -118,7 +118,9 @@ def scene(
     }
 
 
-def family(build: Callable[[float], tuple[list[Scene], list[Scene]]]) -> tuple[list[Scene], list[Scene]]:
+def family(
+    build: Callable[[float], tuple[list[Scene], list[Scene]]],
+) -> tuple[list[Scene], list[Scene]]:
     """Return blocks and joints whose points grow linearly with a thickness.
 
     Args:
@@ -289,7 +291,9 @@ def column() -> tuple[list[Scene], list[Scene]]:
     height, cap, foot, top, density = 5.95, 0.21, 1.11, 0.90, 2620.0
     levels = [k * (height - cap) / 7 for k in range(8)] + [height]
     halves = [0.5 * (foot - (foot - top) * y / height) for y in levels]
-    blocks = [block("base", [(-1.25, -0.75), (1.25, -0.75), (1.25, 0.0), (-1.25, 0.0)], density, True)]
+    blocks = [
+        block("base", [(-1.25, -0.75), (1.25, -0.75), (1.25, 0.0), (-1.25, 0.0)], density, True)
+    ]
     joints = []
     for k in range(8):
         (low, high), (a, b) = levels[k : k + 2], halves[k : k + 2]
@@ -329,7 +333,8 @@ def wall(courses: Sequence[Sequence[float]]) -> tuple[list[Scene], list[Scene]]:
     joints = []
     below = [(0, 0.0, width)]
     for row, course in enumerate(courses):
-        low, x, here = row * height, 0.0, []
+        low, x = row * height, 0.0
+        here: list[tuple[int, float, float]] = []
         for part in course:
             end = x + length * abs(part)
             if part > 0.0:
@@ -350,21 +355,21 @@ def wall(courses: Sequence[Sequence[float]]) -> tuple[list[Scene], list[Scene]]:
 
 def walls() -> Iterator[Scene]:
     """S10: walls of Ferris and Tin-Loi, after tests by Ceradini, pushed sideways."""
-    half, whole = [0.5, 1, 1, 1, 1, 0.5], [1.0] * 5
-    full_even, full_odd = [1.0] * 4, [0.5, 1, 1, 1, 0.5]
-    window_even, window_odd = [1, 0.5, -1, 0.5, 1], [0.5, 1, -1, 1, 0.5]
-    doors_odd, doors_even = [1, -1, 1, -1, 1], [0.5, 0.5, -1, 0.5, 0.5, -1, 0.5, 0.5]
-    tower_even, tower_odd = [0.5, 1, 1, 0.5], [1.0] * 3
-    slit_odd, slit_even = [1, -1, 1], [0.5, 0.5, -1, 0.5, 0.5]
+    half, whole = [0.5, 1.0, 1.0, 1.0, 1.0, 0.5], [1.0] * 5
+    full_even, full_odd = [1.0] * 4, [0.5, 1.0, 1.0, 1.0, 0.5]
+    window_even, window_odd = [1.0, 0.5, -1.0, 0.5, 1.0], [0.5, 1.0, -1.0, 1.0, 0.5]
+    doors_odd, doors_even = [1.0, -1.0, 1.0, -1.0, 1.0], [0.5, 0.5, -1.0, 0.5, 0.5, -1.0, 0.5, 0.5]
+    tower_even, tower_odd = [0.5, 1.0, 1.0, 0.5], [1.0] * 3
+    slit_odd, slit_even = [1.0, -1.0, 1.0], [0.5, 0.5, -1.0, 0.5, 0.5]
     house_even, house_odd = [0.5, *[1.0] * 6, 0.5], [1.0] * 7
-    panes_odd = [0.5, 1, -1, 1, 1, -1, 1, 0.5]
-    panes_even = [1, 0.5, -1, 0.5, 1, 0.5, -1, 0.5, 1]
+    panes_odd = [0.5, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 0.5]
+    panes_even = [1.0, 0.5, -1.0, 0.5, 1.0, 0.5, -1.0, 0.5, 1.0]
     windows = [window_odd, window_even, window_odd, window_even, window_odd]
     slits = [slit_odd, slit_even, slit_odd, slit_even, slit_odd]
     doors = [doors_odd, doors_even, doors_odd, doors_even, doors_odd]
     panes = [panes_odd, panes_even, panes_odd, panes_even, panes_odd]
     tower = [tower_even, tower_odd, tower_even]
-    patterns = [
+    patterns: list[list[list[float]]] = [
         [half, whole] * 3,
         [half, whole] * 5,
         [full_even, full_odd, full_even, *windows, full_even, full_odd, full_even],
@@ -372,7 +377,16 @@ def walls() -> Iterator[Scene]:
         [*tower, *slits, *tower, *slits, *tower],
         [
             *(house_even, house_odd, house_even, house_odd, *panes),
-            *(house_odd, house_even, house_odd, *panes, house_odd, house_even, house_odd, house_even),
+            *(
+                house_odd,
+                house_even,
+                house_odd,
+                *panes,
+                house_odd,
+                house_even,
+                house_odd,
+                house_even,
+            ),
         ],
     ]
     meanings = {
@@ -472,7 +486,9 @@ def bridges() -> Iterator[Scene]:
             "S20": "Geometry, densities and strength as published; the cover is from memory.",
             "S22": "Geometry from memory; densities, strength and fill assumed.",
         }
-        known = "Span as published; other lengths from memory; densities, strength and fill assumed."
+        known = (
+            "Span as published; other lengths from memory; densities, strength and fill assumed."
+        )
         skew = " The skew of 29° is neglected." if place == "Barlae" else ""
         yield scene(
             name,

@@ -48,7 +48,9 @@ class Program:
         """The Python that runs the adapter."""
         if self.python == "bench":
             return Path(sys.executable)
-        return ENVIRONMENTS / self.name / "bin/python" if self.python == "own" else Path(self.python)
+        return (
+            ENVIRONMENTS / self.name / "bin/python" if self.python == "own" else Path(self.python)
+        )
 
     def refusal(self, scene: dict[str, Any]) -> str:
         """Return why the program has no answer to a scene; empty where it should have one."""

@@ -84,11 +84,12 @@ def _run_process(command: Sequence[str], folder: Path, limit: float) -> str:
 
 
 def _missing_numbers(found: Answer, scene: dict[str, Any]) -> str:
-    """Return which quantities of a scene have no finite number; empty where all have one."""
+    """Return which quantities have no finite number; empty where one has, and none is infinite."""
     values = found.get("values", {})
+    given = [name for name in scene["quantities"] if name in values]
     missing = [
         name
-        for name in scene["quantities"]
+        for name in given or scene["quantities"]
         if not isinstance(values.get(name), int | float) or not math.isfinite(values[name])
     ]
     return f"no number for {', '.join(missing)}" if missing else ""
@@ -111,15 +112,19 @@ def results_of(program: str, folder: Path = RESULTS) -> dict[str, Answer]:
 
 def store(program: str, answers: dict[str, Answer], folder: Path = RESULTS) -> None:
     """Store answers of a program, one file a program, in order of scenes."""
-    ordered = {name: answers[name] for name in sorted(answers)}
-    text = json.dumps(_short(ordered), indent=1, ensure_ascii=False) + "\n"
+    lines = []
+    for name in sorted(answers):
+        text = json.dumps(_short(answers[name]), ensure_ascii=False)
+        # one run a line: differences between versions stay readable
+        lines.append(f'"{name}": ' + text.replace('{"settings"', '\n {"settings"'))
+    text = "{\n" + ",\n".join(lines) + "\n}\n"
     (folder / f"{program}.json").write_text(text, encoding="utf-8")
 
 
 def _short(value: Any) -> Any:
-    """Return a value with floats of six digits."""
+    """Return a value with floats of five digits."""
     if isinstance(value, float):
-        return float(f"{value:.6g}")
+        return float(f"{value:.5g}")
     if isinstance(value, dict):
         return {key: _short(each) for key, each in value.items()}
     return [_short(each) for each in value] if isinstance(value, list | tuple) else value
@@ -159,9 +164,10 @@ def compare_with_stored(cost: float = 3.0, tolerance: float = 1e-3) -> tuple[lis
     (program,) = (each for each in programs() if each.name == "archfem")
     adapter, differences, count = load(program.adapter), [], 0
     for name, answer in results_of("archfem").items():
-        stored = next(iter(answer.get("runs", ())), {})
-        if "failed" in stored or stored.get("cpu_s", math.inf) > cost:
+        runs = answer.get("runs")
+        if not runs or "failed" in runs[0] or runs[0]["cpu_s"] > cost:
             continue
+        stored = runs[0]
         found = adapter.run(read_scene(name), stored["settings"])["values"]
         count += 1
         for quantity, value in stored["values"].items():

@@ -193,5 +193,3 @@ def signed_area(outline: list[list[float]]) -> float:
     """Return the area of a polygon, positive where its outline is anticlockwise [m²]."""
     after = [*outline[1:], outline[0]]
     return 0.5 * sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(outline, after, strict=True))
-
-

@@ -1,6 +1,7 @@
 """Helpers that adapters of several programs share; standard library only."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from math import cos, sin
 from typing import Any
 
@@ -60,11 +61,11 @@ def bracketed(name: str, bracket: tuple[float, float], said: str = "") -> dict[s
 
 
 def history(times: list[float], moved: list[float], said: str) -> dict[str, Any]:
-    """Return an answer from the displacements of an observed point [mm], with about 400 of them."""
+    """Return an answer from the displacements of an observed point [mm], with about 200 of them."""
     peak = max(moved, key=abs)
     sense = 1.0 if peak > 0.0 else -1.0
     values = {"peak": abs(peak), "rebound": max(-sense * u for u in moved)}
-    every = max(1, len(times) // 400)
+    every = max(1, len(times) // 200)
     series = {"time": times[::every], "u": moved[::every]}
     return {"values": values, "series": series, "said": said}
 
@@ -142,7 +143,7 @@ def rocking_ratio(angles: list[float], slenderness: float, impacts: int) -> floa
     to cos(α - θ) - cos α above that at which it passes the upright position.
     """
     parts: list[list[float]] = [[]]
-    for before, after in zip(angles, angles[1:], strict=False):
+    for before, after in pairwise(angles):
         parts[-1].append(abs(before))
         if before * after < 0.0:
             parts.append([])

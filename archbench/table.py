@@ -64,7 +64,9 @@ class Row:
         return [
             run["values"][self.quantity]
             for run in runs
-            if "failed" not in run and "variant" not in run["settings"]
+            if "variant" not in run["settings"]
+            and "failed" not in run
+            and self.quantity in run["values"]
         ]
 
     def ratio(self, program: str) -> float | None:
@@ -82,10 +84,8 @@ class Row:
 
     def cost(self, program: str) -> float | None:
         """Return the processor time over that of archfem, both of their first run."""
-        times = [
-            next(iter(self.answers.get(name, {}).get("runs", [])), {}).get("cpu_s")
-            for name in (program, "archfem")
-        ]
+        first = [self.answers.get(name, {}).get("runs", [{}])[0] for name in (program, "archfem")]
+        times = [run.get("cpu_s") for run in first]
         return times[0] / times[1] if times[0] and times[1] else None
 
 
@@ -123,10 +123,14 @@ def cell(row: Row, program: str) -> str:
         return "cannot"
     numbers = row.numbers(program)
     if not numbers:
-        return "failed"
+        # a program may answer one quantity of a scene and not another
+        failed = any("failed" in run for run in answer["runs"])
+        return "failed" if failed else "cannot"
     scale = row.reference[0] if row.references else 1.0
     digits = ".2f" if row.kind == "E" else ".3f"
-    shown = [format(value / scale, digits) if row.references else number(value) for value in numbers]
+    shown = [
+        format(value / scale, digits) if row.references else number(value) for value in numbers
+    ]
     low, high = shown[numbers.index(min(numbers))], shown[numbers.index(max(numbers))]
     text = shown[0] if low == high else f"{shown[0]} ({low}–{high})"
     cost = row.cost(program)
@@ -165,7 +169,10 @@ def scores(found: Sequence[Row], programs: Sequence[str]) -> str:
         "closed form": [r for r in found if r.kind == "A"],
         "other programs": [r for r in found if r.kind == "P"],
     }
-    lines = [f"| inside the uncertainty | {' | '.join(programs)} |", f"|---|{'---|' * len(programs)}"]
+    lines = [
+        f"| inside the uncertainty | {' | '.join(programs)} |",
+        f"|---|{'---|' * len(programs)}",
+    ]
     for name, group in groups.items():
         cells = []
         for program in programs:
@@ -209,11 +216,15 @@ def variants(found: Sequence[Row]) -> str:
         if "exact" not in others:
             continue
         cells = [
-            number(others[name]["values"][row.quantity]) if "failed" not in others[name] else "failed"
+            number(others[name]["values"][row.quantity])
+            if "failed" not in others[name]
+            else "failed"
             for name in names
         ]
         first = number(row.numbers("archfem")[0]) if row.numbers("archfem") else "failed"
-        lines.append(f"| {row.scene} | {row.quantity} [{row.unit}] | {first} | {' | '.join(cells)} |")
+        lines.append(
+            f"| {row.scene} | {row.quantity} [{row.unit}] | {first} | {' | '.join(cells)} |"
+        )
     return "\n".join(lines)
 
 

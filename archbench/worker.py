@@ -18,7 +18,8 @@ def load(path: Path) -> ModuleType:
     if (here := str(Path(__file__).parent)) not in sys.path:
         sys.path.append(here)
     spec = importlib.util.spec_from_file_location(f"adapter_{path.stem}", path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

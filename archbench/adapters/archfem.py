@@ -1,11 +1,12 @@
 """archfem: limit analysis, elastic joints in large displacements, and rigid blocks."""
 
+import contextlib
 from dataclasses import replace
 from importlib.metadata import version as installed
 from typing import Any
 
 import numpy as np
-from scene_tools import at_thickness, bisect, bracketed, first_failure
+from scene_tools import at_thickness, bisect, bracketed, first_failure, history, rocking_ratio
 
 import archfem as af
 
@@ -55,9 +56,7 @@ def version() -> str:
 def structure(scene: dict[str, Any]) -> af.Structure:
     """Return the structure of a scene."""
     laws = {
-        name: af.Contact(
-            law["normal_stiffness"], law["shear_stiffness"], law["friction"], name
-        )
+        name: af.Contact(law["normal_stiffness"], law["shear_stiffness"], law["friction"], name)
         for name, law in scene["laws"].items()
     }
     materials = {
@@ -66,7 +65,7 @@ def structure(scene: dict[str, Any]) -> af.Structure:
     }
     blocks = tuple(
         af.Block(
-            tuple(map(tuple, block["outline"])),
+            tuple((x, y) for x, y in block["outline"]),
             materials[block["density"]],
             block["name"],
             fixed=block["fixed"],
@@ -74,17 +73,14 @@ def structure(scene: dict[str, Any]) -> af.Structure:
         )
         for block in scene["blocks"]
     )
-    joints = tuple(
-        af.Joint(
-            tuple(joint["blocks"]),
-            *map(tuple, joint["ends"]),
-            laws[joint["law"]],
-            f"joint {k}",
-            role="ring",
-        )
-        for k, joint in enumerate(scene["joints"])
-    )
-    return af.Structure(blocks, joints, scene["width"], scene["gravity"], scene["id"])
+    joints = []
+    for number, joint in enumerate(scene["joints"]):
+        (first, second), (start, end) = joint["blocks"], joint["ends"]
+        places = (start[0], start[1]), (end[0], end[1])
+        name = f"joint {number}"
+        law = laws[joint["law"]]
+        joints.append(af.Joint((first, second), *places, law, name, role="ring"))
+    return af.Structure(blocks, tuple(joints), scene["width"], scene["gravity"], scene["id"])
 
 
 def run(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]:
@@ -146,9 +142,7 @@ def find_load(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]
 def with_fill(ring: af.Structure, given: dict[str, Any], gravity: float) -> af.Structure:
     """Return a ring with fill on its back up to a level road."""
     soil = replace(af.masonry.BACKFILL, unit_weight=given["density"] * gravity)
-    back = [tuple(ring.joints[0].extrados)]
-    for block in ring.blocks[1:-1]:
-        back.append(block.outline[2])  # outer corner at the next joint
+    back = [joint.extrados for joint in ring.joints]
     level = given["surface"]
     outline = (*back, (back[-1][0], level), (back[0][0], level))
     body = af.Block(outline, soil, "fill", part="fill", role="other")
@@ -196,25 +190,20 @@ def find_displacement(scene: dict[str, Any], settings: dict[str, Any]) -> dict[s
     else:
         model = model_of(scene, settings["joints"])
         run = shaken(scene, model, motion, dt, af.Record(fields_every=1))
-        times, moved = observed(scene, run), run.displacement
+        times, moved = run.displacement["time"].values, observed(scene, run)
         said = run.verdict.headline
-        times, moved = moved["time"].values, times
-    peak = float(moved[np.argmax(np.abs(moved))])
-    values = {"peak": 1e3 * abs(peak), "rebound": 1e3 * float(np.max(-np.sign(peak) * moved))}
-    every = max(1, len(times) // 400)
-    series = {"time": times[::every].tolist(), "u": (1e3 * moved[::every]).tolist()}
-    return {"values": values, "series": series, "said": said}
+    return history(times.tolist(), (1e3 * moved).tolist(), said)
 
 
 def shaken(
     scene: dict[str, Any], model: Any, motion: af.Motion, dt: float, record: Any = None
 ) -> Any:
-    """Return the history of a model, by equal steps, or by varying ones where these fail."""
+    """Return the history of a model; where a step fails, by varying or by smaller steps."""
     given = {"damping": damping_of(scene), "record": record}
-    try:
-        return af.time_history(model, motion, dt=dt, **given)
-    except af.DidNotConverge:
-        return af.time_history(model, motion, **given)
+    for step in (dt, None, dt / 2.0):
+        with contextlib.suppress(af.DidNotConverge):
+            return af.time_history(model, motion, dt=step, **given)
+    return af.time_history(model, motion, dt=dt / 4.0, **given)
 
 
 def observed(scene: dict[str, Any], run: Any) -> Any:
@@ -293,12 +282,10 @@ def find_rocking(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, A
     turn = np.array([frame.poses[1, 2] for frame in frames])
     slender = np.arctan2(-arm[0], arm[1])
     count = scene["action"]["impacts"]
-    landings = np.flatnonzero(turn[1:] * turn[:-1] < 0.0)[: count + 1]
-    parts = np.split(np.abs(turn), landings + 1)[: count + 1]
-    # on its edge a block of slenderness α at rest at θ has energy cos(α - θ) above that at 0
-    energy = np.array([np.cos(slender - part.max()) - np.cos(slender) for part in parts])
-    first = np.interp(0.0, turn[landings[0] : landings[0] + 2], times[landings[0] :][:2])
-    values = {"ratio": float((energy[-1] / energy[0]) ** (0.5 / count)), "first impact": first}
+    landing = int(np.flatnonzero(turn[1:] * turn[:-1] < 0.0)[0])
+    first = float(np.interp(0.0, turn[landing : landing + 2], times[landing : landing + 2]))
+    ratio = rocking_ratio((-turn).tolist(), float(slender), count)
+    values = {"ratio": ratio, "first impact": first}
     return {"values": {name: values[name] for name in scene["quantities"]}, "said": "rigid impacts"}
 
 

@@ -6,11 +6,11 @@ from importlib.metadata import version as installed
 from math import atan
 from typing import Any
 
-from scene_tools import area_and_centroid, at_thickness, bisect, bracketed, turned
 from compas.geometry import Frame
 from compas_assembly.datastructures import Block
 from compas_cra.datastructures import CRA_Assembly
 from compas_cra.equilibrium import rbe_solve
+from scene_tools import area_and_centroid, at_thickness, bisect, bracketed, turned
 
 needs = ["compas_cra==0.8.0"]
 
@@ -84,9 +84,8 @@ def run(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]:
     tension, width = settings["tension"], settings["width"]
     if scene["action"]["kind"] == "thickness":
         low, high = scene["action"]["between"]
-        bracket = bisect(
-            lambda t: not stands(at_thickness(scene, t), tension), low, high, width
-        )
+        bracket = bisect(lambda t: not stands(at_thickness(scene, t), tension), low, high, width)
         return bracketed("thickness", bracket, "least tension")
     bracket = bisect(lambda f: stands(turned(scene, atan(f)), tension), 0.0, 2.0, width)
-    return bracketed("factor", bracket, "tilted")
+    name = "factor" if "factor" in scene["quantities"] else "associated"
+    return bracketed(name, bracket, "tilted")

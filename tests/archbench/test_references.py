@@ -12,9 +12,7 @@ from archbench.scene import read_references, read_scene
 
 def reference(name, quantity="factor"):
     """The computed value of a quantity, and its uncertainty."""
-    (value,) = (
-        v for v in read_references(name) if v.quantity == quantity and v.grade == "c"
-    )
+    (value,) = (v for v in read_references(name) if v.quantity == quantity and v.grade == "c")
     return value.number, value.uncertainty
 
 
