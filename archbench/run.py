@@ -210,9 +210,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         runs = [pool.submit(run_scene, *pair, chosen.limit) for pair in pairs]
         for (program, name), run in zip(pairs, runs, strict=True):
             found[program.name][name] = run.result()
+            store(program.name, found[program.name])
             print(f"{name} {program.name}: {summary(found[program.name][name])}", flush=True)
     for program in ready:
-        store(program.name, found[program.name])
         fresh = {name: found[program.name][name] for name in names}
         wrong += failures(program.name, fresh)
     print(*wrong, f"{len(wrong)} things went wrong", sep="\n")

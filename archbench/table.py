@@ -161,6 +161,28 @@ def markdown(found: Sequence[Row], programs: Sequence[str]) -> str:
     return "\n".join(lines)
 
 
+def head(found: Sequence[Row], programs: Sequence[str]) -> str:
+    """Return measured rows that were read, short, of the programs that answer any of them."""
+    shown = [row for row in found if row.kind == "E" and row.grade != "m"]
+    answering = [name for name in programs if any(row.numbers(name) for row in shown)]
+    lines = [
+        f"| test | measured | {' | '.join(answering)} |",
+        f"|---|---|{'---|' * len(answering)}",
+    ]
+    for row in shown:
+        cells = [cell(row, program).split(",")[0] or "–" for program in answering]
+        title = row.title.split(",")[0]
+        lines.append(f"| {title} | {measure(row)} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def measure(row: Row) -> str:
+    """Return the reference of a row with its unit."""
+    middle, half = row.reference
+    unit = "" if row.unit == "-" else f" {row.unit}"
+    return f"{number(middle)} ± {half:.1g}{unit}"
+
+
 def scores(found: Sequence[Row], programs: Sequence[str]) -> str:
     """Return the share of rows inside their uncertainty, with their number, as a table."""
     groups = {
@@ -228,6 +250,26 @@ def variants(found: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
+def bridges(found: Sequence[Row]) -> str:
+    """Return archfem's loads of bridges over the tests by the fill's strength, as a table."""
+    lines = [
+        "| bridge | test [kN] | m = 0 | **m = 1/3** | m = 1 | m = 1, c = 7 kPa | m = 1/3, no crushing |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in found:
+        if not row.scene.startswith(("S20", "S21", "S22")) or "archfem" not in row.answers:
+            continue
+        runs = row.answers["archfem"]["runs"]
+        middle = row.reference[0]
+        # stored with the default first
+        default, *others = (f"{run['values']['load'] / middle:.2f}" for run in runs)
+        mark = " **m**" if row.grade == "m" else ""
+        cells = [others[0], f"**{default}**", *others[1:]]
+        name = row.title.split(",")[0]
+        lines.append(f"| {name} | {number(middle)}{mark} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def sources(found: Sequence[Row]) -> str:
     """Return the references with sources, one line each."""
     lines = []
@@ -258,15 +300,15 @@ def versions(found: Sequence[Row], programs: Sequence[str]) -> str:
 def sections(found: Sequence[Row]) -> dict[str, str]:
     """Return the made parts of the documentation by name."""
     programs = known_programs(found)
-    measured = [row for row in found if row.kind == "E" and row.grade != "m"]
     return {
         "table": markdown(found, programs),
         "scores": scores(found, programs),
         "refusals": refusals(found, programs),
         "variants": variants(found),
+        "bridges": bridges(found),
         "sources": sources(found),
         "versions": versions(found, programs),
-        "head": markdown(measured, programs),
+        "head": head(found, programs),
     }
 
 
@@ -280,7 +322,7 @@ def with_sections(text: str, made: dict[str, str]) -> str:
     return re.sub(r"<!-- (\w+) -->\n.*?<!-- end -->", replaced, text, flags=re.DOTALL)
 
 
-PAGES = (ROOT / "docs" / "archbench.md", ROOT / "README.md", ROOT / "docs" / "theory" / "joint.md")
+PAGES = (ROOT / "docs/archbench.md", ROOT / "docs/theory/fill.md", ROOT / "README.md")
 
 
 def main() -> None:

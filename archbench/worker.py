@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 
 def load(path: Path) -> ModuleType:
@@ -25,14 +26,23 @@ def load(path: Path) -> ModuleType:
     return module
 
 
+def timed(module: ModuleType, scene: Any, settings: Any) -> tuple[dict[str, Any], float]:
+    """Return an answer and its processor time [s]."""
+    start = time.process_time()
+    found = module.run(scene, settings)
+    return found, time.process_time() - start
+
+
 def main(adapter: str, scene: str, settings: str, answer: str) -> None:
     """Run an adapter and write its answer, with the processor time of the call alone."""
     module = load(Path(adapter))
     given = json.loads(Path(scene).read_text(encoding="utf-8"))
     chosen = json.loads(Path(settings).read_text(encoding="utf-8"))
-    start = time.process_time()
-    found = module.run(given, chosen)
-    found["cpu_s"] = time.process_time() - start
+    found, cost = timed(module, given, chosen)
+    if cost < 1.0:
+        # a first call loads modules on demand; of a short run it would be all that is measured
+        found, cost = timed(module, given, chosen)
+    found["cpu_s"] = cost
     found["version"] = module.version()
     Path(answer).write_text(json.dumps(found), encoding="utf-8")
 

@@ -20,6 +20,8 @@ settings: dict[str, list[dict[str, Any]]] = {
     "sideways": [{"tension": 1e-4, "width": 2e-3}, {"tension": 1e-3, "width": 2e-3}],
 }
 
+cannot = {"S10": "a wall takes its solver minutes"}
+
 
 def version() -> str:
     """Return the version of compas_cra."""
