@@ -133,10 +133,8 @@ def column(found: list[Row]) -> Figure:
     rigid = [
         (t, first_run(row, "archfem", "rigid")) for t, row in zip(durations, shown, strict=True)
     ]
-    values = [(t, run["values"]["scale"]) for t, run in rigid if run]
-    axes.plot(
-        *np.array(values).T, "o", mfc="none", color=COLOURS["archfem"], label="archfem, rigid"
-    )
+    known = [(t, run["values"]["scale"]) for t, run in rigid if run]
+    axes.plot(*np.array(known).T, "o", mfc="none", color=COLOURS["archfem"], label="archfem, rigid")
     axes.set(
         yscale="log", xlabel="duration of the first rectangle [s]", ylabel="least amplitude [g]"
     )

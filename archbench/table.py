@@ -114,6 +114,11 @@ def number(value: float) -> str:
     return f"{value:.4g}"
 
 
+def rounded(value: float) -> str:
+    """Return an uncertainty of one digit."""
+    return f"{float(f'{value:.1g}'):g}"
+
+
 def cell(row: Row, program: str) -> str:
     """Return the cell of a program: ratio, range, cost, or why there is none."""
     answer = row.answers.get(program)
@@ -153,7 +158,7 @@ def markdown(found: Sequence[Row], programs: Sequence[str]) -> str:
         if row.references:
             middle, half = row.reference
             mark = " **m**" if row.grade == "m" else ""
-            reference = f"{row.kind} {number(middle)} ± {half:.1g}{mark}"
+            reference = f"{row.kind} {number(middle)} ± {rounded(half)}{mark}"
         unit = "" if row.unit == "-" else f" [{row.unit}]"
         cells = [cell(row, program) for program in programs]
         name = f"{row.scene}, {row.title}"
@@ -180,7 +185,7 @@ def measure(row: Row) -> str:
     """Return the reference of a row with its unit."""
     middle, half = row.reference
     unit = "" if row.unit == "-" else f" {row.unit}"
-    return f"{number(middle)} ± {half:.1g}{unit}"
+    return f"{number(middle)} ± {rounded(half)}{unit}"
 
 
 def scores(found: Sequence[Row], programs: Sequence[str]) -> str:
@@ -253,7 +258,7 @@ def variants(found: Sequence[Row]) -> str:
 def bridges(found: Sequence[Row]) -> str:
     """Return archfem's loads of bridges over the tests by the fill's strength, as a table."""
     lines = [
-        "| bridge | test [kN] | m = 0 | **m = 1/3** | m = 1 | m = 1, c = 7 kPa | m = 1/3, no crushing |",
+        "| bridge | test [kN] | m = 0 | **1/3** | 1 | 1, c = 7 kPa | 1/3, no crushing |",
         "|---|---|---|---|---|---|---|",
     ]
     for row in found:
@@ -279,7 +284,8 @@ def sources(found: Sequence[Row]) -> str:
             read = value.read_by or "from memory"
             place = value.url if not value.url.startswith("http") else f"<{value.url}>"
             lines.append(
-                f"- {row.scene}, {row.quantity}: {number(value.number)} ± {value.uncertainty:.1g}, "
+                f"- {row.scene}, {row.quantity}: "
+                f"{number(value.number)} ± {rounded(value.uncertainty)}, "
                 f"{value.kind}{value.grade}. {value.source}. {place}; {read}{note}."
             )
     return "\n".join(dict.fromkeys(lines))
