@@ -21,7 +21,7 @@ DEBIAN13 := /var/tmp/archfem-debian13
 # One worker a core; idle workers take over tests from others.
 SPREAD := -n auto --dist worksteal
 
-.PHONY: help setup demo test test-slow test-debian13 hard bench docs notebooks verification fuzz mutants lint clean
+.PHONY: help setup demo test test-slow test-debian13 hard bench archbench archbench-quick docs notebooks verification fuzz mutants lint clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -66,6 +66,14 @@ fuzz: .venv/compiled  ## malformed input by the thousand, a table; COUNT=100 for
 bench: .venv/bench  ## speed beside error, against OpenSees and a bare compiled loop
 	$(PYTHON) tests/benchmarks/run.py
 
+archbench: .venv/compiled  ## every program on every scene of Arch-Bench, its table and figures (15 min)
+	$(PYTHON) -m archbench.run --install
+	$(PYTHON) -m archbench.table
+	$(PYTHON) -m archbench.figures
+
+archbench-quick: .venv/compiled  ## archfem on the scenes of Arch-Bench against its stored answers
+	$(PYTHON) -m archbench.run --quick
+
 .venv/bench: .venv/ready
 	$(PIP) -e '.[dev,bench]'
 	@touch $@
@@ -84,7 +92,7 @@ verification: .venv/compiled  ## the verification table of the documentation, wr
 	@touch $@
 
 lint: .venv/ready  ## style and types
-	.venv/bin/ruff check . && .venv/bin/ruff format --check . && .venv/bin/mypy archfem
+	.venv/bin/ruff check . && .venv/bin/ruff format --check . && .venv/bin/mypy archfem archbench
 
 clean:  ## remove the environment and all results
 	rm -rf .venv out
