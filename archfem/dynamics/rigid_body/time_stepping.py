@@ -11,7 +11,7 @@ sweeps over the contacts solve for the impulses P, from those of the step before
 no work need not converge within a step; sweeps continue while unconverged impulses add energy.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -28,6 +28,7 @@ from archfem.dynamics.rigid_body.bodies import (
     FallEnergy,
     FallFrame,
     LooseBlocks,
+    Settling,
     check_cohesionless,
     make_bodies,
 )
@@ -46,6 +47,10 @@ from archfem.dynamics.rigid_body.contact_detection import (
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
+
+# Residual of settled impulses: speed by which a contact violates its condition, relative to that
+# which a body gains by its weight in a step [-]
+SETTLED = 1e-3
 
 # Largest number of sweeps over the contacts of a step; the residual is corrected in later steps
 MAX_SWEEPS = 500
@@ -69,8 +74,16 @@ class StepParameters(NamedTuple):
     gravity: float  # downward [m/s²]
     restitution: float  # e [-]
     min_impact_speed: float  # speed of approach below which e is zero [m/s]
+    min_rocking_speed: float  # the same for the speed ratio of a rocking block [m/s]
     max_sweeps: int  # over the contacts of a step
-    tolerance: float  # on the change of an impulse in a sweep, relative to the largest [-]
+    tolerance: float  # on the residual of the impulses, a speed [m/s]
+
+
+class SweepResult(NamedTuple):
+    """Velocities and impulses after a sweep."""
+
+    speeds: Array  # (b + 1, 3)
+    impulse: Array  # (c, 2)
 
 
 class StepWorkspace(NamedTuple):
@@ -81,9 +94,15 @@ class StepWorkspace(NamedTuple):
     stored: StoredImpulses
     middle: Array  # poses at the middle of the step (b, 3)
     # of each contact: cross products of the arms with the normal, first and second body, and with
-    # the tangent; 1/(H M⁻¹ Hᵀ) of normal and tangent; target u_N and u_T; μ (c, 9)
+    # the tangent; 1/(H M⁻¹ Hᵀ) of normal and tangent; target u_N and u_T; μ; coupling of u_N with
+    # the impulse of the next contact, if of the same face; rebound in the target u_N (c, 11)
     rows: Array
     speeds: Array  # velocities during the sweeps, the ground's last (b + 1, 3)
+    begun: Array  # velocities at the start of a sweep (b + 1, 3)
+    last: SweepResult  # of the sweep before
+    rebounding: SweepResult  # with rebound
+
+
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +122,9 @@ class RigidBlockSimulation:
         friction: coefficient between blocks without a common joint, and to the ground [-]; None
             takes the smallest of the structure's joints.
         level: height of the ground [m]; None takes the lowest point of the fixed blocks.
+        rocking_ratio: angular velocity after over that before, where a face that turns about one
+            end closes at the other: of all faces, or by names of joints [-]. None, and joints not
+            named, take that of an impact at the closing end alone (Housner's), which is the least.
 
     Raises:
         InvalidInput: a number is out of range, there is no coefficient of friction, a joint has
@@ -114,6 +136,7 @@ class RigidBlockSimulation:
     restitution: float = 0.0
     friction: float | None = None
     level: float | None = None
+    rocking_ratio: float | Mapping[str, float] | None = None
     bodies: Bodies = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -123,7 +146,7 @@ class RigidBlockSimulation:
         if not 0.0 <= check_number(self.restitution, "restitution") <= 1.0:
             raise InvalidInput(f"restitution {self.restitution:g} is not between 0 and 1")
         check_cohesionless(self.structure)
-        bodies = make_bodies(self.structure, self.friction, self.level)
+        bodies = make_bodies(self.structure, self.friction, self.level, self.rocking_ratio)
         object.__setattr__(self, "bodies", bodies)
 
     def frames(
@@ -206,10 +229,12 @@ class _Run:
         self._q = np.array(start.poses, dtype=float)
         self._v = np.array(start.velocities, dtype=float)
         self._v[bodies.inverse_mass[:-1, 0] == 0.0] = 0.0
+        # speed of a free fall after one step
+        weight_speed = self._weight_speed = simulation.structure.gravity * simulation.dt
         # impacts below 0.05 m/s, the speed of a fall by 0.13 mm, do not bounce
         self._parameters = StepParameters(
             *(simulation.dt, simulation.structure.gravity, simulation.restitution),
-            *(0.05, MAX_SWEEPS, 1e-5),
+            *(0.05, 2.0 * weight_speed, MAX_SWEEPS, SETTLED * weight_speed),
         )
         self._is_first = True
         contacts = allocate_contacts(len(bodies.owner))
@@ -218,13 +243,20 @@ class _Run:
             contacts,
             allocate_stored_impulses(contacts),
             np.empty_like(self._q),
-            np.empty((len(contacts.key), 9)),
+            np.empty((len(contacts.key), 14)),
             np.zeros((len(self._q) + 1, 3)),
+            np.zeros((len(self._q) + 1, 3)),
+            *(
+                SweepResult(np.zeros((len(self._q) + 1, 3)), np.zeros((len(contacts.key), 2)))
+                for _ in range(2)
+            ),
         )
-        # fields of FallEnergy, then the largest loss so far [J]
-        self._energy = np.array([_kinetic_energy(bodies, self._v), 0.0, 0.0, 0.0, 0.0, 0.0])
-        self._exchanged = float(self._energy[0])
-        self._overlap, self._unconverged_steps, self._time = 0.0, 0, start.time
+        # fields of FallEnergy, then the largest loss and the largest energy exchanged so far [J]
+        kinetic = _kinetic_energy(bodies, self._v)
+        self._energy = np.array([kinetic, 0.0, 0.0, 0.0, 0.0, 0.0, kinetic])
+        # fields of Settling
+        self._settling = np.zeros(4)
+        self._overlap, self._time = 0.0, start.time
 
     @property
     def poses(self) -> Array:
@@ -240,36 +272,37 @@ class _Run:
     def advance(self, ground: Array) -> None:
         """Advance by steps with ground accelerations (steps, 2) [m/s²]."""
         if self._is_first:
-            strict = self._parameters._replace(max_sweeps=FIRST_STEP_SWEEPS, tolerance=1e-8)
+            strict = self._parameters._replace(max_sweeps=FIRST_STEP_SWEEPS, tolerance=1e-3*self._parameters.tolerance)
             self._advance(ground[:1], strict)
             self._is_first, ground = False, ground[1:]
         self._advance(ground, self._parameters)
 
     def _advance(self, ground: Array, parameters: StepParameters) -> None:
         """Advance by steps with parameters."""
-        overlap, unconverged_steps, exchanged = advance_steps(
+        ground = np.ascontiguousarray(ground)
+        overlap, is_crowded = advance_steps(
             self._simulation.bodies,
             parameters,
             self._workspace,
-            (self._q, self._v, np.ascontiguousarray(ground), self._energy),
+            (self._q, self._v, ground, self._energy, self._settling),
         )
-        if unconverged_steps < 0:
+        self._overlap = max(self._overlap, overlap)
+        if is_crowded:
             raise DidNotConverge(
                 f"{len(self._simulation.bodies.owner)} pieces touch at more points than pieces in "
                 f"the plane can, near {self._time:.4g} s: blocks overlap by {self._overlap:.3g} m; "
                 f"give a smaller dt than {self._simulation.dt:g} s"
             )
-        self._overlap = max(self._overlap, overlap)
-        self._unconverged_steps += unconverged_steps
-        self._exchanged = max(self._exchanged, exchanged)
 
     def frame(self, time: float, resting: bool) -> FallFrame:
         """Return the present frame after checks of overlap and energy."""
         self._time = time
         self._check(time)
         energy = FallEnergy(*self._energy[:5].tolist())
-        results = energy, self._overlap, self._unconverged_steps, resting
-        return FallFrame(time, self._q.copy(), self._v.copy(), *results)
+        residual, *counts = self._settling.tolist()
+        settling = Settling(residual / self._weight_speed, *map(int, counts))
+        poses, velocities = self._q.copy(), self._v.copy()
+        return FallFrame(time, poses, velocities, energy, self._overlap, settling, resting)
 
     def _check(self, time: float) -> None:
         """Refuse blocks that pass through each other, and energy gained without work."""
@@ -282,12 +315,12 @@ class _Run:
                 f"{self._simulation.dt:g} s"
             )
         noise = ENERGY_GAIN_NOISE * structure.weight * structure.size
-        gained, allowed = self._energy[4], MAX_ENERGY_GAIN * self._exchanged + noise
+        gained, allowed = self._energy[4], MAX_ENERGY_GAIN * self._energy[6] + noise
         if not gained <= allowed:
             raise DidNotConverge(
                 f"by {time:.4g} s the blocks have gained {gained:.3g} J from nowhere, of "
-                f"{self._exchanged:.3g} J exchanged ({self._unconverged_steps} steps without "
-                f"convergence of impulses): give a smaller dt than {self._simulation.dt:g} s"
+                f"{self._energy[6]:.3g} J exchanged (impulses of {self._settling[1]:.0f} steps did "
+                f"not settle): give a smaller dt than {self._simulation.dt:g} s"
             )
 
 
@@ -295,36 +328,55 @@ class _Run:
 def advance_steps(bodies, parameters, workspace, state):  # type: ignore
     """Advance poses and velocities by steps, with their energies.
 
-    Returns the deepest overlap, the number of unconverged steps, and the largest energy exchanged.
+    Returns the deepest overlap, and whether there are too many contacts.
     """
-    q, v, ground, energy = state
-    overlap, unconverged, exchanged = 0.0, 0, 0.0
-    before = q.copy()
+    q, v, ground, energy, settling = state
+    contacts, overlap = workspace.contacts, 0.0
     for k in range(len(ground)):
-        before[:] = q
-        sweeps, deepest = take_step(bodies, parameters, workspace, q, v, ground[k])
-        if sweeps < 0:
-            return overlap, -1, exchanged
-        overlap = max(overlap, deepest)
-        unconverged += sweeps > parameters.max_sweeps
-        # work of the inertia forces of the ground motion, and potential energy of the weight
-        work, rise = 0.0, 0.0
-        for b in range(len(q)):
-            moved = q[b] - before[b]
-            mass = bodies.mass[b, 0]
-            work -= mass * (ground[k, 0] * moved[0] + ground[k, 1] * moved[1])
-            rise += mass * parameters.gravity * moved[1]
-        # the loss is the rest of the balance
+        before = q.copy()
+        touching, sweeps, residual = take_step(bodies, parameters, workspace, q, v, ground[k])
+        for j in range(touching):
+            overlap = max(overlap, -contacts.gap[j])
+        if touching < 0:
+            return overlap, True
+        settling[0] = max(settling[0], residual)
+        settling[1] += residual > parameters.tolerance
+        settling[2] += 1.0
+        settling[3] += sweeps
         kinetic = _kinetic_energy(bodies, v)
-        energy[3] += work - rise - (kinetic - energy[0])
+        rise, work = _exchange(bodies, parameters, q - before, ground[k])
+        # the loss is the rest of the balance
+        lost = energy[3] + work - rise - (kinetic - energy[0])
         energy[0] = kinetic
+        if _separate(bodies, parameters, workspace, touching):
+            # what lifts the blocks is taken from the losses of the step, and from a small share
+            # of all energy exchanged
+            moved = workspace.speeds[: len(q)]
+            lift, push = _exchange(bodies, parameters, moved, ground[k])
+            available = max(lost - energy[5] + 0.25 * MAX_ENERGY_GAIN * energy[6], 0.0)
+            factor = min(1.0, available / (lift - push)) if lift > push else 1.0
+            q += factor * moved
+            rise, work = rise + factor * lift, work + factor * push
+            lost -= factor * (lift - push)
         energy[1] += rise
         energy[2] += work
+        energy[3] = lost
         # a loss below its maximum is energy gained
-        energy[5] = max(energy[5], energy[3])
-        energy[4] = max(energy[4], energy[5] - energy[3])
-        exchanged = max(exchanged, kinetic + energy[3])
-    return overlap, unconverged, exchanged
+        energy[5] = max(energy[5], lost)
+        energy[4] = max(energy[4], energy[5] - lost)
+        energy[6] = max(energy[6], kinetic + lost)
+    return overlap, False
+
+
+@numba.njit(cache=True)
+def _exchange(bodies, parameters, moved, ground):  # type: ignore
+    """Return the rise of potential energy by displacements, and the work of inertia forces [J]."""
+    rise, work = 0.0, 0.0
+    for b in range(len(moved)):
+        mass = bodies.mass[b, 0]
+        rise += mass * parameters.gravity * moved[b, 1]
+        work -= mass * (ground[0] * moved[b, 0] + ground[1] * moved[b, 1])
+    return rise, work
 
 
 @numba.njit(cache=True)
@@ -339,7 +391,7 @@ def _kinetic_energy(bodies, v):  # type: ignore
 
 @numba.njit(cache=True)
 def take_step(bodies, parameters, workspace, q, v, ground):  # type: ignore
-    """Advance by one step; return the number of sweeps, -1 for too many contacts, and overlap."""
+    """Advance by one step; return the contacts, -1 for too many, the sweeps and the residual."""
     contacts, stored, middle, speeds = (
         workspace.contacts,
         workspace.stored,
@@ -352,12 +404,13 @@ def take_step(bodies, parameters, workspace, q, v, ground):  # type: ignore
     place_pieces(bodies, middle, workspace.world)
     touching = find_contacts(bodies, workspace.world, contacts)
     if touching < 0:
-        return -1, 0.0
+        return -1, -1, 0.0
     restore_impulses(bodies, middle, contacts, touching, stored)
     # targets follow from the velocities before the step, hence first
     speeds[:count] = v
     speeds[count] = 0.0
     _prepare_rows(bodies, parameters, workspace, touching)
+    rebounds = _add_rebounds(bodies, parameters, workspace, touching)
     # free velocities: inertia forces of the ground motion, and weight
     for b in range(count):
         if bodies.inverse_mass[b, 0] > 0.0:
@@ -365,20 +418,77 @@ def take_step(bodies, parameters, workspace, q, v, ground):  # type: ignore
             speeds[b, 1] -= parameters.dt * (parameters.gravity + ground[1])
     _apply_initial_impulses(bodies, workspace, touching)
     # unconverged impulses must not add energy: up to 40 times as many sweeps
+    tolerance, sweeps = parameters.tolerance, 0
     for _ in range(40):
-        sweeps = _sweep_contacts(bodies, parameters, workspace, touching)
-        if sweeps <= parameters.max_sweeps or not _adds_energy(
-            bodies, parameters, v, speeds, ground
-        ):
+        more, residual = _settle_impulses(
+            bodies, workspace, touching, tolerance, parameters.max_sweeps
+        )
+        sweeps += more
+        work, kinetic = _impulse_work(bodies, parameters, v, speeds, ground)
+        if residual <= tolerance or work <= 1e-5 * kinetic or rebounds:
             break
+    if rebounds and work > 0.0:
+        more, residual = _limit_rebounds(bodies, parameters, workspace, touching, (v, ground))
+        sweeps += more
     store_impulses(bodies, middle, contacts, touching, stored)
     # trapezoidal rule for the poses
     q += half * (v + speeds[:count])
     v[:] = speeds[:count]
-    overlap = 0.0
+    return touching, sweeps, residual
+
+
+@numba.njit(cache=True)
+def _limit_rebounds(bodies, parameters, workspace, touching, step):  # type: ignore
+    """Reduce all rebounds by one factor, so that the impulses of the step add no energy."""
+    contacts, speeds, rows = workspace.contacts, workspace.speeds, workspace.rows
+    rebounding, (before, ground) = workspace.rebounding, step
+    rebounding.speeds[:] = speeds
+    rebounding.impulse[:touching] = contacts.impulse[:touching]
+    rows[:touching, 6] -= rows[:touching, 10]
+    sweeps, residual = _settle_impulses(
+        bodies, workspace, touching, parameters.tolerance, parameters.max_sweeps
+    )
+    # The work is quadratic in the factor, not positive without rebounds and positive with all of
+    # them. Impulses between those two are admissible too, since cones of friction are convex.
+    least, _ = _impulse_work(bodies, parameters, before, speeds, ground)
+    most, _ = _impulse_work(bodies, parameters, before, rebounding.speeds, ground)
+    mean = 0.5 * (speeds + rebounding.speeds)
+    middle, _ = _impulse_work(bodies, parameters, before, mean, ground)
+    curvature = 2.0 * (least + most - 2.0 * middle)
+    slope = most - least - curvature
+    factor = 0.0
+    if least < 0.0:
+        factor = -2.0 * least / (slope + np.sqrt(slope**2 - 4.0 * curvature * least))
+    speeds += factor * (rebounding.speeds - speeds)
+    impulse = contacts.impulse[:touching]
+    impulse += factor * (rebounding.impulse[:touching] - impulse)
+    return sweeps, residual
+
+
+@numba.njit(cache=True)
+def _separate(bodies, parameters, workspace, touching):  # type: ignore
+    """Find displacements that reduce overlaps; return whether there are any, in `speeds`.
+
+    They are the least, weighted by mass, that undo a share of the overlaps beyond the admissible
+    one and cause no others. No velocity changes.
+    """
+    contacts, speeds, rows = workspace.contacts, workspace.speeds, workspace.rows
+    deepest, half = 0.0, 0.5 * parameters.dt
     for k in range(touching):
-        overlap = max(overlap, -contacts.gap[k])
-    return sweeps, overlap
+        a, b = contacts.bodies[k]
+        nx, ny = contacts.normal[k]
+        speed = _relative_speed(speeds, (a, b), (nx, ny), (rows[k, 0], rows[k, 1]))
+        excess = -bodies.slop - (contacts.gap[k] + half * speed)
+        deepest = max(deepest, excess)
+        # the displacement of the contact, and no friction
+        rows[k, 6] = 0.5 * excess if excess > 0.0 else excess
+        rows[k, 7] = rows[k, 8] = 0.0
+    if deepest <= 0.0:
+        return False
+    speeds[:] = 0.0
+    contacts.impulse[:touching] = 0.0
+    _settle_impulses(bodies, workspace, touching, 0.1 * bodies.slop, 50)
+    return True
 
 
 @numba.njit(cache=True)
@@ -397,19 +507,62 @@ def _prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
         nb, tb = xb * ny - yb * nx, xb * nx + yb * ny
         rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = na, nb, ta, tb
         # effective masses 1/(H M⁻¹ Hᵀ)
-        rows[k, 4] = 1.0 / (ma + mb + ia * na * na + ib * nb * nb)
-        rows[k, 5] = 1.0 / (ma + mb + ia * ta * ta + ib * tb * tb)
-        # Newton's impact law, without rebound of slow impacts
-        before = _relative_speed(speeds, (a, b), (nx, ny), (na, nb))
-        bounce = -parameters.restitution * before if before < -parameters.min_impact_speed else 0.0
+        rows[k, 11] = ma + mb + ia * na * na + ib * nb * nb
+        rows[k, 12] = ma + mb + ia * ta * ta + ib * tb * tb
+        rows[k, 4], rows[k, 5] = 1.0 / rows[k, 11], 1.0 / rows[k, 12]
         # Centripetal accelerations ω² r change the relative velocity in half a step by ½ Δt times
         # their difference. Targets hold at the end of the step: a block that turns about its corner
         # then conserves its energy to O(Δt²)
         spin_a, spin_b = speeds[a, 2] ** 2, speeds[b, 2] ** 2
         pull_x, pull_y = spin_a * xa - spin_b * xb, spin_a * ya - spin_b * yb
-        rows[k, 6] = bounce - 0.5 * parameters.dt * (pull_x * nx + pull_y * ny)
+        rows[k, 6] = -0.5 * parameters.dt * (pull_x * nx + pull_y * ny)
         rows[k, 7] = -0.5 * parameters.dt * (pull_y * nx - pull_x * ny)
         rows[k, 8] = bodies.friction[a, b]
+    for k in range(touching):
+        rows[k, 9] = rows[k, 13] = 0.0
+        if not _has_partner(contacts, k, touching):
+            continue
+        a, b = contacts.bodies[k]
+        (ma, ia), (mb, ib) = bodies.inverse_mass[a], bodies.inverse_mass[b]
+        rows[k, 9] = ma + mb + ia * rows[k, 0] * rows[k + 1, 0] + ib * rows[k, 1] * rows[k + 1, 1]
+        determinant = rows[k, 11] * rows[k + 1, 11] - rows[k, 9] ** 2
+        # points of a face that coincide are solved one after the other
+        if determinant > 1e-9 * rows[k, 11] * rows[k + 1, 11]:
+            rows[k, 13] = 1.0 / determinant
+
+
+@numba.njit(cache=True)
+def _add_rebounds(bodies, parameters, workspace, touching):  # type: ignore
+    """Add the rebounds of impacts to the target velocities; return whether there are any.
+
+    Newton's law applies to each contact. Where a face closes at one end, its other end opens by
+    the given share of the speed at which the face has turned: the impulse is distributed over
+    the face, with its resultant within the closing end.
+    """
+    contacts, rows, speeds = workspace.contacts, workspace.rows, workspace.speeds
+    any_rebound = False
+    for k in range(touching):
+        rows[k, 10] = 0.0
+    for k in range(touching):
+        a, b = contacts.bodies[k]
+        normal = contacts.normal[k, 0], contacts.normal[k, 1]
+        speed = _relative_speed(speeds, (a, b), normal, (rows[k, 0], rows[k, 1]))
+        ratio, is_end = bodies.rocking[a, b], k > 0 and _has_partner(contacts, k - 1, touching)
+        if ratio == 0.0 or not (is_end or _has_partner(contacts, k, touching)):
+            if speed < -parameters.min_impact_speed:
+                rows[k, 10] = -parameters.restitution * speed
+        elif not is_end:
+            other = _relative_speed(speeds, (a, b), normal, (rows[k + 1, 0], rows[k + 1, 1]))
+            # the speed common to both ends rebounds by Newton's law
+            if max(speed, other) < -parameters.min_impact_speed:
+                rows[k, 10] = rows[k + 1, 10] = -parameters.restitution * max(speed, other)
+            if min(speed, other) < -parameters.min_rocking_speed:
+                opening = k if speed > other else k + 1
+                rows[opening, 10] += ratio * abs(other - speed)
+    for k in range(touching):
+        rows[k, 6] += rows[k, 10]
+        any_rebound = any_rebound or rows[k, 10] > 0.0
+    return any_rebound
 
 
 @numba.njit(cache=True)
@@ -441,8 +594,8 @@ def _apply_impulse(bodies, speeds, pair, direction, arms, impulse):  # type: ign
 
 
 @numba.njit(cache=True)
-def _adds_energy(bodies, parameters, before, after, ground):  # type: ignore
-    """Return whether the impulses of a step have done positive work, beyond the tolerance."""
+def _impulse_work(bodies, parameters, before, after, ground):  # type: ignore
+    """Return the work of the impulses of a step, and the kinetic energy after it [J]."""
     work = kinetic = 0.0
     for b in range(len(before)):
         m, inertia = bodies.mass[b]
@@ -454,7 +607,7 @@ def _adds_energy(bodies, parameters, before, after, ground):  # type: ignore
         up = y1 - y0 + parameters.dt * (parameters.gravity + ground[1])
         work += 0.5 * m * (along * (x0 + x1) + up * (y0 + y1)) + 0.5 * inertia * (w1**2 - w0**2)
         kinetic += 0.5 * m * (x1**2 + y1**2) + 0.5 * inertia * w1**2
-    return work > parameters.tolerance * kinetic
+    return work, kinetic
 
 
 @numba.njit(cache=True)
@@ -470,29 +623,155 @@ def _apply_initial_impulses(bodies, workspace, touching):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _sweep_contacts(bodies, parameters, workspace, touching):  # type: ignore
-    """Sweep over the contacts until impulses converge; return the number of sweeps."""
-    contacts, speeds = workspace.contacts, workspace.speeds
-    for sweep in range(1, parameters.max_sweeps + 1):
-        change, largest = 0.0, 0.0
+def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # type: ignore
+    """Sweep with momentum until impulses settle; return the sweeps and the residual [m/s]."""
+    contacts, speeds, last, begun = (
+        workspace.contacts,
+        workspace.speeds,
+        workspace.last,
+        workspace.begun,
+    )
+    count = len(bodies.mass)
+    last.speeds[:] = speeds
+    last.impulse[:touching] = contacts.impulse[:touching]
+    weight, least, residual = 1.0, np.inf, 0.0
+    window, best, plain = np.inf, np.inf, False
+    for sweep in range(1, max_sweeps + 1):
+        begun[:] = speeds
+        residual = _sweep_contacts(bodies, workspace, touching)
+        if residual <= tolerance:
+            residual = _residual(bodies, workspace, touching)
+            if residual <= tolerance:
+                return sweep, residual
+        # where 50 sweeps have hardly improved the residual, the next 50 have no momentum
+        window = min(window, residual)
+        if sweep % 50 == 0:
+            plain = not plain and window > 0.8 * best
+            best, window = min(best, window), np.inf
+        # momentum that works against the last change, or that diverges, is dropped
+        against = 0.0
+        for b in range(count):
+            m, inertia = bodies.mass[b]
+            for axis in range(3):
+                against += (m if axis < 2 else inertia) * (
+                    (begun[b, axis] - speeds[b, axis]) * (speeds[b, axis] - last.speeds[b, axis])
+                )
+        if against > 0.0 or residual > 4.0 * least or plain:
+            weight, least = 1.0, residual
+        least = min(least, residual)
+        before, weight = weight, 0.5 + np.sqrt(0.25 + weight**2)
+        share = (before - 1.0) / weight
+        for b in range(count):
+            for axis in range(3):
+                new = speeds[b, axis]
+                speeds[b, axis] += share * (new - last.speeds[b, axis])
+                last.speeds[b, axis] = new
         for k in range(touching):
-            a, b = contacts.bodies[k]
-            nx, ny = contacts.normal[k]
-            na, nb, ta, tb, kn, kt, target, slip, friction = workspace.rows[k]
-            # normal impulse, projected on P_N >= 0
-            old = contacts.impulse[k, 0]
-            speed = _relative_speed(speeds, (a, b), (nx, ny), (na, nb))
-            new = max(old - kn * (speed - target), 0.0)
-            _apply_impulse(bodies, speeds, (a, b), (nx, ny), (na, nb), new - old)
-            contacts.impulse[k, 0] = new
-            change, largest = max(change, abs(new - old)), max(largest, new)
-            # tangential impulse, projected on the friction cone of the new normal impulse
-            old, limit = contacts.impulse[k, 1], friction * new
-            speed = _relative_speed(speeds, (a, b), (-ny, nx), (ta, tb))
-            new = min(max(old - kt * (speed - slip), -limit), limit)
-            _apply_impulse(bodies, speeds, (a, b), (-ny, nx), (ta, tb), new - old)
-            contacts.impulse[k, 1] = new
-            change = max(change, abs(new - old))
-        if change <= parameters.tolerance * largest:
-            return sweep
-    return parameters.max_sweeps + 1
+            for axis in range(2):
+                new = contacts.impulse[k, axis]
+                contacts.impulse[k, axis] += share * (new - last.impulse[k, axis])
+                last.impulse[k, axis] = new
+    speeds[:] = last.speeds
+    contacts.impulse[:touching] = last.impulse[:touching]
+    return max_sweeps, _residual(bodies, workspace, touching)
+
+
+@numba.njit(cache=True)
+def _has_partner(contacts, k, touching):  # type: ignore
+    """Return whether a contact and the next one are the two points of one face."""
+    return k + 1 < touching and contacts.key[k] == contacts.key[k + 1]
+
+
+@numba.njit(cache=True)
+def _sweep_contacts(bodies, workspace, touching):  # type: ignore
+    """Sweep once over the faces; return the largest violation of a contact found [m/s]."""
+    # single elements are read, since views of rows cost more than the arithmetic
+    pairs, normals, impulse = (
+        workspace.contacts.bodies,
+        workspace.contacts.normal,
+        workspace.contacts.impulse,
+    )
+    speeds, rows, inverse_mass = workspace.speeds, workspace.rows, bodies.inverse_mass
+    worst, k = 0.0, 0
+    while k < touching:
+        a, b, nx, ny = pairs[k, 0], pairs[k, 1], normals[k, 0], normals[k, 1]
+        ma, ia, mb, ib = (
+            inverse_mass[a, 0],
+            inverse_mass[a, 1],
+            inverse_mass[b, 0],
+            inverse_mass[b, 1],
+        )
+        wa, wb = speeds[a, 2], speeds[b, 2]
+        # relative velocity, normal and tangential
+        x, y = speeds[b, 0] - speeds[a, 0], speeds[b, 1] - speeds[a, 1]
+        along, across = y * nx - x * ny, x * nx + y * ny
+        # normal impulses, projected on P_N >= 0, of the two points of a face at once
+        old = impulse[k, 0]
+        gap = across + rows[k, 1] * wb - rows[k, 0] * wa - rows[k, 6]
+        new = max(old - rows[k, 4] * gap, 0.0)
+        worst = max(worst, abs(new - old) * rows[k, 11])
+        end, normal = k + 1, 0.0
+        if rows[k, 13] > 0.0:
+            end, old2 = k + 2, impulse[k + 1, 0]
+            gap2 = across + rows[k + 1, 1] * wb - rows[k + 1, 0] * wa - rows[k + 1, 6]
+            new2 = max(old2 - rows[k + 1, 4] * gap2, 0.0)
+            worst = max(worst, abs(new2 - old2) * rows[k + 1, 11])
+            # relative velocities without these impulses
+            one, two, coupling = rows[k, 11], rows[k + 1, 11], rows[k, 9]
+            gap -= one * old + coupling * old2
+            gap2 -= coupling * old + two * old2
+            new = (coupling * gap2 - two * gap) * rows[k, 13]
+            new2 = (coupling * gap - one * gap2) * rows[k, 13]
+            # one end opens, or both
+            if new < 0.0 or new2 < 0.0:
+                new, new2 = max(-gap * rows[k, 4], 0.0), 0.0
+                if coupling * new + gap2 < 0.0:
+                    new, new2 = 0.0, max(-gap2 * rows[k + 1, 4], 0.0)
+            impulse[k + 1, 0] = new2
+            normal = new2 - old2
+            wa -= ia * rows[k + 1, 0] * normal
+            wb += ib * rows[k + 1, 1] * normal
+        impulse[k, 0] = new
+        wa -= ia * rows[k, 0] * (new - old)
+        wb += ib * rows[k, 1] * (new - old)
+        normal += new - old
+        # tangential impulses, projected on the friction cone of the new normal impulse
+        tangential = 0.0
+        for j in range(k, end):
+            old, limit = impulse[j, 1], rows[j, 8] * impulse[j, 0]
+            slip = along + rows[j, 3] * wb - rows[j, 2] * wa - rows[j, 7]
+            change = min(max(old - rows[j, 5] * slip, -limit), limit) - old
+            worst = max(worst, abs(change) * rows[j, 12])
+            impulse[j, 1] = old + change
+            along += (ma + mb) * change
+            wa -= ia * rows[j, 2] * change
+            wb += ib * rows[j, 3] * change
+            tangential += change
+        px, py = normal * nx - tangential * ny, normal * ny + tangential * nx
+        speeds[a, 0] -= ma * px
+        speeds[a, 1] -= ma * py
+        speeds[a, 2] = wa
+        speeds[b, 0] += mb * px
+        speeds[b, 1] += mb * py
+        speeds[b, 2] = wb
+        k = end
+    return worst
+
+
+@numba.njit(cache=True)
+def _residual(bodies, workspace, touching):  # type: ignore
+    """Return the largest violation of a contact's condition, as a velocity [m/s]."""
+    contacts, speeds = workspace.contacts, workspace.speeds
+    worst = 0.0
+    for k in range(touching):
+        a, b = contacts.bodies[k]
+        nx, ny = contacts.normal[k]
+        na, nb, ta, tb, kn, kt, target, slip, friction = workspace.rows[k, :9]
+        normal, tangential = contacts.impulse[k]
+        speed = _relative_speed(speeds, (a, b), (nx, ny), (na, nb)) - target
+        worst = max(worst, abs(max(normal - kn * speed, 0.0) - normal) / kn)
+        speed = _relative_speed(speeds, (a, b), (-ny, nx), (ta, tb)) - slip
+        limit = friction * normal
+        change = min(max(tangential - kt * speed, -limit), limit) - tangential
+        worst = max(worst, abs(change) / kt)
+    return worst
