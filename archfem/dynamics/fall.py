@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
-from archfem.dynamics.rigid_body.bodies import LooseBlocks, make_bodies
+from archfem.dynamics.rigid_body.bodies import FallFrame, LooseBlocks, make_bodies
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
 from archfem.dynamics.state import Batch, State
 from archfem.errors import InvalidInput
@@ -227,15 +227,22 @@ def is_overturning(model: Model, state: State, min_rotation: float = 0.05) -> bo
 
 
 def simulate_fall(
-    model: Model, start: State, state: State, motion: Motion, settling_time: float = 20.0
+    model: Model,
+    start: State,
+    state: State,
+    motion: Motion,
+    rocking_ratio: float | None = None,
+    settling_time: float = 20.0,
 ) -> tuple[xr.Dataset, CollapseState]:
     """Follow loose blocks until they rest, or until `settling_time` after the motion has ended [s].
 
-    Displacements count from the start of the run.
+    Displacements count from the start of the run. The ratio is that of `RigidBlockSimulation`.
     """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + settling_time
-    simulation = RigidBlockSimulation(_with_sliding_joints(model.structure))
+    simulation = RigidBlockSimulation(
+        _with_sliding_joints(model.structure), rocking_ratio=rocking_ratio
+    )
     frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
     poses, _ = model.rigid_motions(start.q, start.velocity)
     fall = classify_collapse(model.structure, frames, poses)
@@ -243,11 +250,12 @@ def simulate_fall(
 
 
 def _fall_dataset(
-    frames: Sequence[LooseBlocks], motion: Motion, released: ReleasedBlocks
+    frames: Sequence[FallFrame], motion: Motion, released: ReleasedBlocks
 ) -> xr.Dataset:
     """Return the frames of a fall as a dataset."""
     times = np.array([frame.time for frame in frames])
     poses = np.array([frame.poses for frame in frames])
+    settling = frames[-1].settling
     attributes = {
         "long_name": "displacement of a block's centroid, and its turn, from where it was built",
         "units": "m, m, rad",
@@ -262,6 +270,8 @@ def _fall_dataset(
         {
             "handover_strain": released.strain_energy,
             "handover_kinetic": np.array([released.kinetic_before, released.kinetic_after]),
+            "fall_residual": settling.residual,
+            "fall_unsettled": settling.unsettled_share,
         },
     )
 

@@ -79,14 +79,15 @@ def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypat
     calls = []
 
     class Simulation:
-        def __init__(self, structure):
+        def __init__(self, structure, rocking_ratio):
             calls.append(structure)
 
         def frames(self, start, end, motion, *, spacing):
             calls.append((start, end, spacing))
             yield start
 
-    start = SimpleNamespace(time=1.0, poses=np.zeros((3, 3)))
+    settling = SimpleNamespace(residual=0.25, unsettled_share=0.5)
+    start = SimpleNamespace(time=1.0, poses=np.zeros((3, 3)), settling=settling)
     released = fall.ReleasedBlocks(start, 0.5, 2.0, 1.5)
     monkeypatch.setattr(fall, "release_blocks", lambda model, state: released)
     monkeypatch.setattr(fall, "RigidBlockSimulation", Simulation)
@@ -101,6 +102,7 @@ def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypat
         assert count == 1
     assert dataset["fall_ground"].values == pytest.approx(np.array([[0.1, 0.0]]))
     assert dataset.attrs["handover_kinetic"].tolist() == [2.0, 1.5]
+    assert (dataset.attrs["fall_residual"], dataset.attrs["fall_unsettled"]) == (0.25, 0.5)
 
 
 def test_loose_stones_rub_as_their_joints_did_or_by_six_tenths():
