@@ -353,7 +353,7 @@ def restitution_damping(
 
     It is found by runs of the block, as by `restitution`, to 1e-4 of r. It holds for one block and
     contact only: the impact on a stiffer joint is shorter. With large displacements r is the same
-    to 0.005. Where stones come loose, the fall goes on with the coefficient as ratio of rocking faces.
+    to 0.005. Where stones come loose, they rock on with the coefficient (`rocking_ratio`).
 
     Args:
         coefficient: restitution, ω after over ω before [-]; None is Housner's, 1 - 3/2 sin² α.

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from loose_blocks import G, floor
 
 import archfem as af
@@ -17,6 +18,7 @@ from archfem.dynamics.fall import (
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
 from archfem.dynamics.state import State
+from archfem.dynamics.time_history import _doubt_impulses
 
 BREADTH = 0.5
 
@@ -288,3 +290,13 @@ def test_a_block_is_lost_once_it_has_sunk_or_turned():
 def test_a_run_without_frames_is_refused():
     with pytest.raises(af.errors.InvalidInput, match="no frames"):
         classify_collapse(floor((0.0, 0.0, 0.5, 2.0)), [])
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.02, 0), (0.03, 1)])
+def test_a_fall_whose_impulses_did_not_settle_is_doubted(share, count):
+    history = SimpleNamespace(
+        dataset=xr.Dataset(attrs={"fall_unsettled": share, "fall_residual": 0.2})
+    )
+    doubts = _doubt_impulses(history)
+    assert len(doubts) == count
+    assert all("did not settle in 3% of the steps" in doubt.cause for doubt in doubts)

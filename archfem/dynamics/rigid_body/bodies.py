@@ -200,9 +200,7 @@ def _friction_table(structure: Structure, default: float | None) -> Array:
     return np.minimum(np.where(has_joint, table, general), 1e3)
 
 
-def _rocking_table(
-    structure: Structure, ratio: float | Mapping[str, float] | None
-) -> Array:
+def _rocking_table(structure: Structure, ratio: float | Mapping[str, float] | None) -> Array:
     """Return ratios of speeds of rocking faces between any two bodies, zero where none is given."""
     count = len(structure.blocks) + 1
     if not isinstance(ratio, Mapping):

@@ -6,9 +6,11 @@ middle of the step, q + ½ Δt v,
     M (v₁ - v₀) = Δt p + Hᵀ P,   0 <= u_N1 + e u_N0 ⊥ P_N >= 0,   q₁ = q₀ + ½ Δt (v₀ + v₁),
 
 |P_T| <= μ P_N, and P_T opposes u_T1 where that is not zero (Moreau, in: Nonsmooth Mechanics and
-Applications, 1988; Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235). Projected Gauss-Seidel
-sweeps over the contacts solve for the impulses P, from those of the step before. Impulses that do
-no work need not converge within a step; sweeps continue while unconverged impulses add energy.
+Applications, 1988; Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235). Sweeps over the faces,
+each with both of its points at once, solve for the impulses P, from those of the step before. They
+have momentum with restart (Nesterov, Soviet Math. Dokl. 27 (1983) 372; O'Donoghue and Candès, Found.
+Comput. Math. 15 (2015) 715), and end once no contact violates its conditions by more than a stated
+speed. Rebounds are reduced where they would add energy; overlaps are corrected in positions alone.
 """
 
 from collections.abc import Iterator, Mapping
@@ -102,8 +104,6 @@ class StepWorkspace(NamedTuple):
     begun: Array  # velocities at the start of a sweep (b + 1, 3)
     last: SweepResult  # of the sweep before
     rebounding: SweepResult  # with rebound
-
-
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,7 +274,9 @@ class _Run:
     def advance(self, ground: Array) -> None:
         """Advance by steps with ground accelerations (steps, 2) [m/s²]."""
         if self._is_first:
-            strict = self._parameters._replace(max_sweeps=FIRST_STEP_SWEEPS, tolerance=1e-3*self._parameters.tolerance)
+            strict = self._parameters._replace(
+                max_sweeps=FIRST_STEP_SWEEPS, tolerance=1e-3 * self._parameters.tolerance
+            )
             self._advance(ground[:1], strict)
             self._is_first, ground = False, ground[1:]
         self._advance(ground, self._parameters)
@@ -642,7 +644,6 @@ def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # typ
         workspace.last,
         workspace.begun,
     )
-    count = len(bodies.mass)
     last.speeds[:] = speeds
     last.impulse[:touching] = contacts.impulse[:touching]
     weight, least, residual = 1.0, np.inf, 0.0
@@ -660,31 +661,44 @@ def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # typ
             plain = not plain and window > best and sweep >= 150
             best, window = min(best, window), np.inf
         # momentum that works against the last change, or that diverges, is dropped
-        against = 0.0
-        for b in range(count):
-            m, inertia = bodies.mass[b]
-            for axis in range(3):
-                against += (m if axis < 2 else inertia) * (
-                    (begun[b, axis] - speeds[b, axis]) * (speeds[b, axis] - last.speeds[b, axis])
-                )
-        if against > 0.0 or residual > 4.0 * least or plain:
+        if plain or residual > 4.0 * least or _turns_back(bodies, workspace):
             weight, least = 1.0, residual
         least = min(least, residual)
         before, weight = weight, 0.5 + np.sqrt(0.25 + weight**2)
-        share = (before - 1.0) / weight
-        for b in range(count):
-            for axis in range(3):
-                new = speeds[b, axis]
-                speeds[b, axis] += share * (new - last.speeds[b, axis])
-                last.speeds[b, axis] = new
-        for k in range(touching):
-            for axis in range(2):
-                new = contacts.impulse[k, axis]
-                contacts.impulse[k, axis] += share * (new - last.impulse[k, axis])
-                last.impulse[k, axis] = new
+        _add_momentum(workspace, touching, (before - 1.0) / weight)
     speeds[:] = last.speeds
     contacts.impulse[:touching] = last.impulse[:touching]
     return max_sweeps, _residual(bodies, workspace, touching)
+
+
+@numba.njit(cache=True)
+def _turns_back(bodies, workspace):  # type: ignore
+    """Return whether a sweep opposes the momentum with which it began, weighted by mass."""
+    speeds, begun, last = workspace.speeds, workspace.begun, workspace.last.speeds
+    product = 0.0
+    for b in range(len(bodies.mass)):
+        for axis in range(3):
+            mass = bodies.mass[b, 1 if axis == 2 else 0]
+            new = speeds[b, axis]
+            product += mass * (begun[b, axis] - new) * (new - last[b, axis])
+    return product > 0.0
+
+
+@numba.njit(cache=True)
+def _add_momentum(workspace, touching, share):  # type: ignore
+    """Continue the change between two sweeps by a share of it (Nesterov)."""
+    speeds, impulse, last = workspace.speeds, workspace.contacts.impulse, workspace.last
+    # velocities are linear in the impulses, and need no pass over the contacts
+    for b in range(len(speeds)):
+        for axis in range(3):
+            new = speeds[b, axis]
+            speeds[b, axis] += share * (new - last.speeds[b, axis])
+            last.speeds[b, axis] = new
+    for k in range(touching):
+        for axis in range(2):
+            new = impulse[k, axis]
+            impulse[k, axis] += share * (new - last.impulse[k, axis])
+            last.impulse[k, axis] = new
 
 
 @numba.njit(cache=True)
