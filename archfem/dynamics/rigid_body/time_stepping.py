@@ -8,9 +8,9 @@ middle of the step, q + ½ Δt v,
 |P_T| <= μ P_N, and P_T opposes u_T1 where that is not zero (Moreau, in: Nonsmooth Mechanics and
 Applications, 1988; Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235). Sweeps over the faces,
 each with both of its points at once, solve for the impulses P, from those of the step before. They
-have momentum with restart (Nesterov, Soviet Math. Dokl. 27 (1983) 372; O'Donoghue and Candès, Found.
-Comput. Math. 15 (2015) 715), and end once no contact violates its conditions by more than a stated
-speed. Rebounds are reduced where they would add energy; overlaps are corrected in positions alone.
+have momentum with restart (Nesterov, Soviet Math. Dokl. 27 (1983) 372; O'Donoghue and Candès,
+Found. Comput. Math. 15 (2015) 715), and end once no contact violates its conditions by more than a
+stated speed. Rebounds are reduced where they would add energy. Overlaps are corrected in positions.
 """
 
 from collections.abc import Iterator, Mapping
@@ -41,9 +41,15 @@ from archfem.dynamics.rigid_body.contact_detection import (
     allocate_contacts,
     allocate_pieces,
     allocate_stored_impulses,
+    apply_initial_impulses,
     find_contacts,
+    has_partner,
+    measure_residual,
     place_pieces,
+    prepare_rows,
+    relative_speed,
     restore_impulses,
+    solve_face,
     store_impulses,
 )
 from archfem.errors import DidNotConverge, InvalidInput
@@ -235,7 +241,9 @@ class _Run:
         # impacts below 0.05 m/s, the speed of a fall by 0.13 mm, do not bounce
         self._parameters = StepParameters(
             *(simulation.dt, simulation.structure.gravity, simulation.restitution),
-            *(0.05, 2.0 * weight_speed, MAX_SWEEPS, SETTLED * weight_speed),
+            *(0.05, 2.0 * weight_speed),
+            MAX_SWEEPS,
+            SETTLED * weight_speed,
             ENERGY_GAIN_NOISE * simulation.structure.weight * simulation.structure.size,
         )
         self._is_first = True
@@ -400,32 +408,11 @@ def _kinetic_energy(bodies, v):  # type: ignore
 @numba.njit(cache=True)
 def take_step(bodies, parameters, workspace, state):  # type: ignore
     """Advance by one step; return the contacts, -1 for too many, the sweeps and the residual."""
-    contacts, stored, middle, speeds = (
-        workspace.contacts,
-        workspace.stored,
-        workspace.middle,
-        workspace.speeds,
-    )
+    contacts, middle, speeds = workspace.contacts, workspace.middle, workspace.speeds
     q, v, ground, strict = state
-    # contacts at the middle of the step, with the impulses of the step before
-    half, count = 0.5 * parameters.dt, len(q)
-    middle[:] = q + half * v
-    place_pieces(bodies, middle, workspace.world)
-    touching = find_contacts(bodies, workspace.world, contacts)
+    touching, rebounds = _begin_step(bodies, parameters, workspace, (q, v, ground))
     if touching < 0:
         return -1, -1, 0.0
-    restore_impulses(bodies, middle, contacts, touching, stored)
-    # targets follow from the velocities before the step, hence first
-    speeds[:count] = v
-    speeds[count] = 0.0
-    _prepare_rows(bodies, parameters, workspace, touching)
-    rebounds = _add_rebounds(bodies, parameters, workspace, touching)
-    # free velocities: inertia forces of the ground motion, and weight
-    for b in range(count):
-        if bodies.inverse_mass[b, 0] > 0.0:
-            speeds[b, 0] -= parameters.dt * ground[0]
-            speeds[b, 1] -= parameters.dt * (parameters.gravity + ground[1])
-    _apply_initial_impulses(bodies, workspace, touching)
     # impulses that add energy settle further: up to 40 times as many sweeps
     tolerance, sweeps = parameters.tolerance, 0
     for _ in range(40):
@@ -443,11 +430,38 @@ def take_step(bodies, parameters, workspace, state):  # type: ignore
     if rebounds and work > 0.0:
         more, residual = _limit_rebounds(bodies, parameters, workspace, touching, (v, ground))
         sweeps += more
-    store_impulses(bodies, middle, contacts, touching, stored)
+    store_impulses(bodies, middle, contacts, touching, workspace.stored)
     # trapezoidal rule for the poses
-    q += half * (v + speeds[:count])
-    v[:] = speeds[:count]
+    q += 0.5 * parameters.dt * (v + speeds[: len(q)])
+    v[:] = speeds[: len(q)]
     return touching, sweeps, residual
+
+
+@numba.njit(cache=True)
+def _begin_step(bodies, parameters, workspace, state):  # type: ignore
+    """Find contacts, and velocities with the impulses of the step before; return rebounds too."""
+    q, v, ground = state
+    contacts, middle, speeds = workspace.contacts, workspace.middle, workspace.speeds
+    # contacts at the middle of the step, with the impulses of the step before
+    half, count = 0.5 * parameters.dt, len(q)
+    middle[:] = q + half * v
+    place_pieces(bodies, middle, workspace.world)
+    touching = find_contacts(bodies, workspace.world, contacts)
+    if touching < 0:
+        return -1, False
+    restore_impulses(bodies, middle, contacts, touching, workspace.stored)
+    # targets follow from the velocities before the step, hence first
+    speeds[:count] = v
+    speeds[count] = 0.0
+    prepare_rows(bodies, parameters, workspace, touching)
+    rebounds = _add_rebounds(bodies, parameters, workspace, touching)
+    # free velocities: inertia forces of the ground motion, and weight
+    for b in range(count):
+        if bodies.inverse_mass[b, 0] > 0.0:
+            speeds[b, 0] -= parameters.dt * ground[0]
+            speeds[b, 1] -= parameters.dt * (parameters.gravity + ground[1])
+    apply_initial_impulses(bodies, workspace, touching)
+    return touching, rebounds
 
 
 @numba.njit(cache=True)
@@ -490,7 +504,7 @@ def _separate(bodies, parameters, workspace, touching):  # type: ignore
     for k in range(touching):
         a, b = contacts.bodies[k]
         nx, ny = contacts.normal[k]
-        speed = _relative_speed(speeds, (a, b), (nx, ny), (rows[k, 0], rows[k, 1]))
+        speed = relative_speed(speeds, (a, b), (nx, ny), (rows[k, 0], rows[k, 1]))
         excess = -bodies.slop - (contacts.gap[k] + half * speed)
         deepest = max(deepest, excess)
         # the displacement of the contact, and no friction
@@ -502,46 +516,6 @@ def _separate(bodies, parameters, workspace, touching):  # type: ignore
     contacts.impulse[:touching] = 0.0
     _settle_impulses(bodies, workspace, touching, 0.1 * bodies.slop, 50)
     return True
-
-
-@numba.njit(cache=True)
-def _prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
-    """Compute the rows of H, their inverse effective masses, and the target velocities."""
-    contacts, rows = workspace.contacts, workspace.rows
-    speeds, middle = workspace.speeds, workspace.middle
-    for k in range(touching):
-        a, b = contacts.bodies[k]
-        nx, ny = contacts.normal[k]
-        (ma, ia), (mb, ib) = bodies.inverse_mass[a], bodies.inverse_mass[b]
-        # moment arms of normal (n) and tangential (t) impulses
-        xa, ya = _arm(bodies, middle, contacts.point[k], a)
-        xb, yb = _arm(bodies, middle, contacts.point[k], b)
-        na, ta = xa * ny - ya * nx, xa * nx + ya * ny
-        nb, tb = xb * ny - yb * nx, xb * nx + yb * ny
-        rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = na, nb, ta, tb
-        # effective masses 1/(H M⁻¹ Hᵀ)
-        rows[k, 11] = ma + mb + ia * na * na + ib * nb * nb
-        rows[k, 12] = ma + mb + ia * ta * ta + ib * tb * tb
-        rows[k, 4], rows[k, 5] = 1.0 / rows[k, 11], 1.0 / rows[k, 12]
-        # Centripetal accelerations ω² r change the relative velocity in half a step by ½ Δt times
-        # their difference. Targets hold at the end of the step: a block that turns about its corner
-        # then conserves its energy to O(Δt²)
-        spin_a, spin_b = speeds[a, 2] ** 2, speeds[b, 2] ** 2
-        pull_x, pull_y = spin_a * xa - spin_b * xb, spin_a * ya - spin_b * yb
-        rows[k, 6] = -0.5 * parameters.dt * (pull_x * nx + pull_y * ny)
-        rows[k, 7] = -0.5 * parameters.dt * (pull_y * nx - pull_x * ny)
-        rows[k, 8] = bodies.friction[a, b]
-    for k in range(touching):
-        rows[k, 9] = rows[k, 13] = 0.0
-        if not _has_partner(contacts, k, touching):
-            continue
-        a, b = contacts.bodies[k]
-        (ma, ia), (mb, ib) = bodies.inverse_mass[a], bodies.inverse_mass[b]
-        rows[k, 9] = ma + mb + ia * rows[k, 0] * rows[k + 1, 0] + ib * rows[k, 1] * rows[k + 1, 1]
-        determinant = rows[k, 11] * rows[k + 1, 11] - rows[k, 9] ** 2
-        # points of a face that coincide are solved one after the other
-        if determinant > 1e-9 * rows[k, 11] * rows[k + 1, 11]:
-            rows[k, 13] = 1.0 / determinant
 
 
 @numba.njit(cache=True)
@@ -559,13 +533,13 @@ def _add_rebounds(bodies, parameters, workspace, touching):  # type: ignore
     for k in range(touching):
         a, b = contacts.bodies[k]
         normal = contacts.normal[k, 0], contacts.normal[k, 1]
-        speed = _relative_speed(speeds, (a, b), normal, (rows[k, 0], rows[k, 1]))
-        ratio, is_end = bodies.rocking[a, b], k > 0 and _has_partner(contacts, k - 1, touching)
-        if ratio == 0.0 or not (is_end or _has_partner(contacts, k, touching)):
+        speed = relative_speed(speeds, (a, b), normal, (rows[k, 0], rows[k, 1]))
+        ratio, is_end = bodies.rocking[a, b], k > 0 and has_partner(contacts, k - 1, touching)
+        if ratio == 0.0 or not (is_end or has_partner(contacts, k, touching)):
             if speed < -parameters.min_impact_speed:
                 rows[k, 10] = -parameters.restitution * speed
         elif not is_end:
-            other = _relative_speed(speeds, (a, b), normal, (rows[k + 1, 0], rows[k + 1, 1]))
+            other = relative_speed(speeds, (a, b), normal, (rows[k + 1, 0], rows[k + 1, 1]))
             # the speed common to both ends rebounds by Newton's law
             if max(speed, other) < -parameters.min_impact_speed:
                 rows[k, 10] = rows[k + 1, 10] = -parameters.restitution * max(speed, other)
@@ -576,34 +550,6 @@ def _add_rebounds(bodies, parameters, workspace, touching):  # type: ignore
         rows[k, 6] += rows[k, 10]
         any_rebound = any_rebound or rows[k, 10] > 0.0
     return any_rebound
-
-
-@numba.njit(cache=True)
-def _arm(bodies, q, point, body):  # type: ignore
-    """Return the vector from a body's centroid to a point; zero for the ground, which is fixed."""
-    if body == len(q):
-        return 0.0, 0.0
-    x = point[0] - bodies.centre[body, 0] - q[body, 0]
-    return x, point[1] - bodies.centre[body, 1] - q[body, 1]
-
-
-@numba.njit(cache=True)
-def _relative_speed(speeds, pair, direction, arms):  # type: ignore
-    """Return the velocity of the second body relative to the first along a direction."""
-    one, two = speeds[pair[0]], speeds[pair[1]]
-    translation = (two[0] - one[0]) * direction[0] + (two[1] - one[1]) * direction[1]
-    return translation + arms[1] * two[2] - arms[0] * one[2]
-
-
-@numba.njit(cache=True)
-def _apply_impulse(bodies, speeds, pair, direction, arms, impulse):  # type: ignore
-    """Apply an impulse along a direction to the second body, and its reaction to the first."""
-    for side in range(2):
-        m, inertia = bodies.inverse_mass[pair[side]]
-        body, signed = speeds[pair[side]], impulse if side else -impulse
-        body[0] += m * direction[0] * signed
-        body[1] += m * direction[1] * signed
-        body[2] += inertia * arms[side] * signed
 
 
 @numba.njit(cache=True)
@@ -624,26 +570,10 @@ def _impulse_work(bodies, parameters, before, after, ground):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _apply_initial_impulses(bodies, workspace, touching):  # type: ignore
-    """Apply the impulses of the step before, as initial guess of the sweeps."""
-    contacts, speeds = workspace.contacts, workspace.speeds
-    for k in range(touching):
-        a, b = contacts.bodies[k]
-        nx, ny = contacts.normal[k]
-        na, nb, ta, tb = workspace.rows[k, :4]
-        _apply_impulse(bodies, speeds, (a, b), (nx, ny), (na, nb), contacts.impulse[k, 0])
-        _apply_impulse(bodies, speeds, (a, b), (-ny, nx), (ta, tb), contacts.impulse[k, 1])
-
-
-@numba.njit(cache=True)
 def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # type: ignore
     """Sweep with momentum until impulses settle; return the sweeps and the residual [m/s]."""
-    contacts, speeds, last, begun = (
-        workspace.contacts,
-        workspace.speeds,
-        workspace.last,
-        workspace.begun,
-    )
+    contacts, speeds = workspace.contacts, workspace.speeds
+    last, begun = workspace.last, workspace.begun
     last.speeds[:] = speeds
     last.impulse[:touching] = contacts.impulse[:touching]
     weight, least, residual = 1.0, np.inf, 0.0
@@ -652,7 +582,7 @@ def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # typ
         begun[:] = speeds
         residual = _sweep_contacts(bodies, workspace, touching)
         if residual <= tolerance:
-            residual = _residual(bodies, workspace, touching)
+            residual = measure_residual(bodies, workspace, touching)
             if residual <= tolerance:
                 return sweep, residual
         # where 50 late sweeps have not improved the residual, the next 50 have no momentum
@@ -668,7 +598,7 @@ def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # typ
         _add_momentum(workspace, touching, (before - 1.0) / weight)
     speeds[:] = last.speeds
     contacts.impulse[:touching] = last.impulse[:touching]
-    return max_sweeps, _residual(bodies, workspace, touching)
+    return max_sweeps, measure_residual(bodies, workspace, touching)
 
 
 @numba.njit(cache=True)
@@ -702,30 +632,17 @@ def _add_momentum(workspace, touching, share):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _has_partner(contacts, k, touching):  # type: ignore
-    """Return whether a contact and the next one are the two points of one face."""
-    return k + 1 < touching and contacts.key[k] == contacts.key[k + 1]
-
-
-@numba.njit(cache=True)
 def _sweep_contacts(bodies, workspace, touching):  # type: ignore
     """Sweep once over the faces; return the largest violation of a contact found [m/s]."""
     # single elements are read, since views of rows cost more than the arithmetic
-    pairs, normals, impulse = (
-        workspace.contacts.bodies,
-        workspace.contacts.normal,
-        workspace.contacts.impulse,
-    )
-    speeds, rows, inverse_mass = workspace.speeds, workspace.rows, bodies.inverse_mass
+    contacts, speeds, rows = workspace.contacts, workspace.speeds, workspace.rows
+    pairs, normals, impulse = contacts.bodies, contacts.normal, contacts.impulse
+    inverse_mass = bodies.inverse_mass
     worst, k = 0.0, 0
     while k < touching:
         a, b, nx, ny = pairs[k, 0], pairs[k, 1], normals[k, 0], normals[k, 1]
-        ma, ia, mb, ib = (
-            inverse_mass[a, 0],
-            inverse_mass[a, 1],
-            inverse_mass[b, 0],
-            inverse_mass[b, 1],
-        )
+        ma, ia = inverse_mass[a, 0], inverse_mass[a, 1]
+        mb, ib = inverse_mass[b, 0], inverse_mass[b, 1]
         wa, wb = speeds[a, 2], speeds[b, 2]
         # relative velocity, normal and tangential
         x, y = speeds[b, 0] - speeds[a, 0], speeds[b, 1] - speeds[a, 1]
@@ -741,17 +658,8 @@ def _sweep_contacts(bodies, workspace, touching):  # type: ignore
             gap2 = across + rows[k + 1, 1] * wb - rows[k + 1, 0] * wa - rows[k + 1, 6]
             new2 = max(old2 - rows[k + 1, 4] * gap2, 0.0)
             worst = max(worst, abs(new2 - old2) * rows[k + 1, 11])
-            # relative velocities without these impulses
-            one, two, coupling = rows[k, 11], rows[k + 1, 11], rows[k, 9]
-            gap -= one * old + coupling * old2
-            gap2 -= coupling * old + two * old2
-            new = (coupling * gap2 - two * gap) * rows[k, 13]
-            new2 = (coupling * gap - one * gap2) * rows[k, 13]
-            # one end opens, or both
-            if new < 0.0 or new2 < 0.0:
-                new, new2 = max(-gap * rows[k, 4], 0.0), 0.0
-                if coupling * new + gap2 < 0.0:
-                    new, new2 = 0.0, max(-gap2 * rows[k + 1, 4], 0.0)
+            inverse = rows[k, 11], rows[k + 1, 11], rows[k, 9], rows[k, 13]
+            new, new2 = solve_face(inverse, (old, old2), (gap, gap2))
             impulse[k + 1, 0] = new2
             normal = new2 - old2
             wa -= ia * rows[k + 1, 0] * normal
@@ -761,42 +669,33 @@ def _sweep_contacts(bodies, workspace, touching):  # type: ignore
         wb += ib * rows[k, 1] * (new - old)
         normal += new - old
         # tangential impulses, projected on the friction cone of the new normal impulse
-        tangential = 0.0
-        for j in range(k, end):
-            old, limit = impulse[j, 1], rows[j, 8] * impulse[j, 0]
-            slip = along + rows[j, 3] * wb - rows[j, 2] * wa - rows[j, 7]
-            change = min(max(old - rows[j, 5] * slip, -limit), limit) - old
-            worst = max(worst, abs(change) * rows[j, 12])
-            impulse[j, 1] = old + change
-            along += (ma + mb) * change
-            wa -= ia * rows[j, 2] * change
-            wb += ib * rows[j, 3] * change
-            tangential += change
+        tangential, wa, wb, slip = _sweep_friction(
+            rows, impulse, (k, end), (along, wa, wb), (ma + mb, ia, ib)
+        )
+        worst = max(worst, slip)
         px, py = normal * nx - tangential * ny, normal * ny + tangential * nx
         speeds[a, 0] -= ma * px
         speeds[a, 1] -= ma * py
-        speeds[a, 2] = wa
         speeds[b, 0] += mb * px
         speeds[b, 1] += mb * py
-        speeds[b, 2] = wb
+        speeds[a, 2], speeds[b, 2] = wa, wb
         k = end
     return worst
 
 
 @numba.njit(cache=True)
-def _residual(bodies, workspace, touching):  # type: ignore
-    """Return the largest violation of a contact's condition, as a velocity [m/s]."""
-    contacts, speeds = workspace.contacts, workspace.speeds
-    worst = 0.0
-    for k in range(touching):
-        a, b = contacts.bodies[k]
-        nx, ny = contacts.normal[k]
-        na, nb, ta, tb, kn, kt, target, slip, friction = workspace.rows[k, :9]
-        normal, tangential = contacts.impulse[k]
-        speed = _relative_speed(speeds, (a, b), (nx, ny), (na, nb)) - target
-        worst = max(worst, abs(max(normal - kn * speed, 0.0) - normal) / kn)
-        speed = _relative_speed(speeds, (a, b), (-ny, nx), (ta, tb)) - slip
-        limit = friction * normal
-        change = min(max(tangential - kt * speed, -limit), limit) - tangential
-        worst = max(worst, abs(change) / kt)
-    return worst
+def _sweep_friction(rows, impulse, points, speeds, inverse_mass):  # type: ignore
+    """Solve for friction at the points of a face; return its change, both spins, and the slip."""
+    (along, wa, wb), (m, ia, ib) = speeds, inverse_mass
+    total, worst = 0.0, 0.0
+    for j in range(points[0], points[1]):
+        old, limit = impulse[j, 1], rows[j, 8] * impulse[j, 0]
+        slip = along + rows[j, 3] * wb - rows[j, 2] * wa - rows[j, 7]
+        change = min(max(old - rows[j, 5] * slip, -limit), limit) - old
+        worst = max(worst, abs(change) * rows[j, 12])
+        impulse[j, 1] = old + change
+        along += m * change
+        wa -= ia * rows[j, 2] * change
+        wb += ib * rows[j, 3] * change
+        total += change
+    return total, wa, wb, worst
