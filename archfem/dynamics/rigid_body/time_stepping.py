@@ -669,15 +669,12 @@ def _sweep_contacts(bodies, workspace, touching):  # type: ignore
         wb += ib * rows[k, 1] * (new - old)
         normal += new - old
         # tangential impulses, projected on the friction cone of the new normal impulse
-        tangential, wa, wb, slip = _sweep_friction(
-            rows, impulse, (k, end), (along, wa, wb), (ma + mb, ia, ib)
+        tangential, wa, wb, worst = _sweep_friction(
+            rows, impulse, (k, end), (along, wa, wb, worst), (ma + mb, ia, ib)
         )
-        worst = max(worst, slip)
         px, py = normal * nx - tangential * ny, normal * ny + tangential * nx
-        speeds[a, 0] -= ma * px
-        speeds[a, 1] -= ma * py
-        speeds[b, 0] += mb * px
-        speeds[b, 1] += mb * py
+        speeds[a, 0], speeds[a, 1] = speeds[a, 0] - ma * px, speeds[a, 1] - ma * py
+        speeds[b, 0], speeds[b, 1] = speeds[b, 0] + mb * px, speeds[b, 1] + mb * py
         speeds[a, 2], speeds[b, 2] = wa, wb
         k = end
     return worst
@@ -686,8 +683,8 @@ def _sweep_contacts(bodies, workspace, touching):  # type: ignore
 @numba.njit(cache=True)
 def _sweep_friction(rows, impulse, points, speeds, inverse_mass):  # type: ignore
     """Solve for friction at the points of a face; return its change, both spins, and the slip."""
-    (along, wa, wb), (m, ia, ib) = speeds, inverse_mass
-    total, worst = 0.0, 0.0
+    (along, wa, wb, worst), (m, ia, ib) = speeds, inverse_mass
+    total = 0.0
     for j in range(points[0], points[1]):
         old, limit = impulse[j, 1], rows[j, 8] * impulse[j, 0]
         slip = along + rows[j, 3] * wb - rows[j, 2] * wa - rows[j, 7]
