@@ -15,7 +15,7 @@ with more. There is no closed form, so r is measured on a block released from a 
 """
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan, exp, log, pi, sqrt, tau
 
 import numpy as np
@@ -355,7 +355,7 @@ def restitution_damping(
 
     It is found by runs of the block, as by `restitution`, to 1e-4 of r. It holds for one block and
     contact only: the impact on a stiffer joint is shorter. With large displacements r is the same
-    to 0.005.
+    to 0.005. Where stones come loose, they rock on with the coefficient (`rocking_ratio`).
 
     Args:
         coefficient: restitution, ω after over ω before [-]; None is Housner's, 1 - 3/2 sin² α.
@@ -387,4 +387,5 @@ def restitution_damping(
             f"damping: with k_n = {contact.normal_stiffness:.3g} Pa/m it goes from "
             f"{smallest + target:.3f} to {largest + target:.3f}: give a value between"
         )
-    return block.damping(exp(brentq(difference, low, high, xtol=1e-3)))
+    found = block.damping(exp(brentq(difference, low, high, xtol=1e-3)))
+    return replace(found, restitution=coefficient)

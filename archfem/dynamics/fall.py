@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem._validation import validate_arguments
-from archfem.dynamics.rigid_body.bodies import Bodies, LooseBlocks, make_bodies
+from archfem.dynamics.rigid_body.bodies import Bodies, FallFrame, LooseBlocks, make_bodies
 from archfem.dynamics.rigid_body.contact_detection import (
     PlacedPieces,
     allocate_pieces,
@@ -418,18 +418,24 @@ def _largest_rotation(model: Model, state: State) -> float:
 
 
 def simulate_fall(
-    model: Model, start: State, state: State, motion: Motion, settling_time: float = 20.0
+    model: Model,
+    start: State,
+    state: State,
+    motion: Motion,
+    rocking_ratio: float | None = None,
+    settling_time: float = 20.0,
 ) -> tuple[xr.Dataset, CollapseState]:
     """Follow loose blocks until they rest, or until `settling_time` after the motion has ended [s].
 
-    Displacements count from the start of the run. Steps are shortened where they fail.
+    Displacements count from the start of the run. Steps are shortened where they fail. The ratio is
+    that of `RigidBlockSimulation`.
     """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + settling_time
     loose = _with_sliding_joints(model.structure)
     failure = None
     for dt in FALL_STEPS:
-        simulation = RigidBlockSimulation(loose, dt=dt)
+        simulation = RigidBlockSimulation(loose, dt=dt, rocking_ratio=rocking_ratio)
         try:
             frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
         except DidNotConverge as error:
@@ -447,11 +453,12 @@ def simulate_fall(
 
 
 def _fall_dataset(
-    frames: Sequence[LooseBlocks], motion: Motion, released: ReleasedBlocks
+    frames: Sequence[FallFrame], motion: Motion, released: ReleasedBlocks
 ) -> xr.Dataset:
     """Return the frames of a fall as a dataset."""
     times = np.array([frame.time for frame in frames])
     poses = np.array([frame.poses for frame in frames])
+    settling = frames[-1].settling
     attributes = {
         "long_name": "displacement of a block's centroid, and its turn, from where it was built",
         "units": "m, m, rad",
@@ -466,6 +473,8 @@ def _fall_dataset(
         {
             "handover_strain": released.strain_energy,
             "handover_kinetic": np.array([released.kinetic_before, released.kinetic_after]),
+            "fall_residual": settling.residual,
+            "fall_unsettled": settling.unsettled_share,
         },
     )
 

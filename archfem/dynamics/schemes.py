@@ -82,6 +82,8 @@ class StiffnessDamping:
         frequency: frequency at which damping has the ratio [Hz].
         joints: what it acts on besides the blocks, as in `Rayleigh`; only with "closed", the
             default, are open joints undamped.
+        restitution: of rocking blocks, with which loose blocks go on after such damping, see
+            `restitution_damping`; None is that of rigid impacts [-].
 
     Example:
         >>> round(af.StiffnessDamping(0.05, 8.0).stiffness, 6)
@@ -91,12 +93,17 @@ class StiffnessDamping:
     ratio: float
     frequency: float
     joints: str = "closed"
+    restitution: float | None = None
 
     mass = 0.0
 
     def __post_init__(self) -> None:
         """Refuse negative damping, frequencies out of range and unknown options."""
         _check_ratio(self.ratio)
+        if self.restitution is not None:
+            ratio = check_number(self.restitution, "restitution")
+            if not 0.0 < ratio <= 1.0:
+                raise InvalidInput(f"restitution {ratio:g} is not between 0 and 1: leave it out")
         _check_joints(self.joints)
         if not 1e-3 <= check_number(self.frequency, "damping frequency [Hz]") <= 1e6:
             raise InvalidInput(

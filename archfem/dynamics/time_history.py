@@ -193,24 +193,44 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         history = history.with_doubts((*history.doubts, *_doubt_tolerance(history)))
     if not model.large_displacements or ending is Ending.INTERRUPTED:
         return history
-    return _follow_fall(history, model, start, recorder.state, motion)
+    ratio = damping.restitution if isinstance(damping, StiffnessDamping) else None
+    return _follow_fall(history, model, (start, recorder.state), motion, ratio)
 
 
 def _follow_fall(
-    history: History, model: Model, start: State, state: State, motion: Motion
+    history: History,
+    model: Model,
+    states: tuple[State, State],
+    motion: Motion,
+    rocking_ratio: float | None,
 ) -> History:
     """Add the fall of loose or overturning blocks, and the state of collapse, to a history."""
+    start, state = states
     tilts = history.ending is Ending.FINISHED and is_overturning(model, state)
     if history.ending not in (Ending.PARTED, Ending.MET) and not tilts:
         shaken = history.ending is not Ending.FINISHED
         return with_fall(history, standing_state(model, start, state, shaken))
     try:
-        frames, fall = simulate_fall(model, start, state, motion)
+        frames, fall = simulate_fall(model, start, state, motion, rocking_ratio)
     except DidNotConverge as error:
         error.history = history
         raise
     dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
-    return with_fall(History(dataset, history.structure), fall)
+    history = with_fall(History(dataset, history.structure), fall)
+    return history.with_doubts((*history.doubts, *_doubt_impulses(history)))
+
+
+def _doubt_impulses(history: History, admissible: float = 0.02) -> list[Doubt]:
+    """Return a doubt where impulses of a fall did not settle in more than a share of its steps."""
+    attrs = history.dataset.attrs
+    if attrs["fall_unsettled"] <= admissible:
+        return []
+    cause = (
+        f"impulses of loose blocks did not settle in {attrs['fall_unsettled']:.0%} of the steps of "
+        f"the fall, and violate contacts by up to {attrs['fall_residual']:.2g} of a step's weight "
+        "impulse"
+    )
+    return [Doubt(cause, "compare with `dynamics.RigidBlockSimulation` at half the time step")]
 
 
 def _doubt_tolerance(history: History, admissible: float = 0.02) -> list[Doubt]:

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from loose_blocks import G, floor
 
 import archfem as af
@@ -18,6 +19,7 @@ from archfem.dynamics.fall import (
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
 from archfem.dynamics.state import State
+from archfem.dynamics.time_history import _doubt_impulses
 
 BREADTH = 0.5
 
@@ -108,14 +110,15 @@ def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypat
     calls = []
 
     class Simulation:
-        def __init__(self, structure, *, dt):
+        def __init__(self, structure, *, dt, rocking_ratio):
             calls.append(structure)
 
         def frames(self, start, end, motion, *, spacing):
             calls.append((start, end, spacing))
             yield start
 
-    start = SimpleNamespace(time=1.0, poses=np.zeros((3, 3)))
+    settling = SimpleNamespace(residual=0.25, unsettled_share=0.5)
+    start = SimpleNamespace(time=1.0, poses=np.zeros((3, 3)), settling=settling)
     released = fall.ReleasedBlocks(start, 0.5, 2.0, 1.5)
     monkeypatch.setattr(fall, "release_blocks", lambda model, state: released)
     monkeypatch.setattr(fall, "RigidBlockSimulation", Simulation)
@@ -130,6 +133,7 @@ def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypat
         assert count == 1
     assert dataset["fall_ground"].values == pytest.approx(np.array([[0.1, 0.0]]))
     assert dataset.attrs["handover_kinetic"].tolist() == [2.0, 1.5]
+    assert (dataset.attrs["fall_residual"], dataset.attrs["fall_unsettled"]) == (0.25, 0.5)
 
 
 @pytest.mark.parametrize("longest", [5e-4, 3e-4, 1.25e-4, 1e-4])
@@ -137,11 +141,12 @@ def test_a_fall_that_fails_is_repeated_with_shorter_steps(tower, monkeypatch, lo
     """Down to an eighth of a millisecond, beyond which the error says what a user can do."""
 
     class Simulation:
-        def __init__(self, structure, *, dt):
+        def __init__(self, structure, *, dt, rocking_ratio):
             self.dt = dt
 
         def frames(self, start, end, motion, *, spacing):
-            yield start
+            settled = SimpleNamespace(residual=0.0, unsettled_share=0.0)
+            yield SimpleNamespace(**vars(start), settling=settled)
             if self.dt > longest:
                 raise af.errors.DidNotConverge(f"overlap by {self.dt} s")
 
@@ -344,3 +349,13 @@ def test_a_block_is_lost_once_it_has_sunk_or_turned():
 def test_a_run_without_frames_is_refused():
     with pytest.raises(af.errors.InvalidInput, match="no frames"):
         classify_collapse(floor((0.0, 0.0, 0.5, 2.0)), [])
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.02, 0), (0.03, 1)])
+def test_a_fall_whose_impulses_did_not_settle_is_doubted(share, count):
+    history = SimpleNamespace(
+        dataset=xr.Dataset(attrs={"fall_unsettled": share, "fall_residual": 0.2})
+    )
+    doubts = _doubt_impulses(history)
+    assert len(doubts) == count
+    assert all("did not settle in 3% of the steps" in doubt.cause for doubt in doubts)

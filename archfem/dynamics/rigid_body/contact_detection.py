@@ -7,6 +7,7 @@ its length, and up to two points remain. Cuts between the pieces of a body separ
 never reference edges. (Separating axes: Gottschalk, Lin and Manocha, SIGGRAPH 1996.)
 
 Impulses of a step are stored by the pair of pieces in a hash table, as initial guess of the next.
+Rows of relative velocity, effective masses and the residual of impulses belong to contacts too.
 """
 
 from typing import NamedTuple
@@ -306,6 +307,128 @@ def _tangential_position(bodies, q, contacts, k):  # type: ignore
     rx = contacts.point[k, 0] - bodies.centre[body, 0] - q[body, 0]
     ry = contacts.point[k, 1] - bodies.centre[body, 1] - q[body, 1]
     return ry * contacts.normal[k, 0] - rx * contacts.normal[k, 1]
+
+
+@allocating_entry
+def prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
+    """Compute the rows of H, their inverse effective masses, and the target velocities."""
+    contacts, rows = workspace.contacts, workspace.rows
+    speeds, middle = workspace.speeds, workspace.middle
+    for k in range(touching):
+        a, b = contacts.bodies[k]
+        nx, ny = contacts.normal[k]
+        (ma, ia), (mb, ib) = bodies.inverse_mass[a], bodies.inverse_mass[b]
+        # moment arms of normal (n) and tangential (t) impulses
+        xa, ya = _arm(bodies, middle, contacts.point[k], a)
+        xb, yb = _arm(bodies, middle, contacts.point[k], b)
+        na, ta = xa * ny - ya * nx, xa * nx + ya * ny
+        nb, tb = xb * ny - yb * nx, xb * nx + yb * ny
+        rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = na, nb, ta, tb
+        # effective masses 1/(H M⁻¹ Hᵀ)
+        rows[k, 11] = ma + mb + ia * na * na + ib * nb * nb
+        rows[k, 12] = ma + mb + ia * ta * ta + ib * tb * tb
+        rows[k, 4], rows[k, 5] = 1.0 / rows[k, 11], 1.0 / rows[k, 12]
+        # Centripetal accelerations ω² r change the relative velocity in half a step by ½ Δt times
+        # their difference. Targets hold at the end of the step: a block that turns about its corner
+        # then conserves its energy to O(Δt²)
+        spin_a, spin_b = speeds[a, 2] ** 2, speeds[b, 2] ** 2
+        pull_x, pull_y = spin_a * xa - spin_b * xb, spin_a * ya - spin_b * yb
+        rows[k, 6] = -0.5 * parameters.dt * (pull_x * nx + pull_y * ny)
+        rows[k, 7] = -0.5 * parameters.dt * (pull_y * nx - pull_x * ny)
+        rows[k, 8] = bodies.friction[a, b]
+    for k in range(touching):
+        rows[k, 9] = rows[k, 13] = 0.0
+        if not has_partner(contacts, k, touching):
+            continue
+        a, b = contacts.bodies[k]
+        (ma, ia), (mb, ib) = bodies.inverse_mass[a], bodies.inverse_mass[b]
+        rows[k, 9] = ma + mb + ia * rows[k, 0] * rows[k + 1, 0] + ib * rows[k, 1] * rows[k + 1, 1]
+        determinant = rows[k, 11] * rows[k + 1, 11] - rows[k, 9] ** 2
+        # points of a face that coincide are solved one after the other
+        if determinant > 1e-9 * rows[k, 11] * rows[k + 1, 11]:
+            rows[k, 13] = 1.0 / determinant
+
+
+@allocating_entry
+def _arm(bodies, q, point, body):  # type: ignore
+    """Return the vector from a body's centroid to a point; zero for the ground, which is fixed."""
+    if body == len(q):
+        return 0.0, 0.0
+    x = point[0] - bodies.centre[body, 0] - q[body, 0]
+    return x, point[1] - bodies.centre[body, 1] - q[body, 1]
+
+
+@allocating_entry
+def relative_speed(speeds, pair, direction, arms):  # type: ignore
+    """Return the velocity of the second body relative to the first along a direction."""
+    one, two = speeds[pair[0]], speeds[pair[1]]
+    translation = (two[0] - one[0]) * direction[0] + (two[1] - one[1]) * direction[1]
+    return translation + arms[1] * two[2] - arms[0] * one[2]
+
+
+@allocating_entry
+def _apply_impulse(bodies, speeds, pair, direction, arms, impulse):  # type: ignore
+    """Apply an impulse along a direction to the second body, and its reaction to the first."""
+    for side in range(2):
+        m, inertia = bodies.inverse_mass[pair[side]]
+        body, signed = speeds[pair[side]], impulse if side else -impulse
+        body[0] += m * direction[0] * signed
+        body[1] += m * direction[1] * signed
+        body[2] += inertia * arms[side] * signed
+
+
+@allocating_entry
+def apply_initial_impulses(bodies, workspace, touching):  # type: ignore
+    """Apply the impulses of the step before, as initial guess of the sweeps."""
+    contacts, speeds = workspace.contacts, workspace.speeds
+    for k in range(touching):
+        a, b = contacts.bodies[k]
+        nx, ny = contacts.normal[k]
+        na, nb, ta, tb = workspace.rows[k, :4]
+        _apply_impulse(bodies, speeds, (a, b), (nx, ny), (na, nb), contacts.impulse[k, 0])
+        _apply_impulse(bodies, speeds, (a, b), (-ny, nx), (ta, tb), contacts.impulse[k, 1])
+
+
+@allocating_entry
+def has_partner(contacts, k, touching):  # type: ignore
+    """Return whether a contact and the next one are the two points of one face."""
+    return k + 1 < touching and contacts.key[k] == contacts.key[k + 1]
+
+
+@allocating_entry
+def measure_residual(bodies, workspace, touching):  # type: ignore
+    """Return the largest violation of a contact's condition, as a velocity [m/s]."""
+    contacts, speeds = workspace.contacts, workspace.speeds
+    worst = 0.0
+    for k in range(touching):
+        a, b = contacts.bodies[k]
+        nx, ny = contacts.normal[k]
+        na, nb, ta, tb, kn, kt, target, slip, friction = workspace.rows[k, :9]
+        normal, tangential = contacts.impulse[k]
+        speed = relative_speed(speeds, (a, b), (nx, ny), (na, nb)) - target
+        worst = max(worst, abs(max(normal - kn * speed, 0.0) - normal) / kn)
+        speed = relative_speed(speeds, (a, b), (-ny, nx), (ta, tb)) - slip
+        limit = friction * normal
+        change = min(max(tangential - kt * speed, -limit), limit) - tangential
+        worst = max(worst, abs(change) / kt)
+    return worst
+
+
+@allocating_entry
+def solve_face(inverse, old, gap):  # type: ignore
+    """Return the normal impulses of a face's two points that meet the conditions of both."""
+    one, two, coupling, factor = inverse
+    # relative velocities without these impulses
+    free = gap[0] - one * old[0] - coupling * old[1]
+    free2 = gap[1] - coupling * old[0] - two * old[1]
+    new, new2 = (coupling * free2 - two * free) * factor, (coupling * free - one * free2) * factor
+    if new >= 0.0 and new2 >= 0.0:
+        return new, new2
+    # one end opens, or both
+    new = max(-free / one, 0.0)
+    if coupling * new + free2 >= 0.0:
+        return new, 0.0
+    return 0.0, max(-free2 / two, 0.0)
 
 
 @allocating_entry

@@ -6,12 +6,14 @@ middle of the step, q + ½ Δt v,
     M (v₁ - v₀) = Δt p + Hᵀ P,   0 <= u_N1 + e u_N0 ⊥ P_N >= 0,   q₁ = q₀ + ½ Δt (v₀ + v₁),
 
 |P_T| <= μ P_N, and P_T opposes u_T1 where that is not zero (Moreau, in: Nonsmooth Mechanics and
-Applications, 1988; Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235). Projected Gauss-Seidel
-sweeps over the contacts solve for the impulses P, from those of the step before. Impulses that do
-no work need not converge within a step; sweeps continue while unconverged impulses add energy.
+Applications, 1988; Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235). Sweeps over the faces,
+each with both of its points at once, solve for the impulses P, from those of the step before. They
+have momentum with restart (Nesterov, Soviet Math. Dokl. 27 (1983) 372; O'Donoghue and Candès,
+Found. Comput. Math. 15 (2015) 715), and end once no contact violates its conditions by more than a
+stated speed. Rebounds are reduced where they would add energy. Overlaps are corrected in positions.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -27,6 +29,7 @@ from archfem.dynamics.rigid_body.bodies import (
     FallEnergy,
     FallFrame,
     LooseBlocks,
+    Settling,
     check_cohesionless,
     make_bodies,
 )
@@ -37,17 +40,27 @@ from archfem.dynamics.rigid_body.contact_detection import (
     allocate_contacts,
     allocate_pieces,
     allocate_stored_impulses,
+    apply_initial_impulses,
     find_contacts,
+    has_partner,
+    measure_residual,
     place_pieces,
+    prepare_rows,
+    relative_speed,
     restore_impulses,
+    solve_face,
     store_impulses,
 )
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 
+# Residual of settled impulses: speed by which a contact violates its condition, relative to that
+# which a body gains by its weight in a step [-]
+SETTLED = 1e-3
+
 # Largest number of sweeps over the contacts of a step; the residual is corrected in later steps
-MAX_SWEEPS = 500
+MAX_SWEEPS = 1000
 
 # The same for the first step of a run, without impulses of a step before
 FIRST_STEP_SWEEPS = 20000
@@ -68,8 +81,17 @@ class StepParameters(NamedTuple):
     gravity: float  # downward [m/s²]
     restitution: float  # e [-]
     min_impact_speed: float  # speed of approach below which e is zero [m/s]
+    min_rocking_speed: float  # the same for the speed ratio of a rocking block [m/s]
     max_sweeps: int  # over the contacts of a step
-    tolerance: float  # on the change of an impulse in a sweep, relative to the largest [-]
+    tolerance: float  # on the residual of the impulses, a speed [m/s]
+    energy_noise: float  # that a run without exchange of energy may gain [J]
+
+
+class SweepResult(NamedTuple):
+    """Velocities and impulses after a sweep."""
+
+    speeds: Array  # (b + 1, 3)
+    impulse: Array  # (c, 2)
 
 
 class StepWorkspace(NamedTuple):
@@ -80,9 +102,13 @@ class StepWorkspace(NamedTuple):
     stored: StoredImpulses
     middle: Array  # poses at the middle of the step (b, 3)
     # of each contact: cross products of the arms with the normal, first and second body, and with
-    # the tangent; 1/(H M⁻¹ Hᵀ) of normal and tangent; target u_N and u_T; μ (c, 9)
+    # the tangent; 1/(H M⁻¹ Hᵀ) of normal and tangent; target u_N and u_T; μ; coupling of u_N with
+    # the impulse of the next contact, if of the same face; rebound in the target u_N (c, 11)
     rows: Array
     speeds: Array  # velocities during the sweeps, the ground's last (b + 1, 3)
+    begun: Array  # velocities at the start of a sweep (b + 1, 3)
+    last: SweepResult  # of the sweep before
+    rebounding: SweepResult  # with rebound
 
 
 @validate_methods
@@ -103,6 +129,9 @@ class RigidBlockSimulation:
         friction: coefficient between blocks without a common joint, and to the ground [-]; None
             takes the smallest of the structure's joints.
         level: height of the ground [m]; None takes the lowest point of the fixed blocks.
+        rocking_ratio: angular velocity after over that before, where a face that turns about one
+            end closes at the other: of all faces, or by names of joints [-]. None, and joints not
+            named, take that of an impact at the closing end alone (Housner's), which is the least.
 
     Raises:
         InvalidInput: a number is out of range, there is no coefficient of friction, a joint has
@@ -114,6 +143,7 @@ class RigidBlockSimulation:
     restitution: float = 0.0
     friction: float | None = None
     level: float | None = None
+    rocking_ratio: float | Mapping[str, float] | None = None
     bodies: Bodies = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -123,7 +153,7 @@ class RigidBlockSimulation:
         if not 0.0 <= check_number(self.restitution, "restitution") <= 1.0:
             raise InvalidInput(f"restitution {self.restitution:g} is not between 0 and 1")
         check_cohesionless(self.structure)
-        bodies = make_bodies(self.structure, self.friction, self.level)
+        bodies = make_bodies(self.structure, self.friction, self.level, self.rocking_ratio)
         object.__setattr__(self, "bodies", bodies)
 
     def frames(
@@ -206,10 +236,15 @@ class _Run:
         self._q = np.array(start.poses, dtype=float)
         self._v = np.array(start.velocities, dtype=float)
         self._v[bodies.inverse_mass[:-1, 0] == 0.0] = 0.0
+        # speed of a free fall after one step
+        weight_speed = self._weight_speed = simulation.structure.gravity * simulation.dt
         # impacts below 0.05 m/s, the speed of a fall by 0.13 mm, do not bounce
         self._parameters = StepParameters(
             *(simulation.dt, simulation.structure.gravity, simulation.restitution),
-            *(0.05, MAX_SWEEPS, 1e-5),
+            *(0.05, 2.0 * weight_speed),
+            MAX_SWEEPS,
+            SETTLED * weight_speed,
+            ENERGY_GAIN_NOISE * simulation.structure.weight * simulation.structure.size,
         )
         self._is_first = True
         contacts = allocate_contacts(len(bodies.owner))
@@ -218,13 +253,20 @@ class _Run:
             contacts,
             allocate_stored_impulses(contacts),
             np.empty_like(self._q),
-            np.empty((len(contacts.key), 9)),
+            np.empty((len(contacts.key), 14)),
             np.zeros((len(self._q) + 1, 3)),
+            np.zeros((len(self._q) + 1, 3)),
+            *(
+                SweepResult(np.zeros((len(self._q) + 1, 3)), np.zeros((len(contacts.key), 2)))
+                for _ in range(2)
+            ),
         )
-        # fields of FallEnergy, then the largest loss so far [J]
-        self._energy = np.array([_kinetic_energy(bodies, self._v), 0.0, 0.0, 0.0, 0.0, 0.0])
-        self._exchanged = float(self._energy[0])
-        self._overlap, self._unconverged_steps, self._time = 0.0, 0, start.time
+        # fields of FallEnergy, then the largest loss and the largest energy exchanged so far [J]
+        kinetic = _kinetic_energy(bodies, self._v)
+        self._energy = np.array([kinetic, 0.0, 0.0, 0.0, 0.0, 0.0, kinetic])
+        # fields of Settling
+        self._settling = np.zeros(4)
+        self._overlap, self._time = 0.0, start.time
 
     @property
     def poses(self) -> Array:
@@ -240,36 +282,39 @@ class _Run:
     def advance(self, ground: Array) -> None:
         """Advance by steps with ground accelerations (steps, 2) [m/s²]."""
         if self._is_first:
-            strict = self._parameters._replace(max_sweeps=FIRST_STEP_SWEEPS, tolerance=1e-8)
+            strict = self._parameters._replace(
+                max_sweeps=FIRST_STEP_SWEEPS, tolerance=1e-3 * self._parameters.tolerance
+            )
             self._advance(ground[:1], strict)
             self._is_first, ground = False, ground[1:]
         self._advance(ground, self._parameters)
 
     def _advance(self, ground: Array, parameters: StepParameters) -> None:
         """Advance by steps with parameters."""
-        overlap, unconverged_steps, exchanged = advance_steps(
+        ground = np.ascontiguousarray(ground)
+        overlap, is_crowded = advance_steps(
             self._simulation.bodies,
             parameters,
             self._workspace,
-            (self._q, self._v, np.ascontiguousarray(ground), self._energy),
+            (self._q, self._v, ground, self._energy, self._settling),
         )
-        if unconverged_steps < 0:
+        self._overlap = max(self._overlap, overlap)
+        if is_crowded:
             raise DidNotConverge(
                 f"{len(self._simulation.bodies.owner)} pieces touch at more points than pieces in "
                 f"the plane can, near {self._time:.4g} s: blocks overlap by {self._overlap:.3g} m; "
                 f"give a smaller dt than {self._simulation.dt:g} s"
             )
-        self._overlap = max(self._overlap, overlap)
-        self._unconverged_steps += unconverged_steps
-        self._exchanged = max(self._exchanged, exchanged)
 
     def frame(self, time: float, resting: bool) -> FallFrame:
         """Return the present frame after checks of overlap and energy."""
         self._time = time
         self._check(time)
         energy = FallEnergy(*self._energy[:5].tolist())
-        results = energy, self._overlap, self._unconverged_steps, resting
-        return FallFrame(time, self._q.copy(), self._v.copy(), *results)
+        residual, *counts = self._settling.tolist()
+        settling = Settling(residual / self._weight_speed, *map(int, counts))
+        poses, velocities = self._q.copy(), self._v.copy()
+        return FallFrame(time, poses, velocities, energy, self._overlap, settling, resting)
 
     def _check(self, time: float) -> None:
         """Refuse blocks that pass through each other, and energy gained without work."""
@@ -281,13 +326,13 @@ class _Run:
                 "other: begin with blocks apart, and give a smaller dt than "
                 f"{self._simulation.dt:g} s"
             )
-        noise = ENERGY_GAIN_NOISE * structure.weight * structure.size
-        gained, allowed = self._energy[4], MAX_ENERGY_GAIN * self._exchanged + noise
+        noise = self._parameters.energy_noise
+        gained, allowed = self._energy[4], MAX_ENERGY_GAIN * self._energy[6] + noise
         if not gained <= allowed:
             raise DidNotConverge(
                 f"by {time:.4g} s the blocks have gained {gained:.3g} J from nowhere, of "
-                f"{self._exchanged:.3g} J exchanged ({self._unconverged_steps} steps without "
-                f"convergence of impulses): give a smaller dt than {self._simulation.dt:g} s"
+                f"{self._energy[6]:.3g} J exchanged (impulses of {self._settling[1]:.0f} steps did "
+                f"not settle): give a smaller dt than {self._simulation.dt:g} s"
             )
 
 
@@ -295,36 +340,59 @@ class _Run:
 def advance_steps(bodies, parameters, workspace, state):  # type: ignore
     """Advance poses and velocities by steps, with their energies.
 
-    Returns the deepest overlap, the number of unconverged steps, and the largest energy exchanged.
+    Returns the deepest overlap, and whether there are too many contacts.
     """
-    q, v, ground, energy = state
-    overlap, unconverged, exchanged = 0.0, 0, 0.0
-    before = q.copy()
+    q, v, ground, energy, settling = state
+    contacts, overlap = workspace.contacts, 0.0
     for k in range(len(ground)):
-        before[:] = q
-        sweeps, deepest = take_step(bodies, parameters, workspace, q, v, ground[k])
-        if sweeps < 0:
-            return overlap, -1, exchanged
-        overlap = max(overlap, deepest)
-        unconverged += sweeps > parameters.max_sweeps
-        # work of the inertia forces of the ground motion, and potential energy of the weight
-        work, rise = 0.0, 0.0
-        for b in range(len(q)):
-            moved = q[b] - before[b]
-            mass = bodies.mass[b, 0]
-            work -= mass * (ground[k, 0] * moved[0] + ground[k, 1] * moved[1])
-            rise += mass * parameters.gravity * moved[1]
-        # the loss is the rest of the balance
+        before = q.copy()
+        # once a quarter of the admissible energy is gained, impulses settle until they add none
+        admissible = MAX_ENERGY_GAIN * energy[6] + parameters.energy_noise
+        strict = energy[5] - energy[3] > 0.25 * admissible
+        state_of_step = q, v, ground[k], strict
+        touching, sweeps, residual = take_step(bodies, parameters, workspace, state_of_step)
+        for j in range(touching):
+            overlap = max(overlap, -contacts.gap[j])
+        if touching < 0:
+            return overlap, True
+        settling[0] = max(settling[0], residual)
+        settling[1] += residual > parameters.tolerance
+        settling[2] += 1.0
+        settling[3] += sweeps
         kinetic = _kinetic_energy(bodies, v)
-        energy[3] += work - rise - (kinetic - energy[0])
+        rise, work = _exchange(bodies, parameters, q - before, ground[k])
+        # the loss is the rest of the balance
+        lost = energy[3] + work - rise - (kinetic - energy[0])
         energy[0] = kinetic
+        if _separate(bodies, parameters, workspace, touching):
+            # what lifts the blocks is taken from the losses of the step, and from a small share
+            # of all energy exchanged
+            moved = workspace.speeds[: len(q)]
+            lift, push = _exchange(bodies, parameters, moved, ground[k])
+            available = max(lost - energy[5] + 0.05 * MAX_ENERGY_GAIN * energy[6], 0.0)
+            factor = min(1.0, available / (lift - push)) if lift > push else 1.0
+            q += factor * moved
+            rise, work = rise + factor * lift, work + factor * push
+            lost -= factor * (lift - push)
         energy[1] += rise
         energy[2] += work
+        energy[3] = lost
         # a loss below its maximum is energy gained
-        energy[5] = max(energy[5], energy[3])
-        energy[4] = max(energy[4], energy[5] - energy[3])
-        exchanged = max(exchanged, kinetic + energy[3])
-    return overlap, unconverged, exchanged
+        energy[5] = max(energy[5], lost)
+        energy[4] = max(energy[4], energy[5] - lost)
+        energy[6] = max(energy[6], kinetic + lost)
+    return overlap, False
+
+
+@allocating_entry
+def _exchange(bodies, parameters, moved, ground):  # type: ignore
+    """Return the rise of potential energy by displacements, and the work of inertia forces [J]."""
+    rise, work = 0.0, 0.0
+    for b in range(len(moved)):
+        mass = bodies.mass[b, 0]
+        rise += mass * parameters.gravity * moved[b, 1]
+        work -= mass * (ground[0] * moved[b, 0] + ground[1] * moved[b, 1])
+    return rise, work
 
 
 @allocating_entry
@@ -338,111 +406,155 @@ def _kinetic_energy(bodies, v):  # type: ignore
 
 
 @allocating_entry
-def take_step(bodies, parameters, workspace, q, v, ground):  # type: ignore
-    """Advance by one step; return the number of sweeps, -1 for too many contacts, and overlap."""
-    contacts, stored, middle, speeds = (
-        workspace.contacts,
-        workspace.stored,
-        workspace.middle,
-        workspace.speeds,
-    )
+def take_step(bodies, parameters, workspace, state):  # type: ignore
+    """Advance by one step; return the contacts, -1 for too many, the sweeps and the residual."""
+    contacts, middle, speeds = workspace.contacts, workspace.middle, workspace.speeds
+    q, v, ground, strict = state
+    touching, rebounds = _begin_step(bodies, parameters, workspace, (q, v, ground))
+    if touching < 0:
+        return -1, -1, 0.0
+    # impulses that add energy settle further: up to 40 times as many sweeps
+    tolerance, sweeps = parameters.tolerance, 0
+    for _ in range(40):
+        more, residual = _settle_impulses(
+            bodies, workspace, touching, tolerance, parameters.max_sweeps
+        )
+        sweeps += more
+        work, kinetic = _impulse_work(bodies, parameters, v, speeds, ground)
+        if work <= (0.0 if strict else 1e-5 * kinetic) or rebounds:
+            break
+        if residual <= tolerance:
+            if not strict or tolerance <= 1e-3 * parameters.tolerance:
+                break
+            tolerance *= 0.1
+    if rebounds and work > 0.0:
+        more, residual = _limit_rebounds(bodies, parameters, workspace, touching, (v, ground))
+        sweeps += more
+    store_impulses(bodies, middle, contacts, touching, workspace.stored)
+    # trapezoidal rule for the poses
+    q += 0.5 * parameters.dt * (v + speeds[: len(q)])
+    v[:] = speeds[: len(q)]
+    return touching, sweeps, residual
+
+
+@allocating_entry
+def _begin_step(bodies, parameters, workspace, state):  # type: ignore
+    """Find contacts, and velocities with the impulses of the step before; return rebounds too."""
+    q, v, ground = state
+    contacts, middle, speeds = workspace.contacts, workspace.middle, workspace.speeds
     # contacts at the middle of the step, with the impulses of the step before
     half, count = 0.5 * parameters.dt, len(q)
     middle[:] = q + half * v
     place_pieces(bodies, middle, workspace.world)
     touching = find_contacts(bodies, workspace.world, contacts)
     if touching < 0:
-        return -1, 0.0
-    restore_impulses(bodies, middle, contacts, touching, stored)
+        return -1, False
+    restore_impulses(bodies, middle, contacts, touching, workspace.stored)
     # targets follow from the velocities before the step, hence first
     speeds[:count] = v
     speeds[count] = 0.0
-    _prepare_rows(bodies, parameters, workspace, touching)
+    prepare_rows(bodies, parameters, workspace, touching)
+    rebounds = _add_rebounds(bodies, parameters, workspace, touching)
     # free velocities: inertia forces of the ground motion, and weight
     for b in range(count):
         if bodies.inverse_mass[b, 0] > 0.0:
             speeds[b, 0] -= parameters.dt * ground[0]
             speeds[b, 1] -= parameters.dt * (parameters.gravity + ground[1])
-    _apply_initial_impulses(bodies, workspace, touching)
-    # unconverged impulses must not add energy: up to 40 times as many sweeps
-    for _ in range(40):
-        sweeps = _sweep_contacts(bodies, parameters, workspace, touching)
-        if sweeps <= parameters.max_sweeps or not _adds_energy(
-            bodies, parameters, v, speeds, ground
-        ):
-            break
-    store_impulses(bodies, middle, contacts, touching, stored)
-    # trapezoidal rule for the poses
-    q += half * (v + speeds[:count])
-    v[:] = speeds[:count]
-    overlap = 0.0
-    for k in range(touching):
-        overlap = max(overlap, -contacts.gap[k])
-    return sweeps, overlap
+    apply_initial_impulses(bodies, workspace, touching)
+    return touching, rebounds
 
 
 @allocating_entry
-def _prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
-    """Compute the rows of H, their inverse effective masses, and the target velocities."""
-    contacts, rows = workspace.contacts, workspace.rows
-    speeds, middle = workspace.speeds, workspace.middle
+def _limit_rebounds(bodies, parameters, workspace, touching, step):  # type: ignore
+    """Reduce all rebounds by one factor, so that the impulses of the step add no energy."""
+    contacts, speeds, rows = workspace.contacts, workspace.speeds, workspace.rows
+    rebounding, (before, ground) = workspace.rebounding, step
+    rebounding.speeds[:] = speeds
+    rebounding.impulse[:touching] = contacts.impulse[:touching]
+    rows[:touching, 6] -= rows[:touching, 10]
+    sweeps, residual = _settle_impulses(
+        bodies, workspace, touching, parameters.tolerance, parameters.max_sweeps
+    )
+    # The work is quadratic in the factor, not positive without rebounds and positive with all of
+    # them. Impulses between those two are admissible too, since cones of friction are convex.
+    least, _ = _impulse_work(bodies, parameters, before, speeds, ground)
+    most, _ = _impulse_work(bodies, parameters, before, rebounding.speeds, ground)
+    mean = 0.5 * (speeds + rebounding.speeds)
+    middle, _ = _impulse_work(bodies, parameters, before, mean, ground)
+    curvature = 2.0 * (least + most - 2.0 * middle)
+    slope = most - least - curvature
+    factor = 0.0
+    if least < 0.0:
+        factor = -2.0 * least / (slope + np.sqrt(slope**2 - 4.0 * curvature * least))
+    speeds += factor * (rebounding.speeds - speeds)
+    impulse = contacts.impulse[:touching]
+    impulse += factor * (rebounding.impulse[:touching] - impulse)
+    return sweeps, residual
+
+
+@allocating_entry
+def _separate(bodies, parameters, workspace, touching):  # type: ignore
+    """Find displacements that reduce overlaps; return whether there are any, in `speeds`.
+
+    They are the least, weighted by mass, that undo a share of the overlaps beyond the admissible
+    one and cause no others. No velocity changes.
+    """
+    contacts, speeds, rows = workspace.contacts, workspace.speeds, workspace.rows
+    deepest, half = 0.0, 0.5 * parameters.dt
     for k in range(touching):
         a, b = contacts.bodies[k]
         nx, ny = contacts.normal[k]
-        (ma, ia), (mb, ib) = bodies.inverse_mass[a], bodies.inverse_mass[b]
-        # moment arms of normal (n) and tangential (t) impulses
-        xa, ya = _arm(bodies, middle, contacts.point[k], a)
-        xb, yb = _arm(bodies, middle, contacts.point[k], b)
-        na, ta = xa * ny - ya * nx, xa * nx + ya * ny
-        nb, tb = xb * ny - yb * nx, xb * nx + yb * ny
-        rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = na, nb, ta, tb
-        # effective masses 1/(H M⁻¹ Hᵀ)
-        rows[k, 4] = 1.0 / (ma + mb + ia * na * na + ib * nb * nb)
-        rows[k, 5] = 1.0 / (ma + mb + ia * ta * ta + ib * tb * tb)
-        # Newton's impact law, without rebound of slow impacts
-        before = _relative_speed(speeds, (a, b), (nx, ny), (na, nb))
-        bounce = -parameters.restitution * before if before < -parameters.min_impact_speed else 0.0
-        # Centripetal accelerations ω² r change the relative velocity in half a step by ½ Δt times
-        # their difference. Targets hold at the end of the step: a block that turns about its corner
-        # then conserves its energy to O(Δt²)
-        spin_a, spin_b = speeds[a, 2] ** 2, speeds[b, 2] ** 2
-        pull_x, pull_y = spin_a * xa - spin_b * xb, spin_a * ya - spin_b * yb
-        rows[k, 6] = bounce - 0.5 * parameters.dt * (pull_x * nx + pull_y * ny)
-        rows[k, 7] = -0.5 * parameters.dt * (pull_y * nx - pull_x * ny)
-        rows[k, 8] = bodies.friction[a, b]
+        speed = relative_speed(speeds, (a, b), (nx, ny), (rows[k, 0], rows[k, 1]))
+        excess = -bodies.slop - (contacts.gap[k] + half * speed)
+        deepest = max(deepest, excess)
+        # the displacement of the contact, and no friction
+        rows[k, 6] = 0.5 * excess if excess > 0.0 else excess
+        rows[k, 7] = rows[k, 8] = 0.0
+    if deepest <= 0.0:
+        return False
+    speeds[:] = 0.0
+    contacts.impulse[:touching] = 0.0
+    _settle_impulses(bodies, workspace, touching, 0.1 * bodies.slop, 50)
+    return True
 
 
 @allocating_entry
-def _arm(bodies, q, point, body):  # type: ignore
-    """Return the vector from a body's centroid to a point; zero for the ground, which is fixed."""
-    if body == len(q):
-        return 0.0, 0.0
-    x = point[0] - bodies.centre[body, 0] - q[body, 0]
-    return x, point[1] - bodies.centre[body, 1] - q[body, 1]
+def _add_rebounds(bodies, parameters, workspace, touching):  # type: ignore
+    """Add the rebounds of impacts to the target velocities; return whether there are any.
+
+    Newton's law applies to each contact. Where a face closes at one end, its other end opens by
+    the given share of the speed at which the face has turned: the impulse is distributed over
+    the face, with its resultant within the closing end.
+    """
+    contacts, rows, speeds = workspace.contacts, workspace.rows, workspace.speeds
+    any_rebound = False
+    for k in range(touching):
+        rows[k, 10] = 0.0
+    for k in range(touching):
+        a, b = contacts.bodies[k]
+        normal = contacts.normal[k, 0], contacts.normal[k, 1]
+        speed = relative_speed(speeds, (a, b), normal, (rows[k, 0], rows[k, 1]))
+        ratio, is_end = bodies.rocking[a, b], k > 0 and has_partner(contacts, k - 1, touching)
+        if ratio == 0.0 or not (is_end or has_partner(contacts, k, touching)):
+            if speed < -parameters.min_impact_speed:
+                rows[k, 10] = -parameters.restitution * speed
+        elif not is_end:
+            other = relative_speed(speeds, (a, b), normal, (rows[k + 1, 0], rows[k + 1, 1]))
+            # the speed common to both ends rebounds by Newton's law
+            if max(speed, other) < -parameters.min_impact_speed:
+                rows[k, 10] = rows[k + 1, 10] = -parameters.restitution * max(speed, other)
+            if min(speed, other) < -parameters.min_rocking_speed:
+                opening = k if speed > other else k + 1
+                rows[opening, 10] += ratio * abs(other - speed)
+    for k in range(touching):
+        rows[k, 6] += rows[k, 10]
+        any_rebound = any_rebound or rows[k, 10] > 0.0
+    return any_rebound
 
 
 @allocating_entry
-def _relative_speed(speeds, pair, direction, arms):  # type: ignore
-    """Return the velocity of the second body relative to the first along a direction."""
-    one, two = speeds[pair[0]], speeds[pair[1]]
-    translation = (two[0] - one[0]) * direction[0] + (two[1] - one[1]) * direction[1]
-    return translation + arms[1] * two[2] - arms[0] * one[2]
-
-
-@allocating_entry
-def _apply_impulse(bodies, speeds, pair, direction, arms, impulse):  # type: ignore
-    """Apply an impulse along a direction to the second body, and its reaction to the first."""
-    for side in range(2):
-        m, inertia = bodies.inverse_mass[pair[side]]
-        body, signed = speeds[pair[side]], impulse if side else -impulse
-        body[0] += m * direction[0] * signed
-        body[1] += m * direction[1] * signed
-        body[2] += inertia * arms[side] * signed
-
-
-@allocating_entry
-def _adds_energy(bodies, parameters, before, after, ground):  # type: ignore
-    """Return whether the impulses of a step have done positive work, beyond the tolerance."""
+def _impulse_work(bodies, parameters, before, after, ground):  # type: ignore
+    """Return the work of the impulses of a step, and the kinetic energy after it [J]."""
     work = kinetic = 0.0
     for b in range(len(before)):
         m, inertia = bodies.mass[b]
@@ -454,45 +566,133 @@ def _adds_energy(bodies, parameters, before, after, ground):  # type: ignore
         up = y1 - y0 + parameters.dt * (parameters.gravity + ground[1])
         work += 0.5 * m * (along * (x0 + x1) + up * (y0 + y1)) + 0.5 * inertia * (w1**2 - w0**2)
         kinetic += 0.5 * m * (x1**2 + y1**2) + 0.5 * inertia * w1**2
-    return work > parameters.tolerance * kinetic
+    return work, kinetic
 
 
 @allocating_entry
-def _apply_initial_impulses(bodies, workspace, touching):  # type: ignore
-    """Apply the impulses of the step before, as initial guess of the sweeps."""
+def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # type: ignore
+    """Sweep with momentum until impulses settle; return the sweeps and the residual [m/s]."""
     contacts, speeds = workspace.contacts, workspace.speeds
+    last, begun = workspace.last, workspace.begun
+    last.speeds[:] = speeds
+    last.impulse[:touching] = contacts.impulse[:touching]
+    weight, least, residual = 1.0, np.inf, 0.0
+    window, best, plain = np.inf, np.inf, False
+    for sweep in range(1, max_sweeps + 1):
+        begun[:] = speeds
+        residual = _sweep_contacts(bodies, workspace, touching)
+        if residual <= tolerance:
+            residual = measure_residual(bodies, workspace, touching)
+            if residual <= tolerance:
+                return sweep, residual
+        # where 50 late sweeps have not improved the residual, the next 50 have no momentum
+        window = min(window, residual)
+        if sweep % 50 == 0:
+            plain = not plain and window > best and sweep >= 150
+            best, window = min(best, window), np.inf
+        # momentum that works against the last change, or that diverges, is dropped
+        if plain or residual > 4.0 * least or _turns_back(bodies, workspace):
+            weight, least = 1.0, residual
+        least = min(least, residual)
+        before, weight = weight, 0.5 + np.sqrt(0.25 + weight**2)
+        _add_momentum(workspace, touching, (before - 1.0) / weight)
+    speeds[:] = last.speeds
+    contacts.impulse[:touching] = last.impulse[:touching]
+    return max_sweeps, measure_residual(bodies, workspace, touching)
+
+
+@allocating_entry
+def _turns_back(bodies, workspace):  # type: ignore
+    """Return whether a sweep opposes the momentum with which it began, weighted by mass."""
+    speeds, begun, last = workspace.speeds, workspace.begun, workspace.last.speeds
+    product = 0.0
+    for b in range(len(bodies.mass)):
+        for axis in range(3):
+            mass = bodies.mass[b, 1 if axis == 2 else 0]
+            new = speeds[b, axis]
+            product += mass * (begun[b, axis] - new) * (new - last[b, axis])
+    return product > 0.0
+
+
+@allocating_entry
+def _add_momentum(workspace, touching, share):  # type: ignore
+    """Continue the change between two sweeps by a share of it (Nesterov)."""
+    speeds, impulse, last = workspace.speeds, workspace.contacts.impulse, workspace.last
+    # velocities are linear in the impulses, and need no pass over the contacts
+    for b in range(len(speeds)):
+        for axis in range(3):
+            new = speeds[b, axis]
+            speeds[b, axis] += share * (new - last.speeds[b, axis])
+            last.speeds[b, axis] = new
     for k in range(touching):
-        a, b = contacts.bodies[k]
-        nx, ny = contacts.normal[k]
-        na, nb, ta, tb = workspace.rows[k, :4]
-        _apply_impulse(bodies, speeds, (a, b), (nx, ny), (na, nb), contacts.impulse[k, 0])
-        _apply_impulse(bodies, speeds, (a, b), (-ny, nx), (ta, tb), contacts.impulse[k, 1])
+        for axis in range(2):
+            new = impulse[k, axis]
+            impulse[k, axis] += share * (new - last.impulse[k, axis])
+            last.impulse[k, axis] = new
 
 
 @allocating_entry
-def _sweep_contacts(bodies, parameters, workspace, touching):  # type: ignore
-    """Sweep over the contacts until impulses converge; return the number of sweeps."""
-    contacts, speeds = workspace.contacts, workspace.speeds
-    for sweep in range(1, parameters.max_sweeps + 1):
-        change, largest = 0.0, 0.0
-        for k in range(touching):
-            a, b = contacts.bodies[k]
-            nx, ny = contacts.normal[k]
-            na, nb, ta, tb, kn, kt, target, slip, friction = workspace.rows[k]
-            # normal impulse, projected on P_N >= 0
-            old = contacts.impulse[k, 0]
-            speed = _relative_speed(speeds, (a, b), (nx, ny), (na, nb))
-            new = max(old - kn * (speed - target), 0.0)
-            _apply_impulse(bodies, speeds, (a, b), (nx, ny), (na, nb), new - old)
-            contacts.impulse[k, 0] = new
-            change, largest = max(change, abs(new - old)), max(largest, new)
-            # tangential impulse, projected on the friction cone of the new normal impulse
-            old, limit = contacts.impulse[k, 1], friction * new
-            speed = _relative_speed(speeds, (a, b), (-ny, nx), (ta, tb))
-            new = min(max(old - kt * (speed - slip), -limit), limit)
-            _apply_impulse(bodies, speeds, (a, b), (-ny, nx), (ta, tb), new - old)
-            contacts.impulse[k, 1] = new
-            change = max(change, abs(new - old))
-        if change <= parameters.tolerance * largest:
-            return sweep
-    return parameters.max_sweeps + 1
+def _sweep_contacts(bodies, workspace, touching):  # type: ignore
+    """Sweep once over the faces; return the largest violation of a contact found [m/s]."""
+    # single elements are read, since views of rows cost more than the arithmetic
+    contacts, speeds, rows = workspace.contacts, workspace.speeds, workspace.rows
+    pairs, normals, impulse = contacts.bodies, contacts.normal, contacts.impulse
+    inverse_mass = bodies.inverse_mass
+    worst, k = 0.0, 0
+    while k < touching:
+        a, b, nx, ny = pairs[k, 0], pairs[k, 1], normals[k, 0], normals[k, 1]
+        ma, ia = inverse_mass[a, 0], inverse_mass[a, 1]
+        mb, ib = inverse_mass[b, 0], inverse_mass[b, 1]
+        wa, wb = speeds[a, 2], speeds[b, 2]
+        # relative velocity, normal and tangential
+        x, y = speeds[b, 0] - speeds[a, 0], speeds[b, 1] - speeds[a, 1]
+        along, across = y * nx - x * ny, x * nx + y * ny
+        # normal impulses, projected on P_N >= 0, of the two points of a face at once
+        old = impulse[k, 0]
+        gap = across + rows[k, 1] * wb - rows[k, 0] * wa - rows[k, 6]
+        new = max(old - rows[k, 4] * gap, 0.0)
+        worst = max(worst, abs(new - old) * rows[k, 11])
+        end, normal = k + 1, 0.0
+        if rows[k, 13] > 0.0:
+            end, old2 = k + 2, impulse[k + 1, 0]
+            gap2 = across + rows[k + 1, 1] * wb - rows[k + 1, 0] * wa - rows[k + 1, 6]
+            new2 = max(old2 - rows[k + 1, 4] * gap2, 0.0)
+            worst = max(worst, abs(new2 - old2) * rows[k + 1, 11])
+            inverse = rows[k, 11], rows[k + 1, 11], rows[k, 9], rows[k, 13]
+            new, new2 = solve_face(inverse, (old, old2), (gap, gap2))
+            impulse[k + 1, 0] = new2
+            normal = new2 - old2
+            wa -= ia * rows[k + 1, 0] * normal
+            wb += ib * rows[k + 1, 1] * normal
+        impulse[k, 0] = new
+        wa -= ia * rows[k, 0] * (new - old)
+        wb += ib * rows[k, 1] * (new - old)
+        normal += new - old
+        # tangential impulses, projected on the friction cone of the new normal impulse
+        tangential, wa, wb, worst = _sweep_friction(
+            rows, impulse, (k, end), (along, wa, wb, worst), (ma + mb, ia, ib)
+        )
+        px, py = normal * nx - tangential * ny, normal * ny + tangential * nx
+        speeds[a, 0], speeds[a, 1] = speeds[a, 0] - ma * px, speeds[a, 1] - ma * py
+        speeds[b, 0], speeds[b, 1] = speeds[b, 0] + mb * px, speeds[b, 1] + mb * py
+        speeds[a, 2], speeds[b, 2] = wa, wb
+        k = end
+    return worst
+
+
+@allocating_entry
+def _sweep_friction(rows, impulse, points, speeds, inverse_mass):  # type: ignore
+    """Solve for friction at the points of a face; return its change, both spins, and the slip."""
+    (along, wa, wb, worst), (m, ia, ib) = speeds, inverse_mass
+    total = 0.0
+    for j in range(points[0], points[1]):
+        old, limit = impulse[j, 1], rows[j, 8] * impulse[j, 0]
+        slip = along + rows[j, 3] * wb - rows[j, 2] * wa - rows[j, 7]
+        change = min(max(old - rows[j, 5] * slip, -limit), limit) - old
+        worst = max(worst, abs(change) * rows[j, 12])
+        impulse[j, 1] = old + change
+        along += m * change
+        wa -= ia * rows[j, 2] * change
+        wb += ib * rows[j, 3] * change
+        total += change
+    return total, wa, wb, worst
