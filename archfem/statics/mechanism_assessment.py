@@ -397,6 +397,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     return _check(oscillator, spectrum, rules, q, confidence_factor)
 
 
+@validate_arguments
 def assess_parts(
     structure: Structure, spectrum: DesignSpectrum | Motion, **options: Any
 ) -> dict[str, KinematicAssessment]:
