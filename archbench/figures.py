@@ -44,7 +44,7 @@ def measured(found: list[Row]) -> Figure:
     axes.set_xticks([], minor=True)
     axes.set_yticks(range(len(shown)), labels)
     axes.invert_yaxis()
-    axes.set_xlabel("answer over measured value; lines span the settings, grey the uncertainty")
+    axes.set_xlabel("answer over measured value")
     names = [name for name in PROGRAMS if any(row.numbers(name) for row in shown)]
     for name in names:
         axes.plot([], [], MARKERS[name], color=COLOURS[name], label=name)
