@@ -26,7 +26,8 @@ def measured(found: list[Row]) -> Figure:
         middle, half = row.reference
         memory = row.grade == "m"
         axes.barh(place, 2 * half / middle, left=1 - half / middle, color="0.85", height=0.6)
-        labels.append(f"{row.scene}{' (from memory)' if memory else ''}")
+        title = row.title.split(",")[0].removeprefix("free rocking: ")
+        labels.append(f"{title}{' (from memory)' if memory else ''}")
         answered = [name for name in PROGRAMS if row.numbers(name)]
         for step, name in enumerate(answered):
             numbers = np.array(row.numbers(name)) / middle
@@ -43,7 +44,7 @@ def measured(found: list[Row]) -> Figure:
     axes.set_xticks([], minor=True)
     axes.set_yticks(range(len(shown)), labels)
     axes.invert_yaxis()
-    axes.set_xlabel("answer over measured value; lines span the settings, grey the uncertainty")
+    axes.set_xlabel("answer over measured value")
     names = [name for name in PROGRAMS if any(row.numbers(name) for row in shown)]
     for name in names:
         axes.plot([], [], MARKERS[name], color=COLOURS[name], label=name)
@@ -91,7 +92,7 @@ def crown(found: list[Row]) -> Figure:
     known = [(text, run["values"]["scale"]) for text, run in bars if run]
     axes["fall"].barh([text for text, _ in known], [value for _, value in known], color="0.6")
     axes["fall"].axvline(0.15, color="k", lw=0.8, ls=":")
-    axes["fall"].text(0.15, -0.45, " 3DEC stands at 0.15 g", va="bottom", fontsize=8)
+    axes["fall"].text(0.15, 1.0, "3DEC stands at 0.15 g ", ha="right", va="center", fontsize=8)
     axes["fall"].invert_yaxis()
     axes["fall"].set_xlabel("least peak of the half sine under which it falls [g]")
     return figure

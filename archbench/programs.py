@@ -15,6 +15,9 @@ from typing import Any
 from archbench.scene import ACTIONS, HERE, BenchError
 
 ADAPTERS = HERE / "adapters"
+# Beginning of the reason where an adapter does not answer a kind of action
+NO_ACTION = "the adapter has no action"
+
 ENVIRONMENTS = HERE / "environments"
 
 
@@ -58,7 +61,7 @@ class Program:
         if stated:
             return stated[0]
         kind = scene["action"]["kind"]
-        return "" if kind in self.settings else f"the adapter knows no action '{kind}'"
+        return "" if kind in self.settings else f"{NO_ACTION} '{kind}'"
 
     def is_installed(self) -> bool:
         """Return whether the adapter can be imported by its Python."""

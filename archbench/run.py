@@ -151,7 +151,7 @@ def failures(program: str, answers: dict[str, Answer]) -> list[str]:
     ]
 
 
-def compare_with_stored(cost: float = 3.0, tolerance: float = 1e-3) -> tuple[list[str], int]:
+def compare_with_stored(cost: float = 2.0, tolerance: float = 1e-3) -> tuple[list[str], int]:
     """Run archfem again in this process, each scene by its first settings.
 
     Args:

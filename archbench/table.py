@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from archbench.programs import NO_ACTION
 from archbench.run import RESULTS, results_of
 from archbench.scene import HERE, Reference, read_references, read_scene, scene_names
 
@@ -216,7 +217,9 @@ def refusals(found: Sequence[Row], programs: Sequence[str]) -> str:
     for row in found:
         for program in programs:
             answer = row.answers.get(program, {})
+            # "no action": listed once for each program
             why = [f"cannot: {answer['cannot']}"] if "cannot" in answer else []
+            why = [each for each in why if NO_ACTION not in each]
             why += [
                 f"failed: {run['failed']} ({run['settings']})"
                 for run in answer.get("runs", ())
@@ -225,9 +228,16 @@ def refusals(found: Sequence[Row], programs: Sequence[str]) -> str:
             for each in why:
                 names = reasons.setdefault((program, each), [])
                 names += [] if row.scene in names else [row.scene]
-    return "\n".join(
-        f"- {program}, {', '.join(names)}: {why}" for (program, why), names in reasons.items()
-    )
+    lines = [f"- {program}, {', '.join(names)}: {why}" for (program, why), names in reasons.items()]
+    for program in programs:
+        refused = [
+            row.answers[program]["cannot"].split("'")[1]
+            for row in found
+            if NO_ACTION in row.answers.get(program, {}).get("cannot", "")
+        ]
+        if refused:
+            lines.append(f"- {program}: {NO_ACTION} {', '.join(sorted(set(refused)))}")
+    return "\n".join(lines)
 
 
 def variants(found: Sequence[Row]) -> str:

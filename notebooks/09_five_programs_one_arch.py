@@ -11,8 +11,8 @@
 # %% [markdown]
 # # Five programs, one arch
 #
-# A result is believed once it was compared. Here five programs push the same dry ring sideways
-# until it falls: archfem by limit analysis, OpenSees with springs, RBE with corner forces, LMGC90
+# A result is believed once it was compared. Here archfem and five other programs push the same dry
+# ring sideways until it falls: OpenSees and HybriDFEM with springs, RBE with corner forces, LMGC90
 # and Siconos with impacts. **Do they agree, and how far does each depend on settings that are not
 # physics?**
 
@@ -69,6 +69,7 @@ af.view.draw_collapse(ring, push)
 # - **archfem** solves one linear programme.
 # - **OpenSees** has rigid stones on rows of springs without tension. It pushes the crown by
 #   displacement control.
+# - **HybriDFEM** does the same with springs that slide.
 # - **RBE** (compas_cra) finds the least tension at corners of faces. The ring is tilted until
 #   tension is needed.
 # - **LMGC90** and **Siconos** simulate rigid blocks with impacts in time, on a ring that is
