@@ -87,6 +87,7 @@ def draw_collapse_result(found: Collapse) -> Figure:
     return draw_collapse(found.structure, found)
 
 
+@validate_arguments
 def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
     """Draw the mechanism at its displacement capacity, and the capacity curve with its demand.
 
