@@ -9,7 +9,6 @@
     mechanism_count       mechanisms by counting failed joints; duration and opening
     mechanism_kinematics  mechanisms verified by a rigid-block motion
     nonassociated         sliding without dilatancy
-    rigid_regions         blocks that move as rigid bodies
     support_movement      finite movement of a support
     thickness             least thickness
     vehicles              vehicles over a bridge
