@@ -12,7 +12,7 @@
     rigid_regions         blocks that move as rigid bodies
     support_movement      finite movement of a support
     thickness             least thickness
-    vehicles              vehicles over a bridge
+    vehicles              vehicles over a bridge, rating
 
 Imports `masonry`, `joints` and the support modules. Start reading at `collapse`.
 """
