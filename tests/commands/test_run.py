@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -293,7 +294,8 @@ def test_rating_of_a_case(tmp_path, ring, capsys):
     command = ["rate", str(path), *given, f"{ring.width}"]
     assert af.commands.main([*command, "--out", str(out)]) == 0
     said = capsys.readouterr().out
-    found = af.rate(ring, "CS454-single", live=0.1)
+    named = replace(ring, name="a ring pushed over")
+    found = af.rate(named, "CS454-single", live=0.1)
     assert str(found) in said
     assert (out / "rating.txt").read_text().strip() == str(found)
     assert (out / "rating.csv").read_text().strip() == found.table()

@@ -1,5 +1,7 @@
 """Pictures of limit analysis: what they show, not how they look."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -117,9 +119,11 @@ def test_a_rating_shows_factors_over_the_front_axle_and_the_mechanism(ring):
 def test_thrust_lines_of_parts_that_share_no_block_are_not_joined(ring):
     shapes = af.shapes
     arch = shapes.Arch(span=2.0, rise=0.6, thickness=0.3, voussoirs=5)
-    pier = shapes.Pier(breadth=0.8, courses=[0.5])
-    walls = [shapes.Sidewall(length=1.0, height=0.5, state="fixed") for _ in range(2)]
-    bridge = af.bridge(arches=[arch, arch], piers=[pier], sidewalls=walls)
+    pier = shapes.Pier(gap=0.8, height=0.5)
+    names = ("left wall", "right wall")
+    walls = [shapes.Sidewall(length=1.0, height=0.5, state="fixed", name=name) for name in names]
+    arches = [arch, replace(arch, name="second arch")]
+    bridge = af.bridge(arches=arches, piers=[pier], sidewalls=walls)
     found = af.collapse_factor(bridge, live=af.BodyForce(1.0))
     axes = draw_collapse(bridge, found).axes[0]
     line = lines_of(axes)["thrust line"]
