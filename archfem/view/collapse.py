@@ -77,8 +77,8 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse) -> None:
     line = thrust_line(structure, found.joints).values
     # arches and piers that share no block have lines of their own
     pairs = [set(joint.blocks) for joint in structure.joints]
-    ends = [k for k in range(1, len(pairs)) if not pairs[k - 1] & pairs[k]]
-    line = np.insert(line, ends, np.nan, axis=0)
+    breaks = [k for k in range(1, len(pairs)) if not pairs[k - 1] & pairs[k]]
+    line = np.insert(line, breaks, np.nan, axis=0)
     if np.isfinite(line).any():
         style = {"color": Colour.THRUST, "lw": 1.5, "marker": ".", "ms": 3, "zorder": 4}
         axes.plot(*line.T, label="thrust line", **style)
