@@ -39,13 +39,19 @@ from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.limit.collapse import Collapse
+from archfem.limit.vehicles import Rating
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.modes import Modes
 from archfem.statics.stress import strength_use_table
-from archfem.view.collapse import draw_collapse, draw_fall, draw_kinematic_assessment
+from archfem.view.collapse import (
+    draw_collapse,
+    draw_fall,
+    draw_kinematic_assessment,
+    draw_rating,
+)
 from archfem.view.histories import draw_envelope, draw_joints, most_stressed_joints
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.statics import draw_dead_load, draw_free_body, draw_modes
@@ -265,6 +271,15 @@ def write_assessments(
         if result.path is not None
     ]
     return [_write_text(text, folder / "assessment.txt"), *figures]
+
+
+def write_rating(found: Rating, folder: Path) -> list[Path]:
+    """Write the rating of a bridge, the factors at all places, and the picture of both."""
+    return [
+        _write_text(str(found), folder / "rating.txt"),
+        _write_text(found.table(), folder / "rating.csv"),
+        save(draw_rating(found), folder / "rating.png"),
+    ]
 
 
 def write_dead_load(result: DeadLoadResult, folder: Path) -> list[Path]:

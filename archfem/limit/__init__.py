@@ -11,7 +11,7 @@
     nonassociated         sliding without dilatancy
     support_movement      finite movement of a support
     thickness             least thickness
-    vehicles              vehicles over a bridge
+    vehicles              vehicles over a bridge, rating
 
 Imports `masonry`, `joints` and the support modules. Start reading at `collapse`.
 """

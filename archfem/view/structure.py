@@ -314,7 +314,7 @@ def draw_loads(
     A load in proportion to the weights is one arrow above the structure; a force ends at the
     extrados; a movement of a support begins at its centroid.
     """
-    length = 0.11 * structure.size
+    length, before = 0.11 * structure.size, ""
     for number, action in enumerate(live):
         start, direction, size = _load_arrow(structure, action, length)
         tip = start + length * direction
@@ -328,7 +328,9 @@ def draw_loads(
         offset = (0, 5) if direction[1] < 0.5 or abs(direction[0]) > 0.5 else (6, 0)
         where = start if direction[1] < -0.5 else 0.5 * (start + tip)
         style = {"ha": "center", "va": "bottom", "color": Colour.LOAD, "zorder": 9}
-        annotate(axes, f"{factor} {size}".strip(), where, offset, **style)
+        if size != before:  # of equal axles in a row the first has the text
+            annotate(axes, f"{factor} {size}".strip(), where, offset, **style)
+        before = size
     axes.autoscale_view()
 
 

@@ -1,11 +1,18 @@
 """Pictures of limit analysis: what they show, not how they look."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.view.collapse import draw_capacity, draw_collapse, draw_kinematic_assessment
+from archfem.view.collapse import (
+    draw_capacity,
+    draw_collapse,
+    draw_kinematic_assessment,
+    draw_rating,
+)
 
 
 def lines_of(axes):
@@ -88,3 +95,38 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(ring, tmp_path):
     locked = af.kinematic_assessment(piers, found.spectrum, part="left pier")
     with pytest.raises(af.InvalidInput, match="no mechanism moves under horizontal forces"):
         draw_kinematic_assessment(locked)
+
+
+def test_a_rating_shows_factors_over_the_front_axle_and_the_mechanism(ring):
+    lorry = af.limit.Vehicle("lorry", (5e3, 5e3), (1.0,))
+    found = af.rate(ring, lorry)
+    figure = draw_rating(found)
+    upper, lower = figure.axes
+    lines = lines_of(upper)
+    ahead = 0.5 if found.moving.direction == "right" else -0.5
+    np.testing.assert_allclose(
+        lines["worst place"], [[found.moving.position + ahead, found.factor]]
+    )
+    drawn = lines[f"driving {found.moving.direction}"]
+    assert np.nanmin(drawn[:, 1]) == pytest.approx(found.factor, rel=1e-6)
+    assert f"factor {found.factor:.3g}" in upper.get_title()
+    assert len(lines_of(lower)["hinge"]) == len(found.moving.worst.hinges)
+    assert upper.get_xlim() == lower.get_xlim()
+    texts = [text.get_text() for text in lower.texts if text.get_text()]
+    assert len(texts) == 1  # of two equal axles
+
+
+def test_thrust_lines_of_parts_that_share_no_block_are_not_joined(ring):
+    shapes = af.shapes
+    arch = shapes.Arch(span=2.0, rise=0.6, thickness=0.3, voussoirs=5)
+    pier = shapes.Pier(gap=0.8, height=0.5)
+    names = ("left wall", "right wall")
+    walls = [shapes.Sidewall(length=1.0, height=0.5, state="fixed", name=name) for name in names]
+    arches = [arch, replace(arch, name="second arch")]
+    bridge = af.bridge(arches=arches, piers=[pier], sidewalls=walls)
+    found = af.collapse_factor(bridge, live=af.BodyForce(1.0))
+    axes = draw_collapse(bridge, found).axes[0]
+    line = lines_of(axes)["thrust line"]
+    assert len(line) > len(bridge.joints)
+    for place in np.flatnonzero(np.isnan(line[:, 0])):
+        assert 0 < place < len(line) - 1
