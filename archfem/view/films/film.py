@@ -93,7 +93,7 @@ def film(  # noqa: PLR0913  (a film has many settings)
     falls = FallingBlocks.of(model.structure, run)
     known = recorded_fields(run)[0]
     known = known if falls is None else np.append(known, falls.times[1:])
-    timing = frame_timing(run, falls, known, fps, seconds, window)
+    timing = frame_timing(run, known, fps, seconds, window)
     held = timing.times if falls is None else timing.times[timing.times < falls.times[0]]
     setup = Setup.of(model, fields_at(run, held), colour, magnification).with_falls(falls)
     if mechanism is not None and mechanism.moved.blocks:
