@@ -72,7 +72,8 @@ def draw_collapse(structure: Structure, found: Collapse) -> Figure:
         style = {"color": Colour.THRUST, "lw": 1.5, "marker": ".", "ms": 3, "zorder": 4}
         axes.plot(*line.T, label="thrust line", **style)
     factor = f"{found.factor:.3g} ×" if np.isfinite(found.factor) else ""
-    draw_loads(axes, structure, found.live, factor=factor)
+    if found.outcome is not Outcome.INFEASIBLE:  # else nothing was loaded: the weight is too much
+        draw_loads(axes, structure, found.live, factor=factor)
     set_title(axes, f"{structure.name}: {_outcome_text(found)}")
     add_legend(axes)
     return figure

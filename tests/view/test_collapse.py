@@ -1,11 +1,15 @@
 """Pictures of limit analysis: what they show, not how they look."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import archfem as af
 from archfem.view.collapse import draw_capacity, draw_collapse, draw_kinematic_assessment
+from archfem.view.structure import draw_loads, draw_structure
 
 
 def lines_of(axes):
@@ -37,7 +41,7 @@ def test_a_load_that_never_overturns_shows_no_mechanism(ring):
 def test_an_arch_that_falls_has_no_thrust_line():
     thin = af.circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
     axes = draw_collapse(thin, af.collapse_factor(thin, live=af.BodyForce(1.0))).axes[0]
-    assert set(lines_of(axes)) == {"hinge", "live load"}
+    assert set(lines_of(axes)) == {"hinge"}  # a load plays no part: it is not drawn
 
 
 def test_map_of_capacity_carries_known_values(tmp_path):
@@ -88,3 +92,20 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(ring, tmp_path):
     locked = af.kinematic_assessment(piers, found.spectrum, part="left pier")
     with pytest.raises(af.InvalidInput, match="no mechanism moves under horizontal forces"):
         draw_kinematic_assessment(locked)
+
+
+@pytest.mark.parametrize(
+    ("forces", "labels"), [((1e3, 1e3), 1), ((1e3, 2e3), 2), ((1e3, 2e3, 3e3), 3)]
+)
+def test_labels_of_neighbouring_loads_do_not_overlap(ring, forces, labels):
+    places = np.linspace(-0.26, 0.26, len(forces))
+    loads = [af.PointLoad(x, (0.0, -force)) for x, force in zip(places, forces, strict=True)]
+    figure = draw_structure(ring)
+    draw_loads(figure.axes[0], ring, loads)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    texts = [text for text in figure.axes[0].texts if text.get_text()]
+    boxes = [text.get_window_extent() for text in texts]
+    assert len(texts) == labels
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    assert texts[0].get_text() == ("λ × 1 kN each" if labels == 1 else "λ × 1 kN")
