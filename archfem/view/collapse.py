@@ -28,6 +28,7 @@ from archfem.view.style import (
     COLOUR_MAP,
     COLUMN_WIDTH,
     LABEL_SIZE,
+    PAGE_WIDTH,
     TITLE_SIZE,
     Colour,
     add_legend,
@@ -260,10 +261,15 @@ def draw_fall(run: History) -> Figure:
             "there is no fall to draw: no block came loose, displacements were taken as small, or "
             "the run has no structure; read it with History.read(path, structure)"
         )
-    wide, high = structure_figure(falls.structure).get_size_inches()
-    figure = new_figure(1.5 * wide, 1.35 * high)
+    instants = _select_instants(falls)
+    built = [block.drawn() for block in falls.structure.blocks]
+    drawn = np.concatenate([*built, *(each for time in instants for each in falls.outlines(time))])
+    size, margin = np.ptp(drawn, axis=0), 0.4  # [m], [inch]
+    # panels have the shape of what is drawn: else they would leave much of the page white
+    scale = ((np.array([PAGE_WIDTH, 6.8]) / 2.0 - margin) / size).min()
+    figure = new_figure(*np.maximum(2.0 * (scale * size + margin), 0.5 * COLUMN_WIDTH))
     panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
-    for axes, time in zip(panels, _select_instants(falls), strict=True):
+    for axes, time in zip(panels, instants, strict=True):
         _draw_instant(axes, falls, time)
     return figure
 

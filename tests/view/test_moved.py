@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import archfem as af
 from archfem.view.joint_marks import joint_marks
@@ -113,6 +114,9 @@ def test_a_fall_is_drawn_at_four_instants(toppled):
     assert len(times) == 4
     assert times == sorted(times)
     assert times[0] == pytest.approx(float(toppled.dataset["fall_time"][0]), abs=0.006)
+    FigureCanvasAgg(figure).draw()  # equal scales shrink axes that do not suit what they show
+    boxes = [axes.get_position() for axes in figure.axes]
+    assert sum(box.width * box.height for box in boxes) > 0.7
 
 
 def test_the_instant_that_decides_is_the_fall_or_else_a_motion(toppled, ring):
