@@ -330,11 +330,24 @@ def draw_loads(
         # the text stands above a steep arrow's tail, beside an upward arrow, else above its middle
         offset = (0, 5) if direction[1] < 0.5 or abs(direction[0]) > 0.5 else (6, 0)
         where = start if direction[1] < -0.5 else 0.5 * (start + tip)
-        labels.append((f"{factor} {size}".strip(), where + np.array(offset) * inch / 72.0))
+        text = f"{factor} {size}".strip()
+        place = where + np.array(offset) * inch / 72.0
+        if isinstance(action, Settlement):
+            place = _beside_block(structure, action.place(structure), text, inch)
+        labels.append((text, place))
     style = {"ha": "center", "va": "bottom", "color": Colour.LOAD, "zorder": 9}
     for text, place in _separate_labels(labels, inch):
         annotate(axes, text, place, **style)
     axes.autoscale_view()
+
+
+def _beside_block(structure: Structure, block: int, text: str, inch: float) -> Array:
+    """Return the place of a label beside a support (2,) [m], towards the middle."""
+    outline = structure.blocks[block].drawn()
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    half = (0.5 * text_width(len(text)) + 0.3) * inch
+    leftward = low[0] + high[0] > np.sum(outline_bounds(structure), axis=0)[0]
+    return np.array([low[0] - half if leftward else high[0] + half, low[1]])
 
 
 def _separate_labels(labels: Sequence[tuple[str, Array]], inch: float) -> list[tuple[str, Array]]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.transforms import Bbox
 
 import archfem as af
 from archfem.view.collapse import draw_capacity, draw_collapse, draw_kinematic_assessment
@@ -109,3 +110,16 @@ def test_labels_of_neighbouring_loads_do_not_overlap(ring, forces, labels):
     assert len(texts) == labels
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
     assert texts[0].get_text() == ("λ × 1 kN each" if labels == 1 else "λ × 1 kN")
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_label_of_a_movement_stands_clear_of_blocks_and_ticks(ring, side):
+    figure = draw_structure(ring)
+    (axes,) = figure.axes
+    draw_loads(axes, ring, [af.Settlement(f"{side} abutment", (0.0, -0.01, 0.0))])
+    FigureCanvasAgg(figure).draw()
+    (label,) = (text for text in axes.texts if text.get_text())
+    box, frame = label.get_window_extent(), axes.get_window_extent()
+    assert frame.x0 < box.x0 < box.x1 < frame.x1
+    corners = [axes.transData.transform(block.drawn()) for block in ring.blocks]
+    assert not any(box.overlaps(Bbox([each.min(axis=0), each.max(axis=0)])) for each in corners)
