@@ -29,6 +29,7 @@ from archfem.view.style import (
     COLOUR_MAP,
     COLUMN_WIDTH,
     LABEL_SIZE,
+    PAGE_WIDTH,
     TITLE_SIZE,
     Colour,
     add_legend,
@@ -83,7 +84,8 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse) -> None:
         style = {"color": Colour.THRUST, "lw": 1.5, "marker": ".", "ms": 3, "zorder": 4}
         axes.plot(*line.T, label="thrust line", **style)
     factor = f"{found.factor:.3g} ×" if np.isfinite(found.factor) else ""
-    draw_loads(axes, structure, found.live, factor=factor)
+    if found.outcome is not Outcome.INFEASIBLE:  # else nothing was loaded: the weight is too much
+        draw_loads(axes, structure, found.live, factor=factor)
     set_title(axes, f"{structure.name}: {_outcome_text(found)}")
     add_legend(axes)
 
@@ -311,10 +313,15 @@ def draw_fall(run: History) -> Figure:
             "there is no fall to draw: no block came loose, displacements were taken as small, or "
             "the run has no structure; read it with History.read(path, structure)"
         )
-    wide, high = structure_figure(falls.structure).get_size_inches()
-    figure = new_figure(1.5 * wide, 1.35 * high)
+    instants = _select_instants(falls)
+    built = [block.drawn() for block in falls.structure.blocks]
+    drawn = np.concatenate([*built, *(each for time in instants for each in falls.outlines(time))])
+    size, margin = np.ptp(drawn, axis=0), 0.4  # [m], [inch]
+    # panels have the shape of what is drawn: else they would leave much of the page white
+    scale = ((np.array([PAGE_WIDTH, 6.8]) / 2.0 - margin) / size).min()
+    figure = new_figure(*np.maximum(2.0 * (scale * size + margin), 0.5 * COLUMN_WIDTH))
     panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
-    for axes, time in zip(panels, _select_instants(falls), strict=True):
+    for axes, time in zip(panels, instants, strict=True):
         _draw_instant(axes, falls, time)
     return figure
 
