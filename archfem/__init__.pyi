@@ -35,6 +35,7 @@ from .limit.collapse import stands as stands
 from .limit.mechanism_kinematics import verified_mechanism as verified_mechanism
 from .limit.thickness import minimum_thickness as minimum_thickness
 from .limit.vehicles import moving_load as moving_load
+from .limit.vehicles import rate as rate
 from .masonry import shapes as shapes
 from .masonry.block import Block as Block
 from .masonry.loads import BodyForce as BodyForce

@@ -23,6 +23,7 @@ LATE_BOUND_METHODS: Mapping[str, str] = {
     "Modes.plot": "view.statics:draw_modes",
     "Motion.plot": "view.motions:draw_motion",
     "Pushover.plot": "view.statics:draw_pushover",
+    "Rating.plot": "view.collapse:draw_rating",
     "Structure.plot": "view.structure:draw_structure",
     "VerdictRange.plot": "view.studies:draw_verdict_range",
 }

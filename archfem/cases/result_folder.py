@@ -11,8 +11,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import xarray as xr
-
 from archfem._files import (
     FINISHED_FOLDER,
     LIST_FILE,
@@ -37,17 +35,23 @@ from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import ArchfemError, InvalidInput
-from archfem.joints.criteria import assessed_joints
 from archfem.limit.collapse import Collapse
+from archfem.limit.vehicles import Rating
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.modes import Modes
 from archfem.statics.stress import strength_use_table
-from archfem.view.collapse import draw_collapse, draw_fall, draw_kinematic_assessment
+from archfem.view.collapse import (
+    draw_collapse,
+    draw_fall,
+    draw_kinematic_assessment,
+    draw_rating,
+)
 from archfem.view.histories import draw_envelope, draw_joints, most_stressed_joints
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
+from archfem.view.positions import decisive_instant
 from archfem.view.statics import draw_dead_load, draw_free_body, draw_modes
 from archfem.view.stress import draw_stress
 from archfem.view.structure import draw_during, draw_names
@@ -267,6 +271,15 @@ def write_assessments(
     return [_write_text(text, folder / "assessment.txt"), *figures]
 
 
+def write_rating(found: Rating, folder: Path) -> list[Path]:
+    """Write the rating of a bridge, the factors at all places, and the picture of both."""
+    return [
+        _write_text(str(found), folder / "rating.txt"),
+        _write_text(found.table(), folder / "rating.csv"),
+        save(draw_rating(found), folder / "rating.png"),
+    ]
+
+
 def write_dead_load(result: DeadLoadResult, folder: Path) -> list[Path]:
     """Draw thrust line, joint names, and, where available, stress and a free body."""
     case, dead, model = result.case, result.dead, result.dead.model
@@ -288,8 +301,9 @@ def write_dead_load(result: DeadLoadResult, folder: Path) -> list[Path]:
 def write_run(run: Run, at_rest: DeadLoadResult, text: str, folder: Path) -> list[Path]:
     """Draw critical instant, envelope, joints over time and fall of a run; film it if requested."""
     case, history, dead = run.case, run.history, at_rest.dead
+    critical = history.joints.sel(time=decisive_instant(history), method="nearest")
     figures = {
-        "critical_instant.png": draw_during(dead.model, history, _critical_instant(history)),
+        "critical_instant.png": draw_during(dead.model, history, critical),
         "envelope.png": draw_envelope({case.title: history}, dead=dead.joints),
         # The joints of the case, or else those of the largest |e| and of the longest sliding.
         "joints.png": draw_joints(history, case.joints or most_stressed_joints(history)),
@@ -328,14 +342,6 @@ def adopt_files(run: Run) -> bool:
         if not (draft / name).exists():
             _link(folder / name, draft / name)
     return True
-
-
-def _critical_instant(run: History) -> xr.Dataset:
-    """Return the joints at the first mechanism, or at the largest |e|."""
-    if run.mechanism is not None:
-        return run.joints.sel(time=run.mechanism.time, method="nearest")
-    eccentricity = abs(assessed_joints(run.joints)["eccentricity"])
-    return run.joints.isel(time=int(eccentricity.max("joint").argmax("time")))
 
 
 def write_suite(suite: Suite, target: DesignSpectrum | None, folder: Path) -> list[Path]:

@@ -26,9 +26,9 @@ from archfem.joints.criteria import (
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.limit.mechanism_count import duration_text
 from archfem.masonry.structure import Structure, join_joint_names, join_names
-from archfem.motion.intensity_measures import measure_intensity
 from archfem.motion.matching import Match
 from archfem.motion.motion import Motion
+from archfem.motion.response_spectra import measure_intensity
 from archfem.statics.stress import strength_use_text, utilisation_text
 from archfem.units import STANDARD_GRAVITY, kN, mm
 

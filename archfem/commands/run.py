@@ -1,4 +1,4 @@
-"""Commands on cases: run, check, modes, assess, mesh, accuracy, report; motion and compile."""
+"""Commands on cases: run, check, modes, assess, rate, mesh, accuracy, report; motion, compile."""
 
 import argparse
 import io
@@ -132,6 +132,28 @@ def assess(options: argparse.Namespace) -> None:
 
         with _replace_results("assess", case, create_result_folder(options.out)) as draft:
             print_written(write_assessments(found, text, draft))
+
+
+def rate(options: argparse.Namespace) -> None:
+    """Rate the bridge of a case for a vehicle, by the joints and the fill of its [limit]."""
+    from archfem.limit.vehicles import rate as rate_bridge
+
+    case = Case.read(options.case, options.changes)
+    found = rate_bridge(
+        case.structure,
+        options.vehicle,
+        live=options.live,
+        dead=options.dead,
+        width=options.width,
+        friction="coulomb" if case.limit is None else case.limit.friction,
+        fill=None if case.limit is None else case.limit.fill,
+    )
+    print(f"{case.title}\n{found}")
+    if options.out is not None:
+        from archfem.cases.result_folder import write_rating
+
+        with _replace_results("rate", case, create_result_folder(options.out)) as draft:
+            print_written(write_rating(found, draft))
 
 
 def mesh(options: argparse.Namespace) -> None:

@@ -8,7 +8,6 @@
     quadrature        quadrature rules and points
     resultants        N, V, M, e; opening, rotation, slip; tables
     rigid_kinematics  G of rigid blocks
-    sparsity          one sparsity pattern for sums of matrices
     step_average      joint forces averaged over a time step
 
 Imports `masonry` and the support modules. Start reading at `operator`, then at `resultants`.

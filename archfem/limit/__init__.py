@@ -9,10 +9,9 @@
     mechanism_count       mechanisms by counting failed joints; duration and opening
     mechanism_kinematics  mechanisms verified by a rigid-block motion
     nonassociated         sliding without dilatancy
-    rigid_regions         blocks that move as rigid bodies
     support_movement      finite movement of a support
     thickness             least thickness
-    vehicles              vehicles over a bridge
+    vehicles              vehicles over a bridge, rating
 
 Imports `masonry`, `joints` and the support modules. Start reading at `collapse`.
 """

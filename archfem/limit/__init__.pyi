@@ -21,5 +21,9 @@ from .support_movement import Movement as Movement
 from .support_movement import Stage as Stage
 from .support_movement import largest_movement as largest_movement
 from .thickness import minimum_thickness as minimum_thickness
+from .vehicles import VEHICLES as VEHICLES
 from .vehicles import MovingLoad as MovingLoad
+from .vehicles import Rating as Rating
+from .vehicles import Vehicle as Vehicle
 from .vehicles import moving_load as moving_load
+from .vehicles import rate as rate

@@ -29,7 +29,7 @@ from archfem.limit.linear_programme import (
     no_limits,
     rigid_load,
 )
-from archfem.limit.rigid_regions import RigidRegions, find_rigid_regions, take_all_rigid
+from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
 from archfem.masonry.loads import BodyForce, PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (

@@ -1,7 +1,7 @@
-"""Vehicles over a bridge: collapse factor at every position of a row of axles."""
+"""Vehicles over a bridge: collapse factor at every position of a row of axles, and its rating."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any
 
@@ -9,20 +9,89 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from archfem._display import ResultDisplay
 from archfem._typing import Array
-from archfem._validation import check_numbers
+from archfem._validation import check_number, check_numbers, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
 from archfem.limit.collapse import Collapse, collapse_factor
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
 from archfem.masonry.loads import PointLoad
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Joint, Structure
 
 DRIVING_DIRECTIONS = ("right", "left")
 
 # Axles that stand on the structure, from left to right
 AxleRow = tuple[PointLoad, ...]
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """A vehicle of a code, or one's own.
+
+    Attributes:
+        name: in tables and pictures.
+        axles: weight of each axle, from the front [N].
+        spacings: distances between the axles, one fewer [m].
+        live: partial factor of the code on its weight [-].
+        source: code and clause of the axles, and what of the code's load is left out.
+        grade: "read" where weights and spacings were read in the code's table or in a text that
+            quotes it, "from memory" otherwise.
+        live_source: code and clause of the partial factor, and its grade.
+    """
+
+    name: str
+    axles: tuple[float, ...]
+    spacings: tuple[float, ...] = ()
+    live: float = 1.0
+    source: str = "given"
+    grade: str = "given"
+    live_source: str = "given"
+
+    def __post_init__(self) -> None:
+        """Refuse weights, spacings and factors out of range."""
+        _parse_axles(self.axles, self.spacings)
+        _check_factor(self.live, f"partial factor on the live load of {self.name}")
+
+
+def _code_vehicles() -> dict[str, Vehicle]:
+    """Return vehicles of codes: axles in kN (CS 454: tonnes, by 9.81 m/s²), spacings in m."""
+    tonne = 9.81
+    en_1990 = "EN 1990:2002, Table A2.4(B), from memory"
+    dmrb = "BD 21/01: 1.9 by 1.8 for impact, here on all axles; from memory"
+    aashto = "AASHTO LRFD, Strength I, without the dynamic load allowance; from memory"
+    lane = "EN 1991-2:2003, 4.3.2: tandem of lane 1, dynamic; its 9 kN/m² is left out"
+    single = "EN 1991-2:2003, 4.3.3: single axle, dynamic"
+    train = "EN 1991-2:2003, 6.3.2, as UIC 71, without dynamic factor"
+    table = "CS 454, Table 7.3.1a, normal traffic, no axle lift-off"
+    rows: list[tuple[str, list[float], list[float], float, str, str, str]] = [
+        ("LM1", [300.0] * 2, [1.2], 1.35, lane, "read", en_1990),
+        ("LM2", [400.0], [], 1.35, single, "read", en_1990),
+        ("LM71", [250.0] * 4, [1.6] * 3, 1.45, f"{train}: axles alone", "from memory", en_1990),
+        # 80 kN/m from 0.8 m behind the last axle, over 20 m, as a force on each metre
+        (
+            *("LM71-train", [250.0] * 4 + [80.0] * 20, [1.6] * 3 + [1.3] + [1.0] * 19, 1.45),
+            *(f"{train}: axles, and 80 kN/m over 20 m behind them", "from memory", en_1990),
+        ),
+        ("CS454-single", [11.5 * tonne], [], 3.4, table, "read", dmrb),
+        ("CS454-double-1.0", [8.0 * tonne] * 2, [1.0], 3.4, table, "read", dmrb),
+        ("CS454-double-1.3", [9.5 * tonne] * 2, [1.3], 3.4, table, "read", dmrb),
+        ("CS454-double-1.8", [10.0 * tonne] * 2, [1.8], 3.4, table, "read", dmrb),
+        (
+            *("CS454-triple-2.6", [8.0 * tonne] * 3, [1.3] * 2, 3.4),
+            *(f"{table}; 2.6 m from first to last axle, from memory", "read", dmrb),
+        ),
+        ("HL93-tandem", [110.0] * 2, [1.2], 1.75, "AASHTO LRFD, 3.6.1.2.3", "read", aashto),
+        (
+            *("HL93-truck", [35.0, 145.0, 145.0], [4.3, 4.3], 1.75),
+            *("AASHTO LRFD, 3.6.1.2.2, least rear spacing", "read", aashto),
+        ),
+    ]
+    return {
+        name: Vehicle(name, tuple(1e3 * w for w in axles), tuple(gaps), live, *texts)
+        for name, axles, gaps, live, *texts in rows
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +183,228 @@ def moving_load(
         factors[direction, place] = worst.factor  # by the whole search: may be a weaker state
     dataset = _label_factors(places, factors, count)
     return MovingLoad(dataset, worst, DRIVING_DIRECTIONS[direction], float(places[place]))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rating(ResultDisplay):
+    """Rating of a bridge for a vehicle.
+
+    Attributes:
+        structure: the bridge, with its characteristic weights.
+        vehicle: axles, spacings and sources.
+        live: partial factor on the vehicle's weight [-].
+        dead: partial factor on the weights of stones and fill [-].
+        width: width of the bridge over which one vehicle spreads [m].
+        moving: factors at all places in both directions, on the factored vehicle over factored
+            weights, and the collapse at the worst place.
+        geometric: geometric factor of safety at the worst place [-]: depth of the joints over the
+            least share of it, about their middles, that carries the factored vehicle. Undefined
+            (NaN) where the bridge does not carry it, infinite where hinges alone do.
+    """
+
+    structure: Structure
+    vehicle: Vehicle
+    live: float
+    dead: float
+    width: float
+    moving: MovingLoad
+    geometric: float
+
+    @property
+    def factor(self) -> float:
+        """Rating factor: multiple of the factored vehicle at collapse [-]."""
+        return self.moving.worst.factor
+
+    @property
+    def passes(self) -> bool:
+        """Whether the bridge carries the factored vehicle everywhere; not where it falls alone."""
+        return bool(self.factor >= 1.0)
+
+    def table(self) -> str:
+        """Return factors [-] and axles on the bridge at all places [m], as rows of CSV."""
+        rows = ["direction,position [m],factor [-],axles [-]"]
+        for way in DRIVING_DIRECTIONS:
+            here = self.moving.factors.sel(direction=way)
+            values = (here[key].values for key in ("position", "factor", "axles"))
+            rows += [f"{way},{x:.6g},{f:.6g},{n}" for x, f, n in zip(*values, strict=True)]
+        return "\n".join(rows)
+
+    def _summary(self) -> str:
+        """Describe the result in one line."""
+        return (
+            f"Rating of '{self.structure.name}' for {self.vehicle.name}: factor {self.factor:.4g} "
+            f"at x = {self.moving.position:.3g} m, {'passes' if self.passes else 'fails'}"
+        )
+
+    def __str__(self) -> str:
+        """Describe outcome, worst places, mechanism, factors and sources, a line each."""
+        vehicle = self.vehicle
+        least = (
+            f"{way} {float(self.moving.factors['factor'].sel(direction=way).min()):.4g}"
+            for way in DRIVING_DIRECTIONS
+        )
+        return "\n".join(
+            [
+                f"{self._summary()}",
+                f"least factor driving {', '.join(least)}",
+                f"{self.moving}",
+                f"geometric factor of safety {self.geometric:.3g}, at that place",
+                f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN "
+                f"over {self.width:.3g} m of width; {vehicle.source} ({vehicle.grade})",
+                f"live load by {self.live:g} ({self._live_source()})",
+                f"dead load by {self.dead:g} ({self._dead_source()})",
+            ]
+        )
+
+    def _live_source(self) -> str:
+        """Return where the factor on the live load comes from."""
+        return self.vehicle.live_source if self.live == self.vehicle.live else "given"
+
+    def _dead_source(self) -> str:
+        """Return where the factor on the dead load comes from."""
+        favourable = "EN 1990:2002, Table A2.4(B), favourable; from memory"
+        return favourable if self.dead == 1.0 else "given"
+
+
+@validate_arguments
+def rate(
+    structure: Structure,
+    vehicle: str | Vehicle,
+    *,
+    live: float | None = None,
+    dead: float = 1.0,
+    width: float | None = None,
+    friction: str | None = "coulomb",
+    strength: float | None = None,
+    fill: Fill | None = None,
+) -> Rating:
+    """Rate a bridge for a vehicle: the multiple of it, with partial factors, at collapse.
+
+    The vehicle drives over the bridge in both directions (`moving_load`), from on to off in steps
+    of 1/100 of the bridge's length. Its axles spread through a fill along the bridge; across it
+    they spread evenly over `width`. The geometric factor of safety is Heyman's: all joints are
+    narrowed about their middles, at unchanged weights and with the vehicle at its worst place,
+    until it is carried no longer.
+
+    Args:
+        structure: the bridge.
+        vehicle: one of `archfem.limit.VEHICLES` by its name, or one's own.
+        live: partial factor on its weight, with impact if that counts [-]; by default that of its
+            code.
+        dead: partial factor on the weights of stones and fill [-]; by default 1, as for weights
+            that stabilise. Weights on one side alone are not increased.
+        width: width over which one vehicle spreads [m]; by default all of the bridge's.
+        friction: as for `collapse_factor`; the geometric factor takes "coulomb" for
+            "nonassociated".
+        strength: as for `collapse_factor`, divided by its partial factor [Pa].
+        fill: as for `collapse_factor`.
+
+    Returns:
+        Factor, worst place, its mechanism, and the factors at all places.
+
+    Raises:
+        InvalidInput: the vehicle is unknown, a factor or the width is out of range, or as for
+            `moving_load`.
+        DidNotConverge: the solver of linear programmes gave up.
+
+    References:
+        Heyman, The Masonry Arch, Ellis Horwood (1982).
+    """
+    driven = _find_vehicle(vehicle)
+    live = driven.live if live is None else _check_factor(live, "live, factor on the vehicle")
+    _check_factor(dead, "dead, factor on the weights")
+    width = structure.width if width is None else width
+    if not 0.0 < width <= structure.width:
+        raise InvalidInput(
+            f"width {width:.4g} m is not above 0 and up to that of the bridge, "
+            f"{structure.width:.4g} m: give the part over which one vehicle spreads"
+        )
+    # the structure is modelled over its whole width, of which a vehicle loads a part
+    axles = [live * structure.width / width * weight for weight in driven.axles]
+    weighted = _scale_weights(structure, dead)
+    positions = _places_along(weighted, _parse_axles(axles, driven.spacings))
+    options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
+    moving = moving_load(weighted, axles, spacings=driven.spacings, positions=positions, **options)
+    geometric = np.nan
+    if moving.worst.factor >= 1.0:
+        geometric = _geometric_factor(weighted, moving, friction, strength, fill)
+    return Rating(structure, driven, live, dead, width, moving, geometric)
+
+
+def _find_vehicle(vehicle: str | Vehicle) -> Vehicle:
+    """Return a vehicle of the library by its name, or the given one."""
+    if isinstance(vehicle, Vehicle):
+        return vehicle
+    known = {name.lower(): each for name, each in VEHICLES.items()}
+    if vehicle.lower() not in known:
+        raise InvalidInput(
+            f"vehicle {vehicle!r} is not known: use one of {', '.join(VEHICLES)}, or give your own "
+            "as af.limit.Vehicle(name, axles, spacings)"
+        )
+    return known[vehicle.lower()]
+
+
+def _check_factor(value: float, name: str) -> float:
+    """Return a partial factor, which must be a plausible one."""
+    return check_number(value, f"{name} [-]", minimum=0.1, maximum=10.0)
+
+
+def _scale_weights(structure: Structure, factor: float) -> Structure:
+    """Return a structure whose blocks weigh a multiple."""
+    if factor == 1.0:
+        return structure
+    blocks = (
+        replace(
+            block,
+            material=replace(block.material, unit_weight=factor * block.material.unit_weight),
+        )
+        for block in structure.blocks
+    )
+    return replace(structure, blocks=tuple(blocks))
+
+
+def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Sequence[float]:
+    """Return places from where the vehicle drives onto the structure to where it leaves [m]."""
+    ends = _vehicle_positions(structure, vehicle, None, 2)
+    length = float(np.ptp(ends)) - 2.0 * float(vehicle[0, 1])
+    count = 1 + int(np.ceil(steps * float(np.ptp(ends)) / length))
+    return tuple(np.linspace(ends[0], ends[1], count).tolist())
+
+
+def _geometric_factor(
+    structure: Structure,
+    moving: MovingLoad,
+    friction: str | None,
+    strength: float | None,
+    fill: Fill | None,
+    tolerance: float = 1e-4,
+) -> float:
+    """Return the depth of joints over the least one that carries the worst row of axles [-]."""
+    axles = [load for load in moving.worst.live if isinstance(load, PointLoad)]
+
+    def is_carried(share: float) -> bool:
+        narrow = replace(structure, joints=tuple(_narrow(j, share) for j in structure.joints))
+        stones, dead = self_weight_programme(narrow, friction, strength, fill)
+        if not is_balanced(dead.minimise_residual(), dead):
+            return False
+        optimum = dead.with_load_factor(stones.load(axles)).solve()
+        return optimum is None or -optimum.value >= 1.0
+
+    # what narrower joints carry wider ones carry, so that halving finds the least
+    low, high = 0.0, 1.0
+    while high - low > tolerance * high:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if is_carried(middle) else (middle, high)
+        if high < tolerance:
+            return np.inf
+    return 1.0 / high
+
+
+def _narrow(joint: Joint, share: float) -> Joint:
+    """Return a joint with a share of its depth, about its middle."""
+    ends = joint.ends
+    inner, outer = (ends.mean(axis=0) + share * (ends - ends.mean(axis=0))).tolist()
+    return replace(joint, intrados=tuple(inner), extrados=tuple(outer))
 
 
 def _parse_axles(axles: float | Sequence[float], spacings: Sequence[float]) -> Array:
@@ -228,3 +519,6 @@ def _label_factors(places: Array, factors: Array, count: NDArray[np.intp]) -> xr
         },
         {"direction": list(DRIVING_DIRECTIONS), "position": ("position", places, {"units": "m"})},
     )
+
+
+VEHICLES: Mapping[str, Vehicle] = _code_vehicles()

@@ -11,9 +11,8 @@ import numpy as np
 from scipy import sparse
 
 from archfem._typing import Array
-from archfem.joints.operator import JointOperator
+from archfem.joints.operator import JointOperator, Pattern
 from archfem.joints.rigid_kinematics import block_motion_gaps
-from archfem.joints.sparsity import Pattern
 from archfem.joints.step_average import StepForces
 from archfem.masonry.structure import Structure
 from archfem.models.model import Cells, Model, ModelStep, Observer

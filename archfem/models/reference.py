@@ -22,9 +22,8 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem.errors import InvalidInput
-from archfem.joints.operator import JointOperator
+from archfem.joints.operator import JointOperator, Pattern
 from archfem.joints.quadrature import Quadrature
-from archfem.joints.sparsity import Pattern
 from archfem.masonry.structure import rigid_motion_matrix
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.forms import Fields, Forms

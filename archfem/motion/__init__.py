@@ -1,11 +1,10 @@
 """Ground motions: records, synthetic motions, spectra, spectral matching and suites.
 
     design_spectra      design spectra of codes
-    intensity_measures  PGA, Arias, CAV, duration
     matching            spectral matching by wavelets
     motion              Motion: a ground acceleration
     records             files of recorded ground motions, one module for each format
-    response_spectra    damped oscillator, response spectra
+    response_spectra    response spectra; PGA, Arias, CAV, duration
     signal_processing   filters, integration, baseline, resampling, artificial accelerograms
     suite               Suite of motions
 

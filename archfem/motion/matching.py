@@ -11,9 +11,8 @@ from archfem._validation import validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.motion import response_spectra, signal_processing
 from archfem.motion.design_spectra import DesignSpectrum
-from archfem.motion.intensity_measures import IntensityMeasures, measure_intensity
 from archfem.motion.motion import Motion
-from archfem.motion.response_spectra import response_spectrum
+from archfem.motion.response_spectra import IntensityMeasures, measure_intensity, response_spectrum
 from archfem.units import STANDARD_GRAVITY
 
 Target = Callable[[Array], Array]

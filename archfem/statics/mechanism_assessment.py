@@ -35,7 +35,7 @@ from archfem.limit.collapse import collapse_factor
 from archfem.limit.displaced_blocks import Mechanism, PlacedBlocks, classify_motion, find_mechanism
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
 from archfem.limit.linear_programme import NoEquilibrium
-from archfem.limit.rigid_regions import find_rigid_regions
+from archfem.limit.mechanism_kinematics import find_rigid_regions
 from archfem.masonry.loads import AttachedLoad, BodyForce
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_joint_names, join_names

@@ -1,7 +1,7 @@
 """Figures of limit analysis and of collapse.
 
-Thrust line and mechanism of a limit analysis, kinematic assessment, capacity map of rings, and
-instants of a fall.
+Thrust line and mechanism of a limit analysis, rating of a bridge, kinematic assessment, capacity
+map of rings, and instants of a fall.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,6 +19,7 @@ from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.resultants import thrust_line
 from archfem.limit.collapse import Collapse, Outcome
+from archfem.limit.vehicles import Rating
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.view.joint_marks import outline_moving_blocks, scale_motion
@@ -28,6 +29,7 @@ from archfem.view.style import (
     COLOUR_MAP,
     COLUMN_WIDTH,
     LABEL_SIZE,
+    PAGE_WIDTH,
     TITLE_SIZE,
     Colour,
     add_legend,
@@ -35,6 +37,7 @@ from archfem.view.style import (
     add_polygons,
     annotate,
     new_figure,
+    outline_bounds,
     set_title,
     structure_figure,
     style_axes,
@@ -55,7 +58,12 @@ def draw_collapse(structure: Structure, found: Collapse) -> Figure:
         The figure; its title gives the outcome and the collapse factor.
     """
     figure = draw_structure(structure)
-    axes = figure.axes[0]
+    _draw_mechanism(figure.axes[0], structure, found)
+    return figure
+
+
+def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse) -> None:
+    """Draw mechanism, hinges, thrust line and loads over a structure that is drawn already."""
     if found.motion.any():
         motion = scale_motion(structure, found.motion)
         style = {"edge": Colour.MECHANISM, "width": 0.8, "zorder": 2, "label": "mechanism"}
@@ -68,14 +76,18 @@ def draw_collapse(structure: Structure, found: Collapse) -> Figure:
             style = {"colors": Colour.SLIDING, "linewidths": 2.4, "zorder": 4}
             axes.add_collection(LineCollection(ends, label="sliding joint", **style))
     line = thrust_line(structure, found.joints).values
+    # arches and piers that share no block have lines of their own
+    pairs = [set(joint.blocks) for joint in structure.joints]
+    breaks = [k for k in range(1, len(pairs)) if not pairs[k - 1] & pairs[k]]
+    line = np.insert(line, breaks, np.nan, axis=0)
     if np.isfinite(line).any():
         style = {"color": Colour.THRUST, "lw": 1.5, "marker": ".", "ms": 3, "zorder": 4}
         axes.plot(*line.T, label="thrust line", **style)
     factor = f"{found.factor:.3g} ×" if np.isfinite(found.factor) else ""
-    draw_loads(axes, structure, found.live, factor=factor)
+    if found.outcome is not Outcome.INFEASIBLE:  # else nothing was loaded: the weight is too much
+        draw_loads(axes, structure, found.live, factor=factor)
     set_title(axes, f"{structure.name}: {_outcome_text(found)}")
     add_legend(axes)
-    return figure
 
 
 def draw_collapse_result(found: Collapse) -> Figure:
@@ -85,6 +97,48 @@ def draw_collapse_result(found: Collapse) -> Figure:
             "this result does not contain its structure: use draw_collapse(structure, …)"
         )
     return draw_collapse(found.structure, found)
+
+
+@validate_arguments
+def draw_rating(found: Rating) -> Figure:
+    """Draw the factor against the place of the vehicle, and the mechanism at the worst place.
+
+    Args:
+        found: rating of a bridge for a vehicle.
+
+    Returns:
+        The figure: factors of both directions over the place of the front axle, up to four times
+        the least one, above the mechanism at the worst place.
+    """
+    wide, tall = structure_figure(found.structure).get_size_inches()
+    # height to spare, so that the bridge fills the width and both panels have one x axis
+    figure = new_figure(wide, 1.5 * tall + 3.0)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 1.5 * tall])
+    half = 0.5 * sum(found.vehicle.spacings)
+    factors = found.moving.factors["factor"]
+    ahead = {"right": half, "left": -half}  # the front axle, since long vehicles have no middle
+    for (way, reach), line, colour in zip(
+        ahead.items(), ("-", "--"), (Colour.THRUST, Colour.LOAD), strict=True
+    ):
+        style = {"color": colour, "ls": line, "lw": 1.5, "label": f"driving {way}"}
+        drawn = factors.sel(direction=way)
+        upper.plot(drawn["position"] + reach, drawn.where(np.isfinite(drawn)), **style)
+    upper.axhline(1.0, color=Colour.GREY, lw=1.0)
+    if np.isfinite(found.factor):
+        style = {"mfc": Colour.HINGE, "mec": "white", "ms": 7.5, "zorder": 5}
+        front = found.moving.position + ahead[found.moving.direction]
+        upper.plot([front], [found.factor], "o", label="worst place", **style)
+        upper.set_ylim(0.0, 4.0 * max(found.factor, 1.0))
+    style_axes(upper, "front axle, x [m]", "factor [-]")
+    outcome = "passes" if found.passes else "fails"
+    set_title(upper, f"{found.vehicle.name}: factor {found.factor:.3g}, {outcome}")
+    upper.legend(frameon=False, fontsize=LABEL_SIZE)
+    draw_structure(found.structure, axes=lower)
+    _draw_mechanism(lower, found.structure, found.moving.worst)
+    low, high = outline_bounds(found.structure)
+    margin = 0.03 * (high[0] - low[0])
+    lower.set_xlim(low[0] - margin, high[0] + margin)
+    return figure
 
 
 @validate_arguments
@@ -259,10 +313,15 @@ def draw_fall(run: History) -> Figure:
             "there is no fall to draw: no block came loose, displacements were taken as small, or "
             "the run has no structure; read it with History.read(path, structure)"
         )
-    wide, high = structure_figure(falls.structure).get_size_inches()
-    figure = new_figure(1.5 * wide, 1.35 * high)
+    instants = _select_instants(falls)
+    built = [block.drawn() for block in falls.structure.blocks]
+    drawn = np.concatenate([*built, *(each for time in instants for each in falls.outlines(time))])
+    size, margin = np.ptp(drawn, axis=0), 0.4  # [m], [inch]
+    # panels have the shape of what is drawn: else they would leave much of the page white
+    scale = ((np.array([PAGE_WIDTH, 6.8]) / 2.0 - margin) / size).min()
+    figure = new_figure(*np.maximum(2.0 * (scale * size + margin), 0.5 * COLUMN_WIDTH))
     panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
-    for axes, time in zip(panels, _select_instants(falls), strict=True):
+    for axes, time in zip(panels, instants, strict=True):
         _draw_instant(axes, falls, time)
     return figure
 

@@ -146,7 +146,8 @@ def _draw_faces(axes: Axes, hinge: float) -> None:
     for side in (-1.0, 1.0):
         axes.axhspan(side * hinge, side * 0.5, color=Colour.HINGE, alpha=0.12, lw=0)
         axes.axhline(side * 0.5, color=Colour.EDGE, lw=1.2)
-        axes.axhline(side * hinge, color=Colour.HINGE, lw=0.7, ls="--")
+        label = f"hinge from |e| = {hinge:.3g}" if side > 0.0 else None
+        axes.axhline(side * hinge, color=Colour.HINGE, lw=0.7, ls="--", label=label)
     axes.axhline(0.0, color=Colour.GREY, lw=0.5)
 
 
@@ -320,7 +321,12 @@ def draw_ground(
 def _draw_eccentricity(axes: Axes, joint: xr.Dataset, label: str) -> None:
     """Draw the eccentricity of a joint between its faces."""
     style_axes(axes, "", label)
-    _draw_faces(axes, Criteria.of(joint).hinge)
+    hinge = Criteria.of(joint).hinge
+    _draw_faces(axes, hinge)
+    # above the panel: inside it would cover the line
+    style: dict[str, Any] = {"xycoords": "axes fraction", "color": Colour.HINGE}
+    style |= {"ha": "right", "va": "bottom"}
+    annotate(axes, f"hinge from |e| = {hinge:.3g}", (1.0, 1.0), (-3, 1), **style)
     axes.plot(joint["time"], joint["eccentricity"], color=LINE_COLOURS[0], lw=0.6)
     axes.set_ylim(-0.56, 0.56)
 

@@ -124,9 +124,10 @@ def draw_suite(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
 
 def _draw_spectrum(axes: Axes, values: Array, index: int, name: str, *, width: float) -> None:
     """Draw one of several spectra [m/s²], with its own colour and dashes."""
-    # colours repeat after a cycle, with other dashes
-    cycle, place = divmod(index, len(LINE_COLOURS))
-    style = {"color": LINE_COLOURS[place], "ls": ("-", "--", ":", "-.")[cycle % 4], "lw": width}
+    # colours repeat after a cycle, with other dashes; the last one, black, is that of the mean
+    colours = LINE_COLOURS[:-1]
+    cycle, place = divmod(index, len(colours))
+    style = {"color": colours[place], "ls": ("-", "--", ":", "-.")[cycle % 4], "lw": width}
     axes.plot(SPECTRUM_PERIODS, values / STANDARD_GRAVITY, label=name, **style)
 
 

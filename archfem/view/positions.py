@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from archfem._typing import Array
 from archfem.dynamics.history import History
 from archfem.dynamics.rigid_body.bodies import make_bodies
+from archfem.joints.criteria import assessed_joints
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 
@@ -27,6 +28,19 @@ def rotate(points: Array, angle: Array) -> Array:
     c, s = np.cos(angle), np.sin(angle)
     x, y = np.moveaxis(points, -1, 0)
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+def decisive_instant(run: History) -> float:
+    """Return the time of collapse, else first mechanism, else largest |e| of a joint [s]."""
+    if "fall_pose" in run.dataset:
+        return float(run.dataset["fall_time"][0])
+    # enough joints may fail while no block can move: a verified motion comes first
+    verified = run.verified if run.structure is not None else None
+    found = run.mechanism if verified is None else verified.moved
+    if found is not None and found.time is not None:
+        return found.time
+    e = abs(assessed_joints(run.joints)["eccentricity"]).max("joint")
+    return float(run.time[int(e.fillna(0.0).argmax("time"))])
 
 
 def recorded_fields(run: History) -> tuple[Array, Array]:

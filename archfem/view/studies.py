@@ -145,6 +145,8 @@ def draw_ida(
     left.set_ylim(bottom=0.0)
     left.legend(frameon=False, fontsize=LABEL_SIZE, loc="lower right")
     _draw_capacities(right, capacities)
+    handles, labels = right.get_legend_handles_labels()
+    add_legend_below(figure, handles=handles, labels=labels)
     return figure
 
 
@@ -155,13 +157,29 @@ def _draw_capacities(axes: Axes, capacities: Mapping[str, tuple[Array, Array]]) 
         met = np.isfinite(high)
         colour = LINE_COLOURS[place % len(LINE_COLOURS)]
         axes.vlines(spread[met], low[met], high[met], color=colour, lw=2.0)
+        # a bracket may be too narrow to be seen: its middle is marked
+        axes.plot(spread[met], 0.5 * (low + high)[met], ".", color=colour, ms=5)
         axes.plot(spread[~met], low[~met], "^", color=colour, ms=4)
         if met.sum() > len(met) / 2:
             middle = float(np.quantile(np.sqrt(low * high), 0.5, method="nearest"))
             axes.hlines(middle, place - 0.35, place + 0.35, color=Colour.EDGE, lw=1.2)
+    _explain_capacities(axes, capacities)
     axes.set_xticks(range(len(capacities)), list(capacities), rotation=25, ha="right")
     axes.set_xlim(-0.6, len(capacities) - 0.4)
     axes.grid(axis="y", color=Colour.UNDEFORMED, lw=0.5)
+
+
+def _explain_capacities(axes: Axes, capacities: Mapping[str, tuple[Array, Array]]) -> None:
+    """Add legend entries of the marks that occur among the capacities."""
+    met = [np.isfinite(high) for _, high in capacities.values()]
+    marks: dict[str, tuple[bool, dict[str, Any]]] = {
+        "bracket of a motion": (any(each.any() for each in met), {"marker": ".", "lw": 2.0}),
+        "median": (any(each.mean() > 0.5 for each in met), {"color": Colour.EDGE, "lw": 1.2}),
+        "not met up to here": (any(not each.all() for each in met), {"marker": "^", "ls": ""}),
+    }
+    for label, (occurs, style) in marks.items():
+        if occurs:
+            axes.plot([], [], label=label, **({"color": Colour.GREY, "ms": 5} | style))
 
 
 def draw_fragility(
@@ -190,6 +208,11 @@ def draw_fragility(
         axes.plot(intensity, middle, color=colour, lw=1.8, label=name)
         if data is not None and name in data:
             axes.plot(*data[name], "o", color=colour, ms=3.5, mfc="white")
+    # one entry each for what all limit states have, in grey
+    axes.fill_between([], [], color=Colour.GREY, alpha=0.3, lw=0.0, label="confidence band")
+    if data:
+        style = {"color": Colour.GREY, "ms": 3.5, "mfc": "white"}
+        axes.plot([], [], "o", label="data of the fit", **style)
     axes.set(xlim=(0.0, float(intensity.max())), ylim=(0.0, 1.0))
     axes.legend(frameon=False, fontsize=LABEL_SIZE, loc="lower right")
     return figure

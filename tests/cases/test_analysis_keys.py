@@ -171,7 +171,8 @@ def test_command(small, capsys):
     said = capsys.readouterr().out
     assert (out / "modes.txt").read_text(encoding="utf-8") in said
     assert "damping: 5 % at" in said
-    assert {path.name for path in out.iterdir()} == {"modes.txt", "modes.png", "modes.gif"}
+    written = {"modes.txt", "modes.png", "modes.gif", "archfem.json"}
+    assert {path.name for path in out.iterdir()} == written
 
 
 def test_assessment_of_a_case_has_the_arguments_of_python():

@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -284,6 +285,23 @@ def test_assessment_of_a_case_and_its_page(tmp_path, ring, capsys):
     said = capsys.readouterr().out
     assert "arch, right:" in said
     assert "pushed to the left" not in said
+
+
+def test_rating_of_a_case(tmp_path, ring, capsys):
+    path, out = tmp_path / "ring.toml", tmp_path / "out"
+    path.write_text(LIMIT)
+    given = ["--vehicle", "CS454-single", "--live", "0.1", "--width"]
+    command = ["rate", str(path), *given, f"{ring.width}"]
+    assert af.commands.main([*command, "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    named = replace(ring, name="a ring pushed over")
+    found = af.rate(named, "CS454-single", live=0.1)
+    assert str(found) in said
+    assert (out / "rating.txt").read_text().strip() == str(found)
+    assert (out / "rating.csv").read_text().strip() == found.table()
+    assert f"wrote {out / 'rating.png'}" in said
+    assert af.commands.main([*command[:3], "LM9"]) == 1
+    assert "vehicle 'LM9' is not known" in capsys.readouterr().err
 
 
 def test_limit_analysis_refuses_soil_before_all_else(tmp_path, capsys):

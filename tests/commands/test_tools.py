@@ -35,7 +35,18 @@ def test_what_is_missing_is_told_with_its_remedy(monkeypatch, capsys):
     for remedy in ("apt-get install python3-dolfinx", "apt-get install libegl1", "numpy>=99.1"):
         assert remedy in told.out
     assert "nonesuch" in told.err
+    # one that is there and does not load is a fault
     assert "FEniCSx" in told.err
+
+
+def test_an_installation_without_fenicsx_is_well_and_told_what_works(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "archfem.models.fem", None)
+    found = tools.find_spec
+    monkeypatch.setattr(tools, "find_spec", lambda name: None if name == "dolfinx" else found(name))
+    (fenicsx,) = tools._diagnose_fenicsx()
+    assert fenicsx.remedy == ""
+    assert "falls of rigid stones work" in fenicsx.state
+    assert "apt-get install python3-dolfinx" in fenicsx.state
 
 
 def test_examples_are_listed_and_printed(tmp_path, capsys):

@@ -91,6 +91,7 @@ def ready() -> None:
         (af.collapse_factor, {**at, "live": af.BodyForce(0.1), "friction": None, "fill": None}),
         (af.stands, {**at, "friction": "coulomb"}),
         (af.moving_load, {**at, "axles": [1e4, 1e4], "spacings": [0.5], "positions": [0.0, 0.3]}),
+        (af.rate, {**at, "vehicle": "LM1", "live": 1.5, "dead": 1.0, "friction": None}),
         (af.minimum_thickness, {"build": _of_thickness, "friction": "coulomb", "tolerance": 1e-3}),
         (af.verified_mechanism, {**at, "joints": dead.joints}),
         (af.first_mechanisms, {"run": run}),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from archfem.joints.sparsity import Pattern
+from archfem.joints.operator import Pattern
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 from mechanisms import FOUR, failing, filled, piers
 
 import archfem as af
-from archfem.limit.rigid_regions import find_rigid_regions
+from archfem.limit.mechanism_kinematics import find_rigid_regions
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.motion.intensity_measures import measure_intensity
+from archfem.motion.response_spectra import measure_intensity
 
 
 def test_measures_of_a_sine_are_the_closed_forms():
@@ -41,7 +41,7 @@ def test_a_motion_at_rest_measures_nothing():
 
 def test_housner_intensity_goes_from_a_tenth_to_two_and_a_half_seconds(monkeypatch):
     """Of an even spectrum of 1 m/s² in acceleration: ∫ T / 2π dT, which trapezia do exactly."""
-    even = "archfem.motion.intensity_measures.response_spectrum"
+    even = "archfem.motion.response_spectra.response_spectrum"
 
     def one(motion, periods, **_):
         assert np.diff(periods) == pytest.approx(0.025)  # as the table of measures says

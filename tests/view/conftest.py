@@ -63,3 +63,13 @@ def toppled(column):
     time = np.linspace(0.0, 1.0, 201)
     motion = af.Motion(8.0 * np.sin(2.0 * np.pi * time), 0.005, name="swing")
     return af.time_history(column, motion, dt=0.005, record=af.Record(fields_every=5))
+
+
+@pytest.fixture(scope="session")
+def hinged_late(toppled):
+    """The same, with a joint that counts as a mechanism shortly before the stones are loose."""
+    dataset = toppled.with_criteria(af.Criteria(failures=1)).dataset
+    hinge = dataset["hinge"].where(dataset["time"] > 0.4, 0).astype(int)
+    run = af.History(dataset.assign(hinge=hinge), toppled.structure)
+    assert 0.4 < run.mechanism.time < 0.42 < run.time[-1]
+    return run

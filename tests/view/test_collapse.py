@@ -1,11 +1,22 @@
 """Pictures of limit analysis: what they show, not how they look."""
 
+from dataclasses import replace
+from itertools import combinations
+
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.transforms import Bbox
 
 import archfem as af
-from archfem.view.collapse import draw_capacity, draw_collapse, draw_kinematic_assessment
+from archfem.view.collapse import (
+    draw_capacity,
+    draw_collapse,
+    draw_kinematic_assessment,
+    draw_rating,
+)
+from archfem.view.structure import draw_loads, draw_structure
 
 
 def lines_of(axes):
@@ -37,7 +48,7 @@ def test_a_load_that_never_overturns_shows_no_mechanism(ring):
 def test_an_arch_that_falls_has_no_thrust_line():
     thin = af.circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
     axes = draw_collapse(thin, af.collapse_factor(thin, live=af.BodyForce(1.0))).axes[0]
-    assert set(lines_of(axes)) == {"hinge", "live load"}
+    assert set(lines_of(axes)) == {"hinge"}  # a load plays no part: it is not drawn
 
 
 def test_map_of_capacity_carries_known_values(tmp_path):
@@ -88,3 +99,68 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(ring, tmp_path):
     locked = af.kinematic_assessment(piers, found.spectrum, part="left pier")
     with pytest.raises(af.InvalidInput, match="no mechanism moves under horizontal forces"):
         draw_kinematic_assessment(locked)
+
+
+def test_a_rating_shows_factors_over_the_front_axle_and_the_mechanism(ring):
+    lorry = af.limit.Vehicle("lorry", (5e3, 5e3), (1.0,))
+    found = af.rate(ring, lorry)
+    figure = draw_rating(found)
+    upper, lower = figure.axes
+    lines = lines_of(upper)
+    ahead = 0.5 if found.moving.direction == "right" else -0.5
+    np.testing.assert_allclose(
+        lines["worst place"], [[found.moving.position + ahead, found.factor]]
+    )
+    drawn = lines[f"driving {found.moving.direction}"]
+    assert np.nanmin(drawn[:, 1]) == pytest.approx(found.factor, rel=1e-6)
+    assert f"factor {found.factor:.3g}" in upper.get_title()
+    assert len(lines_of(lower)["hinge"]) == len(found.moving.worst.hinges)
+    assert upper.get_xlim() == lower.get_xlim()
+    texts = [text.get_text() for text in lower.texts if text.get_text()]
+    assert len(set(texts)) == 1  # both axles are equal
+
+
+def test_thrust_lines_of_parts_that_share_no_block_are_not_joined(ring):
+    shapes = af.shapes
+    arch = shapes.Arch(span=2.0, rise=0.6, thickness=0.3, voussoirs=5)
+    pier = shapes.Pier(gap=0.8, height=0.5)
+    names = ("left wall", "right wall")
+    walls = [shapes.Sidewall(length=1.0, height=0.5, state="fixed", name=name) for name in names]
+    arches = [arch, replace(arch, name="second arch")]
+    bridge = af.bridge(arches=arches, piers=[pier], sidewalls=walls)
+    found = af.collapse_factor(bridge, live=af.BodyForce(1.0))
+    axes = draw_collapse(bridge, found).axes[0]
+    line = lines_of(axes)["thrust line"]
+    assert len(line) > len(bridge.joints)
+    for place in np.flatnonzero(np.isnan(line[:, 0])):
+        assert 0 < place < len(line) - 1
+
+
+@pytest.mark.parametrize(
+    ("forces", "labels"), [((1e3, 1e3), 1), ((1e3, 2e3), 2), ((1e3, 2e3, 3e3), 3)]
+)
+def test_labels_of_neighbouring_loads_do_not_overlap(ring, forces, labels):
+    places = np.linspace(-0.26, 0.26, len(forces))
+    loads = [af.PointLoad(x, (0.0, -force)) for x, force in zip(places, forces, strict=True)]
+    figure = draw_structure(ring)
+    draw_loads(figure.axes[0], ring, loads)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    texts = [text for text in figure.axes[0].texts if text.get_text()]
+    boxes = [text.get_window_extent() for text in texts]
+    assert len(texts) == labels
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    assert texts[0].get_text() == ("λ × 1 kN each" if labels == 1 else "λ × 1 kN")
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_label_of_a_movement_stands_clear_of_blocks_and_ticks(ring, side):
+    figure = draw_structure(ring)
+    (axes,) = figure.axes
+    draw_loads(axes, ring, [af.Settlement(f"{side} abutment", (0.0, -0.01, 0.0))])
+    FigureCanvasAgg(figure).draw()
+    (label,) = (text for text in axes.texts if text.get_text())
+    box, frame = label.get_window_extent(), axes.get_window_extent()
+    assert frame.x0 < box.x0 < box.x1 < frame.x1
+    corners = [axes.transData.transform(block.drawn()) for block in ring.blocks]
+    assert not any(box.overlaps(Bbox([each.min(axis=0), each.max(axis=0)])) for each in corners)

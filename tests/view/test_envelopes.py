@@ -25,7 +25,7 @@ def test_envelope_shows_extremes_faces_and_dead_load(run):
 def test_envelopes_of_runs_have_their_own_colours(run):
     figure = draw_envelope({"one": run, "other": run})
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert names == ["one", "other", "opened"]
+    assert names == ["hinge from |e| = 0.46", "one", "other", "opened"]
     lines = {line.get_label(): line.get_color() for line in figure.axes[0].lines}
     assert lines["one"] != lines["other"]
 
@@ -40,7 +40,8 @@ def test_each_ring_and_pier_has_a_panel_of_its_own(bridge):
         (highest,) = [line for line in axes.lines if line.get_label() == "quake"]
         assert highest.get_xdata().tolist() == list(range(count))
         assert highest.get_ydata() == pytest.approx(np.full(count, 0.3))
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["quake"]
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["hinge from |e| = 0.46", "quake"]
 
 
 def test_two_bridges_are_told_apart_by_dots(bridge, ring):

@@ -16,8 +16,12 @@ def test_curves_turn_back_and_what_was_not_met_is_an_arrow():
     turned = left.lines[0].get_xydata()
     assert turned.tolist() == [[0.0, 0.0], [0.1, 1.0], [0.3, 2.0], [0.2, 3.0]]
     assert len(left.texts) == 1  # the arrow of the one that broke off
-    (beyond,) = (line for line in right.lines if line.get_marker() == "^")
+    (beyond,) = (line for line in right.lines if line.get_marker() == "^" and len(line.get_xdata()))
     assert beyond.get_ydata().tolist() == [2.0]
+    (bracket,) = right.collections
+    assert bracket.get_segments()[0][:, 1].tolist() == [1.0, 1.1]
+    named = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert named == ["bracket of a motion", "not met up to here"]
     assert [text.get_text() for text in right.get_xticklabels()] == ["verified"]
 
 
@@ -32,3 +36,15 @@ def test_fragility_has_its_band_and_its_data():
     assert axes.lines[1].get_marker() == "o"
     low = axes.collections[0].get_paths()[0].vertices[:, 1].min()
     assert np.isclose(low, 0.0)
+    named = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert named == ["verified", "confidence band", "data of the fit"]
+
+
+def test_a_median_and_brackets_alone_are_named_alone():
+    low = np.array([1.0, 1.2, 1.5])
+    figure = draw_ida([("a", low, low)], {"verified": (low, low + 0.1)})
+    named = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert named == ["bracket of a motion", "median"]
+    (axes,) = draw_fragility({"verified": (low, low, low)}, low).axes
+    named = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert named == ["verified", "confidence band"]

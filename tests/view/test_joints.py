@@ -28,6 +28,7 @@ def test_joint_histories_show_the_recorded_values_and_limits(run):
             sense = np.sign(own["V"].values) if name == "friction" else 1.0
             assert shown == pytest.approx(sense * own[name].values)
         assert f"joint {number}" in row[0].get_ylabel()
+        assert [text.get_text() for text in row[0].texts] == ["hinge from |e| = 0.46"]
         assert row[1].lines[0].get_ydata()[0] == pytest.approx(0.6)
     drawn = [line for axes in figure.axes for line in axes.lines]
     assert sum(line.get_label() == "horizontal" for line in drawn) == 1  # the ground, once

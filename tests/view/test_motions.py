@@ -58,7 +58,7 @@ def test_target_is_drawn_where_it_is_defined(shaking):
 def test_more_motions_than_colours_differ_in_their_dashes(shaking):
     figure = draw_spectra([shaking.with_vertical(None)] * 7)
     (axes,) = figure.get_axes()
-    first, last = axes.get_lines()[0], axes.get_lines()[6]
+    first, last = axes.get_lines()[0], axes.get_lines()[5]
     assert first.get_color() == last.get_color()
     assert first.get_linestyle() != last.get_linestyle()
     assert axes.get_title() == "horizontal or only component"
@@ -70,3 +70,11 @@ def test_the_matched_band_is_shaded():
     suite = af.Suite("one", (shaking,), matches=(match,))
     told = [text.get_text() for text in draw_suite(suite).legends[0].get_texts()]
     assert "matched, 0.1 to 1.5 s" in told
+
+
+def test_mean_and_target_of_a_suite_have_colours_of_their_own(shaking):
+    suite = af.Suite("six", tuple(shaking.scaled(k) for k in range(1, 7)))
+    level, _ = draw_suite(suite, af.Tbec2018(ss=1.0, s1=0.3, site="ZC")).get_axes()
+    *pairs, mean, target = (line.get_color() for line in level.get_lines())
+    assert len(pairs) == 6
+    assert len({mean, target, *pairs}) == 2 + len(set(pairs))

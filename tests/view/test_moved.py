@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import archfem as af
 from archfem.view.joint_marks import joint_marks
-from archfem.view.positions import FallingBlocks, rotate
+from archfem.view.positions import FallingBlocks, decisive_instant, rotate
 
 
 def placed(structure, number, points, pose):
@@ -113,3 +114,18 @@ def test_a_fall_is_drawn_at_four_instants(toppled):
     assert len(times) == 4
     assert times == sorted(times)
     assert times[0] == pytest.approx(float(toppled.dataset["fall_time"][0]), abs=0.006)
+    FigureCanvasAgg(figure).draw()  # equal scales shrink axes that do not suit what they show
+    boxes = [axes.get_position() for axes in figure.axes]
+    assert sum(box.width * box.height for box in boxes) > 0.7
+
+
+def test_the_instant_that_decides_is_the_fall_or_else_a_motion(toppled, ring):
+    """Hinges at 1 s all at the extrados, where nothing can move; they alternate at 2 s."""
+    assert decisive_instant(toppled) == float(toppled.dataset["fall_time"][0])
+    resultants = np.tile([1e4, 0.0, 0.0], (4, 18, 1))
+    resultants[1, [0, 6, 12, 17], 2] = 0.49e4 * 0.55
+    resultants[2, [0, 6, 12, 17], 2] = 0.49e4 * 0.55 * np.array([-1.0, 1.0, -1.0, 1.0])
+    dataset = af.joints.joint_dataset(ring, resultants, np.arange(4.0))
+    assert decisive_instant(af.History(dataset, ring)) == 2.0
+    assert decisive_instant(af.History(dataset)) == 1.0  # by count alone
+    assert decisive_instant(af.History(dataset.isel(time=[0, 3]), ring)) == 0.0

@@ -25,7 +25,7 @@ from archfem.joints.large.forces import (
     measure_states,
 )
 from archfem.joints.large.rates import assemble_rates
-from archfem.joints.sparsity import Pattern
+from archfem.joints.operator import Pattern
 from archfem.masonry.loads import Action, BodyForce, PointLoad
 from archfem.masonry.structure import rigid_motion_matrix
 from archfem.models.condensed import project_model

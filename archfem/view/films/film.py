@@ -93,7 +93,7 @@ def film(  # noqa: PLR0913  (a film has many settings)
     falls = FallingBlocks.of(model.structure, run)
     known = recorded_fields(run)[0]
     known = known if falls is None else np.append(known, falls.times[1:])
-    timing = frame_timing(run, falls, known, fps, seconds, window)
+    timing = frame_timing(run, known, fps, seconds, window)
     held = timing.times if falls is None else timing.times[timing.times < falls.times[0]]
     setup = Setup.of(model, fields_at(run, held), colour, magnification).with_falls(falls)
     if mechanism is not None and mechanism.moved.blocks:
@@ -136,7 +136,9 @@ def picture(
     model, q = model_and_coordinates(model, q)
     joints = joints_of_state(model, q, joints, criteria)
     setup = Setup.of(model, q[None], colour, magnification)
-    return FrameLayout(setup, size).compose(frame_of_state(setup, q, joints))[..., :3].copy()
+    return (
+        FrameLayout(setup, size, joints).compose(frame_of_state(setup, q, joints))[..., :3].copy()
+    )
 
 
 def check_film(
@@ -166,7 +168,7 @@ def _draw_frames(
     """Yield the images of a film, with a progress bar."""
     times = timing.times
     held = times if falls is None else times[times < falls.times[0]]
-    layout = FrameLayout(setup, size, run)
+    layout = FrameLayout(setup, size, run.joints, run)
     frames = frames_of_run(setup, run, held, fields_at(run, held))
     if falls is not None:
         frames = chain(frames, frames_of_fall(setup, falls, times[len(held) :]))

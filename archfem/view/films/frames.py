@@ -13,11 +13,10 @@ import xarray as xr
 from archfem._typing import Array
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import assessed_joints
 from archfem.units import mm
 from archfem.view.films.settings import Setup, colour_values
 from archfem.view.joint_marks import MARKED_QUANTITIES, Marker, Marks, joint_marks
-from archfem.view.positions import FallingBlocks
+from archfem.view.positions import FallingBlocks, decisive_instant
 
 # Slow motion of a film: "auto", its start and end [s], or none
 Window = str | tuple[float, float] | None
@@ -144,26 +143,15 @@ def slow_motion_timing(known: Array, fps: float, window: tuple[float, float]) ->
     return FrameTiming(times, np.where(slow, speed, 1.0), real.fps)
 
 
-def decisive_window(run: History, falls: FallingBlocks | None) -> tuple[float, float]:
-    """Return a time window around collapse, first mechanism or largest |e| of a run [s].
-
-    It surrounds the instant of collapse, or else of the first mechanism by count, or else of the
-    largest |e| of a joint.
-    """
-    if falls is not None:
-        instant = float(falls.times[0])
-    elif run.mechanism is not None and run.mechanism.time is not None:
-        instant = run.mechanism.time
-    else:
-        e = abs(assessed_joints(run.joints)["eccentricity"]).max("joint")
-        instant = float(run.time[int(e.fillna(0.0).argmax("time"))])
+def decisive_window(run: History) -> tuple[float, float]:
+    """Return a time window around collapse, first mechanism or largest |e| of a run [s]."""
+    instant = decisive_instant(run)
     return instant - 0.25, instant + 0.75
 
 
 def frame_timing(
-    run: History, falls: FallingBlocks | None, known: Array, fps: float, seconds: float | None,
-    window: Window,
-) -> FrameTiming:  # fmt: skip
+    run: History, known: Array, fps: float, seconds: float | None, window: Window
+) -> FrameTiming:
     """Return the times of the frames of a run's film."""
     if window is None:
         return even_timing(known, fps, seconds)
@@ -172,5 +160,5 @@ def frame_timing(
     if isinstance(window, str):
         if window != "auto":
             raise InvalidInput(f"window '{window}': give 'auto', or two times in seconds")
-        window = decisive_window(run, falls)
+        window = decisive_window(run)
     return slow_motion_timing(known, fps, window)

@@ -10,11 +10,11 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import GraphicsContextBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.path import Path
@@ -30,7 +30,7 @@ from archfem.view.histories import draw_ground
 from archfem.view.joint_marks import support_outlines
 from archfem.view.positions import ground_acceleration
 from archfem.view.stress import Triangles
-from archfem.view.style import Colour, annotate, style_colour_bar
+from archfem.view.style import Colour, annotate, style_colour_bar, text_width
 
 
 class Canvas:
@@ -123,7 +123,7 @@ class FramePainter:
             values = np.repeat(frame.shades[triangles.cell][:, None], 3, axis=1)
         else:
             values = triangles.corners(frame.shades)
-        colours = scale.shades((values - scale.low) / (scale.high - scale.low))
+        colours = scale.shades(scale.norm(values))
         canvas.shade(triangles.corners(frame.places), colours)
         rims = np.concatenate([frame.places[self._rims], _sides(self._supports)])
         canvas.lines(rims, Colour.EDGE, 1.2)
@@ -154,7 +154,9 @@ class FrameLayout:
     header, footer, strip, side = 0.55, 0.45, 1.75, 1.25
     font_size = 10.5  # [points]
 
-    def __init__(self, setup: Setup, size: tuple[int, int], run: History | None = None) -> None:
+    def __init__(
+        self, setup: Setup, size: tuple[int, int], joints: xr.Dataset, run: History | None = None
+    ) -> None:
         # an image is 12.8 inches wide, or narrower: a small one has at least 60 dots per inch
         dpi = max(60.0, size[0] / 12.8)
         self._figure = Figure(figsize=(size[0] / dpi, size[1] / dpi), dpi=dpi)
@@ -162,7 +164,7 @@ class FrameLayout:
         self._inches, self._speed = np.array(size) / dpi, 1.0
         below = self.footer + (self.strip if run else 0.0)
         with matplotlib.rc_context({"font.size": self.font_size, "legend.frameon": False}):
-            self._draw_surroundings(setup, run, below)
+            self._draw_surroundings(setup, joints, run, below)
             self._cursor = self._draw_strip(run) if run else None
         left, right = round(0.25 * dpi), size[0] - round(self.side * dpi)
         window = (left, round(below * dpi), right, size[1] - round(self.header * dpi))
@@ -172,8 +174,10 @@ class FrameLayout:
 
     def compose(self, frame: Frame, speed: float = 1.0) -> Image:
         """Draw a frame, with its time and numbers of failed joints, at a speed of the film."""
-        if speed != self._speed:
+        joined = bool(len(frame.marks.thrust))  # loose blocks have no marks to explain
+        if speed != self._speed or joined != self._legend.get_visible():
             self._speed = speed
+            self._legend.set_visible(joined)
             self._draw_background()
         self._canvas.restore_region(self._background)
         self._painter.draw(frame)
@@ -193,7 +197,9 @@ class FrameLayout:
         self._painter.draw_background()
         self._background = self._canvas.copy_from_bbox(self._figure.bbox)
 
-    def _draw_surroundings(self, setup: Setup, run: History | None, below: float) -> None:
+    def _draw_surroundings(
+        self, setup: Setup, joints: xr.Dataset, run: History | None, below: float
+    ) -> None:
         """Draw title, colour bar and legend, above a height [inch] that the strip takes."""
         name = setup.model.structure.name
         if run is not None:
@@ -204,9 +210,9 @@ class FrameLayout:
         self._draw_colour_bar(setup.scale, below)
         self._magnification = f"displacements × {setup.magnification:g}"
         middle = (below - 0.5 * self.footer) / self._inches[1]
-        handles = _legend_symbols(run is not None, bool(setup.outlines))
+        handles = _legend_symbols(joints, run is not None, bool(setup.outlines))
         style = {"columnspacing": 1.4, "handletextpad": 0.5, "bbox_to_anchor": (0.01, middle)}
-        self._figure.legend(handles=handles, loc="center left", ncols=6, **style)
+        self._legend = self._figure.legend(handles=handles, loc="center left", ncols=6, **style)
         self._scale_text = self._write(0.985, middle, "")
 
     def _write(self, x: float, y: float, text: str, **style: Any) -> Text:
@@ -219,7 +225,7 @@ class FrameLayout:
         wide, high = self._inches
         room = high - below - self.header
         axes = self._add_axes(wide - self.side + 0.15, below + 0.07 * room, 0.16, 0.86 * room)
-        shades = ScalarMappable(Normalize(scale.low, scale.high), scale.shades)
+        shades = ScalarMappable(scale.norm, scale.shades)
         bar = self._figure.colorbar(shades, cax=axes, extend=scale.extend)
         style_colour_bar(bar, scale.label, self.font_size)
 
@@ -232,11 +238,17 @@ class FrameLayout:
         instants = [(run.time[-1], "blocks loose")] if len(times) > len(run.time) else []
         if run.mechanism is not None and run.mechanism.time is not None:
             instants.append((run.mechanism.time, "mechanism"))
+        width = axes.get_position().width * self._inches[0]
+        style: dict[str, Any] = {"xycoords": "axes fraction", "ha": "center", "va": "bottom"}
+        style |= {"fontsize": self.font_size, "color": Colour.EDGE}
+        end = width + 0.2  # of the room for a text [inch]; later texts push earlier ones aside
         for time, text in instants:
             axes.axvline(time, color=Colour.GREY, lw=1.0, ls="--")
-            style: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "ha": "center"}
-            style |= {"va": "bottom", "fontsize": self.font_size}
-            annotate(axes, text, (time, 1.0), (0, 1), color=Colour.EDGE, **style)
+            half = 0.5 * text_width(len(text), self.font_size)
+            share = (time - times[0]) / max(times[-1] - times[0], 1e-9)
+            place = min(width * share, end - half)
+            end = place - half - 0.1
+            annotate(axes, text, (place / width, 1.0), (0, 1), **style)
         return axes.axvline(run.time[0], color=Colour.HINGE, lw=1.8, animated=True)
 
     def _add_axes(self, *box: float) -> Axes:
@@ -253,15 +265,16 @@ def _speed_text(speed: float) -> str:
     return f", {speed:.3g} times real time"
 
 
-def _legend_symbols(film: bool, mechanism: bool) -> list[Line2D]:
-    """Return the legend's symbols, with earlier hinges in a film and a mechanism if it is shown."""
+def _legend_symbols(joints: xr.Dataset, film: bool, mechanism: bool) -> list[Line2D]:
+    """Return the legend's symbols of the marks that occur at joints, and of a mechanism."""
+    hinges, slides = (bool(((joints[k] != 0) & joints["judged"]).any()) for k in ("hinge", "slide"))
     hinge = {"ls": "", "marker": "o", "ms": 9.0, "color": Colour.HINGE}
     sliding = {"ls": "", "marker": r"$\rightleftharpoons$", "ms": 15.0, "color": Colour.SLIDING}
     symbols = {
         "thrust line": {"color": Colour.THRUST, "lw": 2.4},
-        "hinge": hinge,
-        "earlier hinge": hinge | {"alpha": 0.3} if film else None,
-        "sliding joint": sliding,
+        "hinge": hinge if hinges else None,
+        "earlier hinge": hinge | {"alpha": 0.3} if film and hinges else None,
+        "sliding joint": sliding if slides else None,
         "mechanism": {"color": Colour.MECHANISM, "lw": 2.4} if mechanism else None,
     }
     return [Line2D([], [], label=label, **style) for label, style in symbols.items() if style]

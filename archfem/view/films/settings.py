@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from matplotlib.colors import Colormap
+from matplotlib.colors import Colormap, Normalize, PowerNorm
 
 from archfem._typing import Array
 from archfem.errors import InvalidInput
@@ -22,8 +22,7 @@ class Scale:
     colour: str  # "displacement" or "stress"
     label: str  # of the colour bar, with the unit
     shades: Colormap  # from low to high
-    low: float  # lower end of the scale
-    high: float  # upper end of the scale
+    norm: Normalize  # from values to [0, 1]
     extend: str  # end at which values beyond the scale occur, as in matplotlib's colour bars
 
 
@@ -54,10 +53,10 @@ def fit_scale(cells: Cells, fields: Array, colour: str) -> Scale:
     values = np.array([colour_values(cells, q, colour) for q in fields])
     if colour == "displacement":
         highest = float(values.max()) or 1.0
-        return Scale(colour, "displacement [mm]", COLOUR_MAP, 0.0, highest, "neither")
+        return Scale(colour, "displacement [mm]", COLOUR_MAP, Normalize(0.0, highest), "neither")
     lowest = min(float(np.percentile(values, CLIPPED_PERCENT)), -1e-6)
     label, shades = "least principal stress [MPa]", COLOUR_MAP.reversed()
-    return Scale(colour, label, shades, lowest, 0.0, "min")
+    return Scale(colour, label, shades, Normalize(lowest, 0.0), "min")
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +105,19 @@ class Setup:
         if falls is None:
             return self
         size, cells = self.model.structure.size, self.model.cells
-        places = [falls.places(cells.places, cells.block, float(time)) for time in falls.times]
+        places = np.array(
+            [falls.places(cells.places, cells.block, float(time)) for time in falls.times]
+        )
         points = np.concatenate([*places, [self.low, self.high]])
         low = np.maximum(points.min(axis=0), self.low - size)
         high = np.minimum(points.max(axis=0), self.high + size)
         low[1] = min(low[1], falls.level - 0.02 * size)
-        scale = replace(self.scale, extend="max") if self.scale.extend == "neither" else self.scale
+        scale = self.scale
+        if scale.colour == "displacement":
+            lengths = np.linalg.norm(places - cells.places, axis=2) / mm
+            visible = ((places >= low) & (places <= high)).all(axis=2)
+            largest = float(lengths.max(where=visible, initial=scale.norm.vmax or 0.0))
+            # a fall is some ten times the motion before it; square roots show both
+            extend = "max" if lengths.max() > largest else "neither"
+            scale = replace(scale, norm=PowerNorm(0.5, 0.0, largest), extend=extend)
         return replace(self, low=low, high=high, scale=scale, level=falls.level)

@@ -93,7 +93,7 @@ class Viewer:
             self._blocks,
             scalars="shade",
             cmap=setup.scale.shades,
-            clim=(setup.scale.low, setup.scale.high),
+            clim=(setup.scale.norm.vmin, setup.scale.norm.vmax),
             lighting=False,
             scalar_bar_args=bar | {"color": Colour.EDGE, "fmt": "%.3g", "n_labels": 2},
         )

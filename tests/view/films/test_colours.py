@@ -22,7 +22,9 @@ def test_scales_have_units_and_span_the_film(coarse):
     fields = np.array([af.dead_load(coarse).q])
     scale = fit_scale(coarse.cells, fields, "displacement")
     assert scale.label.endswith("[mm]")
-    assert scale.high == pytest.approx(colour_values(coarse.cells, fields[0], "displacement").max())
+    assert scale.norm.vmax == pytest.approx(
+        colour_values(coarse.cells, fields[0], "displacement").max()
+    )
     scale = fit_scale(coarse.cells, fields, "stress")
     assert scale.label.endswith("[MPa]")
-    assert scale.low < scale.high == 0.0
+    assert scale.norm.vmin < scale.norm.vmax == 0.0

@@ -40,13 +40,13 @@ def test_a_film_of_another_length_tells_its_speed():
 
 def test_what_matters_is_the_mechanism_or_the_fall(run, column, toppled):
     falls = FallingBlocks.of(column.structure, toppled)
-    start, end = decisive_window(toppled, falls)
+    start, end = decisive_window(toppled)
     assert start < falls.times[0] < end
-    start, end = decisive_window(run, None)
+    start, end = decisive_window(run)
     assert start < run.mechanism.time < end
-    calm = run.with_criteria(af.Criteria(failures=17))
+    calm = af.History(run.dataset).with_criteria(af.Criteria(failures=17))
     tilt = abs(run.joints["eccentricity"]).max("joint")
-    start, end = decisive_window(calm, None)
+    start, end = decisive_window(calm)
     assert start < float(tilt["time"][int(tilt.argmax("time"))]) < end
 
 
@@ -61,4 +61,4 @@ def test_what_matters_is_the_mechanism_or_the_fall(run, column, toppled):
 )
 def test_windows_that_cannot_be_meant_are_refused(run, options, said):
     with pytest.raises(af.InvalidInput, match=said):
-        frame_timing(run, None, KEPT, 20.0, **{"seconds": None, "window": None, **options})
+        frame_timing(run, KEPT, 20.0, **{"seconds": None, "window": None, **options})

@@ -7,6 +7,7 @@ import pytest
 import archfem as af
 from archfem.view.films.film import film
 from archfem.view.films.frames import frames_of_fall, frames_of_run
+from archfem.view.films.renderer import FrameLayout
 from archfem.view.films.settings import Setup
 from archfem.view.positions import FallingBlocks, fields_at
 
@@ -82,3 +83,42 @@ def test_stills_of_large_displacements_are_true_to_scale(column, toppled):
     image = af.view.picture(column, q, joints=toppled.joints.isel(time=-1), size=(480, 320))
     assert image.shape == (320, 480, 3)
     assert image.std() > 10.0
+
+
+def test_colours_span_the_fall_that_is_seen(setup, column, toppled, falls):
+    """Before it the column moves by a fifth of it: that is seen as well, on a scale of roots."""
+    scale, cells = setup.scale, column.cells
+    places = [falls.places(cells.places, cells.block, time) for time in falls.times]
+    lengths = 1e3 * np.linalg.norm(np.array(places) - cells.places, axis=2)
+    assert scale.norm.vmax == pytest.approx(lengths.max())
+    assert scale.extend == "neither"
+    held = 1e3 * np.abs(column.cells.displacement(toppled.dataset["last_q"].values)).max()
+    assert held < 0.3 * lengths.max()
+    assert scale.norm(held) > 0.3
+    away = falls.poses + np.array([1e3, 0.0, 0.0])
+    far = setup.with_falls(FallingBlocks(falls.structure, falls.times, away, falls.level))
+    assert far.scale.extend == "max"
+
+
+def test_the_legend_names_what_is_drawn(setup, toppled, falls):
+    """No joint of the column slides, and loose blocks have no marks at all."""
+    assert not toppled.joints["slide"].any()
+    layout = FrameLayout(setup, (480, 320), toppled.joints, toppled)
+    legend = layout._legend
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "thrust line", "hinge", "earlier hinge",
+    ]  # fmt: skip
+    time = falls.times[:1]
+    (held,) = frames_of_run(setup, toppled, time, fields_at(toppled, time))
+    (loose,) = frames_of_fall(setup, falls, falls.times[-1:])
+    for frame, named in ((held, True), (loose, False), (held, True)):
+        layout.compose(frame)
+        assert legend.get_visible() is named
+
+
+@pytest.mark.parametrize("size", [(480, 320), (1280, 720)])
+def test_names_of_instants_do_not_overlap(setup, hinged_late, size):
+    layout = FrameLayout(setup, size, hinged_late.joints, hinged_late)
+    texts = {text.get_text(): text for axes in layout._figure.axes for text in axes.texts}
+    first, second = (texts[name].get_window_extent() for name in ("mechanism", "blocks loose"))
+    assert 0.0 < first.x0 < first.x1 < second.x0 < second.x1 < size[0]

@@ -131,6 +131,24 @@ def test_a_report_fits_its_screen_and_follows_the_colour_scheme(small, tmp_path,
         assert complaints(driver) == []
 
 
+NAMES = """
+return [...document.querySelectorAll(".player-ground .name")].map((each) => {
+  const box = each.getBoundingClientRect();
+  return [each.textContent, box.left, box.right];
+});
+"""
+
+
+def test_names_of_instants_do_not_overlap(column, hinged_late, tmp_path):
+    path = af.view.player(hinged_late, column).save(tmp_path / "player.html")
+    with browser() as driver:
+        opened(driver, path)
+        (later, left, _), (earlier, _, right) = driver.execute_script(NAMES)
+        assert (earlier, later) == ("mechanism", "blocks loose")
+        assert right < left
+        assert complaints(driver) == []
+
+
 def test_time_and_joint_of_the_player_are_set_by_keyboard(rocked, tmp_path):
     model, run = rocked
     path = af.view.player(run, model).save(tmp_path / "player.html")

@@ -101,9 +101,15 @@
         const last = time + apart > this.end * 1.0001;
         element("text", { x: this.x(time), y: this.bottom + 16, "text-anchor": last && this.x(time) > this.right - 20 ? "end" : "middle" }, this.svg).textContent = words(time) + (last ? " s" : "");
       }
-      for (const [time, name] of instants) {
+      let end = this.right + 4; // of the room for a name: later ones push earlier ones aside
+      for (const [time, name] of [...instants].reverse()) {
         element("path", { class: "instant", d: `M${this.x(time)} ${this.top}V${this.bottom}` }, this.svg);
-        if (name) element("text", { x: this.x(time), y: this.top - 5, "text-anchor": this.x(time) > this.right - 40 ? "end" : "middle" }, this.svg).textContent = name;
+        if (!name) continue;
+        const text = element("text", { class: "name", y: this.top - 5, "text-anchor": "middle" }, this.svg);
+        text.textContent = name;
+        const half = text.getComputedTextLength() / 2, x = Math.min(this.x(time), end - half);
+        text.setAttribute("x", x);
+        end = x - half - 6;
       }
       for (const line of lines) element("path", { class: "limit", d: `M${this.left} ${this.y(line)}H${this.right}` }, this.svg);
       for (const { times, values, name } of curves) element("path", { class: `curve ${name}`, d: this.curve(times, values) }, this.svg);
@@ -222,7 +228,7 @@
       for (let k = -Math.floor(top / apart); k * apart <= top; k++) ticks.push(k * apart);
       const instants = [];
       if (scene.mechanism !== null) instants.push([scene.mechanism, "mechanism"]);
-      if (scene.loose !== null) instants.push([scene.loose, scene.mechanism !== null && scene.loose - scene.mechanism < scene.end / 8 ? "" : "blocks loose"]);
+      if (scene.loose !== null) instants.push([scene.loose, "blocks loose"]);
       this.instants = instants.map(([time]) => [time, ""]);
       this.charts = { ground: new Chart(this.find("ground"), scene.end, (time) => { this.pause(); this.show(time); }) };
       const curves = [{ times, values: level, name: "first" }];

@@ -1,0 +1,172 @@
+"""Rating of bridges: against `collapse_factor`, by hand, and both ways over a symmetric bridge."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from backfilled import arch_bridge
+
+import archfem as af
+from archfem.limit import VEHICLES, Vehicle
+
+EXACT = 1e-6
+"""Relative: the programme is solved to 1e-9 block weights, corners count as one within 1e-6."""
+
+GRAVEL = af.limit.Fill(friction_angle=35.0)
+
+
+@pytest.fixture(scope="module")
+def lorry_rating():
+    """Of a lorry with unequal axles, on a bridge three metres wide."""
+    lorry = Vehicle("lorry", (60e3, 115e3), (3.2,), live=1.35)
+    bridge = arch_bridge(width=3.0, voussoirs=8)
+    return af.rate(bridge, lorry, width=2.0, dead=1.1, fill=GRAVEL)
+
+
+def test_the_factor_is_that_of_point_loads_at_the_worst_place(lorry_rating):
+    """Factored axles by hand: live factor, the share of the width, and heavier materials."""
+    found = lorry_rating
+    sense = 1.0 if found.moving.direction == "right" else -1.0
+    places = found.moving.position + sense * np.array([1.6, -1.6])
+    low, high = 0.0, 9.0  # ends of the fill
+    live = [
+        af.PointLoad(x, (0.0, -1.35 * 1.5 * weight))
+        for x, weight in zip(places, (60e3, 115e3), strict=True)
+        if low < x < high
+    ]
+    soil, stone = (
+        replace(material, unit_weight=1.1 * material.unit_weight)
+        for material in (af.masonry.BACKFILL, af.STONE)
+    )
+    bridge = arch_bridge(width=3.0, voussoirs=8)
+    assert {block.material for block in bridge.blocks} == {af.masonry.BACKFILL, af.STONE}
+    blocks = [
+        replace(block, material=soil if block.material == af.masonry.BACKFILL else stone)
+        for block in bridge.blocks
+    ]
+    heavier = replace(bridge, blocks=tuple(blocks))
+    expected = af.collapse_factor(heavier, live=live, fill=GRAVEL)
+    assert found.factor == pytest.approx(expected.factor, rel=EXACT)
+    assert found.moving.worst.hinges == expected.hinges
+    assert float(found.moving.factors["factor"].min()) == pytest.approx(found.factor, rel=EXACT)
+
+
+def test_a_symmetric_bridge_is_rated_alike_in_both_directions(lorry_rating):
+    factors = lorry_rating.moving.factors["factor"]
+    right, left = (factors.sel(direction=way).values for way in ("right", "left"))
+    assert np.isfinite(right).sum() > 10
+    np.testing.assert_allclose(right, left[::-1], rtol=EXACT)
+    assert (right != right[::-1]).any()  # the lorry is not symmetric
+
+
+def column_under_axle(width=1.0):
+    """A stone of 1 m by 2 m whose top overhangs to the right by 1 m: an axle there turns it."""
+    outline = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (0.0, 2.0))
+    base = ((0.0, -1.0), (1.0, -1.0), (1.0, 0.0), (0.0, 0.0))
+    return af.masonry.assembled(
+        [
+            af.Block(base, af.STONE, "rock", part="rock", role="other", fixed=True),
+            af.Block(outline, af.STONE, "stone", part="pier", role="pier"),
+        ],
+        lambda a, b: af.masonry.STONE_TO_STONE,
+        width=width,
+    )
+
+
+def test_an_axle_on_an_overhang_by_hand():
+    """It turns about the toe (1, 0) when Q (x - 1) is the moment of the weight about it.
+
+    Areas: 1 m by 2 m with its middle 0.5 m left of the toe, 1 m by 1 m 0.5 m right of it. The axle
+    is worst at the last place on the stone, its edge at 2 m.
+    """
+    stone = column_under_axle(width=2.0)
+    moment = af.STONE.unit_weight * 2.0 * (2.0 * 0.5 - 1.0 * 0.5)
+    found = af.rate(stone, Vehicle("axle", (50e3,), live=2.0), width=1.0)
+    place = found.moving.position
+    assert place == pytest.approx(2.0)
+    assert found.factor == pytest.approx(moment / (2.0 * 2.0 * 50e3 * (place - 1.0)), rel=EXACT)
+    # It stands on as much of its base, about the middle, as reaches to the resultant.
+    light = af.rate(stone, Vehicle("axle", (2e3,)))
+    weight, place = 6.0 * af.STONE.unit_weight, light.moving.position
+    resultant = (weight * (2.0 * 0.5 + 1.0 * 1.5) / 3.0 + 2e3 * place) / (weight + 2e3)
+    assert light.geometric == pytest.approx(0.5 / (resultant - 0.5), rel=1e-4)  # of the halving
+
+
+@pytest.mark.slow
+def test_the_geometric_factor_of_a_ring_is_one_of_thickness():
+    """A ring whose joints have been narrowed by hand to the least depth has a factor of one."""
+    ring = af.circular_arch(radius=2.95, thickness=0.45, embrace=140.0, voussoirs=11)
+    found = af.rate(ring, Vehicle("axle", (5e3,)))
+    assert found.geometric > 1.1
+    live = found.moving.worst.live
+    for share, carries in ((1.001 / found.geometric, True), (0.999 / found.geometric, False)):
+        joints = []
+        for joint in ring.joints:
+            inner, outer = np.array(joint.intrados), np.array(joint.extrados)
+            middle = 0.5 * (inner + outer)
+            ends = [tuple((middle + share * (end - middle)).tolist()) for end in (inner, outer)]
+            joints.append(replace(joint, intrados=ends[0], extrados=ends[1]))
+        factor = af.collapse_factor(replace(ring, joints=tuple(joints)), live=list(live)).factor
+        assert (factor >= 1.0) == carries
+
+
+def test_vehicles_have_sources_and_grades():
+    assert {"LM1", "LM2", "LM71", "LM71-train", "CS454-single", "HL93-truck"} <= set(VEHICLES)
+    for name, vehicle in VEHICLES.items():
+        assert vehicle.name == name
+        assert vehicle.grade in ("read", "from memory")
+        assert vehicle.source != "given"
+        assert "from memory" in vehicle.live_source
+        assert len(vehicle.spacings) == len(vehicle.axles) - 1
+    tandem = VEHICLES["LM1"]
+    assert (tandem.axles, tandem.spacings) == ((300e3, 300e3), (1.2,))
+    assert VEHICLES["CS454-single"].axles == pytest.approx((11.5 * 9810.0,))
+    assert sum(VEHICLES["LM71-train"].axles) == pytest.approx(1000e3 + 20 * 80e3)
+
+
+def test_words_and_table(lorry_rating):
+    words = str(lorry_rating)
+    assert "live load by 1.35 (given)" in words
+    assert "dead load by 1.1 (given)" in words
+    assert "175 kN over 2 m of width" in words
+    assert f"factor {lorry_rating.factor:.4g} at x = " in repr(lorry_rating)
+    assert ("passes" in repr(lorry_rating)) == (lorry_rating.factor >= 1.0)
+    head, *rows = lorry_rating.table().splitlines()
+    assert head.startswith("direction,position")
+    assert len(rows) == lorry_rating.moving.factors["factor"].size
+    least = min(float(row.split(",")[2]) for row in rows)
+    assert least == pytest.approx(lorry_rating.factor, rel=1e-5)  # six digits
+
+
+def test_a_bridge_that_is_too_weak_fails_and_has_no_geometric_factor():
+    ring = af.circular_arch(radius=2.95, thickness=0.45, embrace=140.0, voussoirs=9)
+    found = af.rate(ring, "lm1")
+    assert found.factor < 1.0
+    assert not found.passes
+    assert np.isnan(found.geometric)
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"vehicle": "LM9"}, "is not known: use one of LM1, LM2"),
+        ({"vehicle": 3}, "vehicle"),
+        ({"live": 0.0}, "live, factor on the vehicle"),
+        ({"dead": -1.0}, "dead, factor on the weights"),
+        ({"width": 7.0}, "up to that of the bridge"),
+        ({"width": 0.0}, "up to that of the bridge"),
+        ({"structure": 3}, "structure"),
+        ({"fill": None}, "softer than the joints"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(given, says):
+    options = {"structure": arch_bridge(voussoirs=7), "vehicle": "LM1", "fill": GRAVEL} | given
+    with pytest.raises(af.InvalidInput, match=says):
+        af.rate(**options)
+
+
+def test_a_vehicle_needs_weights_and_spacings():
+    with pytest.raises(af.InvalidInput, match="one between each two axles"):
+        Vehicle("lorry", (1e5, 1e5))
+    with pytest.raises(af.InvalidInput, match="partial factor on the live load of lorry"):
+        Vehicle("lorry", (1e5,), live=-1.0)
