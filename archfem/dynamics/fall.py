@@ -195,7 +195,7 @@ def _smallest_depth(structure: Structure) -> float:
 
 def list_stones(structure: Structure) -> list[int]:
     """Return the free blocks that are no backfill, or all free blocks where there are no others."""
-    fill = find_yielding_blocks(structure)
+    fill = _find_fill(structure)
     return [number for number in structure.free if number not in fill] or list(structure.free)
 
 

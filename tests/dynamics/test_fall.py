@@ -1,5 +1,6 @@
 """Separation of blocks, their release as rigid bodies, and the state of collapse."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,6 +21,7 @@ from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
 from archfem.dynamics.state import State
 from archfem.dynamics.time_history import _doubt_impulses
+from archfem.masonry.stiffness_ratio import estimate_block_stiffness
 
 BREADTH = 0.5
 
@@ -359,3 +361,15 @@ def test_a_fall_whose_impulses_did_not_settle_is_doubted(share, count):
     doubts = _doubt_impulses(history)
     assert len(doubts) == count
     assert all("did not settle in 3% of the steps" in doubt.cause for doubt in doubts)
+
+
+def test_stones_of_no_role_count_whatever_their_joints_are():
+    """Of stones on joints of 40 GPa/m the large one yields first, and is lost like the others."""
+    contact = af.Contact(4e10, 2e10, 0.6)
+    column = af.column(breadth=1.0, heights=[0.3, 2.0], contact=contact)
+    blocks = tuple(replace(block, role="other") for block in column.blocks)
+    joints = tuple(replace(joint, role="other") for joint in column.joints)
+    structure = replace(column, blocks=blocks, joints=joints)
+    ratios = [estimate_block_stiffness(structure, number).ratio for number in structure.free]
+    assert min(ratios) < 1.0 < max(ratios)
+    assert fall.list_stones(structure) == list(structure.free)
