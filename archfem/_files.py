@@ -85,8 +85,7 @@ def atomic_write(path: Path) -> Iterator[Path]:
 
     An error or a kill leaves the old file or the new one, never a part of it.
     """
-    if "\0" in str(path):
-        raise InvalidInput(f"{short_repr(str(path))} is no path, for it has a null character")
+    _refuse_null(path)
     draft = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -107,6 +106,14 @@ def atomic_write(path: Path) -> Iterator[Path]:
             draft.unlink(missing_ok=True)
 
 
+def _refuse_null(path: Path) -> None:
+    """Refuse a path with a null character, for which Python raises an error of another class."""
+    if "\0" in str(path):
+        raise InvalidInput(
+            f"{short_repr(str(path))} is no path, for it has a null character: remove it"
+        )
+
+
 def _write_error(path: Path, error: Exception) -> str:
     """Return the message of a file or folder that cannot be written."""
     reason = describe_os_error(error)
@@ -124,8 +131,7 @@ def describe_os_error(error: Exception) -> str:
 def create_result_folder(path: str | Path) -> Path:
     """Return a folder for results, created if it is missing."""
     folder = Path(path)
-    if "\0" in str(folder):
-        raise InvalidInput(f"{short_repr(str(folder))} is no path, for it has a null character")
+    _refuse_null(folder)
     try:
         for place in (folder, *folder.parents):
             if place.is_symlink() and not place.exists():

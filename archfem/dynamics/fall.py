@@ -230,7 +230,9 @@ class SeparationMonitor:
         _, rotation, slip = np.moveaxis(observer.faces(batch.read(observer)), -2, 0)
         rotation, slip = np.abs(rotation), np.abs(slip)
         loose = (rotation > self.max_rotation) | (slip >= structure.depths)
-        loose &= _between_stones(structure)
+        # which blocks are fill takes long to find out, and matters once a joint is loose
+        if loose.any():
+            loose &= _between_stones(structure)
         if not loose.any():
             return None
         k = int(np.argmax(loose.any(axis=1)))

@@ -220,29 +220,33 @@ def _follow_fall(
     return history.with_doubts((*history.doubts, *_doubt_impulses(history)))
 
 
-def _doubt_impulses(history: History, admissible: float = 0.02) -> list[Doubt]:
+def _doubt_impulses(history: History) -> list[Doubt]:
     """Return a doubt where impulses of a fall did not settle in more than a share of its steps."""
     attrs = history.dataset.attrs
-    if attrs["fall_unsettled"] <= admissible:
-        return []
+    share = attrs["fall_unsettled"]
     cause = (
-        f"impulses of loose blocks did not settle in {attrs['fall_unsettled']:.0%} of the steps of "
-        f"the fall, and violate contacts by up to {attrs['fall_residual']:.2g} of a step's weight "
-        "impulse"
+        f"impulses of loose blocks did not settle in {share:.0%} of the steps of the fall, and "
+        f"violate contacts by up to {attrs['fall_residual']:.2g} of a step's weight impulse"
     )
-    return [Doubt(cause, "compare with `dynamics.RigidBlockSimulation` at half the time step")]
+    remedy = "compare with `dynamics.RigidBlockSimulation` at half the time step"
+    return _doubt_share(share, cause, remedy)
 
 
-def _doubt_tolerance(history: History, admissible: float = 0.02) -> list[Doubt]:
+def _doubt_tolerance(history: History) -> list[Doubt]:
     """Return a doubt where the tolerance of the steps was missed in more than a share of them."""
     attrs = history.dataset.attrs
-    if attrs["tolerance_unmet"] <= admissible:
-        return []
+    share = attrs["tolerance_unmet"]
     cause = (
-        f"the shortest steps erred by more than {attrs['tolerance']:g} in |e| in "
-        f"{attrs['tolerance_unmet']:.0%} of the run"
+        f"the shortest steps erred by more than {attrs['tolerance']:g} in |e| in {share:.0%} of "
+        "the run"
     )
-    return [Doubt(cause, "compare with a constant dt of 0.1 ms or less, or with more damping")]
+    remedy = "compare with a constant dt of 0.1 ms or less, or with more damping"
+    return _doubt_share(share, cause, remedy)
+
+
+def _doubt_share(share: float, cause: str, remedy: str, admissible: float = 0.02) -> list[Doubt]:
+    """Return a doubt where a share of the steps is above an admissible one [-]."""
+    return [Doubt(cause, remedy)] if share > admissible else []
 
 
 def _resolve_steps(

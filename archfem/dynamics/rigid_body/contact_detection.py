@@ -176,16 +176,21 @@ def _touch_ground(bodies, world, piece, contacts, count):  # type: ignore
 
 
 @allocating_entry
+def _edge_distance(bodies, world, edge, piece):  # type: ignore
+    """Return the distance of a piece's nearest vertex from the line of an edge, outward [m]."""
+    nx, ny = world.normals[edge, 0], world.normals[edge, 1]
+    nearest = np.inf
+    for j in range(bodies.piece_starts[piece], bodies.piece_starts[piece + 1]):
+        nearest = min(nearest, nx * world.points[j, 0] + ny * world.points[j, 1])
+    return nearest - (nx * world.points[edge, 0] + ny * world.points[edge, 1])
+
+
+@allocating_entry
 def _separation(bodies, world, one, two):  # type: ignore
     """Return the largest separation of two pieces along normals of the first, and its edge."""
     best, edge = -np.inf, -1
     for k in range(bodies.piece_starts[one], bodies.piece_starts[one + 1]):
-        # distance of the nearest vertex of the second piece from the line of the edge
-        nx, ny = world.normals[k, 0], world.normals[k, 1]
-        nearest = np.inf
-        for j in range(bodies.piece_starts[two], bodies.piece_starts[two + 1]):
-            nearest = min(nearest, nx * world.points[j, 0] + ny * world.points[j, 1])
-        nearest -= nx * world.points[k, 0] + ny * world.points[k, 1]
+        nearest = _edge_distance(bodies, world, k, two)
         # any separating edge ends the test, but only outer edges can be the reference
         if nearest > bodies.contact_gap:
             return nearest, k
@@ -437,11 +442,7 @@ def _widest_gap(bodies, world, one, two):  # type: ignore
     widest = -np.inf
     for first, second in ((one, two), (two, one)):
         for k in range(bodies.piece_starts[first], bodies.piece_starts[first + 1]):
-            nx, ny = world.normals[k, 0], world.normals[k, 1]
-            nearest = np.inf
-            for j in range(bodies.piece_starts[second], bodies.piece_starts[second + 1]):
-                nearest = min(nearest, nx * world.points[j, 0] + ny * world.points[j, 1])
-            nearest -= nx * world.points[k, 0] + ny * world.points[k, 1]
+            nearest = _edge_distance(bodies, world, k, second)
             # cuts separate pieces too, but do not measure how deep they are in each other
             if nearest > widest and (bodies.outer[k] or nearest > 0.0):
                 widest = nearest

@@ -103,7 +103,8 @@ class StepWorkspace(NamedTuple):
     middle: Array  # poses at the middle of the step (b, 3)
     # of each contact: cross products of the arms with the normal, first and second body, and with
     # the tangent; 1/(H M⁻¹ Hᵀ) of normal and tangent; target u_N and u_T; μ; coupling of u_N with
-    # the impulse of the next contact, if of the same face; rebound in the target u_N (c, 11)
+    # the impulse of the next contact, if of the same face; rebound in the target u_N; H M⁻¹ Hᵀ of
+    # normal and tangent; 1/determinant of the normal equations of a face, zero for none (c, 14)
     rows: Array
     speeds: Array  # velocities during the sweeps, the ground's last (b + 1, 3)
     begun: Array  # velocities at the start of a sweep (b + 1, 3)
