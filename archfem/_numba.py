@@ -191,7 +191,7 @@ def prepare_cache() -> None:
 def cache_folders() -> list[Path]:
     """Return the folders of compiled code, whether they exist or not."""
     folder = os.environ.get(CACHE_VARIABLE)
-    if folder is None:
+    if not folder:  # empty counts as unset, for numba too
         return [source / "__pycache__" for source in SOURCE_FOLDERS]
     return [place for source in SOURCE_FOLDERS for place in Path(folder).glob(f"{source.name}_*")]
 
@@ -199,7 +199,7 @@ def cache_folders() -> list[Path]:
 def count_cached_functions() -> int:
     """Count the compiled functions that are as new as their sources."""
     newest = 0.0
-    if os.environ.get(CACHE_VARIABLE) is None:  # else the folder's name is a digest of the sources
+    if not os.environ.get(CACHE_VARIABLE):  # else the folder's name is a digest of the sources
         newest = max(path.stat().st_mtime for path in _source_files())
     cached = [path for folder in cache_folders() for path in folder.glob("*.nbi")]
     return sum(path.stat().st_mtime >= newest for path in cached)
@@ -243,12 +243,12 @@ def delete_stale_cache(folder: Path, *others: Path) -> None:
 def _cache_folder() -> Path | None:
     """Return the first writable folder for compiled code; None for the default of numba."""
     chosen = os.environ.get(CACHE_VARIABLE)
-    if chosen is None and all(_is_writable(source / "__pycache__") for source in SOURCE_FOLDERS):
+    if not chosen and all(_is_writable(source / "__pycache__") for source in SOURCE_FOLDERS):
         return None
     # one folder for each state of the sources, for the reason given in `delete_stale_cache`
     name = f"archfem-{source_digest()}"
     places = [Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / name]
-    if chosen is not None:
+    if chosen:
         base = Path(chosen)  # or the choice of the parent process, which has such a name already
         places.insert(0, (base.parent if base.name.startswith("archfem-") else base) / name)
     for place in places:

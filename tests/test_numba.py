@@ -23,8 +23,11 @@ def closed(monkeypatch, tmp_path):
     return folders
 
 
-def test_beside_the_sources_where_that_can_be(monkeypatch):
+@pytest.mark.parametrize("chosen", [None, ""])  # numba takes an empty variable for an unset one
+def test_beside_the_sources_where_that_can_be(monkeypatch, chosen):
     monkeypatch.delenv(_numba.CACHE_VARIABLE, raising=False)
+    if chosen is not None:
+        monkeypatch.setenv(_numba.CACHE_VARIABLE, chosen)
     monkeypatch.setattr(_numba, "_is_writable", lambda folder: True)
     assert _numba._cache_folder() is None
     assert [path.parent for path in _numba.cache_folders()] == list(_numba.SOURCE_FOLDERS)

@@ -26,9 +26,11 @@ from setting import plain_options, quick_motion
 from timing import table
 
 import archfem as af
-from archfem.dynamics.history import History
-from archfem.joints.criteria import assessed_joints, find_failed_joints
-from archfem.limit.mechanism_count import Mechanism, duration_text, episode
+from archfem.dynamics import History
+from archfem.joints import assessed_joints
+from archfem.joints.criteria import find_failed_joints
+from archfem.limit import Mechanism, episode
+from archfem.limit.mechanism_count import duration_text
 from archfem.models.builder import build
 from archfem.units import mm
 

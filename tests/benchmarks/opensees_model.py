@@ -8,7 +8,7 @@ import numpy as np
 import openseespy.opensees as ops
 from timing import stopwatch
 
-from archfem.statics.equilibrium import self_weight
+from archfem.statics import self_weight
 
 SETTINGS = {
     "element": "quad",

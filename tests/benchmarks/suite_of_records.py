@@ -20,8 +20,8 @@ from setting import plain_options, print_left_out
 import archfem as af
 from archfem.cases.result_text import tabulate_matches
 from archfem.units import STANDARD_GRAVITY
-from archfem.view.motions import draw_suite
-from archfem.view.style import COLUMN_WIDTH, LABEL_SIZE, LINE_COLOURS, TITLE_SIZE, save, style_axes
+from archfem.view import draw_suite, save
+from archfem.view.style import COLUMN_WIDTH, LABEL_SIZE, LINE_COLOURS, TITLE_SIZE, style_axes
 
 TARGET = af.Tbec2018(ss=1.140, s1=0.315, site="ZD")
 STEP = 0.005  # s, that of most of the records

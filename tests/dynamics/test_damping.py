@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.dynamics import effective_damping
 from archfem.dynamics.damping import (
     EffectiveModeRange,
     _modes_with_share,
-    effective_damping,
     effective_mode_range,
     first_effective_mode,
 )

@@ -6,13 +6,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.dynamics.events import (
-    CountedMechanism,
-    EveryMechanism,
-    FailureScan,
-    MovingMechanism,
-    applicable_definitions,
-)
+from archfem.dynamics import CountedMechanism, EveryMechanism, MovingMechanism
+from archfem.dynamics.events import FailureScan, applicable_definitions
 
 WEIGHT = 1e4
 

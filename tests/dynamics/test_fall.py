@@ -9,17 +9,15 @@ import xarray as xr
 from loose_blocks import G, floor
 
 import archfem as af
-from archfem.dynamics import fall
-from archfem.dynamics.fall import (
-    SeparationMonitor,
+from archfem.dynamics import (
+    LooseBlocks,
+    RigidBlockSimulation,
+    State,
     classify_collapse,
-    is_overturning,
+    fall,
     release_blocks,
-    standing_state,
 )
-from archfem.dynamics.rigid_body.bodies import LooseBlocks
-from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
-from archfem.dynamics.state import State
+from archfem.dynamics.fall import SeparationMonitor, is_overturning, standing_state
 from archfem.dynamics.time_history import _doubt_impulses
 from archfem.masonry.stiffness_ratio import estimate_block_stiffness
 

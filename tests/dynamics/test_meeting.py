@@ -10,8 +10,8 @@ import shapely
 from loose_blocks import G
 
 import archfem as af
+from archfem.dynamics import State
 from archfem.dynamics.fall import MeetingMonitor
-from archfem.dynamics.state import State
 
 CONTACT = af.Contact(1e10, 4e9, 0.6)
 

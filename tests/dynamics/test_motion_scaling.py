@@ -8,14 +8,13 @@ import pytest
 from glued import glued
 
 import archfem as af
+from archfem.dynamics import CollapseScale, mechanism_scales
 from archfem.dynamics.motion_scaling import (
     COLLAPSE_DEFINITION,
-    CollapseScale,
     MechanismScales,
     ScaledRun,
     collapse_scale,
     largest_allowed_scale,
-    mechanism_scales,
     search_scales,
 )
 

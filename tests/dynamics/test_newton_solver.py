@@ -9,13 +9,13 @@ from kernels import from_python
 from scipy import sparse
 
 import archfem as af
+from archfem.dynamics import Stepper
 from archfem.dynamics.solvers import band_lu
 from archfem.dynamics.solvers.band_lu import (
     band_of,
     half_width,
     narrow_order,
 )
-from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.solvers.newton import NewtonSolver
 from archfem.dynamics.solvers.selection import MAX_NEWTON_HALF_WIDTH, select_solver, stepper_for
 

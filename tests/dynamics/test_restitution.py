@@ -7,13 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import archfem as af
-from archfem.dynamics.damping import (
-    _restitution_from_energies,
-    _RockingBlock,
-    restitution,
-    restitution_damping,
-)
-from archfem.dynamics.solvers.equation import Equation
+from archfem.dynamics import Equation, restitution, restitution_damping
+from archfem.dynamics.damping import _restitution_from_energies, _RockingBlock
 from archfem.dynamics.solvers.selection import stepper_for
 
 BREADTH, HEIGHT, WEIGHT = 0.6, 2.4, 19620.0

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.dynamics.state import Batch, Step
+from archfem.dynamics import Batch
+from archfem.dynamics.state import Step
 
 
 def step(time, force, iterations, smallest, energy):

@@ -5,9 +5,9 @@ import pytest
 from glued import glued
 
 import archfem as af
+from archfem.dynamics import Stepper
 from archfem.dynamics.solvers.base import MAX_ITERATIONS, advance
 from archfem.dynamics.solvers.compliance import ComplianceSolver
-from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.solvers.newton import NewtonSolver
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))

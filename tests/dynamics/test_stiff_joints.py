@@ -10,11 +10,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.dynamics.rigid_body.bodies import LooseBlocks
-from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
-from archfem.dynamics.schemes import HHT, Newmark
-from archfem.dynamics.solvers.equation import Equation
-from archfem.dynamics.solvers.snes import SnesSolver
+from archfem.dynamics import HHT, Equation, LooseBlocks, Newmark, RigidBlockSimulation, SnesSolver
 
 DAMPING = af.StiffnessDamping(0.05, 11.0)
 CROWN, FRICTION = 9, np.tan(np.radians(35.0))

@@ -9,8 +9,8 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 import archfem as af
+from archfem.dynamics import Equation
 from archfem.dynamics.solvers import supernodal_lu
-from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.newton import NewtonSolver
 from archfem.dynamics.solvers.supernodal_lu import (
     Elimination,

@@ -9,14 +9,8 @@ import pytest
 from glued import glued
 
 import archfem as af
-from archfem.dynamics.history import Ending
-from archfem.dynamics.time_history import (
-    Record,
-    _find_end,
-    _resolve_steps,
-    last_state,
-    time_history,
-)
+from archfem.dynamics import Ending, Record, last_state
+from archfem.dynamics.time_history import _find_end, _resolve_steps, time_history
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 GIVEN = {"damping": DAMPING, "dt": 0.005}

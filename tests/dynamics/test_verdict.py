@@ -5,9 +5,9 @@ import pytest
 from glued import glued
 
 import archfem as af
-from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
-from archfem.limit import mechanism_over_record
-from archfem.limit.mechanism_count import episode
+from archfem.dynamics import MECHANISM_DEFINITIONS
+from archfem.dynamics.verdict import PUBLISHED_DEFINITION
+from archfem.limit import episode, mechanism_over_record
 
 
 def failed_joints(run):

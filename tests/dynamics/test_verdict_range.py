@@ -6,7 +6,7 @@ import xarray as xr
 from scipy.stats import beta, rankdata
 
 import archfem as af
-from archfem.dynamics.verdict_range import VerdictRange
+from archfem.dynamics import VerdictRange
 
 
 def made_up(falls, sampled=None, error=None, residual=None, **columns):

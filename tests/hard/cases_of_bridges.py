@@ -6,11 +6,9 @@ import numpy as np
 from glued import glued
 
 import archfem as af
-from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE
+from archfem.masonry import BACKFILL, SOIL_TO_STONE
 from archfem.masonry.shapes import Arch, Backfill, Paving, Pier, Sidewall, bridge
-from archfem.statics.equilibrium import Equilibrium
-from archfem.statics.free_body import forces_on
-from archfem.statics.newton import Newton
+from archfem.statics import Equilibrium, Newton, forces_on
 from archfem.units import MPa
 from hard.setting import (
     DT,

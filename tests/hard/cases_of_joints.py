@@ -3,7 +3,7 @@
 import numpy as np
 
 import archfem as af
-from archfem.statics.newton import Newton
+from archfem.statics import Newton
 from hard.setting import (
     DAMPING,
     DT,

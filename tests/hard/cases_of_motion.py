@@ -7,7 +7,7 @@ import numpy as np
 from glued import glued
 
 import archfem as af
-from archfem.dynamics.time_history import last_state
+from archfem.dynamics import last_state
 from hard.setting import DT, Found, answer, case, joints, off, peaks, quake, ring, shaken, still
 
 G = 9.81

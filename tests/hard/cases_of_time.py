@@ -8,7 +8,7 @@ from glued import glued
 from scipy.integrate import solve_ivp
 
 import archfem as af
-from archfem.dynamics.solvers.equation import Equation
+from archfem.dynamics import Equation
 from hard.setting import DT, Found, answer, case, joints, peaks, quake, refused, ring, shaken, still
 
 

@@ -9,12 +9,10 @@ from time import perf_counter
 import numpy as np
 
 import archfem as af
-from archfem.dynamics.history import Ending
+from archfem.dynamics import Ending, Equation, State
 from archfem.dynamics.monitor import ENERGY_DRIFT_WARNING
-from archfem.dynamics.solvers.equation import Equation
-from archfem.dynamics.state import State
-from archfem.masonry.materials import STONE_TO_STONE
-from archfem.statics.equilibrium import Equilibrium
+from archfem.masonry import STONE_TO_STONE
+from archfem.statics import Equilibrium
 from archfem.statics.newton import load_magnitude
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))

@@ -9,9 +9,8 @@ import xarray as xr
 import archfem as af
 from archfem.cases.result_text import tabulate_joints
 from archfem.dynamics import MECHANISM_DEFINITIONS
+from archfem.joints import Criteria, assessed_joints
 from archfem.joints.criteria import (
-    Criteria,
-    assessed_joints,
     envelope,
     find_failed_joints,
     first_time,

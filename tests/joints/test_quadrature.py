@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.joints.quadrature import Quadrature
+from archfem.joints import Quadrature
 
 BREAKS = np.array([-0.3, -0.1, 0.05, 0.3])
 

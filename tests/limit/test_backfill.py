@@ -8,13 +8,8 @@ from backfilled import arch_bridge, column_above, fill_of, row_of_stones
 from scipy.integrate import quad
 
 import archfem as af
-from archfem.limit.backfill import (
-    EQUILIBRIUM_TOLERANCE,
-    Fill,
-    FillProfile,
-    is_balanced,
-    slice_blocks,
-)
+from archfem.limit import Fill
+from archfem.limit.backfill import EQUILIBRIUM_TOLERANCE, FillProfile, is_balanced, slice_blocks
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 
 ROUND_OFF = 1e-12

@@ -8,8 +8,7 @@ from kinematics import gaps
 
 import archfem as af
 from archfem.joints.criteria import with_failure_flags
-from archfem.limit.collapse import Outcome, closed_cohesion
-from archfem.limit.support_movement import End
+from archfem.limit import End, Outcome, closed_cohesion
 from archfem.units import kPa
 
 EXACT = 1e-7

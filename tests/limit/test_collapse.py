@@ -9,7 +9,7 @@ import pytest
 from kinematics import displacement, gaps
 
 import archfem as af
-from archfem.limit.collapse import Outcome, collapse_factor, stands
+from archfem.limit import Outcome, collapse_factor, stands
 
 EXACT = 1e-7
 """Relative: the programme is solved to 1e-9 block weights."""

@@ -6,14 +6,16 @@ import xarray as xr
 from mechanisms import ALTERNATING, arch, failing, piers
 
 import archfem as af
-from archfem.limit.mechanism_count import (
-    OVER_RECORD,
+from archfem.limit import (
     Episode,
     counted_mechanism,
     counted_mechanisms,
     demirel_aldemir_mechanism,
-    duration_text,
     episode,
+)
+from archfem.limit.mechanism_count import (
+    OVER_RECORD,
+    duration_text,
     has_counted_mechanism,
     matching_definitions,
     mechanism_kind,

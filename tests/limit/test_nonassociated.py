@@ -10,8 +10,8 @@ from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
 
 import archfem as af
+from archfem.limit import Outcome
 from archfem.limit.backfill import self_weight_programme
-from archfem.limit.collapse import Outcome
 from archfem.limit.linear_programme import RigidBlocks, rigid_load
 from archfem.limit.nonassociated import MAX_START_COUNT, descend, find_solution, starting_forces
 

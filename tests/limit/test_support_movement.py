@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.limit import support_movement
+from archfem.limit import End, largest_movement, support_movement
 from archfem.limit.linear_programme import RigidBlocks
-from archfem.limit.support_movement import DisplacedBlocks, End, largest_movement
+from archfem.limit.support_movement import DisplacedBlocks
 
 TOLERANCE = 1e-4
 """Width of the last step, as a share of the movement asked for: the default."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 import archfem as af
-from archfem.limit.thickness import minimum_thickness
+from archfem.limit import minimum_thickness
 
 
 def ring(**changes):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.masonry.assembly import _orient_line, assembled, by_materials, touching
+from archfem.masonry import assembled
+from archfem.masonry.assembly import _orient_line, by_materials, touching
 
 EXACT = 1e-12
 """Ends are corners of the blocks, to round-off of coordinates of a few metres."""

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import minimize
 
 import archfem as af
-from archfem.masonry.survey.circle_fit import fitted_circle
+from archfem.masonry import fitted_circle
 
 # The intradoses of the three arches of Prusias ad Hypium, Table 1 of Demirel and Aldemir (2021):
 # span along the centre line [m], embrace [degrees] and thickness [m].

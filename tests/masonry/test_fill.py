@@ -7,17 +7,10 @@ import pytest
 import shapely
 
 import archfem as af
-from archfem.masonry.backfill import (
-    INCIRCLE_RATIO,
-    _incentre,
-    _merge_slivers,
-    _Piece,
-    _tile_box,
-    jointed_fill,
-)
-from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE
+from archfem.masonry import BACKFILL, SOIL_TO_STONE, jointed_fill
+from archfem.masonry.backfill import INCIRCLE_RATIO, _incentre, _merge_slivers, _Piece, _tile_box
 from archfem.masonry.stiffness_ratio import find_soft_blocks, find_yielding_blocks
-from archfem.statics.pushover import Stop
+from archfem.statics import Stop
 
 HEIGHT = 1.5
 """Of the fill behind a wall [m]."""

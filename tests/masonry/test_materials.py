@@ -3,7 +3,8 @@
 import pytest
 
 import archfem as af
-from archfem.masonry.materials import BACKFILL, CONTACT_PRESETS
+from archfem.masonry import BACKFILL
+from archfem.masonry.materials import CONTACT_PRESETS
 
 
 @pytest.mark.parametrize(

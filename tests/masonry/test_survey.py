@@ -8,7 +8,8 @@ import pytest
 from drawn import assert_same, dxf, geojson, square
 
 import archfem as af
-from archfem.commands.cli import EXIT_DOUBTFUL, main
+from archfem.commands import main
+from archfem.commands.cli import EXIT_DOUBTFUL
 
 SHIPPED = Path(__file__).parents[2] / "meshes" / "survey.toml"
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.models.discretisation import BLOCK_FIDELITIES, MODEL_FIDELITIES, Discretisation
+from archfem.models import Discretisation
+from archfem.models.discretisation import BLOCK_FIDELITIES, MODEL_FIDELITIES
 
 BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.models.fem.mesh import generate_mesh, read_mesh, write_mesh
+from archfem.models import read_mesh, write_mesh
+from archfem.models.fem.mesh import generate_mesh
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import pytest
 
 import archfem as af
-from archfem.models.model import Model, Prediction, check_model
+from archfem.models import Model, Prediction
+from archfem.models.model import check_model
 
 
 @pytest.fixture(params=["rigid", "faces", "condensed", "full", "monolithic"])

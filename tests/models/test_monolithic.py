@@ -11,7 +11,7 @@ import pytest
 
 import archfem as af
 from archfem.joints.contact_law import is_closed
-from archfem.masonry.assembly import assembled
+from archfem.masonry import assembled
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.joint_facets import JointFacets
 from archfem.models.fem.mesh import generate_mesh

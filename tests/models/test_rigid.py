@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.joints.quadrature import Quadrature
+from archfem.joints import Quadrature
 from archfem.models.rigid import build_rigid_model
 
 

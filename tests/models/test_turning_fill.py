@@ -113,8 +113,7 @@ def test_springs_between_faces_that_bend_are_refused(structures):
 
 def test_a_fill_hands_over_its_momentum(structures):
     """It falls as one body, which moves as its mass does on the mean."""
-    from archfem.dynamics.fall import release_blocks
-    from archfem.dynamics.state import State
+    from archfem.dynamics import State, release_blocks
 
     model = af.build(structures["bridge"], fidelity=SOIL, displacements="large", cells=(2, 2))
     number = model.structure.block_number("backfill")

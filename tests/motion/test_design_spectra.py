@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.motion.design_spectra import Eurocode8, TableSpectrum, Tbec2018
+from archfem.motion import Eurocode8, TableSpectrum, Tbec2018
 
 ROUND_OFF = 1e-12
 

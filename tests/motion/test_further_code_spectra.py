@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.motion.design_spectra import Asce2022, Eurocode2024, Ntc2018
+from archfem.motion import Asce2022, Eurocode2024, Ntc2018
 
 ROUND_OFF = 1e-12
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.motion import response_spectra
-from archfem.motion.matching import _build_wavelet, _impulse_response, matched, spectral_misfit
+from archfem.motion import matched, response_spectra
+from archfem.motion.matching import _build_wavelet, _impulse_response, spectral_misfit
 
 RECORDS = Path(__file__).parents[2].parent / "shared" / "records"
 CASE_STUDY = af.Tbec2018(ss=1.140, s1=0.315, site="ZD")

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import archfem as af
-from archfem.motion.response_spectra import response_spectrum, scaled_to_spectrum
+from archfem.motion import response_spectrum, scaled_to_spectrum
 
 PERIODS = np.array([0.05, 0.1, 0.23, 0.4, 0.5, 0.71, 1.0, 2.0])
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.statics import Equilibrium
 from archfem.statics.continuation import LoadPath
-from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.newton import EquilibriumSolver
 from archfem.statics.relaxation import solve_irreversible
 

@@ -7,9 +7,9 @@ import pytest
 
 import archfem as af
 from archfem.errors import InvalidInput
-from archfem.masonry.construction import Stage, usual_stages
+from archfem.masonry import Stage, usual_stages
 from archfem.models.construction import PartialStructure
-from archfem.statics.equilibrium import self_weight
+from archfem.statics import self_weight
 
 ROUND_OFF = 1e-9
 """Of solves to 1e-10 of the load."""

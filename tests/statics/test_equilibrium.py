@@ -9,13 +9,8 @@ import pytest
 
 import archfem as af
 from archfem.commands.cli import EXIT_DOUBTFUL
-from archfem.statics.equilibrium import (
-    Equilibrium,
-    _increment_load,
-    dead_load,
-    dead_load_doubts,
-    self_weight,
-)
+from archfem.statics import Equilibrium, dead_load, self_weight
+from archfem.statics.equilibrium import _increment_load, dead_load_doubts
 from archfem.statics.newton import Solution
 
 

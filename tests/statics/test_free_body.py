@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.statics.free_body import FreeBody, forces_on
+from archfem.statics import FreeBody, forces_on
 
 BALANCED = 1e-9
 """Newton's method stops at 1e-10 of the load, and forces on a block are of its order."""

@@ -8,7 +8,8 @@ import pytest
 from backfilled import arch_bridge
 
 import archfem as af
-from archfem.statics.mechanism_assessment import LIMIT_STATES, LimitState, spectral_acceleration
+from archfem.statics import LIMIT_STATES, LimitState
+from archfem.statics.mechanism_assessment import spectral_acceleration
 
 G = 9.81
 SPECTRUM = af.motion.Ntc2018(ag=0.25, f0=2.4, tc_star=0.32, site="B")

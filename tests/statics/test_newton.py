@@ -6,7 +6,8 @@ from glued import glued
 from scipy import sparse
 
 import archfem as af
-from archfem.statics.newton import EquilibriumSolver, Newton
+from archfem.statics import Newton
+from archfem.statics.newton import EquilibriumSolver
 
 
 def test_a_kink_is_solved_exactly():

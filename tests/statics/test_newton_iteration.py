@@ -8,8 +8,15 @@ from scipy import sparse
 
 import archfem as af
 from archfem._optional import FENICSX_PACKAGES
-from archfem.statics import dense_eigensolver, modes, newton, newton_iteration, slepc_eigensolver
-from archfem.statics.newton import EquilibriumSolver, Newton
+from archfem.statics import (
+    Newton,
+    dense_eigensolver,
+    modes,
+    newton,
+    newton_iteration,
+    slepc_eigensolver,
+)
+from archfem.statics.newton import EquilibriumSolver
 
 
 @pytest.fixture

@@ -11,9 +11,9 @@ from glued import glued
 
 import archfem as af
 from archfem.limit.linear_programme import RigidBlocks
+from archfem.statics import Stop
 from archfem.statics.pushover import (
     PUSHOVER_CONTROLS,
-    Stop,
     _extrapolate_limit,
     follow,
     pushover,

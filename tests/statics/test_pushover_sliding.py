@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.limit.collapse import closed_cohesion
-from archfem.masonry.materials import BACKFILL
-from archfem.statics import pushover
+from archfem.limit import closed_cohesion
+from archfem.masonry import BACKFILL
+from archfem.statics import Stop, pushover
 from archfem.statics.continuation import LoadPath
-from archfem.statics.pushover import STAGNATION_STEPS, Stop, _extrapolate_limit, follow, stop_reason
+from archfem.statics.pushover import STAGNATION_STEPS, _extrapolate_limit, follow, stop_reason
 
 SIDEWAYS = af.BodyForce(1.0)
 

@@ -7,10 +7,9 @@ import pytest
 from scipy import sparse
 
 import archfem as af
-from archfem.joints.resultants import joint_dataset
-from archfem.statics import relaxation
+from archfem.joints import joint_dataset
+from archfem.statics import relaxation, self_weight
 from archfem.statics.continuation import LoadPath
-from archfem.statics.equilibrium import self_weight
 from archfem.statics.newton import EquilibriumSolver, Solution
 from archfem.statics.relaxation import _solve_creep_step, relax
 

@@ -11,16 +11,18 @@ from scipy import sparse
 from scipy.integrate import trapezoid
 
 import archfem as af
-from archfem.statics.stress import (
-    _fit_planes,
-    corner_stress_operator,
+from archfem.statics import (
     joint_stress,
     principal_stresses,
     strength_use,
     strength_use_over,
     strength_use_table,
-    strength_use_text,
     utilisation,
+)
+from archfem.statics.stress import (
+    _fit_planes,
+    corner_stress_operator,
+    strength_use_text,
     utilisation_text,
 )
 

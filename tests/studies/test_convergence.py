@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.studies.convergence import converged
+from archfem.studies import converged
 
 
 @pytest.mark.parametrize("order", [0.6, 1.0, 2.0])

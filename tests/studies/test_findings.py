@@ -3,7 +3,8 @@
 import json
 
 import archfem as af
-from archfem.studies.comparison import Finding, study_table, write_finding
+from archfem.studies import Finding, study_table
+from archfem.studies.comparison import write_finding
 
 DEFINITIONS = af.dynamics.MECHANISM_DEFINITIONS
 

@@ -5,7 +5,8 @@ import pytest
 from scipy import optimize, stats
 
 import archfem as af
-from archfem.studies.fragility import fragility, spread, stripe_fragility
+from archfem.studies import spread, stripe_fragility
+from archfem.studies.fragility import fragility
 
 MEDIAN, DISPERSION = 2.5, 0.4
 

@@ -10,12 +10,10 @@ import pytest
 import archfem as af
 from archfem.cases.provenance import hash_inputs
 from archfem.cases.structure_keys import cached_structure
-from archfem.dynamics.motion_scaling import mechanism_scales
-from archfem.dynamics.schemes import StiffnessDamping
+from archfem.dynamics import Equation, StiffnessDamping, mechanism_scales
 from archfem.dynamics.solvers import base
-from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.selection import select_solver
-from archfem.models.discretisation import Discretisation
+from archfem.models import Discretisation
 from archfem.studies import cache
 from archfem.studies.cache import SharedStepper
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.studies.comparison_run import run_pairs
+from archfem.studies import run_pairs
 
 
 def histories(case, folder):

@@ -15,8 +15,9 @@ from scipy import stats
 
 import archfem as af
 from archfem.cases import provenance
+from archfem.studies import parameter_axes
 from archfem.studies.evaluators import Evaluator
-from archfem.studies.parameter_space import group_by_model, parameter_axes
+from archfem.studies.parameter_space import group_by_model
 from archfem.studies.process_pool import TaskQueue
 from archfem.studies.result_store import Store
 

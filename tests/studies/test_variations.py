@@ -7,7 +7,7 @@ import pytest
 from pages import read_page
 
 import archfem as af
-from archfem.dynamics.fall import CollapseState
+from archfem.dynamics import CollapseState
 from archfem.studies import variations
 from archfem.studies.variations import (
     DEFAULT_RANGES,

@@ -10,13 +10,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.transforms import Bbox
 
 import archfem as af
-from archfem.view.collapse import (
+from archfem.view import (
     draw_capacity,
     draw_collapse,
     draw_kinematic_assessment,
     draw_rating,
+    draw_structure,
 )
-from archfem.view.structure import draw_loads, draw_structure
+from archfem.view.structure import draw_loads
 
 
 def lines_of(axes):

@@ -5,7 +5,7 @@ import re
 import pytest
 
 import archfem as af
-from archfem.view.statics import draw_dead_load
+from archfem.view import draw_dead_load
 
 
 @pytest.mark.parametrize("heights", [[0.8, 0.8], [0.8, 0.8, 0.4]])

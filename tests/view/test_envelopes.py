@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from pictures import APART, WEIGHT, history
 
 import archfem as af
-from archfem.view.histories import draw_eccentricity, draw_envelope
+from archfem.view import draw_eccentricity, draw_envelope
 
 
 def test_envelope_shows_extremes_faces_and_dead_load(run):

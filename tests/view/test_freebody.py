@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.statics import draw_free_body
+from archfem.view import draw_free_body
 
 BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
 

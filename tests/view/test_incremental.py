@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from archfem.view.studies import draw_fragility, draw_ida
+from archfem.view import draw_fragility, draw_ida
 
 
 def test_curves_turn_back_and_what_was_not_met_is_an_arrow():

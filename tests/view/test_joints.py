@@ -8,7 +8,8 @@ from glued import glued
 from pictures import history
 
 import archfem as af
-from archfem.view.histories import draw_joint, draw_joints, most_stressed_joints
+from archfem.view import draw_joint, draw_joints
+from archfem.view.histories import most_stressed_joints
 
 
 def units(axes):

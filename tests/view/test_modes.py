@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.statics import MODE_AMPLITUDE, draw_modes
+from archfem.view import draw_modes
+from archfem.view.statics import MODE_AMPLITUDE
 
 
 def drawn(axes):

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.motion.matching import Match
-from archfem.view.motions import SPECTRUM_PERIODS, draw_motion, draw_spectra, draw_suite
+from archfem.motion import Match
+from archfem.view import draw_motion, draw_spectra, draw_suite
+from archfem.view.motions import SPECTRUM_PERIODS
 
 
 @pytest.fixture(scope="module")

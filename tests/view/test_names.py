@@ -5,7 +5,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import archfem as af
-from archfem.view.structure import draw_names, short_name
+from archfem.view import draw_names
+from archfem.view.structure import short_name
 
 
 def test_short_names():

@@ -5,7 +5,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import archfem as af
-from archfem.view.statics import _merge_close_discs, _merge_close_limits, draw_pushover
+from archfem.view import draw_pushover
+from archfem.view.statics import _merge_close_discs, _merge_close_limits
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 MODEL = af.build(RING, fidelity="rigid", quadrature="lobatto")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from archfem.view.studies import draw_convergence, draw_tornado
+from archfem.view import draw_convergence, draw_tornado
 
 
 def test_what_matters_most_is_at_the_top():

@@ -7,7 +7,7 @@ import pytest
 from pictures import drawn
 
 import archfem as af
-from archfem.view.stress import draw_stress
+from archfem.view import draw_stress
 
 
 @pytest.fixture(scope="module")

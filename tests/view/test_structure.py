@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from pictures import APART, HINGES, WEIGHT, drawn, resultants
 
 import archfem as af
-from archfem.view.structure import draw_instants, draw_structure
+from archfem.view import draw_instants, draw_structure
 
 
 def test_hinges_are_drawn_by_the_criteria_given_or_carried(ring, joints):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from archfem.view.studies import draw_study
+from archfem.view import draw_study
 
 FOUND = {
     "weak": {"four joints": np.array([0.3, 0.5, 0.9]), "moves": np.array([0.8, 1.2, np.inf])},

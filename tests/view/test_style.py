@@ -7,7 +7,8 @@ import matplotlib
 import pytest
 
 import archfem as af
-from archfem.view.style import Page, save, set_title, structure_figure
+from archfem.view import save
+from archfem.view.style import Page, set_title, structure_figure
 
 
 @pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".pdf", b"%PDF")])

@@ -7,8 +7,7 @@ import pytest
 from loose_blocks import KEPT, PULSE, TILT, G, floor, rocking_block, tilted, toppling_time
 
 import archfem as af
-from archfem.dynamics.rigid_body.bodies import LooseBlocks
-from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
+from archfem.dynamics import LooseBlocks, RigidBlockSimulation
 
 INCLINE = np.radians(20.0)
 

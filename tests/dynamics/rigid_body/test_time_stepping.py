@@ -9,9 +9,8 @@ import shapely
 from loose_blocks import G, floor, overturns, rocking_block, sine, tilted
 
 import archfem as af
+from archfem.dynamics import LooseBlocks, RigidBlockSimulation
 from archfem.dynamics.rigid_body import time_stepping
-from archfem.dynamics.rigid_body.bodies import LooseBlocks
-from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
 
 THRESHOLDS = [(1.0, 0.33033), (3.0, 0.57432), (8.0, 1.20181)]
 """Frequency over p, and the least half sine that overturns the block 0.6 × 2.4 m, over g."""

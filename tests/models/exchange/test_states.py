@@ -6,7 +6,7 @@ import pytest
 import shapely
 
 import archfem as af
-from archfem.models.export import write_state
+from archfem.models import write_state
 
 meshio = pytest.importorskip("meshio")
 pyvista = pytest.importorskip("pyvista")

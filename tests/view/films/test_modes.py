@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.films.film import film_modes
+from archfem.view import film_modes
 
 
 @pytest.mark.slow

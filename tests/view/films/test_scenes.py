@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.view.films.film import film, picture
+from archfem.view import film, picture
 from archfem.view.films.frames import even_timing
 from archfem.view.positions import fields_at
 from archfem.view.style import Colour

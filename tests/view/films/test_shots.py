@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.films.film import film
+from archfem.view import film
 from archfem.view.films.frames import frames_of_fall, frames_of_run
 from archfem.view.films.renderer import FrameLayout
 from archfem.view.films.settings import Setup

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from archfem.models.model import Cells
+from archfem.models import Cells
 from archfem.view.stress import Triangles
 
 
