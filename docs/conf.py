@@ -57,6 +57,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "archfem"
 html_static_path = ["static"]
 html_css_files = ["archfem.css"]
+html_js_files = ["search.js"]
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {
