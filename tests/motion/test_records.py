@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.motion.records import afad, cosmos, csmip, esm, knet, peer, smc
-from archfem.motion.records.reader import read_channels, read_components
+from archfem.motion.records.cosmos import COSMOS
+from archfem.motion.records.keyed import AFAD, CWB, ESM, KNET, UNAM
+from archfem.motion.records.peer import PEER
+from archfem.motion.records.reader import find_format, read_channels, read_components
 from archfem.motion.records.record_file import RecordText
+from archfem.motion.records.smc import SMC
+from archfem.motion.records.volumes import BHRC, CSMIP, GEONET, VOLUME_1
 
 DAMAGE = runpy.run_path(str(Path(__file__).parents[1] / "fuzz" / "damaged_records.py"))
 SAMPLES, mutants = DAMAGE["SAMPLES"], DAMAGE["mutants"]
@@ -350,20 +354,20 @@ def test_damaged_files_raise_no_foreign_error(tmp_path):
 
 
 PEAK = DAMAGE["PEAK"]
-KNET, AFAD = f"(gal)   {PEAK:.3f}", f"(U-D) {PEAK}"
+KNET_PEAK, AFAD_PEAK = f"(gal)   {PEAK:.3f}", f"(U-D) {PEAK}"
 
 
 @pytest.mark.parametrize(
     ("form", "was", "becomes", "accepted"),
     [
         # K-NET's peak was taken after another estimate of the offset: 2 %
-        ("knet", KNET, f"(gal)   {1.018 * PEAK:.3f}", True),
-        ("knet", KNET, f"(gal)   {1.022 * PEAK:.3f}", False),
+        ("knet", KNET_PEAK, f"(gal)   {1.018 * PEAK:.3f}", True),
+        ("knet", KNET_PEAK, f"(gal)   {1.022 * PEAK:.3f}", False),
         # AFAD's before the offset was taken out: a half
-        ("afad", AFAD, f"(U-D) {1.96 * PEAK}", True),
-        ("afad", AFAD, f"(U-D) {2.04 * PEAK}", False),
-        ("afad", AFAD, f"(U-D) {0.52 * PEAK}", True),
-        ("afad", AFAD, f"(U-D) {0.48 * PEAK}", False),
+        ("afad", AFAD_PEAK, f"(U-D) {1.96 * PEAK}", True),
+        ("afad", AFAD_PEAK, f"(U-D) {2.04 * PEAK}", False),
+        ("afad", AFAD_PEAK, f"(U-D) {0.52 * PEAK}", True),
+        ("afad", AFAD_PEAK, f"(U-D) {0.48 * PEAK}", False),
         # ESM's duration by two steps and a millisecond, to either side
         ("esm", "S: 0.40", "S: 0.420", True),
         ("esm", "S: 0.40", "S: 0.3795", True),
@@ -510,18 +514,22 @@ def test_counts_of_knet_are_about_their_mean(write):
 
 
 KEYS = [
-    (smc, "2 CORRECTED ACCELEROGRAM", "*", 11),
-    (afad, "SAMPLING INTERVAL (sec) : 0.01", "NUMBER OF DATA : 40", 40),
-    (afad, "NUMBER OF DATA : 40", "SAMPLING INTERVAL (sec) : 0.01", 40),
-    (csmip, "", "   40 POINTS OF ACCEL DATA EQUALLY SPACED AT  .010 SEC.", 120),
-    (cosmos, "", "Corrected acceleration (Format v01.20", 3),
-    (cosmos, "", " 100 Integer-header values follow", 40),
-    (esm, "", "NDATA: 40", 80),
-    (esm, "", "SAMPLING_INTERVAL_S: 0.01", 80),
-    (knet, "", "Scale Factor      7845(gal)/8000000", 20),
-    (knet, "", "Sampling Freq(Hz) 100Hz", 20),
-    (peer, "NPTS= 40", "DT= .01 SEC", 12),
-    (peer, "DT= .01 SEC", "NPTS= 40", 12),
+    (SMC, "2 CORRECTED ACCELEROGRAM", "*", 11),
+    (AFAD, "SAMPLING INTERVAL (sec) : 0.01", "NUMBER OF DATA : 40", 40),
+    (AFAD, "NUMBER OF DATA : 40", "SAMPLING INTERVAL (sec) : 0.01", 40),
+    (CSMIP, "", "   40 POINTS OF ACCEL DATA EQUALLY SPACED AT  .010 SEC.", 120),
+    (COSMOS, "", "Corrected acceleration (Format v01.20", 40),
+    (COSMOS, "", " 100 Integer-header values follow", 40),
+    (ESM, "", "NDATA: 40", 80),
+    (ESM, "", "SAMPLING_INTERVAL_S: 0.01", 80),
+    (KNET, "", "Scale Factor      7845(gal)/8000000", 20),
+    (KNET, "", "Sampling Freq(Hz) 100Hz", 20),
+    (UNAM, "", "ARCHIVO ESTANDAR DE ACELERACION:", 20),
+    (CWB, "", "#DataSequence: Time U(+); N(+); E(+)", 30),
+    (BHRC, "", "* VOL1DS FILE:  1/01", 3),
+    (VOLUME_1, "", "NO. OF POINTS =  40  RECORD LENGTH =  0.390 SEC", 120),
+    (PEER, "NPTS= 40", "DT= .01 SEC", 12),
+    (PEER, "DT= .01 SEC", "NPTS= 40", 12),
 ]
 """A first line, another by which a format then is known, and how far down that may stand."""
 
