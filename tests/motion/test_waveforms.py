@@ -153,6 +153,8 @@ def test_doubtful_waveforms_are_refused(miniseed, tmp_path):
         af.Motion.read(path, response=response, units="g")
     with pytest.raises(af.InvalidInput, match="no StationXML that ObsPy reads"):
         af.Motion.read(path, response=path)
+    with pytest.raises(af.InvalidInput, match="there is no StationXML https://"):
+        af.Motion.read(path, response="https://service.example/station.xml")
     with pytest.raises(af.InvalidInput, match="may be counts of an instrument"):
         af.Motion.read(path)
     path.write_bytes(path.read_bytes()[:60])

@@ -51,6 +51,7 @@ def _read_unam(text: RecordText) -> list[Channel]:
         raise text.error("the components differ in number of samples or step, or in the header")
     unit_line, words = text.find(r"^UNIDADES DE LOS DATOS\s*:(.*)$", stop=_UNAM_LINES)
     unit = text.find_unit(words[1], "the header does not state one unit", unit_line)
+    # the header has lines of numbers too: the samples follow their own title
     start, _ = text.find("^DATOS DE ACELERACION")
     table = _read_table(text, text.header_length(start), _parse_count(text, count[0]), len(names))
     # the unit of the peaks is part of their key; they are printed with two decimals at least
@@ -73,6 +74,7 @@ def _read_cwb(text: RecordText) -> list[Channel]:
     duration = float(find(rf"^#RecordLength\(sec\):\s*({NUMBER_PATTERN})")[1][1])
     unit_line, words = find(r"^#AmplitudeUnit:\s*(.*)$")
     order_line, order = find(r"^#DataSequence:\s*Time((?:\s*\w+\(\+\);?)+)\s*$")
+    # a component with a minus is another sense, of which no file is known: the pattern refuses it
     names = re.findall(r"(\w+)\(", order[1])
     frequency = max(float(rate[1]), 1e-9)
     dt = text.check_step(1.0 / frequency, rate_line)

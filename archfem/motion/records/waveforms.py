@@ -3,12 +3,14 @@
 import re
 import struct
 import warnings
+from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from archfem._files import read_bytes
 from archfem._optional import require_package
 from archfem.errors import InvalidInput
 from archfem.motion.records.record_file import Channel, RecordText, parse_unit
@@ -62,10 +64,13 @@ def read(
 
 def _read_foreign(read: Any, path: str | PathLike[str], form: str) -> Any:
     """Read a file by ObsPy, whose errors are of many classes."""
+    # ObsPy would load names as addresses and patterns, and guess formats that run code
+    content = BytesIO(read_bytes(path, form))
+    code = {"miniSEED": "MSEED"}.get(form, form.upper())
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found = read(str(path))
+            found = read(content, format=code)
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         raise InvalidInput(f"{path} is no {form} that ObsPy reads ({reason})") from error
