@@ -564,6 +564,7 @@ def test_a_film_is_read_at_even_times(write, jitter):
         ("unam", f"{DAMAGE['PEAK']:.4f}/", "9.9/", "states a peak of"),
         ("cwb", "(Hz): 100", "(Hz): 50", "the file holds|more follows|does not grow"),
         ("cwb", "(Hz): 100\n#", "(Hz): 40\n#RecordLength(sec): 1\n#", "more follows|does not grow"),
+        ("cwb", f"{0.05:10.3f}", f"{0.08:10.3f}", "does not grow by 0.01 s"),
         ("cwb", "U(+); N(+)", "U(-); N(+)", "no line has"),
         ("cosmos", "acceleration pts", "raw accel.   pts", "no line has|volume 0"),
     ],
@@ -589,6 +590,11 @@ def test_a_response_belongs_to_binary_files(write):
 def test_zeros_that_fill_a_block_end_a_file(write):
     content = SAMPLES["smc_film"] + "\0" * 80 + "\n\x1a"
     assert read_channels(write(content))[0].samples == pytest.approx(DAMAGE["WAVE"], abs=2e-4)
+
+
+def test_one_line_left_over_in_the_last_block_of_a_film_is_no_sample(write):
+    content = SAMPLES["smc_film"] + DAMAGE["rows"](np.array([9.0, 1.0, 9.1, 2.0]), "11.3E", 8)
+    assert len(read_channels(write(content))[0].samples) == 40
 
 
 def test_a_long_number_of_a_narrow_column_may_lose_its_decimals():
