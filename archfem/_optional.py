@@ -36,6 +36,7 @@ OPTIONAL_PACKAGES = {
     ),
     "PETSc": Requirement("its solvers", "it comes with FEniCSx, " + FENICSX_REMEDY),
     "SLEPc": Requirement("modes of large models", "it comes with FEniCSx, " + FENICSX_REMEDY),
+    "ObsPy": Requirement("records in miniSEED and SAC", "pip install 'archfem[seismology]'"),
     "Chromium": Requirement(
         "reports as PDF",
         "'apt-get install chromium', or install Google Chrome; or print the page in a browser",

@@ -52,6 +52,7 @@ ALLOWED_IN = {
     "tomllib": ("cases", "studies"),
     "tomli_w": "cases",
     "argparse": "commands",
+    "obspy": "motion.records.waveforms",
     "distributed": "studies.cluster",
 }
 

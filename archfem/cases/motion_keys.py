@@ -24,7 +24,7 @@ from archfem.motion.suite import Suite
 
 SYNTHETIC_KEYS = {"duration": "s", "pga": "m/s**2", "seed": int, "dt": "s", "vertical_ratio": "1"}
 SOURCE_KEYS = {
-    **{"file": str, "column": int, "units": str, "dt": "s"},
+    **{"file": str, "column": int, "units": str, "dt": "s", "response": str},
     **{"synthetic": dict, "samples": ["m/s**2"]},
 }
 MOTION_KEYS = {
@@ -166,8 +166,8 @@ def _parse_source(table: Any, keys: Table, section: str) -> dict[str, Any]:
             settings["synthetic"], SYNTHETIC_KEYS, f"{section}.synthetic"
         )
     # Keys that describe a file are errors beside another source; samples have a step.
-    of_files = {"file": set(), "synthetic": {"column", "units", "dt"}}
-    if unused := sorted(of_files.get(source, {"column", "units"}) & set(settings)):
+    of_files = {"file": set(), "synthetic": {"column", "units", "dt", "response"}}
+    if unused := sorted(of_files.get(source, {"column", "units", "response"}) & set(settings)):
         raise InvalidInput(f"{section}.{unused[0]} belongs to a file, not to {source}")
     if source == "samples" and "dt" not in settings:
         raise InvalidInput(f'{section}.samples needs the time between them, e.g. dt = "5 ms"')
@@ -190,4 +190,6 @@ def _build_source(settings: Table, folder: Path) -> Motion:
     if "synthetic" in settings:
         return Motion.synthetic(**settings["synthetic"])
     options = {key: settings[key] for key in ("column", "units", "dt") if key in settings}
+    if "response" in settings:
+        options["response"] = folder / settings["response"]
     return Motion.read(folder / settings["file"], **options)

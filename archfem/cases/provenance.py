@@ -68,10 +68,9 @@ def hash_inputs(settings: Table, folder: Path = Path()) -> str:
 
 
 def _record_names(motion: Any) -> Iterator[str]:
-    """Names of the record files of a motion and of its vertical."""
+    """Names of the files of records and responses of a motion and of its vertical."""
     source = _as_table(motion)
-    if "file" in source:
-        yield str(source["file"])
+    yield from (str(source[key]) for key in ("file", "response") if key in source)
     vertical = source.get("vertical")
     if isinstance(vertical, str):
         yield vertical

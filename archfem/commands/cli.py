@@ -242,8 +242,9 @@ def _add_motion(command: argparse.ArgumentParser) -> None:
     command.description = "Print the measures of records, draw them, their integrals and spectra."
     command.add_argument("files", nargs="+", metavar="FILE", help="a record")
     command.add_argument("--column", type=int, help="component or plain column, counted from 1")
-    command.add_argument("--units", help="of plain columns: g, m/s2, cm/s2 or gal")
+    command.add_argument("--units", help="of columns, miniSEED or SAC: g, m/s2, cm/s2 or gal")
     command.add_argument("--dt", type=float, help="time between samples of plain columns [s]")
+    command.add_argument("--response", metavar="XML", help="StationXML of counts in miniSEED, SAC")
     command.add_argument(
         "--out", default="out/motions", metavar="DIR", help="folder for the pictures"
     )

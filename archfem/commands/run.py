@@ -3,9 +3,10 @@
 import argparse
 import io
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
+from typing import Any
 
 from archfem._files import DRAFT_PREFIX, create_result_folder, replace_results
 from archfem.cases.case import Case
@@ -211,7 +212,8 @@ def motion(options: argparse.Namespace) -> None:
     from archfem.cases.result_folder import with_unique_names, write_motions
 
     folder = create_result_folder(options.out)
-    read, refused = _read_records(options.files, options.column, options.units, options.dt)
+    given = {key: getattr(options, key) for key in ("column", "units", "dt", "response")}
+    read, refused = _read_records(options.files, given)
     motions = with_unique_names(list(read.values()), [Path(path).name for path in read])
     print(tabulate_motions(motions).text)
     print_written(write_motions(motions, folder))
@@ -222,13 +224,13 @@ def motion(options: argparse.Namespace) -> None:
 
 
 def _read_records(
-    files: Sequence[str], column: int | None, units: str | None, dt: float | None
+    files: Sequence[str], given: Mapping[str, Any]
 ) -> tuple[dict[str, Motion], list[InvalidInput]]:
     """Read records: motions by file, and the errors of refused files, which are printed."""
     read, refused = {}, []
     for path in files:
         try:
-            read[path] = Motion.read(path, column=column, units=units, dt=dt)
+            read[path] = Motion.read(path, **given)
         except InvalidInput as error:
             refused.append(error)
             if len(files) > 1:

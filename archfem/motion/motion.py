@@ -68,6 +68,7 @@ class Motion(ResultDisplay):
         column: int | None = None,
         units: str | None = None,
         dt: float | None = None,
+        response: str | PathLike[str] | None = None,
     ) -> "Motion":
         """Return the motion of a record; the format is found by the content of the file.
 
@@ -75,18 +76,21 @@ class Motion(ResultDisplay):
         one is the horizontal, the second the transverse; the vertical is turned up.
 
         Args:
-            path: PEER AT2, AFAD, ESM/ITACA, COSMOS V2, CSMIP/CDMG V2, USGS SMC, K-NET, or columns.
+            path: PEER AT2, AFAD, ESM/ITACA, COSMOS, CSMIP/CDMG, USC, RENADIC, BHRC, GeoNet, USGS
+                SMC, K-NET, UNAM, CWB, miniSEED, SAC, or columns.
             vertical: second file, with the vertical component and its own unit and step; one that
                 states neither is read by itself, and added by `with_vertical`.
             transverse: another file, that holds the other horizontal, likewise.
             column: take this component or plain column of `path` only, counted from 1.
-            units: unit of the plain columns of `path`: g, m/s2, cm/s2 or gal.
+            units: of the plain columns, miniSEED or SAC of `path`: g, m/s2, cm/s2 or gal.
             dt: time between samples of the plain columns of `path` [s].
+            response: StationXML of the instrument whose counts `path` has, in miniSEED or SAC.
 
         Raises:
             InvalidInput: what cannot be read without doubt, with file and line.
+            NotInstalled: miniSEED and SAC need ObsPy.
         """
-        channels = read_components(path, column=column, units=units, dt=dt)
+        channels = read_components(path, column=column, units=units, dt=dt, response=response)
         rows: dict[str, Any] = {name: channel.samples for name, channel in channels.items()}
         try:
             motion = cls(**rows, dt=channels["horizontal"].dt, name=Path(path).stem)

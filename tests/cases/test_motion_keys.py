@@ -74,6 +74,7 @@ def test_samples_may_stand_in_the_case():
         ("suite.pairs.third={}", "suite.pairs.third needs either a file, or synthetic"),
         ("suite.pairs.third={synthetic={sed=1}}", "unknown key 'suite.pairs.third.synthetic.sed'"),
         ("suite.pairs.third={synthetic={}, units='g'}", "units belongs to a file"),
+        ("suite.pairs.third={synthetic={}, response='a.xml'}", "response belongs to a file"),
         ("suite.pairs.third={samples=[0.0, 1.0]}", "needs the time between them"),
         ("suite.pairs.third={samples=[0.0, 1.0], synthetic={}}", "it has .'samples', 'synthetic'."),
         ("suite.pairs.first.vertical=3", "vertical = 3 is not a word or a table"),

@@ -87,6 +87,115 @@ def smc():
     ) + rows(100.0 * WAVE, "10.3E", 8)
 
 
+def smc_film():
+    """Pairs of a time and a sample, of which the count is that of numbers."""
+    integers = np.full(48, -32768)
+    reals = np.full(50, 1.7e38)
+    integers[[12, 13, 15, 16]] = 90, 360, 1, 80
+    reals[[29, 31]] = WAVE.max() * 100.0, WAVE.min() * 100.0
+    head = "1 UNCORRECTED ACCELEROGRAM\n*\nPLC\nstation = Town    component= 360\n" + "*\n" * 7
+    headers = rows(integers, "10d", 8) + rows(reals, "15.7E", 5) + "|made for a test\n"
+    return head + headers + rows(pairs(100.0 * WAVE), "11.3E", 8)
+
+
+def pairs(values):
+    """Put the times of samples before them."""
+    return np.column_stack([0.01 * np.arange(len(values)), values]).ravel()
+
+
+def spaced():
+    """Volume 1 of a digital instrument, in g, without end marks."""
+    channels = []
+    for number, direction in ((1, "90 Deg"), (2, "Up")):
+        head = (
+            f"Uncorrected Accelerogram Data\nRcrd of a town\nChan  {number}: {direction}\n"
+            f"Units of uncor data are sec and g.   Max  = {PEAK / 980.665:7.4f} g, at   .100 sec.\n"
+            "   40 Accelerogram points at 100 pts/sec in units of g.       Format: (8f9.6)\n"
+        )
+        channels.append(head + rows(WAVE / 9.80665, "9.6f", 8))
+    return "".join(channels)
+
+
+def volume_1():
+    """Pairs of a time and a sample in tenths of g, as RENADIC, USC and CDMG print them."""
+    channels = []
+    for number, direction in ((1, "L"), (2, "V"), (3, "T")):
+        head = (
+            f"UNCORRECTED ACCELEROGRAM DATA\nTOWN\nCHAN  {number}: {direction}        (STA CHN)\n"
+            "NO. OF POINTS =     40  RECORD LENGTH =  0.390 SEC\n"
+            "UNITS OF UNCOR ACCEL ARE SEC AND G/10.     "
+            f"MAX  = {PEAK / 980.665:6.3f} G, AT   0.100 SEC\n"
+            f"RMS ACCEL OF COMPLETE RECORD = {np.std(WAVE) / 9.80665:5.3f} G\n"
+        )
+        zeros = rows(np.zeros(100, int), "5d", 16) + rows(np.zeros(50), "10.3f", 8)
+        end = f"/&  ----------  END OF DATA FOR CHANNEL {number}  ----------\n"
+        channels.append(head + zeros + rows(pairs(WAVE / 0.980665), "9.4f", 10) + end)
+    return "".join(channels)
+
+
+def usc():
+    """One channel, with the rms of its samples in place of their peak."""
+    rms = np.std(WAVE) / 0.980665
+    return (
+        "FILE     0 OF UNCORRECTED ACCELEROGRAM DATA OF VOLUME I:\nTOWN\nCOMP N90E\n"
+        "NO. OF POINTS =     40      DURATION =    .390 SEC\nUNITS ARE SEC AND G/10\n"
+        f"RMS ACCLN. OF COMPLETE RECORD =     {rms:.3f} G/10\n"
+        + rows(np.zeros(100, int), "5d", 16)
+        + rows(np.zeros(50), "10.3f", 8)
+        + rows(pairs(WAVE / 0.980665), "9.4f", 10)
+    )
+
+
+def bhrc():
+    channels = []
+    for name in ("L1", "V2", "T3"):
+        head = (
+            f"COMP {name}\nTown\nNO. OF POINTS =     40      DURATION =    .400\n"
+            "UNITS ARE SECONDS AND G/10\n\n"
+        )
+        zeros = rows(np.zeros(100, int), "5d", 16) + rows(np.zeros(50), "12.6E", 8)
+        channels.append(head + zeros + rows(WAVE / 0.980665, "14.6E", 10))
+    return "* VOL1DS FILE:  1/01\nInst Type = SSA-2\n" + "".join(channels)
+
+
+def geonet():
+    channels = []
+    for name in ("S90E", "N00E", "Up"):
+        head = (
+            "Corrected accelerogram 1_PLC_20 GNS Science\nTown\n"
+            "Number of points  40    Duration   0.39 sec\n"
+            "Instrument corrected data at 0.010 sec intervals\n"
+            f"Component {name}  Accelerometer Axis\n"
+            f"Acceleration:  peak {10.0 * PEAK:8.1f} mm/s/s at   0.10 sec     rms      1.0 mm/s/s\n"
+        )
+        numbers = rows(np.zeros(40, int), "8d", 10) + rows(np.zeros(60), "8.3f", 10)
+        channels.append(head + numbers + rows(1000.0 * WAVE, "8.1f", 10) + rows(WAVE, "8.2f", 10))
+    return "".join(channels)
+
+
+def unam():
+    shared = "{0}/{0}/{0}".format
+    return (
+        "ARCHIVO ESTANDAR DE ACELERACION:\nORIENTACION C1-C6 (rumbo;orientacion)  : /V/N00E/N90E\n"
+        f"INTERVALO DE MUESTREO, C1-C6 (s)       : /{shared(0.01)}\n"
+        f"NUM. TOTAL DE MUESTRAS, C1-C6          : /{shared(40)}\n"
+        f"ACEL. MAX.(Gal), C1-C6                 : /{shared(f'{PEAK:.4f}')}\n"
+        "UNIDADES DE LOS DATOS                  : Gal (cm/s/s)\nDATOS DE ACELERACION:\n"
+        "---------+---------+---------+\n         V      N00E      N90E\n"
+    ) + rows(np.repeat(100.0 * WAVE, 3), "10.4f", 3)
+
+
+def cwb():
+    highs = (100.0 * WAVE.max(), 100.0 * WAVE.min())
+    peaks = "".join(f"#AmplitudeMAX. {c}: {highs[0]:8.3f}~ {highs[1]:8.3f}\n" for c in "UNE")
+    table = np.column_stack([0.01 * np.arange(40), *[100.0 * WAVE] * 3])
+    return (
+        "#StationCode: PLC\n#RecordLength(sec): 0.4\n#SampleRate(Hz): 100\n"
+        f"#AmplitudeUnit:  gal. DCoffset(corr)\n{peaks}"
+        "#DataSequence: Time U(+); N(+); E(+)\n#Data: 4F10.3\n"
+    ) + rows(table.ravel(), "10.3f", 4)
+
+
 def knet():
     counts = np.rint(WAVE * 8e6 / 78.45).astype(int)
     head = (
@@ -103,7 +212,9 @@ def columns():
     return "# time (s)  acceleration (m/s2)\n" + "".join(lines)
 
 
-SAMPLES = {make.__name__: make() for make in (peer, afad, esm, csmip, cosmos, smc, knet, columns)}
+FORMATS = (peer, afad, esm, csmip, cosmos, smc, knet, columns)
+FORMATS += (smc_film, spaced, volume_1, usc, bhrc, geonet, unam, cwb)
+SAMPLES = {make.__name__: make() for make in FORMATS}
 
 
 def damaged(content, random):

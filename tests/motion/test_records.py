@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.motion.records import afad, cosmos, csmip, esm, knet, peer, smc
+from archfem.motion.records.cosmos import COSMOS
+from archfem.motion.records.keyed import AFAD, CWB, ESM, KNET, UNAM
+from archfem.motion.records.peer import PEER
 from archfem.motion.records.reader import read_channels, read_components
 from archfem.motion.records.record_file import RecordText
+from archfem.motion.records.smc import SMC
+from archfem.motion.records.volumes import BHRC, CSMIP, VOLUME_1
 
 DAMAGE = runpy.run_path(str(Path(__file__).parents[1] / "fuzz" / "damaged_records.py"))
 SAMPLES, mutants = DAMAGE["SAMPLES"], DAMAGE["mutants"]
@@ -350,20 +354,20 @@ def test_damaged_files_raise_no_foreign_error(tmp_path):
 
 
 PEAK = DAMAGE["PEAK"]
-KNET, AFAD = f"(gal)   {PEAK:.3f}", f"(U-D) {PEAK}"
+KNET_PEAK, AFAD_PEAK = f"(gal)   {PEAK:.3f}", f"(U-D) {PEAK}"
 
 
 @pytest.mark.parametrize(
     ("form", "was", "becomes", "accepted"),
     [
         # K-NET's peak was taken after another estimate of the offset: 2 %
-        ("knet", KNET, f"(gal)   {1.018 * PEAK:.3f}", True),
-        ("knet", KNET, f"(gal)   {1.022 * PEAK:.3f}", False),
+        ("knet", KNET_PEAK, f"(gal)   {1.018 * PEAK:.3f}", True),
+        ("knet", KNET_PEAK, f"(gal)   {1.022 * PEAK:.3f}", False),
         # AFAD's before the offset was taken out: a half
-        ("afad", AFAD, f"(U-D) {1.96 * PEAK}", True),
-        ("afad", AFAD, f"(U-D) {2.04 * PEAK}", False),
-        ("afad", AFAD, f"(U-D) {0.52 * PEAK}", True),
-        ("afad", AFAD, f"(U-D) {0.48 * PEAK}", False),
+        ("afad", AFAD_PEAK, f"(U-D) {1.96 * PEAK}", True),
+        ("afad", AFAD_PEAK, f"(U-D) {2.04 * PEAK}", False),
+        ("afad", AFAD_PEAK, f"(U-D) {0.52 * PEAK}", True),
+        ("afad", AFAD_PEAK, f"(U-D) {0.48 * PEAK}", False),
         # ESM's duration by two steps and a millisecond, to either side
         ("esm", "S: 0.40", "S: 0.420", True),
         ("esm", "S: 0.40", "S: 0.3795", True),
@@ -509,19 +513,118 @@ def test_counts_of_knet_are_about_their_mean(write):
     assert found.samples == pytest.approx(DAMAGE["WAVE"] - DAMAGE["WAVE"].mean(), abs=2e-4)
 
 
+@pytest.mark.parametrize("jitter", [0.24, 0.26])
+def test_a_film_is_read_at_even_times(write, jitter):
+    """Beyond a quarter of a step its trace, straight between the points, is sampled each 1 ms."""
+    times = 0.01 * np.arange(101.0)
+    times[50] += 0.01 * jitter  # of so many points one hardly moves the line through all
+    slope = 2.0  # m/s² per second: a straight line, which stays one
+    numbers = np.column_stack([times, 100.0 * slope * times]).ravel()
+    head = SAMPLES["smc_film"].partition("|made for a test\n")[0]
+    head = head.replace(f"{80:10d}", f"{202:10d}")
+    for wave in (DAMAGE["WAVE"].max(), DAMAGE["WAVE"].min()):
+        head = head.replace(f"{100.0 * wave:15.7E}", f"{100.0 * slope:15.7E}")
+    path = write(head + "|made for a test\n" + DAMAGE["rows"](numbers, "13.5E", 8))
+    (found,) = read_channels(path)
+    assert found.dt == pytest.approx(0.001 if jitter > 0.25 else 0.01, rel=1e-3)
+    assert len(found.samples) == (1001 if jitter > 0.25 else 101)
+    if jitter > 0.25:
+        assert found.samples == pytest.approx(slope * 0.001 * np.arange(1001), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("form", "was", "becomes", "message"),
+    [
+        ("smc_film", f"{0.02:11.3E}", f"{0.2:11.3E}", "times decrease"),
+        ("smc_film", f"{80:10d}", f"{64:10d}", "more follows after the 64 numbers"),
+        ("smc_film", "1 UNC", "2 C", "does not state the sampling rate"),
+        ("spaced", "40 Accelerogram", "16 Accelerogram", "more numbers follow after the 16"),
+        (
+            "spaced",
+            "Uncorrected Acc",
+            "Response and Fourier amplitude spectra",
+            "volume 3.*volume 2",
+        ),
+        ("volume_1", "LENGTH =  0.390", "LENGTH =  0.790", "do not last 0.79 s"),
+        ("volume_1", "G/10.     MAX", "G.     MAX", "states a peak of"),
+        (
+            "volume_1",
+            "NO. OF POINTS =     40",
+            "NO. OF POINTS =     41",
+            "the file holds|numbers exp",
+        ),
+        ("usc", "AND G/10", "AND G/10\nRMS ACCLN. OF COMPLETE RECORD = 5.0 G/10", "the rms of"),
+        ("bhrc", "COMP V2", "", "second channel begins"),
+        ("bhrc", "DURATION =    .400", "DURATION =  40.000", "sampling interval 1 s"),
+        ("geonet", f"peak {10.0 * DAMAGE['PEAK']:8.1f}", "peak  9999.0", "states a peak of"),
+        ("geonet", f"{0:8d}" * 10 + "\n", "", "a line is lost"),
+        ("unam", "/40/40/40", "/40/40/41", "differ in number of samples"),
+        ("unam", "/40/40/40", "/39/39/39", "more follows"),
+        ("unam", "/0.01/0.01", "/fast/fast", "differ in number|a number is expected"),
+        ("unam", f"{DAMAGE['PEAK']:.4f}/", "9.9/", "states a peak of"),
+        ("cwb", "(Hz): 100", "(Hz): 50", "the file holds|more follows|does not grow"),
+        ("cwb", "(Hz): 100\n#", "(Hz): 40\n#RecordLength(sec): 1\n#", "more follows|does not grow"),
+        ("cwb", f"{0.05:10.3f}", f"{0.08:10.3f}", "does not grow by 0.01 s"),
+        ("cwb", "U(+); N(+)", "U(-); N(+)", "no line has"),
+        ("cosmos", "acceleration pts", "raw accel.   pts", "no line has|volume 0"),
+    ],
+)
+def test_doubts_about_further_formats(write, form, was, becomes, message):
+    assert was in SAMPLES[form]
+    with pytest.raises(af.InvalidInput, match=message):
+        af.Motion.read(write(SAMPLES[form].replace(was, becomes, 1)))
+
+
+def test_raw_counts_of_cosmos_are_named(write):
+    content = SAMPLES["cosmos"].replace("acceleration pts", "raw accel.   pts")
+    with pytest.raises(af.InvalidInput, match=r"volume 0\): use volume 1 or 2"):
+        af.Motion.read(write(content.replace("units=cm/sec2(04)", "units=counts (50)")))
+
+
+def test_a_response_belongs_to_binary_files(write):
+    path = write(SAMPLES["knet"])
+    with pytest.raises(af.InvalidInput, match="response= belongs to miniSEED and SAC"):
+        af.Motion.read(path, response=path)
+
+
+def test_zeros_that_fill_a_block_end_a_file(write):
+    content = SAMPLES["smc_film"] + "\0" * 80 + "\n\x1a"
+    assert read_channels(write(content))[0].samples == pytest.approx(DAMAGE["WAVE"], abs=2e-4)
+
+
+def test_one_line_left_over_in_the_last_block_of_a_film_is_no_sample(write):
+    content = SAMPLES["smc_film"] + DAMAGE["rows"](np.array([9.0, 1.0, 9.1, 2.0]), "11.3E", 8)
+    assert len(read_channels(write(content))[0].samples) == 40
+
+
+def test_a_long_number_of_a_narrow_column_may_lose_its_decimals():
+    """-11026 stands for -11026.2 where columns have eight letters; -933 for -933.5 does not."""
+    for odd, sound in (("-11026", True), ("-933", False)):
+        text = RecordText(Path("any"), (*[" -9333.5"] * 40, f"  {odd}"), True)
+        if sound:
+            assert text.read_block(0, 41)[0][-1] == -11026.0
+        else:
+            with pytest.raises(af.InvalidInput, match="not as many digits"):
+                text.read_block(0, 41)
+
+
 KEYS = [
-    (smc, "2 CORRECTED ACCELEROGRAM", "*", 11),
-    (afad, "SAMPLING INTERVAL (sec) : 0.01", "NUMBER OF DATA : 40", 40),
-    (afad, "NUMBER OF DATA : 40", "SAMPLING INTERVAL (sec) : 0.01", 40),
-    (csmip, "", "   40 POINTS OF ACCEL DATA EQUALLY SPACED AT  .010 SEC.", 120),
-    (cosmos, "", "Corrected acceleration (Format v01.20", 3),
-    (cosmos, "", " 100 Integer-header values follow", 40),
-    (esm, "", "NDATA: 40", 80),
-    (esm, "", "SAMPLING_INTERVAL_S: 0.01", 80),
-    (knet, "", "Scale Factor      7845(gal)/8000000", 20),
-    (knet, "", "Sampling Freq(Hz) 100Hz", 20),
-    (peer, "NPTS= 40", "DT= .01 SEC", 12),
-    (peer, "DT= .01 SEC", "NPTS= 40", 12),
+    (SMC, "2 CORRECTED ACCELEROGRAM", "*", 11),
+    (AFAD, "SAMPLING INTERVAL (sec) : 0.01", "NUMBER OF DATA : 40", 40),
+    (AFAD, "NUMBER OF DATA : 40", "SAMPLING INTERVAL (sec) : 0.01", 40),
+    (CSMIP, "", "   40 POINTS OF ACCEL DATA EQUALLY SPACED AT  .010 SEC.", 120),
+    (COSMOS, "", "Corrected acceleration (Format v01.20", 40),
+    (COSMOS, "", " 100 Integer-header values follow", 40),
+    (ESM, "", "NDATA: 40", 80),
+    (ESM, "", "SAMPLING_INTERVAL_S: 0.01", 80),
+    (KNET, "", "Scale Factor      7845(gal)/8000000", 20),
+    (KNET, "", "Sampling Freq(Hz) 100Hz", 20),
+    (UNAM, "", "ARCHIVO ESTANDAR DE ACELERACION:", 20),
+    (CWB, "", "#DataSequence: Time U(+); N(+); E(+)", 30),
+    (BHRC, "", "* VOL1DS FILE:  1/01", 3),
+    (VOLUME_1, "", "NO. OF POINTS =  40  RECORD LENGTH =  0.390 SEC", 120),
+    (PEER, "NPTS= 40", "DT= .01 SEC", 12),
+    (PEER, "DT= .01 SEC", "NPTS= 40", 12),
 ]
 """A first line, another by which a format then is known, and how far down that may stand."""
 

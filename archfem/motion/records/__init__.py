@@ -1,15 +1,14 @@
-"""Files of recorded ground motions, one module for each format.
+"""Files of recorded ground motions, one module for each family of formats.
 
-    afad         format afad
-    columns      format columns
-    cosmos       format cosmos
-    csmip        format csmip
-    esm          format esm
-    knet         format knet
-    peer         format peer
+    columns      plain columns
+    cosmos       format COSMOS
+    keyed        named values above samples: AFAD, CWB, ESM, K-NET, UNAM
+    peer         format PEER
     reader       file format detection
     record_file  text, units and channels of a record file
-    smc          format smc
+    smc          format SMC
+    volumes      volumes 1 and 2: CSMIP/CDMG, USC, RENADIC, BHRC, GeoNet
+    waveforms    miniSEED and SAC, through ObsPy
 
 The format is detected from the content. Start reading at `reader`.
 """

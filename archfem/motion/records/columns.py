@@ -58,7 +58,9 @@ def _read_table(text: RecordText) -> tuple[Array, list[int], str]:
             lines.append(line)
             if len(table[-1]) != len(table[0]):
                 raise text.error(
-                    f"{len(table[-1])} columns where the first row has {len(table[0])}", line
+                    f"{len(table[-1])} columns where the first row has {len(table[0])}: this is "
+                    "neither a table nor a known format",
+                    line,
                 )
     if "." not in "".join(text.lines[start:]) and text.contains(r"\d,\d", len(text.lines), start):
         raise text.error("these look like decimal commas: write points", start)

@@ -1,9 +1,15 @@
-"""COSMOS volume 2 files: channels with integer and real headers, comments and samples."""
+"""COSMOS volume 1 and 2 files: channels with integer and real headers, comments and samples."""
 
 import re
 from enum import IntEnum
 
-from archfem.motion.records.record_file import COUNT_PATTERN, Channel, RecordText, find_column_width
+from archfem.motion.records.record_file import (
+    COUNT_PATTERN,
+    Channel,
+    RecordFormat,
+    RecordText,
+    find_column_width,
+)
 
 _HEADER_PATTERN = rf"^\s*({COUNT_PATTERN})\s+%s-header values follow"
 
@@ -16,12 +22,7 @@ class _Position(IntEnum):
     PEAK = 63
 
 
-def recognises(text: RecordText) -> bool:
-    """Return whether the file states a COSMOS format, or has one of its headers."""
-    return text.contains(r"\(Format v\d", 3) or text.contains(r"Integer-header values follow", 40)
-
-
-def read(text: RecordText) -> list[Channel]:
+def _read(text: RecordText) -> list[Channel]:
     """Read the acceleration of every channel."""
     channels: list[Channel] = []
     start = 0
@@ -34,12 +35,16 @@ def read(text: RecordText) -> list[Channel]:
 def _read_channel(text: RecordText, start: int) -> tuple[Channel, int]:
     """Read the next channel after a line; return it and the line after its samples."""
     block_pattern = rf"^\s*({COUNT_PATTERN})\s+acceleration\s+pts\b(.*)$"
-    end_pattern = r"^\s*End-of-data for\s+Chan\s*(\S*)\s+acceleration"
+    end_pattern = r"End[- ]of[- ]data for\s+Chan(?:nel)?\s*(\S*)(?:\s+acceleration|\s+-)"
+    counts_pattern = rf"^\s*{COUNT_PATTERN}\s+raw accel\.?\s+pts\b.*counts"
     # codes of the direction of a vertical sensor
     vertical_codes = {400: "Up", 401: "Down", 402: "Vertical"}
     unknown_value = -999.0
     codes, line = _read_header(text, "Integer", start)
     values, line = _read_header(text, "Real", line)
+    if text.contains(counts_pattern, len(text.lines), line):
+        counts_line, _ = text.find(counts_pattern, line)
+        raise text.error("counts of an instrument (volume 0): use volume 1 or 2", counts_line)
     line, block = text.find(block_pattern, line)
     count, rest = int(block[1]), block[2]
     unit = text.find_unit(
@@ -66,3 +71,8 @@ def _read_header(text: RecordText, kind: str, start: int) -> tuple[list[float], 
     if len(numbers) <= max(_Position):
         raise text.error(f"{len(numbers)} values in a header of 100", line)
     return numbers.tolist(), after
+
+
+COSMOS = RecordFormat(
+    "COSMOS", ((r"\(Format v\d|^\s*\d+\s+Integer-header values follow", 40),), _read
+)

@@ -2,17 +2,18 @@
 
 import re
 
-from archfem.motion.records.record_file import COUNT_PATTERN, NUMBER_PATTERN, Channel, RecordText
+from archfem.motion.records.record_file import (
+    COUNT_PATTERN,
+    NUMBER_PATTERN,
+    Channel,
+    RecordFormat,
+    RecordText,
+)
 
 _HEADER_LINES = 12  # lines; files in the wild begin with blank lines or lack one of the four
 
 
-def recognises(text: RecordText) -> bool:
-    """Return whether the header names both NPTS and DT."""
-    return text.contains(r"\bNPTS\b", _HEADER_LINES) and text.contains(r"\bDT\b", _HEADER_LINES)
-
-
-def read(text: RecordText) -> list[Channel]:
+def _read(text: RecordText) -> list[Channel]:
     """Read the single component of the file."""
     # Count and step follow their names (`NPTS= 5437, DT= .0050 SEC`), in either order, on one line
     # or two, or both precede or follow the names (`4096 0.0100 NPTS, DT`). The rest of the header
@@ -50,3 +51,6 @@ def _find_direction(text: RecordText, line: int) -> str:
     title = next((content for content in text.lines[1:line] if content.count(",") >= 2), "")
     direction = re.sub(r"\([^()]*\)?", "", title).rpartition(",")[2].strip()
     return direction if len(direction) <= 12 else ""
+
+
+PEER = RecordFormat("PEER", ((r"\bNPTS\b", _HEADER_LINES), (r"\bDT\b", _HEADER_LINES)), _read)

@@ -2,25 +2,18 @@
 
 from numbers import Real
 from os import PathLike
-from typing import Protocol
 
+from archfem._files import read_bytes
 from archfem.errors import InvalidInput
 from archfem.motion import signal_processing
-from archfem.motion.records import afad, columns, cosmos, csmip, esm, knet, peer, smc
-from archfem.motion.records.record_file import Channel, RecordText, parse_unit
+from archfem.motion.records import columns, cosmos, keyed, peer, smc, volumes, waveforms
+from archfem.motion.records.record_file import Channel, RecordFormat, RecordText, parse_unit
 
-
-class RecordFormat(Protocol):
-    """Functions of the module of a format."""
-
-    def recognises(self, text: RecordText) -> bool:
-        """Return whether a file is of this format."""
-
-    def read(self, text: RecordText) -> list[Channel]:
-        """Return the components of a file of this format, in its order."""
-
-
-_RECORD_FORMATS: tuple[RecordFormat, ...] = (smc, cosmos, csmip, afad, esm, knet, peer)
+# Old formats with unspecific headers come last.
+_RECORD_FORMATS = (
+    *(smc.SMC, cosmos.COSMOS, volumes.GEONET, volumes.BHRC, volumes.CSMIP, volumes.VOLUME_1),
+    *(keyed.AFAD, keyed.UNAM, keyed.CWB, keyed.ESM, keyed.KNET, peer.PEER),
+)
 
 
 def read_components(
@@ -29,10 +22,11 @@ def read_components(
     column: int | None = None,
     units: str | None = None,
     dt: float | None = None,
+    response: str | PathLike[str] | None = None,
 ) -> dict[str, Channel]:
     """Read the horizontal component of one motion, and vertical and transverse if present."""
     # a single component counts as horizontal, in any direction
-    channels = read_channels(path, column=column, units=units, dt=dt)
+    channels = read_channels(path, column=column, units=units, dt=dt, response=response)
     if len(channels) == 1:
         return {"horizontal": channels[0]}
     level = [channel for channel in channels if not channel.is_vertical]
@@ -53,33 +47,55 @@ def read_channels(
     column: int | None = None,
     units: str | None = None,
     dt: float | None = None,
+    response: str | PathLike[str] | None = None,
 ) -> list[Channel]:
     """Read all channels of a record, or one of them."""
-    text = RecordText.from_file(path)
     if units is not None:
         parse_unit(units)
     if not (dt is None or isinstance(dt, Real)) or not (column is None or isinstance(column, int)):
         raise InvalidInput(f"dt {dt!r} is a number in seconds and column {column!r} a whole number")
-    form = next((form for form in _RECORD_FORMATS if form.recognises(text)), None)
+    content = read_bytes(path, "record")
+    waveform = waveforms.find_waveform_format(content)
+    if waveform:
+        if dt is not None:
+            raise InvalidInput(f"{path}: {waveform} states its step itself: leave out dt=")
+        channels = waveforms.read(path, form=waveform, units=units, response=response)
+        return _choose_channels(path, channels, column)
+    text = RecordText.decode(path, content)
+    if response is not None:
+        raise text.error("response= belongs to miniSEED and SAC: leave it out")
+    form = find_format(text)
     if form is None:
-        return _validate_channels(text, columns.read(text, column=column, units=units, dt=dt))
+        return _validate_channels(path, columns.read(text, column=column, units=units, dt=dt))
     channels = form.read(text)
     if units is not None or dt is not None:
         raise text.error(
-            "this format states its units and its step itself: leave out units= and dt="
+            f"{form.name} states its units and its step itself: leave out units= and dt="
         )
-    if column is None:
-        return _validate_channels(text, channels)
-    if not 1 <= column <= len(channels):
-        raise InvalidInput(f"{text.path} has {len(channels)} components: column {column} is none")
-    return _validate_channels(text, [channels[column - 1]])
+    return _choose_channels(path, channels, column)
 
 
-def _validate_channels(text: RecordText, channels: list[Channel]) -> list[Channel]:
+def find_format(text: RecordText) -> RecordFormat | None:
+    """Return the format of a text, None for plain columns."""
+    return next((form for form in _RECORD_FORMATS if form.recognises(text)), None)
+
+
+def _choose_channels(
+    path: str | PathLike[str], channels: list[Channel], column: int | None
+) -> list[Channel]:
+    """Return the channels, or the one of a number counted from 1."""
+    if column is not None:
+        if not 1 <= column <= len(channels):
+            raise InvalidInput(f"{path} has {len(channels)} components: column {column} is none")
+        channels = [channels[column - 1]]
+    return _validate_channels(path, channels)
+
+
+def _validate_channels(path: str | PathLike[str], channels: list[Channel]) -> list[Channel]:
     """Return the channels after the checks of any motion."""
     for channel in channels:
         try:
             signal_processing.validate_samples(channel.samples, channel.direction or "recorded")
         except InvalidInput as error:
-            raise InvalidInput(f"{text.path}: {error}") from error
+            raise InvalidInput(f"{path}: {error}") from error
     return channels

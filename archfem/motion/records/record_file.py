@@ -2,14 +2,15 @@
 
 import re
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
 from os import PathLike
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from archfem._files import read_bytes
 from archfem._typing import Array
 from archfem.errors import InvalidInput
 from archfem.units import STANDARD_GRAVITY
@@ -30,9 +31,10 @@ class RecordText:
     ended: bool  # whether the last line has its line end
 
     @classmethod
-    def from_file(cls, path: str | PathLike[str]) -> "RecordText":
-        """Decode a file: UTF-8, or else Western or Turkish in 8 bits."""
-        content = read_bytes(path, "record").rstrip(b"\x1a")  # end-of-file mark of DOS
+    def decode(cls, path: str | PathLike[str], content: bytes) -> "RecordText":
+        """Decode the content of a file: UTF-8, or else Western or Turkish in 8 bits."""
+        # end-of-file mark of DOS, and zeros that fill the last block of a tape
+        content = re.sub(rb"\s*\0[\0\s]*\Z", b"\n", content.rstrip(b"\x1a"))
         place = Path(path)
         if b"\0" in content or not content.strip():
             kind = "not a text file" if content.strip() else "empty"
@@ -102,16 +104,21 @@ class RecordText:
 
     def _check_print(self, first: int, end: int, width: int | None) -> None:
         """Refuse a number with more or fewer decimals than nearly all others of its block."""
-        tails = [
-            (len(token.partition(".")[2]), line)
+        tokens = [
+            (*map(len, token.strip().partition(".")[::2]), line)
             for line in range(first, end)
             for token in self._split_tokens(line, width)
         ]
-        usual, times = Counter(length for length, _ in tails).most_common(1)[0]
-        # where 97 % of the numbers have equally many digits, the others are damaged
-        if 0.97 * len(tails) < times < len(tails):
-            line = next(line for length, line in tails if length != usual)
-            raise self.error("a number has not as many digits as the others: it is damaged", line)
+        usual, times = Counter(decimals for _, decimals, _ in tokens).most_common(1)[0]
+        # where 97 % of the numbers have equally many digits, the others are damaged, except
+        # that long ones of a narrow column lose decimals
+        if 0.97 * len(tokens) < times < len(tokens):
+            longest = max(whole for whole, decimals, _ in tokens if decimals == usual)
+            for whole, decimals, line in tokens:
+                if decimals > usual or (decimals < usual and whole <= longest):
+                    raise self.error(
+                        "a number has not as many digits as the others: it is damaged", line
+                    )
 
     def read_last_block(self, first: int, count: int) -> Array:
         """Read the stated number of values at the end of the file (count,)."""
@@ -156,9 +163,9 @@ class RecordText:
         search = re.compile(pattern, re.IGNORECASE).search
         return any(search(line) for line in self.lines[start:stop])
 
-    def header_length(self) -> int:
-        """Count the lines before the first line of numbers."""
-        for line in range(len(self.lines)):
+    def header_length(self, start: int = 0) -> int:
+        """Return the index of the first line of numbers from a line on."""
+        for line in range(start, len(self.lines)):
             if self.is_numeric(line):
                 return line
         raise self.error("no line of numbers: not an accelerogram")
@@ -171,15 +178,34 @@ class RecordText:
             )
         return dt
 
-    def check_peak(self, samples: Array, stated: float, tolerance: float = 0.02) -> None:
+    def check_peak(
+        self, samples: Array, stated: float, tolerance: float = 0.02, rounding: float = 0.0
+    ) -> None:
         """Compare the samples with the peak that the header states, both in one unit."""
         peak = np.abs(samples).max()
         apart = abs(peak - abs(stated))
-        if not (isfinite(apart) and apart <= tolerance * max(peak, abs(stated))):
+        if not (isfinite(apart) and apart <= tolerance * max(peak, abs(stated)) + rounding):
             raise self.error(
                 f"the header states a peak of {abs(stated):g}, the samples reach {peak:g}: "
                 "one of them is damaged"
             )
+
+
+def space_evenly(text: RecordText, pairs: Array, line: int) -> tuple[Array, float]:
+    """Return samples at a constant step, and the step [s], of numbers that are (time, sample)."""
+    times, samples = np.reshape(pairs, (-1, 2)).T
+    if len(times) < 2 or not np.all(np.diff(times) >= 0.0):
+        raise text.error("pairs of a time and a sample are expected, but times decrease", line)
+    count = np.arange(len(times))
+    mean, begin = np.polyfit(count, times, 1)
+    step = text.check_step(float(f"{mean:.6g}"), line)
+    # printed times are rounded; a film is digitised at uneven ones
+    if np.abs(times - begin - mean * count).max() <= 0.25 * mean:
+        return samples, step
+    # between its points a digitised trace is straight, and 1 ms is finer than they are
+    fine = 0.001
+    even = np.arange(times[0], times[-1] + 0.5 * fine, fine)
+    return np.interp(even, times, samples), fine
 
 
 def find_column_width(line: str) -> int | None:
@@ -202,7 +228,7 @@ class Channel:
         """Create a channel; a vertical component with positive downwards changes its sign."""
         down_pattern = re.compile(r"\b(DWN|DOWN|DN)\b|DWN$", re.IGNORECASE)
         vertical_pattern = re.compile(
-            r"\b(UP|UPDO|VERT|VERTICAL|V|VER|U-D|UD|Z|[A-Z]{2}Z)\b|UP$", re.IGNORECASE
+            r"\b(UP|UPDO|VERT|VERTICAL|V|VER|U-D|UD|U|Z|[A-Z]{2}Z)\b|UP$", re.IGNORECASE
         )
         name = direction.strip()
         if down_pattern.search(name):
@@ -210,10 +236,22 @@ class Channel:
         return cls(samples, dt, name, bool(vertical_pattern.search(name)))
 
 
+class RecordFormat(NamedTuple):
+    """A format of record files: how it is recognised, and its reader."""
+
+    name: str
+    marks: tuple[tuple[str, int], ...]  # patterns, each with the number of lines it may stand in
+    read: Callable[[RecordText], list[Channel]]  # components in the order of the file
+
+    def recognises(self, text: RecordText) -> bool:
+        """Return whether a file has all marks of the format."""
+        return all(text.contains(pattern, lines) for pattern, lines in self.marks)
+
+
 # Longer units first: each match is removed before the search for the next.
 _UNIT_PATTERNS = (
     (r"mm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-3),
-    (r"cm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-2),
+    (r"cms?\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-2),
     (r"\bgals?\b", 1e-2),
     (r"\bm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1.0),
     (r"units?\s*(?:of|:|=|in)?\s*\(?g\b|[(\[]\s*g\s*[)\]]|\bin\s+g\b", STANDARD_GRAVITY),

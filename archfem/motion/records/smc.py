@@ -3,7 +3,10 @@
 import re
 from enum import IntEnum
 
-from archfem.motion.records.record_file import Channel, RecordText
+from archfem._typing import Array
+from archfem.motion.records.record_file import Channel, RecordFormat, RecordText, space_evenly
+
+_UNKNOWN_VALUE = 1.0e38  # and above
 
 
 class _Line(IntEnum):
@@ -30,16 +33,8 @@ class _Real(IntEnum):
     MINIMUM = 31
 
 
-def recognises(text: RecordText) -> bool:
-    """Return whether the file starts with a type number and name, and has a line with a star."""
-    first = re.match(r"\s*\d\s+[A-Z ]+$", text.lines[0].rstrip())
-    starred = any(line.strip() == "*" for line in text.lines[1 : _Line.INTEGERS])
-    return bool(first) and starred
-
-
-def read(text: RecordText) -> list[Channel]:
+def _read(text: RecordText) -> list[Channel]:
     """Read the single component of the file."""
-    unknown_value = 1.0e38
     vertical_codes = {0: "UP", 180: "DOWN"}  # degrees from the upward vertical
     if "ACCELEROGRAM" not in text.lines[0]:
         raise text.error(f"{text.lines[0].strip()!r} is not an accelerogram", 0)
@@ -51,18 +46,31 @@ def read(text: RecordText) -> list[Channel]:
     comments = text.lines[_Line.COMMENTS : start]
     if start < _Line.COMMENTS or not all(comment.lstrip().startswith("|") for comment in comments):
         raise text.error(f"{len(comments)} comment lines expected", _Line.COMMENTS)
-    numbers = text.read_last_block(start, int(integers[_Integer.SAMPLE_COUNT]))
+    samples, dt = _read_samples(
+        text, start, int(integers[_Integer.SAMPLE_COUNT]), reals[_Real.RATE]
+    )
     peaks = [
-        abs(reals[at]) for at in (_Real.MAXIMUM, _Real.MINIMUM) if abs(reals[at]) < unknown_value
+        abs(reals[at]) for at in (_Real.MAXIMUM, _Real.MINIMUM) if abs(reals[at]) < _UNKNOWN_VALUE
     ]
     if peaks:
-        text.check_peak(numbers, max(peaks))
-    if not 0.0 < reals[_Real.RATE] < unknown_value:
-        raise text.error("the real header does not state the sampling rate", _Line.REALS)
+        text.check_peak(samples, max(peaks))
     written = re.search(r"component\s*=\s*(\S+)", " ".join(text.lines[: _Line.INTEGERS]))
     direction = vertical_codes.get(int(integers[_Integer.TILT]), written[1] if written else "")
-    return [
-        Channel.from_direction(
-            0.01 * numbers, text.check_step(1.0 / reals[_Real.RATE], _Line.REALS), direction
-        )
-    ]
+    return [Channel.from_direction(0.01 * samples, dt, direction)]
+
+
+def _read_samples(text: RecordText, start: int, count: int, rate: float) -> tuple[Array, float]:
+    """Return the samples [cm/s²] and their step [s]."""
+    if 0.0 < rate < _UNKNOWN_VALUE:
+        return text.read_last_block(start, count), text.check_step(1.0 / rate, _Line.REALS)
+    if "UNCORRECTED" not in text.lines[0]:
+        raise text.error("the real header does not state the sampling rate", _Line.REALS)
+    # a digitised film has pairs of a time and a sample, of which the count is that of numbers
+    numbers, after = text.read_block(start, count + count % 2)
+    if sum(bool(line.strip()) for line in text.lines[after:]) > 1:
+        # one line may be left over in the last block of a tape
+        raise text.error(f"more follows after the {count} numbers of the header", after)
+    return space_evenly(text, numbers, start)
+
+
+SMC = RecordFormat("SMC", ((r"^\s*\d\s+[A-Z ]+$", 1), (r"^\s*\*\s*$", _Line.INTEGERS)), _read)
