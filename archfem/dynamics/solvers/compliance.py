@@ -30,7 +30,6 @@ from archfem.dynamics.solvers.linear_step import (
     LinearStepWorkspace,
     LinearSystem,
     effective_matrix,
-    joint_rows,
     linear_system,
     linear_workspace,
     solve_contact,
@@ -81,10 +80,10 @@ class ComplianceSolver:
 
     def system(self, dt: float) -> ComplianceSystem:
         """Return the data of steps of one length [s]."""
-        linear = linear_system(self._equation, self.order, dt)
+        linear, pairs = linear_system(self._equation, self.order, dt)
         matrix = effective_matrix(self._equation, self.order, dt)
         factor = symmetric_factor(matrix, self._elimination)
-        pairs, rows = len(joint_rows(self._equation, dt).pairs), len(linear.law.offset)
+        rows = len(linear.law.offset)
         return ComplianceSystem(
             linear,
             linear_workspace(linear),
@@ -93,7 +92,7 @@ class ComplianceSolver:
             np.zeros(len(factor.parent), bool),
             np.zeros(rows, np.int64),
             np.zeros(len(linear.weight)),
-            ActiveRows.of(rows, len(linear.law.segments), pairs),
+            ActiveRows.of(rows, len(linear.law.segments), len(pairs)),
         )
 
     def copy_system(self, system: ComplianceSystem) -> ComplianceSystem:

@@ -11,6 +11,7 @@ in the middle of the path of the gaps over a step and f̄ is the mean over that 
 method and HHT the path has no length, and f̄ is the force at an instant.
 """
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -86,6 +87,7 @@ class GapRows(NamedTuple):
         return np.bincount(self.group[self.group >= 0], minlength=len(self.offset))[self.openings :]
 
 
+@lru_cache(maxsize=1)  # the pattern of the tangent and the equations of a step both need them
 def gap_rows(joints: JointOperator) -> GapRows:
     """Return the rows of gaps of joints; slips are followed where any of them can slide."""
     points = joints.points

@@ -128,8 +128,10 @@ def joint_rows(equation: Equation, dt: float) -> JointRows:
     return JointRows(rows, shear[:0] if joints.slides else shear, weight, law, pairs)
 
 
-def linear_system(equation: Equation, order: NDArray[Any], dt: float) -> LinearSystem:
-    """Return the matrices of an equation of motion by rows, its coordinates in another order."""
+def linear_system(
+    equation: Equation, order: NDArray[Any], dt: float
+) -> tuple[LinearSystem, NDArray[np.int64]]:
+    """Return an equation of motion by rows, its coordinates in another order, and pairs of gaps."""
     model, rows = equation.model, joint_rows(equation, dt)
     mass, closed, rest = (
         sparse_rows(without_round_off(matrix[order][:, order]))
@@ -140,8 +142,9 @@ def linear_system(equation: Equation, order: NDArray[Any], dt: float) -> LinearS
     )
     places = np.arange(len(rows.law.stiffness))
     body, numbers = np.ascontiguousarray(model.mass_influence[order].T), equation.numbers(dt)
-    weight = rows.weight[order]
-    return LinearSystem(mass, closed, rest, gaps, shear, weight, body, numbers, rows.law, places)
+    loads = rows.weight[order], body
+    system = LinearSystem(mass, closed, rest, gaps, shear, *loads, numbers, rows.law, places)
+    return system, rows.pairs
 
 
 def effective_matrix(equation: Equation, order: NDArray[Any], dt: float) -> sparse.csr_matrix:

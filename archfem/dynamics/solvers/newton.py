@@ -43,7 +43,6 @@ from archfem.dynamics.solvers.linear_step import (
     LinearSystem,
     effective_matrix,
     evaluate_released,
-    joint_rows,
     linear_system,
     linear_workspace,
     pair_blocks,
@@ -191,9 +190,8 @@ class NewtonSolver:
 
     def _small_system(self, dt: float) -> "SmallSystem":
         """Return the data of steps with small displacements."""
-        linear = linear_system(self._equation, self.order, dt)
+        linear, pairs = linear_system(self._equation, self.order, dt)
         effective, law = effective_matrix(self._equation, self.order, dt), linear.law
-        pairs = joint_rows(self._equation, dt).pairs
         begin, *ends = pair_blocks(linear.gaps, pairs)
         tangent, places = self._tangent(effective, *ends)
         widest = int(np.diff(linear.gaps[0]).max(initial=0))

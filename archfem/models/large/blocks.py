@@ -1,8 +1,8 @@
 """Corotational coordinates of blocks, and displacements of points in these coordinates.
 
-The coordinates of a block are the displacement of its centroid, its rotation, and its elastic modes
-in the frame that rotates with it. The modes neither move the centroid nor rotate the block on the
-mean.
+The coordinates of a block are the displacement of its centroid, its rotation, and its elastic
+motions in the frame that rotates with it. These neither move the centroid nor rotate the block on
+the mean.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import eigh
+from scipy.linalg import qr
 
 from archfem._typing import Array
 from archfem.errors import InvalidInput
@@ -71,7 +71,7 @@ def _find_fill(small: LinearBlockModel) -> list[int]:
 
 
 def _corotational_basis(small: LinearBlockModel, columns: Any, number: int) -> tuple[Array, Array]:
-    """Return rigid motions and modes of a block in the model's coordinates, and its centre."""
+    """Return rigid and elastic motions of a block in the model's coordinates, and its centre."""
     mass = small.mass[columns][:, columns].toarray()
     cells = small.cells
     nodes = np.flatnonzero(cells.block == number)
@@ -90,9 +90,30 @@ def _corotational_basis(small: LinearBlockModel, columns: Any, number: int) -> t
     rigid = rigid_motions(centre)
     if len(columns) == 3:
         return rigid, centre
-    # the first three modes are the rigid motions
-    modes = eigh(small.block_stiffness[columns][:, columns].toarray(), mass)[1]
-    return np.column_stack([rigid, modes[:, 3:]]), centre
+    return np.column_stack([rigid, _mean_axis_motions(small, columns, rigid.T @ mass)]), centre
+
+
+def _mean_axis_motions(small: LinearBlockModel, columns: Any, momentum: Array) -> Array:
+    """Return a sparse basis of a block's motions without momentum, from its momenta (3, s).
+
+    Each motion displaces one coordinate, and three that are common to all motions. A face then sees
+    few motions unless it has one of the three. These are therefore at the corners of one face: the
+    first, so that of two stacked blocks one sees few motions at their joint.
+    """
+    operator = small.operator
+    touched = (abs(operator.opening) + abs(operator.slip))[:, columns]
+    joint = operator.points.joint
+    first = touched[joint == joint[touched.getnnz(axis=1) > 0][0]]
+    # pivots by weight: corners touch half as many points; other faces only where one has too few
+    weights = np.where(first.getnnz(axis=0) > 0, 1.0, 1e-3)
+    weights /= np.maximum(touched.getnnz(axis=0), 1) ** 2
+    scaled = momentum / np.linalg.norm(momentum, axis=1)[:, None] * weights
+    order = qr(scaled, mode="r", pivoting=True)[1]
+    common, own = np.sort(order[:3]), np.sort(order[3:])
+    basis = np.zeros((len(columns), len(own)))
+    basis[own, np.arange(len(own))] = 1.0
+    basis[common] = -np.linalg.solve(momentum[:, common], momentum[:, own])
+    return basis
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +205,7 @@ class RotatingPoint:
 
     first: int  # first coordinate of the block
     arm: Array  # from the centroid of the block (2,) [m]
-    shapes: Array  # displacements by the modes (2, s)
+    shapes: Array  # displacements by the elastic motions (2, s)
 
     def _local(self, q: Array) -> tuple[Array, Array, Array]:
         """Return the place in the block's frame, the rotation matrix, and its derivative."""
@@ -208,10 +229,10 @@ class RotatingPoint:
     def force_rate(self, q: Array, force: Array, size: int) -> sparse.csr_matrix:
         """Return the derivative of the generalised forces of a force on the point (n, n)."""
         place, rotation, rate = self._local(q)
-        turn, modes = self.first + 2, self.first + 3 + np.arange(self.shapes.shape[1])
+        turn, elastic = self.first + 2, self.first + 3 + np.arange(self.shapes.shape[1])
         matrix = sparse.lil_matrix((size, size))
         matrix[turn, turn] = -force @ (rotation @ place)
-        matrix[turn, modes] = matrix[modes, turn] = force @ (rate @ self.shapes)
+        matrix[turn, elastic] = matrix[elastic, turn] = force @ (rate @ self.shapes)
         return matrix.tocsr()
 
 

@@ -208,7 +208,9 @@ def _face_coordinates(
                 continue
             span, has_frame[segment, side] = blocks[block]
             of_block = np.sort(touched[(touched >= span.start) & (touched < span.stop)])
-            columns[segment, side] = np.array(span) if has_frame[segment, side] else of_block
+            if has_frame[segment, side]:  # the frame moves every face
+                of_block = np.concatenate([span[:3], of_block[of_block >= span.start + 3]])
+            columns[segment, side] = of_block
     return columns, has_frame
 
 

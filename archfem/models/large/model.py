@@ -1,9 +1,9 @@
 """Models of large displacements: blocks that rotate and slide as far as they like.
 
 A model of small displacements is written in corotational coordinates of its blocks: displacement
-of the centroid, rotation, and elastic modes in the frame that rotates with the block. The modes
+of the centroid, rotation, and elastic motions in the frame that rotates with the block. These
 neither move the centroid nor rotate the block on the mean (mean axes), so the mass matrix is
-constant and diagonal. Inertia forces on the modes due to the spin of the block are neglected.
+constant. Inertia forces on them due to the spin of the block are neglected.
 """
 
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from archfem._typing import Array
 from archfem.joints.large.face_kinematics import face_pose
@@ -259,9 +260,10 @@ class LargeDisplacementModel(Model):
         cells = self.small.cells
         nodes = np.flatnonzero(cells.block == block)
         rows = (2 * nodes[:, None] + np.arange(2)).ravel()
-        shapes = cells.shape_functions[rows][:, own].toarray()
+        shapes = cells.shape_functions[rows][:, own]
         motion = rigid_motion_matrix(cells.places[nodes], self.centres[block]).reshape(-1, 3)
-        rigid = np.linalg.lstsq(shapes, motion, rcond=None)[0]
+        # sparse normal equations: a fill has thousands of coordinates, of unit shapes
+        rigid = splu((shapes.T @ shapes).tocsc()).solve(shapes.T @ motion)
         mass = rigid.T @ self.mass[own, own]
         return np.linalg.solve(mass @ rigid, mass)
 
