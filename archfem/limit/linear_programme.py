@@ -285,18 +285,15 @@ class ReducedProgramme:
         links, pivots = _find_chains(programme.blocks.structure, columns)
         self._kept = ~np.isin(np.arange(len(load)) // 3, links)
         self._pivot = np.isin(np.arange(3 * joint_count) % joint_count, pivots)
-        generators, largest = _cone_generators(programme, ~self._pivot[:joint_count])
-        free = np.concatenate([np.zeros(generators.shape[1] - len(largest)), largest])
-        self._bounds = np.stack(
-            [
-                np.concatenate([-free, np.zeros(columns.shape[1])]),
-                np.concatenate([np.where(free > 0.0, free, np.inf), programme.upper_bounds]),
-            ],
-            axis=1,
-        )
-        loads = sparse.hstack([sparse.csr_matrix((len(load), generators.shape[1])), columns], "csr")
-        self.map = sparse.hstack(
-            [generators, sparse.csr_matrix((3 * joint_count, columns.shape[1]))], "csr"
+        extra = columns.shape[1]
+        self.map, largest = _cone_generators(programme, ~self._pivot[:joint_count], extra)
+        count = self.map.shape[1] - extra
+        free = np.concatenate([np.zeros(count - len(largest)), largest])
+        lower = np.concatenate([-free, np.zeros(extra)])
+        upper = np.concatenate([np.where(free > 0.0, free, np.inf), programme.upper_bounds])
+        self._bounds = np.stack([lower, upper], axis=1)
+        loads = sparse.csr_matrix(
+            (columns.data, columns.indices + count, columns.indptr), (len(load), count + extra)
         )
         self.constant = np.zeros(3 * joint_count)
         if len(links):
@@ -304,13 +301,14 @@ class ReducedProgramme:
         self.force_cost = np.zeros(3 * joint_count)
         if programme.force_cost is not None:
             self.force_cost += programme.force_cost
-        no_cost = np.zeros(generators.shape[1])
-        own_cost = np.concatenate([no_cost, programme.unknown_cost])
-        self._cost = self.map.T @ self.force_cost + own_cost
+        self._cost = self.map.T @ self.force_cost
+        self._cost[count:] += programme.unknown_cost
         self._balance = balance[self._kept]
         self._equations = self._balance @ self.map + loads[self._kept]
         self._load = load[self._kept] - self._balance @ self.constant
-        self._limits = _pivot_limits(programme, pivots).joined(limits)
+        self._limits = _pivot_limits(programme, pivots)
+        if len(limits.bounds):
+            self._limits = self._limits.joined(limits)
 
     def _eliminate(self, own: sparse.csr_matrix, loads: sparse.csr_matrix, load: Array) -> None:
         """Solve the balance of the links of chains for the forces of their pivots."""
@@ -318,10 +316,10 @@ class ReducedProgramme:
         passed_on = (own @ self.map + loads).tocsc()
         # only forces at the end of a chain and loads act on its links
         acting = np.flatnonzero(np.diff(passed_on.indptr))
-        solved = sparse.csc_matrix(self._factors.solve(-passed_on[:, acting].toarray()))
-        place = sparse.identity(len(self.constant), format="csc")[:, self._pivot]
-        choice = sparse.identity(self.map.shape[1], format="csr")[acting]
-        self.map = (self.map + place @ solved @ choice).tocsr()
+        solved = self._factors.solve(-passed_on[:, acting].toarray())
+        row, column = np.nonzero(solved)
+        place = np.flatnonzero(self._pivot)[row], acting[column]
+        self.map = self.map + sparse.csr_matrix((solved[row, column], place), self.map.shape)
         self.constant[self._pivot] = self._factors.solve(load)
 
     def solve(self, large: int = 600) -> OptimizeResult:
@@ -370,44 +368,60 @@ def _find_chains(
     """Return the free blocks that link two joints, and a joint of each for a pivot (n,)."""
     place = np.full(len(structure.blocks), -1)
     place[list(structure.free)] = np.arange(len(structure.free))
-    block = place[structure.pairs]
-    joint = np.repeat(np.arange(len(block)), 2)[block.ravel() >= 0]
-    incidence = sparse.csr_matrix(
-        (np.ones(len(joint)), (block[block >= 0], joint)), (len(structure.free), len(block))
-    )
+    block, joint = place[structure.pairs.ravel()], np.repeat(np.arange(len(structure.pairs)), 2)
     # An unknown that acts on one block alone would enter the rows of its whole chain.
-    single = columns[:, np.diff(columns.tocsc().indptr) <= 3]
-    loaded = (abs(single).sum(axis=1).A1.reshape(-1, 3) > 0.0).any(axis=1)
-    links = np.flatnonzero((np.diff(incidence.indptr) == 2) & ~loaded)
+    single = np.bincount(columns.indices, minlength=columns.shape[1]) <= 3
+    row = np.repeat(np.arange(columns.shape[0]), np.diff(columns.indptr))
+    is_link = np.bincount(block[block >= 0], minlength=len(structure.free)) == 2
+    is_link[row[single[columns.indices]] // 3] = False
+    links, number = np.flatnonzero(is_link), np.cumsum(is_link) - 1
+    ends = (block >= 0) & is_link[block]
+    incidence = sparse.csr_matrix(
+        (np.ones(2 * len(links)), (number[block[ends]], joint[ends])),
+        (len(links), len(structure.pairs)),
+    )
     # n links in a row have n + 1 joints: any distinct ones can be solved for
-    pivots = csgraph.maximum_bipartite_matching(incidence[links], perm_type="column")
+    pivots = csgraph.maximum_bipartite_matching(incidence, perm_type="column")
     return links, np.asarray(pivots, dtype=np.intp)
 
 
 def _cone_generators(
-    programme: Programme, used: NDArray[np.bool_]
+    programme: Programme, used: NDArray[np.bool_], extra: int
 ) -> tuple[sparse.csr_matrix, Array]:
-    """Return generators of the forces of some joints (3 n_joints, m), and bounds of the last."""
-    friction, unit = programme.friction, sparse.identity(3 * len(used), format="csc")
+    """Return generators of the forces of some joints, and bounds of the last ones.
+
+    Columns (3 n_joints, m + extra) are followed by `extra` zero ones.
+    """
+    friction, count = programme.friction, len(used)
     cone = np.isfinite(friction) & (friction > 0.0)
     slides, plain = np.flatnonzero(used & cone), np.flatnonzero(used & ~cone)
-    ends = slides, slides + len(used)
-    slope = unit[:, slides + 2 * len(used)] @ sparse.diags(friction[slides])
-    cones = [unit[:, end] + sign * slope for end in ends for sign in (1.0, -1.0)]
-    cones += [unit[:, plain], unit[:, plain + len(used)]]
     largest = np.where(np.isfinite(friction), programme.cohesion, np.inf)
     alone = np.flatnonzero(used & (largest > 0.0))  # these carry shear without compression
-    return sparse.hstack([*cones, unit[:, alone + 2 * len(used)]], "csr"), largest[alone]
+    # both ends with a shear of μ, both with -μ, both without shear, shear alone
+    both, ends = np.tile(slides, 2), np.concatenate([slides, slides + count])
+    rows = np.concatenate([ends, ends, plain, plain + count, alone + 2 * count])
+    columns = np.arange(len(rows) + extra)
+    shear, slope = np.tile(both + 2 * count, 2), np.repeat([1.0, -1.0], len(both))
+    entries = np.concatenate([np.ones(len(rows)), slope * np.tile(friction[both], 2)])
+    place = (
+        np.concatenate([rows, shear]),
+        np.concatenate([columns[: len(rows)], columns[: len(shear)]]),
+    )
+    return sparse.csr_matrix((entries, place), (3 * count, len(columns))), largest[alone]
 
 
 def _pivot_limits(programme: Programme, pivots: NDArray[np.intp]) -> Limits:
     """Return the limits F_i, F_e >= 0 and |V| <= r + μ N of the pivots."""
-    friction, joint_count = programme.friction, len(programme.friction)
-    unit = sparse.identity(3 * joint_count, format="csr")
+    friction, count = programme.friction, len(programme.friction)
     slides = pivots[np.isfinite(friction[pivots])]
-    intrados, extrados, shear = (unit[slides + side * joint_count] for side in range(3))
-    resistance = sparse.diags(friction[slides]) @ (intrados + extrados)
-    compression = [-unit[pivots], -unit[pivots + joint_count]]
-    rows = sparse.vstack([*compression, shear - resistance, -shear - resistance], format="csr")
+    first = 2 * len(pivots) + np.arange(2 * len(slides)).reshape(2, -1)  # of V, of -V
+    row = [np.arange(2 * len(pivots)), *(first.ravel() for _ in range(3))]
+    column = [np.concatenate([pivots, pivots + count])]
+    column += [np.tile(slides + side * count, 2) for side in range(3)]
+    slope = -np.tile(friction[slides], 2)
+    entries = [-np.ones(2 * len(pivots)), slope, slope, np.repeat([1.0, -1.0], len(slides))]
+    shape = (2 * len(pivots) + 2 * len(slides), 3 * count)
+    place = np.concatenate(row), np.concatenate(column)
+    rows = sparse.csr_matrix((np.concatenate(entries), place), shape)
     strength = np.tile(programme.cohesion[slides], 2)
     return Limits(rows, np.concatenate([np.zeros(2 * len(pivots)), strength]))
