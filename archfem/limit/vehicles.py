@@ -94,8 +94,18 @@ def _code_vehicles() -> dict[str, Vehicle]:
             *("AASHTO LRFD, 3.6.1.2.2, least rear spacing", "read", aashto),
         ),
     ]
-    # dynamic factors by the first part of a name
-    impacts = {
+    vehicles, impacts = {}, _dynamic_factors()
+    for name, axles, gaps, live, source, grade, live_source in rows:
+        impact = impacts[name.split("-")[0]]
+        weights = tuple(1e3 * weight for weight in axles)
+        texts = source, grade, live_source
+        vehicles[name] = Vehicle(name, weights, tuple(gaps), live, *texts, *impact)
+    return vehicles
+
+
+def _dynamic_factors() -> dict[str, tuple[float, str]]:
+    """Return dynamic factors of codes and their sources, by the first part of a vehicle's name."""
+    return {
         "LM1": (1.0, "EN 1991-2:2003, 4.2.1: in the weights; from memory"),
         "LM2": (1.0, "EN 1991-2:2003, 4.2.1: in the weights; from memory"),
         "LM71": (
@@ -106,13 +116,6 @@ def _code_vehicles() -> dict[str, Vehicle]:
         "CS454": (1.8, "BD 21/01, here on all axles; from memory"),
         "HL93": (1.33, "AASHTO LRFD, 3.6.2, not reduced by depth of fill; from memory"),
     }
-    vehicles = {}
-    for name, axles, gaps, live, source, grade, live_source in rows:
-        impact = impacts[name.split("-")[0]]
-        weights = tuple(1e3 * weight for weight in axles)
-        texts = source, grade, live_source
-        vehicles[name] = Vehicle(name, weights, tuple(gaps), live, *texts, *impact)
-    return vehicles
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -134,8 +137,11 @@ class MovingLoad(ResultDisplay):
     position: float
 
     def _summary(self) -> str:
-        """Describe the worst place and its collapse in one line."""
-        return f"MovingLoad: {self}"
+        """Describe the least factor and its place in one line."""
+        return (
+            f"MovingLoad: least factor {self.worst.factor:.4g}, at x = {self.position:.3g} m "
+            f"driving {self.direction}"
+        )
 
     def __str__(self) -> str:
         """Describe the worst place and its collapse in one line."""

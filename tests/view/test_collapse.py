@@ -135,7 +135,7 @@ def test_a_moving_load_shows_factors_over_its_middle_and_the_mechanism(ring):
     assert worst.get_ydata() == pytest.approx([found.worst.factor])
     assert f"least factor {found.worst.factor:.3g}" in upper.get_title()
     assert found.plot().axes[0].get_title() == upper.get_title()
-    assert repr(found).startswith("MovingLoad: worst at x = ")
+    assert repr(found).startswith(f"MovingLoad: least factor {found.worst.factor:.4g}, ")
 
 
 def test_thrust_lines_of_parts_that_share_no_block_are_not_joined(ring):
