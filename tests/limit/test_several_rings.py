@@ -1,5 +1,7 @@
 """Arches and walls of several leaves that slide on each other, by the joints between them."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -41,7 +43,7 @@ def arch_of_rings(rings, friction, stones=12, radius=3.0, thickness=0.6, embrace
         blocks.append(af.Block(outline, af.STONE, f"support, {k}", fixed=True))
     for ring in range(rings):
         below, above = levels[ring : ring + 2]
-        for k, (left, right) in enumerate(zip(angles[:-1], angles[1:], strict=True)):
+        for k, (left, right) in enumerate(pairwise(angles)):
             outline = [(below, left), (below, right), (above, right), (above, left)]
             name = f"ring {ring}, stone {k}"
             blocks.append(af.Block(tuple(point(*each) for each in outline), af.STONE, name))
@@ -49,9 +51,9 @@ def arch_of_rings(rings, friction, stones=12, radius=3.0, thickness=0.6, embrace
 
 
 @pytest.mark.parametrize("leaves", [1, 2, 3])
-def test_leaves_without_friction_topple_one_by_one(leaves, breadth=0.9, height=2.7):
+def test_leaves_without_friction_topple_one_by_one(leaves):
     """Each turns about its own toe at b / (n h), whatever presses it from behind."""
-    width = breadth / leaves
+    width, height = 0.9 / leaves, 2.7
     blocks = [
         af.Block(((-1.0, -0.5), (2.0, -0.5), (2.0, 0.0), (-1.0, 0.0)), af.STONE, "support", True)
     ]
