@@ -22,6 +22,7 @@ LATE_BOUND_METHODS: Mapping[str, str] = {
     "KinematicAssessment.plot": "view.collapse:draw_kinematic_assessment",
     "Modes.plot": "view.statics:draw_modes",
     "Motion.plot": "view.motions:draw_motion",
+    "MovingLoad.plot": "view.collapse:draw_moving_load",
     "Pushover.plot": "view.statics:draw_pushover",
     "Rating.plot": "view.collapse:draw_rating",
     "Structure.plot": "view.structure:draw_structure",

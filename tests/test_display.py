@@ -27,12 +27,13 @@ def things():
         af.modes(model, 2),
         motion,
         af.kinematic_assessment(stones, af.Eurocode8(ag=0.2, ground="B")),
+        af.moving_load(stones, 1e3),
         af.rate(stones, "LM1"),
         af.verdict_range(stones, motion, samples=2, vary={"joint_rule": "exact"}),
     ]
 
 
-def test_there_are_ten_kinds(things):
+def test_there_are_eleven_kinds(things):
     assert {type(each) for each in things} == set(ResultDisplay.__subclasses__())
 
 

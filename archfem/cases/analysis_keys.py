@@ -1,4 +1,4 @@
-"""Sections [analysis], [limit] and [assessment]: time stepping, limit analysis, assessment."""
+"""Sections [analysis], [limit], [rating] and [assessment]: time stepping, capacity, assessment."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,6 +22,7 @@ from archfem.dynamics.schemes import (
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import Fill
 from archfem.limit.collapse import Collapse, collapse_factor
+from archfem.limit.vehicles import Rating, Vehicle, rate
 from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad
 from archfem.masonry.structure import Structure
 from archfem.motion.design_spectra import DesignSpectrum
@@ -44,6 +45,8 @@ ASSESSMENT_KEYS = {
     **{"spectrum": dict, "direction": "1", "friction": str, "part": str, "blocks": [(int, str)]},
     **{"loads": [dict], "limit_state": (str, dict), "q": "1", "confidence_factor": "1"},
 }
+RATING_KEYS = {"vehicle": (str, dict), "live": "1", "impact": "1", "dead": "1", "width": "m"}
+VEHICLE_KEYS = {"name": str, "axles": ["N"], "spacings": ["m"]}
 ATTACHED_LOAD_KEYS = {"block": (int, str), "point": ["m"], "weight": "N", "force": ["N"]}
 LIMIT_STATE_KEYS = {
     **{"name": str, "share": "1", "period_factor": "1", "secant_share": "1", "damping": "1"},
@@ -118,7 +121,8 @@ class LimitAnalysis:
     """Limit analysis of a case: the live load, the friction law and the strength of a fill.
 
     Attributes:
-        live: loads that grow together; the collapse factor multiplies them.
+        live: loads that grow together; the collapse factor multiplies them. Without any, friction
+            and fill are those of a rating.
         friction: friction law, "coulomb", "nonassociated", or None without sliding.
         fill: strength of the fill, or None.
     """
@@ -137,9 +141,14 @@ class LimitAnalysis:
             Result of `archfem.collapse_factor`.
 
         Raises:
-            InvalidInput: a load misses the structure, or blocks are too soft to be rigid and the
-                case gives no strength of a fill.
+            InvalidInput: there is no load, a load misses the structure, or blocks are too soft to
+                be rigid and the case gives no strength of a fill.
         """
+        if not self.live:
+            raise InvalidInput(
+                "limit has no load: give horizontal = 1.0, a multiple of each block's weight, or "
+                'point = { x = "1.4 m", force = ["0 kN", "-1 kN"] }'
+            )
         return collapse_factor(structure, live=self.live, friction=self.friction, fill=self.fill)
 
 
@@ -151,11 +160,6 @@ def parse_limit(table: Any) -> LimitAnalysis:
         live.append(BodyForce(values.get("horizontal", 0.0), values.get("vertical", 0.0)))
     if "point" in values:
         live.append(_point_load(values["point"]))
-    if not live:
-        raise InvalidInput(
-            "limit has no load: give horizontal = 1.0, a multiple of each block's weight, or "
-            'point = { x = "1.4 m", force = ["0 kN", "-1 kN"] }'
-        )
     laws = ("coulomb", "nonassociated", "none")
     friction = check_choice(values.get("friction", "coulomb"), laws, "limit.friction")
     fill = _fill(values["fill"]) if "fill" in values else None
@@ -182,6 +186,41 @@ def _point_load(table: Any) -> PointLoad:
             '{ x = "1.4 m", force = ["0 kN", "-1 kN"] }'
         )
     return PointLoad(point["x"], point["force"])
+
+
+def parse_rating(table: Any) -> Table:
+    """Return the rating of a case: the arguments of `rate` that it gives."""
+    options = check_table(table, RATING_KEYS, "rating")
+    if isinstance(vehicle := options.get("vehicle"), dict):
+        options["vehicle"] = _build("rating.vehicle", Vehicle, vehicle, VEHICLE_KEYS)
+    return options
+
+
+def rate_case(
+    structure: Structure, rating: Table, limit: LimitAnalysis | None, given: Table
+) -> Rating:
+    """Rate the bridge of a case, by the joints and the fill of its [limit].
+
+    Args:
+        structure: structure of the case.
+        rating: arguments of `rate` that the case gives.
+        limit: limit analysis of the case, or None.
+        given: arguments that replace those of the case.
+
+    Returns:
+        Result of `archfem.rate`.
+
+    Raises:
+        InvalidInput: no vehicle is given, or as for `archfem.rate`.
+    """
+    options = {**rating, **given}
+    if "vehicle" not in options:
+        raise InvalidInput(
+            'a rating needs a vehicle: write [rating] with vehicle = "LM1", or give --vehicle LM1'
+        )
+    if limit is not None:
+        options |= {"friction": limit.friction, "fill": limit.fill}
+    return rate(structure, options.pop("vehicle"), **options)
 
 
 @dataclass(frozen=True)
@@ -250,17 +289,19 @@ def parse_assessment(table: Any) -> AssessmentSettings:
         law = check_choice(options["friction"], laws, "assessment.friction")
         options["friction"] = None if law == "none" else law
     if isinstance(state := options.get("limit_state"), dict):
-        options["limit_state"] = _build("limit_state", LimitState, state, LIMIT_STATE_KEYS)
+        options["limit_state"] = _build(
+            "assessment.limit_state", LimitState, state, LIMIT_STATE_KEYS
+        )
     if "loads" in options:
         options["loads"] = [
-            _build("loads", AttachedLoad, load, ATTACHED_LOAD_KEYS) for load in options["loads"]
+            _build("assessment.loads", AttachedLoad, load, ATTACHED_LOAD_KEYS)
+            for load in options["loads"]
         ]
     return AssessmentSettings(spectrum, directions, options)
 
 
-def _build(key: str, kind: Callable[..., Any], table: Table, keys: Table) -> Any:
+def _build(section: str, kind: Callable[..., Any], table: Table, keys: Table) -> Any:
     """Return an object made of the keys of a table."""
-    section = f"assessment.{key}"
     try:
         return kind(**check_table(table, keys, section))
     except TypeError as error:

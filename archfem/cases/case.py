@@ -21,6 +21,7 @@ from archfem.cases.analysis_keys import (
     parse_assessment,
     parse_damping,
     parse_limit,
+    parse_rating,
     parse_scheme,
 )
 from archfem.cases.motion_keys import (
@@ -58,7 +59,7 @@ OUTPUT_KEYS = {
 }
 TABLE_SECTIONS = (
     *("structure", "materials", "contacts", "model", "motion", "suite", "analysis"),
-    *("criteria", "limit", "assessment", "dead_load", "output"),
+    *("criteria", "limit", "rating", "assessment", "dead_load", "output"),
 )
 
 
@@ -76,6 +77,7 @@ class Case:
         analysis: checked keys of [analysis]: time step, scheme, damping, when to stop.
         criteria: criteria of joint failure, and the number of failed joints of a mechanism.
         limit: limit analysis, or None.
+        rating: arguments of `archfem.rate` from [rating].
         assessment: kinematic assessment; without [assessment] that of the case's motion or suite.
         output: checked keys of [output]: records, pictures and films.
         settings: tables of the case as they were read, changes included.
@@ -90,6 +92,7 @@ class Case:
     analysis: dict[str, Any]
     criteria: Criteria
     limit: LimitAnalysis | None
+    rating: Table
     assessment: AssessmentSettings
     output: dict[str, Any]
     settings: dict[str, Any] = field(repr=False)
@@ -162,6 +165,7 @@ class Case:
                 **check_table(settings.get("criteria", {}), CRITERIA_KEYS, "criteria")
             ),
             limit=None if limit is None else parse_limit(limit),
+            rating=parse_rating(settings.get("rating", {})),
             assessment=parse_assessment(settings.get("assessment", {})),
             output=check_table(settings.get("output", {}), OUTPUT_KEYS, "output"),
             settings=dict(settings),

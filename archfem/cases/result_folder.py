@@ -254,9 +254,14 @@ def _read_case(place: Path, inputs: Path | None) -> Case:
 
 
 def write_limit(case: Case, collapse: Collapse, text: str, folder: Path) -> list[Path]:
-    """Write the result of limit analysis, and draw the mechanism over the structure."""
-    figure = draw_collapse(case.structure, collapse)
-    return [_write_text(text, folder / "limit.txt"), save(figure, folder / "collapse.png")]
+    """Write limit analysis and the joints at collapse, and draw the mechanism."""
+    columns = ["name", "N", "V", "M", "eccentricity"]
+    joints = collapse.joints.to_dataframe()[columns]
+    return [
+        _write_text(text, folder / "limit.txt"),
+        _write_text(joints.to_csv(index=False).rstrip(), folder / "limit.csv"),
+        save(draw_collapse(case.structure, collapse), folder / "collapse.png"),
+    ]
 
 
 def write_assessments(

@@ -203,8 +203,8 @@ def run_case(
         run_motion: function that integrates one motion; by default `run_time_history`.
 
     Yields:
-        A `Collapse` if the case has [limit]; the `DeadLoadResult`; the `Suite` if there is one; and
-        a `Run` for each motion.
+        A `Collapse` if the case has [limit] with a load; the `DeadLoadResult`; the `Suite` if there
+        is one; and a `Run` for each motion.
 
     Raises:
         InvalidInput: a motion cannot be read, or limit analysis is not possible.
@@ -216,7 +216,7 @@ def run_case(
     # Unreadable records are errors before the dead load is computed.
     selected = case if pairs is None else case.alone(*pairs)
     selected.check_ground()
-    if case.limit is not None:
+    if case.limit is not None and case.limit.live:
         yield case.limit.solve(case.structure)
     at_rest = DeadLoadResult.of(case)
     yield at_rest

@@ -1,4 +1,4 @@
-"""Commands on cases: run, check, modes, assess, rate, mesh, accuracy, report; motion, compile."""
+"""Commands on cases: run, check, modes, limit, assess, rate, mesh, accuracy, report; others."""
 
 import argparse
 import io
@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from archfem._files import DRAFT_PREFIX, create_result_folder, replace_results
+from archfem.cases.analysis_keys import rate_case
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs
 from archfem.cases.result_text import (
@@ -90,7 +91,7 @@ def check(options: argparse.Namespace) -> int:
     """Read a case and its motions, and compute limit analysis and dead load."""
     case = Case.read(options.case, options.changes)
     print(case.title)
-    if case.limit is not None:
+    if case.limit is not None and case.limit.live:
         print(describe_collapse(case.structure, case.limit.solve(case.structure)))
     # Unreadable records are errors before the dead load is computed.
     case.check_ground()
@@ -120,6 +121,21 @@ def modes(options: argparse.Namespace) -> None:
         print_written([film_modes(computed, draft / "modes.gif", first)])
 
 
+def limit(options: argparse.Namespace) -> None:
+    """Find the collapse factor of the loads in [limit], and the mechanism."""
+    case = Case.read(options.case, options.changes)
+    if case.limit is None:
+        raise InvalidInput(f"{options.case} has no [limit]: give horizontal = 1.0, or a point load")
+    found = case.limit.solve(case.structure)
+    text = describe_collapse(case.structure, found)
+    print(f"{case.title}\n{text}")
+    if options.out is not None:
+        from archfem.cases.result_folder import write_limit
+
+        with _replace_results("limit", case, create_result_folder(options.out)) as draft:
+            print_written(write_limit(case, found, text, draft))
+
+
 def assess(options: argparse.Namespace) -> None:
     """Assess the collapse mechanisms of a case against a design spectrum, in both directions."""
     case = Case.read(options.case, options.changes)
@@ -137,18 +153,10 @@ def assess(options: argparse.Namespace) -> None:
 
 def rate(options: argparse.Namespace) -> None:
     """Rate the bridge of a case for a vehicle, by the joints and the fill of its [limit]."""
-    from archfem.limit.vehicles import rate as rate_bridge
-
     case = Case.read(options.case, options.changes)
-    found = rate_bridge(
-        case.structure,
-        options.vehicle,
-        live=options.live,
-        dead=options.dead,
-        width=options.width,
-        friction="coulomb" if case.limit is None else case.limit.friction,
-        fill=None if case.limit is None else case.limit.fill,
-    )
+    keys = ("vehicle", "live", "impact", "dead", "width")
+    given = {key: value for key in keys if (value := getattr(options, key)) is not None}
+    found = rate_case(case.structure, case.rating, case.limit, given)
     print(f"{case.title}\n{found}")
     if options.out is not None:
         from archfem.cases.result_folder import write_rating

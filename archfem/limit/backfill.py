@@ -25,8 +25,6 @@ from archfem.limit.linear_programme import (
     Optimum,
     Programme,
     RigidBlocks,
-    friction_limits,
-    no_limits,
     rigid_load,
 )
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
@@ -567,14 +565,12 @@ def self_weight_programme(
     stones = attach_fill(structure, fill)
     rigid = stones.rigid_regions.structure
     blocks = RigidBlocks(rigid)
-    limits = no_limits(len(rigid.joints))
-    if friction is not None:
-        limits = friction_limits(rigid.friction, blocks.cohesion)
+    coefficient = rigid.friction if friction is not None else np.full(len(rigid.joints), np.inf)
     crushing = None
     if strength is not None:
         crushing = strength * rigid.width * rigid.depths / blocks.force_unit
     weight = blocks.dimensionless(stones.load([SELF_WEIGHT]) + stones.active_forces())
-    dead = Programme(blocks, weight, limits, crushing)
+    dead = Programme(blocks, weight, coefficient, blocks.cohesion, crushing=crushing)
     if fill is None:
         return stones, dead
     # further unknowns, 0 to 1: the position of each contact's pressure in its range

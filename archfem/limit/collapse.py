@@ -409,10 +409,10 @@ def warn_cohesion(
     """Warn of failing joints whose shear exceeds the strength of their closed part."""
     normal, shear, moment = (joints[key].values for key in "NVM")
     strength = structure.cohesion * contact_fractions(structure, normal, moment)
-    slides = np.isfinite(structure.friction)
-    strength[slides] += structure.friction[slides] * normal[slides]
+    holds = np.isfinite(structure.friction) & (structure.cohesion > 0.0)
+    strength[holds] += structure.friction[holds] * normal[holds]
     limit = (1.0 + tolerance) * strength + tolerance * structure.cohesion
-    beyond = slides & (np.abs(shear) > limit)
+    beyond = holds & (np.abs(shear) > limit)
     overstrained = [number for number in sorted(failing) if beyond[number]]
     if overstrained:
         logger.warning(

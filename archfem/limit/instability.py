@@ -11,7 +11,7 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem.limit.backfill import is_balanced, self_weight_programme
-from archfem.limit.linear_programme import Programme, RigidBlocks, friction_limits
+from archfem.limit.linear_programme import Programme, RigidBlocks
 from archfem.masonry.structure import Structure, join_joint_names
 
 # Depth of joints, as a multiple of that given, and friction from which more does not help [-]
@@ -88,8 +88,7 @@ def _stands(dead: Programme, friction: float | None = None, depth: float = 1.0) 
     coefficient: Array = blocks.structure.friction
     if friction is not None:
         coefficient = np.maximum(coefficient, friction)
-    limits = friction_limits(coefficient, blocks.cohesion)
-    relaxed = replace(dead, blocks=DeepenedBlocks(blocks.structure, depth), limits=limits)
+    relaxed = replace(dead, blocks=DeepenedBlocks(blocks.structure, depth), friction=coefficient)
     return is_balanced(relaxed.minimise_residual(), relaxed)
 
 

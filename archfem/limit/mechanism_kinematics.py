@@ -67,12 +67,14 @@ def take_all_rigid(structure: Structure) -> RigidRegions:
 
 def _select_blocks(structure: Structure, blocks: tuple[int, ...]) -> RigidRegions:
     """Return some of the blocks, with their joints except those between supports."""
-    place = {number: k for k, number in enumerate(blocks)}
+    place, free = {number: k for k, number in enumerate(blocks)}, set(structure.free)
     joints = tuple(
         number
         for number, joint in enumerate(structure.joints)
-        if place.keys() >= set(joint.blocks) and set(joint.blocks) & set(structure.free)
+        if place.keys() >= set(joint.blocks) and free & set(joint.blocks)
     )
+    if len(blocks) == len(structure.blocks) and len(joints) == len(structure.joints):
+        return RigidRegions(structure, blocks, joints, len(blocks))
     selected = replace(
         structure,
         blocks=tuple(structure.blocks[number] for number in blocks),

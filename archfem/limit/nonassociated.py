@@ -10,7 +10,7 @@ the mechanism that is dual to φ, and t(y) its slips, the gap
 is zero for such a pair. It is linear in the forces x for a given mechanism, and in the mechanism
 for given forces: a bilinear programme over two separate polyhedra (Konno 1976). Alternation
 minimises it in one and then in the other, until it vanishes or stops falling. There the slips are
-scaled at random and the alternation continues. To descend from a solution, the objective is
+changed at random and the alternation continues. To descend from a solution, the objective is
 limited to values a little worse than its own. The gap is always that of the whole programme, so
 that any pair with a vanishing gap is a solution.
 
@@ -26,7 +26,7 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
-from archfem.limit.linear_programme import Limits, Optimum, Programme, friction_limits
+from archfem.limit.linear_programme import Limits, Optimum, Programme, no_limits
 
 # States from which the search starts besides the associated one; fewer for many joints
 MAX_START_COUNT = 40
@@ -59,7 +59,7 @@ def find_solution(
     """Find a solution without dilatancy from given forces; None if the duality gap stagnates."""
     smallest = np.inf
     for _ in range(max_alternations):  # most end within three
-        iterate = _alternate(programme, programme, forces, 1.0)
+        iterate = _alternate(programme, programme, forces)
         if iterate is None or iterate.converged:
             return iterate
         if iterate.gap > (1.0 - GAP_TOLERANCE) * smallest:
@@ -77,7 +77,7 @@ def descend(
     if first is not None:
         restricted, forces = _require_weaker(programme, first.state.value), first.state.forces
     while fruitless < patience:
-        factor = rng.lognormal(size=len(forces) // 3) if perturb else 1.0
+        factor = rng.lognormal(size=len(forces) // 3) if perturb else None
         iterate = _alternate(programme, restricted, forces, factor)
         if iterate is None:
             return
@@ -90,16 +90,18 @@ def descend(
 
 
 def _alternate(
-    programme: Programme, restricted: Programme, forces: Array, factor: Array | float
+    programme: Programme, restricted: Programme, forces: Array, factor: Array | None = None
 ) -> AlternatingIterate | None:
-    """Find the mechanism dual to forces, then the forces of least gap for its scaled slips."""
+    """Find the mechanism dual to forces, then the forces of least gap for its slips."""
     resistance = shear_resistance(programme, normal_forces(forces)) + RESISTANCE_MARGIN
     try:
-        mechanism = replace(programme, limits=shear_limits(programme, resistance)).solve()
+        mechanism = with_shear_limits(programme, resistance).solve()
         if mechanism is None:
             return None
         slips = np.abs(mechanism_gaps(programme, mechanism.multipliers).reshape(3, -1)[2])
-        state = _minimise_gap(restricted, factor * slips)
+        # Random slips lead away from where the search stands, some of them in joints that stick.
+        changed = slips if factor is None else factor * (slips + 0.1 * slips.max())
+        state = _minimise_gap(restricted, changed)
     except DidNotConverge:  # round-off left no state
         return None
     if state is None:
@@ -131,24 +133,24 @@ def _require_weaker(programme: Programme, value: float) -> Programme:
         upper_bounds = np.concatenate([[max(-least, 0.0)], programme.upper_bounds[1:]])
         return replace(programme, upper_bounds=upper_bounds)
     row = Limits(sparse.csr_matrix(-programme.force_cost[None, :]), np.array([-least]))
-    return replace(programme, limits=programme.limits.joined(row))
+    limits = programme.limits or no_limits(len(programme.friction))
+    return replace(programme, limits=limits.joined(row))
 
 
 def friction_coefficients(programme: Programme) -> Array:
     """Return Coulomb's μ, zero in joints that never slide and dissipate nothing (n_joints,)."""
-    coefficient = programme.blocks.structure.friction
-    return np.where(np.isfinite(coefficient), coefficient, 0.0)
+    return np.where(np.isfinite(programme.friction), programme.friction, 0.0)
 
 
 def shear_resistance(programme: Programme, normal: Array) -> Array:
     """Return the shear c A + μ N at which joints slide (n_joints,) [mean block weights]."""
-    return programme.blocks.cohesion + friction_coefficients(programme) * normal
+    return programme.cohesion + friction_coefficients(programme) * normal
 
 
-def shear_limits(programme: Programme, resistance: Array) -> Limits:
-    """Return limits |V| <= R independent of N, none for joints that never slide."""
-    slides = np.isfinite(programme.blocks.structure.friction)
-    return friction_limits(np.where(slides, 0.0, np.inf), resistance)
+def with_shear_limits(programme: Programme, resistance: Array) -> Programme:
+    """Return the programme with limits |V| <= R independent of N; joints that never slide stay."""
+    friction = np.where(np.isfinite(programme.friction), 0.0, np.inf)
+    return replace(programme, friction=friction, cohesion=resistance)
 
 
 def mechanism_gaps(programme: Programme, multipliers: Array) -> Array:
@@ -318,9 +320,8 @@ def _bound_objective(programme: Programme, smallest: Array) -> float:
     highest = -_least_objective(
         replace(programme, force_cost=negated, unknown_cost=-programme.unknown_cost)
     )
-    limits = shear_limits(programme, shear_resistance(programme, least))
     try:
-        safe = replace(programme, limits=limits).solve()
+        safe = with_shear_limits(programme, shear_resistance(programme, least)).solve()
     except DidNotConverge:  # no equilibrium with so little friction
         return highest
     return -np.inf if safe is None else min(highest, safe.value)
@@ -346,7 +347,7 @@ def _with_residuals(
         residual = residual + programme.columns @ state.unknowns
     gaps = mechanism_gaps(programme, state.multipliers)
     carries = state.forces[: 2 * len(normal)] > GAP_TOLERANCE * max(float(normal.max()), 1.0)
-    slides = np.isfinite(programme.blocks.structure.friction)
+    slides = np.isfinite(programme.friction)
     excess = np.max((shear - shear_resistance(programme, normal))[slides], initial=0.0)
     opening = np.max(gaps[: len(carries)][carries], initial=0.0)
     if programme.crushing is not None:  # crushed ends open under force

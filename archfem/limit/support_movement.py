@@ -34,8 +34,6 @@ from archfem.limit.linear_programme import (
     Optimum,
     Programme,
     RigidBlocks,
-    friction_limits,
-    no_limits,
     rigid_load,
 )
 from archfem.masonry.loads import Settlement
@@ -319,8 +317,9 @@ class _MovementPath:
         if further is not None:
             gaps = gaps + blocks.gaps(further)
         load = blocks.dimensionless(rigid_load(self.structure, [SELF_WEIGHT]))
-        limits = no_limits(len(self.structure.joints))
-        return Programme(blocks, load, limits, force_cost=np.concatenate([*gaps[:2], -gaps[2]]))
+        rough = np.full(len(self.structure.joints), np.inf)  # friction is checked afterwards
+        cost = np.concatenate([*gaps[:2], -gaps[2]])
+        return Programme(blocks, load, rough, np.zeros(len(rough)), force_cost=cost)
 
     def _solve(self, programme: Programme) -> Optimum:
         """Return the optimum; where there is none, raise the reason for which the movement ends."""
@@ -360,9 +359,9 @@ class _MovementPath:
         """End the movement by sliding where no equilibrium satisfies the friction limits."""
         if not self.has_friction:
             return
-        limits = friction_limits(self.structure.friction, blocks.cohesion)
+        rough, friction = self._programme(blocks), self.structure.friction
         try:
-            state = replace(self._programme(blocks), limits=limits).solve()
+            state = replace(rough, friction=friction, cohesion=blocks.cohesion).solve()
         except DidNotConverge as error:
             raise _PathEnd(End.SLIDES) from error
         tolerance = 10.0 * GEOMETRY_TOLERANCE * self.structure.size

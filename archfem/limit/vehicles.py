@@ -15,10 +15,11 @@ from archfem._validation import check_number, check_numbers, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
 from archfem.limit.collapse import Collapse, collapse_factor
+from archfem.limit.instability import DeepenedBlocks
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
 from archfem.masonry.loads import PointLoad
-from archfem.masonry.structure import Joint, Structure
+from archfem.masonry.structure import Structure
 
 DRIVING_DIRECTIONS = ("right", "left")
 
@@ -39,6 +40,8 @@ class Vehicle:
         grade: "read" where weights and spacings were read in the code's table or in a text that
             quotes it, "from memory" otherwise.
         live_source: code and clause of the partial factor, and its grade.
+        impact: dynamic factor of the code on its weight [-].
+        impact_source: code and clause of the dynamic factor, and its grade.
     """
 
     name: str
@@ -48,22 +51,25 @@ class Vehicle:
     source: str = "given"
     grade: str = "given"
     live_source: str = "given"
+    impact: float = 1.0
+    impact_source: str = "given"
 
     def __post_init__(self) -> None:
         """Refuse weights, spacings and factors out of range."""
         _parse_axles(self.axles, self.spacings)
         _check_factor(self.live, f"partial factor on the live load of {self.name}")
+        _check_factor(self.impact, f"dynamic factor of {self.name}")
 
 
 def _code_vehicles() -> dict[str, Vehicle]:
     """Return vehicles of codes: axles in kN (CS 454: tonnes, by 9.81 m/s²), spacings in m."""
     tonne = 9.81
     en_1990 = "EN 1990:2002, Table A2.4(B), from memory"
-    dmrb = "BD 21/01: 1.9 by 1.8 for impact, here on all axles; from memory"
-    aashto = "AASHTO LRFD, Strength I, without the dynamic load allowance; from memory"
+    dmrb = "BD 21/01, from memory"
+    aashto = "AASHTO LRFD, Strength I, from memory"
     lane = "EN 1991-2:2003, 4.3.2: tandem of lane 1, dynamic; its 9 kN/m² is left out"
     single = "EN 1991-2:2003, 4.3.3: single axle, dynamic"
-    train = "EN 1991-2:2003, 6.3.2, as UIC 71, without dynamic factor"
+    train = "EN 1991-2:2003, 6.3.2, as UIC 71"
     table = "CS 454, Table 7.3.1a, normal traffic, no axle lift-off"
     rows: list[tuple[str, list[float], list[float], float, str, str, str]] = [
         ("LM1", [300.0] * 2, [1.2], 1.35, lane, "read", en_1990),
@@ -74,12 +80,12 @@ def _code_vehicles() -> dict[str, Vehicle]:
             *("LM71-train", [250.0] * 4 + [80.0] * 20, [1.6] * 3 + [1.3] + [1.0] * 19, 1.45),
             *(f"{train}: axles, and 80 kN/m over 20 m behind them", "from memory", en_1990),
         ),
-        ("CS454-single", [11.5 * tonne], [], 3.4, table, "read", dmrb),
-        ("CS454-double-1.0", [8.0 * tonne] * 2, [1.0], 3.4, table, "read", dmrb),
-        ("CS454-double-1.3", [9.5 * tonne] * 2, [1.3], 3.4, table, "read", dmrb),
-        ("CS454-double-1.8", [10.0 * tonne] * 2, [1.8], 3.4, table, "read", dmrb),
+        ("CS454-single", [11.5 * tonne], [], 1.9, table, "read", dmrb),
+        ("CS454-double-1.0", [8.0 * tonne] * 2, [1.0], 1.9, table, "read", dmrb),
+        ("CS454-double-1.3", [9.5 * tonne] * 2, [1.3], 1.9, table, "read", dmrb),
+        ("CS454-double-1.8", [10.0 * tonne] * 2, [1.8], 1.9, table, "read", dmrb),
         (
-            *("CS454-triple-2.6", [8.0 * tonne] * 3, [1.3] * 2, 3.4),
+            *("CS454-triple-2.6", [8.0 * tonne] * 3, [1.3] * 2, 1.9),
             *(f"{table}; 2.6 m from first to last axle, from memory", "read", dmrb),
         ),
         ("HL93-tandem", [110.0] * 2, [1.2], 1.75, "AASHTO LRFD, 3.6.1.2.3", "read", aashto),
@@ -88,14 +94,32 @@ def _code_vehicles() -> dict[str, Vehicle]:
             *("AASHTO LRFD, 3.6.1.2.2, least rear spacing", "read", aashto),
         ),
     ]
+    vehicles, impacts = {}, _dynamic_factors()
+    for name, axles, gaps, live, source, grade, live_source in rows:
+        impact = impacts[name.split("-")[0]]
+        weights = tuple(1e3 * weight for weight in axles)
+        texts = source, grade, live_source
+        vehicles[name] = Vehicle(name, weights, tuple(gaps), live, *texts, *impact)
+    return vehicles
+
+
+def _dynamic_factors() -> dict[str, tuple[float, str]]:
+    """Return dynamic factors of codes and their sources, by the first part of a vehicle's name."""
     return {
-        name: Vehicle(name, tuple(1e3 * w for w in axles), tuple(gaps), live, *texts)
-        for name, axles, gaps, live, *texts in rows
+        "LM1": (1.0, "EN 1991-2:2003, 4.2.1: in the weights; from memory"),
+        "LM2": (1.0, "EN 1991-2:2003, 4.2.1: in the weights; from memory"),
+        "LM71": (
+            1.0,
+            "none, to be given: EN 1991-2:2003, 6.4.5.2, 1.44 / (√L - 0.2) + 0.82 from 1 to 1.67, "
+            "with L in m, half the span of an arch; from memory",
+        ),
+        "CS454": (1.8, "BD 21/01, here on all axles; from memory"),
+        "HL93": (1.33, "AASHTO LRFD, 3.6.2, not reduced by depth of fill; from memory"),
     }
 
 
-@dataclass(frozen=True, eq=False)
-class MovingLoad:
+@dataclass(frozen=True, eq=False, repr=False)
+class MovingLoad(ResultDisplay):
     """Collapse factors of a vehicle that moves over a structure.
 
     Attributes:
@@ -111,6 +135,13 @@ class MovingLoad:
     worst: Collapse
     direction: str
     position: float
+
+    def _summary(self) -> str:
+        """Describe the least factor and its place in one line."""
+        return (
+            f"MovingLoad: least factor {self.worst.factor:.4g}, at x = {self.position:.3g} m "
+            f"driving {self.direction}"
+        )
 
     def __str__(self) -> str:
         """Describe the worst place and its collapse in one line."""
@@ -193,18 +224,21 @@ class Rating(ResultDisplay):
         structure: the bridge, with its characteristic weights.
         vehicle: axles, spacings and sources.
         live: partial factor on the vehicle's weight [-].
+        impact: dynamic factor on the vehicle's weight [-].
         dead: partial factor on the weights of stones and fill [-].
         width: width of the bridge over which one vehicle spreads [m].
         moving: factors at all places in both directions, on the factored vehicle over factored
             weights, and the collapse at the worst place.
         geometric: geometric factor of safety at the worst place [-]: depth of the joints over the
-            least share of it, about their middles, that carries the factored vehicle. Undefined
-            (NaN) where the bridge does not carry it, infinite where hinges alone do.
+            least share of it, about their middles, that carries the factored vehicle; below 1 where
+            only deeper joints would. Undefined (NaN) where joints of any depth do not carry it,
+            infinite where hinges alone do.
     """
 
     structure: Structure
     vehicle: Vehicle
     live: float
+    impact: float
     dead: float
     width: float
     moving: MovingLoad
@@ -248,17 +282,29 @@ class Rating(ResultDisplay):
                 f"{self._summary()}",
                 f"least factor driving {', '.join(least)}",
                 f"{self.moving}",
-                f"geometric factor of safety {self.geometric:.3g}, at that place",
+                f"geometric factor of safety at that place: {self._geometric_text()}",
                 f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN "
                 f"over {self.width:.3g} m of width; {vehicle.source} ({vehicle.grade})",
-                f"live load by {self.live:g} ({self._live_source()})",
+                f"live load by {self.live:g} ({self._source('live')})",
+                f"impact by {self.impact:g} ({self._source('impact')})",
                 f"dead load by {self.dead:g} ({self._dead_source()})",
             ]
         )
 
-    def _live_source(self) -> str:
-        """Return where the factor on the live load comes from."""
-        return self.vehicle.live_source if self.live == self.vehicle.live else "given"
+    def _source(self, factor: str) -> str:
+        """Return where a factor on the vehicle comes from."""
+        vehicle = self.vehicle
+        own = getattr(self, factor) == getattr(vehicle, factor)
+        return str(getattr(vehicle, f"{factor}_source")) if own else "given"
+
+    def _geometric_text(self) -> str:
+        """Return the geometric factor of safety, in words where it is below 1."""
+        if np.isnan(self.geometric):
+            return "none, joints of any depth do not carry the vehicle: they slide or crush"
+        text = f"{self.geometric:.3g}"
+        if self.geometric < 1.0:
+            text += f", below 1: joints are too thin by {100.0 * (1.0 - self.geometric):.2g} %"
+        return text
 
     def _dead_source(self) -> str:
         """Return where the factor on the dead load comes from."""
@@ -267,11 +313,12 @@ class Rating(ResultDisplay):
 
 
 @validate_arguments
-def rate(
+def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridge)
     structure: Structure,
     vehicle: str | Vehicle,
     *,
     live: float | None = None,
+    impact: float | None = None,
     dead: float = 1.0,
     width: float | None = None,
     friction: str | None = "coulomb",
@@ -284,13 +331,14 @@ def rate(
     of 1/100 of the bridge's length. Its axles spread through a fill along the bridge; across it
     they spread evenly over `width`. The geometric factor of safety is Heyman's: all joints are
     narrowed about their middles, at unchanged weights and with the vehicle at its worst place,
-    until it is carried no longer.
+    until it is carried no longer; or deepened until it is carried.
 
     Args:
         structure: the bridge.
         vehicle: one of `archfem.limit.VEHICLES` by its name, or one's own.
-        live: partial factor on its weight, with impact if that counts [-]; by default that of its
-            code.
+        live: partial factor on its weight [-]; by default that of its code.
+        impact: dynamic factor on its weight [-]; by default that of its code, but 1 for LM71, whose
+            factor depends on the span.
         dead: partial factor on the weights of stones and fill [-]; by default 1, as for weights
             that stabilise. Weights on one side alone are not increased.
         width: width over which one vehicle spreads [m]; by default all of the bridge's.
@@ -312,6 +360,7 @@ def rate(
     """
     driven = _find_vehicle(vehicle)
     live = driven.live if live is None else _check_factor(live, "live, factor on the vehicle")
+    impact = driven.impact if impact is None else _check_factor(impact, "impact, dynamic factor")
     _check_factor(dead, "dead, factor on the weights")
     width = structure.width if width is None else width
     if not 0.0 < width <= structure.width:
@@ -320,15 +369,13 @@ def rate(
             f"{structure.width:.4g} m: give the part over which one vehicle spreads"
         )
     # the structure is modelled over its whole width, of which a vehicle loads a part
-    axles = [live * structure.width / width * weight for weight in driven.axles]
+    axles = [live * impact * structure.width / width * weight for weight in driven.axles]
     weighted = _scale_weights(structure, dead)
     positions = _places_along(weighted, _parse_axles(axles, driven.spacings))
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
     moving = moving_load(weighted, axles, spacings=driven.spacings, positions=positions, **options)
-    geometric = np.nan
-    if moving.worst.factor >= 1.0:
-        geometric = _geometric_factor(weighted, moving, friction, strength, fill)
-    return Rating(structure, driven, live, dead, width, moving, geometric)
+    geometric = _geometric_factor(weighted, moving, friction, strength, fill)
+    return Rating(structure, driven, live, impact, dead, width, moving, geometric)
 
 
 def _find_vehicle(vehicle: str | Vehicle) -> Vehicle:
@@ -378,33 +425,36 @@ def _geometric_factor(
     strength: float | None,
     fill: Fill | None,
     tolerance: float = 1e-4,
+    deepest: float = 1e3,
 ) -> float:
     """Return the depth of joints over the least one that carries the worst row of axles [-]."""
-    axles = [load for load in moving.worst.live if isinstance(load, PointLoad)]
+    stones, dead = self_weight_programme(structure, friction, strength, fill)
+    axles = stones.load([load for load in moving.worst.live if isinstance(load, PointLoad)])
 
     def is_carried(share: float) -> bool:
-        narrow = replace(structure, joints=tuple(_narrow(j, share) for j in structure.joints))
-        stones, dead = self_weight_programme(narrow, friction, strength, fill)
-        if not is_balanced(dead.minimise_residual(), dead):
+        changed = replace(
+            dead,
+            blocks=DeepenedBlocks(dead.blocks.structure, share),
+            cohesion=share * dead.cohesion,
+            crushing=None if dead.crushing is None else share * dead.crushing,
+        )
+        if not is_balanced(changed.minimise_residual(), changed):
             return False
-        optimum = dead.with_load_factor(stones.load(axles)).solve()
+        optimum = changed.with_load_factor(axles).solve()
         return optimum is None or -optimum.value >= 1.0
 
     # what narrower joints carry wider ones carry, so that halving finds the least
     low, high = 0.0, 1.0
+    while not moving.worst.factor >= 1.0 and not is_carried(high):
+        low, high = high, 2.0 * high
+        if high > deepest:
+            return np.nan
     while high - low > tolerance * high:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if is_carried(middle) else (middle, high)
         if high < tolerance:
             return np.inf
     return 1.0 / high
-
-
-def _narrow(joint: Joint, share: float) -> Joint:
-    """Return a joint with a share of its depth, about its middle."""
-    ends = joint.ends
-    inner, outer = (ends.mean(axis=0) + share * (ends - ends.mean(axis=0))).tolist()
-    return replace(joint, intrados=tuple(inner), extrados=tuple(outer))
 
 
 def _parse_axles(axles: float | Sequence[float], spacings: Sequence[float]) -> Array:
@@ -504,7 +554,10 @@ def _search_nonassociated(
 def _find_worst(factors: Array, count: NDArray[np.intp]) -> tuple[int, int]:
     """Return direction and position of the least factor; if none is finite, of the most axles."""
     finite = np.isfinite(factors)
-    flat = np.where(finite, factors, np.inf).argmin() if finite.any() else count.argmax()
+    flat = count.argmax()
+    if finite.any():
+        # of places that differ by round-off, as on a symmetric bridge, the first
+        flat = (factors <= (1.0 + 1e-6) * factors[finite].min()).argmax()
     direction, place = np.unravel_index(flat, factors.shape)
     return int(direction), int(place)
 

@@ -6,6 +6,7 @@ A rigid motion of a block has three coordinates: two translations of its centroi
 import difflib
 import hashlib
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -180,7 +181,7 @@ class Structure(ResultDisplay):
             raise InvalidStructure(f"gravity {self.gravity:.3g} m/s² is not between 0.1 and 1000")
         for kind, things in (("block", self.blocks), ("joint", self.joints)):
             names = [thing.name for thing in things]
-            twice = sorted({name for name in names if names.count(name) > 1})
+            twice = sorted(name for name, count in Counter(names).items() if count > 1)
             if twice:
                 raise InvalidStructure(f"{kind} names {twice} are used twice: name each once")
         if all(block.fixed for block in self.blocks):
@@ -346,12 +347,18 @@ class Structure(ResultDisplay):
 
 def find_supported_blocks(structure: Structure, blocks: Iterable[int]) -> set[int]:
     """Return those of some blocks that are joined to a fixed one through others of them."""
-    among = set(blocks)
-    supported = {number for number in among if structure.blocks[number].fixed}
-    pairs = [set(joint.blocks) for joint in structure.joints if among >= set(joint.blocks)]
-    # breadth-first search from the supports
-    while reached := {n for pair in pairs if pair & supported for n in pair} - supported:
-        supported |= reached
+    neighbours: dict[int, list[int]] = {number: [] for number in blocks}
+    for one, other in (joint.blocks for joint in structure.joints):
+        if one in neighbours and other in neighbours:
+            neighbours[one].append(other)
+            neighbours[other].append(one)
+    # search from the supports
+    reached = [number for number in neighbours if structure.blocks[number].fixed]
+    supported = set(reached)
+    while reached:
+        new = set(neighbours[reached.pop()]) - supported
+        supported |= new
+        reached += new
     return supported
 
 

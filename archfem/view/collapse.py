@@ -19,7 +19,7 @@ from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.resultants import thrust_line
 from archfem.limit.collapse import Collapse, Outcome
-from archfem.limit.vehicles import Rating
+from archfem.limit.vehicles import MovingLoad, Rating
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.view.joint_marks import outline_moving_blocks, scale_motion
@@ -110,32 +110,64 @@ def draw_rating(found: Rating) -> Figure:
         The figure: factors of both directions over the place of the front axle, up to four times
         the least one, above the mechanism at the worst place.
     """
-    wide, tall = structure_figure(found.structure).get_size_inches()
+    outcome = "passes" if found.passes else "fails"
+    title = f"{found.vehicle.name}: factor {found.factor:.3g}, {outcome}"
+    # the front axle, since long vehicles have no middle
+    half = 0.5 * sum(found.vehicle.spacings)
+    label = "front axle, x [m]"
+    return _draw_factors(found.moving, found.structure, title, label, half, required=1.0)
+
+
+@validate_arguments
+def draw_moving_load(found: MovingLoad) -> Figure:
+    """Draw the collapse factor along the bridge, and the mechanism at the worst place.
+
+    Args:
+        found: collapse factors of a vehicle at all places.
+
+    Returns:
+        The figure: factors of both directions over the place of the vehicle's middle, up to four
+        times the least one, above the mechanism at the worst place.
+    """
+    structure = found.worst.structure
+    assert structure is not None  # it was analysed
+    title = f"least factor {found.worst.factor:.3g}, driving {found.direction}"
+    return _draw_factors(found, structure, title, "middle of the vehicle, x [m]")
+
+
+def _draw_factors(
+    found: MovingLoad,
+    structure: Structure,
+    title: str,
+    label: str,
+    half: float = 0.0,
+    required: float = 0.0,
+) -> Figure:
+    """Draw factors over a point `half` ahead of the vehicle's middle, above the worst mechanism."""
+    wide, tall = structure_figure(structure).get_size_inches()
     # height to spare, so that the bridge fills the width and both panels have one x axis
     figure = new_figure(wide, 1.5 * tall + 3.0)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 1.5 * tall])
-    half = 0.5 * sum(found.vehicle.spacings)
-    factors = found.moving.factors["factor"]
-    ahead = {"right": half, "left": -half}  # the front axle, since long vehicles have no middle
+    factors, least = found.factors["factor"], found.worst.factor
+    ahead = {"right": half, "left": -half}
     for (way, reach), line, colour in zip(
         ahead.items(), ("-", "--"), (Colour.THRUST, Colour.LOAD), strict=True
     ):
         style = {"color": colour, "ls": line, "lw": 1.5, "label": f"driving {way}"}
         drawn = factors.sel(direction=way)
         upper.plot(drawn["position"] + reach, drawn.where(np.isfinite(drawn)), **style)
-    upper.axhline(1.0, color=Colour.GREY, lw=1.0)
-    if np.isfinite(found.factor):
+    upper.axhline(required, color=Colour.GREY, lw=1.0)
+    if np.isfinite(least):
         style = {"mfc": Colour.HINGE, "mec": "white", "ms": 7.5, "zorder": 5}
-        front = found.moving.position + ahead[found.moving.direction]
-        upper.plot([front], [found.factor], "o", label="worst place", **style)
-        upper.set_ylim(0.0, 4.0 * max(found.factor, 1.0))
-    style_axes(upper, "front axle, x [m]", "factor [-]")
-    outcome = "passes" if found.passes else "fails"
-    set_title(upper, f"{found.vehicle.name}: factor {found.factor:.3g}, {outcome}")
+        place = found.position + ahead[found.direction]
+        upper.plot([place], [least], "o", label="worst place", **style)
+        upper.set_ylim(0.0, 4.0 * max(least, required))
+    style_axes(upper, label, "factor [-]")
+    set_title(upper, title)
     upper.legend(frameon=False, fontsize=LABEL_SIZE)
-    draw_structure(found.structure, axes=lower)
-    _draw_mechanism(lower, found.structure, found.moving.worst)
-    low, high = outline_bounds(found.structure)
+    draw_structure(structure, axes=lower)
+    _draw_mechanism(lower, structure, found.worst)
+    low, high = outline_bounds(structure)
     margin = 0.03 * (high[0] - low[0])
     lower.set_xlim(low[0] - margin, high[0] + margin)
     return figure

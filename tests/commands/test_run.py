@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import archfem as af
@@ -245,6 +246,23 @@ def test_limit_analysis_of_a_case(tmp_path, ring, capsys):
     assert (out / "dead.png").is_file()
     assert af.commands.main(["check", str(path)]) == 0
     assert f"at a factor of {found.factor:.4g}" in capsys.readouterr().out
+    # the case alone, in the same folder: what it has written replaces what the run did
+    assert af.commands.main(["limit", str(path), "--out", str(out)]) == 0
+    assert (out / "limit.txt").read_text() in capsys.readouterr().out
+    joints = pd.read_csv(out / "limit.csv")
+    assert joints["N"].to_numpy() == pytest.approx(found.joints["N"].values, rel=1e-9)
+    assert af.commands.main(["limit", str(path), "--set", "limit.horizontal=0.5"]) == 0
+    assert f"at a factor of {2.0 * found.factor:.4g}" in capsys.readouterr().out
+
+
+def test_limit_analysis_needs_a_load(tmp_path, capsys):
+    path = tmp_path / "ring.toml"
+    path.write_text(LIMIT.replace("horizontal = 1.0", 'friction = "none"'))
+    assert af.commands.main(["limit", str(path)]) == 1
+    assert "limit has no load" in capsys.readouterr().err
+    path.write_text(LIMIT.partition("[limit]")[0])
+    assert af.commands.main(["limit", str(path)]) == 1
+    assert "has no [limit]" in capsys.readouterr().err
 
 
 ASSESSMENT = """
@@ -302,6 +320,14 @@ def test_rating_of_a_case(tmp_path, ring, capsys):
     assert f"wrote {out / 'rating.png'}" in said
     assert af.commands.main([*command[:3], "LM9"]) == 1
     assert "vehicle 'LM9' is not known" in capsys.readouterr().err
+    # the report of the same case shows both
+    assert af.commands.main(["run", str(path), "--out", str(out)]) == 0
+    assert af.commands.main(["report", str(out)]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "Rating for a vehicle" in page
+    assert f"for CS454-single: factor {found.factor:.4g}" in page
+    assert "Factor along the bridge" in page
+    assert "Thrust line at collapse" in page
 
 
 def test_limit_analysis_refuses_soil_before_all_else(tmp_path, capsys):

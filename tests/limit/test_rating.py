@@ -15,6 +15,14 @@ EXACT = 1e-6
 GRAVEL = af.limit.Fill(friction_angle=35.0)
 
 
+def scaled(joint, share):
+    """Return a joint with a share of its depth, about its middle."""
+    inner, outer = np.array(joint.intrados), np.array(joint.extrados)
+    middle = 0.5 * (inner + outer)
+    ends = [tuple((middle + share * (end - middle)).tolist()) for end in (inner, outer)]
+    return replace(joint, intrados=ends[0], extrados=ends[1])
+
+
 @pytest.fixture(scope="module")
 def lorry_rating():
     """Of a lorry with unequal axles, on a bridge three metres wide."""
@@ -85,11 +93,14 @@ def test_an_axle_on_an_overhang_by_hand():
     place = found.moving.position
     assert place == pytest.approx(2.0)
     assert found.factor == pytest.approx(moment / (2.0 * 2.0 * 50e3 * (place - 1.0)), rel=EXACT)
-    # It stands on as much of its base, about the middle, as reaches to the resultant.
-    light = af.rate(stone, Vehicle("axle", (2e3,)))
-    weight, place = 6.0 * af.STONE.unit_weight, light.moving.position
-    resultant = (weight * (2.0 * 0.5 + 1.0 * 1.5) / 3.0 + 2e3 * place) / (weight + 2e3)
-    assert light.geometric == pytest.approx(0.5 / (resultant - 0.5), rel=1e-4)  # of the halving
+    # It stands on as much of its base, about the middle, as reaches to the resultant; a heavy axle
+    # needs a base that reaches beyond the toe.
+    for axle, stands in ((2e3, True), (2e5, False)):
+        other = af.rate(stone, Vehicle("axle", (axle,)))
+        weight, place = 6.0 * af.STONE.unit_weight, other.moving.position
+        resultant = (weight * (2.0 * 0.5 + 1.0 * 1.5) / 3.0 + axle * place) / (weight + axle)
+        assert other.geometric == pytest.approx(0.5 / (resultant - 0.5), rel=2e-4)  # of the halving
+        assert other.passes == (other.geometric >= 1.0) == stands
 
 
 @pytest.mark.slow
@@ -100,13 +111,8 @@ def test_the_geometric_factor_of_a_ring_is_one_of_thickness():
     assert found.geometric > 1.1
     live = found.moving.worst.live
     for share, carries in ((1.001 / found.geometric, True), (0.999 / found.geometric, False)):
-        joints = []
-        for joint in ring.joints:
-            inner, outer = np.array(joint.intrados), np.array(joint.extrados)
-            middle = 0.5 * (inner + outer)
-            ends = [tuple((middle + share * (end - middle)).tolist()) for end in (inner, outer)]
-            joints.append(replace(joint, intrados=ends[0], extrados=ends[1]))
-        factor = af.collapse_factor(replace(ring, joints=tuple(joints)), live=list(live)).factor
+        other = replace(ring, joints=tuple(scaled(joint, share) for joint in ring.joints))
+        factor = af.collapse_factor(other, live=list(live)).factor
         assert (factor >= 1.0) == carries
 
 
@@ -138,12 +144,26 @@ def test_words_and_table(lorry_rating):
     assert least == pytest.approx(lorry_rating.factor, rel=1e-5)  # six digits
 
 
-def test_a_bridge_that_is_too_weak_fails_and_has_no_geometric_factor():
+def test_a_bridge_that_is_too_weak_would_carry_with_deeper_joints():
     ring = af.circular_arch(radius=2.95, thickness=0.45, embrace=140.0, voussoirs=9)
-    found = af.rate(ring, "lm1")
+    slides = af.rate(ring, "lm1")
+    assert not slides.passes
+    assert np.isnan(slides.geometric)
+    assert "joints of any depth do not carry the vehicle: they slide" in str(slides)
+    found = af.rate(ring, "lm1", friction=None)
     assert found.factor < 1.0
     assert not found.passes
-    assert np.isnan(found.geometric)
+    assert found.geometric < 1.0
+    assert f"below 1: joints are too thin by {100.0 * (1.0 - found.geometric):.2g} %" in str(found)
+
+
+def test_impact_multiplies_the_vehicle():
+    ring = af.circular_arch(radius=2.95, thickness=0.45, embrace=140.0, voussoirs=9)
+    own, doubled = (Vehicle("axle", (1e4,), impact=i, impact_source="ours") for i in (1.0, 2.0))
+    still, moving = af.rate(ring, own), af.rate(ring, doubled)
+    assert moving.factor == pytest.approx(0.5 * still.factor, rel=1e-6)
+    assert af.rate(ring, doubled, impact=1.0).factor == pytest.approx(still.factor, rel=1e-6)
+    assert "impact by 2 (ours)" in str(moving)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from archfem.view import (
     draw_capacity,
     draw_collapse,
     draw_kinematic_assessment,
+    draw_moving_load,
     draw_rating,
     draw_structure,
 )
@@ -119,6 +120,22 @@ def test_a_rating_shows_factors_over_the_front_axle_and_the_mechanism(ring):
     assert upper.get_xlim() == lower.get_xlim()
     texts = [text.get_text() for text in lower.texts if text.get_text()]
     assert len(set(texts)) == 1  # both axles are equal
+
+
+def test_a_moving_load_shows_factors_over_its_middle_and_the_mechanism(ring):
+    found = af.moving_load(ring, [40e3, 80e3], spacings=[1.5])
+    upper, _ = draw_moving_load(found).axes
+    right = found.factors["factor"].sel(direction="right").values
+    (line,) = (each for each in upper.lines if each.get_label() == "driving right")
+    assert line.get_xdata() == pytest.approx(found.factors["position"].values)
+    seen = np.isfinite(right)
+    assert line.get_ydata()[seen] == pytest.approx(right[seen])
+    (worst,) = (each for each in upper.lines if each.get_label() == "worst place")
+    assert worst.get_xdata() == pytest.approx([found.position])
+    assert worst.get_ydata() == pytest.approx([found.worst.factor])
+    assert f"least factor {found.worst.factor:.3g}" in upper.get_title()
+    assert found.plot().axes[0].get_title() == upper.get_title()
+    assert repr(found).startswith(f"MovingLoad: least factor {found.worst.factor:.4g}, ")
 
 
 def test_thrust_lines_of_parts_that_share_no_block_are_not_joined(ring):

@@ -162,7 +162,8 @@ def hash_bytes(content: bytes) -> str:
 
 def _is_source(path: Path) -> bool:
     """Return whether a report is written from a file."""
-    figures = ("dead", "dead_stress", "free_body", "modes", "collapse", "accuracy", "verdict_range")
+    figures = {"dead", "dead_stress", "free_body", "modes", "collapse", "rating"}
+    figures |= {"accuracy", "verdict_range"}
     text = path.suffix in (".nc", ".toml", ".txt")
     drawn = path.stem in figures or path.stem.startswith("assessment_")
     return text or (path.suffix == ".png" and drawn)

@@ -192,11 +192,12 @@ def _tabulate_materials(structure: Structure) -> list[Grid]:
 
 
 def build_dead_load_sections(data: ReportData) -> list[Section]:
-    """Build the sections on dead load, modes, limit analysis and kinematic assessment."""
+    """Build the sections on dead load, modes, limit analysis, rating and assessment."""
     return [
         Section("Dead load", _build_dead_load(data)),
         Section("Modes", _build_modes(data)),
         Section("Limit analysis", _build_limit(data)),
+        Section("Rating for a vehicle", _build_rating(data)),
         Section("Kinematic assessment", _build_assessment(data)),
     ]
 
@@ -264,12 +265,19 @@ def _build_modes(data: ReportData) -> list[Any]:
 
 def _build_limit(data: ReportData) -> list[Any]:
     """Build text and mechanism of limit analysis from the files of the folder."""
-    remedy = "A case with a table [limit] includes it."
-    if data.case.limit is not None:
-        remedy = "The case includes it: `archfem run CASE.toml --out FOLDER` finds it."
-    caption = "The mechanism of limit analysis, over the structure."
+    remedy = "A case with a load in its table [limit] includes it."
+    if data.case.limit is not None and data.case.limit.live:
+        remedy = "The case includes it: `archfem limit CASE.toml --out FOLDER` finds it."
+    caption = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
     missing = missing_note("limit analysis", remedy)
     return data.read_result("limit.txt", "collapse.png", caption, missing)
+
+
+def _build_rating(data: ReportData) -> list[Any]:
+    """Build text and picture of a rating from the files of the folder."""
+    remedy = "`archfem rate CASE.toml --vehicle LM1 --out FOLDER` adds it to the folder."
+    caption = "Factor along the bridge, and mechanism at the worst place."
+    return data.read_result("rating.txt", "rating.png", caption, missing_note("a rating", remedy))
 
 
 def _build_assessment(data: ReportData) -> list[Any]:
