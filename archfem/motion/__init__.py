@@ -5,6 +5,7 @@
     motion              Motion: a ground acceleration
     records             files of recorded ground motions, one module for each format
     response_spectra    response spectra; PGA, Arias, CAV, duration
+    selection           selection of records by the rules of codes
     signal_processing   filters, integration, baseline, resampling, artificial accelerograms
     suite               Suite of motions
 

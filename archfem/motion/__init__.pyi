@@ -9,5 +9,11 @@ from .matching import Match as Match
 from .matching import matched as matched
 from .motion import Motion as Motion
 from .response_spectra import response_spectrum as response_spectrum
+from .response_spectra import rotated_spectrum as rotated_spectrum
 from .response_spectra import scaled_to_spectrum as scaled_to_spectrum
+from .selection import SELECTION_RULES as SELECTION_RULES
+from .selection import RecordSelection as RecordSelection
+from .selection import SelectedRecord as SelectedRecord
+from .selection import SelectionRule as SelectionRule
+from .selection import select_records as select_records
 from .suite import Suite as Suite
