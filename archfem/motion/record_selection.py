@@ -17,7 +17,13 @@ from numpy.typing import NDArray
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
 from archfem._typing import Array
-from archfem._validation import check_fields, check_integer, check_number, validate_arguments
+from archfem._validation import (
+    check_fields,
+    check_integer,
+    check_number,
+    validate_arguments,
+    validate_methods,
+)
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
@@ -31,9 +37,10 @@ from archfem.units import STANDARD_GRAVITY
 Measure = Literal["horizontal", "RotD50", "RotD100"]
 
 # Periods at which the search compares spectra, and at which the result is checked
-SEARCH_PERIODS, CHECK_PERIODS = 60, 200
+SEARCH_PERIODS, CHECK_PERIODS = 60, 120
 
 
+@validate_methods
 @dataclass(frozen=True)
 class SelectionRule:
     """Rule of a code for the mean spectrum of scaled records, by ratio to the design spectrum.
@@ -133,6 +140,7 @@ class SelectedRecord:
     sources: Mapping[str, tuple[Path, int]]
 
 
+@validate_methods
 @dataclass(frozen=True, eq=False, repr=False)
 class RecordSelection(ResultDisplay):
     """Records and scales whose mean spectrum follows a design spectrum by a code's rule.
@@ -189,6 +197,21 @@ class RecordSelection(ResultDisplay):
     def unknown_events(self) -> tuple[str, ...]:
         """Names of the records whose event is unknown; each counts as an event of its own."""
         return tuple(record.motion.name for record in self.records if not record.event)
+
+    def spectra_at(self, periods: Array) -> Array:
+        """Return the scaled spectra of the records at any periods (n, m) [m/s²].
+
+        Args:
+            periods: natural periods (m,) [s].
+
+        Raises:
+            InvalidInput: a period is negative.
+        """
+        rows = (
+            record.scale * _compute_spectrum(record.motion, self.measure, periods)
+            for record in self.records
+        )
+        return np.array(list(rows))
 
     def suite(self, name: str = "selection") -> Suite:
         """Return the scaled records as a suite, for time histories and incremental analyses.
@@ -304,7 +327,9 @@ def select_records(
     candidates, skipped = _read_candidates(_list_files(folder), measure)
     candidates = _name_events(candidates, events or {})
     _check_events(candidates, count, folder, skipped)
-    table = np.array([_spectrum(each.motion, measure, tuple(periods)) for each in candidates])
+    table = np.array(
+        [_cached_spectrum(each.motion, measure, tuple(periods)) for each in candidates]
+    )
     search = _Search(chosen_rule, table / target, _number_events(candidates), scales)
     chosen = [candidates[index] for index in search.find(count)]
     selection = _scale_records(
@@ -502,12 +527,16 @@ def _check_events(
 
 
 @lru_cache(maxsize=4000)
-def _spectrum(motion: Motion, measure: Measure, periods: tuple[float, ...]) -> Array:
-    """Compute peak acceleration and spectrum of a motion (1 + m,) [m/s²]."""
-    natural = np.array([0.0, *periods])
+def _cached_spectrum(motion: Motion, measure: Measure, periods: tuple[float, ...]) -> Array:
+    """Compute the peak acceleration and the spectrum of a motion once (1 + m,) [m/s²]."""
+    return _compute_spectrum(motion, measure, np.array([0.0, *periods]))
+
+
+def _compute_spectrum(motion: Motion, measure: Measure, periods: Array) -> Array:
+    """Compute the spectrum of a motion by a measure (m,) [m/s²]."""
     if measure == "horizontal":
-        return response_spectrum(motion, natural)
-    return rotated_spectrum(motion, natural, 50.0 if measure == "RotD50" else 100.0)
+        return response_spectrum(motion, periods)
+    return rotated_spectrum(motion, periods, 50.0 if measure == "RotD50" else 100.0)
 
 
 class _Search:
@@ -586,8 +615,8 @@ class _Search:
         if self.rule.zero_period:
             lowest = np.maximum(lowest, self.rule.zero_period / mean[:, 0])
         factor = np.clip(inside.sum(axis=1) / (inside**2).sum(axis=1), lowest, highest)
-        # where the rule cannot be met, it is missed on both sides
-        factor = np.where(lowest > highest, np.sqrt(lowest * highest), factor)
+        if self.rule.upper < inf:  # where the rule cannot be met, it is missed on both sides
+            factor = np.where(lowest > highest, np.sqrt(lowest * highest), factor)
         return np.clip(factor, self.limits[0] / least, self.limits[1] / most)
 
 
@@ -611,7 +640,7 @@ def _scale_records(
     """Scale the selected records, and check them at more periods than the search does."""
     periods = np.geomspace(*band, CHECK_PERIODS)
     target = _tabulate_target(spectrum, rule, periods)
-    spectra = np.array([_spectrum(each.motion, measure, tuple(periods)) for each in chosen])
+    spectra = np.array([_cached_spectrum(each.motion, measure, tuple(periods)) for each in chosen])
     fine = _Search(rule, spectra / target, np.arange(len(chosen)), scales)
     mean = fine.ratios.mean(axis=0, keepdims=True)
     factor = fine.common_factor(mean, fine.scales.min(), fine.scales.max())[0]

@@ -4,6 +4,7 @@ Spectra are those of damped oscillators under a piecewise linear ground accelera
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy  # loads scipy.signal and scipy.spatial, which are slow, when first used
@@ -59,10 +60,17 @@ def _count_parts(dt: float, period: float) -> int:
 
 
 def oscillator_displacement(samples: Array, dt: float, period: float, damping: float) -> Array:
-    """Return the relative displacement of one oscillator (n,) [m], exact for straight samples.
+    """Return the relative displacement of one oscillator (n,) [m], exact for straight samples."""
+    numerator, denominator, at_rest = _oscillator_filter(float(dt), float(period), float(damping))
+    return scipy.signal.lfilter(numerator, denominator, samples, zi=samples[0] * at_rest)[0]
+
+
+@lru_cache(maxsize=4096)  # records of a folder share their steps
+def _oscillator_filter(dt: float, period: float, damping: float) -> tuple[Array, Array, Array]:
+    """Return numerator, denominator and initial state of the digital filter of an oscillator.
 
     The step from (u, v) to the next is a matrix exponential; without v it is the recurrence
-    u₂ - tr A u₁ + det A u₀ = b₀ a₂ + b₁ a₁ + b₂ a₀, a digital filter.
+    u₂ - tr A u₁ + det A u₀ = b₀ a₂ + b₁ a₁ + b₂ a₀.
     """
     omega = 2.0 * np.pi / period
     # States u, v, and the input with its slope: a' = s, s' = 0.
@@ -82,9 +90,8 @@ def oscillator_displacement(samples: Array, dt: float, period: float, damping: f
     trace = step[0, 0] + step[1, 1]
     determinant = step[0, 0] * step[1, 1] - step[0, 1] * step[1, 0]
     # the oscillator is at rest at the first sample, at any acceleration there
-    rest = samples[0] * np.array([-numerator[0], now[0] - numerator[1]])
-    denominator = [1.0, -trace, determinant]
-    return scipy.signal.lfilter(numerator, denominator, samples, zi=rest)[0]
+    at_rest = np.array([-numerator[0], now[0] - numerator[1]])
+    return numerator, np.array([1.0, -trace, determinant]), at_rest
 
 
 def interpolate_steps(samples: Array, parts: int) -> Array:
