@@ -52,6 +52,30 @@ def test_other_models_and_regions_differ_within_their_scatter():
     assert turkey.median > peak_ground_acceleration(7.3, 90e3, v_s30=270.0).median
 
 
+# Moment magnitude, distance [km] and peak [g]: Demirel and Aldemir (2021), Table 3
+HISTORY = [
+    *((6.6, 35.0, 0.192), (7.3, 90.0, 0.125), (7.1, 35.0, 0.233)),
+    *((6.8, 50.0, 0.172), (7.5, 109.0, 0.108), (7.1, 15.4, 0.299)),
+]
+
+
+def test_peaks_of_the_six_earthquakes_at_the_bridge(verified):
+    """The paper's values are above the medians, each within one standard deviation."""
+    pytest.importorskip("pygmm")
+    found = [
+        peak_ground_acceleration(size, 1e3 * away, v_s30=270.0, region="turkey")
+        for size, away, _ in HISTORY
+    ]
+    paper = [peak for *_, peak in HISTORY]
+    for estimate, peak in zip(found, paper, strict=True):
+        assert estimate.median < peak * STANDARD_GRAVITY < estimate.interval[1]
+    medians = [round(estimate.median / STANDARD_GRAVITY, 3) for estimate in found]
+    case = (
+        "peaks of six earthquakes at the bridge [g], by BSSA14 for Turkey, each within its scatter"
+    )
+    verified(case, paper, "Demirel and Aldemir (2021), Table 3", medians)
+
+
 @pytest.mark.parametrize(
     ("given", "says"),
     [
