@@ -267,5 +267,7 @@ def _add_select(command: argparse.ArgumentParser) -> None:
     add("--count", type=int, default=7, help="how many records (7)")
     add("--scales", type=float, nargs=2, default=(1 / 3, 3.0), help="allowed (0.333 3)")
     add("--measure", default="horizontal", help="horizontal, RotD50 or RotD100 (horizontal)")
+    about = "earthquake of files; may be given again"
+    add("--event", action="append", default=[], metavar="FILES=NAME", dest="events", help=about)
     add("--out", metavar="DIR", help="folder for text, table, picture and [suite] (none)")
     command.set_defaults(command=_load_command("run", "select"))

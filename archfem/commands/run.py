@@ -243,6 +243,8 @@ def select(options: argparse.Namespace) -> None:
     names = ("count", "rule", "scales", "measure")
     settings = {name: getattr(options, name) for name in names}
     settings["scales"] = tuple(settings["scales"])
+    # files without a name are refused, since no record has such files
+    settings["events"] = dict(event.partition("=")[::2] for event in options.events)
     failure = None
     try:
         found = select_records(options.folder, spectrum, options.period, **settings)

@@ -224,7 +224,10 @@ class RecordSelection(ResultDisplay):
 
     def table(self) -> str:
         """Return name, event, scale, scaled peak [m/s²] and files of the records, as CSV."""
-        return "\n".join(",".join(row) for row in [_TABLE_HEAD, *self._rows()])
+        rows = [_TABLE_HEAD, *self._rows()]
+        return "\n".join(
+            ",".join(f'"{cell}"' if "," in cell else cell for cell in row) for row in rows
+        )
 
     def _rows(self) -> Iterator[list[str]]:
         """Yield the texts of a row of each record."""
@@ -240,9 +243,9 @@ class RecordSelection(ResultDisplay):
         low, high = self.bounds
         state = "met" if self.meets else f"missed by {self.shortfall:.3g} of the design spectrum"
         return (
-            f"{len(self.records)} of {self.candidates} candidates for {self.rule.name}: mean over "
+            f"RecordSelection of {len(self.records)} from {self.candidates} candidates: mean over "
             f"design spectrum {low:.3f} to {high:.3f} from {self.band[0]:.3g} to "
-            f"{self.band[1]:.3g} s, the rule is {state}"
+            f"{self.band[1]:.3g} s, {self.rule.name} is {state}"
         )
 
     def __str__(self) -> str:
@@ -324,7 +327,7 @@ def select_records(
     periods = np.geomspace(*band, SEARCH_PERIODS)
     # a spectrum that is not defined over the whole range is refused before files are read
     target = _tabulate_target(spectrum, chosen_rule, periods)
-    candidates, skipped = _read_candidates(_list_files(folder), measure)
+    candidates, skipped = _read_candidates(Path(folder), _list_files(folder), measure)
     candidates = _name_events(candidates, events or {})
     _check_events(candidates, count, folder, skipped)
     table = np.array(
@@ -338,7 +341,7 @@ def select_records(
     selection = replace(selection, candidates=len(candidates), skipped=skipped)
     if not selection.meets:
         raise DidNotConverge(
-            f"{selection}\nno set was found that meets the rule; error.last is the nearest: add "
+            f"{selection!r}: no set was found that meets the rule; error.last is the nearest: add "
             "records, allow other scales or fewer records, or change the rule",
             last=selection,
         )
@@ -384,7 +387,7 @@ def _list_files(folder: str | PathLike[str]) -> tuple[tuple[Path, int, int], ...
 
 @lru_cache(maxsize=1)  # a folder takes memory, and is usually searched with several settings
 def _read_candidates(
-    files: tuple[tuple[Path, int, int], ...], measure: Measure
+    folder: Path, files: tuple[tuple[Path, int, int], ...], measure: Measure
 ) -> tuple[tuple[_Candidate, ...], Mapping[str, str]]:
     """Read all files; return candidates, and files that are not used with reasons."""
     skipped: dict[str, str] = {}
@@ -393,16 +396,15 @@ def _read_candidates(
         try:
             channels = read_channels(path)
         except ArchfemError as error:
-            skipped[path.name] = str(error).removeprefix(f"{path}: ")
+            skipped[str(path.relative_to(folder))] = str(error).removeprefix(f"{path}: ")
             continue
         alone = len(channels) == 1
         key = _strip_direction(path, channels[0].direction) if alone else path
         groups[key] += [_Source(path, k, channel) for k, channel in enumerate(channels, 1)]
     found: list[_Candidate] = []
     for sources in groups.values():
-        names = ", ".join(dict.fromkeys(each.path.name for each in sources))
         if refusal := _refuse_group(sources, measure):
-            skipped[names] = refusal
+            skipped |= {str(each.path.relative_to(folder)): refusal for each in sources}
         else:
             found += _combine_components(sources, measure)
     return tuple(found), skipped
@@ -422,7 +424,9 @@ def _strip_direction(path: Path, direction: str) -> Path:
     token = re.sub(r"\W", "", direction.partition(",")[0])
     token = token.zfill(3) if token.isdigit() else token
     match = re.search(rf"[-_ ]?{token}(?=\.|$)", path.name, re.IGNORECASE) if token else None
-    return path if match is None else path.with_name(path.name.replace(match[0], "", 1))
+    if match is None:
+        return path
+    return path.with_name(path.name[: match.start()] + path.name[match.end() :])
 
 
 def _refuse_group(sources: Sequence[_Source], measure: Measure) -> str:
@@ -457,7 +461,8 @@ def _combine_components(sources: Sequence[_Source], measure: Measure) -> Iterato
 
 def _find_event(path: Path) -> str:
     """Find the date of the earthquake in the head of a file or in its name, or PEER's name."""
-    head = path.read_bytes()[:4000]
+    with path.open("rb") as file:
+        head = file.read(4000)
     text = "" if b"\0" in head else head.decode("latin-1")
     months = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
     year, day = r"((?:19|20)\d\d)", r"(\d{1,2})"

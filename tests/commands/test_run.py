@@ -257,10 +257,13 @@ def test_selected_records_become_a_suite(tmp_path, at2, undrawn, capsys):
     assert case.target == code
     for made, motion in zip(case.ground_suite().motions, found.suite().motions, strict=True):
         assert made.horizontal == pytest.approx(motion.horizontal)
+    joined = ["--event", "19900101*=one", "--event", "19900102*=one"]
+    assert af.commands.main([*given, "--count", "5", *joined]) == 1
+    assert "6 candidates of 4 events, fewer than 5 to select" in capsys.readouterr().err
     # the nearest set is written, and the command fails
     assert af.commands.main([*given, "--count", "3", "--scales", "0.01", "0.1"]) == 1
     said = capsys.readouterr()
-    assert "the rule is missed by" in said.out
+    assert "EC8 is missed by" in said.out
     assert "no set was found that meets the rule: above is the nearest" in said.err
 
 

@@ -210,7 +210,7 @@ def test_real_records_of_seven_earthquakes():
     found = af.select_records(RECORDS / "peer_at2", CODE, 0.3, scales=(0.2, 5.0))
     assert found.meets
     assert len({record.event for record in found.records}) == 7
-    assert found.candidates == 13
+    assert found.candidates == 15
     assert found.unknown_events == ()
     assert found.skipped == {}
     # down is turned up, and the two horizontals accompany each other
