@@ -160,6 +160,28 @@ def test_a_rule_that_is_missed_says_by_how_much(folder):
         af.select_records(folder, CODE, 0.1, count=3, rule=narrow)
 
 
+def test_each_bound_decides_where_it_is_tight(folder):
+    """Least squares leave ratios on both sides of 1, and peaks of up to 1.5 times the spectrum's."""
+    rule = replace(SELECTION_RULES["EC8"], lower=0.0, zero_period=2.0)
+    found = af.select_records(folder, CODE, 0.3, count=3, rule=rule)
+    peaks = np.mean([record.scale * record.motion.pga for record in found.records])
+    peaks /= CODE.horizontal(0.0) * STANDARD_GRAVITY
+    assert peaks == pytest.approx(2.0)
+    assert found.zero_period_ratio == pytest.approx(2.0)
+    rule = replace(rule, upper=0.8, zero_period=0.0)
+    assert af.select_records(folder, CODE, 0.3, count=3, rule=rule).bounds[1] == pytest.approx(0.8)
+    rule = replace(rule, lower=0.8, upper=1.2)
+    given = {"count": 3, "rule": rule, "scales": (0.01, 0.02)}
+    with pytest.raises(af.DidNotConverge) as caught:
+        af.select_records(folder, CODE, 0.3, **given)
+    nearest = caught.value.last
+    assert nearest.shortfall == pytest.approx(0.8 - nearest.bounds[0])
+    with pytest.raises(af.DidNotConverge) as caught:
+        af.select_records(folder, CODE, 0.3, **{**given, "scales": (20.0, 30.0)})
+    nearest = caught.value.last
+    assert nearest.shortfall == pytest.approx(nearest.bounds[1] - 1.2)
+
+
 def test_pairs_are_selected_by_the_median_of_directions(tmp_path):
     for seed in range(3):
         for direction in (0, 90):
