@@ -161,7 +161,7 @@ def test_a_rule_that_is_missed_says_by_how_much(folder):
 
 
 def test_each_bound_decides_where_it_is_tight(folder):
-    """Least squares leave ratios on both sides of 1, and peaks of up to 1.5 times the spectrum's."""
+    """Least squares alone leave ratios on both sides of 1, and smaller peaks."""
     rule = replace(SELECTION_RULES["EC8"], lower=0.0, zero_period=2.0)
     found = af.select_records(folder, CODE, 0.3, count=3, rule=rule)
     peaks = np.mean([record.scale * record.motion.pga for record in found.records])
