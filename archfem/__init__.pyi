@@ -55,6 +55,7 @@ from .motion.design_spectra import Eurocode8 as Eurocode8
 from .motion.design_spectra import Tbec2018 as Tbec2018
 from .motion.matching import matched as matched
 from .motion.motion import Motion as Motion
+from .motion.record_selection import select_records as select_records
 from .motion.response_spectra import response_spectrum as response_spectrum
 from .motion.suite import Suite as Suite
 from .statics.equilibrium import dead_load as dead_load

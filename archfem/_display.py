@@ -25,6 +25,7 @@ LATE_BOUND_METHODS: Mapping[str, str] = {
     "MovingLoad.plot": "view.collapse:draw_moving_load",
     "Pushover.plot": "view.statics:draw_pushover",
     "Rating.plot": "view.collapse:draw_rating",
+    "RecordSelection.plot": "view.motions:draw_selection",
     "Structure.plot": "view.structure:draw_structure",
     "VerdictRange.plot": "view.studies:draw_verdict_range",
 }
@@ -44,7 +45,8 @@ class ResultDisplay:
 
         Args:
             options: of that function: `draw_structure`, `draw_dead_load`, `draw_joints` for a
-                history, `draw_pushover`, `draw_collapse`, `draw_modes` or `draw_motion`.
+                history, `draw_pushover`, `draw_collapse`, `draw_modes`, `draw_motion` or
+                `draw_selection`.
 
         Returns:
             A matplotlib figure, which `archfem.view.save` writes.

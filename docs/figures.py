@@ -1,5 +1,6 @@
 """Draw the figures of the theory and of the tutorial: `python docs/figures.py`, about a minute."""
 
+import tempfile
 from pathlib import Path
 
 import matplotlib as mpl
@@ -291,8 +292,22 @@ def verdict_range() -> None:
     found.plot().savefig(FOLDER / "verdict_range.png", dpi=90)
 
 
+def selection() -> None:
+    """Draw seven of sixty synthetic records, selected by the rule of NTC 2018."""
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(60):
+            motion = af.Motion.synthetic(duration=20.0, seed=seed, dt=0.01, vertical_ratio=0.0)
+            motion = motion.band_passed(0.25 + 0.1 * (seed % 5), 5.0 + 2.0 * (seed % 9))
+            rows = "\n".join(f"{sample:.5f}" for sample in motion.horizontal)
+            name = f"19900{1 + seed // 28}{1 + seed % 28:02d}.txt"  # each on a day of its own
+            (Path(folder) / name).write_text(f"# acceleration [m/s2], dt = 0.01 s\n{rows}\n")
+        spectrum = af.Eurocode8(0.25, "B")
+        found = af.select_records(folder, spectrum, 0.4, rule="NTC-2018")
+    found.plot().savefig(FOLDER / "selection.png", dpi=90)
+
+
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
     drawings = (signs, law, section, rules, frame, ladder, states, programme)
-    for draw in (*drawings, tutorial, verdict_range):
+    for draw in (*drawings, tutorial, verdict_range, selection):
         draw()

@@ -54,6 +54,7 @@ ALLOWED_IN = {
     "argparse": "commands",
     "obspy": "motion.records.waveforms",
     "distributed": "studies.cluster",
+    "pygmm": "motion.ground_motion_models",
 }
 
 MAX_CODE_LINES_PER_MODULE = 500

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -30,6 +31,19 @@ def things():
         af.moving_load(stones, 1e3),
         af.rate(stones, "LM1"),
         af.verdict_range(stones, motion, samples=2, vary={"joint_rule": "exact"}),
+        af.motion.RecordSelection(
+            rule=af.motion.SELECTION_RULES["NTC-2018"],
+            measure="horizontal",
+            band=(0.1, 1.0),
+            scales=(0.5, 2.0),
+            records=(af.motion.SelectedRecord(motion, "1999-08-17", 1.0, {}),),
+            periods=np.array([0.1, 1.0]),
+            spectra=np.ones((1, 2)),
+            target=np.ones(2),
+            zero_period_ratio=np.nan,
+            candidates=1,
+            skipped={},
+        ),
     ]
 
 

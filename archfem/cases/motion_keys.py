@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from archfem._typing import Array
 from archfem.cases.toml_file import Table, check_choice, check_table
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import (
@@ -20,6 +21,7 @@ from archfem.motion.design_spectra import (
     Tbec2018,
 )
 from archfem.motion.motion import Motion
+from archfem.motion.record_selection import RecordSelection
 from archfem.motion.suite import Suite
 
 SYNTHETIC_KEYS = {"duration": "s", "pga": "m/s**2", "seed": int, "dt": "s", "vertical_ratio": "1"}
@@ -149,6 +151,34 @@ def build_suite(settings: Table, folder: Path = Path()) -> Suite:
     target = build_target_spectrum(settings)
     suite = suite.matched(target) if target and settings.get("matched", False) else suite
     return suite.reversed() if settings.get("reversed", False) else suite
+
+
+def tabulate_selection(selection: RecordSelection, folder: Path, target: Table) -> dict[str, Any]:
+    """Return the [suite] of selected records of a folder, with a target spectrum."""
+    pairs: dict[str, Any] = {}
+    for record in selection.records:
+        name = re.sub(r"[^\w +-]", "_", record.motion.name)
+        name = f"{name} {len(pairs) + 1}" if name in pairs else name
+        pair = {
+            component: _locate_component(path, record.motion.component(component), folder)
+            for component, (path, _) in record.sources.items()
+            if component != "transverse"  # which plane structures do not feel
+        }
+        pairs[name] = pair.pop("horizontal") | pair | {"scale": record.scale}
+    return {"name": selection.rule.name, "folder": str(folder), "target": target, "pairs": pairs}
+
+
+def _locate_component(path: Path, samples: Array, folder: Path) -> dict[str, Any]:
+    """Return the file of a component, and its column where it is not the first."""
+    # columns of plain files count a column of times, which numbers of channels do not
+    for column in (None, 1, 2, 3, 4):
+        try:
+            if np.array_equal(Motion.read(path, column=column).horizontal, samples):
+                number = {} if column is None else {"column": column}
+                return {"file": path.relative_to(folder).as_posix(), **number}
+        except InvalidInput:
+            continue
+    raise InvalidInput(f"{path} was changed while it was read: select again")
 
 
 def _parse_source(table: Any, keys: Table, section: str) -> dict[str, Any]:

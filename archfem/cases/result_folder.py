@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import tomli_w
+
 from archfem._files import (
     FINISHED_FOLDER,
     LIST_FILE,
@@ -30,7 +32,7 @@ from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, list_input_files
 from archfem.cases.run import HISTORY_FILE, CaseResult, DeadLoadResult, Run
-from archfem.cases.toml_file import read_tables
+from archfem.cases.toml_file import Table, read_tables
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import VerdictRange
@@ -39,6 +41,7 @@ from archfem.limit.collapse import Collapse
 from archfem.limit.vehicles import Rating
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
+from archfem.motion.record_selection import RecordSelection
 from archfem.motion.suite import Suite
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.modes import Modes
@@ -50,7 +53,7 @@ from archfem.view.collapse import (
     draw_rating,
 )
 from archfem.view.histories import draw_envelope, draw_joints, most_stressed_joints
-from archfem.view.motions import draw_motion, draw_spectra, draw_suite
+from archfem.view.motions import draw_motion, draw_selection, draw_spectra, draw_suite
 from archfem.view.positions import decisive_instant
 from archfem.view.statics import draw_dead_load, draw_free_body, draw_modes
 from archfem.view.stress import draw_stress
@@ -396,6 +399,16 @@ def write_motions(motions: Sequence[Motion], folder: Path) -> list[Path]:
     """Draw each motion with its integrals, and the spectra of all."""
     files = [save(draw_motion(motion), folder / f"{motion.name}.png") for motion in motions]
     return [*files, save(draw_spectra(motions), folder / "spectra.png")]
+
+
+def write_selection(found: RecordSelection, suite: Table, folder: Path) -> list[Path]:
+    """Write selected records as text, table, picture, and as the [suite] of a case."""
+    return [
+        _write_text(str(found), folder / "selection.txt"),
+        _write_text(found.table(), folder / "selection.csv"),
+        _write_text(tomli_w.dumps({"suite": suite}), folder / "selection.toml"),
+        save(draw_selection(found), folder / "selection.png"),
+    ]
 
 
 def with_unique_names(motions: Sequence[Motion], names: Sequence[str]) -> list[Motion]:

@@ -127,6 +127,8 @@ def _build_parser() -> argparse.ArgumentParser:
     about = "film the history of a run"
     _add_film(commands.add_parser("animate", help=about, description=about))
     _add_motion(commands.add_parser("motion", help="measures and pictures of ground motions"))
+    about = "select recorded motions by the rule of a code"
+    _add_select(commands.add_parser("select", help=about, description=about))
     return parser
 
 
@@ -252,3 +254,20 @@ def _add_motion(command: argparse.ArgumentParser) -> None:
         "--out", default="out/motions", metavar="DIR", help="folder for the pictures"
     )
     command.set_defaults(command=_load_command("run", "motion"))
+
+
+def _add_select(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of `archfem select`."""
+    add = command.add_argument
+    add("folder", metavar="FOLDER", help="folder of the records")
+    about = 'design spectrum, as target of a case: \'{ code = "EC8", ag = 0.3, ground = "B" }\''
+    add("--spectrum", required=True, metavar="TABLE", help=about)
+    add("--period", required=True, type=float, help="fundamental period of the structure [s]")
+    add("--rule", default="EC8", help="EC8 or NTC-2018 (EC8)")
+    add("--count", type=int, default=7, help="how many records (7)")
+    add("--scales", type=float, nargs=2, default=(1 / 3, 3.0), help="allowed (0.333 3)")
+    add("--measure", default="horizontal", help="horizontal, RotD50 or RotD100 (horizontal)")
+    about = "earthquake of files; may be given again"
+    add("--event", action="append", default=[], metavar="FILES=NAME", dest="events", help=about)
+    add("--out", metavar="DIR", help="folder for text, table, picture and [suite] (none)")
+    command.set_defaults(command=_load_command("run", "select"))

@@ -231,6 +231,33 @@ def motion(options: argparse.Namespace) -> None:
         )
 
 
+def select(options: argparse.Namespace) -> None:
+    """Select records of a folder by a code's rule: text, table, picture, and [suite] of a case."""
+    from archfem.cases.motion_keys import build_spectrum, tabulate_selection
+    from archfem.cases.result_folder import write_selection
+    from archfem.cases.toml_file import parse_tables
+    from archfem.motion.record_selection import select_records
+
+    target = parse_tables(f"target = {options.spectrum}")["target"]
+    spectrum = build_spectrum(target, "--spectrum")
+    names = ("count", "rule", "scales", "measure")
+    settings = {name: getattr(options, name) for name in names}
+    settings["scales"] = tuple(settings["scales"])
+    # files without a name are refused, since no record has such files
+    settings["events"] = dict(event.partition("=")[::2] for event in options.events)
+    failure = None
+    try:
+        found = select_records(options.folder, spectrum, options.period, **settings)
+    except DidNotConverge as error:  # the nearest selection is shown, and the command fails
+        failure, found = error, error.last
+    print(found)
+    if options.out is not None:
+        suite = tabulate_selection(found, Path(options.folder).absolute(), target)
+        print_written(write_selection(found, suite, create_result_folder(options.out)))
+    if failure is not None:
+        raise DidNotConverge("no set was found that meets the rule: above is the nearest")
+
+
 def _read_records(
     files: Sequence[str], given: Mapping[str, Any]
 ) -> tuple[dict[str, Motion], list[InvalidInput]]:

@@ -4,9 +4,10 @@ Spectra are those of damped oscillators under a piecewise linear ground accelera
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
-import scipy  # loads scipy.signal, which is slow, when it is first used
+import scipy  # loads scipy.signal and scipy.spatial, which are slow, when first used
 from scipy import integrate, linalg
 
 from archfem._typing import Array
@@ -43,8 +44,7 @@ def find_peak_responses(
             largest = int(np.argmax(np.abs(samples)))
             values[index], times[index] = samples[largest], largest * dt
             continue
-        # 40 samples a period; above 1000 parts of a step the oscillator follows the ground
-        parts = min(max(int(np.ceil(40 * dt / period - 1e-9)), 1), 1000)
+        parts = _count_parts(dt, period)
         if parts not in finer:
             finer[parts] = interpolate_steps(samples, parts)
         moved = oscillator_displacement(finer[parts], dt / parts, period, damping)
@@ -53,11 +53,24 @@ def find_peak_responses(
     return values, times
 
 
+def _count_parts(dt: float, period: float) -> int:
+    """Return the parts of a step that make 40 samples a period."""
+    # above 1000 parts of a step the oscillator follows the ground
+    return min(max(int(np.ceil(40 * dt / period - 1e-9)), 1), 1000)
+
+
 def oscillator_displacement(samples: Array, dt: float, period: float, damping: float) -> Array:
-    """Return the relative displacement of one oscillator (n,) [m], exact for straight samples.
+    """Return the relative displacement of one oscillator (n,) [m], exact for straight samples."""
+    numerator, denominator, at_rest = _oscillator_filter(float(dt), float(period), float(damping))
+    return scipy.signal.lfilter(numerator, denominator, samples, zi=samples[0] * at_rest)[0]
+
+
+@lru_cache(maxsize=4096)  # records of a folder share their steps
+def _oscillator_filter(dt: float, period: float, damping: float) -> tuple[Array, Array, Array]:
+    """Return numerator, denominator and initial state of the digital filter of an oscillator.
 
     The step from (u, v) to the next is a matrix exponential; without v it is the recurrence
-    u₂ - tr A u₁ + det A u₀ = b₀ a₂ + b₁ a₁ + b₂ a₀, a digital filter.
+    u₂ - tr A u₁ + det A u₀ = b₀ a₂ + b₁ a₁ + b₂ a₀.
     """
     omega = 2.0 * np.pi / period
     # States u, v, and the input with its slope: a' = s, s' = 0.
@@ -77,9 +90,8 @@ def oscillator_displacement(samples: Array, dt: float, period: float, damping: f
     trace = step[0, 0] + step[1, 1]
     determinant = step[0, 0] * step[1, 1] - step[0, 1] * step[1, 0]
     # the oscillator is at rest at the first sample, at any acceleration there
-    rest = samples[0] * np.array([-numerator[0], now[0] - numerator[1]])
-    denominator = [1.0, -trace, determinant]
-    return scipy.signal.lfilter(numerator, denominator, samples, zi=rest)[0]
+    at_rest = np.array([-numerator[0], now[0] - numerator[1]])
+    return numerator, np.array([1.0, -trace, determinant]), at_rest
 
 
 def interpolate_steps(samples: Array, parts: int) -> Array:
@@ -152,6 +164,73 @@ def response_spectrum(
     peaks = find_peak_responses(samples, motion.dt, natural.ravel(), damping)[0]
     spectrum: Array = np.abs(peaks)
     return spectrum.reshape(natural.shape)
+
+
+@validate_arguments
+def rotated_spectrum(
+    motion: Motion, periods: float | Array, percentile: float = 50.0, damping: float = 0.05
+) -> Array:
+    """Return a percentile of the pseudo-acceleration spectra over all horizontal directions.
+
+    The response of a pair of components is u(θ) = cos θ u₁ + sin θ u₂. Its largest value over time
+    is found for θ = 0, 1, … 179°, as `response_spectrum` finds it, and the percentile is that over
+    the directions, at each period by itself.
+
+    Args:
+        motion: ground motion with a transverse component.
+        periods: natural periods (n,) [s]; at zero the values are peak ground accelerations.
+        percentile: 50 for RotD50, 100 for RotD100.
+        damping: ratio to the critical [-].
+
+    Returns:
+        Pseudo-accelerations in the shape of the periods [m/s²].
+
+    Raises:
+        InvalidInput: there is no transverse, a percentile outside 0 to 100, a negative period, or a
+            damping out of range.
+
+    References:
+        Boore, Orientation-independent, nongeometric-mean measures of seismic intensity from two
+        horizontal components of motion, BSSA 100 (2010).
+    """
+    check_number(percentile, "percentile of directions", minimum=0.0, maximum=100.0)
+    check_unmasked(periods, "periods [s]")
+    natural = as_periods(periods)
+    check_oscillators(natural, damping)
+    # an angle of zero fills the shorter component with zeros
+    pair = signal_processing.rotate_components(
+        motion.horizontal, motion.component("transverse"), 0.0
+    )
+    values = [
+        np.percentile(_peaks_by_direction(pair, motion.dt, period, damping), percentile)
+        for period in natural.ravel()
+    ]
+    return np.reshape(values, natural.shape)
+
+
+def _peaks_by_direction(
+    pair: tuple[Array, Array], dt: float, period: float, damping: float
+) -> Array:
+    """Return the largest pseudo-accelerations of a pair in directions 1° apart (180,) [m/s²]."""
+    angles = np.radians(np.arange(180.0))
+    directions = np.column_stack([np.cos(angles), np.sin(angles)])
+    if period <= 1e-9 * dt:  # such an oscillator has the acceleration of the ground
+        return np.abs(directions @ np.array(pair)).max(axis=1)
+    parts = _count_parts(dt, period)
+    fine = (interpolate_steps(samples, parts) for samples in pair)
+    moved = np.array([oscillator_displacement(row, dt / parts, period, damping) for row in fine])
+    try:
+        extreme = scipy.spatial.ConvexHull(moved.T).vertices
+    except scipy.spatial.QhullError:  # a path along a line, or of less than three samples
+        extreme = np.arange(moved.shape[1])
+    tops = extreme[np.argmax(np.abs(directions @ moved[:, extreme]), axis=1)]
+    # the parabola through the largest sample and its neighbours, for all directions at once
+    around = np.clip(tops[:, None] + np.array([-1, 0, 1]), 0, moved.shape[1] - 1)
+    before, here, after = np.einsum("dc,cdk->kd", directions, moved[:, around])
+    bend = before - 2.0 * here + after
+    inside = (bend != 0.0) & (tops > 0) & (tops < moved.shape[1] - 1)
+    peaks = here - np.divide((before - after) ** 2, 8.0 * bend, out=0.0 * here, where=inside)
+    return (2.0 * np.pi / period) ** 2 * np.abs(peaks)
 
 
 @validate_arguments

@@ -14,6 +14,7 @@ from .histories import draw_envelope as draw_envelope
 from .histories import draw_joint as draw_joint
 from .histories import draw_joints as draw_joints
 from .motions import draw_motion as draw_motion
+from .motions import draw_selection as draw_selection
 from .motions import draw_spectra as draw_spectra
 from .motions import draw_suite as draw_suite
 from .pages.player import Player as Player

@@ -11,6 +11,7 @@ from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import COMPONENTS, Motion
+from archfem.motion.record_selection import RecordSelection
 from archfem.motion.response_spectra import response_spectrum
 from archfem.motion.suite import Suite
 from archfem.units import STANDARD_GRAVITY
@@ -119,6 +120,41 @@ def draw_suite(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
         _mark_matched_periods(axis, suite)
     figure.suptitle(suite.name, fontsize=TITLE_SIZE, wrap=True)
     _add_common_legend(figure, axes)
+    return figure
+
+
+@validate_arguments
+def draw_selection(found: RecordSelection) -> Figure:
+    """Draw the scaled spectra of selected records, their mean, the design spectrum and its bounds.
+
+    Args:
+        found: selection of records.
+
+    Returns:
+        The figure; the periods that the rule checks are shaded.
+    """
+    rule, (first, last) = found.rule, found.band
+    periods = np.geomspace(0.5 * first, 1.5 * last, 120)
+    spectra = found.spectra_at(periods) / STANDARD_GRAVITY
+    figure = new_figure(1.3 * COLUMN_WIDTH, 4.2)
+    axes = figure.subplots()
+    shade = {"color": Colour.HINGE, "alpha": 0.06, "lw": 0.0, "zorder": 0}
+    axes.axvspan(first, last, label=f"checked, {first:.3g} to {last:.3g} s", **shade)
+    for index, row in enumerate(spectra):
+        label = f"{len(spectra)} scaled records" if index == 0 else None
+        axes.plot(periods, row, color=Colour.GREY, lw=0.7, label=label)
+    axes.plot(periods, spectra.mean(axis=0), Colour.TEXT, lw=1.8, label="mean")
+    target = found.target / STANDARD_GRAVITY
+    axes.plot(found.periods, target, Colour.HINGE, ls="--", lw=1.8, label="design spectrum")
+    for bound in (rule.lower, rule.upper):
+        if np.isfinite(bound):
+            label = f"bound, {bound:g} times"
+            axes.plot(found.periods, bound * target, Colour.HINGE, ls=":", lw=1.0, label=label)
+    style_axes(axes, "period [s]", f"spectral acceleration, {found.measure} [g]")
+    state = "met" if found.meets else f"missed by {found.shortfall:.2g}"
+    axes.set_title(f"{rule.name}: {state}", fontsize=TITLE_SIZE)
+    axes.set_ylim(bottom=0.0)
+    add_legend_below(figure, 3)
     return figure
 
 

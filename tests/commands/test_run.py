@@ -11,6 +11,7 @@ import pytest
 
 import archfem as af
 from archfem.commands.run import print_results
+from archfem.units import STANDARD_GRAVITY
 
 RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
 
@@ -231,6 +232,39 @@ fidelity = "rigid"
 [limit]
 horizontal = 1.0
 """
+
+
+def test_selected_records_become_a_suite(tmp_path, at2, undrawn, capsys):
+    records, out = tmp_path / "records", tmp_path / "out"
+    records.mkdir()
+    for day in range(1, 5):
+        motion = af.Motion.synthetic(duration=2.0, seed=day, dt=0.01, vertical_ratio=0.0)
+        at2(records / f"1990010{day}.AT2", motion.horizontal / STANDARD_GRAVITY, 0.01)
+    # two components in one file, of which the second is nearer to the spectrum
+    rows = "\n".join(f"{0.1 * a:.5f} {a:.5f}" for a in motion.horizontal)
+    (records / "19900109.txt").write_text(f"# N-S E-W m/s2, dt = 0.01\n{rows}\n")
+    spectrum = '{ code = "EC8", ag = 0.25, ground = "B" }'
+    given = ["select", str(records), "--spectrum", spectrum, "--period", "0.2", "--out", str(out)]
+    assert af.commands.main([*given, "--count", "5", "--scales", "0.1", "9"]) == 0
+    said = capsys.readouterr().out
+    code = af.Eurocode8(0.25, "B")
+    found = af.select_records(records, code, 0.2, count=5, scales=(0.1, 9.0))
+    assert str(found) in said
+    assert (out / "selection.csv").read_text().strip() == found.table()
+    assert f"wrote {out / 'selection.png'}" in said
+    column = {"structure": {"shape": "column", "breadth": 1.0, "heights": [1.0]}}
+    case = af.Case.of({**column, **tomllib.loads((out / "selection.toml").read_text())})
+    assert case.target == code
+    for made, motion in zip(case.ground_suite().motions, found.suite().motions, strict=True):
+        assert made.horizontal == pytest.approx(motion.horizontal)
+    joined = ["--event", "19900101*=one", "--event", "19900102*=one"]
+    assert af.commands.main([*given, "--count", "5", *joined]) == 1
+    assert "6 candidates of 4 events, fewer than 5 to select" in capsys.readouterr().err
+    # the nearest set is written, and the command fails
+    assert af.commands.main([*given, "--count", "3", "--scales", "0.01", "0.1"]) == 1
+    said = capsys.readouterr()
+    assert "EC8 is missed by" in said.out
+    assert "no set was found that meets the rule: above is the nearest" in said.err
 
 
 def test_limit_analysis_of_a_case(tmp_path, ring, capsys):

@@ -1,5 +1,7 @@
 """What the pictures of motions show, read back from the drawn lines."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -79,3 +81,25 @@ def test_mean_and_target_of_a_suite_have_colours_of_their_own(shaking):
     *pairs, mean, target = (line.get_color() for line in level.get_lines())
     assert len(pairs) == 6
     assert len({mean, target, *pairs}) == 2 + len(set(pairs))
+
+
+def test_selection_shows_records_mean_target_and_bounds(tmp_path):
+    for seed in range(3):
+        motion = af.Motion.synthetic(duration=2.0, seed=seed, dt=0.02, vertical_ratio=0.0)
+        samples = motion.horizontal / af.units.STANDARD_GRAVITY
+        rows = "\n".join(f"{sample:.6f}" for sample in samples)
+        head = f"PEER\nQuake, {seed + 1}/1/1990, A, 180\nUNITS OF G\nNPTS= 101, DT= .0200 SEC\n"
+        (tmp_path / f"{seed}180.AT2").write_text(f"{head}{rows}\n")
+    rule = replace(af.motion.SELECTION_RULES["NTC-2018"], lower=0.2, upper=4.0)
+    target = af.Eurocode8(0.2, "B")
+    found = af.select_records(tmp_path, target, 0.3, count=3, rule=rule)
+    (axes,) = found.plot().get_axes()
+    *records, mean, aim, low, high = axes.get_lines()
+    assert len(records) == 3
+    drawn = np.mean([line.get_ydata() for line in records], axis=0)
+    assert mean.get_ydata() == pytest.approx(drawn)
+    expected = found.suite().spectra(records[0].get_xdata()) / af.units.STANDARD_GRAVITY
+    assert records[1].get_ydata() == pytest.approx(expected[1])
+    assert aim.get_ydata() == pytest.approx(target.horizontal(aim.get_xdata()))
+    assert low.get_ydata() == pytest.approx(0.2 * aim.get_ydata())
+    assert high.get_ydata() == pytest.approx(4.0 * aim.get_ydata())
