@@ -118,7 +118,7 @@ def overlap_depth(one, two):
     ],
 )
 def test_stones_without_a_joint_do_not_pass_through_each_other(build, peak, met):
-    """The verdict is that of rigid blocks from the start, which know all contacts."""
+    """The verdict is that of rigid blocks from the start, which know all contacts, or doubted."""
     structure, motion = build(), sine(peak)
     model = af.build(structure, fidelity="rigid", displacements="large")
     run = af.time_history(model, motion, dt=0.005, record=af.Record(fields_every=1))
@@ -127,7 +127,9 @@ def test_stones_without_a_joint_do_not_pass_through_each_other(build, peak, met)
     assert "by stones meeting outside their joints: " in run.outcome
     assert met in run.outcome
     assert f"the run {run.outcome}" in run.verdict.remarks
-    assert not run.doubts
+    by_little = any("is dislocated by little" in doubt.cause for doubt in run.doubts)
+    # the wall is displaced by 26 mm, and rigid blocks by 19 mm, where 20 mm decide
+    assert by_little == bool(run.doubts) == (build is running_bond)
     frames = [model.rigid_motions(q, q)[0] for q in run.dataset["q"].values]
     frames += list(run.dataset["fall_pose"].values)
     assert deepest_overlap(structure, frames) < DEEPEST
@@ -135,9 +137,8 @@ def test_stones_without_a_joint_do_not_pass_through_each_other(build, peak, met)
     simulation = af.dynamics.RigidBlockSimulation(structure)
     start = af.dynamics.LooseBlocks.as_built(structure)
     rigid = list(simulation.frames(start, motion.duration + 20.0, motion))
-    fallen = ("partly fallen", "fallen")
     expected = af.dynamics.classify_collapse(structure, rigid).kind
-    assert (run.fall.kind in fallen) == (expected in fallen)
+    assert run.fall.kind == expected or (by_little and expected == "stands")
 
 
 @pytest.fixture(scope="module")

@@ -262,9 +262,10 @@ class _Run:
                 for _ in range(2)
             ),
         )
-        # fields of FallEnergy, then the largest loss and the largest energy exchanged so far [J]
+        # fields of FallEnergy, then the largest loss and the largest energy exchanged so far, and
+        # what is left of the strain energy [J]
         kinetic = _kinetic_energy(bodies, self._v)
-        self._energy = np.array([kinetic, 0.0, 0.0, 0.0, 0.0, 0.0, kinetic])
+        self._energy = np.array([kinetic, *[0.0] * 5, kinetic, start.strain_energy])
         # fields of Settling
         self._settling = np.zeros(4)
         self._overlap, self._time = 0.0, start.time
@@ -366,15 +367,18 @@ def advance_steps(bodies, parameters, workspace, state):  # type: ignore
         lost = energy[3] + work - rise - (kinetic - energy[0])
         energy[0] = kinetic
         if _separate(bodies, parameters, workspace, touching):
-            # what lifts the blocks is taken from the losses of the step, and from a small share
-            # of all energy exchanged
+            # what lifts the blocks is taken from the strain energy of compressed joints, from the
+            # losses of the step, and from a small share of all energy exchanged
             moved = workspace.speeds[: len(q)]
             lift, push = _exchange(bodies, parameters, moved, ground[k])
             available = max(lost - energy[5] + 0.05 * MAX_ENERGY_GAIN * energy[6], 0.0)
+            available += energy[7]
             factor = min(1.0, available / (lift - push)) if lift > push else 1.0
             q += factor * moved
             rise, work = rise + factor * lift, work + factor * push
-            lost -= factor * (lift - push)
+            strain = min(max(factor * (lift - push), 0.0), energy[7])
+            energy[7] -= strain
+            lost -= factor * (lift - push) - strain
         energy[1] += rise
         energy[2] += work
         energy[3] = lost
