@@ -24,6 +24,7 @@ from archfem.dynamics.events import (
 from archfem.dynamics.fall import (
     MeetingMonitor,
     SeparationMonitor,
+    doubt_collapse,
     is_overturning,
     simulate_fall,
     standing_state,
@@ -209,7 +210,8 @@ def _follow_fall(
     tilts = history.ending is Ending.FINISHED and is_overturning(model, state)
     if history.ending not in (Ending.PARTED, Ending.MET) and not tilts:
         shaken = history.ending is not Ending.FINISHED
-        return with_fall(history, standing_state(model, start, state, shaken))
+        history = with_fall(history, standing_state(model, start, state, shaken))
+        return _doubt_kind(history, model)
     try:
         frames, fall = simulate_fall(model, start, state, motion, rocking_ratio)
     except DidNotConverge as error:
@@ -217,7 +219,13 @@ def _follow_fall(
         raise
     dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
     history = with_fall(History(dataset, history.structure), fall)
-    return history.with_doubts((*history.doubts, *_doubt_impulses(history)))
+    return _doubt_kind(history.with_doubts((*history.doubts, *_doubt_impulses(history))), model)
+
+
+def _doubt_kind(history: History, model: Model) -> History:
+    """Return a history with the doubts of a structure near another kind of collapse."""
+    assert history.fall is not None
+    return history.with_doubts((*history.doubts, *doubt_collapse(model.structure, history.fall)))
 
 
 def _doubt_impulses(history: History) -> list[Doubt]:
@@ -226,7 +234,7 @@ def _doubt_impulses(history: History) -> list[Doubt]:
     share = attrs["fall_unsettled"]
     cause = (
         f"impulses of loose blocks did not settle in {share:.0%} of the steps of the fall, and "
-        f"violate contacts by up to {attrs['fall_residual']:.2g} of a step's weight impulse"
+        f"violate contacts by up to {attrs['fall_violation']:.2g} of a step's weight impulse"
     )
     remedy = "compare with `dynamics.RigidBlockSimulation` at half the time step"
     return _doubt_share(share, cause, remedy)

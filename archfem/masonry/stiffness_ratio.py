@@ -44,9 +44,9 @@ def find_soft_blocks(structure: Structure) -> tuple[int, ...]:
 
 
 def find_yielding_blocks(structure: Structure) -> tuple[int, ...]:
-    """Return the blocks, of neither rings nor piers, that deform before their joints open."""
-    # Fill adapts to the rings below; as one rigid body it would support each of them. The pieces of
-    # a fill with joints adapt together.
+    """Return the blocks, of neither rings nor piers, that adapt to others as fill does."""
+    # As one rigid body, fill would support each of the rings below. The pieces of a fill with
+    # joints adapt together.
     return tuple(
         number
         for number in structure.free
@@ -54,7 +54,10 @@ def find_yielding_blocks(structure: Structure) -> tuple[int, ...]:
     )
 
 
-def _is_yielding(structure: Structure, number: int) -> bool:
-    """Return whether a block is softer than its joints (fill about 0.005, voussoirs 40)."""
+def _is_yielding(structure: Structure, number: int, stiffest_fill: float = 1e9) -> bool:
+    """Return whether a block is softer than its joints, and no stiffer than fill can be [Pa]."""
+    # the ratio is about 0.005 for fill and 40 for voussoirs, but below 1 for stones too where
+    # joints are stiffer than the stones
     block = structure.blocks[number]
-    return block.grain or estimate_block_stiffness(structure, number).ratio < 1.0
+    is_fill = block.material.young <= stiffest_fill
+    return block.grain or (is_fill and estimate_block_stiffness(structure, number).ratio < 1.0)

@@ -36,6 +36,7 @@ def by_lmgc90(
     dt: float,
     steps: int,
     ground: tuple[np.ndarray, np.ndarray] | None = None,
+    tolerance: float | None = None,
 ) -> tuple[np.ndarray, float]:
     """Step an arch in LMGC90.
 
@@ -46,6 +47,7 @@ def by_lmgc90(
         dt: time step [s].
         steps: how many.
         ground: times [s] and velocities to the right [m/s] of the fixed blocks.
+        tolerance: of the impulses; None for the usual one, 1.666e-4.
 
     Returns:
         How far each block has moved after each step (steps, n, 2) [m], and the processor time of a
@@ -61,6 +63,8 @@ def by_lmgc90(
     }
     if ground is not None:
         told["ground"] = [each.tolist() for each in ground]
+    if tolerance is not None:
+        told["tolerance"] = tolerance
     with tempfile.TemporaryDirectory() as folder:
         given, out = Path(folder) / "blocks.json", Path(folder) / "moved.npy"
         given.write_text(json.dumps(told))

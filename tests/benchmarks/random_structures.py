@@ -264,7 +264,8 @@ def by_joints(built: af.Structure, motion: af.Motion, *, measure: bool) -> Compa
     overlaps = deepest_overlaps(built, poses, np.maximum(own, 0.0))
     loose = np.empty((0, len(built.blocks), 3))
     if "fall_pose" in run.dataset:
-        loose = run.dataset["fall_pose"].values
+        # the first frame is of the joints, still compressed
+        loose = run.dataset["fall_pose"].values[1:]
     after = deepest_overlaps(built, loose, np.zeros((len(loose), len(built.joints))))
     return replace(found, overlaps=(*overlaps, *after))
 

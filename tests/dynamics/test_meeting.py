@@ -118,7 +118,7 @@ def overlap_depth(one, two):
     ],
 )
 def test_stones_without_a_joint_do_not_pass_through_each_other(build, peak, met):
-    """The verdict is that of rigid blocks from the start, which know all contacts."""
+    """The verdict is that of rigid blocks from the start, which know all contacts, or doubted."""
     structure, motion = build(), sine(peak)
     model = af.build(structure, fidelity="rigid", displacements="large")
     run = af.time_history(model, motion, dt=0.005, record=af.Record(fields_every=1))
@@ -127,7 +127,9 @@ def test_stones_without_a_joint_do_not_pass_through_each_other(build, peak, met)
     assert "by stones meeting outside their joints: " in run.outcome
     assert met in run.outcome
     assert f"the run {run.outcome}" in run.verdict.remarks
-    assert not run.doubts
+    by_little = any("is dislocated by little" in doubt.cause for doubt in run.doubts)
+    # the wall is displaced by 26 mm, and rigid blocks by 19 mm, where 20 mm decide
+    assert by_little == bool(run.doubts) == (build is running_bond)
     frames = [model.rigid_motions(q, q)[0] for q in run.dataset["q"].values]
     frames += list(run.dataset["fall_pose"].values)
     assert deepest_overlap(structure, frames) < DEEPEST
@@ -135,9 +137,50 @@ def test_stones_without_a_joint_do_not_pass_through_each_other(build, peak, met)
     simulation = af.dynamics.RigidBlockSimulation(structure)
     start = af.dynamics.LooseBlocks.as_built(structure)
     rigid = list(simulation.frames(start, motion.duration + 20.0, motion))
-    fallen = ("partly fallen", "fallen")
     expected = af.dynamics.classify_collapse(structure, rigid).kind
-    assert (run.fall.kind in fallen) == (expected in fallen)
+    assert run.fall.kind == expected or (by_little and expected == "stands")
+
+
+@pytest.mark.parametrize(
+    ("thickness", "voussoirs", "friction", "peak"),
+    [(0.48, 9, 0.6, 0.6), pytest.param(0.48, 17, 0.6, 0.6, marks=pytest.mark.slow)],
+)
+def test_a_ring_that_folds_meets_itself(thickness, voussoirs, friction, peak, verified):
+    """It hands over at 0.3 rad, before stones without a joint meet; then many of them do."""
+    contact = af.Contact(1e10, 4e9, friction)
+    structure = af.circular_arch(
+        radius=2.0,
+        thickness=thickness,
+        embrace=180.0,
+        voussoirs=voussoirs,
+        chords=1,
+        contact=contact,
+    )
+    motion = sine(peak)
+    model = af.build(structure, fidelity="rigid", displacements="large")
+    damping, record = af.StiffnessDamping(0.05, 8.0), af.Record(fields_every=1)
+    run = af.time_history(model, motion, dt=0.005, damping=damping, record=record)
+    held = [model.rigid_motions(q, q)[0] for q in run.dataset["q"].values]
+    # the first frame is of the joints, still compressed
+    loose = list(run.dataset["fall_pose"].values[1::8])
+    assert deepest_overlap(structure, held) < 1e-4
+    met = deepest_overlap(structure, loose)
+    assert 0.0 < met < 1e-3
+    assert abs(run.dataset.attrs["energy_drift"]) < 1e-6
+    # rigid blocks from the start: the same kind, at the same time, and energy to 1e-4
+    start = af.dynamics.LooseBlocks.as_built(structure)
+    rigid = list(af.dynamics.RigidBlockSimulation(structure).frames(start, 21.0, motion))
+    expected = af.dynamics.classify_collapse(structure, rigid)
+    energy = rigid[-1].energy
+    assert energy.gained < 1e-4 * energy.lost
+    assert run.fall.kind == expected.kind == "fallen"
+    assert run.fall.time == pytest.approx(expected.time, rel=0.1)
+    verified(
+        f"ring of {voussoirs} stones that folds: time of the first lost stone [s]",
+        expected.time,
+        "rigid blocks from the start",
+        run.fall.time,
+    )
 
 
 @pytest.fixture(scope="module")

@@ -101,3 +101,12 @@ def test_damping_by_the_scheme_is_proposed_where_it_applies(
     given = {} if scheme is None else {"scheme": scheme}
     solver = SnesSolver(Equation(model, pulse(0.1, 0.3), DAMPING, **given))
     assert ("HHT" in solver._remedy()) is proposed
+
+
+@pytest.mark.parametrize(("stiffness", "rigid"), [(1e14, False), (1e15, True)])
+def test_rigid_blocks_are_proposed_where_positions_are_too_coarse(stiffness, rigid):
+    """At 1 PPa/m a joint of 0.5 m² has 1 N for the spacing of numbers at 9 m, and bears 100 kN."""
+    model = af.build(arch(stiffness), fidelity="rigid", displacements="large")
+    remedy = SnesSolver(Equation(model, pulse(0.1, 0.3), DAMPING))._remedy()
+    assert ("RigidBlockSimulation" in remedy) is rigid
+    assert ("smaller dt" in remedy) is not rigid

@@ -68,6 +68,17 @@ def test_rings_and_piers_are_never_left_out():
     assert find_yielding_blocks(soft) == ()
 
 
+def test_stones_without_a_role_on_stiff_joints_are_no_fill():
+    """A stone of 1 m and 30 GPa is softer than joints of 40 GPa/m; soil of 50 MPa is soft."""
+    column = af.column(breadth=1.0, heights=[1.0], contact=af.Contact(4e10, 2e10, 0.6))
+    base, stone = (replace(block, role="other") for block in column.blocks)
+    joint = replace(column.joints[0], role="other")
+    soil = replace(stone, material=af.masonry.BACKFILL)
+    for block, found in ((stone, ()), (soil, (1,))):
+        structure = replace(column, blocks=(base, block), joints=(joint,))
+        assert find_yielding_blocks(structure) == found
+
+
 def test_a_structure_of_soil_alone_is_its_own_skeleton():
     base = af.Block(
         ((0.0, -0.5), (1.0, -0.5), (1.0, 0.0), (0.0, 0.0)), af.STONE, "base", fixed=True

@@ -7,7 +7,7 @@ American Mathematical Monthly 82 (1975) 648), and triangles are merged while the
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations, pairwise
 from math import inf, isinf
 from typing import NamedTuple, Self
@@ -57,11 +57,14 @@ class LooseBlocks:
         poses: displacement of each block's centroid from its position as built, and its rotation,
             anticlockwise (n_blocks, 3) [m, m, rad].
         velocities: rates of the poses; those of fixed blocks have no effect (n_blocks, 3).
+        strain_energy: of joints and blocks, which rigid blocks lose, except for what lifts them out
+            of the compression of joints [J].
     """
 
     time: float
     poses: Array
     velocities: Array
+    strain_energy: float = field(default=0.0, kw_only=True)
 
     @classmethod
     def as_built(cls, structure: Structure, time: float = 0.0) -> Self:

@@ -107,7 +107,6 @@ class StepWorkspace(NamedTuple):
     # normal and tangent; 1/determinant of the normal equations of a face, zero for none (c, 14)
     rows: Array
     speeds: Array  # velocities during the sweeps, the ground's last (b + 1, 3)
-    begun: Array  # velocities at the start of a sweep (b + 1, 3)
     last: SweepResult  # of the sweep before
     rebounding: SweepResult  # with rebound
 
@@ -256,15 +255,15 @@ class _Run:
             np.empty_like(self._q),
             np.empty((len(contacts.key), 14)),
             np.zeros((len(self._q) + 1, 3)),
-            np.zeros((len(self._q) + 1, 3)),
             *(
                 SweepResult(np.zeros((len(self._q) + 1, 3)), np.zeros((len(contacts.key), 2)))
                 for _ in range(2)
             ),
         )
-        # fields of FallEnergy, then the largest loss and the largest energy exchanged so far [J]
+        # fields of FallEnergy, then the largest loss and the largest energy exchanged so far, and
+        # what is left of the strain energy [J]
         kinetic = _kinetic_energy(bodies, self._v)
-        self._energy = np.array([kinetic, 0.0, 0.0, 0.0, 0.0, 0.0, kinetic])
+        self._energy = np.array([kinetic, *[0.0] * 5, kinetic, start.strain_energy])
         # fields of Settling
         self._settling = np.zeros(4)
         self._overlap, self._time = 0.0, start.time
@@ -366,15 +365,18 @@ def advance_steps(bodies, parameters, workspace, state):  # type: ignore
         lost = energy[3] + work - rise - (kinetic - energy[0])
         energy[0] = kinetic
         if _separate(bodies, parameters, workspace, touching):
-            # what lifts the blocks is taken from the losses of the step, and from a small share
-            # of all energy exchanged
+            # what lifts the blocks is taken from the strain energy of compressed joints, from the
+            # losses of the step, and from a small share of all energy exchanged
             moved = workspace.speeds[: len(q)]
             lift, push = _exchange(bodies, parameters, moved, ground[k])
             available = max(lost - energy[5] + 0.05 * MAX_ENERGY_GAIN * energy[6], 0.0)
+            available += energy[7]
             factor = min(1.0, available / (lift - push)) if lift > push else 1.0
             q += factor * moved
             rise, work = rise + factor * lift, work + factor * push
-            lost -= factor * (lift - push)
+            strain = min(max(factor * (lift - push), 0.0), energy[7])
+            energy[7] -= strain
+            lost -= factor * (lift - push) - strain
         energy[1] += rise
         energy[2] += work
         energy[3] = lost
@@ -574,25 +576,19 @@ def _impulse_work(bodies, parameters, before, after, ground):  # type: ignore
 def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # type: ignore
     """Sweep with momentum until impulses settle; return the sweeps and the residual [m/s]."""
     contacts, speeds = workspace.contacts, workspace.speeds
-    last, begun = workspace.last, workspace.begun
+    last = workspace.last
     last.speeds[:] = speeds
     last.impulse[:touching] = contacts.impulse[:touching]
     weight, least, residual = 1.0, np.inf, 0.0
-    window, best, plain = np.inf, np.inf, False
     for sweep in range(1, max_sweeps + 1):
-        begun[:] = speeds
         residual = _sweep_contacts(bodies, workspace, touching)
         if residual <= tolerance:
             residual = measure_residual(bodies, workspace, touching)
             if residual <= tolerance:
                 return sweep, residual
-        # where 50 late sweeps have not improved the residual, the next 50 have no momentum
-        window = min(window, residual)
-        if sweep % 50 == 0:
-            plain = not plain and window > best and sweep >= 150
-            best, window = min(best, window), np.inf
-        # momentum that works against the last change, or that diverges, is dropped
-        if plain or residual > 4.0 * least or _turns_back(bodies, workspace):
+        # Momentum that diverges is dropped. Residuals of faces that open or slide rise for a few
+        # sweeps: restarts at four times the least cost walls up to twice as many sweeps.
+        if residual > 10.0 * least:
             weight, least = 1.0, residual
         least = min(least, residual)
         before, weight = weight, 0.5 + np.sqrt(0.25 + weight**2)
@@ -600,19 +596,6 @@ def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # typ
     speeds[:] = last.speeds
     contacts.impulse[:touching] = last.impulse[:touching]
     return max_sweeps, measure_residual(bodies, workspace, touching)
-
-
-@allocating_entry
-def _turns_back(bodies, workspace):  # type: ignore
-    """Return whether a sweep opposes the momentum with which it began, weighted by mass."""
-    speeds, begun, last = workspace.speeds, workspace.begun, workspace.last.speeds
-    product = 0.0
-    for b in range(len(bodies.mass)):
-        for axis in range(3):
-            mass = bodies.mass[b, 1 if axis == 2 else 0]
-            new = speeds[b, axis]
-            product += mass * (begun[b, axis] - new) * (new - last[b, axis])
-    return product > 0.0
 
 
 @allocating_entry

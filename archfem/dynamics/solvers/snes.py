@@ -220,9 +220,28 @@ class SnesSolver:
             return second.appended_to(first, mean=self.equation.conserving)
         return replace(step, state=replace(step.state, time=target))
 
+    def _rounding_share(self) -> float:
+        """Return the force of the stiffest joint by rounding of positions, over the weight [-]."""
+        structure = self.equation.model.structure
+        stiffness = max(
+            joint.contact.normal_stiffness * depth
+            for joint, depth in zip(structure.joints, structure.depths, strict=True)
+        )
+        rounding = float(np.finfo(float).eps) * structure.size
+        return rounding * stiffness * structure.width / structure.weight
+
     def _remedy(self) -> str:
         """Return what may help where steps fail: damping by the scheme only where it applies."""
         model, scheme = self.equation.model, HHT()
+        stiffest, admissible = self._rounding_share(), 1e-6
+        if stiffest > admissible:
+            # neither shorter steps nor damping make positions more accurate
+            return (
+                f"joints are so stiff that the rounding of positions changes their forces by "
+                f"{stiffest:.1g} of the weight: divide their stiffness by "
+                f"{stiffest / admissible:.0f} or more, or take rigid blocks, "
+                "dynamics.RigidBlockSimulation"
+            )
         try:
             check_friction_scheme(scheme, model.structure)
         except InvalidInput:
