@@ -134,7 +134,7 @@ def test_a_changed_case_is_told_apart(
     else:
         monkeypatch.setattr(af, "__version__", "0.1.0")
     after = af.Study.read(study_file, own_code=True)
-    digests = [[point.digest(study.asked.text) for point in study.points]
+    digests = [[study.asked.digest(point) for point in study.points]
                for study in (before, after)]  # fmt: skip
     if what in ("case", "option"):
         assert not set(digests[0]) & set(digests[1])
