@@ -241,7 +241,7 @@ class Progress:
             status = self._status
             if not self._bar.disable:
                 self._bar.set_postfix(failed=status.failed, runs=status.runs)
-            elif isinstance(sys.stderr, io.TextIOBase):  # a file or pipe; not that of a notebook
+            elif isinstance(sys.stderr, io.TextIOWrapper):  # not that of a notebook
                 sys.stderr.write(f"study: {status}\n")
                 sys.stderr.flush()
 

@@ -68,6 +68,14 @@ def test_a_client_gives_the_rows_that_processes_give(study_file, tmp_path, clien
     )
 
 
+def test_a_pair_is_matched_once_on_a_cluster(matching_study, tmp_path, client):
+    study, marks = matching_study(tmp_path / "marks")
+    found = study.run(tmp_path / "out", client=client)
+    assert sorted(mark.name[0] for mark in marks.iterdir()) == list("abc")
+    serial, _ = matching_study(tmp_path / "serial")
+    assert (found["mean"].values == serial.run(workers=1)["mean"].values).all()
+
+
 def test_a_worker_of_another_version_is_named(study_file, client, monkeypatch):
     monkeypatch.setattr("archfem.studies.cluster.describe_version", lambda: "9.9.9")
     with pytest.raises(
