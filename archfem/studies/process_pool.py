@@ -9,6 +9,7 @@ replaced.
 import logging
 import os
 import pickle
+import re
 import signal
 import sys
 import threading
@@ -75,14 +76,14 @@ def evaluate_serially(
     points: Sequence[tuple[int, StudyPoint]], evaluator: Evaluator
 ) -> Iterator[tuple[int, Row]]:
     """Evaluate points in this process, one after another; a repeated warning is logged once."""
-    places: Counter[tuple[str, int]] = Counter()  # in the code, of all warnings so far
+    warnings: Counter[str] = Counter()
 
     def is_new(record: logging.LogRecord) -> bool:
         if record.levelno != logging.WARNING:
             return True
-        # numbers in the text differ from run to run, its place does not
-        places[record.pathname, record.lineno] += 1
-        return places[record.pathname, record.lineno] == 1
+        kind = re.sub(r"[\d.]+(e[-+]\d+)?", "#", record.getMessage())  # numbers differ by the run
+        warnings[kind] += 1
+        return warnings[kind] == 1
 
     for number, point in points:
         logger.addFilter(is_new)
@@ -91,7 +92,7 @@ def evaluate_serially(
         finally:
             logger.removeFilter(is_new)
         yield number, row
-    if repeated := places.total() - len(places):
+    if repeated := warnings.total() - len(warnings):
         logger.warning("%d more warnings as above, of other runs, are not repeated", repeated)
 
 
