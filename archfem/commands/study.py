@@ -34,43 +34,34 @@ def study(options: argparse.Namespace) -> int:
     errors = table["error"].values.ravel().tolist()
     for error in sorted({error for error in errors if error}):
         print(f"{errors.count(error)} ended in {error}")
-    text = _write_text(definition, table, folder)
-    print(text)
-    _draw(definition, table, folder)
+    _write_results(definition, table, folder)
     for name in ("study.txt", "study.png", NETCDF_FILE, CSV_FILE, EXCEL_FILE):
         if (folder / name).is_file():
             print(f"wrote {folder / name}")
     return 1 if all(errors) else 0
 
 
-def _write_text(definition: "Study", table: xr.Dataset, folder: Path) -> str:
-    """Write the table of a study as text, and the findings of each case of a comparison."""
+def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> None:
+    """Print and write the table of a study, draw it, and write the findings of a comparison."""
     from archfem.studies.comparison import file_name, study_table, write_finding
     from archfem.studies.study import Comparison
+    from archfem.view.studies import draw_findings, draw_study
+    from archfem.view.style import save
 
     findings = definition.findings(table) if isinstance(definition, Comparison) else {}
     for name, finding in findings.items():
         write_finding(finding, folder / f"{file_name(name)}.json")
     text = study_table(findings) if findings else format_table(table)
+    print(text)
     with atomic_write(folder / "study.txt") as draft:
         draft.write_text(f"{definition.title}\n\n{text}\n", encoding="utf-8")
-    return text
-
-
-def _draw(definition: "Study", table: xr.Dataset, folder: Path) -> None:
-    """Draw the scales of a comparison, or the findings of a study over the keys that vary."""
-    from archfem.studies.study import Comparison
-    from archfem.view.studies import draw_findings, draw_study
-    from archfem.view.style import save
-
-    path = folder / "study.png"
-    path.unlink(missing_ok=True)  # it would be of another table
+    picture = folder / "study.png"
+    picture.unlink(missing_ok=True)  # it would be of another table
+    factors = {name: finding.factors for name, finding in findings.items() if finding.scales}
     try:
-        if isinstance(definition, Comparison) and definition.scales is not None:
-            found = definition.findings(table).items()
-            factors = {name: finding.factors for name, finding in found}
-            save(draw_study(factors, definition.reduction, definition.title), path)
+        if isinstance(definition, Comparison) and factors:
+            save(draw_study(factors, definition.reduction, definition.title), picture)
         else:
-            save(draw_findings(table), path)
+            save(draw_findings(table), picture)
     except InvalidInput as error:
         print(f"no picture: {error}")

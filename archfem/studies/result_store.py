@@ -37,7 +37,7 @@ from archfem._files import (
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, StudyStopped
-from archfem.studies.parameter_space import Axis
+from archfem.studies.parameter_space import PAIR_KEY, Axis
 from archfem.studies.process_pool import Row
 from archfem.studies.shared_results import count_results
 from archfem.units import in_si_unit
@@ -274,7 +274,9 @@ def build_table(
     table = xr.Dataset(attrs=dict(attributes))
     for axis in axes:
         for k, key in enumerate(axis.keys):
-            values, unit = in_si_unit([row[k] for row in axis.rows])
+            values, unit = [row[k] for row in axis.rows], ""
+            if "." in key and key != PAIR_KEY:  # of the case; others are names
+                values, unit = in_si_unit(values)
             attributes = {"units": unit} if unit else {}
             table.coords[_coordinate(key)] = _coordinate(axis.name), _to_array(values), attributes
         if axis.name not in axis.keys:

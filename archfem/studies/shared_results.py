@@ -30,7 +30,9 @@ def share_results(folder: Path | None) -> Iterator[None]:
 
 def compute_once(kind: str, key: str, compute: Callable[[], Any]) -> Any:
     """Return the shared result of a key as JSON represents it, or compute and share it."""
-    if not _folders or (folder := _folders[-1]) is None:
+    folder = _folders[-1] if _folders else None
+    # this machine of a cluster may not have the folder of the study
+    if folder is None or not folder.parent.is_dir():
         return compute()
     digest = hashlib.sha256(f"{describe_version()} {key}".encode()).hexdigest()[:32]
     path = folder / kind / f"{digest}.json"
@@ -40,7 +42,7 @@ def compute_once(kind: str, key: str, compute: Callable[[], Any]) -> Any:
         # another worker may have finished it meanwhile
         if (content := _read(path)) is None:
             content = compute()
-            # a full disk, or a folder that this machine of a cluster does not have: not shared
+            # where the disk is full it is not shared
             with suppress(OSError, InvalidInput):
                 write_sealed_json(path, content)
     return content

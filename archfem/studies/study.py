@@ -179,10 +179,10 @@ class Study:
         with ExitStack() as stack:
             if store is None:
                 temporary = TemporaryDirectory(prefix="archfem-", ignore_cleanup_errors=True)
-                shared = Path(stack.enter_context(temporary))
+                shared = Path(stack.enter_context(temporary), "shared")
             else:
                 stack.enter_context(store.lock())
-                shared = store.shared
+                shared = store.shared.resolve()
             rows = self._collect_rows(store, shared, workers, client)
             table = build_table(self.axes, rows, self._attributes)
             if store is not None:
@@ -480,11 +480,9 @@ def run_pairs(
             "pairs run in parallel only if a case has a [suite] and names its model: "
             "model.fidelity = 'auto' selects one by the first pair for all"
         )
-    pairs = tuple(case.suite["pairs"])
-    points = tuple(Point(case.settings, case.folder, ((PAIR_KEY, pair),)) for pair in pairs)
-    evaluator = Evaluator(save_pair, {"folder": str(Path(folder).resolve())})
-    axis = Axis(PAIR_KEY, (PAIR_KEY,), tuple((pair,) for pair in pairs))
-    table = Study(case.title, evaluator, (axis,), points).run(workers=workers, client=client)
+    pairs = list(case.suite["pairs"])
+    find = {"name": save_pair, "folder": str(Path(folder).resolve())}
+    table = Study.of(case, {PAIR_KEY: pairs}, find).run(workers=workers, client=client)
     endings = table["ended"].values if "ended" in table else [""] * len(pairs)
     return [a or b for a, b in zip(table["error"].values.tolist(), endings, strict=True)]
 
