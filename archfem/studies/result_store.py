@@ -344,13 +344,14 @@ def _write_sheet(frame: pd.DataFrame, path: Path) -> None:
 def format_table(table: xr.Dataset, max_rows: int = 50) -> str:
     """Return the table of a study as text: keys, and the findings in which points differ."""
     frame = _flatten(table).drop(columns="error")
-    differs = {name: frame[name].astype(str).nunique() > 1 for name in frame}
-    names = [name for name in frame if differs[name] or name in table.coords]
+    differs = {name: frame[name].nunique(dropna=False) > 1 for name in frame}
+    names = [name for name in frame if name in table.coords]
+    names += [name for name in frame if differs[name] and name not in names]
     units = {name: table[name].attrs.get("units") if name in table else None for name in names}
     head = [f"{name} [{units[name]}]" if units[name] else str(name) for name in names]
-    rows = [[_format_cell(value) for value in row] for row in frame[names].values.tolist()]
-    text = [align_columns(head, rows[:max_rows])]
-    text += [f"… {len(rows) - max_rows} more points"] if len(rows) > max_rows else []
+    shown = frame[names].head(max_rows).to_numpy(dtype=object)
+    text = [align_columns(head, [[_format_cell(value) for value in row] for row in shown])]
+    text += [f"… {len(frame) - max_rows} more points"] if len(frame) > max_rows else []
     same = {name: _format_cell(frame[name].iloc[0]) for name in frame if name not in names}
     shared = "; ".join(f"{name} = {text}" for name, text in same.items() if text)
     return "\n".join([*text, *([f"the same at all points: {shared}"] if shared else [])])

@@ -102,14 +102,17 @@ def _draw_over_key(
         axes.set_xticks(range(len(labels)), labels, rotation=30, ha="right")
         axes.set_xlim(-0.5, len(labels) - 0.5)
         frame = frame.assign(**{key: frame[key].map(labels.index)})
+    # samples differ in all keys at once: no two of them are joined
+    joined = bool(others) and not in_words and 2 * frame.groupby(others).ngroups <= len(frame)
+    sets = others if joined else [coloured] if coloured else []
     colours: dict[Any, str] = {}
-    for _, group in frame.groupby(others, sort=False) if others else [("", frame)]:
+    for _, group in frame.groupby(sets, sort=False) if sets else [("", frame)]:
         words = None if coloured is None else group[coloured].iloc[0]
         label = None if words is None or words in colours else f"{words}"
         colour = colours.setdefault(words, LINE_COLOURS[len(colours)])
         known = group[np.isfinite(group["value"])].sort_values(key)
         style = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
-        axes.plot(known[key], known["value"], "o" if in_words else "o-", **style)
+        axes.plot(known[key], known["value"], "o-" if joined else "o", **style)
 
 
 def draw_study(
