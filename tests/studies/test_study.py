@@ -15,8 +15,7 @@ from scipy import stats
 
 import archfem as af
 from archfem.cases import provenance
-from archfem.studies import parameter_axes
-from archfem.studies import result_store
+from archfem.studies import parameter_axes, result_store
 from archfem.studies import study as study_module
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import group_by_model
