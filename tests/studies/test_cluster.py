@@ -136,6 +136,25 @@ def test_a_scheduler_that_dies_leaves_what_was_finished(small_ring, finders, tmp
 
 
 @pytest.mark.slow
+def test_a_worker_that_ends_is_told(small_ring, finders, tmp_path, monkeypatch, caplog):
+    over = {"structure.thickness": [0.5 + 0.01 * k for k in range(12)]}
+    find = {"name": "finders_of_tests:slowly", "seconds": 0.5}
+    study = af.Study.of(small_ring, over, find)
+    with cluster(tmp_path) as (address, processes):
+        original = Store.write_row
+
+        def write_row(self, digest, row):
+            original(self, digest, row)
+            if len(self.digests()) == 3:
+                processes[1].kill()
+
+        monkeypatch.setattr(Store, "write_row", write_row)
+        table = study.run(tmp_path / "out", client=address)
+    assert not table["error"].values.astype(bool).any()
+    assert "1 workers of the scheduler ended (tcp://" in caplog.text
+
+
+@pytest.mark.slow
 def test_a_process_of_another_version_is_named(study_file, tmp_path):
     preload = tmp_path / "older.py"
     preload.write_text("import archfem\narchfem.__version__ = '0.1.0'\n")

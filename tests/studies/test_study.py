@@ -298,6 +298,25 @@ def test_cases_and_what_is_computed_are_in_one_file(ring_file, tmp_path, capsys)
     assert (folder / "results.xlsx").read_bytes() == before  # without the time of day
 
 
+def test_pairs_that_another_worker_matches_are_left_for_later(small):
+    over = {"analysis.dt": [0.005], "suite.pair": ["first", "second"]}
+    points = list(enumerate(af.Study.of(af.Case.read(small), over, "dead load").points))
+    tasks = TaskQueue(points, Evaluator.of("dead load"))
+    assert tasks.pop(None, (), {"first"}).pair == "second"
+    assert tasks.pop(None, (), {"first"}).pair == "first"  # better than to wait
+
+
+def test_a_long_table_is_cut_and_equal_findings_are_said_once(small_ring):
+    over = {"structure.thickness": ["0.5 m", "0.6 m", "0.7 m"]}
+    table = af.Study.of(small_ring, over, lambda case: {"a": 1.5, "b": case.structure.weight}).run(
+        workers=1
+    )
+    lines = result_store.format_table(table, max_rows=2).splitlines()
+    assert lines[0].split() == ["structure.thickness", "[m]", "b"]
+    assert [line.split()[0] for line in lines[1:3]] == ["0.5", "0.6"]
+    assert lines[3:] == ["… 1 more points", "the same at all points: a = 1.5"]
+
+
 def test_the_study_files_of_the_documentation_are_read(tmp_path):
     root = Path(__file__).parents[2]
     page = (root / "docs/howto/studies.md").read_text(encoding="utf-8")
