@@ -27,10 +27,11 @@ from archfem.errors import ArchfemError, InvalidInput
 from archfem.studies.comparison import Finding, build_findings, file_name, parse_search
 from archfem.studies.evaluators import (
     MOTION_EVALUATORS,
-    NAMED_EVALUATORS,
     Evaluator,
     Findings,
     evaluate_comparison,
+    evaluate_dead_load,
+    evaluate_limit,
     refuse_code,
 )
 from archfem.studies.parameter_space import (
@@ -157,9 +158,10 @@ class Study:
         """Evaluate all points that are not stored in the folder yet.
 
         Args:
-            folder: folder for the row of each finished point, and for the table as NetCDF, CSV, and
-                Parquet if pyarrow is installed. A stored row is used again for the same case,
-                files, function and version of archfem. None stores nothing.
+            folder: folder for the row of each finished point, and for the table as NetCDF and CSV,
+                and as Parquet and Excel if `archfem[tables]` is installed. A stored row is used
+                again for the same case, files, function and version of archfem; title and
+                pictures of the case do not count. None stores nothing.
             workers: number of processes on this machine, one thread each; by default the number of
                 cores; 1 computes in this process.
             client: client of Dask distributed, or the address of a scheduler, instead of processes.
@@ -316,11 +318,8 @@ class Comparison(Study):
         labels = []
         for number, point in enumerate(self.points):
             own = replace(point, changes=tuple(c for c in point.changes if c[0] != PAIR_KEY))
-            names = [
-                *cases[number // variations][:1],
-                *([describe_changes(own)] if own.changes else []),
-            ]
-            labels.append(", ".join(names) or self.title)
+            changes = [describe_changes(own)] if own.changes else []
+            labels.append(", ".join([*cases[number // variations][:1], *changes]) or self.title)
         return labels
 
     def _check(self) -> None:
@@ -345,12 +344,10 @@ def _read_study(
     missing = [] if {"case", "cases"} & set(settings) else ["case"]
     missing += [] if {"cases", "vary"} & set(settings) else ["vary"]
     if missing or {"case", "cases"} <= set(settings):
+        reason = f"says nothing of {missing[0]}" if missing else "has both case and cases"
         raise InvalidInput(
-            f"it says nothing of {missing[0]}: "
-            if missing
-            else "it has both case and cases: "
-            'write case = "file.toml" and vary, keys of the case with lists of values or '
-            'distributions; or tables [cases."name"] of several cases, with or without vary'
+            f'it {reason}: write case = "file.toml" and vary, keys of the case with lists of '
+            'values or distributions; or tables [cases."name"] of several cases, with or without vary'
         )
     asked = _parse_evaluator(settings, own_code)
     cases = _read_cases(settings, path.parent, changes)
@@ -386,9 +383,7 @@ def _parse_evaluator(settings: Mapping[str, Any], own_code: bool) -> Evaluator:
             "scales is the search of a comparison: take it out, or compute = { name = 'scales', "
             "precision = 0.1, between = [0.2, 2.0] }"
         )
-    if "pairs" in settings and asked.find in set(NAMED_EVALUATORS.values()) - set(
-        MOTION_EVALUATORS
-    ):
+    if "pairs" in settings and asked.find in (evaluate_dead_load, evaluate_limit):
         raise InvalidInput(f"pairs are motions, and compute = {find!r} needs none: take pairs out")
     return asked
 

@@ -426,7 +426,7 @@ RANDOM = "vary.structure.thickness = { distribution = 'norm', loc = 0.5, scale =
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (GOOD, "study.toml: it says nothing of vary"),
+        (GOOD, 'study.toml: it says nothing of vary: write case = "file.toml" and vary'),
         (f"{GOOD}[cases]", "study.toml: it has both case and cases"),
         (f"{GOOD}find = 'limit'", "study.toml: unknown key 'find'"),
         (f"{GOOD}scales = true\nvary.title = ['a']", "scales is the search of a comparison"),
