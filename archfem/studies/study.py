@@ -347,7 +347,7 @@ def _read_study(
         reason = f"says nothing of {missing[0]}" if missing else "has both case and cases"
         raise InvalidInput(
             f'it {reason}: write case = "file.toml" and vary, keys of the case with lists of '
-            'values or distributions; or tables [cases."name"] of several cases, with or without vary'
+            'values or distributions; or tables [cases."name"] of several cases'
         )
     asked = _parse_evaluator(settings, own_code)
     cases = _read_cases(settings, path.parent, changes)
