@@ -1,7 +1,9 @@
 """Units: factors into SI, as in `young=30 * GPa`, and quantities as text, as in "1.48 MPa/mm"."""
 
 import re
-from functools import cache
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import cache, partial
 from math import degrees, inf, isfinite, pi, prod, tan
 from typing import Any
 
@@ -111,6 +113,23 @@ def in_degrees(value: Any, key: str) -> float:
             f'{degrees(number):.4g} for {number:.4g} rad, or "{number:.6g} degree" if that is right'
         )
     return number
+
+
+def in_si_unit(values: Sequence[Any]) -> tuple[list[Any], str]:
+    """Return quantities as numbers in one SI unit, angles in degrees; other values unchanged.
+
+    The unit is empty where all values are plain numbers, or one is text that is no quantity.
+    """
+    # "g" is gravity, as no key of a case is a mass; a pure number is no angle
+    units = ("m", "m/s**2", "Pa", "Pa/m", "N/m**3", "s", "Hz", "N", "1", "degree")
+    texts = [value for value in values if isinstance(value, str)]
+    if not texts or not all(re.match(r"\s*[-+]?\.?\d", text) for text in texts):
+        return list(values), ""
+    for unit in units:
+        with suppress(InvalidInput):
+            convert = partial(in_unit, unit=unit, key="value")
+            return [None if value is None else convert(value) for value in values], unit
+    return list(values), ""
 
 
 def _check_text(text: str, unit: str, key: str) -> None:

@@ -5,7 +5,7 @@ import pint
 import pytest
 
 import archfem as af
-from archfem.units import COMMON_UNITS
+from archfem.units import COMMON_UNITS, in_si_unit
 
 
 @pytest.fixture(scope="module")
@@ -25,3 +25,21 @@ def test_common_units_are_those_of_the_registry(registry, unit, si):
 def test_a_common_unit_of_another_dimension_is_refused(text, si):
     with pytest.raises(af.errors.InvalidInput, match="is not in a unit like"):
         af.units.in_unit(text, si, "length")
+
+
+@pytest.mark.parametrize(
+    ("values", "numbers", "unit"),
+    [
+        (["0.5 m", "40 cm", 0.3], [0.5, 0.4, 0.3], "m"),
+        (["0.3 g", None], [0.3 * 9.80665, None], "m/s**2"),
+        (["159 degree"], [159.0], "degree"),
+        (["1.48 MPa/mm"], [1.48e9], "Pa/m"),
+        (["rigid", "0.5 m"], ["rigid", "0.5 m"], ""),
+        (["3 pairs"], ["3 pairs"], ""),
+        ([0.5, 1], [0.5, 1], ""),
+    ],
+)
+def test_quantities_of_one_unit_are_numbers_and_other_values_stay(values, numbers, unit):
+    found, found_unit = in_si_unit(values)
+    assert found == pytest.approx(numbers) if unit else found == numbers
+    assert found_unit == unit

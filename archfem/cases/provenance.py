@@ -7,7 +7,7 @@ reused only if its digest is equal, so that no result of another file or version
 import hashlib
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -65,6 +65,31 @@ def hash_inputs(settings: Table, folder: Path = Path()) -> str:
     order = _tables_within(settings.get("structure"))
     text = json.dumps([describe_version(), settings, files, order], sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def hash_sections(
+    settings: Table, folder: Path, sections: Iterable[str], left_out: Collection[str] = ()
+) -> str:
+    """Return the SHA-256 of sections of a case, without some of their keys, and their files."""
+    tables = {
+        name: {key: value for key, value in settings[name].items() if key not in left_out}
+        for name in sections
+        if name in settings
+    }
+    files = [(str(path), hash_file(path)) for path in list_input_files(tables, folder)]
+    # keys are not sorted: the order of arches and piers is that in the bridge
+    return hashlib.sha256(json.dumps([tables, files], default=str).encode()).hexdigest()
+
+
+def remove_presentation(settings: Table) -> dict[str, Any]:
+    """Return the settings without those that change no number: the title, and pictures and films.
+
+    The largest values of a run are those of its records, so that `output.save_every` stays.
+    """
+    output = _as_table(settings.get("output"))
+    kept = {key: value for key, value in output.items() if key == "save_every"}
+    others = {key: value for key, value in settings.items() if key not in ("title", "output")}
+    return others | ({"output": kept} if kept else {})
 
 
 def _record_names(motion: Any) -> Iterator[str]:

@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
         # All else is printed after the verdict, which is known last.
         with replace_run(case, folder) as draft, redirect_stdout(output):
             if options.workers > 1 and case.suite is not None:
-                from archfem.studies.comparison_run import run_pairs
+                from archfem.studies.study import run_pairs
 
                 # Workers save the histories, which `run_case` reuses below.
                 run_pairs(case, draft, workers=options.workers)

@@ -3,59 +3,65 @@
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from archfem._files import create_result_folder
+import xarray as xr
+
+from archfem._files import atomic_write, create_result_folder
 from archfem.errors import InvalidInput
-from archfem.studies.result_store import status
+from archfem.studies.result_store import CSV_FILE, EXCEL_FILE, NETCDF_FILE, format_table, status
+
+if TYPE_CHECKING:
+    from archfem.studies.study import Study
 
 
-def study(options: argparse.Namespace) -> None:
-    """Run a study, or the points of it that are left; print and write its tables."""
+def study(options: argparse.Namespace) -> int:
+    """Run a study, or the points of it that are left: a table of all points, and a picture."""
     if options.status is not None:
         print(status(options.status))
-        return
+        return 0
     if options.case is None or options.out is None:
         raise InvalidInput("a study needs a file and a folder: archfem study STUDY.toml --out DIR")
-    from archfem.studies.comparison import read_study_tables
+    from archfem.studies.study import Study
 
     if options.own_code:  # compute = "module:function" beside the file
         sys.path.insert(0, str(Path(options.case).resolve().parent))
-    if "cases" in read_study_tables(Path(options.case)):
-        _compare(options, create_result_folder(options.out))
-    else:
-        _run_study(options, create_result_folder(options.out))
-
-
-def _compare(options: argparse.Namespace, folder: Path) -> None:
-    """Compare cases: tables, and a figure of the motion scales at first mechanisms."""
-    from archfem.studies.comparison import Comparison, study_table
-    from archfem.studies.comparison_run import run_comparison, write_comparison
-
-    definition = Comparison.read(options.case, options.changes)
-    print(definition.title)
-    findings = {}
-    for name, finding in run_comparison(
-        definition, folder, workers=options.workers, client=options.scheduler
-    ):
-        findings[name] = finding
-        print(f"{name}: {len(finding.runs)} pairs")
-    text = study_table(findings)
-    print(text)
-    for path in write_comparison(definition, findings, text, folder):
-        print(f"wrote {path}")
-
-
-def _run_study(options: argparse.Namespace, folder: Path) -> None:
-    """Run variations of one case: table of results, and errors of failed points."""
-    from archfem.studies.result_store import CSV_FILE, NETCDF_FILE
-    from archfem.studies.study import Study
-
     definition = Study.read(options.case, options.changes, own_code=options.own_code)
-    print(f"{definition.title}: {len(definition.points)} points")
+    folder = create_result_folder(options.out)
+    print(f"{definition.title}: {len(definition.points)} points", flush=True)
     table = definition.run(folder, workers=options.workers, client=options.scheduler)
     print(status(folder))
     errors = table["error"].values.ravel().tolist()
     for error in sorted({error for error in errors if error}):
         print(f"{errors.count(error)} ended in {error}")
-    for name in (NETCDF_FILE, CSV_FILE):
-        print(f"wrote {folder / name}")
+    _write_results(definition, table, folder)
+    for name in ("study.txt", "study.png", NETCDF_FILE, CSV_FILE, EXCEL_FILE):
+        if (folder / name).is_file():
+            print(f"wrote {folder / name}")
+    return 1 if all(errors) else 0
+
+
+def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> None:
+    """Print and write the table of a study, draw it, and write the findings of a comparison."""
+    from archfem.studies.comparison import file_name, study_table, write_finding
+    from archfem.studies.study import Comparison
+    from archfem.view.studies import draw_findings, draw_study
+    from archfem.view.style import save
+
+    findings = definition.findings(table) if isinstance(definition, Comparison) else {}
+    for name, finding in findings.items():
+        write_finding(finding, folder / f"{file_name(name)}.json")
+    text = study_table(findings) if findings else format_table(table)
+    print(text)
+    with atomic_write(folder / "study.txt") as draft:
+        draft.write_text(f"{definition.title}\n\n{text}\n", encoding="utf-8")
+    picture = folder / "study.png"
+    picture.unlink(missing_ok=True)  # it would be of another table
+    factors = {name: finding.factors for name, finding in findings.items() if finding.scales}
+    try:
+        if isinstance(definition, Comparison) and factors:
+            save(draw_study(factors, definition.reduction, definition.title), picture)
+        else:
+            save(draw_findings(table), picture)
+    except InvalidInput as error:
+        print(f"no picture: {error}")

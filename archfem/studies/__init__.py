@@ -2,8 +2,7 @@
 
     cache            models, motions and solvers reused between points
     cluster          evaluation on a Dask cluster
-    comparison       cases side by side: definition and tables
-    comparison_run   running them; pairs of a suite
+    comparison       cases side by side: findings and tables
     convergence      order, limit and error bar; accuracy of a case
     evaluators       functions from a case to a flat table
     fork_server      loads what workers share
@@ -13,7 +12,8 @@
     parameter_space  products, samples, points
     process_pool     workers on this machine
     result_store     rows on disk, progress, dataset
-    study            Study
+    shared_results   results that workers share, computed once
+    study            Study, Comparison; study files; pairs of a suite
     variations       verdict_range: runs over uncertain properties
 
 Imports all rooms before it. Start reading at `study`.

@@ -1,9 +1,7 @@
 from .cache import dead_load_of as dead_load_of
 from .cache import ground_motion as ground_motion
-from .comparison import Comparison as Comparison
 from .comparison import Finding as Finding
 from .comparison import study_table as study_table
-from .comparison_run import run_pairs as run_pairs
 from .convergence import Convergence as Convergence
 from .convergence import MeshSensitivity as MeshSensitivity
 from .convergence import case_accuracy as case_accuracy
@@ -21,4 +19,6 @@ from .parameter_space import parameter_axes as parameter_axes
 from .result_store import Status as Status
 from .result_store import read_table as read_table
 from .result_store import status as status
+from .study import Comparison as Comparison
 from .study import Study as Study
+from .study import run_pairs as run_pairs

@@ -6,12 +6,10 @@ computed anew.
 """
 
 import fcntl
-import hashlib
-import json
 import os
 import tempfile
 from collections import OrderedDict
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -22,7 +20,7 @@ from archfem._numba import source_digest
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
-from archfem.cases.provenance import hash_file, list_input_files
+from archfem.cases.provenance import hash_sections
 from archfem.cases.run import DeadLoadResult, damping_of, dead_load_of_case
 from archfem.dynamics.schemes import Conserving
 from archfem.dynamics.solvers.base import StepSolver
@@ -37,6 +35,7 @@ from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.modes import Modes, modes
 from archfem.studies.parameter_space import MODEL_SECTIONS
+from archfem.studies.shared_results import compute_once
 
 Value = TypeVar("Value")
 
@@ -139,7 +138,7 @@ def ground_motion(case: Case) -> Motion:
         return case.ground_motion()  # raises the error for a case without motion
     # The scale is applied last, so that scaled motions share one file and one matching.
     unscaled = replace(case, motion=_without(case.motion, ("scale",)))
-    key = _key(case, ("motion",), ("scale",))
+    key = hash_sections(case.settings, case.folder, ("motion",), ("scale",))
     return _look_up("motions", key, unscaled.ground_motion).scaled(case.motion.get("scale", 1.0))
 
 
@@ -149,11 +148,29 @@ def ground_suite(case: Case) -> Suite:
         return case.ground_suite()  # raises the error for a case without suite
     keys = ("scale", "reduction", "reversed")
     plain = replace(case, suite=_without(settings, keys))
-    suite = _look_up("suites", _key(case, ("suite",), keys), plain.ground_suite)
+    key = hash_sections(case.settings, case.folder, ("suite",), keys)
+    suite = _look_up("suites", key, lambda: _match_once(plain, key))
     suite = replace(
         suite, scale=settings.get("scale", 1.0), reduction=settings.get("reduction", 1.0)
     )
     return suite.reversed() if settings.get("reversed", False) else suite
+
+
+def _match_once(case: Case, key: str) -> Suite:
+    """Return the suite of a case; its matched pairs are shared by all workers of a study."""
+    if case.suite is None or not case.suite.get("matched", False):
+        return case.ground_suite()  # records are read faster than they are exchanged
+
+    def match() -> list[dict[str, Any]]:
+        return [
+            {"name": pair.name, "dt": pair.dt}
+            | {name: pair.component(name).tolist() for name in pair.components}
+            for pair in case.ground_suite().pairs
+        ]
+
+    # numbers in JSON have all digits: the motions have the same bits as those that were matched
+    pairs = [Motion(**pair) for pair in compute_once("motions", key, match)]
+    return Suite(case.suite.get("name", "suite"), tuple(pairs))
 
 
 def stepper_of(result: DeadLoadResult, motion: Motion) -> Stepper:
@@ -171,18 +188,7 @@ def stepper_of(result: DeadLoadResult, motion: Motion) -> Stepper:
 def _model_key(case: Case) -> str:
     """Key of the model of a case; it includes the motion if that selects the model."""
     selection = ("motion", "suite", "analysis", "criteria") if case.selects_model else ()
-    return _key(case, (*MODEL_SECTIONS, *selection))
-
-
-def _key(case: Case, sections: Sequence[str], left_out: Collection[str] = ()) -> str:
-    """Digest of some sections of a case and of the files that they name."""
-    settings = {
-        name: _without(case.settings[name], left_out) for name in sections if name in case.settings
-    }
-    files = [(str(p), hash_file(p)) for p in list_input_files(settings, case.folder)]
-    # keys are not sorted: the order of arches and piers is that in the bridge
-    text = json.dumps([settings, files], default=str)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hash_sections(case.settings, case.folder, (*MODEL_SECTIONS, *selection))
 
 
 def _without(table: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:

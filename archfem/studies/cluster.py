@@ -1,7 +1,9 @@
 """Evaluation of points on a cluster, by the scheduler of Dask distributed."""
 
+import logging
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
+from pathlib import Path
 from typing import Any
 
 from distributed import Client, KilledWorker, as_completed
@@ -13,20 +15,22 @@ from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import Point
 from archfem.studies.process_pool import Row, evaluate_batch, make_row
 
+logger = logging.getLogger("archfem")
+
 # A scheduler must answer within this time [s].
 SCHEDULER_TIMEOUT = 10.0
 
 
 def evaluate_on_cluster(
-    points: Sequence[tuple[int, Point]], evaluator: Evaluator, client: Any
+    points: Sequence[tuple[int, Point]], evaluator: Evaluator, client: Any, shared: Path
 ) -> Iterator[tuple[int, Row]]:
     """Evaluate points on the workers of a scheduler, given by its client or address."""
     if not isinstance(client, str):
-        yield from _evaluate(points, evaluator, client)
+        yield from _evaluate(points, evaluator, client, shared)
         return
     own_client = _connect(client)
     try:
-        yield from _evaluate(points, evaluator, own_client)
+        yield from _evaluate(points, evaluator, own_client, shared)
     finally:
         own_client.close(timeout=SCHEDULER_TIMEOUT)
 
@@ -46,7 +50,7 @@ def _connect(address: str) -> Client:
 
 
 def _evaluate(
-    points: Sequence[tuple[int, Point]], evaluator: Evaluator, client: Client
+    points: Sequence[tuple[int, Point]], evaluator: Evaluator, client: Client, shared: Path
 ) -> Iterator[tuple[int, Row]]:
     """Submit points in batches and yield their rows as batches finish."""
     version = describe_version()
@@ -55,10 +59,17 @@ def _evaluate(
         batches = [points[first : first + size] for first in range(0, len(points), size)]
         # not pure: a batch that was evaluated before, and has failed, is to be evaluated again
         futures = {
-            client.submit(evaluate_batch, batch, evaluator, version, pure=False): batch
+            client.submit(evaluate_batch, batch, evaluator, version, shared, pure=False): batch
             for batch in batches
         }
+        workers = set(client.nthreads())
         for future in as_completed(futures):
+            if lost := workers - (present := set(client.nthreads())):
+                logger.warning(
+                    "%d workers of the scheduler ended (%s): others compute their points again",
+                    *(len(lost), ", ".join(sorted(lost))),
+                )
+            workers = present
             yield from _receive(future, futures.pop(future), version)
     except (CommClosedError, OSError, TimeoutError, CancelledError) as error:
         raise StudyStopped(
@@ -74,6 +85,10 @@ def _receive(
     try:
         worker_version, rows = future.result()
     except KilledWorker as error:
+        logger.warning(
+            "workers ended while they computed points %s, which are lost: %s",
+            *([number for number, _ in batch], error),
+        )
         row = make_row({}, f"WorkerDied: {error}", ours=False)
         yield from ((number, row) for number, _ in batch)
         return

@@ -1,10 +1,10 @@
-"""Comparison of several cases under the motions of their suites: definition and tables."""
+"""Comparison of several cases under the motions of their suites: findings and their tables."""
 
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from functools import cached_property
+from dataclasses import asdict, dataclass, field, replace
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -15,26 +15,13 @@ from archfem._files import align_columns, atomic_write
 from archfem._typing import Array
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
-from archfem.cases.toml_file import check_table, read_tables, refuse_unknown
+from archfem.cases.toml_file import check_table
 from archfem.dynamics.fall import FALLEN_STATES
-from archfem.dynamics.history import (
-    Ending,
-    History,
-    first_mechanisms,
-    partial_history,
-)
+from archfem.dynamics.history import Ending
 from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
-from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.criteria import assessed_joints, part_roles
+from archfem.errors import InvalidInput
 from archfem.limit.mechanism_count import MECHANISM_KINDS
-from archfem.studies.cache import dead_load_of, first_mode, ground_motion, ground_suite
-from archfem.studies.evaluators import Evaluator, Findings, run_motion, scales_of
-from archfem.studies.parameter_space import PAIR_KEY, Axis, Point
-
-
-def read_study_tables(path: Path) -> dict[str, Any]:
-    """Read the TOML tables of a study file."""
-    return read_tables(path, "study")
+from archfem.studies.parameter_space import PAIR_KEY, Point
 
 
 @validate_methods
@@ -77,12 +64,6 @@ class Finding:
     def factors(self) -> dict[str, Array]:
         """Smallest failing scale of each pair (pairs,) [-], for each definition of a mechanism."""
         return {definition: self.least(definition) for definition in MECHANISM_DEFINITIONS}
-
-
-def largest_by_part(values: xr.DataArray) -> dict[str, float]:
-    """Return the largest value over the joints of each part."""
-    largest = values.groupby("part").max()
-    return dict(zip(largest["part"].values.tolist(), largest.values.tolist(), strict=True))
 
 
 def write_finding(finding: Finding, path: Path) -> None:
@@ -174,157 +155,71 @@ def _range_text(scales: Array) -> str:
     return f"{middle} ({low} to {high})"
 
 
-@validate_methods
-@dataclass(frozen=True)
-class Comparison:
-    """Cases to compare, each under the motions of its suite.
-
-    Attributes:
-        title: title.
-        cases: cases by name.
-        pairs: pairs of the suites that are run; None for all.
-        scales: options of `mechanism_scales`, which searches the scales of the whole motions at the
-            first mechanisms; None for no search.
-    """
-
-    title: str
-    cases: dict[str, Case]
-    pairs: tuple[str, ...] | None = None
-    scales: dict[str, Any] | None = None
-
-    @property
-    def reduction(self) -> float:
-        """Factor R of the first case's suite [-]."""
-        suite = next(iter(self.cases.values())).suite or {}
-        return float(suite.get("reduction", 1.0) / suite.get("scale", 1.0))
-
-    @property
-    def evaluator(self) -> Evaluator:
-        """The function that is evaluated for each case under each pair."""
-        return Evaluator(evaluate_comparison, {"scales": self.scales})
-
-    @cached_property
-    def axis(self) -> Axis:
-        """Names of case and pair of each point.
-
-        Raises:
-            InvalidInput: a case has none of the pairs.
-        """
-        rows = [(name, pair) for name in self.cases for pair in self.pairs_of(name)]
-        return Axis("point", ("case", "pair"), tuple(rows))
-
-    @property
-    def points(self) -> tuple[Point, ...]:
-        """Each case under each of its pairs."""
-        return tuple(
-            Point(self.cases[name].settings, self.cases[name].folder, ((PAIR_KEY, pair),))
-            for name, pair in self.axis.rows
-        )
-
-    def pairs_of(self, name: str) -> list[str]:
-        """Return the pairs under which a case is run.
-
-        Args:
-            name: name of the case.
-
-        Raises:
-            InvalidInput: the case has none of the pairs.
-        """
-        suite = self.cases[name].suite or {}
-        pairs = [pair for pair in suite["pairs"] if self.pairs is None or pair in self.pairs]
-        if not pairs:
-            raise InvalidInput(
-                f"'{name}' has none of the pairs {self.pairs}, but {list(suite['pairs'])}"
-            )
-        return pairs
-
-    @classmethod
-    def read(cls, path: str | Path, changes: Sequence[str] = ()) -> "Comparison":
-        """Read a comparison from a TOML file that names case files and changes to them.
-
-        Args:
-            path: path of a file with tables [cases."name"] of `case`, a file, and `set`, a list of
-                "section.key=value". `set` above the tables changes all cases, before their own.
-            changes: changes to every case, "section.key=value".
-
-        Returns:
-            The comparison.
-
-        Raises:
-            InvalidInput: the file or one of its cases is invalid.
-        """
-        path = Path(path)
-        settings = read_study_tables(path)
-        kinds = {"title": str, "scales": (bool, dict), "pairs": [str], "set": [str], "cases": dict}
-        refuse_unknown(settings, kinds)
-        settings, cases = check_table(settings, kinds, "study"), {}
-        for name, table in settings.get("cases", {}).items():
-            case = check_table(table, {"case": str, "set": [str]}, f"cases.{name}")
-            if "case" not in case:
-                raise InvalidInput(f"{path}: cases.{name} names no case file")
-            all_changes = [*settings.get("set", []), *case.get("set", []), *changes]
-            cases[name] = Case.read(path.parent / case["case"], all_changes)
-            if cases[name].suite is None:
-                raise InvalidInput(f"{path}: the case of '{name}' has no [suite] to compare under")
-        if not cases:
-            raise InvalidInput(f'{path} has no cases: write [cases."name"] with case = "file.toml"')
-        pairs = settings.get("pairs")
-        _check_names(path, cases, pairs or ())
-        return cls(
-            settings.get("title", path.stem),
-            cases,
-            None if pairs is None else tuple(pairs),
-            _parse_search(settings.get("scales", False)),
-        )
-
-
-def evaluate_comparison(case: Case, scales: Mapping[str, Any] | None = None) -> Findings:
-    """Return the findings of a case under the one pair of its suite."""
-    result, motion = dead_load_of(case), ground_motion(case)
-    joints, first = assessed_joints(result.dead.joints), first_mode(result)
-    findings: Findings = {
-        "frequency": float(first.frequencies[0]),
-        "mass": float(first.mass_ratios[0, 0]),
-        **_prefix("role", part_roles(joints)),
-        **_prefix("dead", largest_by_part(abs(joints["eccentricity"]).fillna(0.5))),
-    }
-    try:
-        run = run_motion(result, motion)
-    except DidNotConverge as error:
-        run = partial_history(error)
-    findings |= findings_of_run(run)
-    if scales is not None:
-        suite = ground_suite(case)
-        # the whole motion: the reduction R of the suite is not applied
-        bounds = scales_of(result, suite.pairs[0].scaled(suite.scale), **scales)
-        for name, scale in bounds.items():
-            definition, survives, _ = name.partition(", survives")
-            findings[f"{'survives' if survives else 'scale'}: {definition}"] = scale
-    return findings
-
-
-def findings_of_run(run: History) -> Findings:
-    """Return the findings of a run, which may be incomplete."""
-    joints, mechanisms = assessed_joints(run.joints), first_mechanisms(run)
-    eccentricity = abs(joints["eccentricity"]).max("time").fillna(0.5)
-    friction = joints["friction"].max("time").fillna(np.inf)
+def build_findings(
+    labels: Sequence[str], points: Sequence[Point], table: xr.Dataset, search: dict[str, Any] | None
+) -> dict[str, Finding]:
+    """Return the findings of a comparison by label, without those of which a point failed."""
+    columns = {str(name): table[name].values.ravel().tolist() for name in table.data_vars}
+    rows: dict[str, dict[str, dict[str, Any]]] = {}
+    cases: dict[str, Case] = {}
+    for number, (label, point) in enumerate(zip(labels, points, strict=True)):
+        pair = str(dict(point.changes)[PAIR_KEY])
+        row = {name: values[number] for name, values in columns.items()}
+        rows.setdefault(label, {})[pair] = row
+        changes = tuple(change for change in point.changes if change[0] != PAIR_KEY)
+        cases.setdefault(label, replace(point, changes=changes).case)
     return {
-        **_prefix("eccentricity", largest_by_part(eccentricity)),
-        **_prefix("friction", largest_by_part(friction)),
-        **_prefix("mechanism", {name: str(m.kind) if m else "" for name, m in mechanisms.items()}),
-        **_prefix("time", {name: m.time if m else np.inf for name, m in mechanisms.items()}),
-        "fall": "" if run.fall is None else run.fall.kind,
-        "ended": str(run.ending),
-        "outcome": run.outcome,
+        label: _build_finding(cases[label].text(), by_pair, search)
+        for label, by_pair in rows.items()
+        if not any(row["error"] for row in by_pair.values())
     }
 
 
-def _prefix(prefix: str, values: Mapping[str, Any]) -> Findings:
-    """Prepend a prefix to the names of findings."""
-    return {f"{prefix}: {name}": value for name, value in values.items()}
+def _build_finding(
+    case: str, rows: Mapping[str, Mapping[str, Any]], search: dict[str, Any] | None
+) -> Finding:
+    """The findings of a case, from its rows by pair."""
+    first = next(iter(rows.values()))  # dead load and mode are the same in all rows
+    scales = {
+        pair: {
+            name: (row[f"scale: {name}"], row[f"survives: {name}"])
+            for name in MECHANISM_DEFINITIONS
+        }
+        for pair, row in rows.items()
+        if search is not None
+    }
+    runs = {pair: _run_findings(row) for pair, row in rows.items()}
+    roles, dead = _select(first, "role"), _select(first, "dead")
+    return Finding(case, first["frequency"], first["mass"], roles, dead, runs, scales, search)
 
 
-def _parse_search(setting: Any) -> dict[str, Any] | None:
+def _run_findings(row: Mapping[str, Any]) -> dict[str, Any]:
+    """The findings of one run, from its row."""
+    kinds, times = _select(row, "mechanism"), _select(row, "time")
+    return {
+        "eccentricity": _select(row, "eccentricity"),
+        "friction": _select(row, "friction"),
+        "mechanisms": {
+            name: {"kind": kinds[name], "time": times.get(name, nan)} if name in kinds else None
+            for name in (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
+        },
+        "fall": row["fall"] or None,
+        "ended": row["ended"],
+        "outcome": row["outcome"],
+    }
+
+
+def _select(row: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """Values whose names have a prefix; NaN and "" stand for parts that only other cases have."""
+    prefix = f"{prefix}: "
+    return {
+        name.removeprefix(prefix): value
+        for name, value in row.items()
+        if name.startswith(prefix) and value == value and value != ""
+    }
+
+
+def parse_search(setting: Any) -> dict[str, Any] | None:
     """Options of the search for scales; None for no search."""
     if isinstance(setting, bool):
         return {} if setting else None
@@ -339,17 +234,3 @@ def _parse_search(setting: Any) -> dict[str, Any] | None:
 def file_name(name: str) -> str:
     """Return a file name for the name of a case."""
     return re.sub(r"[^\w+-]+", "_", name).strip("_")
-
-
-def _check_names(path: Path, cases: Mapping[str, Case], pairs: Sequence[str]) -> None:
-    """Refuse cases that would share a file of findings, and pairs that no case has."""
-    files = [file_name(name) for name in cases]
-    for name, file in zip(cases, files, strict=True):
-        if not file or files.count(file) > 1:
-            raise InvalidInput(
-                f"{path}: '{name}' names a file of results too, and '{file}.json' is not its own: "
-                "let names differ in letters and digits"
-            )
-    available = {pair for case in cases.values() for pair in (case.suite or {})["pairs"]}
-    if unknown := [pair for pair in pairs if pair not in available]:
-        raise InvalidInput(f"{path}: no case has the pairs {unknown}, but {sorted(available)}")

@@ -124,6 +124,16 @@ class MeshSensitivity:
         """Sum of the error bars of mesh and step, in the unit of the finding."""
         return self.mesh.error + (0.0 if self.step is None else self.step.error)
 
+    @property
+    def paths(self) -> dict[str, tuple[Array, Array, float, float]]:
+        """Sizes, values, limit and error bar of mesh and step, as `draw_convergence` draws them."""
+        found = {"mesh": self.mesh, "step": self.step}
+        return {
+            name: (path.sizes, path.values, path.limit, path.error)
+            for name, path in found.items()
+            if path is not None
+        }
+
     def of(self, quantity: str) -> "MeshSensitivity":
         """Return the sensitivity of another finding.
 

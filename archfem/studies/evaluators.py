@@ -1,5 +1,6 @@
 """Evaluators: functions from a case to a flat table of findings, by name or given by the user."""
 
+import hashlib
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -9,19 +10,28 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
+from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.run import DeadLoadResult, log_prefix, run_time_history
-from archfem.dynamics.history import Ending, History, first_mechanisms
+from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.motion_scaling import mechanism_scales
 from archfem.dynamics.verdict import MECHANISM_DEFINITIONS
-from archfem.errors import InvalidInput
-from archfem.joints.criteria import assessed_joints
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.joints.criteria import assessed_joints, part_roles
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import suggest_name
 from archfem.motion.motion import Motion
-from archfem.studies.cache import dead_load_of, first_mode, ground_motion, stepper_of
+from archfem.studies.cache import (
+    dead_load_of,
+    first_mode,
+    ground_motion,
+    ground_suite,
+    stepper_of,
+)
+from archfem.studies.parameter_space import Point
 
 # A flat table: numbers, texts and rows of numbers by name
 Findings = dict[str, Any]
@@ -145,13 +155,69 @@ def evaluate_limit(case: Case) -> Findings:
     }
 
 
+def evaluate_comparison(case: Case, scales: Mapping[str, Any] | None = None) -> Findings:
+    """Return the findings of a case under the one pair of its suite."""
+    result, motion = dead_load_of(case), ground_motion(case)
+    joints, first = assessed_joints(result.dead.joints), first_mode(result)
+    findings: Findings = {
+        "frequency": float(first.frequencies[0]),
+        "mass": float(first.mass_ratios[0, 0]),
+        **_prefix("role", part_roles(joints)),
+        **_prefix("dead", _largest_by_part(abs(joints["eccentricity"]).fillna(0.5))),
+    }
+    try:
+        run = run_motion(result, motion)
+    except DidNotConverge as error:
+        run = partial_history(error)
+    findings |= _findings_by_part(run)
+    if scales is not None:
+        suite = ground_suite(case)
+        # the whole motion: the reduction R of the suite is not applied
+        bounds = scales_of(result, suite.pairs[0].scaled(suite.scale), **scales)
+        for name, scale in bounds.items():
+            definition, survives, _ = name.partition(", survives")
+            findings[f"{'survives' if survives else 'scale'}: {definition}"] = scale
+    return findings
+
+
+def _findings_by_part(run: History) -> Findings:
+    """Return the findings of a run, which may be incomplete."""
+    joints, mechanisms = assessed_joints(run.joints), first_mechanisms(run)
+    eccentricity = abs(joints["eccentricity"]).max("time").fillna(0.5)
+    friction = joints["friction"].max("time").fillna(np.inf)
+    return {
+        **_prefix("eccentricity", _largest_by_part(eccentricity)),
+        **_prefix("friction", _largest_by_part(friction)),
+        **_prefix("mechanism", {name: str(m.kind) if m else "" for name, m in mechanisms.items()}),
+        **_prefix("time", {name: m.time if m else np.inf for name, m in mechanisms.items()}),
+        "fall": "" if run.fall is None else run.fall.kind,
+        "ended": str(run.ending),
+        "outcome": run.outcome,
+    }
+
+
+def _prefix(prefix: str, values: Mapping[str, Any]) -> Findings:
+    """Prepend a prefix to the names of findings."""
+    return {f"{prefix}: {name}": value for name, value in values.items()}
+
+
+def _largest_by_part(values: xr.DataArray) -> dict[str, float]:
+    """Return the largest value over the joints of each part."""
+    largest = values.groupby("part").max()
+    return dict(zip(largest["part"].values.tolist(), largest.values.tolist(), strict=True))
+
+
 # Functions that a study file may name
 NAMED_EVALUATORS: Mapping[str, Callable[..., Findings]] = {
     "history": evaluate_history,
     "scales": evaluate_scales,
     "dead load": evaluate_dead_load,
     "limit": evaluate_limit,
+    "comparison": evaluate_comparison,
 }
+
+# Those of them that need one motion: a case with a suite is evaluated under each of its pairs
+MOTION_EVALUATORS = (evaluate_history, evaluate_scales, evaluate_comparison)
 
 
 @dataclass(frozen=True)
@@ -192,6 +258,14 @@ class Evaluator:
         except (OSError, TypeError):
             source = ""
         return f"{name} {sorted(self.options.items())!r}\n{source}"
+
+    def digest(self, point: Point) -> str:
+        """Return a digest of all that the findings of a point depend on, files included."""
+        settings = point.settings
+        if self.find.__module__.startswith("archfem."):  # a function of the user may read all
+            settings = remove_presentation(settings)
+        text = f"{self.text}\n{hash_inputs(settings, point.folder)}"
+        return hashlib.sha256(text.encode()).hexdigest()[:32]
 
     def evaluate(self, case: Case) -> Findings:
         """Return the findings of a case."""

@@ -8,7 +8,7 @@ References:
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import inf, sqrt
+from math import inf, nan, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,12 @@ import xarray as xr
 from archfem._typing import Array
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
+from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.run import DeadLoadResult
 from archfem.cases.toml_file import check_choice
 from archfem.dynamics.events import applicable_definitions
-from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
+from archfem.dynamics.fall import CollapseState
+from archfem.dynamics.history import Ending, first_mechanisms, partial_history
 from archfem.dynamics.motion_scaling import (
     COLLAPSE_DEFINITION,
     ScaledRun,
@@ -38,6 +40,7 @@ from archfem.studies.cache import dead_load_of, first_mode, ground_motion
 from archfem.studies.evaluators import Evaluator, Findings, of_history, run_motion
 from archfem.studies.fragility import Fragility, fragility
 from archfem.studies.parameter_space import PAIR_KEY, Axis, Point
+from archfem.studies.shared_results import compute_once
 from archfem.studies.study import Study
 
 # Power of the scale of a motion with which an intensity measure grows
@@ -72,9 +75,18 @@ def search_limit_states(
     limits = _applicable_limits(result, limits)
     demands: dict[float, Findings] = {}
 
+    inputs = hash_inputs(remove_presentation(case.settings), case.folder)
+
     def run_scaled(scale: float) -> ScaledRun:
-        run, reached, demands[scale] = _run(result, motion.scaled(scale))
-        return ScaledRun(scale, reached, run.ending, run.outcome, run.fall)
+        # kept one by one: a search that is ended loses the run that it is in
+        run = compute_once(
+            "runs", f"{inputs} {scale!r}", lambda: _run(result, motion.scaled(scale))
+        )
+        demands[scale] = run["demands"]
+        met = Mechanism("", "", (), None)
+        reached = {limit: met if is_met else None for limit, is_met in run["reached"].items()}
+        fall = CollapseState(run["fall"], None, (), nan, nan, True) if run["fall"] else None
+        return ScaledRun(scale, reached, Ending(run["ending"]), run["outcome"], fall)
 
     least, largest = between
     reach = (least, max(least, min(largest, largest_allowed_scale(motion))))
@@ -97,10 +109,8 @@ def search_limit_states(
     return findings | {name: [demands[scale][name] for scale in scales] for name in DEMAND_NAMES}
 
 
-def _run(
-    result: DeadLoadResult, motion: Motion
-) -> tuple[History, dict[str, Mechanism | None], Findings]:
-    """A run, the limit states it reaches, and its demands, infinite if it is incomplete."""
+def _run(result: DeadLoadResult, motion: Motion) -> dict[str, Any]:
+    """The limit states that a run reaches, its end, and its demands, infinite if incomplete."""
     try:
         run = run_motion(result, motion)
         complete = run.ending not in (Ending.PARTED, Ending.MET)
@@ -110,20 +120,15 @@ def _run(
     if complete:
         findings = of_history(run, mechanisms)
         demands = {name: findings[name] for name in DEMAND_NAMES}
-    return run, _find_limits(run, mechanisms), demands
-
-
-def _find_limits(
-    run: History, mechanisms: Mapping[str, Mechanism | None]
-) -> dict[str, Mechanism | None]:
-    """Limit states that a run reaches; a first hinge is expressed as a mechanism too."""
     hinges = assessed_joints(with_failure_flags(run.joints))["hinge"] != 0
-    first = Mechanism("local", "", (), None) if bool(hinges.any()) else None
-    return {
-        "first hinge": first,
-        "four failures": mechanisms["any joints at once"],
-        "verified": mechanisms["verified"],
+    reached = {
+        "first hinge": bool(hinges.any()),
+        "four failures": mechanisms["any joints at once"] is not None,
+        "verified": mechanisms["verified"] is not None,
     }
+    fall = None if run.fall is None else run.fall.kind
+    end = {"ending": str(run.ending), "outcome": run.outcome, "fall": fall}
+    return {"reached": reached, "demands": demands, **end}
 
 
 def _applicable_limits(result: DeadLoadResult, limits: Sequence[str] | None) -> tuple[str, ...]:
@@ -237,8 +242,10 @@ class Ida:
             demand: demand, as for `curves`.
 
         Returns:
-            Demands (3, n), interpolated linearly between runs; infinite above incomplete runs, NaN
-            if fewer than half of the motions were run at such an intensity.
+            Demands (3, n), interpolated linearly between runs. A curve counts as infinite above an
+            incomplete run and above its last one: its motion has met the limit states, and a
+            fractile does not turn back where it ends. NaN if fewer than half of the motions were
+            run at such an intensity.
         """
         curves = [(x, y) for _, x, y in self.curves(measure, demand) if len(x)]
         demands = np.array(
@@ -252,7 +259,7 @@ class Ida:
         # the median, and one standard deviation to either side
         fractiles = np.full((3, demands.shape[1]), np.nan)
         for k in np.flatnonzero(2 * valid.sum(axis=0) >= len(demands)):
-            column = demands[valid[:, k], k]
+            column = np.where(valid[:, k], demands[:, k], inf)
             fractiles[:, k] = np.quantile(column, (0.16, 0.50, 0.84), method="nearest")
         return fractiles
 
@@ -293,7 +300,7 @@ def ida(
             that the structure and model permit.
         precision: relative width of the final brackets [-].
         between: smallest and largest scale [-]; no ground motion may exceed 5 g.
-        folder: folder for finished motions, as for `Study.run`.
+        folder: folder for finished runs, also those of unfinished motions, as for `Study.run`.
         workers: number of processes, as for `Study.run`.
         client: client of Dask, as for `Study.run`.
 

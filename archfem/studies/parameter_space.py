@@ -3,7 +3,6 @@
 A point is one case of the study: a case and the keys in which it differs.
 """
 
-import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -16,9 +15,9 @@ import numpy as np
 from scipy import stats
 from scipy.stats import qmc
 
-from archfem._validation import check_integer
+from archfem._validation import check_integer, short_repr
 from archfem.cases.case import Case
-from archfem.cases.provenance import hash_inputs
+from archfem.cases.provenance import hash_sections
 from archfem.cases.toml_file import check_choice, check_table, refuse_unknown, set_value
 from archfem.errors import InvalidInput
 
@@ -220,18 +219,14 @@ class Point:
         """The changed case."""
         return Case.of(self.settings, self.folder)
 
-    def digest(self, evaluator: str) -> str:
-        """Return a digest of the evaluator's text, the case, its files and archfem's version."""
-        text = f"{evaluator}\n{hash_inputs(self.settings, self.folder)}"
-        return hashlib.sha256(text.encode()).hexdigest()[:32]
+    @property
+    def model_key(self) -> str:
+        """Digest of the content of all sections and files that define the model."""
+        return hash_sections(self.settings, self.folder, MODEL_SECTIONS)
 
 
 class StudyPoint(Protocol):
-    """A point that workers evaluate: what its model is built from, and the changes to it."""
-
-    @property
-    def base(self) -> Any:
-        """Settings that points share; points of one model have the same object."""
+    """A point that workers evaluate, and the changes by which it differs from others."""
 
     @property
     def changes(self) -> tuple[tuple[str, Any], ...]:
@@ -241,18 +236,22 @@ class StudyPoint(Protocol):
     def case(self) -> Any:
         """The argument of the evaluator."""
 
+    @property
+    def model_key(self) -> str:
+        """Text that points of one model have in common, whichever case they are of."""
 
-def model_key(point: StudyPoint) -> str:
-    """Return a key that points of one model share, as a rule."""
-    changes = [each for each in point.changes if each[0].partition(".")[0] in MODEL_SECTIONS]
-    return f"{id(point.base)} {changes!r}"
+
+def describe_changes(point: StudyPoint) -> str:
+    """Return the changes of a point in words."""
+    changes = ", ".join(f"{key} = {short_repr(value)}" for key, value in point.changes)
+    return changes or "no change"
 
 
 def group_by_model(points: Iterable[tuple[int, Point]]) -> list[tuple[int, Point]]:
     """Return points in their order, but those of one model together, so that it is built once."""
     groups: dict[str, list[tuple[int, Point]]] = {}
     for number, point in points:
-        groups.setdefault(model_key(point), []).append((number, point))
+        groups.setdefault(point.model_key, []).append((number, point))
     return list(chain.from_iterable(groups.values()))
 
 

@@ -9,12 +9,14 @@ replaced.
 import logging
 import os
 import pickle
+import re
 import signal
 import sys
 import threading
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from itertools import islice
 from multiprocessing import Pipe, forkserver, get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -28,7 +30,10 @@ from threadpoolctl import threadpool_limits
 from archfem.cases.provenance import describe_version
 from archfem.errors import ArchfemError, InvalidInput, StudyStopped
 from archfem.studies.evaluators import Evaluator
-from archfem.studies.parameter_space import StudyPoint, model_key
+from archfem.studies.parameter_space import PAIR_KEY, StudyPoint, describe_changes
+from archfem.studies.shared_results import share_results
+
+logger = logging.getLogger("archfem")
 
 # Evaluated point: `found`, a flat table; `error`, its text or ""; `ours`, whether the error is one
 # of archfem's, which the same case would raise again
@@ -56,23 +61,39 @@ def evaluate_point(point: StudyPoint, evaluator: Evaluator) -> Row:
 
 
 def evaluate_batch(
-    points: Sequence[tuple[int, StudyPoint]], evaluator: Evaluator, version: str
+    points: Sequence[tuple[int, StudyPoint]], evaluator: Evaluator, version: str, shared: Path
 ) -> tuple[str, list[tuple[int, Row]]]:
     """Evaluate points in a process that may have threads; no rows if its version differs."""
     own_version = describe_version()
     if own_version != version:
         return own_version, []
     # the cache between points is not thread-safe
-    with _evaluation_lock, threadpool_limits(limits=1):
+    with _evaluation_lock, threadpool_limits(limits=1), share_results(shared):
         return own_version, list(evaluate_serially(points, evaluator))
 
 
 def evaluate_serially(
     points: Sequence[tuple[int, StudyPoint]], evaluator: Evaluator
 ) -> Iterator[tuple[int, Row]]:
-    """Evaluate points in this process, one after another."""
+    """Evaluate points in this process, one after another; a repeated warning is logged once."""
+    warnings: Counter[str] = Counter()
+
+    def is_new(record: logging.LogRecord) -> bool:
+        if record.levelno != logging.WARNING:
+            return True
+        kind = re.sub(r"[\d.]+(e[-+]\d+)?", "#", record.getMessage())  # numbers differ by the run
+        warnings[kind] += 1
+        return warnings[kind] == 1
+
     for number, point in points:
-        yield number, evaluate_point(point, evaluator)
+        logger.addFilter(is_new)
+        try:
+            row = evaluate_point(point, evaluator)
+        finally:
+            logger.removeFilter(is_new)
+        yield number, row
+    if repeated := warnings.total() - len(warnings):
+        logger.warning("%d more warnings as above, of other runs, are not repeated", repeated)
 
 
 def evaluate_on_processes(
@@ -81,9 +102,13 @@ def evaluate_on_processes(
     workers: int,
     log: Path | None = None,
     meanwhile: Callable[[], object] | None = None,
+    shared: Path | None = None,
 ) -> Iterator[tuple[int, Row]]:
-    """Evaluate points on processes of this machine; `meanwhile` runs while they start."""
-    pool = WorkerPool(TaskQueue(points, evaluator), workers, str(log or os.devnull))
+    """Evaluate points on processes of this machine; `meanwhile` runs while they start.
+
+    Results that workers share are in the folder `shared`, and their output goes to the file `log`.
+    """
+    pool = WorkerPool(TaskQueue(points, evaluator), workers, str(log or os.devnull), shared)
     try:
         if meanwhile is not None:
             meanwhile()
@@ -98,6 +123,8 @@ class Task(NamedTuple):
     number: int  # of the point
     message: bytes  # the pickled point and evaluator
     model: str  # key of the model
+    changes: str  # of the point, in words
+    pair: Any  # of the suite, or None
 
 
 class TaskQueue:
@@ -106,20 +133,30 @@ class TaskQueue:
     def __init__(self, points: Sequence[tuple[int, StudyPoint]], evaluator: Evaluator) -> None:
         self._tasks: dict[str, deque[Task]] = {}
         for number, point in points:
-            task = Task(number, _pickle_task(point, evaluator), model_key(point))
+            message, pair = _pickle_task(point, evaluator), dict(point.changes).get(PAIR_KEY)
+            task = Task(number, message, point.model_key, describe_changes(point), pair)
             self._tasks.setdefault(task.model, deque()).append(task)
 
     def __bool__(self) -> bool:
         """Whether tasks are left."""
         return bool(self._tasks)
 
-    def pop(self, model: str | None, other_models: Collection[str]) -> Task:
-        """Remove and return the next task: of this model, else of one that no other worker has."""
+    def pop(
+        self, model: str | None, other_models: Collection[str], other_pairs: Collection[Any] = ()
+    ) -> Task:
+        """Remove and return the next task: of this model, else of one that no other worker has.
+
+        Pairs that other workers compute are left for later, when their matched motions are shared.
+        """
         if model not in self._tasks:
             unused = (key for key in self._tasks if key not in other_models)
             model = next(unused, next(iter(self._tasks)))
-        task = self._tasks[model].popleft()
-        if not self._tasks[model]:
+        tasks = self._tasks[model]
+        first = islice(tasks, 100)  # a study of a million points may have a single pair
+        place = next((k for k, task in enumerate(first) if task.pair not in other_pairs), 0)
+        task = tasks[place]
+        del tasks[place]
+        if not tasks:
             del self._tasks[model]
         return task
 
@@ -131,9 +168,10 @@ class TaskQueue:
 class Worker:
     """A process that evaluates points, and the pipe to it."""
 
-    def __init__(self, log: str) -> None:
+    def __init__(self, log: str, shared: Path | None) -> None:
         self.pipe, remote = Pipe()
-        self._process = get_context("forkserver").Process(target=_serve, args=(remote, log))
+        arguments = remote, log, shared
+        self._process = get_context("forkserver").Process(target=_serve, args=arguments)
         with remote:  # the end of the worker then closes the pipe
             _start(self._process)
         self.task: Task | None = None
@@ -167,7 +205,9 @@ class Worker:
 class WorkerPool:
     """Workers that evaluate the tasks of a queue."""
 
-    def __init__(self, tasks: TaskQueue, max_workers: int, log: str) -> None:
+    def __init__(
+        self, tasks: TaskQueue, max_workers: int, log: str, shared: Path | None = None
+    ) -> None:
         # gmsh restores the default action of SIGPIPE, by which a send to a dead worker would end
         # this process; signals can be set in the main thread alone.
         with suppress(ValueError):
@@ -175,7 +215,7 @@ class WorkerPool:
         forkserver.set_forkserver_preload(["archfem.studies.fork_server"])
         with _isolate_start():
             forkserver.ensure_running()
-        self._tasks, self._max_workers, self._log = tasks, max_workers, log
+        self._tasks, self._max_workers, self._log, self._shared = tasks, max_workers, log, shared
         self._workers: list[Worker] = []
         self._deaths: Counter[int] = Counter()
 
@@ -199,11 +239,13 @@ class WorkerPool:
         free = [worker for worker in self._workers if worker.task is None]
         while self._tasks and (free or len(self._workers) < self._max_workers):
             if not free:
-                free.append(Worker(self._log))
+                free.append(Worker(self._log, self._shared))
                 self._workers += free
             worker = free.pop()
-            others = {other.model for other in self._workers if other is not worker and other.model}
-            worker.send(self._tasks.pop(worker.model, others))
+            others = [other for other in self._workers if other is not worker]
+            models = {other.model for other in others if other.model}
+            pairs = {other.task.pair for other in others if other.task} - {None}
+            worker.send(self._tasks.pop(worker.model, models, pairs))
 
     def _receive(self, worker: Worker) -> tuple[int, Row] | None:
         """Return number and row of a point; None if its worker died and the task was put back."""
@@ -215,7 +257,14 @@ class WorkerPool:
         self._workers.remove(worker)
         reason = worker.end()
         self._deaths[task.number] += 1
-        if self._deaths[task.number] < MAX_DEATHS_PER_POINT:
+        final = self._deaths[task.number] == MAX_DEATHS_PER_POINT
+        logger.warning(
+            "a worker ended with %s while it computed point %d (%s): the point is %s; a process "
+            "ends so if memory runs out, or a library fails",
+            *(reason, task.number, task.changes),
+            f"lost, after {MAX_DEATHS_PER_POINT} workers" if final else "computed again",
+        )
+        if not final:
             self._tasks.put_back(task)
             return None
         text = f"{MAX_DEATHS_PER_POINT} processes that computed this point ended"
@@ -250,7 +299,7 @@ def _isolate_start() -> Iterator[None]:
         os.environ |= {} if path is None else {"PYTHONPATH": path}
 
 
-def _serve(pipe: Connection, log: str) -> None:
+def _serve(pipe: Connection, log: str, shared: Path | None) -> None:
     """Evaluate points that come through a pipe until it is closed: a worker."""
     threading.Thread(target=_end_with_driver, daemon=True).start()
     with open(log, "a") as file:
@@ -258,7 +307,7 @@ def _serve(pipe: Connection, log: str) -> None:
             os.dup2(file.fileno(), stream)
     np.random.seed()  # noqa: NPY002  (for users' functions: all workers would draw the same)
     logging.getLogger("archfem").setLevel(logging.ERROR)  # warnings of one run of thousands
-    with suppress(EOFError, OSError), threadpool_limits(1):
+    with suppress(EOFError, OSError), threadpool_limits(1), share_results(shared):
         while True:
             message = pipe.recv_bytes()
             try:

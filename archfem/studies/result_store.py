@@ -3,21 +3,29 @@
 The table is an `xarray.Dataset`, written as NetCDF, CSV and Parquet.
 """
 
+import io
 import logging
+import re
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from math import inf
 from pathlib import Path
+from threading import Event, Thread
 from time import monotonic
 from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from tqdm import tqdm
 
 from archfem._files import (
     DISK_FULL_ERRORS,
+    align_columns,
     atomic_write,
     is_locked,
     lock_folder,
@@ -29,14 +37,21 @@ from archfem._files import (
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, StudyStopped
-from archfem.studies.parameter_space import Axis
+from archfem.studies.parameter_space import PAIR_KEY, Axis
 from archfem.studies.process_pool import Row
+from archfem.studies.shared_results import count_results
+from archfem.units import in_si_unit
 
 logger = logging.getLogger("archfem")
 
 # Files of the table
 NETCDF_FILE = "results.nc"
 CSV_FILE = "results.csv"
+EXCEL_FILE = "results.xlsx"
+MAX_SHEET_ROWS = 1_048_575  # of Excel below the header
+
+# Time between lines of progress where the output is no terminal [s]
+PROGRESS_INTERVAL = 5.0
 
 
 class Store:
@@ -45,13 +60,14 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._points, self._plan = folder / "points", folder / "study.json"
-        self._lock, self._progress = folder / ".lock", folder / "progress.json"
+        self._progress = folder / "progress.json"
+        self.shared = folder / "shared"  # results that workers share
 
     @contextmanager
     def lock(self) -> Iterator[None]:
         """Refuse other drivers while this one runs, and remove what a killed one has left."""
         with lock_folder(self.folder):
-            for draft in self._points.rglob(".*.part*"):
+            for draft in (*self._points.rglob(".*.part*"), *self.shared.rglob(".*")):
                 draft.unlink()
             remove_leftovers(self.folder)
             yield
@@ -146,6 +162,7 @@ class Status:
         failed: number of points that ended in an error.
         rate: points per second of the latest driver; 0 if it has finished none.
         running: whether a driver is running.
+        runs: number of finished runs of searches, of unfinished points too.
     """
 
     total: int
@@ -153,6 +170,7 @@ class Status:
     failed: int
     rate: float = 0.0
     running: bool = False
+    runs: int = 0
 
     @property
     def remaining(self) -> float:
@@ -163,6 +181,7 @@ class Status:
     def __str__(self) -> str:
         """One line of text."""
         words = [f"{self.done} of {self.total} points done", f"{self.failed} failed"]
+        words += [f"{self.runs} runs kept"] if self.runs else []
         if self.done < self.total:
             words.append(f"{self.rate:.3g} a second")
             words.append(f"{self.remaining:.0f} s remaining" if self.rate else "time unknown")
@@ -171,36 +190,60 @@ class Status:
 
 
 class Progress:
-    """Counts finished points, on a progress bar and in a file of the store."""
+    """Counts finished points, on a progress bar or in lines, and in a file of the store."""
 
-    def __init__(self, total: int, done: int, failed: int, store: Store | None) -> None:
-        self._total, self._done_before, self._failed, self._store = total, done, failed, store
+    def __init__(
+        self, total: int, done: int, failed: int, store: Store | None, shared: Path
+    ) -> None:
+        self._total, self._done_before, self._failed = total, done, failed
+        self._store, self._shared = store, shared
         self._done, self._start, self._written = 0, monotonic(), -inf
         self._bar = tqdm(
             total=total, initial=done, unit="point", disable=None, leave=False, desc="study"
         )
+        self._closed = Event()
+        # a point may take minutes, in which the number of its runs shows how far it is
+        self._reporter = Thread(target=self._report, daemon=True)
+        self._reporter.start()
 
     def add(self, *, failed: bool) -> None:
         """Count a finished point."""
         self._done += 1
         self._failed += failed
-        self._bar.set_postfix(failed=self._failed, refresh=False)
         self._bar.update()
         if monotonic() - self._written >= 1.0:  # points may take milliseconds
             self._write()
 
     def close(self) -> None:
         """Remove the bar and write the final progress."""
+        self._closed.set()
+        self._reporter.join()
         self._bar.close()
         self._write()
 
     def _write(self) -> None:
         """Write the progress to the store."""
         self._written = monotonic()
-        rate = self._done / max(self._written - self._start, 1e-9)
         if self._store is not None:
-            done = self._done_before + self._done
-            self._store.write_progress(Status(self._total, done, self._failed, rate))
+            self._store.write_progress(self._status)
+
+    @property
+    def _status(self) -> Status:
+        """The progress at this instant."""
+        rate = self._done / max(monotonic() - self._start, 1e-9)
+        runs = count_results(self._shared, "runs")
+        done = self._done_before + self._done
+        return Status(self._total, done, self._failed, rate, running=True, runs=runs)
+
+    def _report(self) -> None:
+        """Show the progress at intervals until it is closed, on the bar or in lines of a file."""
+        while not self._closed.wait(PROGRESS_INTERVAL if self._bar.disable else 1.0):
+            status = self._status
+            if not self._bar.disable:
+                self._bar.set_postfix(failed=status.failed, runs=status.runs)
+            elif isinstance(sys.stderr, io.TextIOWrapper):  # not that of a notebook
+                sys.stderr.write(f"study: {status}\n")
+                sys.stderr.flush()
 
 
 @validate_arguments
@@ -217,7 +260,8 @@ def status(folder: str | Path) -> Status:
     digests = list(dict.fromkeys(store.read_plan()["points"]))
     rows = store.load_rows(digests)
     failed = sum(bool(row["error"]) for row in rows.values())
-    return Status(len(digests), len(rows), failed, store.read_rate(), store.busy)
+    runs = count_results(store.shared, "runs")
+    return Status(len(digests), len(rows), failed, store.read_rate(), store.busy, runs)
 
 
 def build_table(
@@ -230,8 +274,11 @@ def build_table(
     table = xr.Dataset(attrs=dict(attributes))
     for axis in axes:
         for k, key in enumerate(axis.keys):
-            values = [row[k] for row in axis.rows]
-            table.coords[_coordinate(key)] = _coordinate(axis.name), _to_array(values)
+            values, unit = [row[k] for row in axis.rows], ""
+            if "." in key and key != PAIR_KEY:  # of the case; others are names
+                values, unit = in_si_unit(values)
+            attributes = {"units": unit} if unit else {}
+            table.coords[_coordinate(key)] = _coordinate(axis.name), _to_array(values), attributes
         if axis.name not in axis.keys:
             table.coords[axis.name] = axis.name, np.arange(len(axis.rows))
     dims = tuple(_coordinate(axis.name) for axis in axes)
@@ -254,21 +301,67 @@ def load_table_libraries() -> None:
     frame.to_csv()
     with suppress(ImportError):
         frame.to_parquet()
+    with suppress(ImportError):
+        import_module("openpyxl")
 
 
 def write_table(table: xr.Dataset, folder: Path, inputs: str) -> None:
-    """Write a table as NetCDF and CSV, and as Parquet if pyarrow is installed.
+    """Write a table as NetCDF and CSV, and as Parquet and Excel if their packages are installed.
 
     The folder is locked; `inputs` is the digest of the points.
     """
-    flat = table.drop_dims("entry", errors="ignore")  # rows of numbers are in NetCDF alone
-    frame = flat.to_dataframe(dim_order=list(flat.dims) or None).reset_index()
+    frame = _flatten(table)
+    quoted = frame.map(_quote_formula).rename(columns=_quote_formula)
     with explain_full_disk(folder), stage_results(folder, "study", inputs) as draft:
         write_dataset(table, draft / NETCDF_FILE)
         with atomic_write(draft / CSV_FILE) as part:
-            frame.map(_quote_formula).rename(columns=_quote_formula).to_csv(part, index=False)
+            quoted.to_csv(part, index=False)
         with suppress(ImportError), atomic_write(draft / "results.parquet") as part:
             frame.to_parquet(part, index=False)
+        if len(frame) <= MAX_SHEET_ROWS:
+            with suppress(ImportError), atomic_write(draft / EXCEL_FILE) as part:
+                _write_sheet(quoted, part)
+
+
+def _flatten(table: xr.Dataset) -> pd.DataFrame:
+    """Return a row for each point; rows of numbers are in NetCDF alone."""
+    flat = table.drop_dims("entry", errors="ignore")
+    return flat.to_dataframe(dim_order=list(flat.dims)).reset_index()
+
+
+def _write_sheet(frame: pd.DataFrame, path: Path) -> None:
+    """Write a sheet of Excel without the time of day, so that equal tables are equal files."""
+    frame.to_excel(path, index=False, sheet_name="results", engine="openpyxl")
+    with ZipFile(path) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        for name, content in parts.items():
+            timeless = re.sub(rb"\d{4}-\d\d-\d\dT[\d:]+Z", b"1980-01-01T00:00:00Z", content)
+            is_core = name == "docProps/core.xml"
+            archive.writestr(ZipInfo(name), timeless if is_core else content, ZIP_DEFLATED)
+
+
+def format_table(table: xr.Dataset, max_rows: int = 50) -> str:
+    """Return the table of a study as text: keys, and the findings in which points differ."""
+    frame = _flatten(table).drop(columns="error")
+    differs = {name: frame[name].nunique(dropna=False) > 1 for name in frame}
+    names = [name for name in frame if name in table.coords]
+    names += [name for name in frame if differs[name] and name not in names]
+    units = {name: table[name].attrs.get("units") if name in table else None for name in names}
+    head = [f"{name} [{units[name]}]" if units[name] else str(name) for name in names]
+    shown = frame[names].head(max_rows).to_numpy(dtype=object)
+    text = [align_columns(head, [[_format_cell(value) for value in row] for row in shown])]
+    text += [f"… {len(frame) - max_rows} more points"] if len(frame) > max_rows else []
+    same = {name: _format_cell(frame[name].iloc[0]) for name in frame if name not in names}
+    shared = "; ".join(f"{name} = {text}" for name, text in same.items() if text)
+    return "\n".join([*text, *([f"the same at all points: {shared}"] if shared else [])])
+
+
+def _format_cell(value: Any) -> str:
+    """Return a number or text for a table of text."""
+    if not isinstance(value, float):
+        return str(value)
+    return "-" if value != value else f"{value:.5g}"
 
 
 def _quote_formula(value: Any) -> Any:

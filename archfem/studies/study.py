@@ -1,29 +1,46 @@
-"""`Study`: evaluates one function at all points, on processes of this machine or a cluster."""
+"""`Study`: evaluates one function at all points, on processes of this machine or a cluster.
+
+A study file has the same parts whatever it computes: one case or several, what varies, and what is
+computed of each. `Comparison` is the study of cases under the pairs of their suites.
+"""
 
 import logging
 import os
 from collections.abc import Generator, Mapping, Sequence
-from contextlib import closing, nullcontext
-from dataclasses import dataclass
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
+from typing import Any, Self
 
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
 from archfem._files import hash_json
-from archfem._validation import check_integer, validate_methods
+from archfem._validation import check_integer, validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import describe_version
-from archfem.cases.toml_file import check_table, refuse_unknown
+from archfem.cases.run import Run, run_case
+from archfem.cases.toml_file import check_table, read_tables, refuse_unknown
+from archfem.dynamics.history import Ending
 from archfem.errors import ArchfemError, InvalidInput
-from archfem.studies.comparison import Comparison, read_study_tables
-from archfem.studies.evaluators import Evaluator, refuse_code
+from archfem.studies.comparison import Finding, build_findings, file_name, parse_search
+from archfem.studies.evaluators import (
+    MOTION_EVALUATORS,
+    Evaluator,
+    Findings,
+    evaluate_comparison,
+    evaluate_dead_load,
+    evaluate_limit,
+    refuse_code,
+)
 from archfem.studies.parameter_space import (
+    PAIR_KEY,
     Axis,
     Point,
     changes_along,
     check_points,
+    describe_changes,
     group_by_model,
     parameter_axes,
 )
@@ -36,8 +53,15 @@ from archfem.studies.result_store import (
     status,
     write_table,
 )
+from archfem.studies.shared_results import share_results
 
 logger = logging.getLogger("archfem")
+
+# Keys of a study file and their kinds
+STUDY_KEYS: Mapping[str, Any] = {
+    **{"title": str, "case": str, "cases": dict, "set": [str], "pairs": [str]},
+    **{"vary": (dict, list), "samples": dict, "compute": (str, dict), "scales": (bool, dict)},
+}
 
 
 @validate_methods
@@ -96,45 +120,37 @@ class Study:
         return study
 
     @classmethod
-    def read(
-        cls, path: str | Path, changes: Sequence[str] = (), *, own_code: bool = False
-    ) -> "Study":
-        """Read a study from a TOML file, which varies one case or compares several.
+    def read(cls, path: str | Path, changes: Sequence[str] = (), *, own_code: bool = False) -> Self:
+        """Read a study from a TOML file: its cases, what varies, and what is computed.
 
         Args:
-            path: path of a file with `case`, the file of a case; `vary`, `samples` and `compute`,
-                as `over`, `samples` and `find` of `Study.of`; and `set`, a list of
-                "section.key=value". Or with tables [cases."name"], as for `Comparison.read`.
+            path: path of a file with `case`, the file of a case, or with tables [cases."name"] of
+                `case`, a file, and `set`, a list of "section.key=value"; `set` above the tables
+                changes all cases, before their own. `vary`, `samples` and `compute` are as `over`,
+                `samples` and `find` of `Study.of`; with [cases] nothing need vary, and `compute` is
+                "comparison" by default. Histories, scales and comparisons of cases with a suite are
+                computed under each of its pairs, or those that `pairs` names. `scales` is the
+                search for scales in a comparison: true, or a table of `precision` and `range`.
             changes: changes to every case, "section.key=value".
             own_code: whether `compute` may name a function of a module of the user. By default it
                 may not, since the file may come from anywhere and the module would run.
 
         Returns:
-            The study.
+            The study; a `Comparison` if that is what is computed.
 
         Raises:
-            InvalidInput: the file or one of its cases is invalid.
+            InvalidInput: the file or one of its cases is invalid; the message names the file.
         """
         path = Path(path)
-        settings = read_study_tables(path)
-        if "cases" in settings or not {"case", "vary"} & set(settings):
-            cases = Comparison.read(path, changes)
-            return cls(cases.title, cases.evaluator, (cases.axis,), cases.points)
-        kinds = {"title": str, "case": str, "set": [str], "vary": (dict, list)}
-        kinds |= {"samples": dict, "compute": (str, dict)}
-        refuse_unknown(settings, kinds)
-        settings = check_table(settings, kinds, "study")
-        if missing := [key for key in ("case", "vary") if key not in settings]:
-            raise InvalidInput(
-                f'{path} says nothing of {missing[0]}: write case = "file.toml", and vary, keys of '
-                "the case with lists of values or distributions"
-            )
-        find = settings.get("compute", "history")
-        if not own_code:
-            refuse_code(find)
-        case = Case.read(path.parent / settings["case"], [*settings.get("set", []), *changes])
-        title, samples = settings.get("title", path.stem), settings.get("samples")
-        return cls.of(case, settings["vary"], find, samples=samples, title=title)
+        tables = read_tables(path, "study")
+        try:
+            study = _read_study(tables, path, changes, own_code)
+            if not isinstance(study, cls):
+                raise InvalidInput(f"it computes no {cls.__name__.lower()}: read it by Study.read")
+            study._check()
+        except ArchfemError as error:
+            raise type(error)(f"{path}: {error}") from error
+        return study
 
     def run(
         self, folder: str | Path | None = None, *, workers: int | None = None, client: Any = None
@@ -142,9 +158,10 @@ class Study:
         """Evaluate all points that are not stored in the folder yet.
 
         Args:
-            folder: folder for the row of each finished point, and for the table as NetCDF, CSV, and
-                Parquet if pyarrow is installed. A stored row is used again for the same case,
-                files, function and version of archfem. None stores nothing.
+            folder: folder for the row of each finished point, and for the table as NetCDF and CSV,
+                and as Parquet and Excel if `archfem[tables]` is installed. A stored row is used
+                again for the same case, files, function and version of archfem; title and
+                pictures of the case do not count. None stores nothing.
             workers: number of processes on this machine, one thread each; by default the number of
                 cores; 1 computes in this process.
             client: client of Dask distributed, or the address of a scheduler, instead of processes.
@@ -161,8 +178,14 @@ class Study:
             KeyboardInterrupt: on Ctrl-C; finished points are kept.
         """
         store = None if folder is None else Store(Path(folder))
-        with nullcontext() if store is None else store.lock():
-            rows = self._collect_rows(store, workers, client)
+        with ExitStack() as stack:
+            if store is None:
+                temporary = TemporaryDirectory(prefix="archfem-", ignore_cleanup_errors=True)
+                shared = Path(stack.enter_context(temporary), "shared")
+            else:
+                stack.enter_context(store.lock())
+                shared = store.shared.resolve()
+            rows = self._collect_rows(store, shared, workers, client)
             table = build_table(self.axes, rows, self._attributes)
             if store is not None:
                 write_table(table, store.folder, hash_json(store.read_plan()["points"]))
@@ -176,12 +199,14 @@ class Study:
         attributes = {"title": self.title, "archfem": describe_version()}
         return attributes | {f"samples {key}": value for key, value in (self.samples or {}).items()}
 
-    def _collect_rows(self, store: Store | None, workers: int | None, client: Any) -> list[Row]:
-        """Rows of all points, from the store if they are there."""
+    def _collect_rows(
+        self, store: Store | None, shared: Path, workers: int | None, client: Any
+    ) -> list[Row]:
+        """Rows of all points, from the store if they are there; `shared` is for their parts."""
         rows: dict[str, Row] = {}
         digests = [str(number) for number in range(len(self.points))]
         if store is not None:
-            digests = [point.digest(self.asked.text) for point in self.points]
+            digests = [self.asked.digest(point) for point in self.points]
             store.write_plan({**self._attributes, "points": digests})
             rows = store.load_rows(digests)
             _log_stored(store, digests, rows)
@@ -189,12 +214,12 @@ class Study:
         numbers = {digest: number for number, digest in reversed(list(enumerate(digests)))}
         missing = sorted(number for digest, number in numbers.items() if digest not in rows)
         points = group_by_model([(number, self.points[number]) for number in missing])
-        progress = Progress(
-            len(numbers), len(rows), sum(bool(row["error"]) for row in rows.values()), store
-        )
+        failed = sum(bool(row["error"]) for row in rows.values())
+        progress = Progress(len(numbers), len(rows), failed, store, shared)
         log = None if store is None else store.folder / "workers.log"
+        evaluation = self._evaluate(points, log, shared, workers, client)
         # closed on Ctrl-C too, which ends the workers
-        with closing(progress), closing(self._evaluate(points, log, workers, client)) as finished:
+        with closing(progress), closing(evaluation) as finished:
             for number, row in finished:
                 rows[digests[number]] = row
                 if store is not None:
@@ -204,13 +229,18 @@ class Study:
 
     def _store(self, store: Store, number: int, digest: str, row: Row) -> None:
         """Write the row of a point, unless one of its files has changed during the study."""
-        if self.points[number].digest(self.asked.text) == digest:
+        if self.asked.digest(self.points[number]) == digest:
             store.write_row(digest, row)
         else:
             logger.warning("point %d: a file it reads was changed meanwhile: not kept", number)
 
     def _evaluate(
-        self, points: list[tuple[int, Point]], log: Path | None, workers: int | None, client: Any
+        self,
+        points: list[tuple[int, Point]],
+        log: Path | None,
+        shared: Path,
+        workers: int | None,
+        client: Any,
     ) -> Generator[tuple[int, Row], None, None]:
         """Yield the rows of points as they finish."""
         if not points:
@@ -222,14 +252,14 @@ class Study:
                 raise InvalidInput(
                     f"a scheduler needs {error.name}: pip install 'archfem[cluster]'"
                 ) from error
-            yield from evaluate_on_cluster(points, self.asked, client)
+            yield from evaluate_on_cluster(points, self.asked, client, shared)
             return
         workers = len(os.sched_getaffinity(0)) if workers is None else workers
         if check_integer(workers, "workers") > 1 and len(points) > 1:
             load = load_table_libraries
-            yield from evaluate_on_processes(points, self.asked, workers, log, load)
+            yield from evaluate_on_processes(points, self.asked, workers, log, load, shared)
             return
-        with threadpool_limits(limits=1):
+        with threadpool_limits(limits=1), share_results(shared):
             yield from evaluate_serially(points, self.asked)
 
     def _check(self) -> None:
@@ -239,8 +269,173 @@ class Study:
             try:
                 _ = point.case
             except ArchfemError as error:
-                changes = ", ".join(f"{key} = {value!r}" for key, value in point.changes)
-                raise InvalidInput(f"the point of {changes} is no case: {error}") from error
+                raise InvalidInput(
+                    f"the point of {describe_changes(point)} is no case: {error}"
+                ) from error
+
+
+@validate_methods
+@dataclass(frozen=True, eq=False)
+class Comparison(Study):
+    """Study of cases under each pair of their suites; `study_table` is its table.
+
+    Attributes:
+        cases: cases by name.
+        pairs: pairs of the suites that are run; None for all.
+    """
+
+    cases: Mapping[str, Case] = field(default_factory=dict)
+    pairs: tuple[str, ...] | None = None
+
+    @property
+    def scales(self) -> dict[str, Any] | None:
+        """Options of `mechanism_scales`, which searches scales of whole motions; None for none."""
+        options: dict[str, Any] | None = self.asked.options["scales"]
+        return options
+
+    @property
+    def reduction(self) -> float:
+        """Factor R of the first case's suite [-]."""
+        suite = next(iter(self.cases.values())).suite or {}
+        return float(suite.get("reduction", 1.0) / suite.get("scale", 1.0))
+
+    def findings(self, table: xr.Dataset) -> dict[str, Finding]:
+        """Return the findings of each case, and of each of its variations.
+
+        Args:
+            table: table that `run` returned.
+
+        Returns:
+            Findings by name; without cases of which a point ended in an error.
+        """
+        return build_findings(self._labels, self.points, table, self.scales)
+
+    @property
+    def _labels(self) -> list[str]:
+        """Name of the case of each point, with its changes."""
+        cases = self.axes[0].rows if self.axes[0].keys[0] == "case" else ((),)
+        variations = len(self.points) // len(cases)
+        labels = []
+        for number, point in enumerate(self.points):
+            own = replace(point, changes=tuple(c for c in point.changes if c[0] != PAIR_KEY))
+            changes = [describe_changes(own)] if own.changes else []
+            labels.append(", ".join([*cases[number // variations][:1], *changes]) or self.title)
+        return labels
+
+    def _check(self) -> None:
+        """Check as of any study, and refuse names that would share a file of findings."""
+        names: dict[str, str] = {}
+        for name in dict.fromkeys(self._labels):
+            file = file_name(name)
+            if not file or names.setdefault(file, name) != name:
+                raise InvalidInput(
+                    f"'{name}' names a file of results too, and '{file}.json' is not its own: let "
+                    "names differ in letters and digits"
+                )
+        super()._check()
+
+
+def _read_study(
+    tables: Mapping[str, Any], path: Path, changes: Sequence[str], own_code: bool
+) -> Study:
+    """Return the study of the tables of a file."""
+    refuse_unknown(tables, STUDY_KEYS)
+    settings = check_table(tables, STUDY_KEYS, "study")
+    missing = [] if {"case", "cases"} & set(settings) else ["case"]
+    missing += [] if {"cases", "vary"} & set(settings) else ["vary"]
+    if missing or {"case", "cases"} <= set(settings):
+        reason = f"says nothing of {missing[0]}" if missing else "has both case and cases"
+        raise InvalidInput(
+            f'it {reason}: write case = "file.toml" and vary, keys of the case with lists of '
+            'values or distributions; or tables [cases."name"] of several cases'
+        )
+    asked = _parse_evaluator(settings, own_code)
+    cases = _read_cases(settings, path.parent, changes)
+    vary, samples = settings.get("vary"), settings.get("samples")
+    varied = () if vary is None else parameter_axes(vary, samples)
+    by_pair = asked.find in MOTION_EVALUATORS and all(PAIR_KEY not in axis.keys for axis in varied)
+    rows = _pair_cases(cases, settings.get("pairs"), asked, by_pair)
+    if any(axis.name == "point" for axis in varied):  # the name of the cases with their pairs
+        varied = tuple(replace(axis, name="variation") for axis in varied) if rows[1:] else varied
+    points = tuple(
+        Point(cases[name].settings, cases[name].folder, (*((PAIR_KEY, p) for p in pair), *changed))
+        for name, *pair in rows
+        for changed in changes_along(varied)
+    )
+    title, axes = settings.get("title", path.stem), (*_case_axes(rows, settings), *varied)
+    if asked.find is not evaluate_comparison:
+        return Study(title, asked, axes, points, samples)
+    pairs = tuple(settings["pairs"]) if "pairs" in settings else None
+    return Comparison(title, asked, axes, points, samples, cases, pairs)
+
+
+def _parse_evaluator(settings: Mapping[str, Any], own_code: bool) -> Evaluator:
+    """Return what a study file computes."""
+    find = settings.get("compute", "comparison" if "cases" in settings else "history")
+    if not own_code:
+        refuse_code(find)
+    asked = Evaluator.of(find)
+    if asked.find is evaluate_comparison:
+        scales = settings.get("scales", asked.options.get("scales") or False)
+        return Evaluator(asked.find, {"scales": parse_search(scales)})
+    if "scales" in settings:
+        raise InvalidInput(
+            "scales is the search of a comparison: take it out, or compute = { name = 'scales', "
+            "precision = 0.1, between = [0.2, 2.0] }"
+        )
+    if "pairs" in settings and asked.find in (evaluate_dead_load, evaluate_limit):
+        raise InvalidInput(f"pairs are motions, and compute = {find!r} needs none: take pairs out")
+    return asked
+
+
+def _read_cases(
+    settings: Mapping[str, Any], folder: Path, changes: Sequence[str]
+) -> dict[str, Case]:
+    """Read the cases of a study file by name; a single case has none."""
+    tables = settings.get("cases", {"": {"case": settings.get("case")}})
+    cases = {}
+    for name, table in tables.items():
+        case = check_table(table, {"case": str, "set": [str]}, f"cases.{name}")
+        if "case" not in case:
+            raise InvalidInput(f"cases.{name} names no case file")
+        all_changes = [*settings.get("set", []), *case.get("set", []), *changes]
+        cases[name] = Case.read(folder / case["case"], all_changes)
+    if not cases:
+        raise InvalidInput('it has no cases: write [cases."name"] with case = "file.toml"')
+    return cases
+
+
+def _pair_cases(
+    cases: Mapping[str, Case], pairs: Sequence[str] | None, asked: Evaluator, by_pair: bool
+) -> list[tuple[str, ...]]:
+    """Return name and pair of each case and motion; names alone if no pairs are run."""
+    available = {name: list((case.suite or {}).get("pairs", ())) for name, case in cases.items()}
+    known = sorted({pair for own in available.values() for pair in own})
+    if unknown := [pair for pair in pairs or () if pair not in known]:
+        raise InvalidInput(f"no case has the pairs {unknown}, but {known}")
+    rows: list[tuple[str, ...]] = []
+    for name, own in available.items():
+        chosen = [pair for pair in own if pairs is None or pair in pairs]
+        if asked.find is evaluate_comparison and not own:
+            raise InvalidInput(f"the case of '{name}' has no [suite] to compare under")
+        if own and not chosen:
+            raise InvalidInput(f"'{name}' has none of the pairs {pairs}, but {own}")
+        by_own = by_pair or pairs is not None
+        rows += [(name, pair) for pair in chosen] if by_own and chosen else [(name,)]
+    return rows
+
+
+def _case_axes(rows: Sequence[tuple[str, ...]], settings: Mapping[str, Any]) -> tuple[Axis, ...]:
+    """Return the axis of the cases and pairs of a study file; none for a single motion."""
+    paired = any(len(row) == 2 for row in rows)
+    if "cases" in settings:
+        if not paired:
+            return (Axis("case", ("case",), tuple(rows)),)
+        # a case without a suite has the motion of its own
+        return (Axis("point", ("case", "pair"), tuple((*row, None)[:2] for row in rows)),)
+    if len(rows) == 1 and "pairs" not in settings:
+        return ()
+    return (Axis(PAIR_KEY, (PAIR_KEY,), tuple((pair,) for _, pair in rows)),)
 
 
 def _log_stored(store: Store, digests: Sequence[str], rows: Mapping[str, Row]) -> None:
@@ -253,3 +448,43 @@ def _log_stored(store: Store, digests: Sequence[str], rows: Mapping[str, Row]) -
             store.folder,
             others,
         )
+
+
+@validate_arguments
+def run_pairs(
+    case: Case, folder: str | Path, *, workers: int | None = None, client: Any = None
+) -> list[str]:
+    """Run the pairs of a suite whose histories are not in the folder yet.
+
+    `run_case(case, folder)` then loads them, and runs again those that are incomplete.
+
+    Args:
+        case: case with a suite.
+        folder: folder of the histories.
+        workers: number of processes, as for `Study.run`.
+        client: as for `Study.run`; its workers must see the folder.
+
+    Returns:
+        How the run of each pair ended; the text of an error if there is no history.
+
+    Raises:
+        InvalidInput: the case has no suite, or selects its model by one pair for all.
+    """
+    if case.suite is None or case.selects_model:
+        raise InvalidInput(
+            "pairs run in parallel only if a case has a [suite] and names its model: "
+            "model.fidelity = 'auto' selects one by the first pair for all"
+        )
+    pairs = list(case.suite["pairs"])
+    find = {"name": save_pair, "folder": str(Path(folder).resolve())}
+    table = Study.of(case, {PAIR_KEY: pairs}, find).run(workers=workers, client=client)
+    endings = table["ended"].values if "ended" in table else [""] * len(pairs)
+    return [a or b for a, b in zip(table["error"].values.tolist(), endings, strict=True)]
+
+
+def save_pair(case: Case, folder: str) -> Findings:
+    """Run the only pair of a case, and save its history."""
+    (run,) = (result for result in run_case(case, folder) if isinstance(result, Run))
+    if run.history.ending is Ending.INTERRUPTED:
+        raise KeyboardInterrupt
+    return {"ended": str(run.history.ending)}

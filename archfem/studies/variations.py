@@ -86,6 +86,11 @@ class Variation:
         """The variation itself, as evaluators take it."""
         return self
 
+    @property
+    def model_key(self) -> str:
+        """Empty: each run has a model of its own, and the order of runs saves nothing."""
+        return ""
+
 
 @validate_arguments
 def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that may vary)

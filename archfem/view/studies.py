@@ -1,9 +1,10 @@
 """Figures of studies: IDA, fragility, sensitivity, convergence, and accuracy over time."""
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -11,6 +12,7 @@ from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.verdict_range import VerdictRange
+from archfem.errors import InvalidInput
 from archfem.view.style import (
     COLUMN_WIDTH,
     LABEL_SIZE,
@@ -24,6 +26,93 @@ from archfem.view.style import (
     set_title,
     style_axes,
 )
+
+
+class ConvergencePaths(Protocol):
+    """Result of `mesh_sensitivity`, as far as it is drawn."""
+
+    quantity: str
+
+    @property
+    def paths(self) -> Mapping[str, tuple[Array, Array, float, float]]:
+        """Refinements by name, see `draw_convergence`."""
+
+
+@validate_arguments
+def draw_findings(table: xr.Dataset, max_findings: int = 4, max_keys: int = 3) -> Figure:
+    """Draw the findings of a study over each key that varies.
+
+    Points that differ in one number alone are joined by a line. Colours are the values of a key in
+    words, such as the case.
+
+    Args:
+        table: table of a study, as by `Study.run`.
+        max_findings: number of findings that are drawn, the first ones that differ.
+        max_keys: number of keys that they are drawn over.
+
+    Returns:
+        The figure, with a row for each finding and a column for each key.
+
+    Raises:
+        InvalidInput: no finding is a number that differs between points.
+    """
+    flat = table.drop_dims("entry", errors="ignore")
+    frame = flat.to_dataframe(dim_order=list(flat.dims)).reset_index()
+    differs = {name: frame[name].replace(np.inf, np.nan).nunique() > 1 for name in frame}
+    # numbers of points and samples are no keys of the case
+    plain = [name for name in flat.coords if name not in ("point", "sample", "variation")]
+    keys = [str(name) for name in plain if differs[name]]
+    rows = [name for name in flat.data_vars if differs[name] and frame[name].dtype.kind == "f"]
+    rows, columns = rows[:max_findings], keys[:max_keys]
+    if not rows or not keys:
+        raise InvalidInput("no finding is a number that differs between points")
+    figure = new_figure(max(0.6 + 2.6 * len(columns), COLUMN_WIDTH), 0.9 + 1.5 * len(rows))
+    panels = figure.subplots(len(rows), len(columns), sharex="col", sharey="row", squeeze=False)
+    for (row, column), axes in np.ndenumerate(panels):
+        key, name = columns[column], rows[row]
+        label = _label_key(flat, key) if row == len(rows) - 1 else ""
+        style_axes(axes, label, "" if column else str(name))
+        others = [each for each in keys if each != key]
+        # words first: a case says more than a number
+        few = [each for each in others if frame[each].nunique() <= len(LINE_COLOURS)]
+        coloured = next((each for each in few if frame[each].dtype.kind not in "fi"), None)
+        coloured = coloured or next(iter(few), None)
+        values = frame.rename(columns={name: "value"})
+        _draw_over_key(axes, values, key, others, coloured)
+        if row == 0 and coloured is not None:
+            place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 3}
+            style = {"fontsize": LABEL_SIZE, "title_fontsize": LABEL_SIZE, "frameon": False}
+            axes.legend(title=_label_key(flat, coloured), **place, **style)
+    return figure
+
+
+def _label_key(table: xr.Dataset, key: str) -> str:
+    """Return a key of a case with the unit of its values."""
+    unit = table[key].attrs.get("units")
+    return f"{key} [{unit}]" if unit else key
+
+
+def _draw_over_key(
+    axes: Axes, frame: Any, key: str, others: Sequence[str], coloured: str | None
+) -> None:
+    """Draw the values of a frame over a key, with a line for each set of other keys."""
+    in_words = frame[key].dtype.kind not in "fi"
+    if in_words:
+        labels = list(dict.fromkeys(frame[key]))
+        axes.set_xticks(range(len(labels)), labels, rotation=30, ha="right")
+        axes.set_xlim(-0.5, len(labels) - 0.5)
+        frame = frame.assign(**{key: frame[key].map(labels.index)})
+    # samples differ in all keys at once: no two of them are joined
+    joined = bool(others) and not in_words and 2 * frame.groupby(others).ngroups <= len(frame)
+    sets = others if joined else [coloured] if coloured else []
+    colours: dict[Any, str] = {}
+    for _, group in frame.groupby(sets, sort=False) if sets else [("", frame)]:
+        words = None if coloured is None else group[coloured].iloc[0]
+        label = None if words is None or words in colours else f"{words}"
+        colour = colours.setdefault(words, LINE_COLOURS[len(colours)])
+        known = group[np.isfinite(group["value"])].sort_values(key)
+        style = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
+        axes.plot(known[key], known["value"], "o-" if joined else "o", **style)
 
 
 def draw_study(
@@ -313,18 +402,22 @@ def _draw_property(axes: Axes, values: Array, heights: Array, falls: Array) -> N
 
 
 def draw_convergence(
-    paths: Mapping[str, tuple[Array, Array, float, float]], quantity: str = "finding"
+    paths: Mapping[str, tuple[Array, Array, float, float]] | ConvergencePaths,
+    quantity: str | None = None,
 ) -> Figure:
     """Draw a result over the size of cells and steps, with its extrapolated limit and error bar.
 
     Args:
         paths: by name of the refinement, sizes relative to the finest (n,), results (n,), the limit
-            at size zero, and the error bar of the finest.
+            at size zero, and the error bar of the finest; or what `mesh_sensitivity` returns.
         quantity: name and unit of the result.
 
     Returns:
         The figure, with a panel for each refinement.
     """
+    if not isinstance(paths, Mapping):
+        quantity, paths = quantity or paths.quantity, paths.paths
+    quantity = quantity or "finding"
     wide = 0.25 * COLUMN_WIDTH + 0.55 * COLUMN_WIDTH * len(paths)
     figure = new_figure(wide, 0.55 * COLUMN_WIDTH)
     panels = figure.subplots(1, len(paths), sharey=True, squeeze=False)[0]

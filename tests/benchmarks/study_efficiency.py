@@ -2,6 +2,7 @@
 
     python tests/benchmarks/study_efficiency.py --points 64 --repeat 5
     python tests/benchmarks/study_efficiency.py --bridge
+    python tests/benchmarks/study_efficiency.py --suite
 
 The bridge's are those of its sensitivity study, of which 25 cases are taken under one made pair at
 R = 3: the search for scales, which would take longer still, is left out.
@@ -62,6 +63,16 @@ def bridge() -> af.Study:
         return af.Study.read(path)
 
 
+def suite() -> af.Study:
+    """Return two rings on one suite of six pairs, which are matched to a spectrum."""
+    case = f'case = "{MESHES / "ring_suite.toml"}"'
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "study.toml"
+        thin = 'set = ["structure.thickness=0.50"]'
+        path.write_text(f"[cases]\nthick = {{ {case} }}\nthin = {{ {case}, {thin} }}\n")
+        return af.Study.read(path)
+
+
 def alone(points: Sequence[tuple[int, Point]], asked: Evaluator) -> Iterator[tuple[int, Row]]:
     """Answer points on one process that is not this one."""
     return process_pool.evaluate_on_processes(points, asked, 1, meanwhile=load_table_libraries)
@@ -86,9 +97,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--repeat", type=int, default=1)
     parser.add_argument("--fidelity", default="rigid")
     parser.add_argument("--bridge", action="store_true", help="the bridge in place of the ring")
+    parser.add_argument("--suite", action="store_true", help="two rings on one matched suite")
     given = parser.parse_args(arguments)
-    if given.bridge:
-        study = bridge()
+    if given.bridge or given.suite:
+        study = bridge() if given.bridge else suite()
     else:
         changes = [f"model.fidelity={given.fidelity}", "output.animation=false"]
         if given.quick:

@@ -44,6 +44,35 @@ def deadly(case, folder):
     return lengths(case)
 
 
+def matches(case, folder):
+    """Mean of the only pair; each matching, which takes no time here, leaves a file."""
+    from dataclasses import replace
+    from unittest.mock import patch
+
+    import archfem as af
+    from archfem.studies import cache
+
+    def matched(suite, target):
+        time.sleep(0.05)
+        (Path(folder) / f"{suite.pairs[0].name} {time.monotonic_ns()}").touch()
+        return replace(suite, pairs=tuple(pair.scaled(1.0 / 3.0) for pair in suite.pairs))
+
+    cache._cache.pop("suites", None)  # as if each point were computed by another process
+    with patch.object(af.Suite, "matched", matched):
+        motion = af.studies.ground_motion(case)
+    return {"mean": float(motion.horizontal.mean()), "last": float(motion.vertical[-2])}
+
+
+def noisy(case):
+    """Warns with a number of its own, and of something else."""
+    import logging
+
+    thickness = case.settings["structure"]["thickness"]
+    for text in ("a joint had turned by %g rad", "another %g"):
+        logging.getLogger("archfem").warning(text, thickness)
+    return {}
+
+
 def ending(case, folder):
     """Ends its own process in one way or another, or tells of it."""
     thickness = case.settings["structure"]["thickness"]
@@ -120,6 +149,26 @@ def study_file(ring_file, finders):
         "[vary]\nstructure.thickness = [0.5, 0.6, 1.0]\nmotion.scale = [1.0, 2.0]\n"
     )
     return path
+
+
+@pytest.fixture
+def matching_study(finders):
+    """A function of a folder: a study of two rings on one suite of three pairs to be matched."""
+
+    def study(folder):
+        folder.mkdir()
+        suite = {
+            "matched": True,
+            "target": {"code": "TBEC-2018", "ss": 1.0, "s1": 0.3, "site": "ZD"},
+            "pairs": {n: {"synthetic": {"seed": k, "duration": 1.0}} for k, n in enumerate("abc")},
+        }
+        ring = {"shape": "circular_arch", "radius": 3.0, "embrace": 150.0, "voussoirs": 5}
+        case = af.Case.of({"structure": {**ring, "thickness": 0.5}, "suite": suite})
+        over = {"structure.thickness": [0.5, 0.6], "suite.pair": list("abc")}
+        find = {"name": "finders_of_tests:matches", "folder": str(folder)}
+        return af.Study.of(case, over, find), folder
+
+    return study
 
 
 def rows_of(folder: Path) -> dict[str, str]:

@@ -68,6 +68,14 @@ def test_a_client_gives_the_rows_that_processes_give(study_file, tmp_path, clien
     )
 
 
+def test_a_pair_is_matched_once_on_a_cluster(matching_study, tmp_path, client):
+    study, marks = matching_study(tmp_path / "marks")
+    found = study.run(tmp_path / "out", client=client)
+    assert sorted(mark.name[0] for mark in marks.iterdir()) == list("abc")
+    serial, _ = matching_study(tmp_path / "serial")
+    assert (found["mean"].values == serial.run(workers=1)["mean"].values).all()
+
+
 def test_a_worker_of_another_version_is_named(study_file, client, monkeypatch):
     monkeypatch.setattr("archfem.studies.cluster.describe_version", lambda: "9.9.9")
     with pytest.raises(
@@ -125,6 +133,25 @@ def test_a_scheduler_that_dies_leaves_what_was_finished(small_ring, finders, tmp
     assert 3 <= len(Store(folder).digests()) < 12
     monkeypatch.setattr(Store, "write_row", original)
     assert study.run(folder, workers=1).identical(study.run(workers=1))
+
+
+@pytest.mark.slow
+def test_a_worker_that_ends_is_told(small_ring, finders, tmp_path, monkeypatch, caplog):
+    over = {"structure.thickness": [0.5 + 0.01 * k for k in range(12)]}
+    find = {"name": "finders_of_tests:slowly", "seconds": 0.5}
+    study = af.Study.of(small_ring, over, find)
+    with cluster(tmp_path) as (address, processes):
+        original = Store.write_row
+
+        def write_row(self, digest, row):
+            original(self, digest, row)
+            if len(self.digests()) == 3:
+                processes[1].kill()
+
+        monkeypatch.setattr(Store, "write_row", write_row)
+        table = study.run(tmp_path / "out", client=address)
+    assert not table["error"].values.astype(bool).any()
+    assert "1 workers of the scheduler ended (tcp://" in caplog.text
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import archfem as af
+from archfem.studies import ida as ida_module
 from archfem.studies.ida import ida, measure_intensities
 
 
@@ -73,6 +74,44 @@ def test_it_goes_on_where_it_ended(small_ida, monkeypatch):
     monkeypatch.setattr("archfem.studies.study.evaluate_serially", never)
     again = af.ida(case, made(2), precision=0.2, between=(0.3, 2.5), folder=folder, workers=1)
     assert again.table.identical(found.table)
+
+
+@pytest.mark.parametrize("call", [2, 4])
+def test_each_run_is_kept_when_it_is_ended(small_ida, tmp_path, monkeypatch, call):
+    case, _, found = small_ida
+    runs, options = [], {"precision": 0.2, "between": (0.3, 2.5), "workers": 1}
+    original = ida_module.run_motion
+
+    def counted(result, motion):
+        runs.append(motion)
+        if len(runs) == call:
+            raise KeyboardInterrupt
+        return original(result, motion)
+
+    monkeypatch.setattr(ida_module, "run_motion", counted)
+    with pytest.raises(KeyboardInterrupt):
+        af.ida(case, made(1), folder=tmp_path, **options)
+    assert af.studies.status(tmp_path).runs == call - 1
+    assert f"{call - 1} runs kept" in str(af.studies.status(tmp_path))
+    again = af.ida(case, made(1), folder=tmp_path, **options)
+    first = found.table.sel(motion=["seed 1"]).dropna("entry", how="all")
+    assert len(runs) == first.sizes["entry"] + 1  # the run that was ended was begun twice
+    assert again.table.drop_attrs().identical(first.drop_attrs())
+
+
+def test_a_fractile_does_not_turn_back_where_a_motion_ends():
+    """The strongest of three motions is run no further than 2: its demand is then unknown."""
+    rows = {
+        "pga": ("motion", [1.0, 1.0, 1.0]),
+        "scale": (("motion", "entry"), [[1.0, 4.0], [1.0, 4.0], [1.0, 2.0]]),
+        "rotation": (("motion", "entry"), [[1.0, 4.0], [2.0, 8.0], [10.0, 20.0]]),
+    }
+    found = af.studies.Ida(xr.Dataset(rows, {"motion": ["a", "b", "c"]}))
+    low, middle, high = found.fractiles(np.array([1.0, 1.9, 2.1, 3.0, 4.0]))
+    assert high[:2] == pytest.approx([10.0, 19.0])
+    assert np.isinf(high[2:]).all()  # not 8, 12, 16: those of the motions that are left
+    for fractile in (low, middle):
+        assert (np.diff(fractile) > 0.0).all()
 
 
 def test_fractiles_are_those_of_curves_drawn_by_hand():

@@ -3,6 +3,7 @@
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from archfem.dynamics.solvers.selection import select_solver
 from archfem.models import Discretisation
 from archfem.studies import cache
 from archfem.studies.cache import SharedStepper
+from archfem.studies.parameter_space import Point
 
 DT = 0.005
 
@@ -123,6 +125,30 @@ def test_a_suite_is_matched_once_whatever_its_factors(monkeypatch):
     settings["suite"]["target"]["ss"] = 1.2
     cache.ground_motion(af.Case.of(settings))
     assert len(met) == 2
+
+
+def test_a_pair_is_matched_once_by_all_workers(matching_study, tmp_path):
+    tables = []
+    for workers in (1, 2):
+        study, marks = matching_study(tmp_path / str(workers))
+        tables.append(study.run(workers=workers))
+        assert sorted(mark.name[0] for mark in marks.iterdir()) == list("abc")
+    assert tables[0].identical(tables[1])  # to the last bit
+    assert (tables[0]["mean"].std("suite.pair") > 0.0).all()
+
+
+def test_models_are_told_apart_by_content():
+    """Cases that were read apart share a model, and one that another key changes has its own."""
+    first, again, other = (
+        Point(settings, Path(), changes)
+        for settings, changes in (
+            (deepcopy(CASE), (("structure.breadth", "0.7 m"),)),
+            (case(structure__breadth="0.7 m", analysis__dt="2 ms").settings, ()),
+            (deepcopy(CASE), ()),
+        )
+    )
+    assert first.model_key == again.model_key
+    assert first.model_key != other.model_key
 
 
 def test_a_structure_is_made_once_and_again_where_anything_of_it_differs(tmp_path):

@@ -42,7 +42,7 @@ def study_of(case, find, thicknesses, folder):
 
 
 def test_deaths_of_workers_are_reported_and_nothing_is_inherited(
-    small_ring, tmp_path, finders, monkeypatch
+    small_ring, tmp_path, finders, monkeypatch, caplog
 ):
     monkeypatch.setattr(process_pool, "MAX_DEATHS_PER_POINT", 2)
     thicknesses = [0.5, 0.6, 0.7, 0.8, 0.81, 0.82, 0.83]
@@ -53,6 +53,11 @@ def test_deaths_of_workers_are_reported_and_nothing_is_inherited(
     assert errors.pop(0.7).endswith("the last with exit code 7")
     assert errors.pop(0.8).endswith("the last with exit code 5")  # by sys.exit
     assert not any(errors.values())  # 0.5 ended its first process alone
+    messages = [record.getMessage() for record in caplog.records]
+    first = "a worker ended with signal 9 while it computed point 0 (structure.thickness = 0.5)"
+    assert [text for text in messages if text.startswith(f"{first}: the point is computed again")]
+    assert sum("point 2 (structure.thickness = 0.7): the point is lost" in m for m in messages) == 1
+    assert len(messages) == 7  # two of each of three points, and one of the first
     rows = table.isel({"structure.thickness": [0, 4, 5, 6]})
     assert (rows["sockets"] == 1).all()  # neither the other workers' nor the fork server's
     assert (rows["threads"] == 1).all()  # of the fork server

@@ -15,7 +15,8 @@ from scipy import stats
 
 import archfem as af
 from archfem.cases import provenance
-from archfem.studies import parameter_axes
+from archfem.studies import parameter_axes, result_store
+from archfem.studies import study as study_module
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import group_by_model
 from archfem.studies.process_pool import TaskQueue
@@ -134,7 +135,7 @@ def test_a_changed_case_is_told_apart(
     else:
         monkeypatch.setattr(af, "__version__", "0.1.0")
     after = af.Study.read(study_file, own_code=True)
-    digests = [[point.digest(study.asked.text) for point in study.points]
+    digests = [[study.asked.digest(point) for point in study.points]
                for study in (before, after)]  # fmt: skip
     if what in ("case", "option"):
         assert not set(digests[0]) & set(digests[1])
@@ -215,6 +216,143 @@ def test_a_full_disk_is_named_and_what_was_finished_stays(study_file, tmp_path, 
     )
 
 
+def test_a_changed_title_or_picture_recomputes_nothing(ring_file, tmp_path, monkeypatch):
+    over, folder = {"structure.thickness": [0.5, 0.6]}, tmp_path / "out"
+
+    def table(*changes, find="dead load"):
+        case = af.Case.read(ring_file, ["output.save_every=1", *changes])
+        return af.Study.of(case, over, find, title="one").run(folder, workers=1)
+
+    first = table()
+    evaluated = []
+    original = study_module.evaluate_serially
+
+    def counted(points, evaluator):
+        evaluated.append(len(points))
+        return original(points, evaluator)
+
+    monkeypatch.setattr(study_module, "evaluate_serially", counted)
+    assert table("title=other", "output.animation=true", "output.joints=[1]").identical(first)
+    assert not evaluated
+    table("output.save_every=2")  # the largest value of a run is that of its records
+    assert evaluated == [2]
+    assert len({title(table(f"title={word}", find=title)) for word in "ab"}) == 2
+
+
+def title(found):
+    """The title of a case, as a function of the user; or that of its first point."""
+    if isinstance(found, af.Case):
+        return {"name": found.title}
+    return found["name"].values[0]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_progress_is_told_where_the_output_is_a_file(
+    small_ring, finders, tmp_path, monkeypatch, capsys, workers
+):
+    monkeypatch.setattr(result_store, "PROGRESS_INTERVAL", 0.05)
+    find = {"name": "finders_of_tests:slowly", "seconds": 0.2}
+    af.Study.of(small_ring, {"structure.thickness": [0.5, 0.6, 0.7]}, find).run(workers=workers)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) > 2
+    assert all(line.startswith("study: ") and "of 3 points done" in line for line in lines)
+    assert any("0 failed" in line and "s remaining" in line for line in lines)
+
+
+def test_a_repeated_warning_is_said_once(small_ring, finders, caplog):
+    over = {"structure.thickness": [0.5, 0.6, 0.7]}
+    af.Study.of(small_ring, over, "finders_of_tests:noisy").run(workers=1)
+    said = [record.getMessage() for record in caplog.records]
+    assert said[:2] == ["a joint had turned by 0.5 rad", "another 0.5"]
+    assert said[2:] == ["4 more warnings as above, of other runs, are not repeated"]
+
+
+def test_cases_and_what_is_computed_are_in_one_file(ring_file, tmp_path, capsys):
+    path, folder = tmp_path / "study.toml", tmp_path / "out"
+    path.write_text(
+        'title = "two measures"\ncompute = "limit"\nset = ["limit.horizontal=1.0"]\n'
+        '[cases]\n"as it stands" = { case = "ring.toml" }\n'
+        '"thicker" = { case = "ring.toml", set = ["structure.thickness=0.9"] }\n'
+        '[vary]\nstructure.width = ["1 m", "150 cm"]\n'
+    )
+    command = ["study", str(path), "--out", str(folder), "--workers", "1"]
+    assert af.commands.main(command) == 0
+    said = capsys.readouterr().out
+    found = af.studies.read_table(folder / "results.nc")
+    assert found["factor"].dims == ("case", "structure.width")
+    assert found["structure.width"].values.tolist() == [1.0, 1.5]  # numbers, whatever was written
+    assert found["structure.width"].attrs["units"] == "m"
+    for name, changes in (("as it stands", []), ("thicker", ["structure.thickness=0.9"])):
+        case = af.Case.read(ring_file, ["limit.horizontal=1.0", *changes])
+        factor = case.limit.solve(case.structure).factor
+        assert found["factor"].sel(case=name).values == pytest.approx(factor, rel=1e-9)
+        assert f"{name:12}" in said
+        assert f"{factor:.5g}" in said
+    assert "structure.width [m]" in said
+    assert (folder / "study.png").stat().st_size > 10_000
+    sheet = pd.read_excel(folder / "results.xlsx")
+    assert sheet["structure.width"].tolist() == [1.0, 1.5, 1.0, 1.5]
+    assert sheet["factor"].to_numpy() == pytest.approx(found["factor"].values.ravel(), rel=1e-12)
+    before = (folder / "results.xlsx").read_bytes()
+    assert af.commands.main(command) == 0
+    assert (folder / "results.xlsx").read_bytes() == before  # without the time of day
+
+
+def test_pairs_that_another_worker_matches_are_left_for_later(small):
+    over = {"analysis.dt": [0.005], "suite.pair": ["first", "second"]}
+    points = list(enumerate(af.Study.of(af.Case.read(small), over, "dead load").points))
+    tasks = TaskQueue(points, Evaluator.of("dead load"))
+    assert tasks.pop(None, (), {"first"}).pair == "second"
+    assert tasks.pop(None, (), {"first"}).pair == "first"  # better than to wait
+
+
+def test_a_long_table_is_cut_and_equal_findings_are_said_once(small_ring):
+    over = {"structure.thickness": ["0.5 m", "0.6 m", "0.7 m"]}
+    table = af.Study.of(small_ring, over, lambda case: {"a": 1.5, "b": case.structure.weight}).run(
+        workers=1
+    )
+    lines = result_store.format_table(table, max_rows=2).splitlines()
+    assert lines[0].split() == ["structure.thickness", "[m]", "b"]
+    assert [line.split()[0] for line in lines[1:3]] == ["0.5", "0.6"]
+    assert lines[3:] == ["… 1 more points", "the same at all points: a = 1.5"]
+
+
+def test_the_study_files_of_the_documentation_are_read(tmp_path):
+    root = Path(__file__).parents[2]
+    page = (root / "docs/howto/studies.md").read_text(encoding="utf-8")
+    files = [part.partition("```")[0] for part in page.split("```toml\n")[1:]]
+    (tmp_path / "meshes").symlink_to(root / "meshes")
+    counts = []
+    for text in files:
+        (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+        counts.append(len(af.Study.read(tmp_path / "study.toml").points))
+    assert counts == [3 * 64, 2 * 3 * 2]
+
+
+def test_cases_with_a_suite_are_computed_under_each_pair(small, tmp_path):
+    path = tmp_path / "study.toml"
+    cases = (
+        f'[cases]\na = {{ case = "{small}" }}\nb = {{ case = "{small}", set = ["suite.scale=2"] }}'
+    )
+    path.write_text(f'compute = "history"\n{cases}\n[[vary]]\nanalysis.dt = "5 ms"\n')
+    study = af.Study.read(path)
+    assert study.axes[0].rows == tuple((c, p) for c in "ab" for p in ("first", "second"))
+    assert [axis.name for axis in study.axes] == ["point", "variation"]
+    path.write_text(f'compute = "history"\npairs = ["second"]\n{cases}\n')
+    assert [dict(point.changes) for point in af.Study.read(path).points] == [
+        {"suite.pair": "second"}
+    ] * 2
+    single = f'case = "{small}"\nvary.analysis.dt = [0.005, 0.01]\n'
+    path.write_text(single)
+    assert [axis.name for axis in af.Study.read(path).axes] == ["suite.pair", "analysis.dt"]
+    path.write_text(f'compute = "comparison"\n{single}')
+    study = af.Study.read(path)
+    assert isinstance(study, af.studies.Comparison)
+    table = study.run(workers=1)
+    assert list(study.findings(table)) == ["analysis.dt = 0.005", "analysis.dt = 0.01"]
+    assert all(len(finding.runs) == 2 for finding in study.findings(table).values())
+
+
 def test_status_tells_how_far_a_study_is(study_file, tmp_path, capsys):
     folder = tmp_path / "out"
     command = ["study", "--own-code", str(study_file), "--out", str(folder), "--workers", "1"]
@@ -288,7 +426,11 @@ RANDOM = "vary.structure.thickness = { distribution = 'norm', loc = 0.5, scale =
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (GOOD, "says nothing of vary"),
+        (GOOD, 'study.toml: it says nothing of vary: write case = "file.toml" and vary'),
+        (f"{GOOD}[cases]", "study.toml: it has both case and cases"),
+        (f"{GOOD}find = 'limit'", "study.toml: unknown key 'find'"),
+        (f"{GOOD}scales = true\nvary.title = ['a']", "scales is the search of a comparison"),
+        (f"{GOOD}pairs = ['a']\nvary.title = ['a']", "needs none: take pairs out"),
         ("vary.structure.thickness = [0.5]", "says nothing of case"),
         (f"{GOOD}vary.structure.thicknes = [0.5]", "did you mean 'thickness'"),
         (f"{GOOD}vary.structure.thickness = []", "thickness is empty: a product"),

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from archfem.view import draw_study
+import archfem as af
+from archfem.view import draw_findings, draw_study
 
 FOUND = {
     "weak": {"four joints": np.array([0.3, 0.5, 0.9]), "moves": np.array([0.8, 1.2, np.inf])},
@@ -47,3 +49,23 @@ def test_definitions_by_which_nothing_fails_have_no_sign():
     told = [text.get_text() for text in page.legends[0].get_texts()]
     assert told == ["enough joints fail at once", "median, and range of the pairs"]
     assert "first mechanism" in page.legends[0].get_title().get_text()
+
+
+def test_points_that_differ_in_one_number_are_joined_and_coloured_by_the_case():
+    table = xr.Dataset(
+        {
+            "factor": (("case", "width"), [[0.4, 0.5, np.inf], [0.6, 0.7, 0.8]]),
+            "error": (("case", "width"), np.full((2, 3), "", dtype=object)),
+        },
+        {"case": ["thin", "thick"], "width": ("width", [1.0, 2.0, 3.0], {"units": "m"})},
+    )
+    over_case, over_width = draw_findings(table).axes
+    assert over_width.get_xlabel() == "width [m]"
+    assert over_case.get_ylabel() == "factor"
+    assert [line.get_ydata().tolist() for line in over_width.lines] == [[0.4, 0.5], [0.6, 0.7, 0.8]]
+    named = [text.get_text() for text in over_width.get_legend().get_texts()]
+    assert named == ["thin", "thick"]
+    assert [text.get_text() for text in over_case.get_xticklabels()] == ["thin", "thick"]
+    assert all(line.get_linestyle() == "None" for line in over_case.lines)
+    with pytest.raises(af.InvalidInput, match="no finding is a number"):
+        draw_findings(table[["error"]])
