@@ -126,6 +126,25 @@ def test_the_page_has_the_counts_of_the_table(lines, brackets):
     assert f"{len(lines)} searches made {runs:.0f} runs in {seconds / 60:.0f} minutes" in text
 
 
+def test_the_page_has_the_effects_of_the_settings(lines, brackets):
+    def fall(line):
+        return math.sqrt(line["stands"] * line["falls"])
+
+    softest = min(b["stiffness"] for b in brackets)
+    soft = {(b["arch"], b["motion"]): fall(b) for b in brackets if b["stiffness"] == softest}
+    groups = {"joints ten times as stiff": [b for b in brackets if b["stiffness"] > softest]}
+    for line in lines:
+        if line["variant"] != "map":
+            groups.setdefault(line["variant"], []).append(line)
+    assert len(groups) == 6
+    for name, group in groups.items():
+        ratios = [fall(line) / soft[line["arch"], line["motion"]] for line in group]
+        count, *stated, below = row_of(name)
+        assert count == len(group)
+        assert stated == pytest.approx(np.quantile(ratios, (0.5, 0.1, 0.9)), abs=0.0051)
+        assert below == pytest.approx(100.0 * share(group, "linear"), abs=0.051)
+
+
 @pytest.mark.slow
 def test_a_line_of_the_table_is_computed_again(lines, script):
     line, point = lines[40], script.list_points(50, 10)[40]
