@@ -1,5 +1,6 @@
 """Draw the figures of the theory and of the tutorial: `python docs/figures.py`, about a minute."""
 
+import runpy
 import tempfile
 from pathlib import Path
 
@@ -306,8 +307,14 @@ def selection() -> None:
     found.plot().savefig(FOLDER / "selection.png", dpi=90)
 
 
+def assessment_map() -> None:
+    """Draw the map of checks and falls, as its notebook does from the stored table."""
+    notebook = FOLDER.parents[1] / "notebooks" / "10_where_checks_and_falls_differ.py"
+    runpy.run_path(str(notebook))["figure"].savefig(FOLDER / "assessment_map.png", dpi=90)
+
+
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
     drawings = (signs, law, section, rules, frame, ladder, states, programme)
-    for draw in (*drawings, tutorial, verdict_range, selection):
+    for draw in (*drawings, tutorial, verdict_range, selection, assessment_map):
         draw()

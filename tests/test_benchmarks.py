@@ -19,8 +19,9 @@ NAMES = sorted(
 FIRST = ("opensees_ring", "run")
 """Scripts that import OpenSees, which must be loaded before archfem and its MPI."""
 
-LONG = ("run", "study_efficiency", "study_kills")
-"""Scripts that take seconds: one runs five others of these, two start studies of processes."""
+LONG = ("assessment_map", "run", "study_efficiency", "study_kills")
+"""Scripts that take seconds: one runs five others of these, two start studies of processes,
+and one matches motions and drops arches."""
 
 
 MARKED = [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in NAMES]
