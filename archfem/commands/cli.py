@@ -239,6 +239,7 @@ def _add_film(command: argparse.ArgumentParser) -> None:
     command.add_argument("--fps", type=float, help="frames a second, at most (20)")
     command.add_argument("--seconds", type=float, help="how long the film lasts (as the run)")
     command.add_argument("--size", metavar="WIDTHxHEIGHT", help="in pixels (1280x720)")
+    command.add_argument("--renderer", help="matplotlib, or pyvista, also for .html (matplotlib)")
     command.set_defaults(command=_load_command("tools", "animate"))
 
 
