@@ -167,15 +167,27 @@ class ScenePainter:
         self._canvas.paste(self._scene.plotter.screenshot(return_img=True))
 
 
+def _export_page(plotter: pv.Plotter) -> str:
+    """Return a page with a scene and the script that shows it, without files beside it."""
+    # an optional part of trame that this page does not use would download files of its own
+    unused = "trame.widgets.vtklocal"
+    modules: dict[str, Any] = sys.modules
+    blocked = modules.setdefault(unused, None) is None
+    try:
+        with require_package("trame"):
+            # older versions of pyvista have the exporter itself
+            return str(getattr(plotter, "trame", plotter).export_html(None).getvalue())
+    finally:
+        if blocked:
+            del modules[unused]
+
+
 def write_scene(path: Path, setup: Setup, run: History) -> Path:
     """Write an HTML page of a run at its decisive instant, which can be moved and enlarged."""
     scene, instant = Scene(setup), np.array([decisive_instant(run)])
     scene.show(next(frames_of_run(setup, run, instant, fields_at(run, instant))))
     scene.add_colour_bar()
-    with require_package("trame"):
-        # older versions of pyvista have the exporter itself
-        exporter = getattr(scene.plotter, "trame", scene.plotter)
-        page = exporter.export_html(None).getvalue()
+    page = _export_page(scene.plotter)
     title = f"{run.dataset.attrs['title']}: {run.verdict.outcome}, t = {instant[0]:.3f} s"
     # by style, since the page's script replaces its body; characters are written as CSS codes
     content = "".join(f"\\{ord(character):x} " for character in title)
