@@ -23,6 +23,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from multiprocessing import parent_process
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numba
@@ -156,25 +157,69 @@ view_kernel: Any = numba.njit(**INNER_OPTIONS, inline="always")
 
 
 class CompilationNotice(event.Listener):
-    """Event listener that announces the first compilation of a function of this package."""
+    """Event listener that announces compilations of this package, and how long they take."""
 
     def on_start(self, event: Any) -> None:
         function = getattr(event.data["dispatcher"], "py_func", None)
-        if getattr(function, "__module__", "").startswith("archfem."):
-            _announce_compilation()
+        module = getattr(function, "__module__", "")
+        if module.startswith("archfem.") and module != __name__:
+            _announce_compilation(module)
 
     def on_end(self, event: Any) -> None:
         pass
 
 
-@cache
-def _announce_compilation() -> None:
-    """Write the notice, once."""
+# Parts of a run that are compiled at once, by the module of their first kernel: what is compiled,
+# and its time as a multiple of that of the reference function
+_COMPILED_PARTS = {
+    "rigid_body.time_stepping": ("fall of loose blocks", 270.0),
+    "solvers.supernodal_lu": ("steps of elastic blocks", 290.0),
+    "joints.large": ("time steps", 225.0),
+    "": ("time steps", 150.0),  # of rigid blocks with small displacements
+}
+_announced: set[str] = set()
+
+
+def _announce_compilation(module: str) -> None:
+    """Write which part of a run is compiled, and for how long, once for each part."""
+    key = next(part for part in _COMPILED_PARTS if part in module)
+    part, multiple = _COMPILED_PARTS[key]
+    if part in _announced:
+        return
+    # kernels of large displacements include those of elastic blocks
+    _announced.update({part, "steps of elastic blocks"} if key == "joints.large" else {part})
+    seconds = multiple * _time_compilation()
+    duration = f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.1f} minutes"
     sys.stderr.write(
-        "archfem: compiling the time steps, which takes about a minute; later runs reuse the result"
-        " ('archfem compile' compiles everything, 'archfem doctor' shows the folder)\n"
+        f"archfem: compiling the {part}, which takes about {duration}; later runs reuse the result "
+        "('archfem compile' compiles everything, 'archfem doctor' shows the folder)\n"
     )
     sys.stderr.flush()
+
+
+def _time_compilation(repeats: int = 3) -> float:
+    """Return the time that the compilation of a small reference function takes [s]."""
+    times = []
+    for _ in range(repeats + 1):
+        start = perf_counter()
+        numba.njit("void(f8[:,::1], f8[::1])", **KERNEL_OPTIONS)(_eliminate)
+        times.append(perf_counter() - start)
+    return sorted(times[1:])[repeats // 2]  # the first one loads the compiler as well
+
+
+def _eliminate(a: Any, b: Any) -> None:
+    """Solve a x = b by elimination without pivots, x in place of b; only to be compiled."""
+    n = len(b)
+    for k in range(n):
+        for i in range(k + 1, n):
+            factor = a[i, k] / a[k, k]
+            for j in range(k, n):
+                a[i, j] -= factor * a[k, j]
+            b[i] -= factor * b[k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            b[k] -= a[k, j] * b[j]
+        b[k] /= a[k, k]
 
 
 @cache

@@ -45,6 +45,7 @@ OPTIONAL_PACKAGES = {
     "EGL": Requirement(
         "pyvista's viewer of a run", "'apt-get install libegl1 libgl1', elsewhere Mesa's libEGL"
     ),
+    "trame": Requirement("pyvista's HTML pages", "pip install 'archfem[notebooks]'"),
     "gmsh": Requirement(
         "meshes",
         "'pip install gmsh'; where libGLU or another library is missing, 'apt-get install "

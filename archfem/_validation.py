@@ -2,23 +2,45 @@
 
 import inspect
 import os
+import traceback
 import unicodedata
-from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache, wraps
 from math import inf, isfinite
 from numbers import Integral
+from pathlib import Path
 from types import NoneType, SimpleNamespace, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from archfem._typing import Array
-from archfem.errors import InvalidInput
+from archfem.errors import ArchfemError, InvalidInput
 
 # Length of a value that an error quotes, in characters
 MAX_REPR_LENGTH = 200
 
 _NUMBER_TYPES = (int, float, np.integer, np.floating)
+
+
+@contextmanager
+def report_user_errors(what: str) -> Iterator[None]:
+    """Turn an error of code of the user into one that names its module and line."""
+    try:
+        yield
+    except ArchfemError:
+        raise
+    except Exception as error:
+        # the innermost line that is neither of archfem nor of the import system
+        package = str(Path(__file__).parent)
+        frames = [
+            frame
+            for frame in traceback.extract_tb(error.__traceback__)
+            if not frame.filename.startswith((package, "<")) and "importlib" not in frame.filename
+        ]
+        place = f" at {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
+        raise InvalidInput(f"{what} failed{place}: {type(error).__name__}: {error}") from error
 
 
 def short_repr(value: Any) -> str:

@@ -4,7 +4,7 @@
     case            Case: one analysis
     examples        shipped cases
     motion_keys     [motion] and [suite]
-    provenance      digests of inputs and program
+    provenance      digests of inputs and program, modules of the user
     report          HTML report of the results of a case
     result_folder   result folders written and opened again
     result_text     results as text

@@ -1,5 +1,6 @@
 from .analysis_keys import LimitAnalysis as LimitAnalysis
 from .case import Case as Case
+from .provenance import load_extension as load_extension
 from .result_folder import ResultFolder as ResultFolder
 from .result_folder import open_results as open_results
 from .run import DeadLoadResult as DeadLoadResult

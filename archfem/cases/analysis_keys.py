@@ -7,6 +7,7 @@ from typing import Any
 from archfem._validation import validate_methods
 from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.toml_file import Table, check_choice, check_table
+from archfem.dynamics.events import REGISTERED_CRITERIA
 from archfem.dynamics.schemes import (
     HHT,
     Conserving,
@@ -34,7 +35,10 @@ from archfem.statics.mechanism_assessment import (
     kinematic_assessment,
 )
 
-ANALYSIS_KEYS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "stop_at_mechanism": bool}
+ANALYSIS_KEYS = {
+    **{"dt": "s", "scheme": str, "alpha": "1", "damping": dict},
+    **{"stop_at_mechanism": bool, "stop_at": str},
+}
 DAMPING_KEYS = {
     **{"ratio": "1", "frequency": "Hz", "frequencies": ["Hz"], "modes": str, "kind": str},
     **{"mass_share": "1", "joints": str},
@@ -63,6 +67,10 @@ def parse_analysis(table: Any) -> dict[str, Any]:
     analysis = check_table(table, ANALYSIS_KEYS, "analysis")
     if "damping" in analysis:
         analysis["damping"] = check_table(analysis["damping"], DAMPING_KEYS, "analysis.damping")
+    if "stop_at" in analysis:
+        check_choice(analysis["stop_at"], REGISTERED_CRITERIA, "analysis.stop_at")
+        if analysis.get("stop_at_mechanism", False):
+            raise InvalidInput("analysis.stop_at and stop_at_mechanism: one condition ends a run")
     return analysis
 
 

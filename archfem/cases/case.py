@@ -32,6 +32,7 @@ from archfem.cases.motion_keys import (
     parse_motion,
     parse_suite,
 )
+from archfem.cases.provenance import load_extensions_of
 from archfem.cases.structure_keys import cached_structure, parse_stages
 from archfem.cases.toml_file import Table, apply_change, check_table, read_with_base, refuse_unknown
 from archfem.dynamics.schemes import MIN_TIME_STEP, EffectiveDamping, Scheme, Viscous
@@ -144,7 +145,8 @@ class Case:
             InvalidInput: a key or value is invalid; the message names it and the remedy.
             InvalidStructure: the lengths of the structure contradict each other.
         """
-        refuse_unknown(settings, ("title", *TABLE_SECTIONS))
+        refuse_unknown(settings, ("title", "extensions", *TABLE_SECTIONS))
+        load_extensions_of(settings, folder)
         check_words(settings.get("title", ""), "title", 'write words in quotes: title = "…"')
         for key in TABLE_SECTIONS:
             if not isinstance(settings.get(key, {}), dict):

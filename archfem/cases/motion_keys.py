@@ -12,6 +12,7 @@ from archfem._typing import Array
 from archfem.cases.toml_file import Table, check_choice, check_table
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import (
+    REGISTERED_SPECTRA,
     Asce2022,
     DesignSpectrum,
     Eurocode8,
@@ -19,6 +20,7 @@ from archfem.motion.design_spectra import (
     Ntc2018,
     TableSpectrum,
     Tbec2018,
+    build_registered_spectrum,
 )
 from archfem.motion.motion import Motion
 from archfem.motion.record_selection import RecordSelection
@@ -122,7 +124,12 @@ def build_target_spectrum(settings: Table) -> DesignSpectrum | None:
 def build_spectrum(table: Table, section: str) -> DesignSpectrum:
     """Return the design spectrum of a table with its code."""
     values = dict(table)
-    code = check_choice(values.pop("code", None), TARGET_SPECTRA, f"{section}.code")
+    known = [*TARGET_SPECTRA, *REGISTERED_SPECTRA]
+    code = check_choice(values.pop("code", None), known, f"{section}.code")
+    if code not in TARGET_SPECTRA:
+        kinds = {float: "1", int: int, str: str}
+        own = {key: kinds[kind] for key, kind in REGISTERED_SPECTRA[code][1].items()}
+        return build_registered_spectrum(code, check_table(values, own, section))
     spectrum, keys = TARGET_SPECTRA[code]
     try:
         return spectrum(**check_table(values, keys, section))

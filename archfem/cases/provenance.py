@@ -1,25 +1,39 @@
-"""Digests of everything that determines a result: the case, its input files and the program.
+"""Digests of all that determines a result: case, input files, program and modules of the user.
 
 Input files count by their content and archfem by that of its modules. A result in a folder is
 reused only if its digest is equal, so that no result of another file or version is mistaken.
+
+Python modules of the user, which a case names in `extensions`, are such files. They are code, which
+no file runs by itself: a module is loaded after `load_extension`, or by a command with
+`--own-code`.
+Permissions are stored in the environment, which worker processes inherit.
 """
 
 import hashlib
 import json
+import os
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from archfem._files import check_file
-from archfem.cases.toml_file import Table
+from archfem._validation import report_user_errors, validate_arguments
+from archfem.cases.toml_file import Table, check_table
 from archfem.errors import InvalidInput
+
+# Environment variable with the permitted modules; "*" permits those of all cases
+OWN_CODE_VARIABLE = "ARCHFEM_OWN_CODE"
+
+# SHA-256 of each loaded module, by its name
+_loaded: dict[str, str] = {}
 
 
 def list_input_files(settings: Table, folder: Path = Path()) -> list[Path]:
-    """Return the records, drawings and meshes that a case names, existing or not."""
+    """Return the records, drawings, meshes and modules that a case names, existing or not."""
     suite = _as_table(settings.get("suite"))
     named = [("structure", "file"), ("model", "mesh_file")]
     files = [
@@ -27,6 +41,7 @@ def list_input_files(settings: Table, folder: Path = Path()) -> list[Path]:
         for section, key in named
         if key in (table := _as_table(settings.get(section)))
     ]
+    files += [folder / str(name) for name in settings.get("extensions", ())]
     files += [folder / name for name in _record_names(settings.get("motion"))]
     for pair in _as_table(suite.get("pairs")).values():
         files += [folder / str(suite.get("folder", "")) / name for name in _record_names(pair)]
@@ -76,7 +91,9 @@ def hash_sections(
         for name in sections
         if name in settings
     }
-    files = [(str(path), hash_file(path)) for path in list_input_files(tables, folder)]
+    # any section may name what a module of the user has registered
+    named = tables | {"extensions": settings.get("extensions", ())}
+    files = [(str(path), hash_file(path)) for path in list_input_files(named, folder)]
     # keys are not sorted: the order of arches and piers is that in the bridge
     return hashlib.sha256(json.dumps([tables, files], default=str).encode()).hexdigest()
 
@@ -112,3 +129,72 @@ def _tables_within(table: Any) -> list[Any]:
 def _as_table(value: Any) -> Table:
     """Return a value that is a table, or else an empty table."""
     return value if isinstance(value, Mapping) else {}
+
+
+@validate_arguments
+def load_extension(path: str | Path) -> ModuleType:
+    """Run a Python module of the user, once, which adds to archfem by functions `register_…`.
+
+    The module runs with all rights of the user: load only what you trust. Cases that name this file
+    in `extensions` may load it as well from then on, also in worker processes.
+
+    Args:
+        path: file of the module; modules beside it can be imported by it.
+
+    Returns:
+        The module.
+
+    Raises:
+        InvalidInput: there is no such file, it ends in an error, its name is that of another
+            module, or it was changed after it had been loaded.
+    """
+    path = Path(path)
+    digest, name = hash_file(path), path.stem
+    if digest == "missing" or path.suffix != ".py":
+        raise InvalidInput(f"extension {path} is no file of a Python module: give its path, *.py")
+    path = path.resolve()
+    if _loaded.setdefault(name, digest) != digest:
+        raise InvalidInput(
+            f"extension {path} has changed since it was loaded, or another one has its name: "
+            "start Python again, or give it another name"
+        )
+    if str(path.parent) not in sys.path:  # workers inherit this path too
+        sys.path.insert(0, str(path.parent))
+    try:
+        with report_user_errors(f"extension {path.name}"):
+            module = import_module(name)
+        if Path(module.__file__ or "").resolve() != path:
+            raise InvalidInput(f"extension {path}: Python has another module '{name}': rename it")
+    except BaseException:
+        del _loaded[name]  # a corrected file may be loaded
+        raise
+    _permit(str(path))
+    return module
+
+
+def permit_extensions() -> None:
+    """Permit the extensions of all cases that this process and its workers read."""
+    _permit("*")
+
+
+def _permit(name: str) -> None:
+    """Add a file to the permitted extensions."""
+    known = os.environ.get(OWN_CODE_VARIABLE, "").split(os.pathsep)
+    os.environ[OWN_CODE_VARIABLE] = os.pathsep.join(dict.fromkeys([*filter(None, known), name]))
+
+
+def load_extensions_of(settings: Table, folder: Path) -> None:
+    """Load the extensions of a case, or refuse those that are not permitted."""
+    given = {key: settings[key] for key in ("extensions",) if key in settings}
+    for name in check_table(given, {"extensions": [str]}, "case").get("extensions", []):
+        path = (folder / name).resolve()
+        # a report reads its case without the files of it
+        if path.stem in _loaded and not path.exists():
+            continue
+        permitted = os.environ.get(OWN_CODE_VARIABLE, "").split(os.pathsep)
+        if not {"*", str(path)} & set(permitted):
+            raise InvalidInput(
+                f"extensions: '{name}' is code, which no file runs by itself: if you trust it, say "
+                f"so, by --own-code or archfem.cases.load_extension('{name}')"
+            )
+        load_extension(path)

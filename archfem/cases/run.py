@@ -22,7 +22,7 @@ from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs
 from archfem.dynamics.damping import effective_mode_range, first_effective_mode
-from archfem.dynamics.events import CountedMechanism
+from archfem.dynamics.events import REGISTERED_CRITERIA, CountedMechanism, StopCondition
 from archfem.dynamics.history import Ending, History, partial_history
 from archfem.dynamics.model_selection import DampingChoice, select_model
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, StiffnessDamping, Viscous
@@ -348,7 +348,7 @@ def run_time_history(
                 damping=damping or damping_of(case, dead)[0],
                 scheme=case.scheme,
                 record=Record(every=output.get("save_every", 1), fields_every=fields_every),
-                until=CountedMechanism() if case.analysis.get("stop_at_mechanism", False) else None,
+                until=_stop_condition(case),
                 criteria=case.criteria,
                 method=method,
             )
@@ -359,6 +359,13 @@ def run_time_history(
         raise
     run.dataset.attrs |= attrs
     return run
+
+
+def _stop_condition(case: Case) -> StopCondition | None:
+    """Return the event that ends a run before its motion does, if any."""
+    if "stop_at" in case.analysis:
+        return REGISTERED_CRITERIA[case.analysis["stop_at"]]
+    return CountedMechanism() if case.analysis.get("stop_at_mechanism", False) else None
 
 
 @contextmanager

@@ -56,6 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run_command(options: argparse.Namespace) -> int | None:
     """Run a command, if the memory suffices."""
     _check_memory()
+    if getattr(options, "own_code", False):
+        import_module("archfem.cases.provenance").permit_extensions()
     return options.command(options)
 
 
@@ -183,7 +185,8 @@ def _load_command(module: str, name: str) -> Command:
 
 
 def _add_changes(command: argparse.ArgumentParser) -> None:
-    """Add the option that changes values of a case."""
+    """Add the options that change values of a case, and permit its code."""
+    _add_own_code(command)
     command.add_argument(
         "--set",
         action="append",
@@ -194,6 +197,12 @@ def _add_changes(command: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_own_code(command: argparse.ArgumentParser) -> None:
+    """Add the option that permits code of the user."""
+    about = "run the Python modules that the file names: only if you trust them"
+    command.add_argument("--own-code", action="store_true", help=about)
+
+
 def _add_report(command: argparse.ArgumentParser) -> None:
     """Add the arguments of `archfem report`."""
     command.description = "Write one self-contained HTML page of what a result folder holds."
@@ -201,6 +210,7 @@ def _add_report(command: argparse.ArgumentParser) -> None:
     command.add_argument("--out", metavar="FILE.html", help="the page (FOLDER/report.html)")
     command.add_argument("--inputs", metavar="DIR", help="folder of the case's drawing (FOLDER)")
     command.add_argument("--pdf", action="store_true", help="also print it, by Chromium or Chrome")
+    _add_own_code(command)
     command.set_defaults(command=_load_command("run", "report"))
 
 
@@ -211,9 +221,6 @@ def _add_study(command: argparse.ArgumentParser) -> None:
     command.add_argument("--out", metavar="DIR", help="folder for the results")
     command.add_argument("--workers", type=int, help="processes (one a core)")
     command.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="of Dask, for a cluster")
-    command.add_argument(
-        "--own-code", action="store_true", help="let `compute` of the study run its own function"
-    )
     command.add_argument("--status", metavar="DIR", help="say how far the study in a folder is")
     command.set_defaults(command=_load_command("study", "study"))
 
@@ -239,6 +246,8 @@ def _add_film(command: argparse.ArgumentParser) -> None:
     command.add_argument("--fps", type=float, help="frames a second, at most (20)")
     command.add_argument("--seconds", type=float, help="how long the film lasts (as the run)")
     command.add_argument("--size", metavar="WIDTHxHEIGHT", help="in pixels (1280x720)")
+    command.add_argument("--renderer", help="matplotlib, or pyvista, also for .html (matplotlib)")
+    _add_own_code(command)
     command.set_defaults(command=_load_command("tools", "animate"))
 
 

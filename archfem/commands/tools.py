@@ -29,7 +29,7 @@ def animate(options: argparse.Namespace) -> None:
         raise InvalidInput(f"there is no history file {path}")
     case = Case.read(options.case or _find_case(path))
     run = History.read(path, case.structure)
-    names = ("magnification", "colour", "fps", "seconds")
+    names = ("magnification", "colour", "fps", "seconds", "renderer")
     settings = {key: getattr(options, key) for key in names}
     settings |= {"window": _parse_window(options.window), "size": _parse_size(options.size)}
     from archfem.view.films.film import film  # pyvista and the encoder are slow to import

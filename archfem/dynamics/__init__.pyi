@@ -5,6 +5,7 @@ from .events import CountedMechanism as CountedMechanism
 from .events import Event as Event
 from .events import EveryMechanism as EveryMechanism
 from .events import MovingMechanism as MovingMechanism
+from .events import register_criterion as register_criterion
 from .fall import CollapseState as CollapseState
 from .fall import classify_collapse as classify_collapse
 from .fall import release_blocks as release_blocks

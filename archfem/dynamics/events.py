@@ -7,6 +7,7 @@ Most steps repeat a pattern of failed joints. Monitors therefore scan N, V, M fo
 evaluate the costly condition (mechanism count, rigid-block motion) once per distinct pattern.
 """
 
+import inspect
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import InitVar, dataclass
 from functools import partial
@@ -17,7 +18,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
-from archfem._validation import is_one_of
+from archfem._validation import is_one_of, report_user_errors, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     Criteria,
@@ -161,6 +162,41 @@ class Event(Protocol):
 
 # An event, or a function of the structure and N, V, M of a step that returns a reason or None
 StopCondition = Event | Callable[[Structure, Array], str | None]
+
+# Criteria of the user by name
+REGISTERED_CRITERIA: dict[str, Callable[[Structure, Array], str | None]] = {}
+
+
+@validate_arguments
+def register_criterion(name: str, criterion: Callable[[Structure, Array], str | None]) -> None:
+    """Add a criterion that ends a run, which case files can name in `analysis.stop_at`.
+
+    In Python `time_history(…, until=criterion)` needs no registration.
+
+    Args:
+        name: of the criterion.
+        criterion: function of the structure and of N, V, M of all joints at a step (n_joints, 3)
+            [N, N, N m]; it returns the reason to end the run, or None.
+
+    Raises:
+        InvalidInput: the function does not take two arguments; in a run, its error with its line,
+            or that it returned another thing than a text or None.
+    """
+    try:
+        inspect.signature(criterion).bind(None, None)
+    except TypeError as error:
+        raise InvalidInput(
+            f"criterion '{name}' takes the structure, and N, V, M of its joints: {error}"
+        ) from error
+
+    def check(structure: Structure, resultants: Array) -> str | None:
+        with report_user_errors(f"criterion '{name}'"):
+            reason = criterion(structure, resultants)
+        if not (reason is None or isinstance(reason, str)):
+            raise InvalidInput(f"criterion '{name}' returned {reason!r}: return a text, or None")
+        return reason
+
+    REGISTERED_CRITERIA[name] = check
 
 
 @dataclass(frozen=True, kw_only=True)

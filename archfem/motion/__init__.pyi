@@ -5,6 +5,7 @@ from .design_spectra import Eurocode2024 as Eurocode2024
 from .design_spectra import Ntc2018 as Ntc2018
 from .design_spectra import TableSpectrum as TableSpectrum
 from .design_spectra import Tbec2018 as Tbec2018
+from .design_spectra import register_spectrum as register_spectrum
 from .ground_motion_models import GROUND_MOTION_MODELS as GROUND_MOTION_MODELS
 from .ground_motion_models import PeakAccelerationEstimate as PeakAccelerationEstimate
 from .ground_motion_models import peak_ground_acceleration as peak_ground_acceleration
@@ -16,6 +17,9 @@ from .record_selection import RecordSelection as RecordSelection
 from .record_selection import SelectedRecord as SelectedRecord
 from .record_selection import SelectionRule as SelectionRule
 from .record_selection import select_records as select_records
+from .records.reader import register_record_format as register_record_format
+from .records.record_file import Channel as Channel
+from .records.record_file import RecordText as RecordText
 from .response_spectra import response_spectrum as response_spectrum
 from .response_spectra import rotated_spectrum as rotated_spectrum
 from .response_spectra import scaled_to_spectrum as scaled_to_spectrum

@@ -1,12 +1,20 @@
 """Elastic design spectra in g: Turkish, European, Italian and American codes, and tables."""
 
-from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, ClassVar, Protocol, get_type_hints
 
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import check_array, check_fields, check_number, is_one_of
+from archfem._validation import (
+    check_array,
+    check_fields,
+    check_number,
+    is_one_of,
+    report_user_errors,
+    validate_arguments,
+)
 from archfem.errors import InvalidInput
 from archfem.motion.response_spectra import as_periods, check_oscillators
 from archfem.units import STANDARD_GRAVITY
@@ -569,3 +577,57 @@ def _check_positive(value: float, name: str) -> float:
     if not check_number(value, name) > 0.0:
         raise InvalidInput(f"{name} = {value!r}: expected more than 0")
     return value
+
+
+# Spectra of the user by name, each with its fields and their types
+REGISTERED_SPECTRA: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {}
+
+
+@validate_arguments
+def register_spectrum(name: str, spectrum: type) -> None:
+    """Add a code spectrum that case files can name, `target = { code = "NAME", … }`.
+
+    In Python an object with `horizontal` and `vertical` needs no registration.
+
+    Args:
+        name: of the code.
+        spectrum: dataclass whose fields are numbers, whole numbers and texts, the keys of a case;
+            with the methods of `DesignSpectrum`, in g.
+
+    Raises:
+        InvalidInput: the class is no such dataclass.
+    """
+    if not is_dataclass(spectrum):
+        raise InvalidInput(f"spectrum '{name}': {spectrum!r} is no dataclass: write @dataclass")
+    for method in ("horizontal", "vertical"):
+        if not callable(getattr(spectrum, method, None)):
+            raise InvalidInput(f"spectrum '{name}' has no method {method}(periods)")
+    with report_user_errors(f"spectrum '{name}'"):
+        hints = get_type_hints(spectrum)
+    kinds: dict[str, Any] = {each.name: hints[each.name] for each in fields(spectrum)}
+    for key, kind in kinds.items():
+        if kind not in (float, int, str):
+            raise InvalidInput(f"spectrum '{name}', {key}: {kind!r} is none of float, int and str")
+    REGISTERED_SPECTRA[name] = spectrum, kinds
+
+
+def build_registered_spectrum(name: str, values: dict[str, Any]) -> DesignSpectrum:
+    """Return a spectrum of the user after a check of its values up to 4 s."""
+    periods = np.linspace(0.0, 4.0, 81)
+    with report_user_errors(f"spectrum '{name}'"):
+        spectrum: DesignSpectrum = REGISTERED_SPECTRA[name][0](**values)
+    for direction in ("horizontal", "vertical"):
+        with report_user_errors(f"spectrum '{name}', {direction}"):
+            found = np.asarray(getattr(spectrum, direction)(periods), dtype=float)
+        if found.shape != periods.shape:
+            raise InvalidInput(
+                f"spectrum '{name}', {direction}: {found.shape} values for {periods.shape} periods"
+            )
+        # a comparison with NaN is false
+        wrong = ~((found >= 0.0) & (found <= MAX_SPECTRAL_ACCELERATION))
+        if wrong.any():
+            raise InvalidInput(
+                f"spectrum '{name}', {direction}: {found[wrong][0]:g} g at "
+                f"{periods[wrong][0]:g} s: give values from 0 to {MAX_SPECTRAL_ACCELERATION:g} g"
+            )
+    return spectrum

@@ -220,6 +220,27 @@ NAMED_EVALUATORS: Mapping[str, Callable[..., Findings]] = {
 MOTION_EVALUATORS = (evaluate_history, evaluate_scales, evaluate_comparison)
 
 
+_registered_findings: dict[str, Callable[..., Findings]] = {}
+
+
+@validate_arguments
+def register_finding(name: str, find: Callable[..., Findings]) -> None:
+    """Add a function that studies can name in `compute`.
+
+    Args:
+        name: of the function, without a colon.
+        find: function of a `Case`, and of options as keywords, to a flat table of numbers and
+            texts; at the top of a module, so that worker processes find it.
+
+    Raises:
+        InvalidInput: the function takes no case, or the name is one of archfem's.
+    """
+    if name in NAMED_EVALUATORS or ":" in name:
+        raise InvalidInput(f"finding '{name}': the name has a colon, or is one of archfem's")
+    Evaluator.of(find)
+    _registered_findings[name] = find
+
+
 @dataclass(frozen=True)
 class Evaluator:
     """A function from a case to findings, with its options."""
@@ -289,8 +310,9 @@ def refuse_code(setting: Any) -> None:
 
 def _find_function(name: str) -> Callable[..., Mapping[str, Any]]:
     """Return a named evaluator, or a function of the user by "module:function"."""
-    if name in NAMED_EVALUATORS:
-        return NAMED_EVALUATORS[name]
+    named = {**NAMED_EVALUATORS, **_registered_findings}
+    if name in named:
+        return named[name]
     module, colon, function = name.partition(":")
     if not colon:
         hint = suggest_name(name, NAMED_EVALUATORS) or f"use one of {sorted(NAMED_EVALUATORS)}"

@@ -1,9 +1,12 @@
 """Detection of the format of a record file, by its content."""
 
+import re
+from collections.abc import Callable, Mapping
 from numbers import Real
 from os import PathLike
 
 from archfem._files import read_bytes
+from archfem._validation import report_user_errors, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.motion import signal_processing
 from archfem.motion.records import columns, keyed, numeric_headers, peer, volumes, waveforms
@@ -15,6 +18,45 @@ _RECORD_FORMATS = (
     *(volumes.GEONET, volumes.BHRC, volumes.CSMIP, volumes.VOLUME_1),
     *(keyed.AFAD, keyed.UNAM, keyed.CWB, keyed.ESM, keyed.KNET, peer.PEER),
 )
+
+
+_registered_formats: dict[str, RecordFormat] = {}
+
+
+@validate_arguments
+def register_record_format(
+    name: str, marks: Mapping[str, int], read: Callable[[RecordText], list[Channel]]
+) -> None:
+    """Add a format of record files, which is tried before those of archfem.
+
+    Args:
+        name: of the format.
+        marks: regular expressions that all files of the format contain, each with the number of
+            lines, from the first, among which it must be found.
+        read: function from the text of a file to its components. `text.lines` are the lines;
+            `text.error(message, line)` is the error to raise for a file that cannot be read.
+
+    Raises:
+        InvalidInput: there is no mark, or one is no regular expression.
+    """
+    for pattern in marks:
+        with report_user_errors(f"record format '{name}', mark {pattern!r}"):
+            re.compile(pattern)
+    if not marks:
+        raise InvalidInput(f"record format '{name}' has no marks: it would read every file")
+
+    def read_checked(text: RecordText) -> list[Channel]:
+        with report_user_errors(f"record format '{name}', {text.path},"):
+            channels = read(text)
+        if not isinstance(channels, list) or not channels:
+            raise text.error(f"record format '{name}' returned {channels!r}: return [Channel(…)]")
+        if any(not isinstance(channel, Channel) for channel in channels):
+            raise text.error(f"record format '{name}' returned another thing than a Channel")
+        for channel in channels:
+            text.check_step(channel.dt, 0)
+        return channels
+
+    _registered_formats[name] = RecordFormat(name, tuple(marks.items()), read_checked)
 
 
 def read_components(
@@ -78,7 +120,8 @@ def read_channels(
 
 def find_format(text: RecordText) -> RecordFormat | None:
     """Return the format of a text, None for plain columns."""
-    return next((form for form in _RECORD_FORMATS if form.recognises(text)), None)
+    known = (*_registered_formats.values(), *_RECORD_FORMATS)
+    return next((form for form in known if form.recognises(text)), None)
 
 
 def _choose_channels(

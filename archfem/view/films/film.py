@@ -16,7 +16,7 @@ from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_kinematics import VerifiedMechanism
-from archfem.models.model import Model, check_coordinate_count
+from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.modes import Modes
 from archfem.view.films.encoder import Image, film_path, write_film
@@ -28,8 +28,8 @@ from archfem.view.films.frames import (
     frames_of_fall,
     frames_of_run,
 )
-from archfem.view.films.renderer import FrameLayout
-from archfem.view.films.settings import Setup, check_colour
+from archfem.view.films.renderer import FrameLayout, FramePainter, Painter
+from archfem.view.films.settings import Setup, check_film, check_options
 from archfem.view.joint_marks import (
     joints_of_state,
     model_and_coordinates,
@@ -53,6 +53,7 @@ def film(  # noqa: PLR0913  (a film has many settings)
     size: tuple[int, int] = (1280, 720),
     mechanism: VerifiedMechanism | None = None,
     window: Window = None,
+    renderer: str = "matplotlib",
 ) -> Path:
     """Write a film of a time history: moving blocks, thrust line, hinges, ground acceleration.
 
@@ -81,14 +82,19 @@ def film(  # noqa: PLR0913  (a film has many settings)
         window: start and end of slow motion [s], outside of which the film is in real time; "auto"
             for the time around the instant of collapse, or else of the first mechanism by count.
             Slow motion has a tenth of the speed, or more if few fields were recorded.
+        renderer: "matplotlib", or "pyvista" to draw blocks and marks by VTK. The latter also writes
+            an .html page of the decisive instant, to move and enlarge.
 
     Returns:
         The path of the film.
 
     Raises:
         InvalidInput: the run has no fields or belongs to another model, or an option is invalid.
+        NotInstalled: pyvista cannot be used, or trame is missing for a page.
     """
-    target = film_path(path)
+    page = renderer == "pyvista" and Path(path).suffix == ".html"
+    target = Path(path) if page else film_path(path)
+    painter = _choose_painter(renderer)
     check_film(model, run, colour, magnification, size)
     falls = FallingBlocks.of(model.structure, run)
     known = recorded_fields(run)[0]
@@ -100,7 +106,11 @@ def film(  # noqa: PLR0913  (a film has many settings)
         motion = scale_motion(model.structure, mechanism.motion)
         outlines = outline_moving_blocks(model.structure, motion)
         setup = setup.with_outlines(outlines, mechanism.moved.time or 0.0)
-    return write_film(target, _draw_frames(setup, run, timing, falls, size), timing.fps)
+    if page:
+        from archfem.view.films.viewer import write_scene
+
+        return write_scene(target, setup, run)
+    return write_film(target, _draw_frames(setup, run, timing, falls, size, painter), timing.fps)
 
 
 @validate_arguments
@@ -132,7 +142,7 @@ def picture(
     Raises:
         InvalidInput: q or joints belong to another model, or an option is invalid.
     """
-    _check_options(model, colour, magnification, size)
+    check_options(model, colour, magnification, size)
     model, q = model_and_coordinates(model, q)
     joints = joints_of_state(model, q, joints, criteria)
     setup = Setup.of(model, q[None], colour, magnification)
@@ -141,21 +151,15 @@ def picture(
     )
 
 
-def check_film(
-    model: Model,
-    run: History,
-    colour: str,
-    magnification: float | None,
-    size: tuple[int, int] = (1280, 720),
-) -> None:
-    """Refuse invalid options, a run without fields, and a run of another model."""
-    _check_options(model, colour, magnification, size)
-    if "q" not in run.dataset:
-        raise InvalidInput(
-            "the run has no fields to draw: record them with "
-            "time_history(..., record=Record(fields_every=10))"
-        )
-    check_coordinate_count(model, run.dataset.sizes["coordinate"])
+def _choose_painter(renderer: str) -> type[Painter]:
+    """Return the painter of a renderer; pyvista is imported only where it is used."""
+    if renderer == "matplotlib":
+        return FramePainter
+    if renderer != "pyvista":
+        raise InvalidInput(f"renderer '{renderer}' is not known: use 'matplotlib' or 'pyvista'")
+    from archfem.view.films.viewer import ScenePainter
+
+    return ScenePainter
 
 
 def _draw_frames(
@@ -164,31 +168,18 @@ def _draw_frames(
     timing: FrameTiming,
     falls: FallingBlocks | None,
     size: tuple[int, int],
+    painter: type[Painter],
 ) -> Iterator[Image]:
     """Yield the images of a film, with a progress bar."""
     times = timing.times
     held = times if falls is None else times[times < falls.times[0]]
-    layout = FrameLayout(setup, size, run.joints, run)
+    layout = FrameLayout(setup, size, run.joints, run, painter)
     frames = frames_of_run(setup, run, held, fields_at(run, held))
     if falls is not None:
         frames = chain(frames, frames_of_fall(setup, falls, times[len(held) :]))
     bar = tqdm(frames, total=len(times), unit="frame", disable=None, leave=False)
     for frame, speed in zip(bar, timing.speeds, strict=True):
         yield layout.compose(frame, float(speed))
-
-
-def _check_options(
-    model: Model, colour: str, magnification: float | None, size: tuple[int, int]
-) -> None:
-    """Refuse invalid options of a frame."""
-    check_colour(model.cells, colour)
-    if magnification is not None and not 0.0 < magnification < 1e12:
-        raise InvalidInput(f"magnification {magnification:.4g} is not above 0")
-    smallest = (480, 320)  # the texts do not fit into a smaller frame
-    if len(size) != 2 or any(n % 2 or n < least for n, least in zip(size, smallest, strict=True)):
-        raise InvalidInput(
-            f"size {size}: give an even width and height of at least {smallest} pixels"
-        )
 
 
 @validate_arguments

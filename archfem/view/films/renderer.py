@@ -1,12 +1,12 @@
 """Rendering of a frame: structure, title, colour bar, legend and ground acceleration.
 
 Constant parts of a film are drawn once. Blocks and marks are drawn into a window of the image by
-matplotlib's Agg renderer, many shapes per call; blocks are divided into triangles so fine that
-colours may vary linearly between their corners.
+matplotlib's Agg renderer, many shapes per call, or by a painter of another library; blocks are
+divided into triangles so fine that colours may vary linearly between their corners.
 """
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Protocol
 
 import matplotlib
 import numpy as np
@@ -25,7 +25,7 @@ from archfem._typing import Array
 from archfem.dynamics.history import History
 from archfem.view.films.encoder import Image
 from archfem.view.films.frames import Frame
-from archfem.view.films.settings import Scale, Setup
+from archfem.view.films.settings import Scale, Setup, polygon_sides
 from archfem.view.histories import draw_ground
 from archfem.view.joint_marks import support_outlines
 from archfem.view.positions import ground_acceleration
@@ -39,6 +39,7 @@ class Canvas:
     def __init__(
         self, renderer: RendererAgg, window: tuple[int, int, int, int], low: Array, high: Array
     ) -> None:
+        self.size = window[2] - window[0], window[3] - window[1]
         self._renderer, self._window = renderer, Bbox.from_extents(*window)
         room, self._identity = np.array(self._window.size), IdentityTransform()
         self._scale = float(np.min(room / (high - low)))
@@ -70,6 +71,13 @@ class Canvas:
         style, points = self._style("white"), self._pixels(corners)
         self._renderer.draw_gouraud_triangles(style, points, colours, self._identity)
 
+    def paste(self, image: Image) -> None:
+        """Fill the window with an image (height, width, 3)."""
+        opaque = np.full((*image.shape[:2], 1), 255, dtype=np.uint8)
+        # the renderer counts rows from the bottom
+        pixels = np.ascontiguousarray(np.concatenate([image, opaque], axis=2)[::-1])
+        self._renderer.draw_image(self._style("white"), *self._window.min, pixels)
+
     def _draw_path(
         self, style: GraphicsContextBase, pieces: Array, codes: list[Any], face: Any = None
     ) -> None:
@@ -93,19 +101,25 @@ class Canvas:
         return style
 
 
+class Painter(Protocol):
+    """Draws the frames of a film on a canvas."""
+
+    def draw_background(self) -> None:
+        """Draw the layers below the blocks, which do not change."""
+
+    def draw(self, frame: Frame) -> None:
+        """Draw blocks and marks of a frame."""
+
+
 class FramePainter:
     """Draws blocks, supports and marks on a canvas, from the lowest layer to the uppermost."""
 
     def __init__(self, setup: Setup, canvas: Canvas) -> None:
         self._setup, self._canvas = setup, canvas
-        structure, cells = setup.model.structure, setup.model.cells
+        cells = setup.model.cells
         self._triangles, self._rims = Triangles(cells), cells.outline_edges
         self._supports = support_outlines(setup.model, setup.magnification)
-        # radius of a hinge [m]: discs of shallow joints must not cover their blocks
-        shallowest = float(structure.depths[structure.judged].min())
-        radius = min(0.0125 * structure.size, 0.3 * shallowest)
-        angle = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
-        self._disc = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        self._disc = setup.hinge_disc
 
     def draw_background(self) -> None:
         """Draw the layers below the blocks, which do not change: ground, supports, outlines."""
@@ -125,9 +139,9 @@ class FramePainter:
             values = triangles.corners(frame.shades)
         colours = scale.shades(scale.norm(values))
         canvas.shade(triangles.corners(frame.places), colours)
-        rims = np.concatenate([frame.places[self._rims], _sides(self._supports)])
+        rims = np.concatenate([frame.places[self._rims], polygon_sides(self._supports)])
         canvas.lines(rims, Colour.EDGE, 1.2)
-        canvas.lines(_sides(frame.outlines), Colour.MECHANISM, 3.0)
+        canvas.lines(polygon_sides(frame.outlines), Colour.MECHANISM, 3.0)
         self._draw_discs(frame.past, Colour.HINGE, 1.0, 0.3)
         canvas.lines(marks.links, "white", 6.0)
         canvas.lines(marks.links, Colour.THRUST, 3.0)
@@ -141,12 +155,6 @@ class FramePainter:
         self._canvas.fill(centres[:, None] + size * self._disc, colour, opacity)
 
 
-def _sides(outlines: Sequence[Array]) -> Array:
-    """Return the sides of polygons, each (k, 2), one after another (sides, 2, 2)."""
-    sides = [np.stack([each, np.roll(each, -1, axis=0)], axis=1) for each in outlines]
-    return np.concatenate([np.zeros((0, 2, 2)), *sides])
-
-
 class FrameLayout:
     """Layout of a frame, of which only changing parts are redrawn."""
 
@@ -155,7 +163,12 @@ class FrameLayout:
     font_size = 10.5  # [points]
 
     def __init__(
-        self, setup: Setup, size: tuple[int, int], joints: xr.Dataset, run: History | None = None
+        self,
+        setup: Setup,
+        size: tuple[int, int],
+        joints: xr.Dataset,
+        run: History | None = None,
+        painter: Callable[[Setup, Canvas], Painter] = FramePainter,
     ) -> None:
         # an image is 12.8 inches wide, or narrower: a small one has at least 60 dots per inch
         dpi = max(60.0, size[0] / 12.8)
@@ -169,7 +182,7 @@ class FrameLayout:
         left, right = round(0.25 * dpi), size[0] - round(self.side * dpi)
         window = (left, round(below * dpi), right, size[1] - round(self.header * dpi))
         canvas = Canvas(self._canvas.get_renderer(), window, setup.low, setup.high)
-        self._painter = FramePainter(setup, canvas)
+        self._painter = painter(setup, canvas)
         self._draw_background()
 
     def compose(self, frame: Frame, speed: float = 1.0) -> Image:

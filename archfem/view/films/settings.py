@@ -1,5 +1,6 @@
 """Properties that are constant over a film: magnification, visible region and colour scale."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -7,8 +8,9 @@ import numpy as np
 from matplotlib.colors import Colormap, Normalize, PowerNorm
 
 from archfem._typing import Array
+from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.models.model import Cells, Model
+from archfem.models.model import Cells, Model, check_coordinate_count
 from archfem.units import MPa, mm
 from archfem.view.joint_marks import round_magnification, support_outlines
 from archfem.view.positions import FallingBlocks
@@ -35,6 +37,37 @@ def check_colour(cells: Cells, colour: str) -> None:
         raise InvalidInput(
             "rigid blocks have no stress: use colour='displacement', or build and run the model "
             "with fidelity='full'"
+        )
+
+
+def check_film(
+    model: Model,
+    run: History,
+    colour: str,
+    magnification: float | None,
+    size: tuple[int, int] = (1280, 720),
+) -> None:
+    """Refuse invalid options, a run without fields, and a run of another model."""
+    check_options(model, colour, magnification, size)
+    if "q" not in run.dataset:
+        raise InvalidInput(
+            "the run has no fields to draw: record them with "
+            "time_history(..., record=Record(fields_every=10))"
+        )
+    check_coordinate_count(model, run.dataset.sizes["coordinate"])
+
+
+def check_options(
+    model: Model, colour: str, magnification: float | None, size: tuple[int, int]
+) -> None:
+    """Refuse invalid options of a frame."""
+    check_colour(model.cells, colour)
+    if magnification is not None and not 0.0 < magnification < 1e12:
+        raise InvalidInput(f"magnification {magnification:.4g} is not above 0")
+    smallest = (480, 320)  # the texts do not fit into a smaller frame
+    if len(size) != 2 or any(n % 2 or n < least for n, least in zip(size, smallest, strict=True)):
+        raise InvalidInput(
+            f"size {size}: give an even width and height of at least {smallest} pixels"
         )
 
 
@@ -79,6 +112,15 @@ class Setup:
             return None
         return np.array([[self.low[0], self.level], [self.high[0], self.level]])
 
+    @property
+    def hinge_disc(self) -> Array:
+        """Outline of the disc of a hinge about its centre (32, 2) [m]."""
+        structure, angle = self.model.structure, np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+        # discs of shallow joints must not cover their blocks
+        shallowest = float(structure.depths[structure.judged].min())
+        radius = min(0.0125 * structure.size, 0.3 * shallowest)
+        return radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
     @classmethod
     def of(cls, model: Model, fields: Array, colour: str, magnification: float | None) -> Self:
         """Return the properties for all frames; by default, magnify by a suitable factor."""
@@ -121,3 +163,9 @@ class Setup:
             extend = "max" if lengths.max() > largest else "neither"
             scale = replace(scale, norm=PowerNorm(0.5, 0.0, largest), extend=extend)
         return replace(self, low=low, high=high, scale=scale, level=falls.level)
+
+
+def polygon_sides(outlines: Sequence[Array]) -> Array:
+    """Return the sides of polygons, each (k, 2), one after another (sides, 2, 2)."""
+    sides = [np.stack([each, np.roll(each, -1, axis=0)], axis=1) for each in outlines]
+    return np.concatenate([np.zeros((0, 2, 2)), *sides])

@@ -1,24 +1,201 @@
-"""Interactive viewer of a run by pyvista: zoom, pan, and a slider over time."""
+"""Structures drawn by pyvista: a viewer with a slider over time, and the blocks of films."""
 
 import os
+import re
 import sys
+from html import escape
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 
-from archfem._optional import check_drawing
+from archfem._files import atomic_write
+from archfem._optional import check_drawing, require_package
 from archfem._typing import Array
 from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.history import History
 from archfem.models.model import Model
-from archfem.view.films.film import check_film
-from archfem.view.films.frames import frames_of_run
-from archfem.view.films.settings import Setup
+from archfem.view.films.frames import Frame, frames_of_run
+from archfem.view.films.renderer import Canvas
+from archfem.view.films.settings import Setup, check_film, polygon_sides
 from archfem.view.joint_marks import support_outlines
-from archfem.view.positions import fields_at, recorded_fields
+from archfem.view.positions import decisive_instant, fields_at, recorded_fields
 from archfem.view.stress import Triangles
 from archfem.view.style import Colour
+
+
+class Scene:
+    """Blocks and marks of a structure in a pyvista plotter, each kind in a layer of its own."""
+
+    def __init__(self, setup: Setup, size: tuple[int, int] | None = None) -> None:
+        check_drawing()
+        # without a display, VTK renders off screen by EGL
+        if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+            os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+        self._setup, self._supports = setup, support_outlines(setup.model, setup.magnification)
+        self._triangles = Triangles(setup.model.cells)
+        hidden = size is not None or not os.environ.get("DISPLAY")
+        self.plotter = pv.Plotter(off_screen=hidden, window_size=size)
+        self.plotter.set_background("white")
+        self.blocks = pv.PolyData()
+        self._add_blocks()
+        self._set_camera()
+        self._add_marks()
+
+    def show(self, frame: Frame) -> None:
+        """Move blocks and marks to where a frame has them."""
+        triangles, marks = self._triangles, frame.marks
+        self.blocks.points = self._in_layer(triangles.corners(frame.places).reshape(-1, 2), 0)
+        if self._setup.scale.colour == "stress":  # a value for each cell
+            self.blocks["shade"] = np.repeat(frame.shades[triangles.cell], 3)
+        else:
+            self.blocks["shade"] = triangles.corners(frame.shades).ravel()
+        edges = frame.places[self._setup.model.cells.outline_edges]
+        thrust = marks.thrust[np.isfinite(marks.thrust[:, 0])]
+        shown = {
+            "edges": self._segments(edges, 1),
+            "mechanism": self._segments(polygon_sides(frame.outlines), 2),
+            "past": self._discs(frame.past, 3),
+            "halo": self._segments(marks.links, 4),
+            "thrust": self._segments(marks.links, 5),
+            "joints": self._discs(thrust, 5, 0.35),
+            "slips": self._polygons(marks.slips, 6),
+            "rims": self._discs(marks.hinges, 7, 1.25),
+            "hinges": self._discs(marks.hinges, 8),
+        }
+        for kind, mesh in shown.items():
+            self._mappers[kind].dataset = mesh
+        self.plotter.render()
+
+    def add_colour_bar(self) -> None:
+        """Add the colour bar of the blocks."""
+        style = {"title_font_size": 14, "label_font_size": 12, "color": Colour.EDGE}
+        self.plotter.add_scalar_bar(self._setup.scale.label, fmt="%.3g", n_labels=2, **style)
+
+    def _add_blocks(self) -> None:
+        """Add the blocks, undeformed and displaced, the supports and the ground."""
+        setup, cells = self._setup, self._setup.model.cells
+        corners = self._triangles.corners(cells.places).reshape(-1, 2)
+        faces = np.arange(len(corners)).reshape(-1, 3)
+        self.blocks.copy_from(pv.PolyData.from_regular_faces(self._in_layer(corners, 0), faces))
+        self.blocks["shade"] = np.zeros(len(corners))
+        norm = setup.scale.norm
+        ends = (float(norm.vmin or 0.0), float(norm.vmax or 0.0))
+        # a table of colours, since the scale of a fall is not linear
+        shades = setup.scale.shades(norm(np.linspace(*ends, 256)))
+        table = pv.LookupTable(values=(255.0 * shades).astype(np.uint8), scalar_range=ends)
+        style = {"lighting": False, "show_scalar_bar": False}
+        self.plotter.add_mesh(self.blocks, scalars="shade", cmap=table, **style)
+        for outline in self._supports:
+            self._add(self._polygons(outline[None], 0), Colour.SUPPORT)
+        self._add(self._segments(polygon_sides(self._supports), 1), Colour.EDGE, 1.5)
+        self._add(self._segments(cells.places[cells.outline_edges], -1), Colour.UNDEFORMED)
+        if setup.ground is not None:
+            self._add(self._segments(setup.ground[None], 0), Colour.EDGE, 2.0)
+
+    def _add_marks(self) -> None:
+        """Add an empty mesh for each kind of mark."""
+        line = max(0.6, self.plotter.window_size[0] / 1100.0)
+        styles = {
+            **{"edges": (Colour.EDGE, 1.5 * line), "mechanism": (Colour.MECHANISM, 4.0 * line)},
+            **{"past": (Colour.HINGE, 1.0, 0.3), "halo": ("white", 8.0 * line)},
+            **{"thrust": (Colour.THRUST, 4.0 * line), "joints": (Colour.THRUST,)},
+            **{"slips": (Colour.SLIDING,), "rims": ("white",), "hinges": (Colour.HINGE,)},
+        }
+        self._mappers = {kind: self._add(pv.PolyData(), *each) for kind, each in styles.items()}
+
+    def _set_camera(self) -> None:
+        """Look straight at the visible region, which fills the window."""
+        low, high = self._setup.low, self._setup.high
+        width, height = self.plotter.window_size
+        room = max(high[1] - low[1], (high[0] - low[0]) * height / width)
+        self.plotter.view_xy()  # type: ignore[call-arg]
+        self.plotter.enable_parallel_projection()  # type: ignore[call-arg]
+        camera, centre = self.plotter.camera, 0.5 * (low + high)
+        # pages are seen in perspective, from where the region fills the angle of view as well
+        distance = 0.5 * room / np.tan(np.radians(0.5 * camera.view_angle))
+        camera.focal_point, camera.position = (*centre, 0.0), (*centre, distance)
+        camera.parallel_scale, camera.clipping_range = 0.5 * room, (0.1 * distance, 4.0 * distance)
+
+    def _add(
+        self, mesh: pv.PolyData, colour: str, width: float = 1.0, opacity: float = 1.0
+    ) -> pv.DataSetMapper:
+        """Add a mesh, which may be empty, in one colour; `width` is that of lines [pixels]."""
+        mapper = pv.DataSetMapper(mesh)
+        actor = pv.Actor(mapper=mapper)
+        actor.prop.color, actor.prop.lighting, actor.prop.opacity = colour, False, opacity
+        actor.prop.line_width = width
+        self.plotter.add_actor(actor, render=False, reset_camera=False)
+        return mapper
+
+    def _polygons(self, outlines: Array, layer: int) -> pv.PolyData:
+        """Return filled polygons of equal numbers of corners (n, k, 2) as a mesh."""
+        if not len(outlines):
+            return pv.PolyData()
+        corners = np.arange(outlines[..., 0].size).reshape(outlines.shape[:2])
+        points = self._in_layer(outlines.reshape(-1, 2), layer)
+        # VTK renders only convex polygons correctly
+        return pv.PolyData.from_regular_faces(points, corners).triangulate()
+
+    def _discs(self, centres: Array, layer: int, size: float = 1.0) -> pv.PolyData:
+        """Return discs at points (n, 2) as a mesh, of a size relative to a hinge's."""
+        return self._polygons(centres[:, None] + size * self._setup.hinge_disc, layer)
+
+    def _segments(self, segments: Array, layer: int) -> pv.PolyData:
+        """Return line segments (n, 2, 2) as a mesh."""
+        return pv.line_segments_from_points(self._in_layer(segments.reshape(-1, 2), layer))
+
+    def _in_layer(self, points: Array, layer: int) -> Array:
+        """Return plane points in a layer of the picture (n, 3) [m]; higher layers cover lower."""
+        height = 1e-3 * self._setup.model.structure.size
+        return np.column_stack([points, np.full(len(points), layer * height)])
+
+
+class ScenePainter:
+    """Draws the frames of a film by pyvista."""
+
+    def __init__(self, setup: Setup, canvas: Canvas) -> None:
+        self._scene, self._canvas = Scene(setup, canvas.size), canvas
+
+    def draw_background(self) -> None:
+        """Draw nothing: the image of a frame covers the window."""
+
+    def draw(self, frame: Frame) -> None:
+        """Draw blocks and marks of a frame."""
+        self._scene.show(frame)
+        self._canvas.paste(self._scene.plotter.screenshot(return_img=True))
+
+
+def _export_page(plotter: pv.Plotter) -> str:
+    """Return a page with a scene and the script that shows it, without files beside it."""
+    # an optional part of trame that this page does not use would download files of its own
+    unused = "trame.widgets.vtklocal"
+    modules: dict[str, Any] = sys.modules
+    blocked = modules.setdefault(unused, None) is None
+    try:
+        with require_package("trame"):
+            # older versions of pyvista have the exporter itself
+            return str(getattr(plotter, "trame", plotter).export_html(None).getvalue())
+    finally:
+        if blocked:
+            del modules[unused]
+
+
+def write_scene(path: Path, setup: Setup, run: History) -> Path:
+    """Write an HTML page of a run at its decisive instant, which can be moved and enlarged."""
+    scene, instant = Scene(setup), np.array([decisive_instant(run)])
+    scene.show(next(frames_of_run(setup, run, instant, fields_at(run, instant))))
+    scene.add_colour_bar()
+    page = _export_page(scene.plotter)
+    title = f"{run.dataset.attrs['title']}: {run.verdict.outcome}, t = {instant[0]:.3f} s"
+    # by style, since the page's script replaces its body; characters are written as CSS codes
+    content = "".join(f"\\{ord(character):x} " for character in title)
+    style = f'body::before {{ content: "{content}"; position: fixed; z-index: 9; padding: 1em }}'
+    page = re.sub("<title>.*?</title>", lambda _: f"<title>{escape(title)}</title>", page, count=1)
+    with atomic_write(path) as draft:
+        draft.write_text(page.replace("</style>", f"{style}\n</style>", 1), "utf-8")
+    return path
 
 
 @validate_methods
@@ -30,15 +207,9 @@ class Viewer:
     """
 
     def __init__(self, setup: Setup, run: History) -> None:
-        check_drawing()
-        # without a display, VTK renders off screen by EGL
-        if sys.platform == "linux" and not os.environ.get("DISPLAY"):
-            os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        self._setup, self._run = setup, run
-        self._triangles = Triangles(setup.model.cells)
-        self._blocks = pv.PolyData()
-        self.plotter = pv.Plotter(off_screen=not os.environ.get("DISPLAY"))
-        self._add_meshes()
+        self._setup, self._run, self._scene = setup, run, Scene(setup)
+        self.plotter = self._scene.plotter
+        self._scene.add_colour_bar()
         times = recorded_fields(run)[0]
         self.at(float(times[0]))
         style = {"title": "time [s]", "title_height": 0.02, "color": Colour.EDGE}
@@ -46,8 +217,6 @@ class Viewer:
         self.plotter.add_slider_widget(
             self.at, (times[0], times[-1]), value=times[0], **style, **ends
         )
-        self.plotter.view_xy()  # type: ignore[call-arg]
-        self.plotter.enable_parallel_projection()  # type: ignore[call-arg]
 
     def show(self, **options: Any) -> Any:
         """Open the viewer.
@@ -66,65 +235,9 @@ class Viewer:
         Args:
             time: from the first to the last recorded field [s].
         """
-        times, triangles = np.array([time]), self._triangles
-        frame = next(frames_of_run(self._setup, self._run, times, fields_at(self._run, times)))
-        self._blocks.points = self._in_layer(triangles.corners(frame.places).reshape(-1, 2), 0)
-        if self._setup.scale.colour == "stress":  # a value for each cell
-            self._blocks["shade"] = np.repeat(frame.shades[triangles.cell], 3)
-        else:
-            self._blocks["shade"] = triangles.corners(frame.shades).ravel()
-        edges = frame.places[self._setup.model.cells.outline_edges]
-        self._edges.dataset = self._segments(edges, 1)
-        self._thrust.dataset = self._segments(frame.marks.links, 2)
-        self._hinges.dataset = pv.PolyData(self._in_layer(frame.marks.hinges, 3))
-        self.plotter.render()
-
-    def _add_meshes(self) -> None:
-        """Add the undeformed blocks, the supports, and empty meshes for all that moves."""
-        setup, cells = self._setup, self._setup.model.cells
-        self.plotter.set_background("white")
-        corners = self._triangles.corners(cells.places).reshape(-1, 2)
-        faces = np.arange(len(corners)).reshape(-1, 3)
-        blocks = pv.PolyData.from_regular_faces(self._in_layer(corners, 0), faces)
-        self._blocks.copy_from(blocks)
-        self._blocks["shade"] = np.zeros(len(corners))
-        bar = {"title": setup.scale.label, "title_font_size": 14, "label_font_size": 12}
-        self.plotter.add_mesh(
-            self._blocks,
-            scalars="shade",
-            cmap=setup.scale.shades,
-            clim=(setup.scale.norm.vmin, setup.scale.norm.vmax),
-            lighting=False,
-            scalar_bar_args=bar | {"color": Colour.EDGE, "fmt": "%.3g", "n_labels": 2},
-        )
-        for outline in support_outlines(setup.model, setup.magnification):
-            polygon = [len(outline), *range(len(outline))]
-            mesh = pv.PolyData(self._in_layer(outline, 0), faces=polygon)
-            # VTK renders only convex polygons correctly
-            self._add(mesh.triangulate(), Colour.SUPPORT)
-        self._add(self._segments(cells.places[cells.outline_edges], -1), Colour.UNDEFORMED)
-        self._edges = self._add(pv.PolyData(), Colour.EDGE, 1.5)
-        self._thrust = self._add(pv.PolyData(), Colour.THRUST, 3.0)
-        self._hinges = self._add(pv.PolyData(), Colour.HINGE, 14.0)
-
-    def _add(self, mesh: pv.PolyData, colour: str, width: float = 1.0) -> pv.DataSetMapper:
-        """Add a mesh, which may be empty, in one colour; `width` is that of lines and points."""
-        mapper = pv.DataSetMapper(mesh)
-        actor = pv.Actor(mapper=mapper)
-        actor.prop.color, actor.prop.lighting = colour, False
-        actor.prop.line_width = actor.prop.point_size = width
-        actor.prop.render_points_as_spheres = True
-        self.plotter.add_actor(actor, render=False)
-        return mapper
-
-    def _segments(self, segments: Array, layer: int) -> pv.PolyData:
-        """Return line segments (n, 2, 2) as a mesh."""
-        return pv.line_segments_from_points(self._in_layer(segments.reshape(-1, 2), layer))
-
-    def _in_layer(self, points: Array, layer: int) -> Array:
-        """Return plane points in a layer of the picture (n, 3) [m]; higher layers cover lower."""
-        height = 1e-3 * self._setup.model.structure.size
-        return np.column_stack([points, np.full(len(points), layer * height)])
+        times = np.array([time])
+        frames = frames_of_run(self._setup, self._run, times, fields_at(self._run, times))
+        self._scene.show(next(frames))
 
 
 @validate_arguments

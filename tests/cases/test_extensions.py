@@ -1,0 +1,225 @@
+"""Modules of the user: what the page adds works, is permitted, and is checked."""
+
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.cases.motion_keys import build_spectrum
+from archfem.cases.provenance import OWN_CODE_VARIABLE
+from archfem.dynamics.events import REGISTERED_CRITERIA
+from archfem.motion.records import reader
+
+ROOT = Path(__file__).parents[2]
+
+CASE = """
+extensions = ["mine.py"]
+
+[structure]
+shape = "column"
+breadth = "0.6 m"
+heights = ["1.2 m", "1.2 m"]
+
+[model]
+fidelity = "rigid"
+
+[motion]
+file = "record.txt"
+
+[analysis]
+dt = "10 ms"
+stop_at = "overloaded"
+
+[assessment]
+spectrum = { code = "plateau", level = 0.9, corner = 0.5 }
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    page = (ROOT / "docs/howto/extend.md").read_text("utf-8")
+    code = "\n\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL))
+    # the column's joints carry some 20 kN under dead load
+    (tmp_path / "mine.py").write_text(code.replace("40e3", "10e3"), "utf-8")
+    (tmp_path / "case.toml").write_text(CASE)
+    rows = "\n".join(f"{value:.2f}" for value in 100.0 * np.sin(np.arange(40.0)))
+    (tmp_path / "record.txt").write_text(f"OUR STATION, RATE 100 HZ\n{rows}\n")
+    return tmp_path
+
+
+# Modules of a process have distinct names, so that the page's is loaded by a process of its own.
+def call(folder, *words):
+    paths = {"PYTHONPATH": str(ROOT), "PATH": os.environ["PATH"], "HOME": str(folder)}
+    command = [sys.executable, *words]
+    return subprocess.run(command, cwd=folder, env=paths, text=True, capture_output=True)
+
+
+SCRIPT = """
+import archfem as af
+from archfem.cases.provenance import hash_inputs, hash_sections
+def digests():
+    digest = hash_inputs(case.settings, case.folder)
+    return {digest, hash_sections(case.settings, case.folder, ["motion"])}
+af.cases.load_extension("mine.py")
+case = af.Case.read("case.toml")
+motion = case.ground_motion()
+print(motion.dt, abs(motion.horizontal).max())
+spectrum = case.assessment.spectrum
+print(*spectrum.horizontal([0.25, 1.0]), *spectrum.vertical([0.25]))
+before = digests()
+history = af.cases.run_time_history(case, motion, af.cases.dead_load_of_case(case))
+print(len(history.time) - 1, history.dataset.attrs["outcome"])
+study = af.Study.of(case, {"structure.breadth": [0.5, 0.6]}, "slenderness")
+print(*study.run(workers=2)["least depth"].values)
+open("mine.py", "a").write("# changed\\n")
+print(not before & digests())
+"""
+
+
+def test_the_examples_of_the_page_work_together(folder):
+    ran = call(folder, "-c", SCRIPT)
+    assert ran.returncode == 0, ran.stderr
+    sampled, spectra, ended, found, changed = ran.stdout.splitlines()
+    assert sampled == "0.01 1.0"  # 100 Hz, and a sine in cm/s² whose printed peak is 100
+    # 0.9 g up to 0.5 s, then as 1 / T; the vertical is 0.7 of it
+    assert [float(word) for word in spectra.split()] == pytest.approx([0.9, 0.45, 0.63])
+    # two blocks of 0.6 m × 1.2 m × 1 m and 2000 kg/m³ weigh 28 kN
+    assert ended.startswith("1 ended at 0.01 s by N = 28")
+    assert found == "0.5 0.6"  # breadth of the column, from two worker processes
+    assert changed == "True"
+
+
+def test_no_case_runs_code_by_itself(folder):
+    (folder / "mine.py").write_text("open('it ran', 'w')")
+    with pytest.raises(af.InvalidInput, match="is code, which no file runs by itself"):
+        af.Case.read(folder / "case.toml")
+    refused = call(folder, "-m", "archfem", "check", "case.toml")
+    assert refused.returncode == 1
+    assert "--own-code" in refused.stderr
+    assert not (folder / "it ran").exists()
+    call(folder, "-m", "archfem", "check", "case.toml", "--own-code")
+    assert (folder / "it ran").exists()
+
+
+@pytest.fixture
+def permitted(monkeypatch, tmp_path):
+    monkeypatch.setenv(OWN_CODE_VARIABLE, "")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        ("x = 1\ny = 1 / 0", "failed at wrong_{}.py, line 2: ZeroDivisionError"),
+        ("x = (", "SyntaxError"),
+        ("import archfem as af\naf.motion.register_spectrum('s', int)", "no dataclass"),
+    ],
+)
+def test_errors_of_a_module_are_told_as_its_own(permitted, code, said, request):
+    number = abs(hash(code))
+    path = permitted / f"wrong_{number}.py"
+    path.write_text(code)
+    with pytest.raises(af.InvalidInput, match=re.escape(said.format(number))):
+        af.cases.load_extension(path)
+
+
+def test_a_module_does_not_hide_another(permitted):
+    (permitted / "json.py").write_text("")
+    with pytest.raises(af.InvalidInput, match="another module 'json'"):
+        af.cases.load_extension(permitted / "json.py")
+    with pytest.raises(af.InvalidInput, match="no file of a Python module"):
+        af.cases.load_extension(permitted / "missing.py")
+
+
+def test_a_module_that_has_changed_is_refused(permitted):
+    path = permitted / "changing_module.py"
+    path.write_text("")
+    assert af.cases.load_extension(path) is af.cases.load_extension(path)
+    path.write_text("# changed")
+    with pytest.raises(af.InvalidInput, match="has changed since it was loaded"):
+        af.cases.load_extension(path)
+
+
+class Flat:
+    level: float
+
+    def horizontal(self, periods):
+        return self.level - np.asarray(periods)
+
+    def vertical(self, periods):
+        return np.zeros(3)
+
+
+@pytest.mark.parametrize(
+    ("level", "said"),
+    [
+        (1.0, "horizontal: -0.05 g at 1.05 s"),
+        (20.0, "20 g at 0 s"),
+        (5.0, r"vertical: \(3,\) values"),
+    ],
+)
+def test_a_spectrum_is_checked(level, said):
+    af.motion.register_spectrum("flat", dataclass(Flat))
+    with pytest.raises(af.InvalidInput, match=said):
+        build_spectrum({"code": "flat", "level": level}, "suite.target")
+
+
+def test_fields_of_a_spectrum_are_keys_of_a_case():
+    listed = type("Listed", (Flat,), {"__annotations__": {"values": list}})
+    with pytest.raises(af.InvalidInput, match="none of float, int and str"):
+        af.motion.register_spectrum("listed", dataclass(listed))
+    with pytest.raises(af.InvalidInput, match="no method horizontal"):
+        af.motion.register_spectrum("empty", dataclass(type("Empty", (), {})))
+    af.motion.register_spectrum("flat", dataclass(Flat))
+    with pytest.raises(af.InvalidInput, match="level"):
+        build_spectrum({"code": "flat", "levle": 1.0}, "suite.target")
+
+
+@pytest.mark.parametrize(
+    ("read", "said"),
+    [
+        (lambda text: 1.0 / 0.0, "test_extensions.py, line"),
+        (lambda text: None, r"returned None: return \[Channel"),
+        (lambda text: [np.zeros(3)], "another thing than a Channel"),
+        (lambda text: [af.motion.Channel(np.ones(9), 2.0)], "sampling interval 2 s"),
+    ],
+)
+def test_a_reader_is_checked(tmp_path, monkeypatch, read, said):
+    monkeypatch.setattr(reader, "_registered_formats", {})
+    af.motion.register_record_format("mine", {"^MINE$": 1}, read)
+    (tmp_path / "record.txt").write_text("MINE\n1\n2\n")
+    with pytest.raises(af.InvalidInput, match=said):
+        af.Motion.read(tmp_path / "record.txt")
+
+
+def test_marks_of_a_format_are_patterns():
+    for marks, said in (({}, "no marks"), ({"(": 1}, "missing \\)")):
+        with pytest.raises(af.InvalidInput, match=said):
+            af.motion.register_record_format("mine", marks, list)
+
+
+def test_a_criterion_is_checked():
+    column = af.column(breadth=0.6, heights=[1.0])
+    with pytest.raises(af.InvalidInput, match="takes the structure, and N, V, M"):
+        af.dynamics.register_criterion("mine", lambda structure: None)
+    for criterion, said in (
+        (lambda structure, resultants: 1, "returned 1: return a text, or None"),
+        (lambda structure, resultants: resultants[99], "test_extensions.py, line .* IndexError"),
+    ):
+        af.dynamics.register_criterion("mine", criterion)
+        with pytest.raises(af.InvalidInput, match=said):
+            REGISTERED_CRITERIA["mine"](column, np.zeros((1, 3)))
+
+
+def test_a_finding_is_checked():
+    with pytest.raises(af.InvalidInput, match="one of archfem's"):
+        af.studies.register_finding("history", lambda case: {})
+    with pytest.raises(af.InvalidInput, match="does not take"):
+        af.studies.register_finding("mine", lambda: {})
