@@ -371,7 +371,7 @@ def _small_move(system, work, share):  # type: ignore
 
 @kernel
 def _halve_small(system, work, iteration, before, whole):  # type: ignore
-    """Take a correction: `whole`, or a share that reduces the residual, found by halving."""
+    """Add the correction, or unless `whole` a share by halving, which reduces the residual."""
     share, evaluations = 1.0, 0
     while True:
         _small_move(system, work, share)
