@@ -82,7 +82,7 @@ class FailureScan:
         self._cache: dict[bytes, frozenset[str]] = {}
 
     def __call__(self, resultants: Array, min_failures: int) -> Iterator[frozenset[str]]:
-        """Yield the conditions that hold at each step; none below `min_failures` failed joints."""
+        """Yield the set of named conditions that hold at each step; empty below `min_failures`."""
         forces = resultants[:, self._numbers]
         e, friction = eccentricity_and_friction(forces, self._depth)
         limits = sliding_ratio(forces[..., 0], e, *self._laws)
@@ -493,7 +493,7 @@ def applicable_definitions(
 
 
 def _as_condition(mechanism: object) -> frozenset[str]:
-    """Return the set of the one condition "mechanism"; empty if there is no mechanism."""
+    """Return the set {"mechanism"} if there is a mechanism, else an empty set."""
     return frozenset() if mechanism is None else frozenset({"mechanism"})
 
 

@@ -347,7 +347,7 @@ class PathFollower:
     def _start(
         self, blocks: PlacedBlocks, mechanism: Mechanism
     ) -> tuple[Mechanism, LinkageState, Array]:
-        """Return a mechanism that can slide flat, with the first state and velocity of its path."""
+        """Return a mechanism that slides without dilatancy, and the start of its path."""
         for trial in (mechanism, None):
             if trial is None:
                 # With the dilatancy of associated flow joints open that would close if faces slid
@@ -509,7 +509,7 @@ class PathFollower:
         return not -2.0 * near <= share <= length + 2.0 * near
 
     def last_equilibrium(self, path: MechanismPath, samples: int = 9) -> int:
-        """Return the last place up to which the joints that the mechanism keeps closed hold."""
+        """Return the last place up to which no mechanism has a lower factor than the path."""
         # Places are checked from rest on, then bisected between the last two.
         places = np.unique(np.linspace(0, len(path.factors) - 1, samples).astype(int))
         bad = next((k for k in places if not self._holds(path, k)), None)

@@ -310,7 +310,7 @@ class _MovementPath:
         return Movement(self.structure, self.settlement, share, end, tuple(stages), displacement)
 
     def _programme(self, blocks: DisplacedBlocks, further: Array | None = None) -> Programme:
-        """Return the linear programme of least work on gaps, present and by a further movement."""
+        """Return the equilibrium programme of least work on present and imposed gaps."""
         gaps = blocks.current_gaps
         # gaps of round-off make the solver of programmes stall
         gaps = np.where(np.abs(gaps) > 1e-10 * self.structure.size, gaps, 0.0)

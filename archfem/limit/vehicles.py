@@ -251,7 +251,7 @@ class Rating(ResultDisplay):
 
     @property
     def passes(self) -> bool:
-        """Whether the bridge carries the factored vehicle everywhere; not where it falls alone."""
+        """Whether the bridge carries the factored vehicle everywhere; no if it falls unloaded."""
         return bool(self.factor >= 1.0)
 
     def table(self) -> str:

@@ -274,7 +274,7 @@ class Motion(ResultDisplay):
         )
 
     def baseline_corrected(self, degree: int = 6) -> "Motion":
-        """Return the motion without drift, as `signals.baseline_corrected` does it.
+        """Return the motion without drift, as by `signal_processing.correct_baseline`.
 
         Args:
             degree: of the polynomial taken out of the displacement, at least 3.
@@ -287,7 +287,7 @@ class Motion(ResultDisplay):
         )
 
     def band_passed(self, low: float, high: float, *, order: int = 4) -> "Motion":
-        """Return the motion with its frequencies in a band, as `signals.band_passed` does it.
+        """Return the motion with its frequencies in a band, as by `signal_processing.filter_band`.
 
         Args:
             low: lowest frequency kept [Hz].

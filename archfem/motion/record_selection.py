@@ -611,7 +611,7 @@ class _Search:
         return np.where(np.isin(self.events[added], self.events[chosen]), inf, cost)
 
     def common_factor(self, mean: Array, least: Array, most: Array) -> Array:
-        """Return the factor on means (n, 1 + m), with the least and the largest scale of the sets.
+        """Return the factor of each set that brings its mean spectrum (n, 1 + m) to the target.
 
         The factor of least squares is brought within the rule, then within the allowed scales.
         """

@@ -95,7 +95,7 @@ class FallEnergy:
 
 @dataclass(frozen=True)
 class Settling:
-    """How the impulses of the steps settled, since the start of a simulation."""
+    """Convergence of the contact impulses of all steps since the start of a simulation."""
 
     # largest speed by which a contact violates its condition, relative to that which a body gains
     # by its weight in a step [-]
@@ -204,7 +204,7 @@ def _friction_table(structure: Structure, default: float | None) -> Array:
 
 
 def _rocking_table(structure: Structure, ratio: float | Mapping[str, float] | None) -> Array:
-    """Return ratios of speeds of rocking faces between any two bodies, zero where none is given."""
+    """Return the rocking restitution between any two bodies, zero where none is given."""
     count = len(structure.blocks) + 1
     if not isinstance(ratio, Mapping):
         return np.full((count, count), 0.0 if ratio is None else _check_ratio(ratio))
@@ -219,7 +219,7 @@ def _rocking_table(structure: Structure, ratio: float | Mapping[str, float] | No
 
 
 def _check_ratio(ratio: float) -> float:
-    """Return a ratio of speeds of a rocking block, between 0 and 1."""
+    """Return the restitution of a rocking block, which must be between 0 and 1."""
     if not 0.0 < check_number(ratio, "rocking_ratio") <= 1.0:
         raise InvalidInput(
             f"rocking_ratio {ratio:g} is not between 0 and 1: give the angular velocity after an "

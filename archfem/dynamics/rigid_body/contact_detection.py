@@ -61,7 +61,7 @@ def allocate_pieces(bodies: Bodies) -> PlacedPieces:
 
 
 def allocate_contacts(pieces: int) -> Contacts:
-    """Return the workspace of the contacts, twice the largest number in the plane."""
+    """Return the workspace of contacts, for twice as many as pieces in the plane can have."""
     # Pieces and touching pairs make a planar graph: n pieces have fewer than 3 n pairs, and n more
     # with the ground, at two points each
     capacity = 16 * pieces + 16
@@ -410,8 +410,10 @@ def measure_residual(bodies, workspace, touching):  # type: ignore
         nx, ny = contacts.normal[k]
         na, nb, ta, tb, kn, kt, target, slip, friction = workspace.rows[k, :9]
         normal, tangential = contacts.impulse[k]
+        # no tension and no approach: the impulse equals its projection after a correction
         speed = relative_speed(speeds, (a, b), (nx, ny), (na, nb)) - target
         worst = max(worst, abs(max(normal - kn * speed, 0.0) - normal) / kn)
+        # likewise stick, or slip at Coulomb's limit
         speed = relative_speed(speeds, (a, b), (-ny, nx), (ta, tb)) - slip
         limit = friction * normal
         change = min(max(tangential - kt * speed, -limit), limit) - tangential

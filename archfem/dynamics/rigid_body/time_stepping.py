@@ -671,6 +671,7 @@ def _sweep_friction(rows, impulse, points, speeds, inverse_mass):  # type: ignor
     total = 0.0
     for j in range(points[0], points[1]):
         old, limit = impulse[j, 1], rows[j, 8] * impulse[j, 0]
+        # the impulse that stops the slip, at most Coulomb's limit; then velocities with its change
         slip = along + rows[j, 3] * wb - rows[j, 2] * wa - rows[j, 7]
         change = min(max(old - rows[j, 5] * slip, -limit), limit) - old
         worst = max(worst, abs(change) * rows[j, 12])

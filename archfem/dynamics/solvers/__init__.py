@@ -1,4 +1,4 @@
-"""Solvers of a time step: "snes" by PETSc, and "newton" and "compliance", compiled, as its equals.
+"""Solvers of a time step: "snes" by PETSc; "newton" and "compliance", compiled, give its results.
 
 `equation` is the equation of motion; `snes` solves it step by step. `integrator` takes many steps
 at a time in the compiled loop of `base` by one of two solvers, which `selection` selects by a rule,

@@ -94,7 +94,7 @@ class ActiveRows(NamedTuple):
 
 
 def _allocate_aligned(count: int, kind: Any) -> Array:
-    """Return zeros that begin with a line of memory of 64 bytes, as loads across lines are slow."""
+    """Return zeros aligned to cache lines of 64 bytes, as loads across two lines are slow."""
     size = count * np.dtype(kind).itemsize
     memory = np.zeros(size + 64, np.uint8)
     begin = -memory.ctypes.data % 64
@@ -103,13 +103,13 @@ def _allocate_aligned(count: int, kind: Any) -> Array:
 
 @view_kernel
 def row_room(count):  # type: ignore
-    """Return the room of a row of some entries."""
+    """Return the storage length of a row of `count` entries, a multiple of `ROW_PADDING`."""
     return (count + ROW_PADDING - 1) // ROW_PADDING * ROW_PADDING
 
 
 @view_kernel
 def rows_of(entries, count, wide):  # type: ignore
-    """Return some rows of a matrix in an array that may be larger (k, c)."""
+    """Return the first `count` rows, of `wide` entries each, of a matrix stored in a flat array."""
     return entries[: count * wide].reshape((count, wide))
 
 
@@ -145,7 +145,7 @@ def clear_problem(active):  # type: ignore
 
 @kernel
 def begin_problem(active, rows):  # type: ignore
-    """Begin a problem in some rows (k,), with the columns that are still there."""
+    """Replace the rows of the problem by others (k,); those in both keep their columns."""
     marks, sizes, k = active.marks, active.sizes, 0
     for row in rows:
         marks[row] = True
@@ -202,7 +202,7 @@ def _remove_column(active, column):  # type: ignore
 
 @kernel
 def update_columns(active, before, force, count):  # type: ignore
-    """Remove columns without λ or derivative, and add those with one.
+    """Remove columns of rows whose λ and λ′ are zero, and add columns of the others.
 
     A column with λ in the last step stays: it often returns, and takes long to copy.
     """
@@ -222,7 +222,7 @@ def update_columns(active, before, force, count):  # type: ignore
 
 @kernel
 def add_columns(active, force, count):  # type: ignore
-    """Add the columns of rows with λ, or with one of some derivatives."""
+    """Add columns of rows whose λ, or one of the first `count` derivatives λ′, is not zero."""
     for k in range(active.sizes[0]):
         if force[k] != 0.0:
             _add_column(active, k)
@@ -232,7 +232,7 @@ def add_columns(active, force, count):  # type: ignore
 
 @inlined_kernel
 def _add_column(active, row):  # type: ignore
-    """Make a row the next column, unless it is one."""
+    """Add the column of a row, unless the row has one."""
     if active.column_of[row] < 0:
         column, full = active.sizes[1], active.full[active.numbers[row]]
         if column == active.sizes[2]:
@@ -245,9 +245,10 @@ def _add_column(active, row):  # type: ignore
 
 @kernel
 def _widen(active):  # type: ignore
-    """Make room for more columns, from the last row on as rows move backwards."""
+    """Lengthen the storage of each row by `COLUMN_BLOCK` entries."""
     rows, columns, wide = active.sizes[0], active.sizes[1], active.sizes[2]
     wider = min(wide + COLUMN_BLOCK, row_room(len(active.place)))
+    # from the last entry on: each moves to a higher address, which none still needs
     for k in range(rows - 1, 0, -1):
         for j in range(columns - 1, -1, -1):
             active.entries[k * wider + j] = active.entries[k * wide + j]

@@ -79,7 +79,7 @@ def _add_slips_near_limit(law, near):  # type: ignore
 
 @kernel
 def _add_pressing(law, near):  # type: ignore
-    """Add the openings that press on points of active slip rows."""
+    """Add openings at points of active slip rows, whose normal force sets Coulomb's limit there."""
     for k in range(len(law.points)):
         point = law.points[k]
         if point.slip_row >= 0 and near[point.slip_row]:
@@ -204,7 +204,7 @@ def _iterate(law, active, selection, tolerance, full_steps):  # type: ignore
         change[places[k, 0]] += values[k] * gap[places[k, 1]]
     for iteration in range(1, 17):
         solve_equations(change, active, count)
-        last, error = error, _go(law, active, selection, iteration >= full_steps)
+        last, error = error, _take_correction(law, active, selection, iteration >= full_steps)
         if error <= tolerance or last <= error <= 10.0 * tolerance:
             return iteration
         if not error < np.inf:
@@ -220,8 +220,8 @@ def _iterate(law, active, selection, tolerance, full_steps):  # type: ignore
 
 
 @kernel
-def _go(law, active, selection, search):  # type: ignore
-    """Change λ by its correction, or with a line search by a share; returns its residual [N]."""
+def _take_correction(law, active, selection, search):  # type: ignore
+    """Add the correction to λ, or with a line search a share of it; returns the residual [N]."""
     size, share, square, change = active.sizes[0], 1.0, 0.0, active.change
     force, released, before, trial = active.force, active.released, active.before, active.trial
     for k in range(size):
@@ -280,7 +280,7 @@ def _factorise_equations(active, count):  # type: ignore
 
 @summing_kernel
 def _fill_equations(active, count, matrix):  # type: ignore
-    """Fill 1 - λ′ F of the columns, by two derivatives at a time where these share a row."""
+    """Fill the matrix 1 - λ′ F of the columns."""
     (places, values), (size, wide), entry = active.derivatives, matrix.shape, 0
     entries = rows_of(active.entries, active.sizes[0], active.sizes[2])
     for i in range(size):
@@ -291,6 +291,7 @@ def _fill_equations(active, count, matrix):  # type: ignore
         row, value = places[entry, 0], values[entry]
         own, other = matrix[active.column_of[row]], entries[places[entry, 1]]
         entry += 1
+        # two derivatives of the same force at a time: its row is loaded once for both
         if entry < count and places[entry, 0] == row:
             second, further = values[entry], entries[places[entry, 1]]
             for k in range(wide):
@@ -325,6 +326,7 @@ def factorise_dense(matrix, pivots):  # type: ignore
     """
     size = len(matrix)
     for k in range(size):
+        # partial pivoting: the largest entry of the column moves to the diagonal
         best = k
         for i in range(k + 1, size):
             if abs(matrix[i, k]) > abs(matrix[best, k]):
@@ -334,6 +336,7 @@ def factorise_dense(matrix, pivots):  # type: ignore
             for j in range(size):
                 matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
         scale = 1.0 / matrix[k, k] if matrix[k, k] != 0.0 else np.nan
+        # elimination of the column below; the diagonal stores the inverse pivot
         top = matrix[k][k + 1 :]
         for i in range(k + 1, size):
             factor, row = scale * matrix[i, k], matrix[i][k + 1 :]
@@ -347,6 +350,7 @@ def factorise_dense(matrix, pivots):  # type: ignore
 def solve_dense(matrix, pivots, right):  # type: ignore
     """Solve in place by the factor of `factorise_dense`."""
     size = len(matrix)
+    # forward substitution with the row exchanges, then back substitution
     for k in range(size):
         best = pivots[k]
         right[k], right[best] = right[best], right[k]
@@ -394,6 +398,7 @@ def minimise_residual(active, right):  # type: ignore
 @summing_kernel
 def _orthogonalise(basis, number, size, shares):  # type: ignore
     """Subtract from a vector its components along those before it, and scale it; its norm."""
+    # modified Gram-Schmidt: one vector after another, which rounds less than all at once
     own, square_sum, zero = basis[number], 0.0, np.float32(0.0)
     for j in range(number):
         other, share = basis[j], zero
@@ -414,6 +419,7 @@ def _orthogonalise(basis, number, size, shares):  # type: ignore
 @kernel
 def _rotate(column, step, norm, rotations):  # type: ignore
     """Bring a column of the Hessenberg matrix into a triangle by Givens rotations."""
+    # rotations of the columns before, then one that makes the entry below the diagonal zero
     for j in range(step):
         above, cosine, sine = column[j], rotations[j, 0], rotations[j, 1]
         column[j] = cosine * above + sine * column[j + 1]

@@ -38,7 +38,7 @@ def band_of(matrix: sparse.csr_matrix, half: int) -> Band:
 
 
 def band_places(band: Band, rows: Any, columns: Any) -> Indices:
-    """Return which entry belongs to each row and column (k,)."""
+    """Return the positions in `entries` of the matrix entries at some rows and columns (k,)."""
     return np.asarray(band.half + 3 * band.half * rows + columns)
 
 
@@ -59,7 +59,7 @@ def narrow_order(pattern: sparse.csr_matrix) -> tuple[Any, int]:
 
 @view_kernel
 def _rows(band):  # type: ignore
-    """Return the band such that indices are those of the matrix; columns exceed the shape."""
+    """Return a view of the band whose indices are row and column of the full matrix."""
     half, size = band.half, band.pivots.shape[1]
     return band.entries[half : half + 3 * half * size].reshape((size, 3 * half))
 
@@ -79,6 +79,7 @@ def factorise_band(band):  # type: ignore
                 matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
         far = min(max(far, pivot + half), size - 1)
         band.pivots[0, k], band.pivots[1, k] = pivot, far
+        # elimination of the column below the pivot, which is stored as its inverse
         inverse = 1.0 / matrix[k, k]
         matrix[k, k] = inverse
         for i in range(k + 1, last + 1):
@@ -119,6 +120,7 @@ def solve_band(band, vector):  # type: ignore
         value = vector[k]
         for i in range(k + 1, min(k + half, size - 1) + 1):
             vector[i] -= matrix[i, k] * value
+    # back substitution, up to the last column that fill reaches in each row
     for k in range(size - 1, -1, -1):
         value = vector[k]
         for j in range(k + 1, band.pivots[1, k] + 1):

@@ -75,7 +75,7 @@ class ComplianceSolver:
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
-        """Return the solver, or None where more than plain joints is not linear."""
+        """Return the solver, or None where anything but plain joints is nonlinear."""
         return cls(equation) if equation.joints is not None else None
 
     def system(self, dt: float) -> ComplianceSystem:
@@ -178,7 +178,7 @@ def _copy(source, target):  # type: ignore
 
 @kernel
 def _list_marked(marks, numbers):  # type: ignore
-    """List the numbers of what is marked; returns how many there are."""
+    """List the indices at which `marks` is true; returns how many there are."""
     count = 0
     for k in range(len(marks)):
         if marks[k]:
@@ -189,9 +189,10 @@ def _list_marked(marks, numbers):  # type: ignore
 
 @kernel
 def _fill_compliance(system, row):  # type: ignore
-    """Compute a row of F, as far as it meets rows computed before."""
+    """Compute the entries of a row of F in the columns of all rows filled so far, and its own."""
     (indptr, indices, data), active = system.linear.gaps, system.active
     active.filled[row] = True
+    # displacements by forces of one at the row, then the gaps that they cause at the others
     vector = system.unit
     for k in range(len(vector)):
         vector[k] = 0.0

@@ -63,7 +63,7 @@ class Equation:
 
     @cached_property
     def lag(self) -> float:
-        """β of damping that follows the joints [s]."""
+        """β of damping written as f(u + β v), which acts in closed joints only [s]; else 0."""
         damping = self.damping
         return damping.stiffness if damping and damping.joints == "closed" else 0.0
 

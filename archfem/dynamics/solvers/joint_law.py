@@ -120,7 +120,7 @@ def gap_rows(joints: JointOperator) -> GapRows:
 
 
 def _segments(joints: JointOperator, own: Any, gaps: Array) -> tuple[Any, Any, Array]:
-    """Return rows of a joint; begin, near and far row of its segments (s, 3); ξ of its points."""
+    """Cut a joint into segments: points that define its rows, begin, near, far (s, 3), and ξ."""
     # interpolate between the outermost points: on a plane face that is exact
     arm = joints.points.offset[own]
     ends = int(arm.argmin()), int(arm.argmax())
@@ -137,13 +137,13 @@ def _segments(joints: JointOperator, own: Any, gaps: Array) -> tuple[Any, Any, A
 
 
 def _dense_rows(rows: sparse.csr_matrix, offset: Array) -> Array:
-    """Return rows without empty columns, and offsets, relative to the largest entry (k, m)."""
+    """Return rows and offsets as dense arrays, each scaled by its largest entry (k, m)."""
     parts = rows[:, np.unique(rows.indices)].toarray(), offset[:, None]
     return np.hstack([each / max(np.abs(each).max(initial=0.0), 1e-300) for each in parts])
 
 
 def _distinct_rows(rows: Array) -> tuple[Any, Any]:
-    """Return the first of each set of equal rows, and the set of each row (k,)."""
+    """Group equal rows; return the first row of each group, and the group of each row (k,)."""
     distinct: list[int] = []
     number = np.empty(len(rows), int)
     for row, values in enumerate(rows):
@@ -265,7 +265,7 @@ def _closed_forces(stiffness: Array, share: Array, facets: bool) -> Array:
 def _derivative_pairs(
     segments: Any, segment_of: Any, members: Any, first: Any, openings: int
 ) -> tuple[Any, Any]:
-    """Return pairs of rows that have derivatives (q, 2), and begins of those of slip rows."""
+    """Return pairs (row of λ, row of z) with derivatives (q, 2), and where those of slips begin."""
     pairs: list[tuple[int, int]] = []
     begin = []
     for _, _, near, far in segments.tolist():
@@ -330,7 +330,7 @@ def evaluate_openings(law, gap, segments):  # type: ignore
 
 @inlined_kernel
 def _open_point(point, state, means, end, shares):  # type: ignore
-    """Write down the forces of a point of a facet, or a spring, that opens or closes."""
+    """Store normal force, closed area and derivatives of a point from the means over its path."""
     (normal, _, rate, time), (a, b), stiffness = means, shares, point.stiffness
     state.normal = stiffness * normal[end]
     state.area = point.area * time[end]
@@ -341,7 +341,7 @@ def _open_point(point, state, means, end, shares):  # type: ignore
 
 @kernel
 def _mean_forces(ends, rates, facets):  # type: ignore
-    """Return means of closing, opening, rates and time of a facet, or of a spring with zeros."""
+    """Return means of <g>₋, <g>₊, its rate, and closed time at a facet's ends, or at a spring."""
     if facets:
         return facet_means(ends, rates[0], rates[1])
     normal, opening, rate, time = point_means(ends[0], ends[2], rates[0], rates[1])
@@ -446,7 +446,7 @@ def _slip_derivatives(law, place, row, entries, count):  # type: ignore
 
 @inlined_kernel
 def _enter(entries, number, where, value):  # type: ignore
-    """Set one entry of the derivatives."""
+    """Store one derivative: its places (row, column, pair) and its value."""
     for k in range(3):
         entries[0][number, k] = where[k]
     entries[1][number] = value
@@ -492,7 +492,7 @@ def largest_force(law, gap):  # type: ignore
 
 @kernel
 def hold_reversed(last, released, entries, count):  # type: ignore
-    """Hold points that reversed their slip: they release nothing, whatever their gaps."""
+    """Hold points that reversed their slip: set their λ and λ′ to zero, as if they stuck."""
     rows, values = entries
     for k in range(count):
         if last[rows[k, 0]] * released[rows[k, 0]] < 0.0:
@@ -504,7 +504,7 @@ def hold_reversed(last, released, entries, count):  # type: ignore
 
 @kernel
 def add_derivatives(entries, count, along, result):  # type: ignore
-    """Add the change of λ with that of the gaps, by the derivatives in the factor."""
+    """Add the change λ′ Δz of the released forces due to a change `along` of the gaps."""
     rows, values = entries
     for k in range(count):
         result[rows[k, 0]] += values[k] * along[rows[k, 1]]

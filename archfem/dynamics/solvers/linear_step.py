@@ -73,17 +73,17 @@ class LinearStepWorkspace(NamedTuple):
 
 
 class JointRows(NamedTuple):
-    """Rows of gaps, shear resultants of joints that cannot slide, loads, law and its pairs."""
+    """Matrices and law of the joints for steps of one length."""
 
-    gaps: sparse.csr_matrix
-    shear: sparse.csr_matrix
-    weight: Array
+    gaps: sparse.csr_matrix  # G (r, n)
+    shear: sparse.csr_matrix  # shear resultants of joints that cannot slide (n_joints, n)
+    weight: Array  # forces of gravity and of initial gaps (n,)
     law: JointLaw
-    pairs: Any
+    pairs: Any  # rows of λ and z of each derivative (q, 2)
 
 
 def pair_blocks(gaps: SparseRows, pairs: NDArray[np.int64]) -> tuple[NDArray[np.int64], Any, Any]:
-    """Return begin of the block of each pair of gap rows, and rows and columns of all blocks.
+    """Return where each pair's tangent block begins among all entries, and their rows and columns.
 
     Rows that move with the same coordinates, as those of one joint, share a block.
     """
@@ -131,7 +131,7 @@ def joint_rows(equation: Equation, dt: float) -> JointRows:
 def linear_system(
     equation: Equation, order: NDArray[Any], dt: float
 ) -> tuple[LinearSystem, NDArray[np.int64]]:
-    """Return an equation of motion by rows, its coordinates in another order, and pairs of gaps."""
+    """Return the data of steps with reordered coordinates, and the pairs of gap rows (q, 2)."""
     model, rows = equation.model, joint_rows(equation, dt)
     mass, closed, rest = (
         sparse_rows(without_round_off(matrix[order][:, order]))
@@ -287,7 +287,7 @@ def _evaluate_linear_step(system, step, states, ground, results, memory):  # typ
 
 @kernel
 def _gaps_at_end(linear, work, state):  # type: ignore
-    """Find the gaps at the end of a step, and forces where the law of an instant sees them."""
+    """Find the gaps at the end of a step; with HHT, also forces where it writes the equation."""
     law, numbers, now, seen = linear.law, linear.numbers, work.gap_end, work.gap_seen
     multiply(linear.gaps, state[0], now)
     if numbers.share == 1.0:

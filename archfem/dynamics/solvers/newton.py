@@ -181,7 +181,7 @@ class NewtonSolver:
         return deepcopy(system)
 
     def _tangent(self, matrix: sparse.csr_matrix, rows: Any, columns: Any) -> tuple[Any, Indices]:
-        """Return a tangent, and which of its entries rows and columns of changes belong to."""
+        """Return a matrix as a tangent, and the positions in it of entries that joints change."""
         if self._elimination is None:
             band = band_of(matrix, self.half_width)
             return band, band_places(band, rows, columns)
@@ -360,7 +360,7 @@ def _renew_factor(system, hold):  # type: ignore
 
 @kernel
 def _small_move(system, work, share):  # type: ignore
-    """Go a share of the correction from where it begins."""
+    """Add a share of the correction to w, gaps and balanced λ before it."""
     law, contact = system.linear.law, system.contact
     for row in range(len(law.guess)):
         law.guess[row] = system.gap_origin[row] + share * system.along[row]
@@ -371,7 +371,7 @@ def _small_move(system, work, share):  # type: ignore
 
 @kernel
 def _halve_small(system, work, iteration, before, whole):  # type: ignore
-    """Go the share of the correction that reduces the residual, by halving unless it is `whole`."""
+    """Add the correction, or unless `whole` a share by halving, which reduces the residual."""
     share, evaluations = 1.0, 0
     while True:
         _small_move(system, work, share)
@@ -391,7 +391,7 @@ def _solve_contact(system):  # type: ignore
 
 
 def _solve_small_step(system):  # type: ignore
-    """Solve a step; a second try restarts from the guess, with a line search from its begin."""
+    """Solve a step; a second try restarts from the guess, with a line search throughout."""
     law, work, total = system.linear.law, system.work, 0
     # relative to the largest force; ten times as much where rounding does not let it fall
     error = 1e-12 * largest_force(law, work.gap)
@@ -475,6 +475,7 @@ def _sum_loads(system, work, old, ground):  # type: ignore
     constant, body, elastic = work.constant, system.body, len(system.blocks[2]) > 0
     for k in range(len(constant)):
         work.before[k] = old[0, k]
+        # gravity, ground motion, 2 M v/Δt, and blocks at the start
         inertia = 2.0 / system.step[0] * row_times(system.mass, k, old[1])
         constant[k] = system.weight[k] + inertia - ground[0] * body[0, k] - ground[1] * body[1, k]
         if elastic:
@@ -493,6 +494,7 @@ def _large_residual(system, work, iteration):  # type: ignore
         for point in range(len(forces.slip_direction)):
             forces.slip_direction[point] = 0.0
     compute_step_forces(system.joints, work.before, work.after, system.step[1], system.slip, forces)
+    # loads less inertia, damping and blocks, then less the mean forces of the joints
     for k in range(len(residual)):
         residual[k] = work.constant[k] - row_times(system.effective, k, move)
     for joint in range(len(forces.force)):
@@ -551,7 +553,7 @@ def _correction_work(work):  # type: ignore
 
 @kernel
 def _search_large(system, work, iteration, before, whole):  # type: ignore
-    """Go the share of the correction where the residual does no more work along it.
+    """Take the share of the correction at which the residual does no work along it.
 
     But for friction the residual is the negative gradient of an energy, which is least there. With
     stiff joints that open or close it is a small share, and the norm of the residual tells nothing.

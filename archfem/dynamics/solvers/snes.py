@@ -254,7 +254,7 @@ class SnesSolver:
 def _solve_with_teeth(
     passage: ModelStep, solve: Callable[[ModelStep, Array], Solution], guess: Array
 ) -> tuple[ModelStep, Solution]:
-    """Alternate between a step and the rise of its saw teeth; one solve where there are none."""
+    """Alternate between solving a step and its dilatancy opening until that stays; return both."""
     iterations, alternations = 0, 60
     for _ in range(alternations):
         solution = solve(passage, guess)

@@ -219,7 +219,7 @@ def _layout(matrix: sparse.csr_matrix, elimination: Elimination, smallest: float
 
 
 def panel_places(panels: Panels, rows: Any, columns: Any) -> Indices:
-    """Return which entry belongs to each row and column (k,)."""
+    """Return the positions in `entries` of the matrix entries at some rows and columns (k,)."""
     first, low, high = panels.first, np.minimum(rows, columns), np.maximum(rows, columns)
     group = np.searchsorted(first, low, "right") - 1
     start, width, count = first[group], np.diff(first)[group], np.diff(panels.below)[group]
@@ -279,6 +279,7 @@ def _eliminate_rows(top, smallest):  # type: ignore
             own[last] = factor = own[last] * row[last]
             for j in range(last + 1, size):
                 own[j] -= factor * row[j]
+        # without row exchanges, a pivot that is small in its row would round all others off
         largest = 0.0
         for j in range(i, size):
             largest = max(largest, abs(own[j]))
@@ -293,6 +294,7 @@ def _eliminate_columns(top, left):  # type: ignore
     """Eliminate in the rows below a group, stored by columns, the columns of the group."""
     width, count = left.shape
     for m in range(width):
+        # columns before this one, four at a time, then the rest, then its pivot
         own, k = left[m], 0
         while k + 4 <= m:
             a, b, c, d = top[k, m], top[k + 1, m], top[k + 2, m], top[k + 3, m]
@@ -318,6 +320,7 @@ def _update_rest(top, left, targets, image, entries):  # type: ignore
         one, two = image[:count], image[count : 2 * count]
         for j in range(count):
             one[j] = two[j] = 0.0
+        # both rows of the product, four columns of the group at a time
         for k in range(0, width - width % 4, 4):
             p, q, r, s = top[k][width:], top[k + 1][width:], top[k + 2][width:], top[k + 3][width:]
             a, b, c, d = left[k, i], left[k + 1, i], left[k + 2, i], left[k + 3, i]
@@ -330,6 +333,7 @@ def _update_rest(top, left, targets, image, entries):  # type: ignore
             for j in range(count):
                 one[j] += a * row[j]
                 two[j] += e * row[j]
+        # each entry of the product goes to its position in the panels of later groups
         own = targets[i * count : (i + 1) * count]
         for j in range(count):
             entries[own[j]] -= one[j]
@@ -340,8 +344,8 @@ def _update_rest(top, left, targets, image, entries):  # type: ignore
 
 
 @view_kernel
-def four(panel, column, height):  # type: ignore
-    """Return four columns of a panel, from one on."""
+def _four_columns(panel, column, height):  # type: ignore
+    """Return four consecutive columns of a panel, the first of them `column`."""
     start = column * height
     return (
         panel[start : start + height],
@@ -354,6 +358,7 @@ def four(panel, column, height):  # type: ignore
 @summing_kernel
 def solve_panels(panels, vector):  # type: ignore
     """Solve in place by the factor of `eliminate`."""
+    # forward substitution, group by group
     for group in range(len(panels.parent)):
         start, width = panels.first[group], panels.first[group + 1] - panels.first[group]
         rows = panels.rows[panels.below[group] : panels.below[group + 1]]
@@ -367,6 +372,7 @@ def solve_panels(panels, vector):  # type: ignore
             column = block[width * size + k * len(rows) :]
             for i in range(len(rows)):
                 vector[rows[i]] -= column[i] * value
+    # back substitution, from the last group on
     for group in range(len(panels.parent) - 1, -1, -1):
         start, width = panels.first[group], panels.first[group + 1] - panels.first[group]
         rows = panels.rows[panels.below[group] : panels.below[group + 1]]
@@ -407,7 +413,7 @@ def solve_forward(factor, vector):  # type: ignore
         for i in range(size):
             total[i] = 0.0
         for k in range(0, width - width % 4, 4):
-            p, q, r, s = four(panel, k, size)
+            p, q, r, s = _four_columns(panel, k, size)
             a, b, c, d = own[k], own[k + 1], own[k + 2], own[k + 3]
             for i in range(size):
                 total[i] += a * p[i] + b * q[i] + c * r[i] + d * s[i]
@@ -430,13 +436,14 @@ def solve_backward(factor, vector, marked):  # type: ignore
         start, width = factor.first[group], factor.first[group + 1] - factor.first[group]
         rows = factor.rows[factor.below[group] : factor.below[group + 1]]
         panel, size = factor.panels[factor.places[group] :], width + len(rows)
+        # right side of the group, and the solution below it, which later groups have found
         own, known = vector[start : start + width], factor.image[:size]
         for i in range(width):
             known[i] = own[i]
         for i in range(len(rows)):
             known[width + i] = -vector[rows[i]]
         for k in range(0, width - width % 4, 4):
-            p, q, r, s = four(panel, k, size)
+            p, q, r, s = _four_columns(panel, k, size)
             a, b, c, d = 0.0, 0.0, 0.0, 0.0
             for i in range(size):
                 a += p[i] * known[i]

@@ -118,7 +118,7 @@ def face_forces(rates, force):  # type: ignore
 
 @inlined_kernel
 def measure_rates(now, row):  # type: ignore
-    """Return a row times a derivative: by the jump's x and y, and by the faces' angles."""
+    """Return derivatives by the jump's x and y and both angles from those by the measures."""
     c, s, a, b, t = now
     middle, apart = a * row[0] - b * row[1], t * row[2]
     return c * row[0] - s * row[1], s * row[0] + c * row[1], middle - apart, middle + apart
@@ -181,7 +181,7 @@ class FaceKinematics(NamedTuple):
 
 @inlined_kernel
 def _shape_motion(sides, joint, side, q):  # type: ignore
-    """Return U ξ and Θ ξ of a face."""
+    """Return displacement U ξ and rotation Θ ξ of a face due to its block's elastic coordinates."""
     x = y = turn = 0.0
     for k in range(3 if sides.has_frame[joint, side] else 0, sides.size[joint, side]):
         coordinate = q[sides.index[joint, side, k]]

@@ -153,7 +153,7 @@ def _measure_state(joints, q, sums, measures):  # type: ignore
 
 @allocating_entry
 def facet_slips(joints, q):  # type: ignore
-    """Return the slip of segments whose places stay opposite, over their length (j,) [-]."""
+    """Return the slip over the length of segments whose points are paired as built (j,) [-]."""
     slips, law = np.zeros(len(joints.normal_angle)), joints.face_law
     for segment in range(len(slips)):
         if law.paired[segment]:

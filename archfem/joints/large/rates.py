@@ -119,7 +119,7 @@ def _face_derivatives(sides, joint, side, motion, derivatives):  # type: ignore
 
 @summing_kernel
 def _add_product(law, which, counts, ends, block):  # type: ignore
-    """Add Uᵀ L V of two faces to their block, row by row."""
+    """Add the derivative Uᵀ L V of one face's forces by another's coordinates to their block."""
     (side, other), (rows, columns), (mean, last) = which, counts, ends
     # rows of L: x, y, angle of the lower face, angle of the higher face, elongation
     angle, by_angle = 2 + side, 2 + other
@@ -141,6 +141,7 @@ def _add_product(law, which, counts, ends, block):  # type: ignore
 @kernel
 def _add_rotation_stiffness(shapes, count, bend, block):  # type: ignore
     """Add the derivative of generalised forces at a constant force on the face."""
+    # moment by the angle, force on each shape by the angle, moment by each shape
     a, b, c, d, e = bend[0], bend[1], bend[2], bend[3], bend[4]
     block[2 * count + 2] += a
     for k in range(3, count):

@@ -224,7 +224,7 @@ def _side_cells(edges: Edges, number: int, settings: Discretisation) -> list[int
 
 
 def _minimum_edge_cells(edges: Edges, settings: Discretisation) -> tuple[Numbers, Array]:
-    """Return minimum numbers of cells on edges, and which ones a block's side or joint sets."""
+    """Return minimum numbers of cells on edges, and whether a side or joint sets each of them."""
     # cells on the edges of a side, or of a joint between two blocks without corners, are not longer
     # than those of the whole side
     minimum = np.ones(len(edges.ends), dtype=np.intp)

@@ -65,7 +65,7 @@ class CorotationalCoordinates:
 
 
 def _find_fill(small: LinearBlockModel) -> list[int]:
-    """Return blocks that deform and follow their support rather than rotate."""
+    """Return the blocks of fill, which deform with the blocks below and get no rotating frame."""
     blocks = small.structure.blocks
     return [number for number in find_yielding_blocks(small.structure) if not blocks[number].grain]
 
