@@ -31,7 +31,7 @@ KEY_KINDS: Table = {
     **dict.fromkeys(("cover", "erosion", "hump", "spandrels", "snap"), "m"),
     **{key: ["m"] for key in ("heights", "courses", "spans", "breadths", "thicknesses", "rises")},
     **dict.fromkeys(("voussoirs", "chords"), int),
-    **dict.fromkeys(("material", "contact", "state", "unit"), str),
+    **dict.fromkeys(("material", "contact", "state", "unit", "measured"), str),
     **dict.fromkeys(("part", "role"), str),
     **dict.fromkeys(("arches", "piers", "sidewalls", "backfill", "paving"), dict),
     **dict.fromkeys(("layers", "contacts"), dict),

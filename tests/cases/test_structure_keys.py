@@ -83,7 +83,15 @@ def test_shapes_by_name(told, blocks):
 BRIDGE = {
     "structure": {
         "shape": "bridge",
-        "arches": {"arch": {"span": 4.0, "rise": 1.6, "thickness": 0.45, "voussoirs": 9}},
+        "arches": {
+            "arch": {
+                "measured": "centre line",
+                "span": 4.0,
+                "rise": 1.6,
+                "thickness": 0.45,
+                "voussoirs": 9,
+            }
+        },
         "sidewalls": {
             "length": 1.0,
             "height": 0.8,
