@@ -89,7 +89,7 @@ def test_what_is_not_lognormal_is_seen():
 
 
 def test_a_curve_says_its_median_and_dispersion():
-    curve = af.studies.fragility(np.exp([0.0, 1.0, 2.0]))
+    curve = fragility(np.exp([0.0, 1.0, 2.0]))
     assert str(curve).startswith(f"median {np.e:.3g} (")
     assert f"dispersion {curve.dispersion:.2f}, " in str(curve)
 
