@@ -173,6 +173,9 @@ def _convert(text: str, unit: str, key: str) -> float:
                 f"{key} = {text!r} is an angle, and this must be a pure number: a coefficient of "
                 f"friction is the tangent of its angle, {tan(angle):.3f}"
             )
+        if unit == "N" and quantity.check("[mass]"):
+            weight = float(quantity.to("kg").magnitude) * G / kN
+            raise InvalidInput(f"{key} = {text!r} is a mass: give its weight, '{weight:.4g} kN'")
         return float(quantity.to(target).magnitude)
     except InvalidInput:
         raise

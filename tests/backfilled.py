@@ -18,7 +18,12 @@ def arch_bridge(cover=0.3, material=SOIL, width=1.0, **ring):
         for side in ("left", "right")
     ]
     fill = None if cover is None else af.shapes.Backfill(cover=cover, material=material)
-    return af.bridge(arches=[af.shapes.Arch(**given)], sidewalls=walls, backfill=fill, width=width)
+    return af.bridge(
+        arches=[af.shapes.Arch(measured="centre line", **given)],
+        sidewalls=walls,
+        backfill=fill,
+        width=width,
+    )
 
 
 def rectangle(left, bottom, right, top, name, material=af.STONE, **given):

@@ -27,6 +27,12 @@ def test_a_common_unit_of_another_dimension_is_refused(text, si):
         af.units.in_unit(text, si, "length")
 
 
+@pytest.mark.parametrize("mass", ["10 t", "10000 kg"])
+def test_a_mass_in_place_of_a_weight_is_refused_with_its_weight(mass):
+    with pytest.raises(af.InvalidInput, match=r"is a mass: give its weight, '98\.1 kN'"):
+        af.units.in_unit(mass, "N", "axles")
+
+
 @pytest.mark.parametrize(
     ("values", "numbers", "unit"),
     [

@@ -145,6 +145,8 @@ class Case:
             InvalidInput: a key or value is invalid; the message names it and the remedy.
             InvalidStructure: the lengths of the structure contradict each other.
         """
+        if "structure" not in settings and {"case", "cases"} & set(settings):
+            raise InvalidInput("this is a study of cases: compute it by `archfem study`")
         refuse_unknown(settings, ("title", "extensions", *TABLE_SECTIONS))
         load_extensions_of(settings, folder)
         check_words(settings.get("title", ""), "title", 'write words in quotes: title = "…"')

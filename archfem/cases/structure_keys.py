@@ -31,7 +31,7 @@ KEY_KINDS: Table = {
     **dict.fromkeys(("cover", "erosion", "hump", "spandrels", "snap"), "m"),
     **{key: ["m"] for key in ("heights", "courses", "spans", "breadths", "thicknesses", "rises")},
     **dict.fromkeys(("voussoirs", "chords"), int),
-    **dict.fromkeys(("material", "contact", "state", "unit"), str),
+    **dict.fromkeys(("material", "contact", "state", "unit", "measured"), str),
     **dict.fromkeys(("part", "role"), str),
     **dict.fromkeys(("arches", "piers", "sidewalls", "backfill", "paving"), dict),
     **dict.fromkeys(("layers", "contacts"), dict),
@@ -191,11 +191,13 @@ def _build_parts(part: Callable[..., Described], table: Table, section: str) -> 
 
 def _call(function: Callable[..., Described], section: str, **values: Any) -> Described:
     """Call a constructor with the values of a table; a missing value names the table."""
-    try:
-        return function(**values)
-    # Keys are checked before, so that a TypeError is a missing argument.
-    except TypeError as error:
-        raise InvalidInput(f"{section}: {error}") from error
+    parameters = inspect.signature(function).parameters.values()
+    required = [key.name for key in parameters if key.default is key.empty]
+    if missing := [key for key in required if key not in values]:
+        raise InvalidInput(
+            f"{section} lacks {', '.join(missing)}: give them, or correct the name of the table"
+        )
+    return function(**values)
 
 
 def _material(settings: Table, name: str) -> Material:

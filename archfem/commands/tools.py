@@ -26,7 +26,8 @@ def animate(options: argparse.Namespace) -> None:
     """Film the history of a run."""
     path = Path(options.history)
     if not path.is_file():
-        raise InvalidInput(f"there is no history file {path}")
+        remedy = ": name the history.nc in it" if path.is_dir() else ""
+        raise InvalidInput(f"there is no history file {path}{remedy}")
     case = Case.read(options.case or _find_case(path))
     run = History.read(path, case.structure)
     names = ("magnification", "colour", "fps", "seconds", "renderer")

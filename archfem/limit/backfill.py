@@ -528,8 +528,9 @@ def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
     if names and fill is None:
         raise InvalidInput(
             f"blocks {names} are softer than the joints around them: rigid, they would hold every "
-            "ring below; give their strength, fill=af.limit.Fill(friction_angle=35.0), to take "
-            "them as weight and earth pressure, or push a finite-element model over"
+            "ring below; give their strength, fill=af.limit.Fill(friction_angle=35.0) or in a "
+            'case fill = { friction_angle = "35 degree" } in [limit], to take them as weight and '
+            "earth pressure, or push a finite-element model over"
         )
     if fill is not None and not names:
         raise InvalidInput(

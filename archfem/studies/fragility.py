@@ -55,6 +55,14 @@ class Fragility:
     misfit: float
     resampled: Array = field(repr=False)
 
+    def __str__(self) -> str:
+        """Describe the median with its confidence interval, the dispersion and the fit."""
+        low, high = self.interval()
+        return (
+            f"median {self.median:.3g} ({low:.3g} to {high:.3g} at 90 %), dispersion "
+            f"{self.dispersion:.2f}, p-value of the fit {self.goodness:.2f}"
+        )
+
     def probability(self, intensity: Any) -> Array:
         """Return the probability of the limit state at intensities.
 

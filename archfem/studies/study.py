@@ -339,6 +339,8 @@ def _read_study(
     tables: Mapping[str, Any], path: Path, changes: Sequence[str], own_code: bool
 ) -> Study:
     """Return the study of the tables of a file."""
+    if {"structure", "base"} & set(tables):
+        raise InvalidInput('this is a case: name it in the file of a study, case = "CASE.toml"')
     refuse_unknown(tables, STUDY_KEYS)
     settings = check_table(tables, STUDY_KEYS, "study")
     missing = [] if {"case", "cases"} & set(settings) else ["case"]
@@ -417,7 +419,10 @@ def _pair_cases(
     for name, own in available.items():
         chosen = [pair for pair in own if pairs is None or pair in pairs]
         if asked.find is evaluate_comparison and not own:
-            raise InvalidInput(f"the case of '{name}' has no [suite] to compare under")
+            raise InvalidInput(
+                f"the case of '{name}' has no [suite] to compare under: "
+                'give it one, or say what to compute, such as compute = "limit"'
+            )
         if own and not chosen:
             raise InvalidInput(f"'{name}' has none of the pairs {pairs}, but {own}")
         by_own = by_pair or pairs is not None

@@ -54,7 +54,7 @@ def semicircle() -> af.Structure:
 
 def small_bridge() -> af.Structure:
     """Build an arch under backfill."""
-    arch = af.shapes.Arch(span=4.0, rise=1.5, thickness=0.45, voussoirs=11)
+    arch = af.shapes.Arch(measured="centre line", span=4.0, rise=1.5, thickness=0.45, voussoirs=11)
     return af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.4), width=4.0)
 
 
@@ -71,14 +71,26 @@ def shallow_ring() -> af.Structure:
 def tall_piers() -> af.Structure:
     """Build an arch on piers taller than its rise."""
     return af.shapes.buttressed_arch(
-        span=4.0, thickness=0.5, voussoirs=13, breadth=1.5, height=3.0, embrace=150.0
+        measured="centre line",
+        span=4.0,
+        thickness=0.5,
+        voussoirs=13,
+        breadth=1.5,
+        height=3.0,
+        embrace=150.0,
     )
 
 
 def two_spans() -> af.Structure:
     """Build an arcade of two arches on three piers."""
     return af.shapes.arcade(
-        spans=(3.0, 3.0), heights=2.0, breadths=1.2, thicknesses=0.4, voussoirs=11, embraces=150.0
+        measured="centre line",
+        spans=(3.0, 3.0),
+        heights=2.0,
+        breadths=1.2,
+        thicknesses=0.4,
+        voussoirs=11,
+        embraces=150.0,
     )
 
 

@@ -46,7 +46,13 @@ def ring(voussoirs: int = 17) -> af.Structure:
 def arch_on_piers() -> af.Structure:
     """Build a segmental arch of 15 voussoirs on two piers, which stands at a friction of 0.3."""
     return af.shapes.buttressed_arch(
-        span=5.0, thickness=0.6, voussoirs=15, breadth=2.0, height=2.4, embrace=140.0
+        measured="centre line",
+        span=5.0,
+        thickness=0.6,
+        voussoirs=15,
+        breadth=2.0,
+        height=2.4,
+        embrace=140.0,
     )
 
 

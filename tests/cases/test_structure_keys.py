@@ -21,6 +21,7 @@ BRIDGES = [
     [
         ("structure.width=0", "do not fit into a width of 0 m"),
         ("structure.arches.main arch.spn=3", "structure.arches.main arch.spn': did you mean"),
+        ("structure.arches.mian arch.thickness=1", "mian arch lacks span, voussoirs: give them"),
         ("structure.piers.gapp=3", "'structure.piers.gapp': did you mean 'gap'"),
         ("structure.backfill.hmp=3", "'structure.backfill.hmp': did you mean 'hump'"),
         ("structure.paving={thickness=0.2,lenght=1}", "structure.paving.lenght': did you mean"),
@@ -83,7 +84,15 @@ def test_shapes_by_name(told, blocks):
 BRIDGE = {
     "structure": {
         "shape": "bridge",
-        "arches": {"arch": {"span": 4.0, "rise": 1.6, "thickness": 0.45, "voussoirs": 9}},
+        "arches": {
+            "arch": {
+                "measured": "centre line",
+                "span": 4.0,
+                "rise": 1.6,
+                "thickness": 0.45,
+                "voussoirs": 9,
+            }
+        },
         "sidewalls": {
             "length": 1.0,
             "height": 0.8,

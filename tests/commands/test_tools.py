@@ -100,6 +100,7 @@ def test_a_history_is_filmed_beside_its_case(kept, capsys):
         (["pair/history.nc", "--window", "soon"], "--window soon: give 'auto', or two times"),
         (["pair/history.nc", "--size", "big"], "--size big: give width and height"),
         (["none.nc"], "there is no history file"),
+        (["pair"], "pair: name the history.nc in it"),
     ],
 )
 def test_what_cannot_be_meant_is_told(kept, capsys, given, said):

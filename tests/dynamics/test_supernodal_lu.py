@@ -78,7 +78,9 @@ def test_a_pivot_that_vanishes_is_reported(grid):
 def test_with_a_fill_it_gives_the_history_of_snes(caplog):
     """N to 1e-7 of the largest, slips and rotations to 1e-8 m and rad."""
     caplog.set_level(logging.ERROR)
-    arch = af.shapes.Arch(span=4.0, embrace=159.0, thickness=0.5, voussoirs=7, name="arch")
+    arch = af.shapes.Arch(
+        measured="centre line", span=4.0, embrace=159.0, thickness=0.5, voussoirs=7, name="arch"
+    )
     bridge = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.4))
     soil = {"backfill": "full", "rest": "rigid"}
     built = af.build(bridge, fidelity=soil, displacements="large", cells=(4, 4))

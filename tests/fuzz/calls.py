@@ -46,7 +46,16 @@ def ready() -> None:
         (
             af.bridge,
             {
-                "arches": [af.shapes.Arch(name="a", span=3.0, rise=1, thickness=0.4, voussoirs=7)],
+                "arches": [
+                    af.shapes.Arch(
+                        measured="centre line",
+                        name="a",
+                        span=3.0,
+                        rise=1,
+                        thickness=0.4,
+                        voussoirs=7,
+                    )
+                ],
                 "width": 4.0,
                 "gravity": 9.81,
                 "chords": 2,

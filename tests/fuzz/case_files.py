@@ -113,6 +113,7 @@ friction = "nonassociated"
 shape = "bridge"
 width = 4.0
 [structure.arches.one]
+measured = "centre line"
 span = 3.0
 rise = 1.2
 thickness = 0.4

@@ -33,7 +33,7 @@ CLOSED = 1e-7
 def span(name="arch", **given) -> Arch:
     """A ring of 4 m."""
     lengths = {"span": 4.0, "embrace": 150.0, "thickness": 0.45, "voussoirs": 9}
-    return Arch(name=name, **{**lengths, **given})
+    return Arch(measured="centre line", name=name, **{**lengths, **given})
 
 
 def fill(cover=0.4, young=None, joints=1.0, **given) -> Backfill:

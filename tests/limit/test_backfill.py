@@ -133,8 +133,22 @@ def test_every_stone_carries_the_column_above_it():
 
 def test_nothing_of_an_eroded_fill_under_paving_is_lost_between_two_rings():
     arches = [
-        af.shapes.Arch(span=4.7, embrace=157.0, thickness=0.5, voussoirs=14, name="west arch"),
-        af.shapes.Arch(span=5.8, embrace=159.0, thickness=0.6, voussoirs=17, name="east arch"),
+        af.shapes.Arch(
+            measured="centre line",
+            span=4.7,
+            embrace=157.0,
+            thickness=0.5,
+            voussoirs=14,
+            name="west arch",
+        ),
+        af.shapes.Arch(
+            measured="centre line",
+            span=5.8,
+            embrace=159.0,
+            thickness=0.6,
+            voussoirs=17,
+            name="east arch",
+        ),
     ]
     walls = [
         af.shapes.Sidewall(length=2.8, height=2.0, above=above, name=f"{side} wall")

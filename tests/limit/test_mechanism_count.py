@@ -111,7 +111,14 @@ def test_the_words_of_demirel_and_aldemir_begin_with_four_in_a_ring():
 def test_two_rings_without_piers_are_local_each():
     """Three and two failures in two rings are none; where one has four, only that one counts."""
     spans = [
-        af.shapes.Arch(span=4.0, rise=1.5, thickness=0.5, voussoirs=9, name=f"{side} arch")
+        af.shapes.Arch(
+            measured="centre line",
+            span=4.0,
+            rise=1.5,
+            thickness=0.5,
+            voussoirs=9,
+            name=f"{side} arch",
+        )
         for side in ("left", "right")
     ]
     structure = af.bridge(arches=spans, piers=[af.shapes.Pier(gap=1.0, height=1.5)])

@@ -82,7 +82,13 @@ STRUCTURES = {
     "ring with cohesion": ring(contact=contact(0.3, 5e3)),
     "column": af.column(breadth=0.6, heights=[0.8, 0.8, 0.8]),
     "arch on piers": af.shapes.buttressed_arch(
-        span=5.0, thickness=0.6, voussoirs=15, breadth=2.0, height=2.4, embrace=140.0
+        measured="centre line",
+        span=5.0,
+        thickness=0.6,
+        voussoirs=15,
+        breadth=2.0,
+        height=2.4,
+        embrace=140.0,
     ),
     "wall": bonded_wall(4, 4),
 }

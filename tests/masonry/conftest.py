@@ -11,7 +11,10 @@ def viaduct():
     ring = {"span": 4.0, "rise": 1.6, "thickness": 0.45, "voussoirs": 13}
     wall = {"length": 1.5, "height": 2.4, "above": 0.8}
     return af.bridge(
-        arches=[af.shapes.Arch(name="west arch", **ring), af.shapes.Arch(name="east arch", **ring)],
+        arches=[
+            af.shapes.Arch(measured="centre line", name="west arch", **ring),
+            af.shapes.Arch(measured="centre line", name="east arch", **ring),
+        ],
         piers=[af.shapes.Pier(name="pier", gap=0.9, height=2.4)],
         sidewalls=[
             af.shapes.Sidewall(name="west sidewall", **wall),

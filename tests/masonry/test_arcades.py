@@ -11,6 +11,7 @@ from archfem.masonry import shapes
 def test_two_spans_on_piers_of_different_height():
     heights, breadths = [2.0, 3.0, 2.5], [1.4, 1.8, 1.5]
     arcade = shapes.arcade(
+        measured="centre line",
         spans=[4.0, 5.0],
         embraces=170.0,
         thicknesses=0.6,
@@ -36,7 +37,9 @@ def test_two_spans_on_piers_of_different_height():
 def test_an_arch_between_buttresses():
     """Its buttresses hold the thrust from some breadth on, and overturn below."""
     given = {"span": 5.0, "embrace": 150.0, "thickness": 0.5, "voussoirs": 15, "height": 3.0}
-    narrow, broad = (shapes.buttressed_arch(breadth=b, **given) for b in (0.7, 2.0))
+    narrow, broad = (
+        shapes.buttressed_arch(measured="centre line", breadth=b, **given) for b in (0.7, 2.0)
+    )
     assert not af.stands(narrow)
     assert af.stands(broad)
     top = next(block for block in broad.blocks if block.name == "pier 1, skewback")
@@ -57,11 +60,11 @@ def test_numbers_that_do_not_go_together(change, says):
     given = {"spans": [4.0, 4.0], "embraces": 150.0, "thicknesses": 0.5, "voussoirs": 9}
     given |= {"heights": 2.0, "breadths": 1.5, **change}
     with pytest.raises(af.InvalidStructure, match=says):
-        shapes.arcade(**given)
+        shapes.arcade(measured="centre line", **given)
 
 
 def test_piers_under_the_ends_of_a_bridge_leave_no_place_for_sidewalls():
-    arch = shapes.Arch(span=4.0, rise=1.6, thickness=0.45, voussoirs=9)
+    arch = shapes.Arch(measured="centre line", span=4.0, rise=1.6, thickness=0.45, voussoirs=9)
     piers = [shapes.Pier(gap=1.0, height=2.0, name=name) for name in ("left", "right")]
     wall = shapes.Sidewall(length=1.5, height=2.0)
     with pytest.raises(af.InvalidStructure, match="none where piers stand under the ends"):

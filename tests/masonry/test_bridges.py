@@ -15,9 +15,12 @@ EXACT = 1e-9
 """Areas of tens of m² from sums of products of coordinates, in double precision."""
 RING = {"span": 4.0, "rise": 1.6, "thickness": 0.45, "voussoirs": 13}
 WALL = {"length": 2.0, "height": 2.3, "above": 0.8}
-ARCH = af.shapes.Arch(**RING)
+ARCH = af.shapes.Arch(measured="centre line", **RING)
 PAIR = {
-    "arches": (af.shapes.Arch(name="west arch", **RING), af.shapes.Arch(name="east arch", **RING)),
+    "arches": (
+        af.shapes.Arch(measured="centre line", name="west arch", **RING),
+        af.shapes.Arch(measured="centre line", name="east arch", **RING),
+    ),
     "piers": (af.shapes.Pier(name="pier", gap=0.9, height=2.4),),
 }
 
@@ -241,7 +244,9 @@ def test_states_of_sidewalls(state, filled, above):
 @pytest.mark.parametrize("stones", [1, 2, 3])
 def test_the_hump_is_over_the_crown_of_rings_of_few_thick_stones(stones):
     """The highest points of one stone are the outer ends of its springings."""
-    arch = af.shapes.Arch(span=0.8, rise=0.2, thickness=0.7, voussoirs=stones)
+    arch = af.shapes.Arch(
+        measured="centre line", span=0.8, rise=0.2, thickness=0.7, voussoirs=stones
+    )
     sides = walls(above=0.0, setback=0.1, length=4.0)
     fill = af.shapes.Backfill(cover=0.5, erosion=0.1, hump=0.6)
     made = af.bridge(arches=[arch], sidewalls=sides, backfill=fill)

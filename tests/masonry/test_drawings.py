@@ -215,3 +215,12 @@ def test_reading_a_drawing_leaves_the_limits_of_the_process_as_they_were(viaduct
     before = resource.getrlimit(resource.RLIMIT_AS)
     read_drawing(dxf(tmp_path / "viaduct.dxf", viaduct))
     assert resource.getrlimit(resource.RLIMIT_AS) == before
+
+
+def test_lines_in_place_of_outlines_are_counted(tmp_path):
+    drawing = ezdxf.new(units=6)
+    for x in (0.0, 1.0):
+        drawing.modelspace().add_line((x, 0.0), (x, 1.0))
+    drawing.saveas(tmp_path / "lines.dxf")
+    with pytest.raises(af.InvalidInput, match="no polylines, but 2 LINE: make a closed one"):
+        af.read_outlines(tmp_path / "lines.dxf")

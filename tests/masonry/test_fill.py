@@ -215,7 +215,8 @@ def test_fill_bears_no_tension():
 def test_pieces_fill_the_body_and_are_soil_still():
     ring = {"span": 4.0, "rise": 1.6, "thickness": 0.45, "voussoirs": 13}
     whole = af.bridge(
-        arches=[af.shapes.Arch(name="arch", **ring)], backfill=af.shapes.Backfill(cover=0.5)
+        arches=[af.shapes.Arch(measured="centre line", name="arch", **ring)],
+        backfill=af.shapes.Backfill(cover=0.5),
     )
     fill = jointed_fill(whole, 0.4, angle=35.0, cohesion=5e3)
     soil = find_yielding_blocks(fill)

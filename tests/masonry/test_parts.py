@@ -1,5 +1,6 @@
 """Parts of a bridge that cannot be."""
 
+import numpy as np
 import pytest
 
 import archfem as af
@@ -23,6 +24,9 @@ WALL = {"length": 2.0, "height": 2.3, "above": 0.8}
             lambda: af.shapes.Arch(**RING | {"rise": None}, embrace=360.0),
             "embrace 360° is not between",
         ),
+        (lambda: af.shapes.Arch(**RING, measured="extrados"), "measured = 'extrados' is unknown"),
+        (lambda: af.shapes.Arch(**RING | {"rise": 2.1}), "rise 2.1 m is above half the span 4 m"),
+        (lambda: af.shapes.Arch(**RING, measured=1), "measured = 1 is unknown"),
         (lambda: af.shapes.Pier(gap=1.0, height=-2.0), "'pier': height -2 m"),
         (
             lambda: af.shapes.Sidewall(**WALL, state="loose"),
@@ -52,3 +56,22 @@ WALL = {"length": 2.0, "height": 2.3, "above": 0.8}
 def test_impossible_parts_are_refused(make, says):
     with pytest.raises(af.errors.InvalidStructure, match=says):
         make()
+
+
+@pytest.mark.parametrize("shape", [{"rise": 1.6}, {"rise": None, "embrace": 150.0}])
+@pytest.mark.parametrize(("measured", "depth"), [("intrados", 0.0), ("centre line", 0.5)])
+def test_span_and_rise_are_those_of_the_line_that_is_named(measured, depth, shape):
+    """By joints of the ring: `depth` is from the intrados, 0, to the extrados, 1."""
+    arch = af.shapes.Arch(**RING | shape, measured=measured)
+    faces = np.array([joint.ends for joint in af.bridge(arches=[arch]).joints])
+    first, last = faces[0], faces[-1]
+    foot, end = ((1.0 - depth) * low + depth * high for low, high in (first, last))
+    assert end[0] - foot[0] == pytest.approx(4.0, rel=1e-12)
+    assert end[1] == pytest.approx(foot[1], abs=1e-12)
+    # the joints lie on circles about one centre, where the springing joints meet
+    half = np.arctan2(*np.abs(first[1] - first[0]))
+    radius = 2.0 / np.sin(half)
+    if "embrace" in shape:
+        assert 2.0 * np.degrees(half) == pytest.approx(150.0, rel=1e-12)
+    else:
+        assert radius * (1.0 - np.cos(half)) == pytest.approx(1.6, rel=1e-12)

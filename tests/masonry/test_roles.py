@@ -25,7 +25,10 @@ NAMES = {
 def viaduct(west, east, middle, fill=FILL):
     """Two rings, a pier and fill, of the names given."""
     return af.bridge(
-        arches=[af.shapes.Arch(name=west, **RING), af.shapes.Arch(name=east, **RING)],
+        arches=[
+            af.shapes.Arch(measured="centre line", name=west, **RING),
+            af.shapes.Arch(measured="centre line", name=east, **RING),
+        ],
         piers=[af.shapes.Pier(name=middle, gap=0.9, height=2.4)],
         backfill=fill,
     )

@@ -20,7 +20,9 @@ from archfem.models.fem.edge_division import (
 
 def one_arch(**parts):
     """One span between fixed abutments, with fill that ends in wedges on the springings."""
-    ring = af.shapes.Arch(span=5.0, embrace=160.0, thickness=0.5, voussoirs=13)
+    ring = af.shapes.Arch(
+        measured="centre line", span=5.0, embrace=160.0, thickness=0.5, voussoirs=13
+    )
     return af.bridge(arches=[ring], backfill=af.shapes.Backfill(cover=0.3), **parts)
 
 

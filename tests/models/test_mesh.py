@@ -153,8 +153,22 @@ def viaduct(**parts):
     """Two spans with fill, piers and sidewalls that rise above the springing."""
     return af.bridge(
         arches=[
-            af.shapes.Arch(span=4.0, embrace=150.0, thickness=0.5, voussoirs=9, name="left arch"),
-            af.shapes.Arch(span=5.0, embrace=140.0, thickness=0.5, voussoirs=11, name="right arch"),
+            af.shapes.Arch(
+                measured="centre line",
+                span=4.0,
+                embrace=150.0,
+                thickness=0.5,
+                voussoirs=9,
+                name="left arch",
+            ),
+            af.shapes.Arch(
+                measured="centre line",
+                span=5.0,
+                embrace=140.0,
+                thickness=0.5,
+                voussoirs=11,
+                name="right arch",
+            ),
         ],
         piers=[af.shapes.Pier(gap=1.2, height=1.0, name="pier")],
         sidewalls=[
@@ -168,7 +182,9 @@ def viaduct(**parts):
 
 def one_arch(**parts):
     """One span between fixed abutments, with fill that ends in wedges on the springings."""
-    ring = af.shapes.Arch(span=5.0, embrace=160.0, thickness=0.5, voussoirs=13)
+    ring = af.shapes.Arch(
+        measured="centre line", span=5.0, embrace=160.0, thickness=0.5, voussoirs=13
+    )
     return af.bridge(arches=[ring], backfill=af.shapes.Backfill(cover=0.3), **parts)
 
 

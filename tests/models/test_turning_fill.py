@@ -27,7 +27,9 @@ def quiet(caplog):
 @pytest.fixture(scope="module")
 def structures():
     """A ring, and one under a fill."""
-    arch = af.shapes.Arch(span=4.0, embrace=159.0, thickness=0.5, voussoirs=7, name="arch")
+    arch = af.shapes.Arch(
+        measured="centre line", span=4.0, embrace=159.0, thickness=0.5, voussoirs=7, name="arch"
+    )
     return {
         "ring": af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, chords=1),
         "bridge": af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.4)),

@@ -24,7 +24,9 @@ def column():
 @pytest.fixture(scope="module")
 def bridge():
     """A small bridge with fill in pieces, which holds together a little."""
-    ring = af.shapes.Arch(name="arch", span=4.0, rise=1.6, thickness=0.45, voussoirs=11)
+    ring = af.shapes.Arch(
+        measured="centre line", name="arch", span=4.0, rise=1.6, thickness=0.45, voussoirs=11
+    )
     wall = {"length": 1.0, "height": 1.2, "above": 0.8}
     whole = af.bridge(
         arches=[ring],

@@ -45,7 +45,9 @@ def boxed(length, size, angle=35.0):
 
 def filled_bridge(cohesion, above):
     """One span under fill in pieces of 35°, between sidewalls that rise so far [Pa, m]."""
-    ring = af.shapes.Arch(name="arch", span=4.0, rise=1.6, thickness=0.45, voussoirs=11)
+    ring = af.shapes.Arch(
+        measured="centre line", name="arch", span=4.0, rise=1.6, thickness=0.45, voussoirs=11
+    )
     wall = {"length": 1.5, "height": 2.0, "above": above}
     whole = af.bridge(
         arches=[ring],

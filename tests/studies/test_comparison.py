@@ -72,7 +72,7 @@ def test_a_study_finds_what_its_cases_do_alone(study, tmp_path):
         ("[cases]", "has no cases"),
         ('[cases."a"]\nset = []', "names no case file"),
         ('[cases."a"]\ncase = "nothing.toml"', "there is no case file"),
-        (f'[cases."a"]\ncase = "{MESHES}/ring.toml"', "no \\[suite\\] to compare under"),
+        (f'[cases."a"]\ncase = "{MESHES}/ring.toml"', "no \\[suite\\] to compare under: give it"),
         ("pears = 1", "unknown key 'pears'"),
         ("title =", "is not TOML"),
         ("cases = 3", "study.cases = 3 is not a table"),

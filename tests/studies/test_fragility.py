@@ -88,6 +88,12 @@ def test_what_is_not_lognormal_is_seen():
     assert uneven.goodness < 0.01
 
 
+def test_a_curve_says_its_median_and_dispersion():
+    curve = fragility(np.exp([0.0, 1.0, 2.0]))
+    assert str(curve).startswith(f"median {np.e:.3g} (")
+    assert f"dispersion {curve.dispersion:.2f}, " in str(curve)
+
+
 def test_what_is_not_known_of_the_structure_widens_the_curve():
     found = fragility(drawn(30))
     wider = found.widened(0.3)

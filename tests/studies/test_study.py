@@ -428,6 +428,7 @@ RANDOM = "vary.structure.thickness = { distribution = 'norm', loc = 0.5, scale =
     [
         (GOOD, 'study.toml: it says nothing of vary: write case = "file.toml" and vary'),
         (f"{GOOD}[cases]", "study.toml: it has both case and cases"),
+        ("[structure]", "study.toml: this is a case: name it in the file of a study"),
         (f"{GOOD}find = 'limit'", "study.toml: unknown key 'find'"),
         (f"{GOOD}scales = true\nvary.title = ['a']", "scales is the search of a comparison"),
         (f"{GOOD}pairs = ['a']\nvary.title = ['a']", "needs none: take pairs out"),

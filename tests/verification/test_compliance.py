@@ -28,7 +28,14 @@ NEWMARK, CONSERVING = af.dynamics.Newmark(), af.dynamics.Conserving()
 @pytest.fixture(scope="module")
 def filled():
     """One span under backfill."""
-    arch = af.shapes.Arch(span=5.8, embrace=159.0, thickness=0.58, voussoirs=9, name="main arch")
+    arch = af.shapes.Arch(
+        measured="centre line",
+        span=5.8,
+        embrace=159.0,
+        thickness=0.58,
+        voussoirs=9,
+        name="main arch",
+    )
     return af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.4))
 
 

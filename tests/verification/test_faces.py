@@ -14,7 +14,9 @@ STONES = 13
 @pytest.fixture(scope="module")
 def arch():
     """A ring between fixed abutments, under fill that ends in wedges on the springings."""
-    ring = af.shapes.Arch(span=5.0, embrace=160.0, thickness=0.5, voussoirs=STONES)
+    ring = af.shapes.Arch(
+        measured="centre line", span=5.0, embrace=160.0, thickness=0.5, voussoirs=STONES
+    )
     return af.bridge(arches=[ring], backfill=af.shapes.Backfill(cover=0.3))
 
 

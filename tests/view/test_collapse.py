@@ -140,7 +140,7 @@ def test_a_moving_load_shows_factors_over_its_middle_and_the_mechanism(ring):
 
 def test_thrust_lines_of_parts_that_share_no_block_are_not_joined(ring):
     shapes = af.shapes
-    arch = shapes.Arch(span=2.0, rise=0.6, thickness=0.3, voussoirs=5)
+    arch = shapes.Arch(measured="centre line", span=2.0, rise=0.6, thickness=0.3, voussoirs=5)
     pier = shapes.Pier(gap=0.8, height=0.5)
     names = ("left wall", "right wall")
     walls = [shapes.Sidewall(length=1.0, height=0.5, state="fixed", name=name) for name in names]

@@ -1,7 +1,8 @@
 """Parts of a bridge: rings, piers, sidewalls, backfill and paving.
 
 The origin is at the left end of the deck (x) and at the springing level (y), where the centre
-lines of all rings intersect their springing joints.
+lines of all rings intersect their springing joints. Gaps and lengths of piers and sidewalls end
+there too, however the rings are measured.
 """
 
 from dataclasses import dataclass, field, replace
@@ -23,11 +24,12 @@ class Arch:
     """One ring of a bridge.
 
     Attributes:
-        span: between its springings, along the centre line [m].
+        span: clear span between its springings [m].
         embrace: subtended angle [degrees], a small one with its unit, "5 degree"; or
-        rise: of the centre line above the springings [m].
+        rise: clear rise of the intrados above its springings [m].
         thickness: of the ring [m].
         voussoirs: number of stones.
+        measured: "intrados"; or "centre line", along which span and rise are measured then.
         name: of the part.
     """
 
@@ -38,14 +40,26 @@ class Arch:
     voussoirs: int
     embrace: float | str | None = None
     rise: float | None = None
+    measured: str = "intrados"
     name: str = "arch"
 
     def __post_init__(self) -> None:
-        """Check the lengths and the embrace."""
+        """Check the lengths, how they are measured, and the embrace."""
+        if self.measured not in ("intrados", "centre line"):
+            raise InvalidStructure(
+                f"'{self.name}': measured = {short_repr(self.measured)} is unknown: span and rise "
+                "are those of the 'intrados' or of the 'centre line'"
+            )
         if (self.embrace is None) == (self.rise is None):
             raise InvalidStructure(f"'{self.name}': give either embrace or rise, the other follows")
         _check_lengths(self, "span", "thickness", *(["rise"] if self.embrace is None else []))
-        if self.embrace is None:
+        if self.rise is not None:
+            if self.rise > self.span / 2.0:
+                raise InvalidStructure(
+                    f"'{self.name}': rise {self.rise:.4g} m is above half the span "
+                    f"{self.span:.4g} m: an arch by span and rise is at most a semicircle; give "
+                    "span and embrace beyond"
+                )
             return
         embrace = in_degrees(self.embrace, f"'{self.name}': embrace")
         object.__setattr__(self, "embrace", embrace)
@@ -66,7 +80,13 @@ class Arch:
     @property
     def radius(self) -> float:
         """Radius of the centre line [m]."""
-        return self.span / (2.0 * sin(self.half))
+        radius = self.span / (2.0 * sin(self.half))
+        return radius if self.measured == "centre line" else radius + 0.5 * self.thickness
+
+    @property
+    def centre_line_span(self) -> float:
+        """Span of the centre line [m]."""
+        return self.span if self.measured == "centre line" else 2.0 * self.radius * sin(self.half)
 
     @property
     def reach(self) -> float:

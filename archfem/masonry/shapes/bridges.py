@@ -144,6 +144,7 @@ def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one st
     height: float,
     rise: float | None = None,
     embrace: float | str | None = None,
+    measured: str = "intrados",
     course: float = 0.40,
     chords: int = 1,
     width: float = 1.0,
@@ -156,13 +157,14 @@ def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one st
     Coordinates are those of a `bridge`: x from the left springing, y from the springing level.
 
     Args:
-        span: between the springings, along the centre line [m].
+        span: clear span between the springings [m].
         thickness: of the ring [m].
         voussoirs: number of stones.
         breadth: of each buttress [m].
         height: of the buttresses, from foundation to springing level [m].
-        rise: of the centre line above the springings [m]; or
+        rise: clear rise of the intrados above its springings [m]; or
         embrace: angle subtended by the ring [degrees].
+        measured: "intrados"; or "centre line", along which span and rise are measured then.
         course: height of a course, about [m].
         chords: straight pieces of each face of a voussoir.
         width: out of plane [m].
@@ -177,6 +179,7 @@ def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one st
         spans=[span],
         rises=rise,
         embraces=embrace,
+        measured=measured,
         heights=height,
         breadths=breadth,
         thicknesses=thickness,
@@ -200,6 +203,7 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
     voussoirs: int | Sequence[int],
     rises: Numbers | None = None,
     embraces: float | str | Sequence[float | str] | None = None,
+    measured: str = "intrados",
     course: float = 0.40,
     chords: int = 1,
     width: float = 1.0,
@@ -213,13 +217,14 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
     left; coordinates are those of a `bridge`.
 
     Args:
-        spans: of the arches, between their springings along the centre line [m].
+        spans: clear spans of the arches between their springings [m].
         heights: of the piers, one more than arches, from foundation to springing level [m].
         breadths: of the piers [m].
         thicknesses: of the rings [m].
         voussoirs: numbers of stones.
-        rises: of the centre lines above the springings [m]; or
+        rises: clear rises of the intrados above their springings [m]; or
         embraces: angles subtended by the rings [degrees].
+        measured: "intrados"; or "centre line", along which spans and rises are measured then.
         course: height of a course, about [m].
         chords: straight pieces of each face of a voussoir.
         width: out of plane [m].
@@ -236,7 +241,13 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
     )
     arches = [
         Arch(
-            span=span, thickness=thick, voussoirs=stones, rise=rise, embrace=turn, name=f"arch {k}"
+            span=span,
+            thickness=thick,
+            voussoirs=stones,
+            rise=rise,
+            embrace=turn,
+            measured=measured,
+            name=f"arch {k}",
         )
         for k, (span, thick, stones, rise, turn) in enumerate(zip(spans, *of_rings, strict=True), 1)
     ]

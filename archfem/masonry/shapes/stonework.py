@@ -35,7 +35,7 @@ def build_ring(
         chords=chords,
     )
     # from the centre of the circle to the left end of the deck and the springing level
-    right, up = left + arch.span / 2.0, -arch.radius * cos(arch.half)
+    right, up = left + arch.centre_line_span / 2.0, -arch.radius * cos(arch.half)
 
     def at(point: Point) -> Point:
         return (float(point[0] + right), float(point[1] + up))
@@ -104,7 +104,7 @@ class StoneworkBuilder:
             ends, piers = (piers[0], piers[-1]), piers[1:-1]
         for number, arch in enumerate(arches):
             rings.append(build_ring(arch, x, self.material, self.contact, self.chords))
-            x += arch.span + (piers[number].gap if number < len(piers) else 0.0)
+            x += arch.centre_line_span + (piers[number].gap if number < len(piers) else 0.0)
         joints = [[(joint.intrados, joint.extrados) for joint in ring.joints] for ring in rings]
         springings = [(faces[0], faces[-1]) for faces in joints]
         support = self._build_end(springings[0][0], 1.0, ends[:1], "left abutment")

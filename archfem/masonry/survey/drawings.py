@@ -210,6 +210,10 @@ def _read_dxf(path: Path, unit: str | None, ignored: Collection[str]) -> Iterato
                 f"layer '{entity.layer}' has a {entity.kind} beside its polylines: make "
                 "a closed polyline of each stone, and leave out layers of other things"
             )
+    curves = Counter(entity.kind for entity in read if entity.kind in OTHER_CURVES)
+    if curves and not polylines:
+        found = ", ".join(f"{count} {kind}" for kind, count in curves.items())
+        raise InvalidInput(f"it has no polylines, but {found}: make a closed one of each stone")
     if unit is None and own_unit is None:
         raise InvalidInput('the drawing does not say its unit ($INSUNITS): give one, e.g. "mm"')
     factor = in_unit(f"1 {unit}", "m", "unit") if unit is not None else float(own_unit or 1.0)

@@ -52,7 +52,8 @@ def check_film(
     if "q" not in run.dataset:
         raise InvalidInput(
             "the run has no fields to draw: record them with "
-            "time_history(..., record=Record(fields_every=10))"
+            "time_history(..., record=Record(fields_every=10)), in a case with "
+            "save_fields_every = 10 in [output]"
         )
     check_coordinate_count(model, run.dataset.sizes["coordinate"])
 

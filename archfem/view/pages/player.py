@@ -95,7 +95,9 @@ def write_page(path: str | Path, text: str) -> Path:
     """Write a page atomically."""
     target = Path(path)
     if target.suffix.lower() not in (".html", ".htm"):
-        raise InvalidInput(f"{target} has suffix '{target.suffix}': a page is .html")
+        raise InvalidInput(
+            f"{target} has suffix '{target.suffix}': a page is .html, which --pdf prints"
+        )
     with atomic_write(target) as draft:
         draft.write_text(text, encoding="utf-8")
     return target

@@ -1,0 +1,60 @@
+"""The how-to of tasks: its case files, commands and Python run, and print what it shows."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from chromium import BROWSER
+
+import archfem as af
+
+PAGE = (Path(__file__).parents[1] / "docs" / "howto" / "tasks.md").read_text(encoding="utf-8")
+TASKS = dict(re.findall(r"^## (.*?)\n(.*?)(?=^## |\Z)", PAGE, re.DOTALL | re.MULTILINE))
+
+FILES = dict(re.findall(r"`([\w.]+)`[^`]*\n\n```toml\n(.*?)```", PAGE, re.DOTALL))
+"""Case files of all tasks, under the name in the line above."""
+
+BLOCK = re.compile(r"```(python|sh)\n(.*?)```(?:\n\n```text\n(.*?)```)?", re.DOTALL)
+
+QUICK = ("A sweep of friction and thickness to Excel", "Two measures compared")
+"""Tasks by limit analysis alone; the others compute and draw histories."""
+
+
+def run_commands(lines):
+    for line in lines.splitlines():
+        program, *arguments = shlex.split(line, comments=True)
+        assert program == "archfem"
+        assert af.commands.main(arguments) == 0, line
+
+
+def check_printed(shown, printed):
+    """Every line shown is printed, in this order: the page shortens long output."""
+    rest = iter(printed.splitlines())
+    for line in shown.splitlines():
+        assert any(line == other.rstrip() for other in rest), (line, printed)
+
+
+def test_every_task_has_a_file_commands_and_python():
+    assert len(TASKS) == 9
+    assert set(QUICK) < set(TASKS)
+    for task, text in TASKS.items():
+        assert {"```toml", "```sh", "```python"} <= set(re.findall(r"```\w+", text)), task
+
+
+@pytest.mark.parametrize(
+    "task", [pytest.param(task, marks=() if task in QUICK else pytest.mark.slow) for task in TASKS]
+)
+def test_a_task_runs_and_prints_what_it_shows(task, tmp_path, monkeypatch, capsys):
+    if "--pdf" in TASKS[task] and BROWSER is None:
+        pytest.skip("there is no chromium: apt-get install chromium")
+    monkeypatch.chdir(tmp_path)
+    for name, content in FILES.items():
+        Path(name).write_text(content, encoding="utf-8")
+    space = {"__name__": "__main__"}
+    for kind, code, shown in BLOCK.findall(TASKS[task]):
+        if kind == "sh":
+            run_commands(code)
+        else:
+            exec(compile(code, task, "exec"), space)
+        check_printed(shown, capsys.readouterr().out)
