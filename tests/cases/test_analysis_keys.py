@@ -58,6 +58,7 @@ def test_a_limit_without_a_load_has_friction_and_fill_for_a_rating(ring):
         limit.solve(ring)
 
 
+@pytest.mark.slow
 def test_a_case_is_rated_by_its_own_table(ring):
     lorry = {"name": "lorry", "axles": ["20 kN", "40 kN"], "spacings": ["3 m"]}
     rating = parse_rating({"vehicle": lorry, "live": 1.2, "impact": 1.1, "width": "0.5 m"})

@@ -82,6 +82,7 @@ print(not before & digests())
 """
 
 
+@pytest.mark.slow
 def test_the_examples_of_the_page_work_together(folder):
     ran = call(folder, "-c", SCRIPT)
     assert ran.returncode == 0, ran.stderr
