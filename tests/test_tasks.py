@@ -17,7 +17,7 @@ FILES = dict(re.findall(r"`([\w.]+)`[^`]*\n\n```toml\n(.*?)```", PAGE, re.DOTALL
 
 BLOCK = re.compile(r"```(python|sh)\n(.*?)```(?:\n\n```text\n(.*?)```)?", re.DOTALL)
 
-QUICK = ("A sweep of friction and thickness to Excel", "Two measures compared")
+QUICK = ("Two measures compared",)
 """Tasks by limit analysis alone; the others compute and draw histories."""
 
 

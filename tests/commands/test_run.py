@@ -339,6 +339,7 @@ def test_assessment_of_a_case_and_its_page(tmp_path, ring, capsys):
     assert "pushed to the left" not in said
 
 
+@pytest.mark.slow
 def test_rating_of_a_case(tmp_path, ring, capsys):
     path, out = tmp_path / "ring.toml", tmp_path / "out"
     path.write_text(LIMIT)

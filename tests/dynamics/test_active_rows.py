@@ -22,6 +22,9 @@ FEW, MANY = MAX_DIRECT_ROWS // 2, 2 * MAX_DIRECT_ROWS
 RESIDUAL = 3e-4
 """Of minimal residuals, relative to the first."""
 
+# kernels are compiled anew where tests call them from Python
+pytestmark = pytest.mark.slow
+
 
 def compliance_of(full: np.ndarray) -> ActiveRows:
     """The workspace of a compliance whose rows are all filled."""

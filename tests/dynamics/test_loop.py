@@ -96,6 +96,7 @@ def _evaluate_step(system, step, states, ground, results, memory):
         return evaluated
 
 
+@pytest.mark.slow
 def test_a_solver_with_memory_and_friction_is_stepped_by_the_same_loop():
     """Newmark's block: a pulse a for a time t slides it by ½ (a - μ g) t² a/(μ g)."""
     model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid")

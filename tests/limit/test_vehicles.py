@@ -60,6 +60,7 @@ def test_each_place_is_a_row_of_point_loads(fill, direction):
         assert float(here["factor"]) == pytest.approx(expected, rel=EXACT)
 
 
+@pytest.mark.slow
 def test_sliding_flat_is_searched_from_place_to_place(monkeypatch):
     """As weak as by the whole search at each place, in a fifth of its programmes."""
     solved, solve = [], Programme.solve
