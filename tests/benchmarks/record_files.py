@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from archfem.errors import ArchfemError
+from archfem.motion import RecordText
 from archfem.motion.records.reader import find_format, read_channels
-from archfem.motion.records.record_file import RecordText
 from archfem.motion.records.waveforms import find_waveform_format
 
 # What lies beside records and is none: events, stations, pictures, archives

@@ -79,3 +79,13 @@ def test_rings_that_do_not_slide_carry_a_load_as_one():
     assert by_friction[0] < 0.5 * single
     slides = af.collapse_factor(arch_of_rings(2, 0.6), live=load, friction="nonassociated")
     assert by_friction[0] < slides.factor <= by_friction[2] * (1.0 + 1e-9)
+
+
+@pytest.mark.slow
+def test_a_bridge_of_two_rings_is_rated_as_one_only_where_they_cannot_slide():
+    single, held, loose, smooth = (
+        af.rate(arch_of_rings(rings, friction), "LM1").factor
+        for rings, friction in ((1, ROUGH), (2, None), (2, ROUGH), (2, 0.0))
+    )
+    assert held == pytest.approx(single, rel=1e-6)  # the tolerance of the programmes
+    assert smooth < 0.9 * loose < 0.8 * single

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.motion.records.record_file import RecordText, find_column_width, find_units, parse_unit
+from archfem.motion import RecordText
+from archfem.motion.records.record_file import find_column_width, find_units, parse_unit
 
 PLACE = Path("record.txt")
 
