@@ -19,9 +19,16 @@ NAMES = sorted(
 FIRST = ("opensees_ring", "run")
 """Scripts that import OpenSees, which must be loaded before archfem and its MPI."""
 
-LONG = ("assessment_map", "opensees_ring", "run", "study_efficiency", "study_kills")
+LONG = (
+    "assessment_map",
+    "bridge_fragility",
+    "opensees_ring",
+    "run",
+    "study_efficiency",
+    "study_kills",
+)
 """Scripts that take seconds: one runs five others of these, two start studies of processes,
-one matches motions and drops arches, and one needs OpenSees."""
+two match motions, and one needs OpenSees."""
 
 
 MARKED = [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in NAMES]

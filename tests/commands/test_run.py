@@ -307,6 +307,7 @@ q = 1.5
 """
 
 
+@pytest.mark.slow
 def test_assessment_of_a_case_and_its_page(tmp_path, ring, capsys):
     path, out = tmp_path / "ring.toml", tmp_path / "out"
     path.write_text(LIMIT + ASSESSMENT)

@@ -229,6 +229,7 @@ def random_structure(seed):
     return wall(courses[:rows], friction, height=float(chance.uniform(0.1, 0.4)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "seed", [k if k < 4 else pytest.param(k, marks=pytest.mark.slow) for k in range(30)]
 )
@@ -257,6 +258,7 @@ def test_a_block_held_between_walls_lifts_at_its_weight():
     assert found.factor == pytest.approx(structure.weight, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_from_the_strongest_solution_the_search_goes_down_to_the_weakest():
     """A wall that slides at two factors, of which the mixed-integer programme finds the least."""
     structure = random_structure(10)

@@ -157,6 +157,7 @@ def test_a_bridge_that_is_too_weak_would_carry_with_deeper_joints():
     assert f"below 1: joints are too thin by {100.0 * (1.0 - found.geometric):.2g} %" in str(found)
 
 
+@pytest.mark.slow
 def test_impact_multiplies_the_vehicle():
     ring = af.circular_arch(radius=2.95, thickness=0.45, embrace=140.0, voussoirs=9)
     own, doubled = (Vehicle("axle", (1e4,), impact=i, impact_source="ours") for i in (1.0, 2.0))

@@ -127,6 +127,7 @@ def test_a_suite_is_matched_once_whatever_its_factors(monkeypatch):
     assert len(met) == 2
 
 
+@pytest.mark.slow
 def test_a_pair_is_matched_once_by_all_workers(matching_study, tmp_path):
     tables = []
     for workers in (1, 2):

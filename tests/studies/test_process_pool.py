@@ -103,6 +103,7 @@ def test_a_dead_worker_does_not_end_its_driver(small_ring, tmp_path, finders):
     assert table["twice"].values[0] == 1.0
 
 
+@pytest.mark.slow
 def test_a_script_without_a_main_guard_is_not_run_by_workers(small_ring, tmp_path, finders):
     script = tmp_path / "script.py"
     script.write_text(

@@ -293,6 +293,7 @@ def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, undrawn,
     assert (out / "verdict_range.txt").read_text().strip() == str(found)
 
 
+@pytest.mark.slow
 def test_a_report_shows_the_range(tmp_path, undrawn, calls):
     path, out = tmp_path / "column.toml", tmp_path / "out"
     path.write_text(CASE)

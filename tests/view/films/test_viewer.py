@@ -69,6 +69,7 @@ def read_film(path):
 
 
 def test_pyvista_writes_a_page_without_links(shaken, tmp_path):
+    pytest.importorskip("trame", reason="the extra for notebooks is not installed")
     model, run = shaken
     path = af.view.film(model, run, tmp_path / "run.html", renderer="pyvista")
     page = path.read_text("utf-8")
