@@ -49,6 +49,7 @@ FOREIGN = (
     "pathlib",
     "typing",
     "enum",
+    "re",
     "pandas",
     "pd",
     "dolfinx",
