@@ -169,7 +169,7 @@ def evaluate_comparison(case: Case, scales: Mapping[str, Any] | None = None) -> 
         run = run_motion(result, motion)
     except DidNotConverge as error:
         run = partial_history(error)
-    findings |= _findings_by_part(run)
+    findings |= findings_by_part(run)
     if scales is not None:
         suite = ground_suite(case)
         # the whole motion: the reduction R of the suite is not applied
@@ -180,7 +180,7 @@ def evaluate_comparison(case: Case, scales: Mapping[str, Any] | None = None) -> 
     return findings
 
 
-def _findings_by_part(run: History) -> Findings:
+def findings_by_part(run: History) -> Findings:
     """Return the findings of a run, which may be incomplete."""
     joints, mechanisms = assessed_joints(run.joints), first_mechanisms(run)
     eccentricity = abs(joints["eccentricity"]).max("time").fillna(0.5)

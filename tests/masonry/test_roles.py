@@ -9,7 +9,7 @@ import pytest
 
 import archfem as af
 from archfem.masonry.parts import infer_role, select_assessed_parts
-from archfem.studies.evaluators import _findings_by_part
+from archfem.studies.evaluators import findings_by_part
 from archfem.view.joint_marks import joint_marks
 
 RING = {"span": 4.0, "rise": 1.6, "thickness": 0.3, "voussoirs": 13}
@@ -144,7 +144,7 @@ def test_all_else_goes_by_roles_too():
         run = af.History(joints.assign_attrs(ended="finished", outcome="reached the end"), made)
         panels = [axes.get_title() for axes in af.view.draw_envelope({"run": run}).axes]
         assert panels == list(names)
-        found = _findings_by_part(run)
+        found = findings_by_part(run)
         told = {word: {} for word in ("eccentricity", "friction", "mechanism", "time")}
         for key, value in found.items():
             word, colon, name = key.partition(": ")
