@@ -30,8 +30,10 @@ known() {  # what this machine knows of the network: names, certificates, where 
 }
 leave() { for each in dev/shm dev/pts sys proc; do umount "$folder/$each" 2>/dev/null || true; done; }
 
-if [ ! -f "$folder/made" ]; then
+if [ ! -x "$folder/usr/sbin/policy-rc.d" ]; then
 	mirror=${MIRROR:-http://deb.debian.org/debian}
+	# debootstrap keeps this folder until it has ended, and fails over an unfinished system
+	if [ -d "$folder/debootstrap" ]; then rm -rf --one-file-system "$folder"; fi
 	echo "making Debian $suite in $folder (about a minute)" >&2
 	debootstrap --variant=minbase "$suite" "$folder" "$mirror" >/dev/null
 	printf '#!/bin/sh\nexit 101\n' >"$folder/usr/sbin/policy-rc.d"  # no service starts
