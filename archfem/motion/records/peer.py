@@ -10,7 +10,8 @@ from archfem.motion.records.record_file import (
     RecordText,
 )
 
-_HEADER_LINES = 12  # lines; files in the wild begin with blank lines or lack one of the four
+# Files in the wild begin with blank lines or lack one of the four lines of the header.
+_HEADER_LINES = 12
 
 
 def _read(text: RecordText) -> list[Channel]:
@@ -30,16 +31,14 @@ def _read(text: RecordText) -> list[Channel]:
 
 def _find_count_and_step(text: RecordText) -> tuple[int, float, int]:
     """Return NPTS, DT [s] and the index of the last header line."""
-    values_before_names = re.compile(
-        rf"\s*({COUNT_PATTERN})[\s,]+({NUMBER_PATTERN})[\s,]+NPTS[\s,]*DT\b", re.IGNORECASE
-    )
-    values_after_names = re.compile(
-        rf"\bNPTS[\s,]+DT\s*[=:]?\s*({COUNT_PATTERN})[\s,]+({NUMBER_PATTERN})", re.IGNORECASE
-    )
-    for line, content in enumerate(text.lines[:_HEADER_LINES]):
-        together = values_before_names.match(content) or values_after_names.search(content)
-        if together:
-            return int(together[1]), float(together[2]), line
+    pair = rf"({COUNT_PATTERN})[\s,]+({NUMBER_PATTERN})"
+    values_before_names = rf"^\s*{pair}[\s,]+NPTS[\s,]*DT\b"
+    values_after_names = rf"\bNPTS[\s,]+DT\s*[=:]?\s*{pair}"
+    together = text.search(values_before_names, stop=_HEADER_LINES)
+    together = together or text.search(values_after_names, stop=_HEADER_LINES)
+    if together:
+        line, values = together
+        return int(values[1]), float(values[2]), line
     count_pattern = rf"\bNPTS\s*[=:]?\s*({COUNT_PATTERN})\b(?!\.)"
     count_line, count = text.find(count_pattern, stop=_HEADER_LINES)
     step_line, step = text.find(rf"\bDT\s*[=:]?\s*({NUMBER_PATTERN})", stop=_HEADER_LINES)
