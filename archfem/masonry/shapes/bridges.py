@@ -78,14 +78,8 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
     def select_contact(a: Block, b: Block) -> Contact:
         return soil if "backfill" in (a.part, b.part) else contact
 
-    return assembled(
-        builder.blocks,
-        select_contact,
-        joints=builder.joints,
-        width=width,
-        gravity=gravity,
-        name="bridge",
-    )
+    common: dict[str, Any] = {"width": width, "gravity": gravity, "name": "bridge"}
+    return assembled(builder.blocks, select_contact, joints=builder.joints, **common)
 
 
 def _check_parts(
