@@ -81,10 +81,8 @@ class Tbec2018:
     site: str
 
     def __post_init__(self) -> None:
-        values = (
-            check_number(self.ss, "map value S_S [g]"),
-            check_number(self.s1, "map value S_1 [g]"),
-        )
+        named = (self.ss, "S_S"), (self.s1, "S_1")
+        values = [check_number(value, f"map value {name} [g]") for value, name in named]
         if not 0.0 < min(values) <= max(values) <= MAX_SPECTRAL_ACCELERATION:
             raise InvalidInput(f"S_S {self.ss!r}, S_1 {self.s1!r} g: both are between 0 and 10 g")
         check_fields(self)

@@ -4,14 +4,14 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from csv import writer
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fnmatch import fnmatch
 from functools import lru_cache
 from io import StringIO
 from math import inf, nan
 from os import PathLike
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -218,8 +218,7 @@ class RecordSelection(ResultDisplay):
         Args:
             name: of the suite.
         """
-        scaled = (record.motion.scaled(record.scale) for record in self.records)
-        return Suite(name, tuple(scaled))
+        return Suite(name, tuple(each.motion.scaled(each.scale) for each in self.records))
 
     def table(self) -> str:
         """Return name, event, scale, scaled peak [m/s²] and files of the records, as CSV."""
@@ -315,7 +314,11 @@ def select_records(
         of structures, J. Earthquake Engineering 12 (2008). Boore, Orientation-independent,
         nongeometric-mean measures of seismic intensity, BSSA 100 (2010).
     """
-    chosen_rule = _find_rule(rule)
+    if not isinstance(rule, SelectionRule) and rule not in SELECTION_RULES:
+        raise InvalidInput(
+            f"rule {rule!r} is unknown: use one of {', '.join(SELECTION_RULES)}, or a SelectionRule"
+        )
+    chosen_rule = rule if isinstance(rule, SelectionRule) else SELECTION_RULES[rule]
     check_integer(count, f"count of records for {chosen_rule.name}", minimum=chosen_rule.fewest)
     if not 0.0 < scales[0] <= scales[1] < inf:
         raise InvalidInput(f"scales {scales}: expected 0 < least <= largest")
@@ -330,10 +333,9 @@ def select_records(
     table = _compute_spectra(candidates, measure, periods)
     search = _Search(chosen_rule, table / target, _number_events(candidates), scales)
     chosen = [candidates[index] for index in search.find(count)]
-    selection = _scale_records(
-        chosen, spectrum, chosen_rule, band=band, scales=scales, measure=measure
-    )
-    selection = replace(selection, candidates=len(candidates), skipped=skipped)
+    settings: dict[str, Any] = {"rule": chosen_rule, "measure": measure, "band": band}
+    settings |= {"scales": scales, "candidates": len(candidates), "skipped": skipped}
+    selection = _scale_records(chosen, spectrum, settings)
     if not selection.meets:
         raise DidNotConverge(
             f"{selection!r}: no set was found that meets the rule; error.last is the nearest: add "
@@ -341,17 +343,6 @@ def select_records(
             last=selection,
         )
     return selection
-
-
-def _find_rule(rule: str | SelectionRule) -> SelectionRule:
-    """Return a rule by its name, or the rule itself."""
-    if isinstance(rule, SelectionRule):
-        return rule
-    if rule not in SELECTION_RULES:
-        raise InvalidInput(
-            f"rule {rule!r} is unknown: use one of {', '.join(SELECTION_RULES)}, or a SelectionRule"
-        )
-    return SELECTION_RULES[rule]
 
 
 def _tabulate_target(spectrum: DesignSpectrum, rule: SelectionRule, periods: Array) -> Array:
@@ -418,10 +409,8 @@ def _strip_direction(path: Path, direction: str) -> Path:
     # "DWN, turned up" is DWN in the name, "E-W" is EW, and 0 is 000 degrees
     token = re.sub(r"\W", "", direction.partition(",")[0])
     token = token.zfill(3) if token.isdigit() else token
-    match = re.search(rf"[-_ ]?{token}(?=\.|$)", path.name, re.IGNORECASE) if token else None
-    if match is None:
-        return path
-    return path.with_name(path.name[: match.start()] + path.name[match.end() :])
+    pattern = re.compile(rf"[-_ ]?{token}(?=\.|$)", re.IGNORECASE)
+    return path.with_name(pattern.sub("", path.name, count=1)) if token else path
 
 
 def _refuse_group(sources: Sequence[_Source], measure: Measure) -> str:
@@ -624,19 +613,14 @@ def _measure_miss(
 
 
 def _scale_records(
-    chosen: Sequence[_Candidate],
-    spectrum: DesignSpectrum,
-    rule: SelectionRule,
-    *,
-    band: tuple[float, float],
-    scales: tuple[float, float],
-    measure: Measure,
+    chosen: Sequence[_Candidate], spectrum: DesignSpectrum, settings: dict[str, Any]
 ) -> RecordSelection:
     """Scale the selected records, and check them at more periods than the search does."""
-    periods = np.geomspace(*band, 120)
+    rule, (first, last) = settings["rule"], settings["band"]
+    periods = np.geomspace(first, last, 120)
     target = _tabulate_target(spectrum, rule, periods)
-    spectra = _compute_spectra(chosen, measure, periods)
-    fine = _Search(rule, spectra / target, np.arange(len(chosen)), scales)
+    spectra = _compute_spectra(chosen, settings["measure"], periods)
+    fine = _Search(rule, spectra / target, np.arange(len(chosen)), settings["scales"])
     mean = fine.ratios.mean(axis=0, keepdims=True)
     factor = fine.common_factor(mean, fine.scales.min(), fine.scales.max())[0]
     final = factor * fine.scales
@@ -645,15 +629,10 @@ def _scale_records(
         for each, scale in zip(chosen, final, strict=True)
     )
     return RecordSelection(
-        rule=rule,
-        measure=measure,
-        band=band,
-        scales=scales,
+        **settings,
         records=tuple(records),
         periods=periods,
         spectra=final[:, None] * spectra[:, 1:],
         target=target[1:],
         zero_period_ratio=float(factor * mean[0, 0]) if rule.zero_period else nan,
-        candidates=len(chosen),
-        skipped={},
     )

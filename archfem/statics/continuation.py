@@ -328,11 +328,8 @@ class SupportPath(EquilibriumPath):
         corner = RigidBlocks(model.structure).largest_displacement(motion)
         if corner == 0.0:
             raise InvalidInput(f"the settlement of '{settlement.block}' is zero: give it a motion")
-        unit, forces = (
-            (FIRST_DISPLACEMENT * model.structure.size, np.inf),
-            model.resultants(start.q),
-        )
-        common = model, self_weight(model), unit, [start.q], [forces], [0]
+        unit = FIRST_DISPLACEMENT * model.structure.size, np.inf
+        common = model, self_weight(model), unit, [start.q], [model.resultants(start.q)], [0]
         return cls(*common, model.support_motion, motion, corner, [0.0])
 
     @property

@@ -208,27 +208,12 @@ def column(
             f"a column of breadth {breadth} m and heights {list(heights)} m: give lengths above 0"
         )
     half, levels = breadth / 2.0, _bed_levels(heights)
-    blocks = _stack_blocks(0.0, breadth, levels, material, "column", "base", "block")
+    blocks = _stack_blocks(0.0, breadth, levels, material, "column")
     joints = [
         Joint((k, k + 1), (-half, y), (half, y), contact, f"joint {k}", "column", "pier")
         for k, y in enumerate(levels[1:-1])
     ]
     return Structure(tuple(blocks), tuple(joints), width, gravity, "column")
-
-
-def _check_pier(
-    pier_breadth: float, courses: Sequence[float], thickness: float, radius: float
-) -> tuple[float, ...]:
-    """Check the breadth and the courses of a pier below a ring; return the courses."""
-    heights = check_numbers(courses, "heights of the courses [m]")
-    if not thickness <= check_number(pier_breadth, "pier_breadth [m]") < 2.0 * radius:
-        raise InvalidStructure(
-            f"pier_breadth {pier_breadth:.3g} m is not between the ring's thickness "
-            f"{thickness:.3g} m and twice its radius {radius:.3g} m"
-        )
-    if not heights or min(heights) <= 0.0:
-        raise InvalidStructure(f"courses {list(heights)} m: give at least one height above 0")
-    return heights
 
 
 def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one structure)
@@ -268,22 +253,25 @@ def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one stru
     """
     stones: dict[str, Any] = {"thickness": thickness, "voussoirs": voussoirs, "material": material}
     ring = circular_arch(radius=radius, embrace=180.0, chords=chords, **stones)
-    levels = _bed_levels(_check_pier(pier_breadth, courses, thickness, radius))
+    heights = check_numbers(courses, "heights of the courses [m]")
+    if not thickness <= check_number(pier_breadth, "pier_breadth [m]") < 2.0 * radius:
+        raise InvalidStructure(
+            f"pier_breadth {pier_breadth:.3g} m is not between the ring's thickness "
+            f"{thickness:.3g} m and twice its radius {radius:.3g} m"
+        )
+    if not heights or min(heights) <= 0.0:
+        raise InvalidStructure(f"courses {list(heights)} m: give at least one height above 0")
+    levels = _bed_levels(heights)
     # The springings are at y = 0, at the level of the centre of the ring.
     levels = [level - levels[-1] for level in levels]
-    left, right = (
-        _stack_blocks(
-            x, pier_breadth, levels, material, part, f"{part} foundation", f"{part} course"
-        )
-        for x, part in ((-radius, "left pier"), (radius, "right pier"))
-    )
+    left = _stack_blocks(-radius, pier_breadth, levels, material, "left pier", "left pier ")
+    right = _stack_blocks(radius, pier_breadth, levels, material, "right pier", "right pier ")
     # The top courses of the piers take the place of the abutments.
     blocks = (*left, *ring.blocks[1:-1], *reversed(right))
-    inner = -radius + pier_breadth / 2.0, radius - pier_breadth / 2.0
-    outer = -radius - pier_breadth / 2.0, radius + pier_breadth / 2.0
-    beds = [((inner[0], y), (outer[0], y), "left pier", "pier") for y in levels[1:-1]]
+    inner, outer = radius - pier_breadth / 2.0, radius + pier_breadth / 2.0
+    beds = [((-inner, y), (-outer, y), "left pier", "pier") for y in levels[1:-1]]
     beds += [(each.intrados, each.extrados, "arch", "ring") for each in ring.joints]
-    beds += [((inner[1], y), (outer[1], y), "right pier", "pier") for y in reversed(levels[1:-1])]
+    beds += [((inner, y), (outer, y), "right pier", "pier") for y in reversed(levels[1:-1])]
     joints = tuple(
         Joint((k, k + 1), intrados, extrados, contact, f"joint {k}", part, role)
         for k, (intrados, extrados, part, role) in enumerate(beds)
@@ -303,13 +291,14 @@ def _stack_blocks(
     levels: Sequence[float],
     material: Material,
     part: str,
-    *names: str,
+    prefix: str = "",
 ) -> list[Block]:
     """Build rectangular blocks between levels; the lowest is fixed and has its own name."""
+    base, course = ("foundation", "course") if prefix else ("base", "block")
     left, right, blocks = middle - breadth / 2.0, middle + breadth / 2.0, []
     for k, (low, top) in enumerate(pairwise(levels)):
         outline = (left, top), (left, low), (right, low), (right, top)
-        name = f"{names[1]} {k}" if k else names[0]
+        name = prefix + (f"{course} {k}" if k else base)
         blocks.append(Block(outline, material, name, k == 0, (0, 1, 2, 3), part, role="pier"))
     return blocks
 

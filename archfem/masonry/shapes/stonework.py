@@ -110,17 +110,16 @@ class StoneworkBuilder:
         springings = [(faces[0], faces[-1]) for faces in joints]
         support = self._build_end(springings[0][0], 1.0, ends[:1], "left abutment")
         for number, (arch, ring) in enumerate(zip(arches, rings, strict=True)):
-            first = len(self.blocks)
+            stones = [support, *range(len(self.blocks), len(self.blocks) + len(ring.blocks) - 2)]
             self.blocks += ring.blocks[1:-1]  # its abutments are the supports of this bridge
-            last, right = len(self.blocks) - 1, springings[number][1]
+            right = springings[number][1]
             if number < len(piers):
-                after = self._build_pier(piers[number], right, springings[number + 1][0])
+                support = self._build_pier(piers[number], right, springings[number + 1][0])
             else:
-                after = self._build_end(right, -1.0, ends[1:], "right abutment")
-            stones = [support, *range(first, last + 1), after]
-            for k, (pair, face) in enumerate(zip(pairwise(stones), joints[number], strict=True)):
+                support = self._build_end(right, -1.0, ends[1:], "right abutment")
+            pairs = pairwise([*stones, support])
+            for k, (pair, face) in enumerate(zip(pairs, joints[number], strict=True)):
                 self._add_joint(pair, face, f"joint {k}", arch)
-            support = after
         return springings, [extrados_points(ring) for ring in rings]
 
     def add(
@@ -151,16 +150,15 @@ class StoneworkBuilder:
         """Lay paving stones on a surface."""
         # Stones end where the slope of the surface changes.
         breaks, levels = np.array(surface).T
-        parts = [
-            np.linspace(a, b, count_pieces(b - a, paving.length, "paving stones") + 1)[:-1]
-            for a, b in pairwise(breaks)
-        ]
-        x = np.append(np.concatenate(parts), breaks[-1])
-        y = np.interp(x, breaks, levels)
-        for k in range(len(x) - 1):
-            low = [(x[k], y[k]), (x[k + 1], y[k + 1])]
+        x: list[float] = []
+        for a, b in pairwise(breaks):
+            count = count_pieces(b - a, paving.length, "paving stones")
+            x.extend(np.linspace(a, b, count + 1)[:-1])
+        x.append(breaks[-1])
+        points = zip(x, np.interp(x, breaks, levels), strict=True)
+        for k, low in enumerate(pairwise(points), 1):
             high = [(px, py + paving.thickness) for px, py in reversed(low)]
-            self.add([*low, *high], f"paving stone {k + 1}", part="paving", structured=True)
+            self.add([*low, *high], f"paving stone {k}", part="paving", structured=True)
 
     def check(self) -> None:
         """Check that no blocks cross themselves or overlap."""
@@ -193,8 +191,7 @@ class StoneworkBuilder:
     def _build_skewback(self, pier: Pier, sides: Pair, step: float, top: Sequence[Point]) -> int:
         """Build the courses of a pier and the skewback on them; return the number of the latter."""
         below = self._build_courses(sides, (-pier.height, -step), pier)
-        outline = [(sides[0], -step), (sides[1], -step), *top]
-        skewback = self._add_stone(outline, "skewback", pier)
+        skewback = self._add_stone([(x, -step) for x in sides] + list(top), "skewback", pier)
         self._add_bed((below, skewback), sides, -step, pier)
         return skewback
 

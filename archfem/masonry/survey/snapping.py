@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from archfem._typing import Array
 from archfem.errors import InvalidStructure
-from archfem.masonry.block import check_overlaps, check_simple
+from archfem.masonry.block import check_overlaps, check_simple, measure_polygon
 from archfem.masonry.structure import CONTACT_TOLERANCE
 
 # Gaps and contacts up to this multiple of the tolerance are taken for errors of the survey [-]
@@ -36,7 +36,7 @@ def close_gaps(
     for name, points in zip(names, outlines, strict=True):
         check_simple(points, name)
     # all outlines anticlockwise
-    oriented = [points if _area(points) > 0.0 else points[::-1] for points in outlines]
+    oriented = [points if measure_polygon(points)[0] > 0.0 else points[::-1] for points in outlines]
     given = np.concatenate(oriented)
     places, number = _merge_vertices(oriented, snap)
     parts = np.split(number, np.cumsum([len(points) for points in oriented])[:-1])
@@ -55,12 +55,6 @@ def close_gaps(
     check_overlaps(found, names, AMBIGUOUS_GAP_RATIO * snap)
     _check_gaps(places, boundaries, names, snap)
     return found, float(moved.max())
-
-
-def _area(points: Array) -> float:
-    """Return the area of a polygon, positive if anticlockwise [m²]."""
-    x, y = (points - points[0]).T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def _edges(boundaries: Boundaries) -> Iterator[tuple[int, int, int]]:

@@ -1,4 +1,4 @@
-"""Text files with named values above one column or three: AFAD, CWB, ESM, K-NET and UNAM."""
+"""Text files with named values above the samples: AFAD, CWB, ESM, K-NET, PEER and UNAM."""
 
 import re
 from collections.abc import Sequence
@@ -170,9 +170,53 @@ def _read_knet(text: RecordText) -> list[Channel]:
     return [Channel.from_direction(samples, dt, name)]
 
 
+# Files in the wild begin with blank lines or lack one of the four lines of the header.
+_PEER_LINES = 12
+
+
+def _read_peer(text: RecordText) -> list[Channel]:
+    """Read the single component of a file of PEER or PEER NGA (`.AT2`), in g."""
+    # Count and step follow their names (`NPTS= 5437, DT= .0050 SEC`), in either order, on one line
+    # or two, or both precede or follow the names (`4096 0.0100 NPTS, DT`). The rest of the header
+    # is free: a unit of acceleration identifies one, unless a velocity or displacement is named.
+    count, dt, line = _find_count_and_step(text)
+    header = " ".join(text.lines[:line])
+    other = re.search(r"\b(?:VELOC|DISPL)", header, re.IGNORECASE)
+    if other and not re.search(r"\bACC", header, re.IGNORECASE):
+        raise text.error("the header does not state an acceleration, but another quantity")
+    unit = text.find_unit(header, "the header does not state one unit, such as UNITS OF G")
+    samples = text.read_last_block(line + 1, count) * unit
+    direction = _find_peer_direction(text, line)
+    return [Channel.from_direction(samples, text.check_step(dt, line), direction)]
+
+
+def _find_count_and_step(text: RecordText) -> tuple[int, float, int]:
+    """Return NPTS, DT [s] and the index of the last header line."""
+    pair = rf"({COUNT_PATTERN})[\s,]+({NUMBER_PATTERN})"
+    values_before_names = rf"^\s*{pair}[\s,]+NPTS[\s,]*DT\b"
+    values_after_names = rf"\bNPTS[\s,]+DT\s*[=:]?\s*{pair}"
+    together = text.search(values_before_names, stop=_PEER_LINES)
+    together = together or text.search(values_after_names, stop=_PEER_LINES)
+    if together:
+        line, values = together
+        return int(values[1]), float(values[2]), line
+    count_pattern = rf"\bNPTS\s*[=:]?\s*({COUNT_PATTERN})\b(?!\.)"
+    count_line, count = text.find(count_pattern, stop=_PEER_LINES)
+    step_line, step = text.find(rf"\bDT\s*[=:]?\s*({NUMBER_PATTERN})", stop=_PEER_LINES)
+    return int(count[1]), float(step[1]), max(count_line, step_line)
+
+
+def _find_peer_direction(text: RecordText, line: int) -> str:
+    """Return the component: the text after the last comma of the line with the station."""
+    title = next((content for content in text.lines[1:line] if content.count(",") >= 2), "")
+    direction = re.sub(r"\([^()]*\)?", "", title).rpartition(",")[2].strip()
+    return direction if len(direction) <= 12 else ""
+
+
 _AFAD_MARKS = (r"^\s*NUMBER OF DATA\s*:", 40), (r"SAMPLING INTERVAL", 40)
 AFAD = RecordFormat("AFAD", _AFAD_MARKS, _read_afad)
 CWB = RecordFormat("CWB", ((r"^#DataSequence:\s*Time", 30),), _read_cwb)
 ESM = RecordFormat("ESM", ((r"^\s*NDATA\s*:|^\s*SAMPLING_INTERVAL_S\s*:", 80),), _read_esm)
 KNET = RecordFormat("K-NET", ((r"^\s*Scale Factor\s|^\s*Sampling Freq\(Hz\)", 20),), _read_knet)
 UNAM = RecordFormat("UNAM", (("^ARCHIVO ESTANDAR DE ACELERACION", 20),), _read_unam)
+PEER = RecordFormat("PEER", ((r"\bNPTS\b", _PEER_LINES), (r"\bDT\b", _PEER_LINES)), _read_peer)

@@ -10,14 +10,14 @@ from archfem._files import read_bytes
 from archfem._validation import report_user_errors, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.motion import signal_processing
-from archfem.motion.records import columns, keyed, numeric_headers, peer, volumes, waveforms
+from archfem.motion.records import columns, keyed, numeric_headers, volumes, waveforms
 from archfem.motion.records.record_file import Channel, RecordFormat, RecordText, parse_unit
 
 # Old formats with unspecific headers come last.
 _RECORD_FORMATS = (
     *(numeric_headers.SMC, numeric_headers.COSMOS),
     *(volumes.GEONET, volumes.BHRC, volumes.CSMIP, volumes.VOLUME_1),
-    *(keyed.AFAD, keyed.UNAM, keyed.CWB, keyed.ESM, keyed.KNET, peer.PEER),
+    *(keyed.AFAD, keyed.UNAM, keyed.CWB, keyed.ESM, keyed.KNET, keyed.PEER),
 )
 
 
