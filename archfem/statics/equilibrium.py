@@ -265,13 +265,11 @@ def _move_supports(
     """Move the supports of a structure at rest to their final places."""
     if not motion.any():
         return state
-    return _increment_load(
-        solver,
-        state,
-        lambda part: (state.model.with_support_motion(part * motion), load),
-        "settlement",
-        SUPPORT_SEARCHES,
-    )
+
+    def at(part: float) -> tuple[Model, Array]:
+        return state.model.with_support_motion(part * motion), load
+
+    return _increment_load(solver, state, at, "settlement", SUPPORT_SEARCHES)
 
 
 def _build_in_stages(

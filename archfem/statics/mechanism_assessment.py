@@ -344,7 +344,12 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         >>> round(found.alpha_0, 4), round(found.d_0_star, 4), found.displacement.passes
         (0.25, 0.3, True)
     """
-    rules = _parse_limit_state(limit_state)
+    if not isinstance(limit_state, LimitState) and not is_one_of(limit_state, LIMIT_STATES):
+        raise InvalidInput(
+            f"limit_state {limit_state!r} is not known: use one of {list(LIMIT_STATES)}, or give "
+            "the rules of another code as a LimitState"
+        )
+    rules = limit_state if isinstance(limit_state, LimitState) else LIMIT_STATES[limit_state]
     if abs(direction) != 1.0:
         raise InvalidInput(f"direction {direction!r}: give 1 to the right or -1 to the left")
     for name, value, most in (("q", q, 10.0), ("confidence_factor", confidence_factor, 2.0)):
@@ -408,18 +413,6 @@ def spectral_acceleration(
     held = np.minimum(periods, longest)
     beyond = np.where(periods > longest, longest / np.maximum(periods, 1e-9), 1.0)
     return np.asarray(factor * spectrum.horizontal(held) * beyond**2)
-
-
-def _parse_limit_state(limit_state: str | LimitState) -> LimitState:
-    """Return the rules of a limit state."""
-    if isinstance(limit_state, LimitState):
-        return limit_state
-    if not is_one_of(limit_state, LIMIT_STATES):
-        raise InvalidInput(
-            f"limit_state {limit_state!r} is not known: use one of {list(LIMIT_STATES)}, or give "
-            "the rules of another code as a LimitState"
-        )
-    return LIMIT_STATES[limit_state]
 
 
 def _check_structure(

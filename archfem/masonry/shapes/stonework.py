@@ -58,8 +58,8 @@ def extrados_points(ring: Structure) -> list[Point]:
     """Return the points along the extrados of a ring, from left to right [m]."""
     points = [ring.joints[0].extrados]
     for block in ring.blocks[1:-1]:
-        half = len(block.outline) // 2  # the extrados is the second half, from the right
-        points += list(reversed(block.outline[half:-1]))
+        # the extrados is the second half, from the right
+        points += reversed(block.outline[len(block.outline) // 2 : -1])
     return points
 
 
