@@ -75,13 +75,11 @@ def assembled(
                 across[part].append(joint)
             else:
                 others.append(joint)
-    ordered = [
-        each
-        for part in directions
-        for each in _order_joints(across[part], part, directions[part], blocks)
-    ]
-    all_joints = (*joints, *ordered, *_name_joints(others, blocks))
-    return Structure(blocks, all_joints, width, gravity, name)
+    all_joints = list(joints)
+    for part, direction in directions.items():
+        all_joints += _order_joints(across[part], part, direction, blocks)
+    all_joints += _name_joints(others, blocks)
+    return Structure(blocks, tuple(all_joints), width, gravity, name)
 
 
 def by_materials(contact: Contact, pairs: Mapping[str, Contact]) -> ContactOf:
@@ -108,8 +106,6 @@ def by_materials(contact: Contact, pairs: Mapping[str, Contact]) -> ContactOf:
 def touching(blocks: Sequence[Block]) -> list[Touch]:
     """Find the straight lines along which edges of two blocks touch."""
     starts, ends, owner = _straight_edges(blocks)
-    if not len(starts):
-        raise InvalidStructure("there are no blocks to assemble: give at least one")
     near = CONTACT_TOLERANCE * float(np.linalg.norm(np.ptp(starts, axis=0)))
     steps = ends - starts
     lengths = np.linalg.norm(steps, axis=1)
@@ -129,15 +125,16 @@ def touching(blocks: Sequence[Block]) -> list[Touch]:
 
 def _straight_edges(blocks: Sequence[Block]) -> tuple[Array, Array, Array]:
     """Return starts and ends of all straight edges (e, 2), and their blocks (e,)."""
-    starts, ends, owner = [np.empty((0, 2))], [np.empty((0, 2))], [np.empty(0, dtype=int)]
+    if not blocks:
+        raise InvalidStructure("there are no blocks to assemble: give at least one")
+    starts = np.concatenate([block.points for block in blocks])
+    ends = np.concatenate([np.roll(block.points, -1, axis=0) for block in blocks])
+    owner = np.repeat(np.arange(len(blocks)), [len(block.points) for block in blocks])
+    straight = np.any(starts != ends, axis=1)
     for number, block in enumerate(blocks):
-        straight = np.any(block.points != np.roll(block.points, -1, axis=0), axis=1)
         if block.centre is not None:
-            straight[[0, 2]] = False
-        starts.append(block.points[straight])
-        ends.append(np.roll(block.points, -1, axis=0)[straight])
-        owner.append(np.full(int(straight.sum()), number))
-    return np.concatenate(starts), np.concatenate(ends), np.concatenate(owner)
+            straight[np.flatnonzero(owner == number)[[0, 2]]] = False
+    return starts[straight], ends[straight], owner[straight]
 
 
 def _merge_lines(lines: list[Array], near: float) -> list[Array]:

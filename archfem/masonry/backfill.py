@@ -13,9 +13,9 @@ Saito, Engineering Fracture Mechanics 61 (1998) 569-591, for Voronoi cells.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import radians, sqrt, tan
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -36,12 +36,11 @@ if TYPE_CHECKING:
 INCIRCLE_RATIO = (sqrt(3.0) - 1.0) / 4.0
 
 
-@dataclass(frozen=True)
-class _Piece:
+class _Piece(NamedTuple):
     """Part of a tile inside the outline, and the incentre of the whole tile."""
 
     polygon: "Polygon"
-    centre: tuple[float, float]
+    centre: Array  # (2,) [m]
 
 
 @validate_arguments
@@ -79,18 +78,14 @@ def jointed_fill(
     )
     soft = find_yielding_blocks(structure)
     _check_fill(structure, soft, check_number(size, "size of the pieces [m]"))
+    fill = _FillAssembly(structure, set(soft), law, INCIRCLE_RATIO * size)
     blocks: list[Block] = []
-    origin: list[int] = []
-    centres: list[tuple[float, float]] = []
     for number, block in enumerate(structure.blocks):
-        pieces = list(_cut_block(block, size)) if number in soft else []
+        pieces = _cut_block(block, size) if number in soft else []
         blocks += _create_blocks(block, pieces) if pieces else [block]
-        origin += [number] * max(1, len(pieces))
-        centres += [piece.centre for piece in pieces] or [(0.0, 0.0)]
-    touching = _FillAssembly(
-        structure, set(soft), origin, np.array(centres), law, INCIRCLE_RATIO * size
-    )
-    return touching.assemble(blocks)
+        fill.origin += [number] * max(1, len(pieces))
+        fill.centres += [piece.centre for piece in pieces] or [np.zeros(2)]
+    return fill.assemble(blocks)
 
 
 def _fill_contact(angle: float, cohesion: float) -> Contact:
@@ -102,8 +97,6 @@ def _fill_contact(angle: float, cohesion: float) -> Contact:
 
 def _check_fill(structure: Structure, soft: Sequence[int], size: float) -> None:
     """Check that there is fill, and that the size of the pieces suits it."""
-    # more pieces cannot be solved in reasonable time
-    max_pieces = 20_000
     if not soft:
         raise InvalidInput(
             "no block is soft beside its joints: there is no fill to cut; give the structure one, "
@@ -115,10 +108,10 @@ def _check_fill(structure: Structure, soft: Sequence[int], size: float) -> None:
         raise InvalidInput(f"size {size:g} m of the pieces is not above 0: give a length in m")
     area = sum(structure.blocks[number].area for number in soft)
     count = area / (size**2 * sqrt(3.0) / 8.0)
-    if not 2.0 <= count <= max_pieces:
+    if not 2.0 <= count <= 20_000:  # more cannot be solved in reasonable time
         raise InvalidInput(
             f"pieces of {size:g} m make {count:.3g} of a fill of {area:.3g} m²: give a size with "
-            f"which there are 2 to {max_pieces}"
+            "which there are 2 to 20000"
         )
 
 
@@ -146,14 +139,13 @@ def _split_by_medians(corners: Array) -> Iterator[Array]:
         yield np.array([foot, end, centre])
 
 
-def _incentre(corners: Array) -> tuple[float, float]:
-    """Return the centre of the inscribed circle of a triangle."""
+def _incentre(corners: Array) -> Array:
+    """Return the centre of the inscribed circle of a triangle (2,) [m]."""
     opposite = np.linalg.norm(np.roll(corners, -1, axis=0) - np.roll(corners, 1, axis=0), axis=1)
-    x, y = opposite @ corners / opposite.sum()
-    return float(x), float(y)
+    return opposite @ corners / opposite.sum()
 
 
-def _cut_block(block: Block, size: float) -> Iterator[_Piece]:
+def _cut_block(block: Block, size: float) -> list[_Piece]:
     """Cut a block into pieces; slivers are merged with their main neighbour."""
     import shapely
 
@@ -167,7 +159,7 @@ def _cut_block(block: Block, size: float) -> Iterator[_Piece]:
         parts = (part for part in shapely.get_parts(common) if part.geom_type == "Polygon")
         pieces += [_Piece(part, _incentre(corners)) for part in parts if part.area > 0.0]
     # below 30 % of a whole piece a sliver is merged
-    yield from _merge_slivers(pieces, 0.3 * size**2 * sqrt(3.0) / 8.0, grid)
+    return _merge_slivers(pieces, 0.3 * size**2 * sqrt(3.0) / 8.0, grid)
 
 
 def _merge_slivers(pieces: list[_Piece], min_area: float, grid: float) -> list[_Piece]:
@@ -201,30 +193,21 @@ def _create_blocks(block: Block, pieces: Sequence[_Piece]) -> list[Block]:
         ring = np.array(piece.polygon.exterior.normalize().coords)[:-1]
         x, y = ring.T
         oriented = ring if x @ np.roll(y, -1) > y @ np.roll(x, -1) else ring[::-1]
-        points = tuple((float(px), float(py)) for px, py in oriented)
-        blocks.append(
-            Block(
-                points,
-                material,
-                f"{block.name} {count}",
-                part=block.part,
-                role=block.role,
-                grain=True,
-            )
-        )
+        points, name = tuple(map(tuple, oriented.tolist())), f"{block.name} {count}"
+        blocks.append(Block(points, material, name, part=block.part, role=block.role, grain=True))
     return blocks
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _FillAssembly:
     """Assembly of pieces of soft bodies with each other and with the stones."""
 
     structure: Structure  # with whole fill
     soft: set[int]  # numbers of the divided bodies
-    origin: Sequence[int]  # original block of each new one
-    centres: Array  # of the pieces (n_blocks, 2) [m]
     law: Contact  # strength between pieces of one body
     radius: float  # of the inscribed circle of a whole piece [m]
+    origin: list[int] = field(default_factory=list)  # original block of each new one
+    centres: list[Array] = field(default_factory=list)  # of the pieces, each (2,) [m]
 
     def assemble(self, blocks: Sequence[Block]) -> Structure:
         """Assemble the structure of the new blocks."""
@@ -238,26 +221,24 @@ class _FillAssembly:
         cut = assembled(
             blocks, self.law, joints=unchanged, width=old.width, gravity=old.gravity, name=old.name
         )
-        new = (self._with_contact(joint) for joint in cut.joints[len(unchanged) :])
-        return replace(cut, joints=(*unchanged, *(joint for joint in new if joint is not None)))
+        new = filter(None, map(self._with_contact, cut.joints[len(unchanged) :]))
+        return replace(cut, joints=(*unchanged, *new))
 
     def _with_contact(self, joint: Joint) -> Joint | None:
         """Return a joint with its contact; None where the whole bodies had no joint."""
         first, second = (self.origin[number] for number in joint.blocks)
         if first == second:
-            young = self.structure.blocks[first].material.young
-            return replace(
-                joint, contact=_with_compliance(self.law, (2.0 * self.radius / young,) * 2)
-            )
-        whole = next((j for j in self.structure.joints if set(j.blocks) == {first, second}), None)
-        if whole is None:
-            return None
-        soil = sum(self._soil_compliance(joint, number) for number in joint.blocks)
-        across, along = whole.contact.normal_stiffness, whole.contact.shear_stiffness
-        return replace(
-            joint,
-            contact=_with_compliance(whole.contact, (1.0 / across + soil, 1.0 / along + soil)),
-        )
+            law = self.law
+            across = along = 2.0 * self.radius / self.structure.blocks[first].material.young
+        else:
+            joints = (j for j in self.structure.joints if set(j.blocks) == {first, second})
+            if (whole := next(joints, None)) is None:
+                return None
+            law = whole.contact
+            soil = sum(self._soil_compliance(joint, number) for number in joint.blocks)
+            across, along = 1.0 / law.normal_stiffness + soil, 1.0 / law.shear_stiffness + soil
+        law = replace(law, normal_stiffness=1.0 / across, shear_stiffness=1.0 / along)
+        return replace(joint, contact=law)
 
     def _soil_compliance(self, joint: Joint, number: int) -> float:
         """Return the compliance of the fill between a joint and the incentre of a piece [m/Pa]."""
@@ -266,9 +247,3 @@ class _FillAssembly:
         block = self.structure.blocks[self.origin[number]]
         across = np.array([joint.tangent[1], -joint.tangent[0]])
         return abs(float((self.centres[number] - joint.middle) @ across)) / block.material.young
-
-
-def _with_compliance(contact: Contact, compliance: tuple[float, float]) -> Contact:
-    """Return a contact of the same strength with given compliances, normal and shear [m/Pa]."""
-    across, along = compliance
-    return replace(contact, normal_stiffness=1.0 / across, shear_stiffness=1.0 / along)

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import hypot
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from archfem._typing import Array
-from archfem._validation import check_fields, check_unmasked
+from archfem._validation import check_fields, check_numbers, check_sequence, check_unmasked
 from archfem.errors import InvalidStructure
 from archfem.masonry.materials import Material
 
@@ -103,6 +104,12 @@ def find_side_of_line(points: Array, line: Array, near: float, arcs: Sequence[in
 Point = tuple[float, float]
 
 
+def check_points(given: Any, name: str) -> list[tuple[float, ...]]:
+    """Return a sequence of pairs of coordinates [m] as floats."""
+    points = enumerate(check_sequence(given, name))
+    return [check_numbers(point, f"{name}[{k}] [m]", 2) for k, point in points]
+
+
 @dataclass(frozen=True)
 class Block:
     """A plane body bounded by straight edges, or a voussoir cut from a circular ring.
@@ -193,9 +200,8 @@ class Block:
         Returns:
             The height, or None where the vertical misses the block.
         """
-        arcs = () if self.centre is None else (0, 2)
-        met = intersect_edges(self.points, x, arcs)
-        for side in arcs:
+        met = intersect_edges(self.points, x, self._arcs)
+        for side in self._arcs:
             met += intersect_arc(self.points[side : side + 2], np.array(self.centre), x)
         return max(met, default=None)
 
@@ -209,9 +215,12 @@ class Block:
         Returns:
             1 for left, -1 for right, 0 where its edges do not cover the line.
         """
-        return find_side_of_line(
-            self.points, line, near, arcs=() if self.centre is None else (0, 2)
-        )
+        return find_side_of_line(self.points, line, near, self._arcs)
+
+    @property
+    def _arcs(self) -> tuple[int, ...]:
+        """Numbers of the sides that are arcs."""
+        return () if self.centre is None else (0, 2)
 
     @cached_property
     def _measures(self) -> tuple[float, Array, float]:
@@ -252,31 +261,24 @@ def check_overlaps(
     outlines: Sequence[Array],
     names: Sequence[str],
     slight: float = 0.0,
-    fixed: Sequence[bool] | None = None,
+    body: NDArray[np.intp] | None = None,
 ) -> None:
-    """Refuse outlines that are the same or overlap."""
-    import shapely
-
+    """Refuse outlines that cross themselves, are the same or overlap; those of a body may do."""
+    for outline, name in zip(outlines, names, strict=True):
+        check_simple(outline, name)
     # overlaps of less depth, relative to the size of all outlines, are round-off
     near = 1e-6 * float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0)))
-    polygons = np.array([shapely.Polygon(points) for points in outlines])
-    a, b = shapely.STRtree(polygons).query(polygons, predicate="intersects")
-    still = np.zeros(len(polygons), dtype=bool) if fixed is None else np.array(fixed, dtype=bool)
-    counted = (a < b) & ~(still[a] & still[b])
-    a, b = a[counted], b[counted]
-    common = shapely.intersection(polygons[a], polygons[b])
-    depth = _overlap_depths(common)
+    pairs, common, depth = _find_overlaps(outlines, body)
     if not np.any(depth > near):
         return
     worst = int(np.argmax(depth > near))
-    first, second, both = a[worst], b[worst], common[worst]
-    if both.area > (1.0 - 1e-6) * max(polygons[first].area, polygons[second].area):
-        raise InvalidStructure(
-            f"'{names[first]}' and '{names[second]}' are the same: leave one out"
-        )
+    both, (first, second) = common[worst], pairs[worst]
+    one, other = names[first], names[second]
+    if both.area > (1.0 - 1e-6) * max(measure_polygon(outlines[k])[0] for k in pairs[worst]):
+        raise InvalidStructure(f"'{one}' and '{other}' are the same: leave one out")
     remedy = ", or raise snap above that" if depth[worst] < slight else ""
     raise InvalidStructure(
-        f"'{names[first]}' and '{names[second]}' overlap by {1e4 * both.area:.3g} cm², about "
+        f"'{one}' and '{other}' overlap by {1e4 * both.area:.3g} cm², about "
         f"{1e3 * depth[worst]:.3g} mm deep at ({both.centroid.x:.3f}, {both.centroid.y:.3f}): "
         f"correct their outlines{remedy}"
     )
@@ -284,18 +286,21 @@ def check_overlaps(
 
 def largest_overlap(outlines: Sequence[Array], body: NDArray[np.intp]) -> float:
     """Return the largest depth by which outlines of different bodies overlap [m]."""
+    return float(_find_overlaps(outlines, body)[2].max(initial=0.0))
+
+
+def _find_overlaps(
+    outlines: Sequence[Array], body: NDArray[np.intp] | None
+) -> tuple[NDArray[np.intp], NDArray[np.object_], Array]:
+    """Return pairs (n, 2) of different bodies that meet, their overlaps, and mean depths [m]."""
     import shapely
 
     polygons = np.array([shapely.Polygon(points) for points in outlines])
-    a, b = shapely.STRtree(polygons).query(polygons, predicate="intersects")
-    counted = (a < b) & (body[a] != body[b])
-    depths = _overlap_depths(shapely.intersection(polygons[a[counted]], polygons[b[counted]]))
-    return float(depths.max(initial=0.0))
-
-
-def _overlap_depths(common: NDArray[np.object_]) -> Array:
-    """Return the mean depths of overlaps, from their area and length [m]."""
-    import shapely
-
+    pairs = shapely.STRtree(polygons).query(polygons, predicate="intersects").T
+    numbers = np.arange(len(polygons)) if body is None else body
+    a, b = pairs.T
+    pairs = pairs[(a < b) & (numbers[a] != numbers[b])]
+    common = shapely.intersection(*polygons[pairs].T)
+    # the mean depth follows from area and length
     length = shapely.length(common)
-    return np.asarray(2.0 * shapely.area(common) / np.where(length > 0.0, length, 1.0))
+    return pairs, common, 2.0 * shapely.area(common) / np.where(length > 0.0, length, 1.0)

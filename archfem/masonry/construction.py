@@ -1,6 +1,6 @@
 """Construction stages: the order in which blocks are placed, with and without centring."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from archfem._validation import check_integer, check_sequence, check_type, validate_arguments
@@ -59,21 +59,16 @@ def usual_stages(structure: Structure, layers: int = 4) -> tuple[Stage, ...]:
     rings = {n for n in structure.free if structure.blocks[n].role == "ring"} - soil
     first = find_supported_blocks(structure, set(range(len(structure.blocks))) - soil - rings)
     last = set(structure.free) - soil - rings - first
-    stages = [
-        ("piers and walls", first & set(structure.free), False),
-        ("rings", rings, True),
-        *(
-            (f"fill, layer {k}", layer, False)
-            for k, layer in _divide_into_layers(structure, soil, layers)
-        ),
-        ("parts on the fill", last, False),
-    ]
+    stages = [("piers and walls", first & set(structure.free)), ("rings", rings)]
+    for number, layer in _divide_into_layers(structure, soil, layers):
+        stages.append((f"fill, layer {number}", layer))
     result = []
-    for name, blocks, centring in stages:
+    for name, blocks in (*stages, ("parts on the fill", last)):
         if blocks:
+            centring = name == "rings"
             result.append(Stage(blocks=tuple(sorted(blocks)), centring=centring, name=name))
-        if centring and blocks:
-            result.append(Stage(strike=True, name="centring struck"))
+            if centring:
+                result.append(Stage(strike=True, name="centring struck"))
     return tuple(result)
 
 
@@ -97,9 +92,8 @@ def resolve_stages(structure: Structure, stages: Sequence[Stage]) -> list[set[in
     done: set[int] = set()
     placed, centred = [], False
     for stage in check_sequence(stages, "stages"):
-        check_type(
-            stage, Stage, "stages", "give some of Stage(blocks=…), or usual_stages(structure)"
-        )
+        remedy = "give some of Stage(blocks=…), or usual_stages(structure)"
+        check_type(stage, Stage, "stages", remedy)
         new = set().union(*(_select_blocks(structure, word, done) for word in stage.blocks))
         if twice := sorted(structure.blocks[n].name for n in new & done):
             raise InvalidInput(f"'{stage.name}' places {twice}, which stand already")
@@ -107,9 +101,8 @@ def resolve_stages(structure: Structure, stages: Sequence[Stage]) -> list[set[in
         placed.append(new)
         centred = stage.centring or (centred and not stage.strike)
     if left := [structure.blocks[n].name for n in structure.free if n not in done]:
-        raise InvalidInput(
-            f"no stage places {_shorten_names(left)}: every block that moves is placed once"
-        )
+        names = str(left) if len(left) <= 5 else f"{left[:5]} and {len(left) - 5} more"
+        raise InvalidInput(f"no stage places {names}: every block that moves is placed once")
     if centred:
         raise InvalidInput("the centring is never struck: end with Stage(strike=True)")
     return placed
@@ -128,9 +121,3 @@ def _select_blocks(structure: Structure, word: int | str, done: set[int]) -> set
     if structure.blocks[number].fixed:
         raise InvalidInput(f"block '{names[number]}' is fixed: it stands before anything is built")
     return {number}
-
-
-def _shorten_names(names: Iterable[str]) -> str:
-    """Write the first five of many names."""
-    names = list(names)
-    return str(names) if len(names) <= 5 else f"{names[:5]} and {len(names) - 5} more"

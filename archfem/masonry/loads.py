@@ -33,14 +33,12 @@ class BodyForce:
 
     def __post_init__(self) -> None:
         """Check that the values are multiples of g."""
-        # larger body forces [g] and point loads [N] must be a mistake of units
-        max_body_force = 1e3
         for name in ("horizontal", "vertical"):
             value = check_number(getattr(self, name), f"body force, {name} [g]")
-            if abs(value) > max_body_force:
+            if abs(value) > 1e3:  # a mistake of units
                 raise InvalidInput(
-                    f"body force, {name} = {value:.4g} g is more than {max_body_force:g} g: give a "
-                    "multiple of g, such as 0.3"
+                    f"body force, {name} = {value:.4g} g is more than 1000 g: give a multiple of "
+                    "g, such as 0.3"
                 )
 
 
@@ -64,15 +62,11 @@ class PointLoad:
 
     def __post_init__(self) -> None:
         """Check position and force."""
-        max_point_load = 1e9
         check_number(self.x, "point load, x [m]")
-        object.__setattr__(
-            self, "force", check_numbers(self.force, "point load, force (x, y) [N]", 2)
-        )
-        if max(map(abs, self.force)) > max_point_load:
-            raise InvalidInput(
-                f"a point load of {self.force} N is above {max_point_load:g} N: give newtons"
-            )
+        force = check_numbers(self.force, "point load, force (x, y) [N]", 2)
+        object.__setattr__(self, "force", force)
+        if max(map(abs, force)) > 1e9:  # a mistake of units
+            raise InvalidInput(f"a point load of {force} N is above 1e+09 N: give newtons")
 
     def place(self, structure: Structure) -> tuple[int, Array]:
         """Return the number of the loaded block and the loaded point (2,) [m].
@@ -83,11 +77,8 @@ class PointLoad:
         Raises:
             InvalidInput: no block that moves lies below or above x.
         """
-        tops = {
-            number: top
-            for number in structure.free
-            if (top := structure.blocks[number].top(self.x)) is not None
-        }
+        found = {number: structure.blocks[number].top(self.x) for number in structure.free}
+        tops = {number: top for number, top in found.items() if top is not None}
         if not tops:
             points = np.concatenate([structure.blocks[b].drawn() for b in structure.free])
             low, high = points[:, 0].min(), points[:, 0].max()
@@ -177,11 +168,10 @@ class AttachedLoad:
             pair = check_numbers(getattr(self, name), f"attached load, {name} (x, y) [{unit}]", 2)
             object.__setattr__(self, name, pair)
         check_number(self.weight, "attached load, weight [N]", minimum=0.0)
-        max_load = 1e9  # larger ones [N] must be a mistake of units
-        if max(self.weight, *map(abs, self.force)) > max_load:
+        if max(self.weight, *map(abs, self.force)) > 1e9:  # a mistake of units
             raise InvalidInput(
-                f"an attached load of {self.weight} N and {self.force} N is above {max_load:g} N: "
-                "give newtons"
+                f"an attached load of {self.weight} N and {self.force} N is above 1e+09 N: give "
+                "newtons"
             )
 
 

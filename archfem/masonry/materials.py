@@ -1,17 +1,23 @@
 """Block materials and joint contacts, with presets of Demirel and Aldemir (2021)."""
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, nextafter
+from typing import Any
 
 from archfem._validation import check_number, check_words, is_one_of
 from archfem.errors import InvalidInput
 from archfem.units import G, GPa, MPa, kN
 
 
-def _require(holds: bool, what: str, remedy: str) -> None:
-    """Raise an error where a condition does not hold."""
-    if not holds:
-        raise InvalidInput(f"{what}: {remedy}")
+def _check_range(
+    item: Any, key: str, low: float, high: float, unit: str, words: str, remedy: str
+) -> None:
+    """Check that a field is a number between two values, which are given in words too."""
+    value = check_number(getattr(item, key), f"{key} of '{item.name}'")
+    if not low <= value <= high:
+        raise InvalidInput(
+            f"{key} {value:.3g}{unit} of '{item.name}' is not between {words}: {remedy}"
+        )
 
 
 @dataclass(frozen=True)
@@ -35,37 +41,27 @@ class Material:
     def __post_init__(self) -> None:
         """Check that the values are possible, which detects wrong units."""
         check_words(self.name, "name of a material")
-        of = f"of '{self.name}'"
-        for key in ("young", "poisson", "unit_weight"):
-            check_number(getattr(self, key), f"{key} {of}")
-        if self.strength is not None:
-            check_number(self.strength, f"strength {of}")
-        _require(
-            1e3 <= self.young <= 1e13,
-            f"young {self.young:.3g} Pa {of} is not between 1 kPa and 10 TPa",
-            "give it in Pa, e.g. 30 * GPa",
-        )
-        _require(
-            -1.0 < self.poisson < 0.5,
-            f"poisson {self.poisson:.3g} {of} is not between -1 and 0.5",
-            "stone has about 0.2",
-        )
-        _require(
-            1e-3 <= self.unit_weight <= 250.0 * kN,
-            f"unit_weight {self.unit_weight:.3g} N/m³ {of} is not between 0.001 N/m³ and 250 kN/m³",
-            "give a weight, not a density, in N/m³, e.g. 20 * kN",
-        )
-        _require(
-            # no building material weighs 1 to 4 kN/m³, but soils and stones have such densities
-            not 1000.0 <= self.unit_weight <= 4000.0,
-            f"unit_weight {self.unit_weight:.4g} N/m³ {of} is the number of a density in kg/m³",
-            f"give a weight in N/m³: {self.unit_weight:.4g} kg/m³ have {self.unit_weight * G:.4g}",
-        )
-        _require(
-            self.strength is None or self.strength >= 1e3,
-            f"strength {self.strength} Pa {of} is below 1000 Pa, which no building material has",
-            "leave it out where it is unknown",
-        )
+        weight_range = 1e-3, 250.0 * kN, " N/m³", "0.001 N/m³ and 250 kN/m³"
+        inside = nextafter(-1.0, 0.0), nextafter(0.5, 0.0)  # the bounds of ν make no material
+        for row in (
+            ("young", 1e3, 1e13, " Pa", "1 kPa and 10 TPa", "give it in Pa, e.g. 30 * GPa"),
+            ("poisson", *inside, "", "-1 and 0.5", "stone has about 0.2"),
+            ("unit_weight", *weight_range, "give a weight, not a density, in N/m³, e.g. 20 * kN"),
+        ):
+            _check_range(self, *row)
+        # no building material weighs 1 to 4 kN/m³, but soils and stones have such densities
+        if 1000.0 <= self.unit_weight <= 4000.0:
+            raise InvalidInput(
+                f"unit_weight {self.unit_weight:.4g} N/m³ of '{self.name}' is the number of a "
+                f"density in kg/m³: give a weight in N/m³: {self.unit_weight:.4g} kg/m³ have "
+                f"{self.unit_weight * G:.4g}"
+            )
+        strength = self.strength
+        if strength is not None and check_number(strength, f"strength of '{self.name}'") < 1e3:
+            raise InvalidInput(
+                f"strength {strength} Pa of '{self.name}' is below 1000 Pa, which no building "
+                "material has: leave it out where it is unknown"
+            )
 
 
 @dataclass(frozen=True)
@@ -115,44 +111,25 @@ class Contact:
         if is_one_of(self.friction, (None, inf)):
             object.__setattr__(self, "friction", inf)
         else:
-            check_number(self.friction, f"friction of '{self.name}'")
-        for key in ("normal_stiffness", "shear_stiffness", "cohesion", "dilatancy", "tension"):
-            check_number(getattr(self, key), f"{key} of '{self.name}'")
+            remedy = "give the coefficient, not the angle, or None for a joint that never slides"
+            _check_range(self, "friction", 0.0, 10.0, "", "0 and 10", remedy)
+        stiffness_range = 1e3, 1e16, " Pa/m", "1 kPa/m and 10 PPa/m"
         for key in ("normal_stiffness", "shear_stiffness"):
-            value = getattr(self, key)
-            _require(
-                1e3 <= value <= 1e16,
-                f"{key} {value:.3g} Pa/m of '{self.name}' is not between 1 kPa/m and 10 PPa/m",
-                "give it in Pa/m: 1 MPa/mm is 1e9",
-            )
-        _require(
-            0.0 <= self.coefficient <= 10.0 or not self.slides,
-            f"friction {self.coefficient:.3g} of '{self.name}' is not between 0 and 10",
-            "give the coefficient, not the angle, or None for a joint that never slides",
-        )
-        _require(
-            0.0 <= self.cohesion <= 1e9,
-            f"cohesion {self.cohesion:.3g} Pa of '{self.name}' is not between 0 and 1 GPa",
-            "give it in Pa, e.g. 5 * kPa",
-        )
-        self._check_teeth_and_bond()
-
-    def _check_teeth_and_bond(self) -> None:
-        """Check that dilatancy is below friction, and tension below the apex of Coulomb's limit."""
+            _check_range(self, key, *stiffness_range, "give it in Pa/m: 1 MPa/mm is 1e9")
+        remedy = "give it in Pa, e.g. 5 * kPa"
+        _check_range(self, "cohesion", 0.0, 1e9, " Pa", "0 and 1 GPa", remedy)
+        # teeth are less steep than friction, and a bond ends at the apex of Coulomb's limit
         steepest = self.coefficient if self.slides else 0.0
-        _require(
-            0.0 <= self.dilatancy <= steepest,
-            f"dilatancy {self.dilatancy:.3g} of '{self.name}' is not between 0 and {steepest:.3g}",
+        remedy = (
             "give tan ψ, not the angle, up to the coefficient of friction, which includes it; a "
-            "joint that never slides does not dilate",
+            "joint that never slides does not dilate"
         )
+        _check_range(self, "dilatancy", 0.0, steepest, "", f"0 and {steepest:.3g}", remedy)
         apex = self.cohesion / self.coefficient if 0.0 < self.coefficient < inf else 1e9
-        _require(
-            0.0 <= self.tension <= apex,
-            f"tension {self.tension:.3g} Pa of '{self.name}' is not between 0 and {apex:.3g} Pa",
-            "give the tensile strength in Pa, up to cohesion / friction, where Coulomb's limit "
-            "ends",
+        remedy = (
+            "give the tensile strength in Pa, up to cohesion / friction, where Coulomb's limit ends"
         )
+        _check_range(self, "tension", 0.0, apex, " Pa", f"0 and {apex:.3g} Pa", remedy)
 
     @property
     def coefficient(self) -> float:
@@ -173,5 +150,5 @@ SOIL_TO_STONE = Contact(0.30e9, 0.24e9, 0.60, "soil to stone")
 # Named presets, Table 2 of Demirel and Aldemir (2021)
 MATERIAL_PRESETS = {material.name: material for material in (STONE, BACKFILL)}
 
-# Named presets, Table 2 of Demirel and Aldemir (2021); the table gives no μ for soil
+# The table gives no μ for soil.
 CONTACT_PRESETS = {contact.name: contact for contact in (STONE_TO_STONE, SOIL_TO_STONE)}

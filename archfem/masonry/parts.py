@@ -24,7 +24,6 @@ from archfem.masonry.block import Block
 # Rings and piers are assessed; other parts follow their support.
 PART_ROLES = ("ring", "pier", "other")
 
-
 logger = logging.getLogger("archfem")
 
 
@@ -54,9 +53,10 @@ def assign_roles(
 ) -> tuple[AnyMember, ...]:
     """Return blocks or joints with the roles of their parts, derived where none is given."""
     # a role given for one member holds for its part; without any, the name of the part decides
-    given = _collect_roles((*members, *others))
-    open_parts = dict.fromkeys(each.part for each in members if each.part not in given)
-    roles = given | {part: infer_role(part) for part in open_parts}
+    roles = _collect_roles((*members, *others))
+    for each in members:
+        if each.part not in roles:
+            roles[each.part] = infer_role(each.part)
     return tuple(each if each.role else replace(each, role=roles[each.part]) for each in members)
 
 

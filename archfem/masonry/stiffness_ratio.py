@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from math import sqrt
 
-from archfem.masonry.block import Block
 from archfem.masonry.structure import Structure
 
 
@@ -23,13 +22,9 @@ def estimate_block_stiffness(structure: Structure, number: int) -> BlockStiffnes
     stiffest = max(
         joint.contact.normal_stiffness for joint in structure.joints if number in joint.blocks
     )
-    wave = sqrt(_shear_modulus(block) / structure.density(block))
+    shear_modulus = block.material.young / (2.0 * (1.0 + block.material.poisson))
+    wave = sqrt(shear_modulus / structure.density(block))
     return BlockStiffness(wave / (2.0 * length), block.material.young / length / stiffest)
-
-
-def _shear_modulus(block: Block) -> float:
-    """Return G = E / (2 (1 + ν)) [Pa]."""
-    return block.material.young / (2.0 * (1.0 + block.material.poisson))
 
 
 def find_soft_blocks(structure: Structure) -> tuple[int, ...]:

@@ -19,7 +19,7 @@ from archfem._display import ResultDisplay
 from archfem._typing import Array
 from archfem._validation import check_fields, check_number
 from archfem.errors import InvalidInput, InvalidStructure
-from archfem.masonry.block import Block, Point, check_overlaps, check_simple
+from archfem.masonry.block import Block, Point, check_overlaps
 from archfem.masonry.materials import Contact
 from archfem.masonry.parts import assign_roles, select_assessed_parts
 from archfem.units import G
@@ -61,11 +61,9 @@ def join_joint_names(names: Sequence[str]) -> str:
 def _shorten_list(names: Sequence[str], put: Callable[[Sequence[str]], str], comma: str) -> str:
     """Join a list; of a long one both ends, with its length."""
     # longer lists of names in messages lose their middle
-    max_listed_names = 8
-    if len(names) <= max_listed_names:
+    if len(names) <= 8:
         return put(names)
-    half = max_listed_names // 2
-    return f"{put(names[:half])}{comma}…{comma}{put(names[-half:])} ({len(names)} in all)"
+    return f"{put(names[:4])}{comma}…{comma}{put(names[-4:])} ({len(names)} in all)"
 
 
 def _group_by_stem(names: Sequence[str]) -> str:
@@ -79,12 +77,11 @@ def _group_by_stem(names: Sequence[str]) -> str:
             groups[-1][1].append(number)
         else:
             groups.append((stem, [number]))
-    return "; ".join(
-        f"{stem}s {', '.join(numbers[:-1])} and {numbers[-1]}"
-        if len(numbers) > 1
-        else " ".join([stem, *numbers])
-        for stem, numbers in groups
-    )
+    texts = []
+    for stem, numbers in groups:
+        several = f"{stem}s {', '.join(numbers[:-1])} and " if len(numbers) > 1 else f"{stem} "
+        texts.append(several + numbers[-1] if numbers else stem)
+    return "; ".join(texts)
 
 
 # Distance of two coincident points, relative to the size of the structure
@@ -180,9 +177,8 @@ class Structure(ResultDisplay):
         if not 0.1 <= check_number(self.gravity, "gravity [m/s²]") < 1e3:
             raise InvalidStructure(f"gravity {self.gravity:.3g} m/s² is not between 0.1 and 1000")
         for kind, things in (("block", self.blocks), ("joint", self.joints)):
-            names = [thing.name for thing in things]
-            twice = sorted(name for name, count in Counter(names).items() if count > 1)
-            if twice:
+            counts = Counter(thing.name for thing in things)
+            if twice := sorted(name for name, count in counts.items() if count > 1):
                 raise InvalidStructure(f"{kind} names {twice} are used twice: name each once")
         if all(block.fixed for block in self.blocks):
             raise InvalidStructure("no block is free to move: leave at least one not fixed")
@@ -274,8 +270,7 @@ class Structure(ResultDisplay):
     def _check_support(self) -> None:
         """Check that every block is connected, through others, to a fixed one."""
         held = find_supported_blocks(self, range(len(self.blocks)))
-        loose = [block.name for number, block in enumerate(self.blocks) if number not in held]
-        if loose:
+        if loose := [block.name for k, block in enumerate(self.blocks) if k not in held]:
             raise InvalidStructure(
                 f"blocks {loose} rest on nothing: join each, through others, to a fixed block"
             )
@@ -283,10 +278,9 @@ class Structure(ResultDisplay):
     def _check_outlines(self) -> None:
         """Check that outlines neither cross themselves nor overlap."""
         outlines = [block.drawn() for block in self.blocks]
-        names = [block.name for block in self.blocks]
-        for outline, name in zip(outlines, names, strict=True):
-            check_simple(outline, name)
-        check_overlaps(outlines, names, fixed=[block.fixed for block in self.blocks])
+        # fixed blocks are one body
+        body = np.array([-1 if block.fixed else k for k, block in enumerate(self.blocks)])
+        check_overlaps(outlines, [block.name for block in self.blocks], body=body)
 
     @cached_property
     def free(self) -> tuple[int, ...]:

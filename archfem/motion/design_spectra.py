@@ -1,6 +1,6 @@
 """Elastic design spectra in g: Turkish, European, Italian and American codes, and tables."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, ClassVar, Protocol, get_type_hints
 
@@ -81,9 +81,8 @@ class Tbec2018:
     site: str
 
     def __post_init__(self) -> None:
-        check_number(self.ss, "map value S_S [g]")
-        check_number(self.s1, "map value S_1 [g]")
-        values = (self.ss, self.s1)
+        named = (self.ss, "S_S"), (self.s1, "S_1")
+        values = [check_number(value, f"map value {name} [g]") for value, name in named]
         if not 0.0 < min(values) <= max(values) <= MAX_SPECTRAL_ACCELERATION:
             raise InvalidInput(f"S_S {self.ss!r}, S_1 {self.s1!r} g: both are between 0 and 10 g")
         check_fields(self)
@@ -95,24 +94,22 @@ class Tbec2018:
     @property
     def sds(self) -> float:
         """Design spectral acceleration at short periods S_DS = F_S S_S [g]."""
-        short_period_levels = np.array([0.25, 0.50, 0.75, 1.00, 1.25, 1.50])
-        factor = np.interp(self.ss, short_period_levels, _SHORT_PERIOD_FACTORS[self.site])
-        return self.ss * float(factor)
+        levels = 0.25, 0.50, 0.75, 1.00, 1.25, 1.50
+        return self.ss * float(np.interp(self.ss, levels, _SHORT_PERIOD_FACTORS[self.site]))
 
     @property
     def sd1(self) -> float:
         """Design spectral acceleration at 1 s S_D1 = F_1 S_1 [g]."""
         # site factors of table 2.2, as those of table 2.1
-        long_period_levels = np.array([0.10, 0.20, 0.30, 0.40, 0.50, 0.60])
-        long_period_factors = {
+        levels = 0.10, 0.20, 0.30, 0.40, 0.50, 0.60
+        factors = {
             "ZA": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
             "ZB": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
             "ZC": (1.5, 1.5, 1.5, 1.5, 1.5, 1.4),
             "ZD": (2.4, 2.2, 2.0, 1.9, 1.8, 1.7),
             "ZE": (4.2, 3.3, 2.8, 2.4, 2.2, 2.0),
         }
-        factor = np.interp(self.s1, long_period_levels, long_period_factors[self.site])
-        return self.s1 * float(factor)
+        return self.s1 * float(np.interp(self.s1, levels, factors[self.site]))
 
     def horizontal(self, periods: float | Array) -> Array:
         """Return horizontal spectral accelerations in the shape of the periods [g].
@@ -123,10 +120,8 @@ class Tbec2018:
         Raises:
             InvalidInput: a period is negative or not finite.
         """
-        start, end, long = 0.2 * self.sd1 / self.sds, self.sd1 / self.sds, 6.0
-        return self.sds * spectrum_shape(
-            validate_periods(periods, np.inf), (start, end, long), lowest=0.4
-        )
+        corners = 0.2 * self.sd1 / self.sds, self.sd1 / self.sds, 6.0
+        return self.sds * spectrum_shape(periods, np.inf, corners, lowest=0.4)
 
     def vertical(self, periods: float | Array) -> Array:
         """Return vertical spectral accelerations in the shape of the periods [g].
@@ -137,9 +132,8 @@ class Tbec2018:
         Raises:
             InvalidInput: a period is negative, or beyond 3 s, where the code gives none.
         """
-        natural = validate_periods(periods, 3.0)
-        start, end = self.sd1 / self.sds / 15.0, self.sd1 / self.sds / 3.0
-        return 0.8 * self.sds * spectrum_shape(natural, (start, end, np.inf), lowest=0.4)
+        corners = self.sd1 / self.sds / 15.0, self.sd1 / self.sds / 3.0, np.inf
+        return 0.8 * self.sds * spectrum_shape(periods, 3.0, corners, lowest=0.4)
 
 
 # EN 1998-1:2004, tables 3.2 to 3.4: soil factor S and the periods T_B, T_C, T_D [s].
@@ -218,8 +212,7 @@ class Eurocode8:
         """
         soil, *corners = _GROUND_TYPES[self.type][self.ground]
         top = 2.5 * damping_correction(self.damping)
-        natural = validate_periods(periods, 4.0)
-        return self.ag * soil * top * spectrum_shape(natural, tuple(corners), lowest=1.0 / top)
+        return self.ag * soil * top * spectrum_shape(periods, 4.0, corners, lowest=1.0 / top)
 
     def vertical(self, periods: float | Array) -> Array:
         """Return vertical spectral accelerations in the shape of the periods [g].
@@ -230,10 +223,10 @@ class Eurocode8:
         Raises:
             InvalidInput: a period is negative, or beyond 4 s, where these clauses give none.
         """
-        vertical_ratios = {1: 0.90, 2: 0.45}  # a_vg / a_g [-]
+        ratio = {1: 0.90, 2: 0.45}[self.type]  # a_vg / a_g [-]
         top = 3.0 * damping_correction(self.damping)
-        shape = spectrum_shape(validate_periods(periods, 4.0), _VERTICAL_PERIODS, lowest=1.0 / top)
-        return self.ag * vertical_ratios[self.type] * top * shape
+        shape = spectrum_shape(periods, 4.0, _VERTICAL_PERIODS, lowest=1.0 / top)
+        return self.ag * ratio * top * shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,13 +292,13 @@ class TableSpectrum:
 
     def _interpolate(self, periods: float | Array, row: Array) -> Array:
         """Interpolate a row of the table linearly."""
-        natural = validate_periods(periods, self.periods[-1])
+        natural = _validate_periods(periods, self.periods[-1])
         if np.any(natural < self.periods[0]):
             raise InvalidInput(f"period below the table's first, {self.periods[0]:g} s")
         return np.interp(natural, self.periods, row)
 
 
-def validate_periods(periods: float | Array, longest: float) -> Array:
+def _validate_periods(periods: float | Array, longest: float) -> Array:
     """Return periods as an array, refused where a spectrum is not defined."""
     natural = as_periods(periods)
     check_oscillators(natural, 0.05)
@@ -321,15 +314,15 @@ def damping_correction(damping: float) -> float:
     return max(float(np.sqrt(10.0 / (5.0 + 100.0 * damping))), 0.55)
 
 
-def spectrum_shape(periods: Array, corners: tuple[float, ...], *, lowest: float) -> Array:
+def spectrum_shape(
+    periods: float | Array, longest: float, corners: Sequence[float], *, lowest: float
+) -> Array:
     """Return the shape of code spectra: rise from `lowest` to 1, plateau, 1/T, then 1/T²."""
+    natural = _validate_periods(periods, longest)
     rise, level, fall = corners
-    safe = np.maximum(periods, rise)
-    return np.where(
-        periods < rise,
-        lowest + (1.0 - lowest) * periods / rise,
-        np.minimum(1.0, level / safe) * np.minimum(1.0, fall / safe),
-    )
+    safe = np.maximum(natural, rise)
+    falling = np.minimum(1.0, level / safe) * np.minimum(1.0, fall / safe)
+    return np.where(natural < rise, lowest + (1.0 - lowest) * natural / rise, falling)
 
 
 # NTC 2018, table 3.2.IV: S_S = a - b F_0 a_g/g within its bounds, and C_C = c (T_C*)^d.
@@ -414,7 +407,7 @@ class Ntc2018:
             InvalidInput: a period is negative, or beyond 4 s, where the code gives none.
         """
         top = damping_correction(self.damping) * self.f0
-        shape = spectrum_shape(validate_periods(periods, 4.0), self.corners, lowest=1.0 / top)
+        shape = spectrum_shape(periods, 4.0, self.corners, lowest=1.0 / top)
         return self.ag * self.soil * self.topography * top * shape
 
     def vertical(self, periods: float | Array) -> Array:
@@ -427,7 +420,7 @@ class Ntc2018:
             InvalidInput: a period is negative, or beyond 4 s, where the code gives none.
         """
         top = damping_correction(self.damping) * self.f0
-        shape = spectrum_shape(validate_periods(periods, 4.0), _VERTICAL_PERIODS, lowest=1.0 / top)
+        shape = spectrum_shape(periods, 4.0, _VERTICAL_PERIODS, lowest=1.0 / top)
         # table 3.2.VI has the periods of Eurocode 8, and S_S = 1
         factor = 1.35 * float(self.ag) ** 1.5 * self.topography
         return factor * top * shape
@@ -499,8 +492,7 @@ class Asce2022(_HorizontalSpectrum):
             InvalidInput: a period is negative or not finite.
         """
         end = self.sd1 / self.sds
-        corners = (0.2 * end, end, self.tl)
-        return self.sds * spectrum_shape(validate_periods(periods, np.inf), corners, lowest=0.4)
+        return self.sds * spectrum_shape(periods, np.inf, (0.2 * end, end, self.tl), lowest=0.4)
 
 
 @dataclass(frozen=True)
@@ -565,8 +557,8 @@ class Eurocode2024(_HorizontalSpectrum):
         """
         rise, falls, far = self.corners
         cut = 0.02  # T_A [s]
-        natural = np.maximum(validate_periods(periods, 4.0), cut) - cut
-        shape = spectrum_shape(natural, (rise - cut, np.inf, np.inf), lowest=1.0 / 2.5)
+        natural = np.maximum(_validate_periods(periods, 4.0), cut) - cut
+        shape = spectrum_shape(natural, 4.0, (rise - cut, np.inf, np.inf), lowest=1.0 / 2.5)
         beyond = np.maximum(natural + cut, falls)
         level = self.topography * self.f_alpha * self.s_alpha
         return level * shape * (falls / beyond) * np.minimum(1.0, far / beyond)

@@ -86,13 +86,11 @@ def peak_ground_acceleration(
             f"ground-motion model {model!r} is unknown: use {', '.join(GROUND_MOTION_MODELS)}"
         )
     away = check_number(distance, "distance [m]", minimum=0.0) / 1e3
-    keys = {
-        **{"mag": check_number(magnitude, "magnitude"), "v_s30": v_s30, "dip": 90.0},
-        **{"depth_hyp": check_number(depth, "depth [m]", minimum=0.0) / 1e3},
-        **{"mechanism": {"strike-slip": "SS", "normal": "NS", "reverse": "RS"}[mechanism]},
-    }
     names = ("dist_epi",) if model == "ASB14" else ("dist_jb", "dist_rup", "dist_x")
-    keys |= dict.fromkeys(names, away)
+    keys: dict[str, Any] = dict.fromkeys(names, away)
+    keys |= {"mag": check_number(magnitude, "magnitude"), "v_s30": v_s30, "dip": 90.0}
+    keys["depth_hyp"] = check_number(depth, "depth [m]", minimum=0.0) / 1e3
+    keys["mechanism"] = {"strike-slip": "SS", "normal": "NS", "reverse": "RS"}[mechanism]
     keys |= {} if region is None else {"region": region}
     with require_package("pygmm"):
         package = import_module("pygmm")
@@ -109,14 +107,14 @@ def _check_range(model: str, parameters: Any, keys: Mapping[str, Any]) -> None:
     if "region" in keys and "region" not in known:
         raise InvalidInput(f"{model} has no regions: leave out region = {keys['region']!r}")
     for name in known.keys() & keys.keys():
-        options = getattr(known[name], "options", None)
+        value, options = keys[name], getattr(known[name], "options", None)
         if options is not None:
-            if keys[name] not in options:
-                raise InvalidInput(f"{model}: {name} {keys[name]!r} is none of {options}")
+            if value not in options:
+                raise InvalidInput(f"{model}: {name} {value!r} is none of {options}")
             continue
         low, high = known[name].min, known[name].max
-        if (low is not None and keys[name] < low) or (high is not None and keys[name] > high):
+        if (low is not None and value < low) or (high is not None and value > high):
             raise InvalidInput(
-                f"{model}: {name} = {keys[name]:g} is outside its range from {low} to {high} "
+                f"{model}: {name} = {value:g} is outside its range from {low} to {high} "
                 "(distances and depths in km, velocities in m/s): choose another model"
             )

@@ -1,6 +1,7 @@
 """Spectral matching of a motion by wavelets in the time domain."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,9 +17,6 @@ from archfem.motion.response_spectra import IntensityMeasures, measure_intensity
 from archfem.units import STANDARD_GRAVITY
 
 Target = Callable[[Array], Array]
-
-# Periods, evenly spaced in log period, at which the misfit is measured
-MISFIT_PERIOD_COUNT = 150
 
 # A wavelet has decayed to 2e-9 after this many of its widths.
 WAVELET_HALF_LENGTH = 4.5
@@ -99,14 +97,19 @@ def matched(
                 f"{component} of motion {motion.name!r} is at rest or shorter than "
                 f"{2 * band[1]:g} s, twice the longest period: it cannot be matched"
             )
-        goal = _TargetAccelerations(
-            _target_spectrum(spectrum, component), band, damping, 0.5 * tolerance
-        )
+        target = _target_spectrum(spectrum, component)
+        goal = _TargetAccelerations(target, band, damping, 0.5 * tolerance)
         fine = response_spectra.interpolate_steps(samples, parts)
         changed[component] = _fit_spectrum(fine, motion.dt / parts, goal)
     result = replace(motion, dt=motion.dt / parts, **changed)
-    match = _compare(motion, result, spectrum, band=band, damping=damping)
-    worst = max(match.misfit.values())
+    names = result.components
+    misfit = {
+        name: spectral_misfit(result, spectrum, component=name, band=band, damping=damping)
+        for name in names
+    }
+    before, after = ({name: measure_intensity(m, name) for name in names} for m in (motion, result))
+    match = Match(result, misfit, before, after, band)
+    worst = max(misfit.values())
     if worst > tolerance:
         raise DidNotConverge(
             f"matching {motion.name!r} ended at a misfit of {worst:.1%}, above the tolerance of "
@@ -127,10 +130,15 @@ def spectral_misfit(
 ) -> float:
     """Compute the root mean square of spectrum/target - 1 over a band, even in log period [-]."""
     _check_band(band)
-    periods = np.geomspace(*band, MISFIT_PERIOD_COUNT)
+    periods = _misfit_periods(band)
     response = response_spectrum(motion, periods, damping, component=component)
     target = _target_spectrum(spectrum, component)(periods) * STANDARD_GRAVITY
     return _relative_misfit(response, target)
+
+
+def _misfit_periods(band: tuple[float, float]) -> Array:
+    """Return the periods, evenly spaced in log period, at which the misfit is measured [s]."""
+    return np.geomspace(*band, 150)
 
 
 def _check_band(band: tuple[float, float]) -> None:
@@ -144,40 +152,19 @@ def _target_spectrum(spectrum: DesignSpectrum, component: str) -> Target:
     return spectrum.vertical if component == "vertical" else spectrum.horizontal
 
 
-def _compare(
-    before: Motion,
-    after: Motion,
-    spectrum: DesignSpectrum,
-    *,
-    band: tuple[float, float],
-    damping: float,
-) -> Match:
-    """Collect the misfits and intensity measures before and after matching."""
-    names = after.components
-    return Match(
-        after,
-        {
-            name: spectral_misfit(after, spectrum, component=name, band=band, damping=damping)
-            for name in names
-        },
-        {name: measure_intensity(before, name) for name in names},
-        {name: measure_intensity(after, name) for name in names},
-        band,
-    )
-
-
 class _TargetAccelerations:
     """Target accelerations [m/s²] of one component at control periods and at check periods."""
 
     def __init__(
         self, target: Target, band: tuple[float, float], damping: float, tolerance: float
     ) -> None:
-        self.damping = damping
-        self.tolerance = tolerance
-        controls = np.geomspace(*band, 100)
-        self.periods = np.concatenate((_zero_period(target), controls))
+        self.damping, self.tolerance = damping, tolerance
+        self.periods = np.geomspace(*band, 100)
+        with suppress(InvalidInput):  # where the spectrum is not defined at period zero
+            target(np.zeros(1))
+            self.periods = np.append(0.0, self.periods)
         self.values = target(self.periods) * STANDARD_GRAVITY
-        self.checks = np.geomspace(*band, MISFIT_PERIOD_COUNT)
+        self.checks = _misfit_periods(band)
         self.check_values = target(self.checks) * STANDARD_GRAVITY
         self.lags = np.array([_peak_lag(period, damping) for period in self.periods])
         # the peak ground acceleration is corrected with the shortest wavelet of the band
@@ -192,15 +179,6 @@ class _TargetAccelerations:
         peak = float(peaks[0] / self.values[0])
         # 10 % of the peak acceleration count as 2.5 % of the band
         return max(apart, 0.25 * abs(abs(peak) - 1.0))
-
-
-def _zero_period(target: Target) -> Array:
-    """Return period zero (1,), or no period where the spectrum is not defined there."""
-    try:
-        target(np.zeros(1))
-    except InvalidInput:
-        return np.zeros(0)
-    return np.zeros(1)
 
 
 def _fit_spectrum(samples: Array, dt: float, goal: _TargetAccelerations) -> Array:
@@ -225,18 +203,10 @@ def _compute_correction(
     peaks: Array, times: Array, goal: _TargetAccelerations, *, dt: float, count: int
 ) -> Array:
     """Compute the sum of wavelets (count,) [m/s²] that corrects the peaks."""
-    waves = np.stack(
-        [
-            _build_wavelet(period, centre, dt, count)
-            for period, centre in zip(goal.wave_periods, times - goal.lags, strict=True)
-        ]
-    )
-    gains = np.stack(
-        [
-            _impulse_response(period, time, goal.damping, dt=dt, count=count)
-            for period, time in zip(goal.periods, times, strict=True)
-        ]
-    )
+    waves, gains = np.empty((2, len(times), count))
+    for k, (period, time) in enumerate(zip(goal.periods, times, strict=True)):
+        waves[k] = _build_wavelet(goal.wave_periods[k], time - goal.lags[k], dt, count)
+        gains[k] = _impulse_response(period, time, goal.damping, dt=dt, count=count)
     effect = (gains @ waves.T) / goal.values[:, None]
     correction = np.sign(peaks) - peaks / goal.values
     left, scales, right = np.linalg.svd(effect)

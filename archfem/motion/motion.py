@@ -50,9 +50,8 @@ class Motion(ResultDisplay):
         for component in COMPONENTS:
             samples = getattr(self, component)
             if samples is not None or component == "horizontal":
-                object.__setattr__(
-                    self, component, signal_processing.validate_samples(samples, component)
-                )
+                samples = signal_processing.validate_samples(samples, component)
+                object.__setattr__(self, component, samples)
 
     def _summary(self) -> str:
         """Describe the motion in one line."""
@@ -192,9 +191,8 @@ class Motion(ResultDisplay):
         """
         moments, up = signal_processing.count_in_samples(times, self.dt), self.vertical
         rows = self.horizontal, np.zeros(1) if up is None else up
-        return np.column_stack(
-            [signal_processing.interpolate_samples(row, moments) for row in rows]
-        )
+        values = [signal_processing.interpolate_samples(row, moments) for row in rows]
+        return np.column_stack(values)
 
     def scaled(self, factor: float) -> "Motion":
         """Return the motion with all components multiplied by a factor.
@@ -239,9 +237,7 @@ class Motion(ResultDisplay):
                 f"cut from {start:g} to {stop:g} s: nothing of the {self.duration:g} s is left"
             )
         kept = slice(int(first), int(last) + 1)
-        return self._map_components(
-            lambda samples: samples[kept] if len(samples[kept]) else np.zeros(1)
-        )
+        return self._map_components(lambda row: row[kept] if len(row[kept]) else np.zeros(1))
 
     def significant(self, low: float = 0.05, high: float = 0.95) -> "Motion":
         """Return the part of significant duration, after Trifunac and Brady (1975).
@@ -253,9 +249,8 @@ class Motion(ResultDisplay):
         Raises:
             InvalidInput: not 0 <= low < high <= 1, or the horizontal is at rest.
         """
-        return self.cut(
-            *signal_processing.find_significant_window(self.horizontal, self.dt, low, high)
-        )
+        window = signal_processing.find_significant_window(self.horizontal, self.dt, low, high)
+        return self.cut(*window)
 
     def resampled(self, dt: float) -> "Motion":
         """Return the motion sampled anew by straight lines, with all its peaks and no filter.
@@ -266,11 +261,8 @@ class Motion(ResultDisplay):
         Raises:
             InvalidInput: dt is not positive and finite.
         """
-        return replace(
-            self._map_components(
-                lambda samples: signal_processing.resample_peaks(samples, self.dt, dt)
-            ),
-            dt=dt,
+        return self._map_components(
+            lambda row: signal_processing.resample_peaks(row, self.dt, dt), dt=dt
         )
 
     def baseline_corrected(self, degree: int = 6) -> "Motion":
@@ -347,6 +339,6 @@ class Motion(ResultDisplay):
             steps = f"a step of {other.dt:g} s ({other.name!r}) and one of {self.dt:g} s"
             raise InvalidInput(f"{steps}: bring one to the other's with resampled")
 
-    def _map_components(self, change: Callable[[Array], Array]) -> "Motion":
+    def _map_components(self, change: Callable[[Array], Array], **fields: Any) -> "Motion":
         rows: dict[str, Any] = {name: change(self.component(name)) for name in self.components}
-        return replace(self, **rows)
+        return replace(self, **rows, **fields)

@@ -3,13 +3,15 @@
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from csv import writer
+from dataclasses import dataclass
 from fnmatch import fnmatch
 from functools import lru_cache
+from io import StringIO
 from math import inf, nan
 from os import PathLike
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +37,6 @@ from archfem.units import STANDARD_GRAVITY
 
 # Spectral measure of a record: of one horizontal component, or over all directions of a pair
 Measure = Literal["horizontal", "RotD50", "RotD100"]
-
-# Periods at which the search compares spectra, and at which the result is checked
-SEARCH_PERIODS, CHECK_PERIODS = 60, 120
 
 
 @validate_methods
@@ -207,11 +206,11 @@ class RecordSelection(ResultDisplay):
         Raises:
             InvalidInput: a period is negative.
         """
-        rows = (
+        rows = [
             record.scale * _compute_spectrum(record.motion, self.measure, periods)
             for record in self.records
-        )
-        return np.array(list(rows))
+        ]
+        return np.array(rows)
 
     def suite(self, name: str = "selection") -> Suite:
         """Return the scaled records as a suite, for time histories and incremental analyses.
@@ -219,24 +218,22 @@ class RecordSelection(ResultDisplay):
         Args:
             name: of the suite.
         """
-        scaled = (record.motion.scaled(record.scale) for record in self.records)
-        return Suite(name, tuple(scaled))
+        return Suite(name, tuple(each.motion.scaled(each.scale) for each in self.records))
 
     def table(self) -> str:
         """Return name, event, scale, scaled peak [m/s²] and files of the records, as CSV."""
-        rows = [_TABLE_HEAD, *self._rows()]
-        return "\n".join(
-            ",".join(f'"{cell}"' if "," in cell else cell for cell in row) for row in rows
-        )
+        text = StringIO()
+        writer(text, lineterminator="\n").writerows(self._rows())
+        return text.getvalue().rstrip("\n")
 
-    def _rows(self) -> Iterator[list[str]]:
-        """Yield the texts of a row of each record."""
+    def _rows(self) -> list[list[str]]:
+        """Return the head and the texts of a row of each record."""
+        rows = [["record", "event", "scale [-]", "scaled PGA [m/s²]", "files"]]
         for record in self.records:
-            files = dict.fromkeys(path.name for path, _ in record.sources.values())
-            yield [
-                *(record.motion.name, record.event or "unknown", f"{record.scale:.4g}"),
-                *(f"{record.scale * record.motion.pga:.4g}", " + ".join(files)),
-            ]
+            files = " + ".join(dict.fromkeys(path.name for path, _ in record.sources.values()))
+            row = record.motion.name, record.event or "unknown", f"{record.scale:.4g}"
+            rows.append([*row, f"{record.scale * record.motion.pga:.4g}", files])
+        return rows
 
     def _summary(self) -> str:
         """Describe the result in one line."""
@@ -255,11 +252,12 @@ class RecordSelection(ResultDisplay):
             peaks = f"; mean peak over design spectrum {self.zero_period_ratio:.3f}, "
             peaks += f"at least {rule.zero_period:g}"
         most = f"at most {rule.upper:g}" if rule.upper < inf else "no upper bound"
+        head, *rows = self._rows()
         lines = [
             self._summary(),
             f"mean of {self.measure} at least {rule.lower:g}, {most}{peaks}; scales from "
             f"{self.scales[0]:g} to {self.scales[1]:g}",
-            align_columns(_TABLE_HEAD, list(self._rows())),
+            align_columns(head, rows),
             f"{rule.name}: {rule.source}",
         ]
         if self.unknown_events:
@@ -267,9 +265,6 @@ class RecordSelection(ResultDisplay):
             lines.append(f"event unknown, each counted as an event of its own: {names}")
         lines += [f"not used: {name}: {reason}" for name, reason in self.skipped.items()]
         return "\n".join(lines)
-
-
-_TABLE_HEAD = ["record", "event", "scale [-]", "scaled PGA [m/s²]", "files"]
 
 
 @validate_arguments
@@ -319,26 +314,28 @@ def select_records(
         of structures, J. Earthquake Engineering 12 (2008). Boore, Orientation-independent,
         nongeometric-mean measures of seismic intensity, BSSA 100 (2010).
     """
-    chosen_rule = _find_rule(rule)
+    if not isinstance(rule, SelectionRule) and rule not in SELECTION_RULES:
+        raise InvalidInput(
+            f"rule {rule!r} is unknown: use one of {', '.join(SELECTION_RULES)}, or a SelectionRule"
+        )
+    chosen_rule = rule if isinstance(rule, SelectionRule) else SELECTION_RULES[rule]
     check_integer(count, f"count of records for {chosen_rule.name}", minimum=chosen_rule.fewest)
     if not 0.0 < scales[0] <= scales[1] < inf:
         raise InvalidInput(f"scales {scales}: expected 0 < least <= largest")
     band = chosen_rule.band(period)
-    periods = np.geomspace(*band, SEARCH_PERIODS)
+    # the search compares spectra at fewer periods than those at which its result is checked
+    periods = np.geomspace(*band, 60)
     # a spectrum that is not defined over the whole range is refused before files are read
     target = _tabulate_target(spectrum, chosen_rule, periods)
     candidates, skipped = _read_candidates(Path(folder), _list_files(folder), measure)
     candidates = _name_events(candidates, events or {})
     _check_events(candidates, count, folder, skipped)
-    table = np.array(
-        [_cached_spectrum(each.motion, measure, tuple(periods)) for each in candidates]
-    )
+    table = _compute_spectra(candidates, measure, periods)
     search = _Search(chosen_rule, table / target, _number_events(candidates), scales)
     chosen = [candidates[index] for index in search.find(count)]
-    selection = _scale_records(
-        chosen, spectrum, chosen_rule, band=band, scales=scales, measure=measure
-    )
-    selection = replace(selection, candidates=len(candidates), skipped=skipped)
+    settings: dict[str, Any] = {"rule": chosen_rule, "measure": measure, "band": band}
+    settings |= {"scales": scales, "candidates": len(candidates), "skipped": skipped}
+    selection = _scale_records(chosen, spectrum, settings)
     if not selection.meets:
         raise DidNotConverge(
             f"{selection!r}: no set was found that meets the rule; error.last is the nearest: add "
@@ -346,17 +343,6 @@ def select_records(
             last=selection,
         )
     return selection
-
-
-def _find_rule(rule: str | SelectionRule) -> SelectionRule:
-    """Return a rule by its name, or the rule itself."""
-    if isinstance(rule, SelectionRule):
-        return rule
-    if rule not in SELECTION_RULES:
-        raise InvalidInput(
-            f"rule {rule!r} is unknown: use one of {', '.join(SELECTION_RULES)}, or a SelectionRule"
-        )
-    return SELECTION_RULES[rule]
 
 
 def _tabulate_target(spectrum: DesignSpectrum, rule: SelectionRule, periods: Array) -> Array:
@@ -423,10 +409,8 @@ def _strip_direction(path: Path, direction: str) -> Path:
     # "DWN, turned up" is DWN in the name, "E-W" is EW, and 0 is 000 degrees
     token = re.sub(r"\W", "", direction.partition(",")[0])
     token = token.zfill(3) if token.isdigit() else token
-    match = re.search(rf"[-_ ]?{token}(?=\.|$)", path.name, re.IGNORECASE) if token else None
-    if match is None:
-        return path
-    return path.with_name(path.name[: match.start()] + path.name[match.end() :])
+    pattern = re.compile(rf"[-_ ]?{token}(?=\.|$)", re.IGNORECASE)
+    return path.with_name(pattern.sub("", path.name, count=1)) if token else path
 
 
 def _refuse_group(sources: Sequence[_Source], measure: Measure) -> str:
@@ -471,15 +455,15 @@ def _find_event(path: Path) -> str:
         if "process" in line.lower():  # the date of processing
             continue
         if found := re.search(rf"(?<!\d){year}(?:[-/]| +){day}(?:[-/]| +){day}(?!\d)", line):
-            return _format_date(found[1], found[2], found[3])
+            return _format_date(*found.groups())
         if found := re.search(rf"\b({'|'.join(months)})[a-z]*\.? +{day}, *{year}", line, re.I):
             return _format_date(found[3], months.index(found[1].lower()) + 1, found[2])
         if found := re.search(rf"(?<!\d){day}/{day}/({year}|\d\d)(?!\d)", line):
             return _format_date(found[3], found[1], found[2])
         if found := re.search(rf"event.*?(?<!\d){year}(\d\d)(\d\d)(?!\d)", line, re.I):
-            return _format_date(found[1], found[2], found[3])
+            return _format_date(*found.groups())
     if name:
-        return _format_date(name[1], name[2], name[3])
+        return _format_date(*name.groups())
     return found[1] if (found := re.match(r"RSN\d+_([^_]+)_", path.name)) else ""
 
 
@@ -496,15 +480,12 @@ def _name_events(
     """Replace events by those that were given for file names."""
     named = list(candidates)
     for pattern, event in events.items():
-        hits = [
-            index
-            for index, each in enumerate(candidates)
-            if any(fnmatch(path.name, pattern) for path, _ in each.sources.values())
-        ]
-        if not hits:
+        found = False
+        for index, each in enumerate(candidates):
+            if any(fnmatch(path.name, pattern) for path, _ in each.sources.values()):
+                named[index], found = each._replace(event=event), True
+        if not found:
             raise InvalidInput(f"events: no record that can be used has a file {pattern!r}")
-        for index in hits:
-            named[index] = candidates[index]._replace(event=event)
     return tuple(named)
 
 
@@ -535,6 +516,11 @@ def _check_events(
 def _cached_spectrum(motion: Motion, measure: Measure, periods: tuple[float, ...]) -> Array:
     """Compute the peak acceleration and the spectrum of a motion once (1 + m,) [m/s²]."""
     return _compute_spectrum(motion, measure, np.array([0.0, *periods]))
+
+
+def _compute_spectra(motions: Sequence[_Candidate], measure: Measure, periods: Array) -> Array:
+    """Return peak acceleration and spectrum of each candidate (n, 1 + m) [m/s²]."""
+    return np.array([_cached_spectrum(each.motion, measure, tuple(periods)) for each in motions])
 
 
 def _compute_spectrum(motion: Motion, measure: Measure, periods: Array) -> Array:
@@ -569,14 +555,11 @@ class _Search:
 
     def find(self, count: int, starts: int = 30) -> list[int]:
         """Return the numbers of the selected records, in order."""
-        everything = np.arange(len(self.ratios))
-        single = self._evaluate([], everything)
-        best: list[int] = []
-        lowest = inf
-        for first in np.argsort(single, kind="stable")[:starts]:
+        best, lowest = list[int](), inf
+        for first in np.argsort(self._evaluate([]), kind="stable")[:starts]:
             chosen = [int(first)]
             while len(chosen) < count:
-                chosen.append(int(np.argmin(self._evaluate(chosen, everything))))
+                chosen.append(int(np.argmin(self._evaluate(chosen))))
             cost = self._exchange(chosen)
             if cost < lowest - 1e-12:
                 best, lowest = chosen, cost
@@ -584,11 +567,9 @@ class _Search:
 
     def _exchange(self, chosen: list[int]) -> float:
         """Exchange single records, in place, as long as the cost decreases; return the cost."""
-        everything = np.arange(len(self.ratios))
         cost, place, since = inf, 0, 0
         while since < len(chosen):
-            others = chosen[:place] + chosen[place + 1 :]
-            costs = self._evaluate(others, everything)
+            costs = self._evaluate(chosen[:place] + chosen[place + 1 :])
             best = int(np.argmin(costs))
             since = 0 if costs[best] < cost - 1e-12 else since + 1
             if not since:
@@ -596,19 +577,17 @@ class _Search:
             place = (place + 1) % len(chosen)
         return cost
 
-    def _evaluate(self, chosen: list[int], added: NDArray[np.intp]) -> Array:
-        """Return the cost of a set with each of the added records (n,), infinite for its events."""
-        mean = (self.ratios[chosen].sum(axis=0) + self.ratios[added]) / (len(chosen) + 1)
-        own = self.scales[chosen]
-        least = np.minimum(self.scales[added], own.min(initial=inf))
-        most = np.maximum(self.scales[added], own.max(initial=0.0))
-        factor = self.common_factor(mean, least, most)
-        scaled = factor[:, None] * mean
+    def _evaluate(self, chosen: list[int]) -> Array:
+        """Return the cost of a set with each further record (n,), infinite for its events."""
+        mean = (self.ratios[chosen].sum(axis=0) + self.ratios) / (len(chosen) + 1)
+        least = np.minimum(self.scales, self.scales[chosen].min(initial=inf))
+        most = np.maximum(self.scales, self.scales[chosen].max(initial=0.0))
+        scaled = self.common_factor(mean, least, most)[:, None] * mean
         inside = scaled[:, 1:]
         miss = _measure_miss(self.rule, inside.min(axis=1), inside.max(axis=1), scaled[:, 0])
         # a set that misses the rule by 0.001 is worse than any set that meets it
         cost = 1e3 * miss + np.sqrt(np.mean((inside - 1.0) ** 2, axis=1))
-        return np.where(np.isin(self.events[added], self.events[chosen]), inf, cost)
+        return np.where(np.isin(self.events, self.events[chosen]), inf, cost)
 
     def common_factor(self, mean: Array, least: Array, most: Array) -> Array:
         """Return the factor of each set that brings its mean spectrum (n, 1 + m) to the target.
@@ -634,19 +613,14 @@ def _measure_miss(
 
 
 def _scale_records(
-    chosen: Sequence[_Candidate],
-    spectrum: DesignSpectrum,
-    rule: SelectionRule,
-    *,
-    band: tuple[float, float],
-    scales: tuple[float, float],
-    measure: Measure,
+    chosen: Sequence[_Candidate], spectrum: DesignSpectrum, settings: dict[str, Any]
 ) -> RecordSelection:
     """Scale the selected records, and check them at more periods than the search does."""
-    periods = np.geomspace(*band, CHECK_PERIODS)
+    rule, (first, last) = settings["rule"], settings["band"]
+    periods = np.geomspace(first, last, 120)
     target = _tabulate_target(spectrum, rule, periods)
-    spectra = np.array([_cached_spectrum(each.motion, measure, tuple(periods)) for each in chosen])
-    fine = _Search(rule, spectra / target, np.arange(len(chosen)), scales)
+    spectra = _compute_spectra(chosen, settings["measure"], periods)
+    fine = _Search(rule, spectra / target, np.arange(len(chosen)), settings["scales"])
     mean = fine.ratios.mean(axis=0, keepdims=True)
     factor = fine.common_factor(mean, fine.scales.min(), fine.scales.max())[0]
     final = factor * fine.scales
@@ -655,15 +629,10 @@ def _scale_records(
         for each, scale in zip(chosen, final, strict=True)
     )
     return RecordSelection(
-        rule=rule,
-        measure=measure,
-        band=band,
-        scales=scales,
+        **settings,
         records=tuple(records),
         periods=periods,
         spectra=final[:, None] * spectra[:, 1:],
         target=target[1:],
         zero_period_ratio=float(factor * mean[0, 0]) if rule.zero_period else nan,
-        candidates=len(chosen),
-        skipped={},
     )

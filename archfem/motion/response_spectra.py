@@ -80,13 +80,8 @@ def _oscillator_filter(dt: float, period: float, damping: float) -> tuple[Array,
     step = linalg.expm(rates * dt)
     later = step[:2, 3] / dt
     now = step[:2, 2] - later
-    numerator = np.array(
-        [
-            later[0],
-            now[0] - step[1, 1] * later[0] + step[0, 1] * later[1],
-            step[0, 1] * now[1] - step[1, 1] * now[0],
-        ]
-    )
+    middle = now[0] - step[1, 1] * later[0] + step[0, 1] * later[1]
+    numerator = np.array([later[0], middle, step[0, 1] * now[1] - step[1, 1] * now[0]])
     trace = step[0, 0] + step[1, 1]
     determinant = step[0, 0] * step[1, 1] - step[0, 1] * step[1, 0]
     # the oscillator is at rest at the first sample, at any acceleration there
@@ -198,9 +193,8 @@ def rotated_spectrum(
     natural = as_periods(periods)
     check_oscillators(natural, damping)
     # an angle of zero fills the shorter component with zeros
-    pair = signal_processing.rotate_components(
-        motion.horizontal, motion.component("transverse"), 0.0
-    )
+    across = motion.component("transverse")
+    pair = signal_processing.rotate_components(motion.horizontal, across, 0.0)
     values = [
         np.percentile(_peaks_by_direction(pair, motion.dt, period, damping), percentile)
         for period in natural.ravel()
@@ -282,10 +276,9 @@ def measure_intensity(motion: Motion, component: str = "horizontal") -> Intensit
     samples = motion.component(component)
     periods = np.linspace(0.1, 2.5, 97)
     spectrum = response_spectrum(motion, periods, component=component)
-    moves = bool(np.any(samples))
-    start, end = (
-        signal_processing.find_significant_window(samples, motion.dt) if moves else (0.0, 0.0)
-    )
+    start = end = 0.0
+    if np.any(samples):
+        start, end = signal_processing.find_significant_window(samples, motion.dt)
     return IntensityMeasures(
         pga=float(np.abs(samples).max()),
         pgv=float(np.abs(motion.velocity(component)).max()),

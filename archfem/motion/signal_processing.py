@@ -51,10 +51,9 @@ def integrate_velocity(samples: Array, dt: float) -> Array:
 def integrate_displacement(samples: Array, dt: float) -> Array:
     """Integrate a piecewise linear acceleration twice, from rest (n,) [m]."""
     # exact in each step: d₁ = d₀ + v₀ Δt + (2 a₀ + a₁) Δt²/6
-    steps = (
-        integrate_velocity(samples, dt)[:-1] * dt + (2.0 * samples[:-1] + samples[1:]) * dt**2 / 6.0
-    )
-    return np.concatenate(([0.0], np.cumsum(steps)))
+    velocity = integrate_velocity(samples, dt)[:-1]
+    steps = velocity * dt + (2.0 * samples[:-1] + samples[1:]) * dt**2 / 6.0
+    return np.append(0.0, np.cumsum(steps))
 
 
 def correct_baseline(samples: Array, dt: float, degree: int = 6) -> Array:
@@ -187,14 +186,9 @@ def generate_accelerogram(
     duration: float, dt: float, *, pga: float, ratio: float, seed: int
 ) -> tuple[Array, Array | None]:
     """Generate a horizontal and a vertical component (n,) [m/s²] of an artificial accelerogram."""
-    settings = {
-        "duration [s]": duration,
-        "dt [s]": dt,
-        "pga [m/s²]": pga,
-        "vertical_ratio [-]": ratio,
-    }
-    for key, value in settings.items():
-        check_number(value, f"synthetic motion, {key}")
+    values = (duration, "duration [s]"), (dt, "dt [s]"), (pga, "pga [m/s²]")
+    for value, name in (*values, (ratio, "vertical_ratio [-]")):
+        check_number(value, f"synthetic motion, {name}")
     if not (duration >= 50 * dt > 0.0 and pga > 0.0 and ratio >= 0.0):
         raise InvalidInput(
             f"synthetic motion of {duration:g} s at {dt:g} s, pga {pga:g} m/s², vertical ratio "

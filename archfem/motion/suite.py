@@ -75,11 +75,10 @@ class Suite:
                 f"{len(horizontals)} horizontals cannot share {len(verticals)} verticals evenly"
             )
         share = len(horizontals) // len(verticals)
-        pairs = (
-            level.with_vertical(verticals[index // share])
-            for index, level in enumerate(horizontals)
+        pairs = tuple(
+            level.with_vertical(verticals[k // share]) for k, level in enumerate(horizontals)
         )
-        return cls(name, tuple(pairs), scale=scale, reduction=reduction)
+        return cls(name, pairs, scale=scale, reduction=reduction)
 
     @classmethod
     def synthetic(
@@ -107,9 +106,7 @@ class Suite:
                 than twice the longest period matched.
             DidNotConverge: a motion could not be matched within the tolerance.
         """
-        made = [
-            Motion.synthetic(seed=seed + index, duration=duration) for index in range(horizontals)
-        ]
+        made = [Motion.synthetic(seed=seed + k, duration=duration) for k in range(horizontals)]
         share = cls.paired(f"synthetic {seed}", made, made[:verticals], reduction=reduction)
         return share.matched(spectrum)
 

@@ -82,17 +82,35 @@ def _action_size(model: Model, action: BodyForce | PointLoad) -> float:
 
 
 @dataclass(eq=False)
-class LoadPath:
-    """Equilibria under a growing load, in the order of its steps."""
+class EquilibriumPath:
+    """Equilibria in the order of their steps, the dead load's first."""
 
-    model: Model  # with the joint memory of the last step
+    model: Model  # with the joint memory, and the support motion, of the last step
     dead: Array  # generalised forces of the self-weight (n,)
-    load: GrowingLoad
     unit: tuple[float, float]  # displacement and factor of the first step of an elastic structure
-    states: list[Array]  # coordinates at each step, the dead load's first (n,)
+    states: list[Array]  # coordinates at each step (n,)
     joint_forces: list[Array]  # N, V, M of every joint at each step (n_joints, 3) [N, N, N m]
-    factors: list[float]  # of the load at each step [-]
     iterations: list[int]  # of Newton's method in each step
+
+    @property
+    def resultants(self) -> Array:
+        """N, V, M of every joint (steps, n_joints, 3) [N, N, N m]."""
+        return np.array(self.joint_forces)
+
+    def _add_state(self, model: Model, q: Array, iterations: int) -> None:
+        """Add an equilibrium."""
+        self.model = model
+        self.states.append(q)
+        self.joint_forces.append(model.resultants(q))
+        self.iterations.append(iterations)
+
+
+@dataclass(eq=False)
+class LoadPath(EquilibriumPath):
+    """Equilibria under a growing load."""
+
+    load: GrowingLoad
+    factors: list[float]  # of the load at each step [-]
     units = "1"  # of the factors
     moving = "load"  # name of the moving object in messages
 
@@ -105,20 +123,14 @@ class LoadPath:
         live = load.forces(start.q)
         displacement = FIRST_DISPLACEMENT * model.structure.size
         compliance = float(live @ splu(model.tangent(start.q).tocsc()).solve(live)) / load.size
-        unit = (displacement, displacement / compliance)
-        resultants = [model.resultants(start.q)]
-        return cls(model, self_weight(model), load, unit, [start.q], resultants, [0.0], [0])
+        unit, forces = (displacement, displacement / compliance), [model.resultants(start.q)]
+        return cls(model, self_weight(model), unit, [start.q], forces, [0], load, [0.0])
 
     @property
     def displacements(self) -> Array:
         """Displacement conjugate to the load, since the dead load (steps,) [m]."""
         first = self.load.displacement(self.states[0])
         return np.array([self.load.displacement(q) - first for q in self.states])
-
-    @property
-    def resultants(self) -> Array:
-        """N, V, M of every joint (steps, n_joints, 3) [N, N, N m]."""
-        return np.array(self.joint_forces)
 
     @property
     def faces(self) -> Array:
@@ -187,7 +199,7 @@ class LoadPath:
             return False
         if self.load.displacement(solution.q) - self.load.displacement(self.states[0]) > farthest:
             return False
-        self._add_state(model, np.append(solution.q, factor), solution.iterations)
+        self._add_loaded_state(model, solution.q, factor, solution.iterations)
         return True
 
     def _solve_step(
@@ -213,7 +225,7 @@ class LoadPath:
             ):
                 if sense is not None and self._sense(model, x, x - last) != sense:
                     return False
-                self._add_state(model, x, iterations)
+                self._add_loaded_state(model, x[:-1], float(x[-1]), iterations)
                 return True
             model = model.with_memory(model.updated_memory(x[:-1]))
         return False
@@ -242,20 +254,18 @@ class LoadPath:
             x = x + step
         return None
 
-    def _add_state(self, model: Model, x: Array, iterations: int) -> None:
-        """Add an equilibrium, (q, λ) in one (n + 1,), and update the joint memory."""
-        self.states.append(x[:-1])
-        self.joint_forces.append(model.resultants(x[:-1]))
-        self.model = model.with_memory(model.updated_memory(x[:-1]))
-        self.factors.append(float(x[-1]))
-        self.iterations.append(iterations)
+    def _add_loaded_state(self, model: Model, q: Array, factor: float, iterations: int) -> None:
+        """Add an equilibrium under a factor, and update the joint memory."""
+        self._add_state(model, q, iterations)
+        self.model = model.with_memory(model.updated_memory(q))
+        self.factors.append(factor)
 
     def _is_converged(self, residual: Array, x: Array, tangent: sparse.csr_matrix) -> bool:
         """Return whether forces are in balance, up to round-off of large motions."""
         load = load_magnitude(self.dead) + abs(x[-1]) * load_magnitude(self.load.forces(x[:-1]))
         size = load_magnitude(residual)
         if size <= RESIDUAL_TOLERANCE * load or size > MAX_ROUND_OFF_RESIDUAL * load:
-            return bool(size <= RESIDUAL_TOLERANCE * load)
+            return size <= RESIDUAL_TOLERANCE * load
         return bool(size <= 8.0 * np.finfo(float).eps * load_magnitude(abs(tangent) @ abs(x[:-1])))
 
 
@@ -301,19 +311,13 @@ def _determinant_sign(tangent: sparse.csr_matrix, load: Array, row: Array) -> fl
 
 
 @dataclass(eq=False)
-class SupportPath:
-    """Equilibria under the dead load over a moving support, as `LoadPath`."""
+class SupportPath(EquilibriumPath):
+    """Equilibria under the dead load over a moving support."""
 
-    model: Model  # with the support motion and the joint memory of the last step
     support_motion: Array  # before this support moves (n_blocks, 3) [m, m, rad]
     motion: Array  # of all blocks, for a multiple of one (n_blocks, 3) [m, m, rad]
-    dead: Array  # generalised forces of the self-weight (n,)
     corner_displacement: float  # of the support's fastest corner, for a multiple of one [m]
-    unit: tuple[float, float]  # displacement, and change of the factor, in the first step
     multiples: list[float]  # of the motion at each step [-]
-    states: list[Array]  # coordinates at each step (n,)
-    joint_forces: list[Array]  # N, V, M of every joint at each step (n_joints, 3) [N, N, N m]
-    iterations: list[int]  # of Newton's method in each step
     units = "N m"  # of the factors
     moving = "support"  # name of the moving object in messages
 
@@ -324,18 +328,9 @@ class SupportPath:
         corner = RigidBlocks(model.structure).largest_displacement(motion)
         if corner == 0.0:
             raise InvalidInput(f"the settlement of '{settlement.block}' is zero: give it a motion")
-        return cls(
-            model,
-            model.support_motion,
-            motion,
-            self_weight(model),
-            corner,
-            unit=(FIRST_DISPLACEMENT * model.structure.size, np.inf),
-            multiples=[0.0],
-            states=[start.q],
-            joint_forces=[model.resultants(start.q)],
-            iterations=[0],
-        )
+        unit = FIRST_DISPLACEMENT * model.structure.size, np.inf
+        common = model, self_weight(model), unit, [start.q], [model.resultants(start.q)], [0]
+        return cls(*common, model.support_motion, motion, corner, [0.0])
 
     @property
     def displacements(self) -> Array:
@@ -343,19 +338,12 @@ class SupportPath:
         return self.corner_displacement * np.array(self.multiples)
 
     @property
-    def resultants(self) -> Array:
-        """N, V, M of every joint (steps, n_joints, 3) [N, N, N m]."""
-        return np.array(self.joint_forces)
-
-    @property
     def faces(self) -> Array:
         """Gaps at mid-depth, rotations and slips of joints (steps, 3, n_joints) [m, rad, m]."""
         fixed = self._model_at(0.0).observer()
         if self.model.large_displacements:
-            observers = [self._model_at(multiple).observer() for multiple in self.multiples]
-            readings = [
-                observer.read(q) for observer, q in zip(observers, self.states, strict=True)
-            ]
+            steps = zip(self.multiples, self.states, strict=True)
+            readings = [self._model_at(multiple).observer().read(q) for multiple, q in steps]
             return fixed.faces(np.array(readings))
         # readings are linear in coordinates and support motion
         origin = np.zeros(self.model.size)
@@ -383,10 +371,7 @@ class SupportPath:
         except DidNotConverge:
             return False
         self.multiples.append(multiple)
-        self.states.append(solution.q)
-        self.model = model
-        self.joint_forces.append(model.resultants(solution.q))
-        self.iterations.append(solution.iterations)
+        self._add_state(model, solution.q, solution.iterations)
         if len(self.multiples) == 2:  # the first step gives the unit of the factor
             before, after = self.factors
             change = abs(float(after - before))

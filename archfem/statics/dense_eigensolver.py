@@ -19,9 +19,7 @@ def find_lowest_modes(
         raise NotInstalled(missing_package_message("SLEPc", message))
     dense = stiffness.toarray()
     squares, shapes = eigh(0.5 * (dense + dense.T), mass.toarray(), subset_by_index=(0, count - 1))
-    zero = zero_threshold(stiffness, mass)
-    if squares[0] <= zero:
-        raise DidNotConverge(mechanism_message(float(squares[0]), zero))
+    check_lowest(float(squares[0]), zero_threshold(stiffness, mass))
     return squares, shapes
 
 
@@ -31,9 +29,10 @@ def zero_threshold(stiffness: sparse.csr_matrix, mass: sparse.csr_matrix) -> flo
     return 1e-13 * float(np.max(stiffness.diagonal() / mass.diagonal()))
 
 
-def mechanism_message(square: float, zero: float) -> str:
-    """Return the message for a structure with a motion of no stiffness."""
-    return (
-        f"the stiffness is singular or negative, with ω² = {square:.1e} 1/s² where rounding makes "
-        f"up to {zero:.0e}: a mechanism; check supports and joints, or take another state"
-    )
+def check_lowest(square: float, zero: float) -> None:
+    """Refuse a structure with a motion of no stiffness, by its lowest ω² [1/s²]."""
+    if square <= zero:
+        raise DidNotConverge(
+            f"the stiffness is singular or negative, with ω² = {square:.1e} 1/s² where rounding "
+            f"makes up to {zero:.0e}: a mechanism; check supports and joints, or take another state"
+        )

@@ -163,9 +163,8 @@ def dead_load(
         try:
             return equilibrium_under(model, self_weight(model), newton)
         except DidNotConverge as error:
-            raise DidNotConverge(
-                _describe_failure(model, error, newton), last=error.last
-            ) from error
+            message = _describe_failure(model, error, newton)
+            raise DidNotConverge(message, last=error.last) from error
     # blocks are placed by small displacements on supports that have not moved
     small = model.small_displacement_model()
     if not isinstance(small, LinearBlockModel):
@@ -216,13 +215,12 @@ def _find_carried_part(
     for _ in range(rounds):
         try:
             equilibrium_under(model, tried * weight, newton)
+            return tried
         except DidNotConverge as error:
             if error.last is None:
                 return None
             carried = error.last.model.force(error.last.q)
-            part = float(carried @ weight) / float(weight @ weight)
-        else:
-            return tried
+        part = float(carried @ weight) / float(weight @ weight)
         # steps of the load, a sixty-fourth of it, are too coarse to find a small part
         if part >= precise * tried:
             return part
@@ -267,10 +265,9 @@ def _move_supports(
     """Move the supports of a structure at rest to their final places."""
     if not motion.any():
         return state
-    model = state.model
 
     def at(part: float) -> tuple[Model, Array]:
-        return model.with_support_motion(part * motion), load
+        return state.model.with_support_motion(part * motion), load
 
     return _increment_load(solver, state, at, "settlement", SUPPORT_SEARCHES)
 
@@ -331,9 +328,8 @@ def _increment_load(
             raise DidNotConverge(
                 f"no equilibrium beyond {factor:.3f} of the {what}: {error}", last=state
             ) from error
-        iterations = state.iterations + solution.iterations
+        iterations, factor = state.iterations + solution.iterations, target
         state = Equilibrium(model, solution.q, iterations, state.steps + 1)
-        factor = target
     return state
 
 
@@ -344,39 +340,29 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
     limit = 1.0 if friction is None else friction  # rough faces of stone slide at 0.6 to 0.75
     doubts = []
     if (steep := (ratio > limit).values).any():
-        doubts.append(
-            Doubt(
-                f"under dead load |V| / N is {float(ratio.max()):.3g} in "
-                f"{join_joint_names(names[steep])}, and joints slide from {limit:g} on: they hold "
-                "only because they never slide",
-                "give the contacts their friction",
-            )
+        reason = (
+            f"under dead load |V| / N is {float(ratio.max()):.3g} in "
+            f"{join_joint_names(names[steep])}, and joints slide from {limit:g} on: they hold "
+            "only because they never slide"
         )
+        doubts.append(Doubt(reason, "give the contacts their friction"))
     slip = abs(joints["slip"])
     if (far := (slip > 1.0 * mm).values).any():
-        doubts.append(
-            Doubt(
-                f"under dead load joints slide by up to {float(slip.max()) / mm:.3g} mm "
-                f"({join_joint_names(names[far])}): it does not stand as it was drawn",
-                "check friction and the direction of these joints",
-            )
+        reason = (
+            f"under dead load joints slide by up to {float(slip.max()) / mm:.3g} mm "
+            f"({join_joint_names(names[far])}): it does not stand as it was drawn"
         )
+        doubts.append(Doubt(reason, "check friction and the direction of these joints"))
     smallest = min(joint.contact.coefficient for joint in structure.joints)
     if smallest < 0.1:
-        doubts.append(
-            Doubt(
-                f"the least coefficient of friction is {smallest:g}",
-                "joints of stone have 0.6 to 0.75: check it",
-            )
-        )
+        reason = f"the least coefficient of friction is {smallest:g}"
+        doubts.append(Doubt(reason, "joints of stone have 0.6 to 0.75: check it"))
     if not _stands_as_rigid_blocks(dead):
-        doubts.append(
-            Doubt(
-                "it was found at rest, but as rigid blocks nothing within friction holds it: "
-                "archfem.stands says that it falls",
-                "compare with stiffer joints, or with large displacements",
-            )
+        reason = (
+            "it was found at rest, but as rigid blocks nothing within friction holds it: "
+            "archfem.stands says that it falls"
         )
+        doubts.append(Doubt(reason, "compare with stiffer joints, or with large displacements"))
     return tuple(doubts)
 
 

@@ -9,7 +9,7 @@ from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.resultants import check_instant, thrust_line
-from archfem.masonry.block import Block
+from archfem.masonry.block import Block, measure_polygon
 from archfem.masonry.structure import Structure
 from archfem.models.model import Cells
 
@@ -109,11 +109,6 @@ def _area_and_centroid(block: Block, number: int, cells: Cells | None) -> tuple[
     """Return area and centroid of a block, or of its cells [m², m]."""
     if cells is None or cells.stress is None:
         return block.area, block.centroid
-    pieces = [
-        Block(tuple(map(tuple, cells.places[cell])), block.material, block.name)
-        for cell, owner in zip(cells.polygons, cells.owner, strict=True)
-        if owner == number
-    ]
-    areas = np.array([piece.area for piece in pieces])
-    centroids = np.array([piece.centroid for piece in pieces])
-    return float(areas.sum()), areas @ centroids / areas.sum()
+    own = (cell for cell, owner in zip(cells.polygons, cells.owner, strict=True) if owner == number)
+    areas, centroids, _ = zip(*(measure_polygon(cells.places[cell]) for cell in own), strict=True)
+    return float(np.sum(areas)), areas @ np.array(centroids) / np.sum(areas)

@@ -80,35 +80,26 @@ class LimitState:
     def __post_init__(self) -> None:
         """Check that shares are up to 1 and the damping is a ratio."""
         check_fields(self)
-        for key, most in (
-            *(("share", 1.0), ("secant_share", 1.0)),
-            *(("period_factor", 10.0), ("damping", 0.5)),
-        ):
-            if not 0.0 < check_number(getattr(self, key), f"{self.name}, {key} [-]") <= most:
+        limits = {"share": 1.0, "secant_share": 1.0, "period_factor": 10.0, "damping": 0.5}
+        for key, most in limits.items():
+            value = check_number(getattr(self, key), f"{self.name}, {key} [-]")
+            if not 0.0 < value <= most:
                 raise InvalidInput(
-                    f"{self.name}, {key} = {getattr(self, key):.4g} is not above 0 and up to "
-                    f"{most:g}: give a ratio, such as 0.4 for 40 %"
+                    f"{self.name}, {key} = {value:.4g} is not above 0 and up to {most:g}: give a "
+                    "ratio, such as 0.4 for 40 %"
                 )
 
 
-CIRCOLARE = "Circolare 7/2019"
+_CLAUSES_2019 = "Circolare 7/2019, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq. C8.7.1."
+_CLAUSES_2008 = "Circolare 617/2009, C8A.4.2.2 and C8A.4.2.3, from memory: its text was not read"
 
 # Displacement checks by name. The 2019 values were read in a transcription of the Circolare.
 LIMIT_STATES: Mapping[str, LimitState] = {
     state.name: state
     for state in (
-        LimitState(
-            *("NTC-2018 SLV", 0.4, 1.68, 1.0, 0.08),
-            f"{CIRCOLARE}, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq. C8.7.1.10",
-        ),
-        LimitState(
-            *("NTC-2018 SLC", 0.6, 1.56, 1.0, 0.10),
-            f"{CIRCOLARE}, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq. C8.7.1.11",
-        ),
-        LimitState(
-            *("NTC-2008 SLV", 0.4, 2.0, 0.4, 0.05),
-            "Circolare 617/2009, C8A.4.2.2 and C8A.4.2.3, from memory: its text was not read",
-        ),
+        LimitState("NTC-2018 SLV", 0.4, 1.68, 1.0, 0.08, _CLAUSES_2019 + "10"),
+        LimitState("NTC-2018 SLC", 0.6, 1.56, 1.0, 0.10, _CLAUSES_2019 + "11"),
+        LimitState("NTC-2008 SLV", 0.4, 2.0, 0.4, 0.05, _CLAUSES_2008),
     )
 }
 
@@ -200,11 +191,7 @@ class KinematicAssessment(ResultDisplay):
     @property
     def hinges(self) -> tuple[tuple[int, str], ...]:
         """Joints that turn at first, with the face where the blocks stay in contact."""
-        return tuple(
-            (contact.joint, end)
-            for contact, end in self._contacts
-            if contact.joint not in self.sliding
-        )
+        return tuple((c.joint, end) for c, end in self._contacts if c.joint not in self.sliding)
 
     @cached_property
     def sliding(self) -> tuple[int, ...]:
@@ -214,24 +201,21 @@ class KinematicAssessment(ResultDisplay):
     @cached_property
     def _contacts(self) -> list[tuple[Any, str]]:
         """Contacts of the first mechanism, with the end of the joint where they are."""
-        if self.path is None:
-            return []
-        ends = self.structure.ends
-        return [
-            (
-                c,
-                ("intrados", "extrados")[
-                    int(np.linalg.norm(ends[c.joint] - c.point, axis=1).argmin())
-                ],
-            )
-            for c in self.path.mechanisms[0].contacts
-        ]
+        found = []
+        for contact in self.path.mechanisms[0].contacts if self.path else ():
+            away = np.linalg.norm(self.structure.ends[contact.joint] - contact.point, axis=1)
+            found.append((contact, ("intrados", "extrados")[int(away.argmin())]))
+        return found
+
+    @property
+    def _checks(self) -> list[AssessmentCheck]:
+        """Linear check, and that of the displacement where the mechanism moves."""
+        return [self.linear, *([self.displacement] if self.displacement else [])]
 
     @property
     def passes(self) -> bool:
         """Whether the displacement check passes, or without it the linear one."""
-        check = self.linear if self.displacement is None else self.displacement
-        return check.passes
+        return self._checks[-1].passes
 
     def demand(self, periods: Array) -> tuple[Array, Array]:
         """Return spectral displacements [m] and accelerations [m/s²] of the demand.
@@ -247,23 +231,20 @@ class KinematicAssessment(ResultDisplay):
 
     def table(self) -> str:
         """Return the quantities and both checks, a line each."""
-        g = STANDARD_GRAVITY
         rows = [
-            ["alpha_0", f"{self.alpha_0:.4g}", "-"],
-            ["e_star", f"{self.e_star:.4g}", "-"],
-            ["M_star", f"{self.M_star:.4g}", "kg"],
-            ["a_0_star", f"{self.a_0_star:.4g}", f"m/s² ({self.a_0_star / g:.3f} g)"],
-            ["d_0_star", f"{self.d_0_star:.4g}", "m"],
-            ["T_s", f"{self.T_s:.4g}", "s"],
+            ("alpha_0", self.alpha_0, "-"),
+            ("e_star", self.e_star, "-"),
+            ("M_star", self.M_star, "kg"),
+            ("a_0_star", self.a_0_star, f"m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g)"),
+            ("d_0_star", self.d_0_star, "m"),
+            ("T_s", self.T_s, "s"),
         ]
-        for check in (self.linear, self.displacement):
-            if check is not None:
-                rows += [
-                    [f"{check.name}: capacity", f"{check.capacity:.4g}", check.unit],
-                    [f"{check.name}: demand", f"{check.demand:.4g}", check.unit],
-                    [f"{check.name}: ratio", f"{check.ratio:.4g}", "-"],
-                ]
-        return align_columns(["quantity", "value", "unit"], rows)
+        for check in self._checks:
+            rows.append((f"{check.name}: capacity", check.capacity, check.unit))
+            rows.append((f"{check.name}: demand", check.demand, check.unit))
+            rows.append((f"{check.name}: ratio", check.ratio, "-"))
+        texts = [[name, f"{value:.4g}", unit] for name, value, unit in rows]
+        return align_columns(["quantity", "value", "unit"], texts)
 
     def _summary(self) -> str:
         """Describe the result in one line."""
@@ -280,27 +261,19 @@ class KinematicAssessment(ResultDisplay):
         if self.path is None:
             lines.append("no horizontal force makes it a mechanism")
         else:
-            lines += [self._mechanism_text(), self._oscillator_text()]
+            names = [joint.name for joint in self.structure.joints]
+            hinges = join_names([f"{names[k]} at the {end}" for k, end in self.hinges], "; ")
+            sliding = join_joint_names([names[k] for k in self.sliding])
+            lines += [
+                f"hinges: {hinges or 'none'}; sliding: {sliding or 'none'}",
+                f"alpha_0 = {self.alpha_0:.4g}, e* = {self.e_star:.3f}, M* = {self.M_star:.4g} kg, "
+                f"a_0* = {self.a_0_star:.4g} m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g), "
+                f"d_0* = {self.d_0_star:.4g} m, T_s = {self.T_s:.3f} s",
+            ]
             changes = [event.text for event in self.path.events if event.text != self.path.end]
             lines += [f"along the path: {join_names(changes, '; ')}"] if changes else []
-            lines.append(self.path.end.sentence)
-            lines += [str(check) for check in (self.linear, self.displacement) if check is not None]
+            lines += [self.path.end.sentence, *map(str, self._checks)]
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
-
-    def _mechanism_text(self) -> str:
-        """Describe hinges and sliding joints."""
-        names = [joint.name for joint in self.structure.joints]
-        hinges = join_names([f"{names[k]} at the {end}" for k, end in self.hinges], "; ")
-        sliding = join_joint_names([names[k] for k in self.sliding])
-        return f"hinges: {hinges or 'none'}; sliding: {sliding or 'none'}"
-
-    def _oscillator_text(self) -> str:
-        """Describe the equivalent oscillator."""
-        return (
-            f"alpha_0 = {self.alpha_0:.4g}, e* = {self.e_star:.3f}, M* = {self.M_star:.4g} kg, "
-            f"a_0* = {self.a_0_star:.4g} m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g), "
-            f"d_0* = {self.d_0_star:.4g} m, T_s = {self.T_s:.3f} s"
-        )
 
 
 @validate_arguments
@@ -371,7 +344,12 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         >>> round(found.alpha_0, 4), round(found.d_0_star, 4), found.displacement.passes
         (0.25, 0.3, True)
     """
-    rules = _parse_limit_state(limit_state)
+    if not isinstance(limit_state, LimitState) and not is_one_of(limit_state, LIMIT_STATES):
+        raise InvalidInput(
+            f"limit_state {limit_state!r} is not known: use one of {list(LIMIT_STATES)}, or give "
+            "the rules of another code as a LimitState"
+        )
+    rules = limit_state if isinstance(limit_state, LimitState) else LIMIT_STATES[limit_state]
     if abs(direction) != 1.0:
         raise InvalidInput(f"direction {direction!r}: give 1 to the right or -1 to the left")
     for name, value, most in (("q", q, 10.0), ("confidence_factor", confidence_factor, 2.0)):
@@ -383,7 +361,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     placed = PlacedBlocks.at_rest(stones, (*fill, *loads), float(direction))
     coefficient = stones.friction if friction else np.full(len(stones.joints), np.inf)
     mechanism = _find_first_mechanism(placed, joints, coefficient, friction)
-    oscillator = _Oscillator(placed, None, 0, bool(fill))
+    path, holds = None, 0
     if mechanism is not None:
         follower = PathFollower(placed, joints, coefficient)
         path = follower.follow(mechanism)
@@ -393,7 +371,8 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
                 "move if its faces slide without dilatancy: assess fewer blocks, or forbid sliding "
                 "(friction=None)"
             )
-        oscillator = _Oscillator(placed, path, follower.last_equilibrium(path), bool(fill))
+        holds = follower.last_equilibrium(path)
+    oscillator = _Oscillator(placed, path, holds, bool(fill))
     return _check(oscillator, spectrum, rules, q, confidence_factor)
 
 
@@ -434,18 +413,6 @@ def spectral_acceleration(
     held = np.minimum(periods, longest)
     beyond = np.where(periods > longest, longest / np.maximum(periods, 1e-9), 1.0)
     return np.asarray(factor * spectrum.horizontal(held) * beyond**2)
-
-
-def _parse_limit_state(limit_state: str | LimitState) -> LimitState:
-    """Return the rules of a limit state."""
-    if isinstance(limit_state, LimitState):
-        return limit_state
-    if not is_one_of(limit_state, LIMIT_STATES):
-        raise InvalidInput(
-            f"limit_state {limit_state!r} is not known: use one of {list(LIMIT_STATES)}, or give "
-            "the rules of another code as a LimitState"
-        )
-    return LIMIT_STATES[limit_state]
 
 
 def _check_structure(
@@ -556,15 +523,13 @@ class _Oscillator:
     def weights(self) -> tuple[Array, Array]:
         """Weights that move [N], and their virtual displacements along the forces [m/s]."""
         assert self.path is not None
-        body = self.path.mechanisms[0].body
-        moving = [(k, place, weight) for k, place, weight in self.placed.masses if body[k] >= 0]
-        speeds = [
-            self.path.velocity[k, 0]
-            - self.path.velocity[k, 2] * (place[1] - self.placed.centroids[k, 1])
-            for k, place, _ in moving
-        ]
-        weights = np.array([weight for _, _, weight in moving])
-        return weights, self.placed.direction * np.array(speeds)
+        speed, _, turn = self.path.velocity.T
+        weights, speeds = [], []
+        for k, place, weight in self.placed.masses:
+            if self.path.mechanisms[0].body[k] >= 0:
+                weights.append(weight)
+                speeds.append(speed[k] - turn[k] * (place[1] - self.placed.centroids[k, 1]))
+        return np.array(weights), self.placed.direction * np.array(speeds)
 
     @cached_property
     def control(self) -> int:
@@ -594,10 +559,13 @@ class _Oscillator:
                 own = self.placed.direction * self.path.velocity[self.control, 0]
                 moved = control / own * (weight @ speed**2) / (weight @ speed)
         acceleration = factors * self.placed.structure.gravity / self.e_star
-        units = {"d": "m", "a": "m/s2", "alpha": "1", "d_control": "m"}
-        values = {"d": moved, "a": acceleration, "alpha": factors, "d_control": control}
         return xr.Dataset(
-            {key: ("place", values[key], {"units": unit}) for key, unit in units.items()}
+            {
+                "d": ("place", moved, {"units": "m"}),
+                "a": ("place", acceleration, {"units": "m/s2"}),
+                "alpha": ("place", factors, {"units": "1"}),
+                "d_control": ("place", control, {"units": "m"}),
+            }
         )
 
     def notes(self, factor: float) -> list[str]:
@@ -643,42 +611,37 @@ def _check(
 ) -> KinematicAssessment:
     """Return the assessment of an oscillator under a spectrum."""
     curve, path, structure = oscillator.curve, oscillator.path, oscillator.placed.structure
-    moves = path is not None
-    alpha_0 = float(curve["alpha"][0]) if path is not None else np.inf
-    a_0 = float(curve["a"][0]) if moves else np.inf
-    falls = moves and path is not None and path.end is PathEnd.FALLS
-    last = float(curve["d"][-1]) if moves else np.inf
     ground = float(spectral_acceleration(spectrum, np.zeros(1), 0.05)[0])
-    linear = AssessmentCheck(
-        f"linear, q = {q:g}, FC = {confidence_factor:g}",
-        q * a_0 / confidence_factor,
-        ground,
-        "m/s²",
-        q * a_0 / confidence_factor / ground,
-        np.nan,
-        f"{CIRCOLARE}, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8",
-    )
-    mass = oscillator.weights[0].sum() / structure.gravity if moves else 0.0
-    displacement = None
-    if moves:
+    alpha_0, a_0, d_0, secant = np.inf, np.inf, np.inf, np.nan
+    mass, control, displacement = 0.0, "", None
+    if path is not None:
+        alpha_0, a_0 = float(curve["alpha"][0]), float(curve["a"][0])
+        mass = oscillator.e_star * (oscillator.weights[0].sum() / structure.gravity)
+        control = structure.blocks[oscillator.control].name
         starts = a_0 / confidence_factor / ground  # ratio at which the mechanism sets in motion
         displacement = _check_displacement(curve, spectrum, rules, confidence_factor, starts)
+        if path.end is PathEnd.FALLS:
+            d_0 = float(curve["d"][-1])
+            secant = secant_period(curve, 0.16 * d_0)
+    name = f"linear, q = {q:g}, FC = {confidence_factor:g}"
+    capacity = q * a_0 / confidence_factor
+    source = "Circolare 7/2019, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8"
     return KinematicAssessment(
         structure,
         spectrum,
         oscillator.placed.direction,
         alpha_0,
-        oscillator.e_star * mass if moves else 0.0,
+        mass,
         oscillator.e_star,
         a_0,
-        last if falls else np.inf,
-        secant_period(curve, 0.16 * last) if falls else np.nan,
+        d_0,
+        secant,
         curve,
-        linear,
+        AssessmentCheck(name, capacity, ground, "m/s²", capacity / ground, np.nan, source),
         displacement,
         rules,
         confidence_factor,
-        structure.blocks[oscillator.control].name if moves else "",
+        control,
         path,
         tuple(oscillator.notes(alpha_0)),
     )
@@ -686,9 +649,8 @@ def _check(
 
 def secant_period(curve: xr.Dataset, displacement: float) -> float:
     """Return the secant period of a capacity curve at a displacement [s]."""
-    acceleration = float(
-        np.interp(displacement, np.maximum.accumulate(curve["d"].values), curve["a"].values)
-    )
+    growing = np.maximum.accumulate(curve["d"].values)
+    acceleration = float(np.interp(displacement, growing, curve["a"].values))
     return float(2.0 * np.pi * np.sqrt(displacement / acceleration)) if acceleration else np.inf
 
 

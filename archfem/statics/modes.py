@@ -4,8 +4,10 @@ import hashlib
 from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from importlib.util import find_spec
 from numbers import Integral
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -142,13 +144,12 @@ def _find_cached_modes(
             digest.update(part.tobytes())
     key = digest.hexdigest()
     if key not in _mode_cache:
+        solver: Any = dense_eigensolver
         if by_slepc:
             with require_package("SLEPc"):
-                from archfem.statics import slepc_eigensolver
-            _mode_cache[key] = slepc_eigensolver.find_lowest_modes(stiffness, mass, count)
-        else:
-            _mode_cache[key] = dense_eigensolver.find_lowest_modes(stiffness, mass, count)
-        while len(_mode_cache) > cache_size:
+                solver = import_module("archfem.statics.slepc_eigensolver")
+        _mode_cache[key] = solver.find_lowest_modes(stiffness, mass, count)
+        if len(_mode_cache) > cache_size:
             _mode_cache.popitem(last=False)
     _mode_cache.move_to_end(key)
     return _mode_cache[key]

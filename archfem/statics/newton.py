@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
@@ -18,7 +19,10 @@ from archfem._optional import require_package
 from archfem._typing import Array
 from archfem._validation import check_number, check_type
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.statics.newton_iteration import Equations, NewtonEngine, Residual, ScipyNewton, Tangent
+from archfem.statics.newton_iteration import Equations, Residual, ScipyNewton, Tangent
+
+if TYPE_CHECKING:
+    from archfem.statics.snes import PetscNewton
 
 # Residual, relative to the load, above which it cannot be round-off [-]
 MAX_ROUND_OFF_RESIDUAL = 1e-7
@@ -87,8 +91,7 @@ class EquilibriumSolver:
         equations = Equations(residual, self._check_tangents(tangent), self._is_converged)
         iterations = 0
         for search in searches:
-            light = self._scipy_engine if search == "basic" else None
-            engine = self._engine if light is None else light
+            engine = (self._scipy_engine if search == "basic" else None) or self._engine
             # more than a dozen full steps are a cycle of joint statuses
             attempt = engine.attempt(equations, start, search, 12 if search == "basic" else 60)
             iterations += attempt.iterations
@@ -103,7 +106,7 @@ class EquilibriumSolver:
         )
 
     @cached_property
-    def _engine(self) -> NewtonEngine:
+    def _engine(self) -> "ScipyNewton | PetscNewton":
         """Engine for large systems, loaded when it is first needed: PETSc is slow to initialise."""
         if find_spec("petsc4py") is None and not self.settings.petsc:
             return ScipyNewton()

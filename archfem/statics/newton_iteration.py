@@ -1,4 +1,4 @@
-"""Newton iterations on SciPy's sparse factors, and the protocol of both Newton engines.
+"""Newton iterations on SciPy's sparse factors, and the equations of both Newton engines.
 
 Small systems, and systems without PETSc, are solved here; `snes` solves the others. The line
 searches are those of SNES: none ("basic"), for the point where the slope of the energy vanishes
@@ -6,7 +6,7 @@ searches are those of SNES: none ("basic"), for the point where the slope of the
 """
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -40,16 +40,6 @@ class Attempt(NamedTuple):
     iterations: int  # of Newton's method
     residual: float  # Euclidean norm
     failure: str  # reason; "" where it has converged
-
-
-class NewtonEngine(Protocol):
-    """Newton's method, by one library or another."""
-
-    def attempt(
-        self, equations: Equations, start: Array, search: str, max_iterations: int
-    ) -> Attempt:
-        """Iterate from a start with one line search."""
-        ...
 
 
 class ScipyNewton:

@@ -256,18 +256,13 @@ def stop_reason(path: Path, stop: Stop, criteria: Criteria, step: Array) -> str 
     if displacement >= stop.displacement * path.model.structure.size:
         return f"the {path.moving} moved by {displacement:.3g} m"
     if stop.hinges is not None:
-        joints = joint_dataset(path.model.structure, path.joint_forces[-1], criteria=criteria)
-        count = int((joints["hinge"] != 0).sum())
+        count = int((_last_joints(path, criteria)["hinge"] != 0).sum())
         if count >= stop.hinges:
             return f"{count} joints hinge"
     # Share of all displacement by which the path must progress. How fast it crawls depends on
     # round-off, so that most paths that take all their steps crawl.
     is_last = len(path.states) > stop.steps
-    if (
-        len(path.states) > STAGNATION_STEPS
-        and _is_stagnating(path, 0.1 if is_last else 0.01)
-        and sliding_joints(path, criteria)
-    ):
+    if _is_stagnating(path, 0.1 if is_last else 0.01) and sliding_joints(path, criteria):
         return (
             f"it crawls: in {STAGNATION_STEPS} steps the {path.moving} moved by less than a tenth "
             f"of {displacement:.3g} m, and the factor went no further than {path.factors[-1]:.5g}"
@@ -277,6 +272,8 @@ def stop_reason(path: Path, stop: Stop, criteria: Criteria, step: Array) -> str 
 
 def _is_stagnating(path: Path, share: float) -> bool:
     """Return whether displacement and factor change too little, although each step has a state."""
+    if len(path.states) <= STAGNATION_STEPS:
+        return False
     before, after = path.displacements[[-STAGNATION_STEPS, -1]]
     first, last = np.array(path.factors)[[-STAGNATION_STEPS, -1]]
     change = abs(last - first) / max(abs(last), np.finfo(float).tiny)
@@ -285,8 +282,13 @@ def _is_stagnating(path: Path, share: float) -> bool:
 
 def sliding_joints(path: Path, criteria: Criteria) -> list[str]:
     """Return the names of the joints that slide in the last state."""
-    joints = joint_dataset(path.model.structure, path.joint_forces[-1], criteria=criteria)
+    joints = _last_joints(path, criteria)
     return [str(name) for name in joints["name"].values[joints["slide"].values]]
+
+
+def _last_joints(path: Path, criteria: Criteria) -> xr.Dataset:
+    """Return the joints in the last state."""
+    return joint_dataset(path.model.structure, path.joint_forces[-1], criteria=criteria)
 
 
 def continue_by_relaxation(path: Path, stop: Stop, criteria: Criteria) -> str | None:
@@ -387,13 +389,11 @@ def _extrapolate_limit(displacements: Array, factors: Array) -> tuple[float, flo
     flat = 1e-6 * abs(last)
     if abs(last - before) * shortness <= flat:  # the limit is reached
         return last, flat
-    if len(factors) == 2:  # one step defines no curve
-        return float("nan"), float("nan")
     half = min(int(np.searchsorted(displacements, 0.5 * displacements[-1])), len(factors) - 2)
     x = np.maximum(displacements, displacements[1]) ** -0.5
-    if x[half] <= x[-1]:  # the load moves back
-        return float("nan"), float("nan")
-    beyond = (last - float(factors[half])) * x[-1] / (x[half] - x[-1])
-    if abs(beyond) > 0.2 * abs(last):  # too far for the asymptote to hold
-        return float("nan"), float("nan")
-    return last + beyond, abs(beyond)
+    # one step defines no curve, and no load that moves back has an asymptote
+    if len(factors) > 2 and x[half] > x[-1]:
+        beyond = (last - float(factors[half])) * x[-1] / (x[half] - x[-1])
+        if abs(beyond) <= 0.2 * abs(last):  # beyond that the asymptote does not hold
+            return last + beyond, abs(beyond)
+    return float("nan"), float("nan")

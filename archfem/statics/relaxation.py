@@ -25,6 +25,7 @@ Nečas, Handbook of Numerical Analysis IV (1996).
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from scipy import sparse
@@ -149,13 +150,10 @@ def _solve_with_drag(
         total.data = stiffness.data + drag.data
         return total
 
-    return solver.solve(
-        lambda q: model.force(q) - load + drag @ (q - origin),
-        tangent,
-        guess,
-        load_magnitude(load),
-        searches,
-    )
+    def residual(q: Array) -> Array:
+        return model.force(q) - load + drag @ (q - origin)
+
+    return solver.solve(residual, tangent, guess, load_magnitude(load), searches)
 
 
 def _relaxation_tolerance(solver: EquilibriumSolver, model: Model, q: Array, scale: float) -> float:
@@ -221,11 +219,8 @@ def linear_predictor(model: Model, q: Array, motion: Array) -> Array:
         return q
 
 
-def solve_local(
-    solver: EquilibriumSolver, model: Model, load: Array, start: Array
-) -> tuple[Model, Solution]:
-    """Find an equilibrium near the start, by a few full Newton steps."""
-    return solve_irreversible(solver, model, load, start, ("basic",))
+# Finds an equilibrium near the start, by a few full Newton steps
+solve_local = partial(solve_irreversible, searches=("basic",))
 
 
 def solve_or_relax(

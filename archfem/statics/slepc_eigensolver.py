@@ -13,7 +13,7 @@ from scipy import sparse
 from archfem._petsc import PETSc, SLEPc
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
-from archfem.statics.dense_eigensolver import mechanism_message, zero_threshold
+from archfem.statics.dense_eigensolver import check_lowest, zero_threshold
 
 
 def count_modes_below(stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, square: float) -> int:
@@ -34,8 +34,7 @@ def find_lowest_modes(
 ) -> tuple[Array, Array]:
     """Find the lowest ω² and their shapes, with φᵀ M φ = 1."""
     zero = zero_threshold(stiffness, mass)
-    if zero <= 0.0:
-        raise DidNotConverge(mechanism_message(0.0, zero))
+    check_lowest(0.0, -zero)
     # a shift just below zero: K + zero M is regular for any structure that stands
     solver = _create_solver(_to_petsc(stiffness), _to_petsc(mass), count, -zero)
     solver.setTolerances(accuracy, iterations)
@@ -49,8 +48,7 @@ def find_lowest_modes(
     squares, shapes = _read_pairs(solver, converged, mass.shape[0])
     order = np.argsort(squares)[:count]
     squares, shapes = squares[order], shapes[:, order]
-    if _count_negative_pivots(solver) or squares[0] <= zero:
-        raise DidNotConverge(mechanism_message(float(squares[0]), zero))
+    check_lowest(float(squares[0]), np.inf if _count_negative_pivots(solver) else zero)
     # Count modes below the highest one; those within 1e-6 of it count as equal and are left out.
     edge = float(squares[-1]) * (1.0 - 1e-6)
     below, expected = int(np.sum(squares < edge)), check(stiffness, mass, edge)

@@ -49,9 +49,8 @@ class PetscNewton:
         self._equations = equations
         if self._matrix is None:
             first = self._loaded = equations.tangent(start)
-            self._matrix = PETSc.Mat().createAIJ(
-                first.shape, csr=(first.indptr, first.indices, first.data)
-            )
+            entries = first.indptr, first.indices, first.data
+            self._matrix = PETSc.Mat().createAIJ(first.shape, csr=entries)
         if search not in self._snes:
             self._snes[search] = self._create_snes(search, max_iterations)
         snes = self._snes[search]

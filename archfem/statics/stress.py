@@ -171,11 +171,8 @@ def utilisation(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
         `joint_stress` over the strength of the weaker of the two blocks, over joint, or time and
         joint [-]; NaN where neither has a strength.
     """
-    strengths = [
-        [strength for k in joint.blocks if (strength := structure.blocks[k].material.strength)]
-        for joint in structure.joints
-    ]
-    weaker = xr.DataArray([min(pair, default=np.nan) for pair in strengths], dims="joint")
+    strength = np.array([block.material.strength or np.nan for block in structure.blocks])
+    weaker = xr.DataArray(np.fmin(*strength[structure.pairs].T), dims="joint")
     share = joint_stress(structure, joints) / weaker
     return share.rename("utilisation").assign_attrs(units="1")
 
@@ -193,30 +190,27 @@ def strength_use_table(use: xr.Dataset) -> str:
         in_part = use.isel(block=np.flatnonzero(use["part"].values == part))
         pressed, pulled = _largest(in_part, "compression"), _largest(in_part, "tension")
         share = float(pressed["use"])
-        rows.append(
-            [
-                str(part) or "(no name)",
-                f"{float(pressed['compression']) / MPa:.3f} MPa",
-                str(pressed["name"].values),
-                "-" if np.isnan(share) else f"{share:.2%}",
-                f"{float(pulled['tension']) / MPa:.3f} MPa",
-                str(pulled["name"].values),
-            ]
-        )
+        use_text = "-" if np.isnan(share) else f"{share:.2%}"
+        row = [str(part) or "(no name)", _in_mpa(pressed["compression"])]
+        row += [str(pressed["name"].values), use_text]
+        rows.append([*row, _in_mpa(pulled["tension"]), str(pulled["name"].values)])
     return align_columns(head, rows)
 
 
 def strength_use_text(use: xr.Dataset) -> str:
     """Return the largest compression and tension of all blocks as text."""
     pressed, pulled = _largest(use, "compression"), _largest(use, "tension")
-    share = float(pressed["use"])
-    strength = f"{float(pressed['strength']) / MPa:.3g} MPa"
-    of = "" if np.isnan(share) else f" ({share:.2%} of strength {strength})"
+    share, strength = float(pressed["use"]), float(pressed["strength"]) / MPa
+    of = "" if np.isnan(share) else f" ({share:.2%} of strength {strength:.3g} MPa)"
     return (
-        f"largest compression {float(pressed['compression']) / MPa:.3f} MPa in "
-        f"{_block_label(pressed)}{of}, "
-        f"largest tension {float(pulled['tension']) / MPa:.3f} MPa in {_block_label(pulled)}"
+        f"largest compression {_in_mpa(pressed['compression'])} in {_block_label(pressed)}{of}, "
+        f"largest tension {_in_mpa(pulled['tension'])} in {_block_label(pulled)}"
     )
+
+
+def _in_mpa(stress: xr.DataArray) -> str:
+    """Return a stress as text."""
+    return f"{float(stress) / MPa:.3f} MPa"
 
 
 def utilisation_text(structure: Structure, joints: xr.Dataset) -> str:
@@ -269,11 +263,9 @@ def _fit_planes(cells: Cells, min_cells: int = 4) -> sparse.csr_matrix:
     # Each plane is fitted to the cells around a corner, by least squares. Where these are too few,
     # as at the faces of a block, their neighbours are included; `min_cells` is one more than a
     # plane needs. No fit reaches across a joint. A linear stress field is recovered exactly.
-    sizes = [len(cell) for cell in cells.polygons]
+    sizes, shape = [len(cell) for cell in cells.polygons], (len(cells.places), len(cells.polygons))
     entries = (np.concatenate(cells.polygons), np.repeat(np.arange(len(sizes)), sizes))
-    touching = sparse.csr_matrix(
-        (np.ones(sum(sizes)), entries), (len(cells.places), len(cells.polygons))
-    )
+    touching = sparse.csr_matrix((np.ones(sum(sizes)), entries), shape)
     few = sparse.diags((np.diff(touching.indptr) < min_cells).astype(float))
     row, column = (touching + few @ touching @ (touching.T @ touching)).nonzero()
     # centroid of the centres around each corner, and second moments about it

@@ -50,15 +50,16 @@ def test_outlines_are_the_same_to_a_millionth_of_their_area(share, same):
 
 
 @pytest.mark.parametrize(
-    ("fixed", "refused"), [([True, True], False), ([True, False], True), (None, True)]
+    ("body", "refused"),
+    [(np.array([-1, -1]), False), (np.array([-1, 1]), True), (None, True)],
 )
-def test_it_does_not_matter_between_supports(fixed, refused):
+def test_it_does_not_matter_between_supports(body, refused):
     outlines = [box(0.0, 0.0), box(0.5, 0.0)]
     if refused:
         with pytest.raises(af.errors.InvalidStructure, match="overlap"):
-            check_overlaps(outlines, NAMES, fixed=fixed)
+            check_overlaps(outlines, NAMES, body=body)
     else:
-        check_overlaps(outlines, NAMES, fixed=fixed)
+        check_overlaps(outlines, NAMES, body=body)
 
 
 def test_outlines_that_cross_themselves_are_refused_either_way_round():

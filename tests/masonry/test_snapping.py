@@ -7,7 +7,7 @@ import pytest
 from drawn import assert_same, geojson, square
 
 import archfem as af
-from archfem.masonry.survey.snapping import _area
+from archfem.masonry.block import measure_polygon
 
 
 @pytest.mark.parametrize(("error", "snap"), [(0.5e-3, 2e-3), (2e-3, 8e-3), (8e-3, 0.03)])
@@ -134,5 +134,5 @@ def test_areas_have_the_sense_of_their_outline():
     outlines = {4.5: [[0, 0], [3, 0], [1, 3]], 1.0: square(0, 0), 4.0: angle}
     for area, outline in outlines.items():
         points = np.array(outline, float) + np.array([100.0, -50.0])
-        assert _area(points) == pytest.approx(area)
-        assert _area(points[::-1]) == pytest.approx(-area)
+        assert measure_polygon(points)[0] == pytest.approx(area)
+        assert measure_polygon(points[::-1])[0] == pytest.approx(-area)

@@ -8,9 +8,8 @@ import pytest
 
 import archfem as af
 from archfem.motion import RecordText
-from archfem.motion.records.keyed import AFAD, CWB, ESM, KNET, UNAM
+from archfem.motion.records.keyed import AFAD, CWB, ESM, KNET, PEER, UNAM
 from archfem.motion.records.numeric_headers import COSMOS, SMC
-from archfem.motion.records.peer import PEER
 from archfem.motion.records.reader import read_channels, read_components
 from archfem.motion.records.volumes import BHRC, CSMIP, VOLUME_1
 

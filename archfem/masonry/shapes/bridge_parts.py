@@ -53,19 +53,16 @@ class Arch:
         if (self.embrace is None) == (self.rise is None):
             raise InvalidStructure(f"'{self.name}': give either embrace or rise, the other follows")
         _check_lengths(self, "span", "thickness", *(["rise"] if self.embrace is None else []))
-        if self.rise is not None:
-            if self.rise > self.span / 2.0:
-                raise InvalidStructure(
-                    f"'{self.name}': rise {self.rise:.4g} m is above half the span "
-                    f"{self.span:.4g} m: an arch by span and rise is at most a semicircle; give "
-                    "span and embrace beyond"
-                )
-            return
-        embrace = in_degrees(self.embrace, f"'{self.name}': embrace")
-        object.__setattr__(self, "embrace", embrace)
-        if not 0.0 < embrace < 360.0:
+        if self.rise is None:
+            embrace = in_degrees(self.embrace, f"'{self.name}': embrace")
+            object.__setattr__(self, "embrace", embrace)
+            if not 0.0 < embrace < 360.0:
+                problem = f"embrace {embrace:.4g}° is not between 0° and 360°"
+                raise InvalidStructure(f"'{self.name}': {problem}")
+        elif self.rise > self.span / 2.0:
             raise InvalidStructure(
-                f"'{self.name}': embrace {embrace:.4g}° is not between 0° and 360°"
+                f"'{self.name}': rise {self.rise:.4g} m is above half the span {self.span:.4g} m: "
+                "an arch by span and rise is at most a semicircle; give span and embrace beyond"
             )
 
     @property

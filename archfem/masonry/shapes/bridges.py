@@ -78,14 +78,8 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
     def select_contact(a: Block, b: Block) -> Contact:
         return soil if "backfill" in (a.part, b.part) else contact
 
-    return assembled(
-        builder.blocks,
-        select_contact,
-        joints=builder.joints,
-        width=width,
-        gravity=gravity,
-        name="bridge",
-    )
+    common: dict[str, Any] = {"width": width, "gravity": gravity, "name": "bridge"}
+    return assembled(builder.blocks, select_contact, joints=builder.joints, **common)
 
 
 def _check_parts(
@@ -175,22 +169,11 @@ def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one st
     Raises:
         InvalidStructure: the lengths do not fit together.
     """
-    return arcade(
-        spans=[span],
-        rises=rise,
-        embraces=embrace,
-        measured=measured,
-        heights=height,
-        breadths=breadth,
-        thicknesses=thickness,
-        voussoirs=voussoirs,
-        course=course,
-        chords=chords,
-        width=width,
-        material=material,
-        contact=contact,
-        gravity=gravity,
-    )
+    of_arch: dict[str, Any] = {"spans": [span], "rises": rise, "embraces": embrace}
+    of_arch |= {"thicknesses": thickness, "voussoirs": voussoirs, "measured": measured}
+    common: dict[str, Any] = {"material": material, "contact": contact, "gravity": gravity}
+    common |= {"course": course, "chords": chords, "width": width}
+    return arcade(heights=height, breadths=breadth, **of_arch, **common)
 
 
 @validate_arguments
@@ -239,18 +222,10 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
     of_rings = _expand_values(
         count, thicknesses=thicknesses, voussoirs=voussoirs, rises=rises, embraces=embraces
     )
-    arches = [
-        Arch(
-            span=span,
-            thickness=thick,
-            voussoirs=stones,
-            rise=rise,
-            embrace=turn,
-            measured=measured,
-            name=f"arch {k}",
-        )
-        for k, (span, thick, stones, rise, turn) in enumerate(zip(spans, *of_rings, strict=True), 1)
-    ]
+    arches = []
+    for k, (span, *of_ring) in enumerate(zip(spans, *of_rings, strict=True), 1):
+        keys = dict(zip(("thickness", "voussoirs", "rise", "embrace"), of_ring, strict=True))
+        arches.append(Arch(span=span, measured=measured, name=f"arch {k}", **keys))
     # A pier is flush with the intrados of its rings: half their springing joints stand on it.
     reach = [0.0, *(arch.reach for arch in arches), 0.0]
     of_piers = _expand_values(count + 1, breadths=breadths, heights=heights)
@@ -260,15 +235,8 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
             zip(*of_piers, reach[1:], reach[:-1], strict=True), 1
         )
     ]
-    return bridge(
-        arches=arches,
-        piers=piers,
-        chords=chords,
-        width=width,
-        material=material,
-        contact=contact,
-        gravity=gravity,
-    )
+    common: dict[str, Any] = {"material": material, "contact": contact, "gravity": gravity}
+    return bridge(arches=arches, piers=piers, chords=chords, width=width, **common)
 
 
 def _expand_values(count: int, **values: Any) -> list[list[Any]]:

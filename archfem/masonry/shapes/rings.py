@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import acos, asin, atan2, degrees, isfinite, pi, radians, sin, tan
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +18,10 @@ from archfem._validation import (
     check_integer,
     check_number,
     check_numbers,
-    check_sequence,
     validate_arguments,
 )
 from archfem.errors import InvalidStructure
-from archfem.masonry.block import Block, Point
+from archfem.masonry.block import Block, Point, check_points
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.structure import Joint, Structure
 from archfem.units import G, in_degrees
@@ -71,9 +71,8 @@ class RingGeometry:
         abutment_depth: float | None = None,
     ) -> Structure:
         """Assemble stones, from left to right, between two fixed abutments."""
-        sections = [(inner[0], outer[0]) for inner, outer in stones]
-        sections.append((stones[-1][0][-1], stones[-1][1][-1]))
-        faces = [(_as_point(inner), _as_point(outer)) for inner, outer in sections]
+        faces = [(_as_point(inner[0]), _as_point(outer[0])) for inner, outer in stones]
+        faces.append((_as_point(stones[-1][0][-1]), _as_point(stones[-1][1][-1])))
         blocks = [
             Block(
                 # anticlockwise: along the intrados, and back along the extrados
@@ -87,9 +86,8 @@ class RingGeometry:
             )
             for k, (inner, outer) in enumerate(stones, 1)
         ]
-        depth = abutment_depth
-        if depth is None:
-            depth = 0.5 * float(np.linalg.norm(np.subtract(*faces[0])))
+        half = 0.5 * float(np.linalg.norm(np.subtract(*faces[0])))
+        depth = half if abutment_depth is None else abutment_depth
         left = _build_abutment(faces[0], -1.0, depth, self.material, "left abutment")
         right = _build_abutment(faces[-1], 1.0, depth, self.material, "right abutment")
         joints = [
@@ -155,25 +153,20 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     half = radians(embrace) / 2.0
     angles = np.linspace(-half, half, voussoirs * pieces + 1)
     inner, outer = radius - thickness / 2.0, radius + thickness / 2.0
-    faces = [
-        np.array([(r * np.sin(angle), r * np.cos(angle)) for angle in angles])
-        for r in (inner, outer)
-    ]
+    unit = np.column_stack([np.sin(angles), np.cos(angles)])
     # Sectors have their true area and centroid; stones with chords are plain polygons.
     centre = (0.0, 0.0) if chords is None else None
     # Beyond a semicircle the abutments approach each other: they must not meet.
     depth = thickness / 2.0 if half < 0.5 * pi else min(thickness / 2.0, 0.9 * inner * sin(half))
     ring = RingGeometry(thickness, voussoirs, pieces, width, material, contact, gravity)
-    return ring.assemble(ring.split(*faces), "circular arch", centre, depth)
+    return ring.assemble(ring.split(inner * unit, outer * unit), "circular arch", centre, depth)
 
 
 def _check_division(embrace: float, voussoirs: int, pieces: int) -> tuple[int, int]:
     """Check the number of voussoirs and of straight pieces of each."""
-    # limit for the number of voussoirs, and of chords of each
-    max_voussoirs = 10_000
     for key, count in (("voussoirs", voussoirs), ("chords", pieces)):
-        if not 1 <= check_number(count, key) <= max_voussoirs or count != int(count):
-            raise InvalidStructure(f"{key} {count} is not a whole number from 1 to {max_voussoirs}")
+        if not 1 <= check_number(count, key) <= 10_000 or count != int(count):
+            raise InvalidStructure(f"{key} {count} is not a whole number from 1 to 10000")
     turn = embrace / int(voussoirs) / int(pieces)
     if turn > 120.0:
         raise InvalidStructure(f"a stone turns {turn:.4g}° in one piece: use more voussoirs")
@@ -215,27 +208,12 @@ def column(
             f"a column of breadth {breadth} m and heights {list(heights)} m: give lengths above 0"
         )
     half, levels = breadth / 2.0, _bed_levels(heights)
-    blocks = _stack_blocks(0.0, breadth, levels, material, "column", ("base", "block"))
+    blocks = _stack_blocks(0.0, breadth, levels, material, "column")
     joints = [
         Joint((k, k + 1), (-half, y), (half, y), contact, f"joint {k}", "column", "pier")
         for k, y in enumerate(levels[1:-1])
     ]
     return Structure(tuple(blocks), tuple(joints), width, gravity, "column")
-
-
-def _check_pier(
-    pier_breadth: float, courses: Sequence[float], thickness: float, radius: float
-) -> tuple[float, ...]:
-    """Check the breadth and the courses of a pier below a ring; return the courses."""
-    heights = check_numbers(courses, "heights of the courses [m]")
-    if not thickness <= check_number(pier_breadth, "pier_breadth [m]") < 2.0 * radius:
-        raise InvalidStructure(
-            f"pier_breadth {pier_breadth:.3g} m is not between the ring's thickness "
-            f"{thickness:.3g} m and twice its radius {radius:.3g} m"
-        )
-    if not heights or min(heights) <= 0.0:
-        raise InvalidStructure(f"courses {list(heights)} m: give at least one height above 0")
-    return heights
 
 
 def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one structure)
@@ -273,30 +251,27 @@ def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one stru
     Raises:
         InvalidStructure: the lengths do not form a ring, or it does not rest on its piers.
     """
-    ring = circular_arch(
-        radius=radius,
-        thickness=thickness,
-        embrace=180.0,
-        voussoirs=voussoirs,
-        material=material,
-        chords=chords,
-    )
-    levels = _bed_levels(_check_pier(pier_breadth, courses, thickness, radius))
+    stones: dict[str, Any] = {"thickness": thickness, "voussoirs": voussoirs, "material": material}
+    ring = circular_arch(radius=radius, embrace=180.0, chords=chords, **stones)
+    heights = check_numbers(courses, "heights of the courses [m]")
+    if not thickness <= check_number(pier_breadth, "pier_breadth [m]") < 2.0 * radius:
+        raise InvalidStructure(
+            f"pier_breadth {pier_breadth:.3g} m is not between the ring's thickness "
+            f"{thickness:.3g} m and twice its radius {radius:.3g} m"
+        )
+    if not heights or min(heights) <= 0.0:
+        raise InvalidStructure(f"courses {list(heights)} m: give at least one height above 0")
+    levels = _bed_levels(heights)
     # The springings are at y = 0, at the level of the centre of the ring.
     levels = [level - levels[-1] for level in levels]
-    left, right = (
-        _stack_blocks(
-            x, pier_breadth, levels, material, part, (f"{part} foundation", f"{part} course")
-        )
-        for x, part in ((-radius, "left pier"), (radius, "right pier"))
-    )
+    left = _stack_blocks(-radius, pier_breadth, levels, material, "left pier", "left pier ")
+    right = _stack_blocks(radius, pier_breadth, levels, material, "right pier", "right pier ")
     # The top courses of the piers take the place of the abutments.
     blocks = (*left, *ring.blocks[1:-1], *reversed(right))
-    inner = -radius + pier_breadth / 2.0, radius - pier_breadth / 2.0
-    outer = -radius - pier_breadth / 2.0, radius + pier_breadth / 2.0
-    beds = [((inner[0], y), (outer[0], y), "left pier", "pier") for y in levels[1:-1]]
+    inner, outer = radius - pier_breadth / 2.0, radius + pier_breadth / 2.0
+    beds = [((-inner, y), (-outer, y), "left pier", "pier") for y in levels[1:-1]]
     beds += [(each.intrados, each.extrados, "arch", "ring") for each in ring.joints]
-    beds += [((inner[1], y), (outer[1], y), "right pier", "pier") for y in reversed(levels[1:-1])]
+    beds += [((inner, y), (outer, y), "right pier", "pier") for y in reversed(levels[1:-1])]
     joints = tuple(
         Joint((k, k + 1), intrados, extrados, contact, f"joint {k}", part, role)
         for k, (intrados, extrados, part, role) in enumerate(beds)
@@ -316,34 +291,23 @@ def _stack_blocks(
     levels: Sequence[float],
     material: Material,
     part: str,
-    names: tuple[str, str],
+    prefix: str = "",
 ) -> list[Block]:
     """Build rectangular blocks between levels; the lowest is fixed and has its own name."""
-    left, right = middle - breadth / 2.0, middle + breadth / 2.0
-    return [
-        Block(
-            ((left, top), (left, low), (right, low), (right, top)),
-            material,
-            f"{names[1]} {k}" if k else names[0],
-            fixed=k == 0,
-            corners=(0, 1, 2, 3),
-            part=part,
-            role="pier",
-        )
-        for k, (low, top) in enumerate(pairwise(levels))
-    ]
+    base, course = ("foundation", "course") if prefix else ("base", "block")
+    left, right, blocks = middle - breadth / 2.0, middle + breadth / 2.0, []
+    for k, (low, top) in enumerate(pairwise(levels)):
+        outline = (left, top), (left, low), (right, low), (right, top)
+        name = prefix + (f"{course} {k}" if k else base)
+        blocks.append(Block(outline, material, name, k == 0, (0, 1, 2, 3), part, role="pier"))
+    return blocks
 
 
 def _resolve_circle(
-    radius: float | None,
-    embrace: float | str | None,
-    span: float | None,
-    rise: float | None,
-    thickness: float,
+    radius: float | None, embrace: Any, span: float | None, rise: float | None, thickness: float
 ) -> tuple[float, float]:
     """Return radius of the centre line and embrace from either pair of lengths."""
-    lengths = {"radius [m]": radius, "span [m]": span, "rise [m]": rise}
-    for name, value in lengths.items():
+    for value, name in ((radius, "radius [m]"), (span, "span [m]"), (rise, "rise [m]")):
         if value is not None:
             check_number(value, name)
     if radius is not None and embrace is not None and span is None and rise is None:
@@ -367,10 +331,9 @@ def _build_abutment(
     face: tuple[Point, Point], side: float, depth: float, material: Material, name: str
 ) -> Block:
     """Build the fixed block behind a springing joint."""
-    inner, outer = np.array(face[0]), np.array(face[1])
-    radial = (outer - inner) / np.linalg.norm(outer - inner)
-    shift = side * depth * np.array([radial[1], -radial[0]])
-    near, far = (face[0], face[1]), (tuple(inner + shift), tuple(outer + shift))
+    near = np.array(face)
+    radial = (near[1] - near[0]) / np.linalg.norm(near[1] - near[0])
+    far = near + side * depth * np.array([radial[1], -radial[0]])
     start, end = (near, far) if side > 0 else (far, near)
     outline = tuple((float(x), float(y)) for x, y in (start[0], end[0], end[1], start[1]))
     return Block(outline, material, name, fixed=True, corners=(0, 1, 2, 3), part=name, role="other")
@@ -557,11 +520,7 @@ def arch_along(
     """
     ring = RingGeometry(thickness, voussoirs, chords, width, material, contact, gravity)
     ring.check()
-    rows = [
-        check_numbers(point, f"intrados[{k}] [m]", 2)
-        for k, point in enumerate(check_sequence(intrados, "intrados"))
-    ]
-    points = np.array(rows, dtype=float)
+    points = np.array(check_points(intrados, "intrados"))
     if len(points) < 3 or np.any(np.all(np.diff(points, axis=0) == 0.0, axis=1)):
         raise InvalidStructure(
             f"an intrados of {len(points)} points: give at least three, no two alike in a row"

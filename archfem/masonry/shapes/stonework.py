@@ -10,7 +10,7 @@ import numpy as np
 
 from archfem._validation import count_pieces
 from archfem.errors import InvalidStructure
-from archfem.masonry.block import Block, Point, check_overlaps, check_simple
+from archfem.masonry.block import Block, Point, check_overlaps
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.shapes.bridge_parts import Arch, Paving, Pier, Sidewall
 from archfem.masonry.shapes.rings import circular_arch
@@ -40,15 +40,12 @@ def build_ring(
     def at(point: Point) -> Point:
         return (float(point[0] + right), float(point[1] + up))
 
+    part: dict[str, Any] = {"part": arch.name, "role": arch.role}
     blocks = [
         replace(
-            block,
-            outline=tuple(map(at, block.outline)),
-            name=f"{arch.name}, {block.name}",
-            part=arch.name,
-            role=arch.role,
+            each, outline=tuple(map(at, each.outline)), name=f"{arch.name}, {each.name}", **part
         )
-        for block in ring.blocks
+        for each in ring.blocks
     ]
     joints = [
         replace(each, intrados=at(each.intrados), extrados=at(each.extrados), part=arch.name)
@@ -61,16 +58,20 @@ def extrados_points(ring: Structure) -> list[Point]:
     """Return the points along the extrados of a ring, from left to right [m]."""
     points = [ring.joints[0].extrados]
     for block in ring.blocks[1:-1]:
-        half = len(block.outline) // 2  # the extrados is the second half, from the right
-        points += list(reversed(block.outline[half:-1]))
+        # the extrados is the second half, from the right
+        points += reversed(block.outline[len(block.outline) // 2 : -1])
     return points
 
 
 # Depth of the fixed blocks under piers and behind walls [m]; they do not deform.
 FOUNDATION_DEPTH = 0.2
 
-# A part that consists of courses
+# A part with stones and joints of its own, and one that consists of courses
+Part = Arch | Pier | Sidewall
 Courses = Pier | Sidewall
+
+# Levels [m], or distances along the bridge [m]
+Pair = tuple[float, float]
 
 
 def fill_ledge(face: Face, inward: float, walls: Sequence[Sidewall]) -> list[Point]:
@@ -109,17 +110,16 @@ class StoneworkBuilder:
         springings = [(faces[0], faces[-1]) for faces in joints]
         support = self._build_end(springings[0][0], 1.0, ends[:1], "left abutment")
         for number, (arch, ring) in enumerate(zip(arches, rings, strict=True)):
-            first = len(self.blocks)
+            stones = [support, *range(len(self.blocks), len(self.blocks) + len(ring.blocks) - 2)]
             self.blocks += ring.blocks[1:-1]  # its abutments are the supports of this bridge
-            last, right = len(self.blocks) - 1, springings[number][1]
+            right = springings[number][1]
             if number < len(piers):
-                after = self._build_pier(piers[number], right, springings[number + 1][0])
+                support = self._build_pier(piers[number], right, springings[number + 1][0])
             else:
-                after = self._build_end(right, -1.0, ends[1:], "right abutment")
-            stones = [support, *range(first, last + 1), after]
-            for k, (pair, face) in enumerate(zip(pairwise(stones), joints[number], strict=True)):
+                support = self._build_end(right, -1.0, ends[1:], "right abutment")
+            pairs = pairwise([*stones, support])
+            for k, (pair, face) in enumerate(zip(pairs, joints[number], strict=True)):
                 self._add_joint(pair, face, f"joint {k}", arch)
-            support = after
         return springings, [extrados_points(ring) for ring in rings]
 
     def add(
@@ -142,52 +142,35 @@ class StoneworkBuilder:
         if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) < 0.0:
             points = [points[0], *reversed(points[1:])]
         corners = (0, 1, 2, 3) if structured else None
-        self.blocks.append(
-            Block(
-                tuple(points),
-                material or self.material,
-                name,
-                fixed,
-                corners,
-                part or name,
-                role=role,
-            )
-        )
+        given = tuple(points), material or self.material, name, fixed, corners, part or name
+        self.blocks.append(Block(*given, role=role))
         return len(self.blocks) - 1
 
     def pave(self, surface: Sequence[Point], paving: Paving) -> None:
         """Lay paving stones on a surface."""
         # Stones end where the slope of the surface changes.
         breaks, levels = np.array(surface).T
-        parts = [
-            np.linspace(a, b, count_pieces(b - a, paving.length, "paving stones") + 1)[:-1]
-            for a, b in pairwise(breaks)
-        ]
-        x = np.append(np.concatenate(parts), breaks[-1])
-        y = np.interp(x, breaks, levels)
-        for k in range(len(x) - 1):
-            low = [(x[k], y[k]), (x[k + 1], y[k + 1])]
+        x: list[float] = []
+        for a, b in pairwise(breaks):
+            count = count_pieces(b - a, paving.length, "paving stones")
+            x.extend(np.linspace(a, b, count + 1)[:-1])
+        x.append(breaks[-1])
+        points = zip(x, np.interp(x, breaks, levels), strict=True)
+        for k, low in enumerate(pairwise(points), 1):
             high = [(px, py + paving.thickness) for px, py in reversed(low)]
-            self.add([*low, *high], f"paving stone {k + 1}", part="paving", structured=True)
+            self.add([*low, *high], f"paving stone {k}", part="paving", structured=True)
 
     def check(self) -> None:
         """Check that no blocks cross themselves or overlap."""
-        outlines = [block.points for block in self.blocks]
         names = [block.name for block in self.blocks]
-        for outline, name in zip(outlines, names, strict=True):
-            check_simple(outline, name)
-        check_overlaps(outlines, names)
+        check_overlaps([block.points for block in self.blocks], names)
 
-    def _add_joint(
-        self, pair: tuple[int, int], ends: Face, words: str, part: Arch | Courses
-    ) -> None:
+    def _add_joint(self, pair: tuple[int, int], ends: Face, words: str, part: Part) -> None:
         """Add a joint."""
         name = f"{part.name}, {words}"
         self.joints.append(Joint(pair, *ends, self.contact, name, part.name, part.role))
 
-    def _add_stone(
-        self, outline: Sequence[Point], words: str, part: Courses, **options: Any
-    ) -> int:
+    def _add_stone(self, outline: Sequence[Point], words: str, part: Part, **options: Any) -> int:
         """Add a block of a pier or sidewall and return its number."""
         name = f"{part.name}, {words}"
         return self.add(outline, name, part=part.name, role=part.role, **options)
@@ -205,19 +188,14 @@ class StoneworkBuilder:
         top = [right[0], right[1], left[1], left[0]]
         return self._build_skewback(pier, (x0, x1), step, top)
 
-    def _build_skewback(
-        self, pier: Pier, sides: tuple[float, float], step: float, top: Sequence[Point]
-    ) -> int:
+    def _build_skewback(self, pier: Pier, sides: Pair, step: float, top: Sequence[Point]) -> int:
         """Build the courses of a pier and the skewback on them; return the number of the latter."""
         below = self._build_courses(sides, (-pier.height, -step), pier)
-        outline = [(sides[0], -step), (sides[1], -step), *top]
-        skewback = self._add_stone(outline, "skewback", pier)
+        skewback = self._add_stone([(x, -step) for x in sides] + list(top), "skewback", pier)
         self._add_bed((below, skewback), sides, -step, pier)
         return skewback
 
-    def _build_courses(
-        self, sides: tuple[float, float], levels: tuple[float, float], part: Courses
-    ) -> int:
+    def _build_courses(self, sides: Pair, levels: Pair, part: Courses) -> int:
         """Build a foundation and courses between two levels; return the number of the top one."""
         (left, right), low = sides, levels[0]
         base = low - FOUNDATION_DEPTH
@@ -225,9 +203,7 @@ class StoneworkBuilder:
         below = self._add_stone(under, "foundation", part, fixed=True)
         return self._stack_courses(below, sides, levels, part)
 
-    def _stack_courses(
-        self, below: int, sides: tuple[float, float], levels: tuple[float, float], part: Courses
-    ) -> int:
+    def _stack_courses(self, below: int, sides: Pair, levels: Pair, part: Courses) -> int:
         """Build courses on a block, between two levels; return the number of the top one."""
         low, high = levels
         if high - low < 1e-9:  # round-off of nothing to build
@@ -239,9 +215,7 @@ class StoneworkBuilder:
             below = number
         return below
 
-    def _add_course(
-        self, sides: tuple[float, float], levels: tuple[float, float], part: Courses
-    ) -> int:
+    def _add_course(self, sides: Pair, levels: Pair, part: Courses) -> int:
         """Add a rectangular course and return its number."""
         (left, right), (low, top) = sorted(sides), levels
         # Courses are numbered on above the skewback of a wall.
@@ -249,9 +223,7 @@ class StoneworkBuilder:
         outline = [(left, top), (left, low), (right, low), (right, top)]
         return self._add_stone(outline, f"course {count + 1}", part, structured=True)
 
-    def _add_bed(
-        self, pair: tuple[int, int], sides: tuple[float, float], level: float, part: Courses
-    ) -> None:
+    def _add_bed(self, pair: tuple[int, int], sides: Pair, level: float, part: Courses) -> None:
         """Add a horizontal joint between two courses."""
         left, right = ((float(x), float(level)) for x in sorted(sides))
         count = sum(joint.part == part.name for joint in self.joints)

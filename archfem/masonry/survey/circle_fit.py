@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import check_numbers, check_sequence
 from archfem.errors import InvalidInput
-from archfem.masonry.block import Point
+from archfem.masonry.block import Point, check_points
 
 
 @dataclass(frozen=True)
@@ -59,11 +58,7 @@ def fitted_circle(points: Sequence[Point] | Array) -> FittedCircle:
         Coope, J. Optim. Theory Appl. 76 (1993) 381-388. Gander, Golub and Strebel, BIT 34 (1994)
         558-578.
     """
-    rows = [
-        check_numbers(point, f"points[{k}] [m]", 2)
-        for k, point in enumerate(check_sequence(points, "points"))
-    ]
-    places = np.array(rows, dtype=float).reshape(-1, 2)
+    places = np.array(check_points(points, "points")).reshape(-1, 2)
     mean = places.mean(axis=0) if len(places) else np.zeros(2)
     centred = places - mean
     extent = float(np.abs(centred).max(initial=0.0))

@@ -28,25 +28,9 @@ from archfem.units import in_unit
 # Largest size of a drawing [bytes]
 MAX_DRAWING_BYTES = 2**25
 
-# Range of the median diagonal of the blocks [m]; beyond it the unit is wrong
-BLOCK_SIZE_RANGE = (0.02, 20.0)
-
-# Largest coordinate [m]: round-off beyond it moves vertices by more than a micrometre
-MAX_COORDINATE = 1e9
-
-# Largest number of vertices of a drawing: every edge is compared with every vertex
-MAX_VERTICES = 20_000
-
-# Properties of a GeoJSON feature that are read; others are ignored
-FEATURE_PROPERTIES = ("name", "part", "role", "material", "fixed")
-
 # Entities of a DXF file that are read; with other curves stones are drawn too, but not outlined
 POLYLINES = ("LWPOLYLINE", "POLYLINE")
-TEXTS = ("TEXT", "MTEXT")
 OTHER_CURVES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT")
-
-# Cells of a mesh that belong to blocks, and the number of their corners
-CORNERS_PER_CELL = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +52,11 @@ def read_drawing(
     path = Path(path)
     readers = {".geojson": _read_geojson, ".json": _read_geojson}
     readers |= {".dxf": _read_dxf, ".msh": _read_msh}
-    if path.suffix.lower() not in readers:
+    if (read := readers.get(path.suffix.lower())) is None:
         raise InvalidInput(f"{path} is no drawing: give a .geojson, a .dxf or a .msh file")
     check_file(path, "drawing", MAX_DRAWING_BYTES)
     try:
-        outlines = list(readers[path.suffix.lower()](path, unit, ignored))
+        outlines = list(read(path, unit, ignored))
         _check_sizes(outlines)
     except InvalidInput as error:
         raise InvalidInput(f"{path}: {error}") from error
@@ -116,19 +100,20 @@ def _check_sizes(outlines: list[Outline]) -> None:
     """Refuse a drawing without outlines, with too many, or whose unit is evidently wrong."""
     if not outlines:
         raise InvalidInput("it has no closed outlines to read")
-    if (count := sum(len(each.points) for each in outlines)) > MAX_VERTICES:
+    points = np.concatenate([each.points for each in outlines])
+    if len(points) > 20_000:  # every edge is compared with every vertex
         raise InvalidInput(
-            f"it has {count} vertices, and there is room for {MAX_VERTICES}: leave out those along "
+            f"it has {len(points)} vertices, and there is room for 20000: leave out those along "
             "straight edges"
         )
-    # the median is insensitive to a few long blocks, such as a fill
+    # the median diagonal is insensitive to a few long blocks, such as a fill
     typical = float(np.median([np.hypot(*np.ptp(each.points, axis=0)) for each in outlines]))
-    if BLOCK_SIZE_RANGE[0] <= typical <= BLOCK_SIZE_RANGE[1]:
+    if 0.02 <= typical <= 20.0:
         return
-    away = np.abs(np.concatenate([each.points for each in outlines])).max(axis=0)
+    away = np.abs(points).max(axis=0)
     remedy = 'give the unit of the drawing, e.g. unit = "mm"'
     # longitudes and latitudes make blocks far smaller than a unit
-    if typical < BLOCK_SIZE_RANGE[0] and away[0] <= 180.0 and away[1] <= 90.0:
+    if typical < 0.02 and away[0] <= 180.0 and away[1] <= 90.0:
         remedy += "; coordinates in degrees (CRS84) do not do: export projected metres"
     raise InvalidInput(f"a block is typically {typical:.3g} m large: {remedy}")
 
@@ -173,12 +158,13 @@ def _read_feature(feature: dict[str, Any], number: int, factor: float) -> Outlin
 
 def _check_properties(data: dict[str, Any], name: str) -> None:
     """Refuse misspelt properties and values of the wrong kind."""
-    for key in set(data) - set(FEATURE_PROPERTIES):
-        if hint := suggest_name(key.lower(), FEATURE_PROPERTIES, 0.8):
+    words = ("name", "part", "role", "material")
+    for key in set(data) - {*words, "fixed"}:  # others are ignored
+        if hint := suggest_name(key.lower(), [*words, "fixed"], 0.8):
             raise InvalidInput(f"'{name}' has a property '{key}': {hint}")
     if data.get("fixed") not in (None, True, False):  # 0 and 1 too, as many programs export
         raise InvalidInput(f"'{name}': fixed = {short_repr(data['fixed'])} is not true or false")
-    for key in ("name", "part", "role", "material"):
+    for key in words:
         # numbers are names too, of blocks and parts
         if not isinstance(data.get(key), str | int | float | None):
             raise InvalidInput(f"'{name}': {key} = {short_repr(data[key])} is a table: give words")
@@ -218,11 +204,11 @@ def _read_dxf(path: Path, unit: str | None, ignored: Collection[str]) -> Iterato
         raise InvalidInput('the drawing does not say its unit ($INSUNITS): give one, e.g. "mm"')
     factor = in_unit(f"1 {unit}", "m", "unit") if unit is not None else float(own_unit or 1.0)
     outlines = [_read_polyline(entity, factor) for entity in polylines]
-    texts = [
-        (entity.text, _check_coordinates(entity.points, f"the text '{entity.text}'", factor)[0])
-        for entity in read
-        if entity.text
-    ]
+    texts = []
+    for entity in read:
+        if text := entity.text:
+            place = _check_coordinates(entity.points, f"the text '{text}'", factor)[0]
+            texts.append((text, place))
     counts = Counter[str]()
     for outline in outlines:
         counts[outline.layer] += 1
@@ -238,32 +224,22 @@ def _load_dxf(path: Path) -> tuple[list[Entity], float | None]:
     drawing: Any = readfile(path)
     entities = []
     for entity in drawing.modelspace():
-        kind = entity.dxftype()
+        kind, layer = entity.dxftype(), entity.dxf.layer
         if kind in POLYLINES:
-            entities.append(_load_polyline(entity))
-        elif kind in TEXTS:
+            light = kind == "LWPOLYLINE"
+            points = map(tuple, entity.vertices_in_wcs() if light else entity.points_in_wcs())
+            is_mesh = not (light or entity.is_2d_polyline or entity.is_3d_polyline)
+            kinds = entity.is_closed, entity.has_arc, is_mesh
+            entities.append(Entity(kind, layer, list(points), "", *kinds))
+        elif kind in ("TEXT", "MTEXT"):
             place = entity.dxf.insert if kind == "MTEXT" else entity.get_placement()[1]
             text = " ".join(entity.plain_text().split())
-            entities.append(Entity(kind, entity.dxf.layer, [(place.x, place.y)], text))
+            entities.append(Entity(kind, layer, [(place.x, place.y)], text))
         elif kind in OTHER_CURVES:
-            entities.append(Entity(kind, entity.dxf.layer, []))
+            entities.append(Entity(kind, layer, []))
     known = drawing.units  # 0 where the drawing has none
     factor = units.conversion_factor(known, InsertUnits.Meters) if known else None
     return entities, factor
-
-
-def _load_polyline(entity: Any) -> Entity:
-    """Load a polyline, in the coordinates of the drawing."""
-    light = entity.dxftype() == "LWPOLYLINE"
-    points = [tuple(p) for p in (entity.vertices_in_wcs() if light else entity.points_in_wcs())]
-    return Entity(
-        entity.dxftype(),
-        entity.dxf.layer,
-        points,
-        closed=entity.is_closed,
-        has_arc=entity.has_arc,
-        is_mesh=not (light or entity.is_2d_polyline or entity.is_3d_polyline),
-    )
 
 
 def _read_polyline(entity: Entity, factor: float) -> Outline:
@@ -297,10 +273,7 @@ def _block_name(outline: Outline, texts: list[tuple[str, Array]], number: int) -
 
 def _check_polygon(given: Any, name: str, factor: float) -> Array:
     """Return the vertices of a polygon without a repeated last one (n, 2) [m]."""
-    points = _check_coordinates(given, name, factor)
-    if np.any(np.ptp(points[:, 2:], axis=0) > 1e-6 * np.ptp(points[:, :2])):
-        raise InvalidInput(f"{name} does not lie in the plane of x and y: draw an elevation in it")
-    points = points[:, :2]
+    points = _check_plane(given, name, factor, f"{name} does not lie", "draw")
     points = points[:-1] if np.array_equal(points[0], points[-1]) else points
     if len(points) < 3:
         raise InvalidInput(f"{name} has {len(points)} vertices: a block has at least 3")
@@ -317,11 +290,11 @@ def _check_coordinates(given: Any, name: str, factor: float) -> Array:
         raise InvalidInput(f"{name} has coordinates that are no finite points in the plane")
     if not len(points):
         raise InvalidInput(f"{name} has no points")
-    far = float(np.abs(points).max())
-    if far * factor > MAX_COORDINATE:
+    far = float(np.abs(points).max()) * factor
+    if far > 1e9:  # round-off beyond moves vertices by more than a micrometre
         raise InvalidInput(
-            f"{name} has a coordinate of {far * factor:.3g} m, and there is room up to "
-            f"{MAX_COORDINATE:.0e} m: move the drawing, or give its unit"
+            f"{name} has a coordinate of {far:.3g} m, and there is room up to 1e+09 m: move the "
+            "drawing, or give its unit"
         )
     return factor * points
 
@@ -337,9 +310,10 @@ def _read_msh(path: Path, unit: str | None, ignored: Collection[str]) -> Iterato
 def read_physical_surfaces(path: Path, factor: float = 1.0) -> list[tuple[str, Array]]:
     """Read names and outlines (n, 2) [m] of the physical surfaces, ordered by tag."""
     mesh = _load_msh(path)
-    names, points = mesh.group_names(2), _check_plane(mesh.points, factor)
+    names, points = mesh.group_names(2), _check_plane(mesh.points, "the mesh", factor)
     found: dict[int, list[NDArray[np.intp]]] = {}
-    for tag, cell in mesh.tagged_cells(CORNERS_PER_CELL):
+    corners = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
+    for tag, cell in mesh.tagged_cells(corners):
         found.setdefault(tag, []).append(cell)
     if not found:
         raise InvalidInput("it has no physical surface: tag each block with one, in gmsh")
@@ -353,7 +327,7 @@ def read_physical_surfaces(path: Path, factor: float = 1.0) -> list[tuple[str, A
 def read_physical_curves(path: Path, factor: float = 1.0) -> list[tuple[str, Array]]:
     """Read name and edge mid-points (n, 2) [m] of each named physical curve."""
     mesh = _load_msh(path)
-    names, points = mesh.group_names(1), _check_plane(mesh.points, factor)
+    names, points = mesh.group_names(1), _check_plane(mesh.points, "the mesh", factor)
     found: dict[str, list[Array]] = {}
     for tag, edge in mesh.tagged_cells({"line": 2, "line3": 2}):
         if tag in names:
@@ -413,11 +387,13 @@ def _load_msh(path: Path) -> TaggedMesh:
     return mesh
 
 
-def _check_plane(given: Array, factor: float) -> Array:
-    """Return the points of a mesh in the plane of x and y (n, 2) [m]."""
-    points = _check_coordinates(given, "the mesh", factor)
+def _check_plane(
+    given: Any, name: str, factor: float, problem: str = "it does not lie", verb: str = "mesh"
+) -> Array:
+    """Return points in the plane of x and y (n, 2) [m]."""
+    points = _check_coordinates(given, name, factor)
     if np.any(np.ptp(points[:, 2:], axis=0) > 1e-6 * np.ptp(points[:, :2])):
-        raise InvalidInput("it does not lie in the plane of x and y: mesh an elevation in it")
+        raise InvalidInput(f"{problem} in the plane of x and y: {verb} an elevation in it")
     return points[:, :2]
 
 
@@ -464,16 +440,14 @@ def write_dxf(
     space = drawing.modelspace()
     for layer, polygons in outlines.items():
         for name, points in polygons:
-            given = [(float(x), float(y)) for x, y in points]
-            space.add_lwpolyline(given, close=True, dxfattribs={"layer": layer})
-            inside = shapely.Polygon(given).representative_point()
+            space.add_lwpolyline(points.tolist(), close=True, dxfattribs={"layer": layer})
+            inside = shapely.Polygon(points).representative_point()
             # names of 0.05 m on a layer of their own, so that the outlines can be read alone
             note = {"layer": f"{layer} names", "height": 0.05, "insert": (inside.x, inside.y)}
             space.add_text(name, dxfattribs=note)
     for layer, runs in (lines or {}).items():
         for _, points in runs:
-            given = [(float(x), float(y)) for x, y in points]
-            space.add_lwpolyline(given, dxfattribs={"layer": layer})
+            space.add_lwpolyline(points.tolist(), dxfattribs={"layer": layer})
     with atomic_write(Path(path)) as draft:
         drawing.saveas(draft)
     return Path(path)

@@ -28,6 +28,9 @@ from archfem.masonry.survey.drawings import Outline, read_drawing, read_physical
 from archfem.masonry.survey.snapping import AMBIGUOUS_GAP_RATIO, close_gaps
 from archfem.units import G, in_unit
 
+# Materials by name
+Materials = Mapping[str, Material]
+
 # Contact of blocks of two preset materials
 DEFAULT_CONTACTS = {"stone/backfill": SOIL_TO_STONE}
 
@@ -74,7 +77,7 @@ def read_outlines(
     snap: float = 1e-3,
     layers: Mapping[str, Layer] | None = None,
     material: Material = STONE,
-    materials: Mapping[str, Material] = MATERIAL_PRESETS,
+    materials: Materials = MATERIAL_PRESETS,
 ) -> Survey:
     """Read the outlines of a drawing as blocks, and close small gaps between them.
 
@@ -122,7 +125,7 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
     snap: float = 1e-3,
     layers: Mapping[str, Layer] | None = None,
     material: Material = STONE,
-    materials: Mapping[str, Material] = MATERIAL_PRESETS,
+    materials: Materials = MATERIAL_PRESETS,
     contact: Contact = STONE_TO_STONE,
     contacts: Mapping[str, Contact] = DEFAULT_CONTACTS,
     width: float = 1.0,
@@ -170,11 +173,9 @@ def _name_joints(structure: Structure, path: Path, unit: str | None) -> Structur
         beside = np.abs(np.einsum("jpk,jk->jp", away, structure.normals))
         on = np.all((beside < near) & (along < structure.depths[:, None] / 2.0), axis=1)
         names |= {int(number): name for number in np.flatnonzero(on)}
-    joints = tuple(
-        replace(joint, name=names.get(number, joint.name))
-        for number, joint in enumerate(structure.joints)
-    )
-    return replace(structure, joints=joints)
+    named = enumerate(structure.joints)
+    joints = [replace(joint, name=names.get(number, joint.name)) for number, joint in named]
+    return replace(structure, joints=tuple(joints))
 
 
 def _check_layers(outlines: list[Outline], layers: Mapping[str, Layer], path: str | Path) -> None:
@@ -192,11 +193,7 @@ def _check_layers(outlines: list[Outline], layers: Mapping[str, Layer], path: st
 
 
 def _make_block(
-    outline: Outline,
-    points: Array,
-    layer: Layer,
-    material: Material,
-    materials: Mapping[str, Material],
+    outline: Outline, points: Array, layer: Layer, material: Material, materials: Materials
 ) -> Block:
     """Make a block with the properties of its outline, else of its layer."""
     name = outline.material or layer.material
@@ -205,14 +202,12 @@ def _make_block(
             f"'{outline.name}' is of '{name}', which is not among the materials "
             f"{sorted(materials)}: name one of them"
         )
-    return Block(
-        tuple((float(x), float(y)) for x, y in points),
-        material if name is None else materials[name],
-        outline.name,
-        layer.fixed if outline.fixed is None else bool(outline.fixed),
-        part=outline.layer if layer.part is None else layer.part,
-        role=outline.role or layer.role or "",
-    )
+    chosen = material if name is None else materials[name]
+    fixed = layer.fixed if outline.fixed is None else bool(outline.fixed)
+    part = outline.layer if layer.part is None else layer.part
+    role = outline.role or layer.role or ""
+    corners = tuple((float(x), float(y)) for x, y in points)
+    return Block(corners, chosen, outline.name, fixed, part=part, role=role)
 
 
 def _assign_corners(blocks: Sequence[Block], snap: float) -> tuple[Block, ...]:
@@ -234,19 +229,17 @@ def _find_corners(block: Block, direction: Direction | None) -> tuple[int, int, 
     """Return four clear corners, so that sides 1 and 3 run along the ring, or are the longer."""
     steps = np.roll(block.points, -1, axis=0) - block.points
     before = np.roll(steps, 1, axis=0)
-    turns = np.arctan2(
-        before[:, 0] * steps[:, 1] - before[:, 1] * steps[:, 0], np.sum(before * steps, axis=1)
-    )
+    sine = before[:, 0] * steps[:, 1] - before[:, 1] * steps[:, 0]
+    turns = np.arctan2(sine, np.sum(before * steps, axis=1))
     # the outline turns by more than 45 degrees at four corners, elsewhere by at most 10 degrees
     found = np.flatnonzero(turns > np.radians(45.0))
     if len(found) != 4 or np.any(np.abs(np.delete(turns, found)) > np.radians(10.0)):
         return None
     corners = block.points[found]
     sides = np.roll(corners, -1, axis=0) - corners
-    if direction is None:
-        measure = np.linalg.norm(sides, axis=1)
-    else:
-        measure = -np.abs(sides @ direction.outward(block.centroid)) / np.linalg.norm(sides, axis=1)
+    measure = np.linalg.norm(sides, axis=1)
+    if direction is not None:
+        measure = -np.abs(sides @ direction.outward(block.centroid)) / measure
     # of the two pairs of opposite sides, that of larger measure lies first
     first = int(measure[1] + measure[3] > measure[0] + measure[2])
     a, b, c, d = (int(n) for n in np.roll(found, -first))

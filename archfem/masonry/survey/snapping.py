@@ -17,14 +17,11 @@ from scipy.spatial import cKDTree
 
 from archfem._typing import Array
 from archfem.errors import InvalidStructure
-from archfem.masonry.block import check_overlaps, check_simple
+from archfem.masonry.block import check_overlaps, check_simple, measure_polygon
 from archfem.masonry.structure import CONTACT_TOLERANCE
 
 # Gaps and contacts up to this multiple of the tolerance are taken for errors of the survey [-]
 AMBIGUOUS_GAP_RATIO = 5.0
-
-# Vertices within the tolerance of one another, on average [-]
-MAX_NEIGHBOURS = 100.0
 
 Edge = tuple[int, int]
 Boundaries = list[list[int]]
@@ -39,15 +36,12 @@ def close_gaps(
     for name, points in zip(names, outlines, strict=True):
         check_simple(points, name)
     # all outlines anticlockwise
-    oriented = [points if _area(points) > 0.0 else points[::-1] for points in outlines]
+    oriented = [points if measure_polygon(points)[0] > 0.0 else points[::-1] for points in outlines]
     given = np.concatenate(oriented)
     places, number = _merge_vertices(oriented, snap)
     parts = np.split(number, np.cumsum([len(points) for points in oriented])[:-1])
     # merged vertices repeat, inside a boundary and across its end
-    boundaries = [[int(n) for n, _ in groupby(part)] for part in parts]
-    boundaries = [
-        boundary[:-1] if boundary[0] == boundary[-1] else boundary for boundary in boundaries
-    ]
+    boundaries = [part[part != np.roll(part, 1)].tolist() or [int(part[0])] for part in parts]
     ties = _find_ties(boundaries, places, snap)
     ties |= _find_bends(boundaries, places, ties, snap)
     places = _place_tied(places, ties)
@@ -55,19 +49,12 @@ def close_gaps(
     owners = [name for name, points in zip(names, oriented, strict=True) for _ in points]
     _check_moved(moved, given, owners, snap)
     found = [places[boundary] for boundary in boundaries]
-    for name, points, boundary in zip(names, found, boundaries, strict=True):
+    for name, boundary in zip(names, boundaries, strict=True):
         if len(boundary) < 3:
             raise InvalidStructure(f"'{name}' is no larger than snap {snap:.3g} m: lower snap")
-        check_simple(points, name)
     check_overlaps(found, names, AMBIGUOUS_GAP_RATIO * snap)
     _check_gaps(places, boundaries, names, snap)
     return found, float(moved.max())
-
-
-def _area(points: Array) -> float:
-    """Return the area of a polygon, positive if anticlockwise [m²]."""
-    x, y = (points - points[0]).T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def _edges(boundaries: Boundaries) -> Iterator[tuple[int, int, int]]:
@@ -91,7 +78,7 @@ def _merge_vertices(outlines: Sequence[Array], snap: float) -> tuple[Array, Any]
     tree = cKDTree(points)
     # pairs are counted before memory is taken for them; a few touch at each corner
     near = tree.count_neighbors(tree, snap) / len(points)
-    if near > MAX_NEIGHBOURS:
+    if near > 100.0:
         raise InvalidStructure(
             f"snap = {snap:.3g} m would merge {near:.0f} vertices at each place on average: lower "
             "snap below the shortest side of a block"
@@ -144,10 +131,8 @@ def _find_bends(
     across = {(a, b): number for number, a, b in _edges(whole)}
     found: dict[int, Edge] = {}
     for boundary in whole:
-        beyond = [
-            across.get((b, a), -1)
-            for a, b in zip(boundary, boundary[1:] + boundary[:1], strict=True)
-        ]
+        after = boundary[1:] + boundary[:1]
+        beyond = [across.get((b, a), -1) for a, b in zip(boundary, after, strict=True)]
         # start where the neighbour changes, so that no joint is split by the start of the list
         turn = next((k for k in range(len(boundary)) if beyond[k] != beyond[k - 1]), 0)
         nodes, beyond = boundary[turn:] + boundary[:turn], beyond[turn:] + beyond[:turn]
@@ -195,11 +180,9 @@ def _check_gaps(places: Array, boundaries: Boundaries, names: Sequence[str], sna
     near = CONTACT_TOLERANCE * float(np.linalg.norm(np.ptp(places, axis=0)))
     polygons = [shapely.Polygon(places[boundary]) for boundary in boundaries]
     tree = shapely.STRtree(polygons)
-    first = {
-        place: number
-        for number, boundary in reversed([*enumerate(boundaries)])
-        for place in boundary
-    }
+    first: dict[int, int] = {}
+    for number, boundary in enumerate(boundaries):
+        first = dict.fromkeys(boundary, number) | first
     found = []
     for number, a, b in _edges(boundaries):
         along, off, length = _project(places, a, b)

@@ -1,9 +1,8 @@
 """Files of recorded ground motions, one module for each family of formats.
 
     columns          plain columns
-    keyed            named values above samples: AFAD, CWB, ESM, K-NET, UNAM
+    keyed            named values above samples: AFAD, CWB, ESM, K-NET, PEER, UNAM
     numeric_headers  COSMOS and SMC
-    peer             format PEER
     reader           file format detection
     record_file      text, units and channels of a record file
     volumes          volumes 1 and 2: CSMIP/CDMG, USC, RENADIC, BHRC, GeoNet

@@ -11,6 +11,7 @@ from archfem.motion.records.record_file import (
     Channel,
     RecordText,
     find_units,
+    fit_step,
     parse_unit,
 )
 
@@ -19,7 +20,6 @@ def read(
     text: RecordText, *, column: int | None, units: str | None, dt: float | None
 ) -> list[Channel]:
     """Read the acceleration columns of a plain file."""
-    direction_pattern = re.compile(r"\b(N-S|E-W|U-D|NS|EW|UD|UP|DOWN)\b", re.IGNORECASE)
     # Lines before the first line of numbers, and lines that begin with #, %, ! or *, are comments;
     # they may state units and step. An increasing first column is time.
     rows, lines, comments = _read_table(text)
@@ -28,7 +28,7 @@ def read(
     first = 1 if _is_time(rows) else 0
     if column is None:
         chosen = list(range(first, rows.shape[1]))
-        directions = [match.upper() for match in direction_pattern.findall(comments)]
+        directions = re.findall(r"\b(?:N-S|E-W|U-D|NS|EW|UD|UP|DOWN)\b", comments.upper())
         if len(chosen) != 1 and len(directions) != len(chosen):
             raise text.error(
                 f"{len(chosen)} columns could be the acceleration: choose with column=, from 1"
@@ -72,9 +72,8 @@ def _read_table(text: RecordText) -> tuple[Array, list[int], str]:
 
 def _is_time(rows: Array) -> bool:
     """Return whether the first of several columns is time: at least 90 % of it increases."""
-    if rows.shape[1] == 1 or len(rows) < 3:
-        return False
-    return bool(np.mean(np.diff(rows[:, 0]) > 0.0) > 0.9)
+    several = rows.shape[1] > 1 and len(rows) > 2
+    return bool(several and np.mean(np.diff(rows[:, 0]) > 0.0) > 0.9)
 
 
 def _find_unit(text: RecordText, comments: str, units: str | None) -> float:
@@ -93,20 +92,14 @@ def _find_unit(text: RecordText, comments: str, units: str | None) -> float:
 
 def _list_stated_steps(comments: str, dt: float | None) -> list[float]:
     """Return the steps stated by keyword and in the comments [s]."""
-    step_pattern = re.compile(
-        rf"\b(?:dt|delta\s*t|time\s*step|sampl\w*\s+interval)\b[^\d+\-.\n]{{0,12}}({NUMBER_PATTERN})\s*(ms)?",
-        re.IGNORECASE,
-    )
-    rate_pattern = re.compile(
-        rf"\bsampl\w*\s+(?:rate|freq\w*)\b[^\d+\-.\n]{{0,12}}({NUMBER_PATTERN})\s*(?:Hz|sps)\b",
-        re.IGNORECASE,
-    )
+    number = rf"\b[^\d+\-.\n]{{0,12}}({NUMBER_PATTERN})\s*"
+    step_pattern = r"\b(?:dt|delta\s*t|time\s*step|sampl\w*\s+interval)" + number + "(ms)?"
+    rate_pattern = r"\bsampl\w*\s+(?:rate|freq\w*)" + number + r"(?:Hz|sps)\b"
     steps = [] if dt is None else [check_number(dt, "dt [s]")]
-    steps += [
-        float(value) * (1e-3 if milli else 1.0) for value, milli in step_pattern.findall(comments)
-    ]
-    steps += [1.0 / max(float(rate), 1e-9) for rate in rate_pattern.findall(comments)]
-    return steps
+    for value, milli in re.findall(step_pattern, comments, re.IGNORECASE):
+        steps.append(float(value) * (1e-3 if milli else 1.0))
+    rates = re.findall(rate_pattern, comments, re.IGNORECASE)
+    return steps + [1.0 / max(float(rate), 1e-9) for rate in rates]
 
 
 def _find_step(text: RecordText, rows: Array, lines: list[int], stated: list[float]) -> float:
@@ -124,15 +117,15 @@ def _find_step(text: RecordText, rows: Array, lines: list[int], stated: list[flo
 
 def _time_column_step(text: RecordText, times: Array, lines: list[int]) -> float:
     """Return the constant step of a time column [s]."""
-    count = np.arange(len(times))
-    step, begin = np.polyfit(count, times, 1)
-    apart = np.abs(times - begin - step * count).max()
+    step, apart = fit_step(times)
+    steps = np.diff(times)
+    usual = np.median(steps)
     # printed times are rounded, by up to a quarter of a step
-    if step <= 0.0 or max(apart, np.abs(np.diff(times) - step).max()) > 0.25 * step:
-        jump = int(np.argmax(np.abs(np.diff(times) - np.median(np.diff(times)))))
+    if step <= 0.0 or max(apart, np.abs(steps - step).max()) > 0.25 * step:
+        jump = int(np.argmax(np.abs(steps - usual)))
         raise text.error(
             f"time is not uniform: {times[jump]:g} to {times[jump + 1]:g} s, elsewhere steps of "
-            f"{np.median(np.diff(times)):g} s; bring the record to a constant step",
+            f"{usual:g} s; bring the record to a constant step",
             lines[jump + 1],
         )
     return float(f"{step:.6g}")

@@ -1,8 +1,7 @@
-"""Text files with named values above one column or three: AFAD, CWB, ESM, K-NET and UNAM."""
+"""Text files with named values above the samples: AFAD, CWB, ESM, K-NET, PEER and UNAM."""
 
 import re
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
@@ -15,24 +14,14 @@ from archfem.motion.records.record_file import (
     RecordText,
 )
 
-_AFAD_LINES = 40
-_CWB_LINES = 30
-_ESM_LINES = 80
-_KNET_LINES = 20
-_UNAM_LINES = 130
-
 
 def _read_afad(text: RecordText) -> list[Channel]:
     """Read the three components of a file of AFAD (Turkish national network)."""
-    direction_pattern = r"[NSEWUD]-[NSEWUD]"
-    find = partial(text.find, stop=_AFAD_LINES)
-    count_line, count = find(rf"^\s*NUMBER OF DATA\s*:\s*({COUNT_PATTERN})\s*$")
-    step_line, step = find(rf"SAMPLING INTERVAL\s*\(sec\)\s*:\s*({NUMBER_PATTERN})\s*$")
-    peak_line, peaks = find(r"^\s*(?:RAW )?PGA VALUES\s*(\(.*?\))\s*:(.*)$")
-    names_line, names = find(
-        rf"^\s*({direction_pattern})\s+({direction_pattern})\s+({direction_pattern})\s*$",
-        start=max(count_line, step_line, peak_line),
-    )
+    count_line, count = text.find(rf"^\s*NUMBER OF DATA\s*:\s*({COUNT_PATTERN})\s*$")
+    step_line, step = text.find(rf"SAMPLING INTERVAL\s*\(sec\)\s*:\s*({NUMBER_PATTERN})\s*$")
+    peak_line, peaks = text.find(r"^\s*(?:RAW )?PGA VALUES\s*(\(.*?\))\s*:(.*)$")
+    titles = r"^\s*" + r"\s+".join(["([NSEWUD]-[NSEWUD])"] * 3) + r"\s*$"
+    names_line, names = text.find(titles, max(count_line, step_line, peak_line))
     unit = text.find_unit(peaks[1], "the header does not state the unit of the peaks", peak_line)
     table = _read_table(text, names_line + 1, int(count[1]), 3) * unit
     stated = [float(peak) * unit for peak in re.findall(rf"\)\s*({NUMBER_PATTERN})", peaks[2])]
@@ -49,7 +38,7 @@ def _read_unam(text: RecordText) -> list[Channel]:
     names = _list_unam_values(text, "ORIENTACION")
     if len(set(count)) != 1 or len(set(steps)) != 1 or len(names) != len(peaks):
         raise text.error("the components differ in number of samples or step, or in the header")
-    unit_line, words = text.find(r"^UNIDADES DE LOS DATOS\s*:(.*)$", stop=_UNAM_LINES)
+    unit_line, words = text.find(r"^UNIDADES DE LOS DATOS\s*:(.*)$")
     unit = text.find_unit(words[1], "the header does not state one unit", unit_line)
     # the header has lines of numbers too: the samples follow their own title
     start, _ = text.find("^DATOS DE ACELERACION")
@@ -63,17 +52,16 @@ def _read_unam(text: RecordText) -> list[Channel]:
 
 def _list_unam_values(text: RecordText, key: str) -> list[str]:
     """Return the values of the first six channels after a key, which slashes separate."""
-    _, found = text.find(rf"^{key}[^:]*C1-C6[^:]*:\s*/(.*)$", stop=_UNAM_LINES)
+    _, found = text.find(rf"^{key}[^:]*C1-C6[^:]*:\s*/(.*)$")
     return [value.strip() for value in found[1].split("/")]
 
 
 def _read_cwb(text: RecordText) -> list[Channel]:
     """Read the three components of a file of CWB (Taiwan), whose first column is time."""
-    find = partial(text.find, stop=_CWB_LINES)
-    rate_line, rate = find(rf"^#SampleRate\(Hz\):\s*({NUMBER_PATTERN})")
-    duration = float(find(rf"^#RecordLength\(sec\):\s*({NUMBER_PATTERN})")[1][1])
-    unit_line, words = find(r"^#AmplitudeUnit:\s*(.*)$")
-    order_line, order = find(r"^#DataSequence:\s*Time((?:\s*\w+\(\+\);?)+)\s*$")
+    rate_line, rate = text.find(rf"^#SampleRate\(Hz\):\s*({NUMBER_PATTERN})")
+    duration = float(text.find(rf"^#RecordLength\(sec\):\s*({NUMBER_PATTERN})")[1][1])
+    unit_line, words = text.find(r"^#AmplitudeUnit:\s*(.*)$")
+    order_line, order = text.find(r"^#DataSequence:\s*Time((?:\s*\w+\(\+\);?)+)\s*$")
     # a component with a minus is another sense, of which no file is known: the pattern refuses it
     names = re.findall(r"(\w+)\(", order[1])
     frequency = max(float(rate[1]), 1e-9)
@@ -84,7 +72,7 @@ def _read_cwb(text: RecordText) -> list[Channel]:
         raise text.error(f"the column of times does not grow by {dt:g} s", start)
     unit = text.find_unit(words[1], "the header does not state one unit", unit_line)
     extremes = rf"^#AmplitudeMAX\.\s*%s:\s*({NUMBER_PATTERN})\s*~\s*({NUMBER_PATTERN})"
-    stated = [max(map(float, find(extremes % name)[1].groups()), key=abs) for name in names]
+    stated = [max(map(float, text.find(extremes % name)[1].groups()), key=abs) for name in names]
     _check_peaks(text, table[:, 1:], stated, rounding=0.0005)
     return _create_channels(table[:, 1:] * unit, dt, names)
 
@@ -123,17 +111,15 @@ def _read_esm(text: RecordText) -> list[Channel]:
     kind = _find_value(text, "DATA_TYPE")
     if kind.upper() != "ACCELERATION":
         raise text.error(f"DATA_TYPE is {kind!r}, expected ACCELERATION")
-    find = partial(text.find, stop=_ESM_LINES)
-    line, count = find(rf"^\s*NDATA\s*:\s*({COUNT_PATTERN})\s*$")
-    step_line, step = find(rf"^\s*SAMPLING_INTERVAL_S\s*:\s*({NUMBER_PATTERN})\s*$")
+    line, count = text.find(rf"^\s*NDATA\s*:\s*({COUNT_PATTERN})\s*$")
+    step_line, step = text.find(rf"^\s*SAMPLING_INTERVAL_S\s*:\s*({NUMBER_PATTERN})\s*$")
     dt = text.check_step(float(step[1]), step_line)
     duration = _find_value(text, "DURATION_S")
     if duration and abs(_parse_number(text, duration) - int(count[1]) * dt) > 2.0 * dt + 1e-3:
         raise text.error(f"{count[1]} samples at {dt:g} s do not last {duration} s", line)
     unit = text.find_unit(_find_value(text, "UNITS"), "UNITS is not a unit of acceleration")
     samples = text.read_last_block(text.header_length(), int(count[1])) * unit
-    peak = _find_value(text, r"PGA_CM/S\^2")
-    if peak:
+    if peak := _find_value(text, r"PGA_CM/S\^2"):
         text.check_peak(samples, 0.01 * _parse_number(text, peak))
     direction = _find_value(text, "STREAM") or _find_value(text, "COMPONENT")
     return [Channel.from_direction(samples, dt, direction)]
@@ -141,9 +127,8 @@ def _read_esm(text: RecordText) -> list[Channel]:
 
 def _find_value(text: RecordText, key: str) -> str:
     """Return the text after a key of ESM, empty where the key is missing."""
-    if not text.contains(rf"^\s*{key}\s*:", _ESM_LINES):
-        return ""
-    return text.find(rf"^\s*{key}\s*:\s*(.*?)\s*$", stop=_ESM_LINES)[1][1]
+    found = text.search(rf"^\s*{key}\s*:\s*(.*?)\s*$")
+    return found[1][1] if found else ""
 
 
 def _parse_number(text: RecordText, value: str) -> float:
@@ -163,37 +148,75 @@ def _parse_count(text: RecordText, value: str) -> int:
 
 def _read_knet(text: RecordText) -> list[Channel]:
     """Read the single component of a file of K-NET or KiK-net, and subtract its mean."""
-    # kiK-net numbers its components: 1 to 3 in the borehole, 4 to 6 at the surface
-    vertical_codes = {"3": "U-D", "6": "U-D"}
     # the number of samples is the product of frequency and duration in the header
-    find = partial(text.find, stop=_KNET_LINES)
-    rate_line, rate = find(rf"^\s*Sampling Freq\(Hz\)\s+({NUMBER_PATTERN})\s*Hz")
-    duration = find(rf"^\s*Duration Time\(s\)\s+({NUMBER_PATTERN})\s*$")[1]
+    rate_line, rate = text.find(rf"^\s*Sampling Freq\(Hz\)\s+({NUMBER_PATTERN})\s*Hz")
+    duration = text.find(rf"^\s*Duration Time\(s\)\s+({NUMBER_PATTERN})\s*$")[1]
     scale_factor = rf"^\s*Scale Factor\s+({NUMBER_PATTERN})\s*\(gal\)\s*/\s*({NUMBER_PATTERN})\s*$"
-    scale = find(scale_factor)[1]
-    memo = find(r"^\s*Memo")[0]
-    direction = find(r"^\s*Dir\.\s+(\S+)")[1][1]
+    scale = text.find(scale_factor)[1]
+    memo = text.find(r"^\s*Memo")[0]
+    direction = text.find(r"^\s*Dir\.\s+(\S+)")[1][1]
     frequency = float(rate[1])
     count = frequency * float(duration[1])
     if not 0.0 < count < 1e9 or float(scale[2]) == 0.0:
         raise text.error("frequency, duration and scale factor are positive numbers", rate_line)
     counts = text.read_last_block(memo + 1, round(count))
     samples = (counts - counts.mean()) * (0.01 * float(scale[1]) / float(scale[2]))
-    peak = find(rf"^\s*Max\. Acc\. \(gal\)\s+({NUMBER_PATTERN})\s*$")[1]
+    peak = text.find(rf"^\s*Max\. Acc\. \(gal\)\s+({NUMBER_PATTERN})\s*$")[1]
     # the peak of the header relies on another estimate of the offset
     text.check_peak(samples, 0.01 * float(peak[1]), tolerance=0.02)
     dt = text.check_step(1.0 / frequency, rate_line)
-    return [Channel.from_direction(samples, dt, vertical_codes.get(direction, direction))]
+    # kiK-net numbers its components: 1 to 3 in the borehole, 4 to 6 at the surface
+    name = "U-D" if direction in ("3", "6") else direction
+    return [Channel.from_direction(samples, dt, name)]
 
 
-AFAD = RecordFormat(
-    "AFAD",
-    ((r"^\s*NUMBER OF DATA\s*:", _AFAD_LINES), (r"SAMPLING INTERVAL", _AFAD_LINES)),
-    _read_afad,
-)
-CWB = RecordFormat("CWB", ((r"^#DataSequence:\s*Time", _CWB_LINES),), _read_cwb)
-ESM = RecordFormat("ESM", ((r"^\s*NDATA\s*:|^\s*SAMPLING_INTERVAL_S\s*:", _ESM_LINES),), _read_esm)
-KNET = RecordFormat(
-    "K-NET", ((r"^\s*Scale Factor\s|^\s*Sampling Freq\(Hz\)", _KNET_LINES),), _read_knet
-)
+# Files in the wild begin with blank lines or lack one of the four lines of the header.
+_PEER_LINES = 12
+
+
+def _read_peer(text: RecordText) -> list[Channel]:
+    """Read the single component of a file of PEER or PEER NGA (`.AT2`), in g."""
+    # Count and step follow their names (`NPTS= 5437, DT= .0050 SEC`), in either order, on one line
+    # or two, or both precede or follow the names (`4096 0.0100 NPTS, DT`). The rest of the header
+    # is free: a unit of acceleration identifies one, unless a velocity or displacement is named.
+    count, dt, line = _find_count_and_step(text)
+    header = " ".join(text.lines[:line])
+    other = re.search(r"\b(?:VELOC|DISPL)", header, re.IGNORECASE)
+    if other and not re.search(r"\bACC", header, re.IGNORECASE):
+        raise text.error("the header does not state an acceleration, but another quantity")
+    unit = text.find_unit(header, "the header does not state one unit, such as UNITS OF G")
+    samples = text.read_last_block(line + 1, count) * unit
+    direction = _find_peer_direction(text, line)
+    return [Channel.from_direction(samples, text.check_step(dt, line), direction)]
+
+
+def _find_count_and_step(text: RecordText) -> tuple[int, float, int]:
+    """Return NPTS, DT [s] and the index of the last header line."""
+    pair = rf"({COUNT_PATTERN})[\s,]+({NUMBER_PATTERN})"
+    values_before_names = rf"^\s*{pair}[\s,]+NPTS[\s,]*DT\b"
+    values_after_names = rf"\bNPTS[\s,]+DT\s*[=:]?\s*{pair}"
+    together = text.search(values_before_names, stop=_PEER_LINES)
+    together = together or text.search(values_after_names, stop=_PEER_LINES)
+    if together:
+        line, values = together
+        return int(values[1]), float(values[2]), line
+    count_pattern = rf"\bNPTS\s*[=:]?\s*({COUNT_PATTERN})\b(?!\.)"
+    count_line, count = text.find(count_pattern, stop=_PEER_LINES)
+    step_line, step = text.find(rf"\bDT\s*[=:]?\s*({NUMBER_PATTERN})", stop=_PEER_LINES)
+    return int(count[1]), float(step[1]), max(count_line, step_line)
+
+
+def _find_peer_direction(text: RecordText, line: int) -> str:
+    """Return the component: the text after the last comma of the line with the station."""
+    title = next((content for content in text.lines[1:line] if content.count(",") >= 2), "")
+    direction = re.sub(r"\([^()]*\)?", "", title).rpartition(",")[2].strip()
+    return direction if len(direction) <= 12 else ""
+
+
+_AFAD_MARKS = (r"^\s*NUMBER OF DATA\s*:", 40), (r"SAMPLING INTERVAL", 40)
+AFAD = RecordFormat("AFAD", _AFAD_MARKS, _read_afad)
+CWB = RecordFormat("CWB", ((r"^#DataSequence:\s*Time", 30),), _read_cwb)
+ESM = RecordFormat("ESM", ((r"^\s*NDATA\s*:|^\s*SAMPLING_INTERVAL_S\s*:", 80),), _read_esm)
+KNET = RecordFormat("K-NET", ((r"^\s*Scale Factor\s|^\s*Sampling Freq\(Hz\)", 20),), _read_knet)
 UNAM = RecordFormat("UNAM", (("^ARCHIVO ESTANDAR DE ACELERACION", 20),), _read_unam)
+PEER = RecordFormat("PEER", ((r"\bNPTS\b", _PEER_LINES), (r"\bDT\b", _PEER_LINES)), _read_peer)

@@ -4,19 +4,20 @@ import re
 from collections.abc import Callable, Mapping
 from numbers import Real
 from os import PathLike
+from typing import Any
 
 from archfem._files import read_bytes
 from archfem._validation import report_user_errors, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.motion import signal_processing
-from archfem.motion.records import columns, keyed, numeric_headers, peer, volumes, waveforms
+from archfem.motion.records import columns, keyed, numeric_headers, volumes, waveforms
 from archfem.motion.records.record_file import Channel, RecordFormat, RecordText, parse_unit
 
 # Old formats with unspecific headers come last.
 _RECORD_FORMATS = (
     *(numeric_headers.SMC, numeric_headers.COSMOS),
     *(volumes.GEONET, volumes.BHRC, volumes.CSMIP, volumes.VOLUME_1),
-    *(keyed.AFAD, keyed.UNAM, keyed.CWB, keyed.ESM, keyed.KNET, peer.PEER),
+    *(keyed.AFAD, keyed.UNAM, keyed.CWB, keyed.ESM, keyed.KNET, keyed.PEER),
 )
 
 
@@ -59,17 +60,10 @@ def register_record_format(
     _registered_formats[name] = RecordFormat(name, tuple(marks.items()), read_checked)
 
 
-def read_components(
-    path: str | PathLike[str],
-    *,
-    column: int | None = None,
-    units: str | None = None,
-    dt: float | None = None,
-    response: str | PathLike[str] | None = None,
-) -> dict[str, Channel]:
-    """Read the horizontal component of one motion, and vertical and transverse if present."""
+def read_components(path: str | PathLike[str], **options: Any) -> dict[str, Channel]:
+    """Read the components of one motion by name; options are those of `read_channels`."""
     # a single component counts as horizontal, in any direction
-    channels = read_channels(path, column=column, units=units, dt=dt, response=response)
+    channels = read_channels(path, **options)
     if len(channels) == 1:
         return {"horizontal": channels[0]}
     level = [channel for channel in channels if not channel.is_vertical]
@@ -95,51 +89,47 @@ def read_channels(
     """Read all channels of a record, or one of them."""
     if units is not None:
         parse_unit(units)
-    if not (dt is None or isinstance(dt, Real)) or not (column is None or isinstance(column, int)):
+    if not (isinstance(dt, Real | None) and isinstance(column, int | None)):
         raise InvalidInput(f"dt {dt!r} is a number in seconds and column {column!r} a whole number")
     content = read_bytes(path, "record")
-    waveform = waveforms.find_waveform_format(content)
-    if waveform:
+    if waveform := waveforms.find_waveform_format(content):
         if dt is not None:
             raise InvalidInput(f"{path}: {waveform} states its step itself: leave out dt=")
         channels = waveforms.read(path, form=waveform, units=units, response=response)
-        return _choose_channels(path, channels, column)
-    text = RecordText.decode(path, content)
-    if response is not None:
-        raise text.error("response= belongs to miniSEED and SAC: leave it out")
-    form = find_format(text)
-    if form is None:
-        return _validate_channels(path, columns.read(text, column=column, units=units, dt=dt))
-    channels = form.read(text)
-    if units is not None or dt is not None:
-        raise text.error(
-            f"{form.name} states its units and its step itself: leave out units= and dt="
-        )
-    return _choose_channels(path, channels, column)
+    else:
+        text = RecordText.decode(path, content)
+        if response is not None:
+            raise text.error("response= belongs to miniSEED and SAC: leave it out")
+        form = find_format(text)
+        if form is None:
+            channels = columns.read(text, column=column, units=units, dt=dt)
+            column = None  # the only one that was read
+        else:
+            channels = form.read(text)
+            if units is not None or dt is not None:
+                raise text.error(
+                    f"{form.name} states its units and its step itself: leave out units= and dt="
+                )
+    return _select_channels(path, channels, column)
 
 
-def find_format(text: RecordText) -> RecordFormat | None:
-    """Return the format of a text, None for plain columns."""
-    known = (*_registered_formats.values(), *_RECORD_FORMATS)
-    return next((form for form in known if form.recognises(text)), None)
-
-
-def _choose_channels(
+def _select_channels(
     path: str | PathLike[str], channels: list[Channel], column: int | None
 ) -> list[Channel]:
-    """Return the channels, or the one of a number counted from 1."""
+    """Return the channels, or the one of a number from 1, after the checks of any motion."""
     if column is not None:
         if not 1 <= column <= len(channels):
             raise InvalidInput(f"{path} has {len(channels)} components: column {column} is none")
         channels = [channels[column - 1]]
-    return _validate_channels(path, channels)
-
-
-def _validate_channels(path: str | PathLike[str], channels: list[Channel]) -> list[Channel]:
-    """Return the channels after the checks of any motion."""
     for channel in channels:
         try:
             signal_processing.validate_samples(channel.samples, channel.direction or "recorded")
         except InvalidInput as error:
             raise InvalidInput(f"{path}: {error}") from error
     return channels
+
+
+def find_format(text: RecordText) -> RecordFormat | None:
+    """Return the format of a text, None for plain columns."""
+    known = (*_registered_formats.values(), *_RECORD_FORMATS)
+    return next((form for form in known if form.recognises(text)), None)

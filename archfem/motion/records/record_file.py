@@ -35,17 +35,16 @@ class RecordText:
         """Decode the content of a file: UTF-8, or else Western or Turkish in 8 bits."""
         # end-of-file mark of DOS, and zeros that fill the last block of a tape
         content = re.sub(rb"\s*\0[\0\s]*\Z", b"\n", content.rstrip(b"\x1a"))
-        place = Path(path)
         if b"\0" in content or not content.strip():
             kind = "not a text file" if content.strip() else "empty"
-            raise InvalidInput(f"{place} is {kind}: give an accelerogram as text")
+            raise InvalidInput(f"{Path(path)} is {kind}: give an accelerogram as text")
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = content.decode("cp1254", errors="replace")
         # `splitlines` would also split at form feeds and shift the line numbers
         lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-        return cls(place, tuple(lines), lines[-1].strip() == "")
+        return cls(Path(path), tuple(lines), lines[-1].strip() == "")
 
     def error(self, message: str, line: int | None = None) -> InvalidInput:
         """Create an error with the file and the line."""
@@ -54,10 +53,9 @@ class RecordText:
 
     def is_numeric(self, line: int) -> bool:
         """Return whether a line consists of numbers."""
-        numeric_line = re.compile(r"[\s\d+\-.,;EeDd]+", re.ASCII)
-        any_digit = re.compile(r"[0-9]")
         content = self.lines[line]
-        return bool(numeric_line.fullmatch(content) and any_digit.search(content))
+        numeric = re.fullmatch(r"[\s\d+\-.,;EeDd]+", content, re.ASCII)
+        return bool(numeric and re.search(r"[0-9]", content))
 
     def parse_row(self, line: int, width: int | None = None) -> list[float]:
         """Parse the numbers of one line."""
@@ -75,9 +73,9 @@ class RecordText:
 
     def _split_tokens(self, line: int, width: int | None) -> list[str]:
         """Split a line into the texts of numbers, with E for Fortran's D."""
-        run_together = re.compile(r"(?<=[\d.])(?=[-+])")
         content = self.lines[line].upper().replace("D", "E")
-        tokens = run_together.sub(" ", content).replace(",", " ").replace(";", " ").split()
+        # numbers that run together part before a sign
+        tokens = re.sub(r"(?<=[\d.])(?=[-+])|[,;]", " ", content).split()
         if width and not all(re.fullmatch(NUMBER_PATTERN, token) for token in tokens):
             return [content[at : at + width] for at in range(0, len(content.rstrip()), width)]
         return tokens
@@ -86,8 +84,7 @@ class RecordText:
         """Read the number of values that a header states; return them and the next line."""
         if count < 1:
             raise self.error(f"the header states {count} samples")
-        numbers: list[float] = []
-        line = first
+        numbers, line = list[float](), first
         while len(numbers) < count and line < len(self.lines):
             numbers.extend(self.parse_row(line, width))
             line += 1
@@ -123,9 +120,8 @@ class RecordText:
     def read_last_block(self, first: int, count: int) -> Array:
         """Read the stated number of values at the end of the file (count,)."""
         numbers, line = self.read_block(first, count)
-        for rest in range(line, len(self.lines)):
-            if self.lines[rest].strip():
-                raise self.error(f"more follows after the {count} samples of the header", rest)
+        if rest := self.search(r"\S", line):
+            raise self.error(f"more follows after the {count} samples of the header", rest[0])
         self.check_end()
         return numbers
 
@@ -151,24 +147,28 @@ class RecordText:
         self, pattern: str, start: int = 0, stop: int | None = None
     ) -> tuple[int, re.Match[str]]:
         """Return the index of the first line that contains a pattern, and the match."""
-        search = re.compile(pattern, re.IGNORECASE).search
-        for line, content in enumerate(self.lines[start:stop], start):
-            match = search(content)
-            if match:
-                return line, match
+        if found := self.search(pattern, start, stop):
+            return found
         raise self.error(f"no line has {pattern!r}: the header is damaged")
+
+    def search(
+        self, pattern: str, start: int = 0, stop: int | None = None
+    ) -> tuple[int, re.Match[str]] | None:
+        """Return the first line that contains a pattern and the match, or None."""
+        search = re.compile(pattern, re.IGNORECASE).search
+        matches = ((line, search(text)) for line, text in enumerate(self.lines[start:stop], start))
+        return next(((line, match) for line, match in matches if match), None)
 
     def contains(self, pattern: str, stop: int, start: int = 0) -> bool:
         """Return whether a line contains a pattern."""
-        search = re.compile(pattern, re.IGNORECASE).search
-        return any(search(line) for line in self.lines[start:stop])
+        return self.search(pattern, start, stop) is not None
 
     def header_length(self, start: int = 0) -> int:
         """Return the index of the first line of numbers from a line on."""
-        for line in range(start, len(self.lines)):
-            if self.is_numeric(line):
-                return line
-        raise self.error("no line of numbers: not an accelerogram")
+        line = next(filter(self.is_numeric, range(start, len(self.lines))), None)
+        if line is None:
+            raise self.error("no line of numbers: not an accelerogram")
+        return line
 
     def check_step(self, dt: float, line: int | None = None) -> float:
         """Return a valid sampling interval [s]."""
@@ -191,16 +191,22 @@ class RecordText:
             )
 
 
+def fit_step(times: Array) -> tuple[float, float]:
+    """Fit a constant step to times; return it and the largest distance of a time from it [s]."""
+    count = np.arange(len(times))
+    step, begin = np.polyfit(count, times, 1)
+    return step, np.abs(times - begin - step * count).max()
+
+
 def space_evenly(text: RecordText, pairs: Array, line: int) -> tuple[Array, float]:
     """Return samples at a constant step, and the step [s], of numbers that are (time, sample)."""
     times, samples = np.reshape(pairs, (-1, 2)).T
     if len(times) < 2 or not np.all(np.diff(times) >= 0.0):
         raise text.error("pairs of a time and a sample are expected, but times decrease", line)
-    count = np.arange(len(times))
-    mean, begin = np.polyfit(count, times, 1)
+    mean, apart = fit_step(times)
     step = text.check_step(float(f"{mean:.6g}"), line)
     # printed times are rounded; a film is digitised at uneven ones
-    if np.abs(times - begin - mean * count).max() <= 0.25 * mean:
+    if apart <= 0.25 * mean:
         return samples, step
     # between its points a digitised trace is straight, and 1 ms is finer than they are
     fine = 0.001
@@ -226,14 +232,11 @@ class Channel:
     @classmethod
     def from_direction(cls, samples: Array, dt: float, direction: str) -> "Channel":
         """Create a channel; a vertical component with positive downwards changes its sign."""
-        down_pattern = re.compile(r"\b(DWN|DOWN|DN)\b|DWN$", re.IGNORECASE)
-        vertical_pattern = re.compile(
-            r"\b(UP|UPDO|VERT|VERTICAL|V|VER|U-D|UD|U|Z|[A-Z]{2}Z)\b|UP$", re.IGNORECASE
-        )
         name = direction.strip()
-        if down_pattern.search(name):
+        if re.search(r"\b(DWN|DOWN|DN)\b|DWN$", name, re.IGNORECASE):
             return cls(-samples, dt, f"{name}, turned up", True)
-        return cls(samples, dt, name, bool(vertical_pattern.search(name)))
+        upward = r"\b(UP|UPDO|VERT|VERTICAL|V|VER|U-D|UD|U|Z|[A-Z]{2}Z)\b|UP$"
+        return cls(samples, dt, name, bool(re.search(upward, name, re.IGNORECASE)))
 
 
 class RecordFormat(NamedTuple):

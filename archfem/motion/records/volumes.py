@@ -28,26 +28,28 @@ _COUNT_PATTERN = (
     rf"\s*({NUMBER_PATTERN})"
 )
 _SPECTRA_PATTERN = r"^\s*RESPONSE AND FOURIER AMPLITUDE SPECTRA"
-_FIRST_PATTERN = r"\s*(UN)?CORRECTED ACCELEROGRAM|FILE\s+\d+ OF UNCORRECTED"
-_END_PATTERN = r"END OF DATA FOR CHAN"
-_HEADER_LINES = 120
+_PEAK_PATTERN = (
+    rf"(?:PEAK ACCELERATION\s*=|(?<!UNCOR )MAX\s*=|^ACCELERATION:\s+PEAK)\s*({NUMBER_PATTERN})"
+    r"\s*(G|MM/S/S|CMS?/SEC/SEC)\b"
+)
 
 
 def _read_spaced(text: RecordText) -> list[Channel]:
     """Read the acceleration of every channel that a line announces."""
-    if text.contains(_SPECTRA_PATTERN, 1):
+    if text.search(_SPECTRA_PATTERN, stop=1):
         raise text.error("response spectra (volume 3), no accelerogram: use volume 2", 0)
     return [_read_spaced_channel(text, *bounds) for bounds in _find_bounds(text)]
 
 
-def _find_bounds(text: RecordText, first: str = _FIRST_PATTERN) -> Iterator[tuple[int, int]]:
+def _find_bounds(
+    text: RecordText, first: str = r"\s*(UN)?CORRECTED ACCELEROGRAM|FILE\s+\d+ OF UNCORRECTED"
+) -> Iterator[tuple[int, int]]:
     """Yield the first line of each channel and the line after its last, by end marks if any."""
-    last = len(text.lines)
-    if text.contains(_END_PATTERN, last):
-        start = 0
+    end_pattern, start, last = r"END OF DATA FOR CHAN", 0, len(text.lines)
+    if text.search(end_pattern):
         # a channel without its end mark is refused, since the file is truncated
-        while any(line.strip() for line in text.lines[start:]):
-            end = text.find(_END_PATTERN, start)[0]
+        while text.search(r"\S", start):
+            end = text.find(end_pattern, start)[0]
             yield start, end
             start = end + 1
         return
@@ -65,8 +67,8 @@ def _read_spaced_channel(text: RecordText, start: int, end: int) -> Channel:
     dt = text.check_step(1.0 / max(spacing, 1e-9) if by_rate else spacing, line)
     # USC states the unit at the peak only
     words = block[4]
-    if not find_units(words) and text.contains(_PEAK_PATTERN, line, start):
-        words = f"in {text.find(_PEAK_PATTERN, start, line)[1][2]}"
+    if not find_units(words) and (peak := text.search(_PEAK_PATTERN, start, line)):
+        words = f"in {peak[1][2]}"
     unit = text.find_unit(words, "no single unit of acceleration such as CM/SEC/SEC", line)
     numbers, after = text.read_block(line + 1, int(block[1]), find_column_width(block[4]))
     _check_end(text, after, end, int(block[1]))
@@ -76,7 +78,7 @@ def _read_spaced_channel(text: RecordText, start: int, end: int) -> Channel:
 def _find_once(text: RecordText, pattern: str, start: int, end: int) -> tuple[int, re.Match[str]]:
     """Return the only line of a channel with a pattern, and the match."""
     line, found = text.find(pattern, start, end)
-    if text.contains(pattern, end, line + 1):
+    if text.search(pattern, line + 1, end):
         raise text.error("a second channel begins before the end of the first", line)
     return line, found
 
@@ -103,12 +105,11 @@ def _read_pairs(text: RecordText, start: int, end: int) -> Channel:
         raise text.error(f"the points do not last {duration:g} s, as the header states", line)
     samples, dt = space_evenly(text, numbers, first)
     rms_pattern = rf"^\s*RMS ACC\w*\.? OF COMPLETE RECORD\s*=\s*({NUMBER_PATTERN})\s*G/10"
-    if text.contains(rms_pattern, first, line):
-        rms_line, stated = text.find(rms_pattern, line, first)
+    if stated := text.search(rms_pattern, line, first):
         rms = float(np.sqrt(np.mean(numbers[1::2] ** 2)))
         # USC states no peak but the rms, of later files to 1 %, of earlier ones up to 1.9 times
-        if not 0.4 * rms < float(stated[1]) + 0.001 < 2.5 * rms + 0.002:
-            raise text.error(f"the rms of the points is {rms:.3f} G/10: damaged", rms_line)
+        if not 0.4 * rms < float(stated[1][1]) + 0.001 < 2.5 * rms + 0.002:
+            raise text.error(f"the rms of the points is {rms:.3f} G/10: damaged", stated[0])
     return _create_channel(text, samples * unit, dt, (start, first))
 
 
@@ -133,11 +134,10 @@ def _read_bhrc(text: RecordText) -> list[Channel]:
 
 def _read_geonet(text: RecordText) -> list[Channel]:
     """Read the three channels of a file of GeoNet (New Zealand), volume 1 or 2."""
-    count_pattern = rf"^Number of points\s+({COUNT_PATTERN})\s"
-    step_pattern = rf"({NUMBER_PATTERN}) s(?:ec)?(?: intervals|\s*$)"
     channels = []
     for start, end in _find_bounds(text):
-        line, count = _find_once(text, count_pattern, start, end)
+        line, count = _find_once(text, rf"^Number of points\s+({COUNT_PATTERN})\s", start, end)
+        step_pattern = rf"({NUMBER_PATTERN}) s(?:ec)?(?: intervals|\s*$)"
         step_line, step = text.find(step_pattern, line + 1, end)
         # "Raw readings in units of 1.00 mm/s/s"; corrected ones have none but mm/s/s
         scale = re.search(r"units of\s+(\d{1,3}\.\d+)\s+mm/s/s", text.lines[step_line])
@@ -155,33 +155,21 @@ def _read_geonet(text: RecordText) -> list[Channel]:
     return channels
 
 
-_PEAK_PATTERN = (
-    rf"(?:PEAK ACCELERATION\s*=|(?<!UNCOR )MAX\s*=|^ACCELERATION:\s+PEAK)\s*({NUMBER_PATTERN})"
-    r"\s*(G|MM/S/S|CMS?/SEC/SEC)\b"
-)
-
-
 def _create_channel(
     text: RecordText, samples: Array, dt: float, header: tuple[int, int]
 ) -> Channel:
     """Create a channel of samples [m/s²] after a comparison with the peak of its header."""
-    start, end = header
+    if found := text.search(_PEAK_PATTERN, *header):
+        peak, unit = found[1][1], find_units(f"in {found[1][2]}").pop()
+        decimals = len(peak.partition(".")[2])
+        text.check_peak(samples, float(peak) * unit, rounding=0.5 * unit * 10.0**-decimals)
     name_pattern = r"(?:\bCHAN\s+\d+:|^COMP(?:ONENT)?)\s+(\S+(?: DEG)?)"
-    if text.contains(_PEAK_PATTERN, end, start):
-        _, peak = text.find(_PEAK_PATTERN, start, end)
-        unit = find_units(f"in {peak[2]}").pop()
-        decimals = len(peak[1].partition(".")[2])
-        text.check_peak(samples, float(peak[1]) * unit, rounding=0.5 * unit * 10.0**-decimals)
-    direction = text.find(name_pattern, start, end)[1][1]
+    direction = text.find(name_pattern, *header)[1][1]
     # BHRC numbers its components: L1, V2 and T3
     return Channel.from_direction(samples, dt, re.sub(r"^([LVT])\d$", r"\1", direction))
 
 
 BHRC = RecordFormat("BHRC", ((r"^\W*VOL1DS FILE", 3),), _read_bhrc)
-CSMIP = RecordFormat(
-    "CSMIP", ((f"{_SPACED_PATTERN}|{_SPECTRA_PATTERN}", _HEADER_LINES),), _read_spaced
-)
+CSMIP = RecordFormat("CSMIP", ((f"{_SPACED_PATTERN}|{_SPECTRA_PATTERN}", 120),), _read_spaced)
 GEONET = RecordFormat("GeoNet", ((r"CORRECTED ACCELEROGRAM .*GNS Science", 1),), _read_geonet)
-VOLUME_1 = RecordFormat(
-    "volume 1 (CDMG, USC, RENADIC)", ((_COUNT_PATTERN, _HEADER_LINES),), _read_volume_1
-)
+VOLUME_1 = RecordFormat("volume 1 (CDMG, USC, RENADIC)", ((_COUNT_PATTERN, 120),), _read_volume_1)

@@ -1,7 +1,6 @@
 """Binary files of seismology, miniSEED and SAC, read with ObsPy."""
 
 import re
-import struct
 import warnings
 from io import BytesIO
 from os import PathLike
@@ -21,17 +20,13 @@ def find_waveform_format(content: bytes) -> str | None:
     if re.match(rb"\d{6}[DRQM][ \0]|MS\x03", content):
         return "miniSEED"
     # SAC has no mark but the version of its header, number 77 of its words of four bytes
-    word = content[304:308] if len(content) >= 632 else b""
-    versions = [struct.pack(order + "i", version) for order in "<>" for version in (6, 7)]
-    return "SAC" if word in versions else None
+    version = content[304:308] if len(content) >= 632 else b""
+    known = {number.to_bytes(4, order) for number in (6, 7) for order in ("little", "big")}
+    return "SAC" if version in known else None
 
 
 def read(
-    path: str | PathLike[str],
-    *,
-    form: str,
-    units: str | None,
-    response: str | PathLike[str] | None,
+    path: str | PathLike[str], *, form: str, units: str | None, response: str | PathLike[str] | None
 ) -> list[Channel]:
     """Read every channel of a file, without its mean: an instrument's zero is no acceleration."""
     with require_package("ObsPy"):
@@ -46,18 +41,17 @@ def read(
     for name in dict.fromkeys(trace.id for trace in stream):
         trace = _merge_traces(path, name, stream)
         if units is not None:
-            scale, is_down = parse_unit(units), False
+            scale = parse_unit(units)
         elif inventory is not None:
-            scale, is_down = _find_scale(path, trace, inventory)
+            scale = _find_scale(path, trace, inventory)
         else:
             raise InvalidInput(
                 f"{path}: {form} states no unit, and channel {name} may be counts of an instrument:"
                 " give response= with its StationXML, or units= of samples that are accelerations"
             )
-        text = RecordText(Path(path), (), True)
         samples = np.asarray(trace.data, dtype=float)
-        samples = (samples - samples.mean()) * (-scale if is_down else scale)
-        dt = text.check_step(float(trace.stats.delta))
+        samples = (samples - samples.mean()) * scale
+        dt = RecordText(Path(path), (), True).check_step(float(trace.stats.delta))
         channels.append(Channel.from_direction(samples, dt, trace.stats.channel))
     return channels
 
@@ -95,8 +89,8 @@ def _merge_traces(path: str | PathLike[str], name: str, stream: Any) -> Any:
     return pieces[0]
 
 
-def _find_scale(path: str | PathLike[str], trace: Any, inventory: Any) -> tuple[float, bool]:
-    """Return the acceleration of one count [m/s²], and whether a vertical is positive downwards."""
+def _find_scale(path: str | PathLike[str], trace: Any, inventory: Any) -> float:
+    """Return the acceleration of one count [m/s²], negative where a vertical counts downwards."""
     # Below a third of its corner an accelerometer answers by one number, its sensitivity.
     try:
         found = inventory.get_response(trace.id, trace.stats.starttime).instrument_sensitivity
@@ -121,4 +115,4 @@ def _find_scale(path: str | PathLike[str], trace: Any, inventory: Any) -> tuple[
             "units= in place of response="
         )
     scale = {"": 1.0, "C": 1e-2, "M": 1e-3, "N": 1e-9}[sensed[1]]
-    return scale / value, (place.get("dip") or 0.0) > 45.0
+    return -scale / value if (place.get("dip") or 0.0) > 45.0 else scale / value
