@@ -53,11 +53,6 @@ MODEL_KEYS = {
 }
 # Keywords of `build` which have another name in a case file.
 BUILD_KEYWORDS = {"max_cell_size": "coarse", "quadrature_points": "points", "mesh_file": "file"}
-CRITERIA_KEYS = {"hinge": "1", "failures": int, "friction": "1", "duration": "s"}
-OUTPUT_KEYS = {
-    **{"save_every": int, "save_fields_every": int, "joints": [(int, str)], "animation": bool},
-    "free_body": str,
-}
 TABLE_SECTIONS = (
     *("structure", "materials", "contacts", "model", "motion", "suite", "analysis"),
     *("criteria", "limit", "rating", "assessment", "dead_load", "output"),
@@ -153,8 +148,11 @@ class Case:
         for key in TABLE_SECTIONS:
             if not isinstance(settings.get(key, {}), dict):
                 raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
-        analysis = parse_analysis(settings.get("analysis", {}))
         model = check_table(settings.get("model", {}), MODEL_KEYS, "model")
+        keys: Table = {"hinge": "1", "failures": int, "friction": "1", "duration": "s"}
+        criteria = check_table(settings.get("criteria", {}), keys, "criteria")
+        keys = {"save_every": int, "save_fields_every": int, "joints": [(int, str)]}
+        keys |= {"animation": bool, "free_body": str}
         motion, suite, limit = (settings.get(key) for key in ("motion", "suite", "limit"))
         if motion is not None and suite is not None:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
@@ -164,14 +162,12 @@ class Case:
             model={BUILD_KEYWORDS.get(key, key): value for key, value in model.items()},
             motion=None if motion is None else parse_motion(motion),
             suite=None if suite is None else parse_suite(suite),
-            analysis=analysis,
-            criteria=Criteria(
-                **check_table(settings.get("criteria", {}), CRITERIA_KEYS, "criteria")
-            ),
+            analysis=parse_analysis(settings.get("analysis", {})),
+            criteria=Criteria(**criteria),
             limit=None if limit is None else parse_limit(limit),
             rating=parse_rating(settings.get("rating", {})),
             assessment=parse_assessment(settings.get("assessment", {})),
-            output=check_table(settings.get("output", {}), OUTPUT_KEYS, "output"),
+            output=check_table(settings.get("output", {}), keys, "output"),
             settings=dict(settings),
             folder=folder,
         )
@@ -303,10 +299,7 @@ class Case:
         refuse_unknown(dict.fromkeys(pairs), self.suite["pairs"], "suite.pairs")
         # Checked keys and original tables must agree: the digest is that of the tables.
         suite, table = (
-            {
-                **keys,
-                "pairs": {name: keys["pairs"][name] for name in keys["pairs"] if name in pairs},
-            }
+            {**keys, "pairs": {key: pair for key, pair in keys["pairs"].items() if key in pairs}}
             for keys in (self.suite, self.settings["suite"])
         )
         return replace(self, suite=suite, settings={**self.settings, "suite": table})

@@ -46,12 +46,7 @@ from archfem.motion.suite import Suite
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.modes import Modes
 from archfem.statics.stress import strength_use_table
-from archfem.view.collapse import (
-    draw_collapse,
-    draw_fall,
-    draw_kinematic_assessment,
-    draw_rating,
-)
+from archfem.view.collapse import draw_collapse, draw_fall, draw_kinematic_assessment, draw_rating
 from archfem.view.histories import draw_envelope, draw_joints, most_stressed_joints
 from archfem.view.motions import draw_motion, draw_selection, draw_spectra, draw_suite
 from archfem.view.positions import decisive_instant
@@ -212,10 +207,8 @@ def _check_files(place: Path) -> FileGroup:
             "case again"
         )
     # histories are checked as they are read, and an earlier report is replaced
-    listed = [
-        name for command, group in groups.items() if command != "report" for name in group.files
-    ]
-    for path in (place / name for name in listed):
+    written = [group for command, group in groups.items() if command != "report"]
+    for path in (place / name for group in written for name in group.files):
         if path.is_file() and path.name != HISTORY_FILE:
             check_listed(path, read_bytes(path, "result", max_bytes=2**40))
     return run
@@ -337,9 +330,8 @@ def adopt_files(run: Run) -> bool:
     pair, draft, folder = run.path.parents[0].name, run.path.parents[1], run.path.parents[2]
     listed = intact_file_list(folder).get("run")
     names = [] if listed is None else [n for n in listed.files if n.startswith(f"{pair}/")]
-    if f"{pair}/{SUMMARY_FILE}" not in names or not _is_linked(
-        run.path, folder / pair / HISTORY_FILE
-    ):
+    same_history = _is_linked(run.path, folder / pair / HISTORY_FILE)
+    if f"{pair}/{SUMMARY_FILE}" not in names or not same_history:
         return False
     try:
         for name in names:
@@ -361,10 +353,7 @@ def write_pairs(
     runs: Mapping[str, History], at_rest: DeadLoadResult, text: str, folder: Path
 ) -> list[Path]:
     """Write the table of a suite, and draw the envelopes of its runs."""
-    pairs, per_figure = (
-        list(runs.items()),
-        len(LINE_COLOURS),
-    )  # as many runs as there are line styles
+    pairs, per_figure = list(runs.items()), len(LINE_COLOURS)  # as many runs as line styles
     files = [_write_text(text, folder / "suite.txt")]
     for number, first in enumerate(range(0, len(pairs), per_figure), start=1):
         figure = draw_envelope(dict(pairs[first : first + per_figure]), dead=at_rest.dead.joints)
@@ -380,10 +369,8 @@ def write_modes(modes: Modes, text: str, folder: Path) -> list[Path]:
 
 def write_accuracy(accuracy: Accuracy, text: str, folder: Path) -> list[Path]:
     """Write and draw computing time against error."""
-    return [
-        _write_text(text, folder / "accuracy.txt"),
-        save(draw_accuracy(accuracy), folder / "accuracy.png"),
-    ]
+    figure = save(draw_accuracy(accuracy), folder / "accuracy.png")
+    return [_write_text(text, folder / "accuracy.txt"), figure]
 
 
 def write_verdict_range(verdicts: VerdictRange, folder: Path) -> list[Path]:

@@ -11,11 +11,7 @@ from archfem._files import align_columns
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import Ending, History
-from archfem.dynamics.verdict import (
-    MECHANISM_DEFINITIONS,
-    PUBLISHED_DEFINITION,
-    DetectedMechanism,
-)
+from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION, DetectedMechanism
 from archfem.joints.criteria import (
     assessed_joints,
     envelope,

@@ -21,12 +21,7 @@ from scipy import sparse
 from archfem._typing import Array
 from archfem._validation import check_number, check_type, is_one_of, short_repr
 from archfem.errors import InvalidInput
-from archfem.limit.linear_programme import (
-    Optimum,
-    Programme,
-    RigidBlocks,
-    rigid_load,
-)
+from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks, rigid_load
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
 from archfem.masonry.loads import BodyForce, PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks

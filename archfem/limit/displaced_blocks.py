@@ -430,10 +430,7 @@ def _solve_flat(
 
 
 def _solve_static(
-    bodies: Bodies,
-    contacts: Sequence[Contact],
-    coefficient: Array,
-    held: Array | None = None,
+    bodies: Bodies, contacts: Sequence[Contact], coefficient: Array, held: Array | None = None
 ) -> tuple[float, Array, Array] | None:
     """Return the largest factor, velocities by duality and normal forces [mean body weights].
 

@@ -402,8 +402,7 @@ def _scale_weights(structure: Structure, factor: float) -> Structure:
         return structure
     blocks = (
         replace(
-            block,
-            material=replace(block.material, unit_weight=factor * block.material.unit_weight),
+            block, material=replace(block.material, unit_weight=factor * block.material.unit_weight)
         )
         for block in structure.blocks
     )

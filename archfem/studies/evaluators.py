@@ -24,13 +24,7 @@ from archfem.joints.criteria import assessed_joints, part_roles
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import suggest_name
 from archfem.motion.motion import Motion
-from archfem.studies.cache import (
-    dead_load_of,
-    first_mode,
-    ground_motion,
-    ground_suite,
-    stepper_of,
-)
+from archfem.studies.cache import dead_load_of, first_mode, ground_motion, ground_suite, stepper_of
 from archfem.studies.parameter_space import Point
 
 # A flat table: numbers, texts and rows of numbers by name

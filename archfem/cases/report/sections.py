@@ -87,9 +87,8 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
     recorded = {str(run.dataset.attrs.get("fidelity", "")) for run in data.runs.values()}
     fidelity = ", ".join(sorted(recorded)) if recorded else case.discretisation.name
     large = case.discretisation.displacements == "large"
-    sliding = (
-        "its own limit, μ + c A / N" if criteria.friction is None else f"{criteria.friction:g}"
-    )
+    own_limit = "its own limit, μ + c A / N"
+    sliding = own_limit if criteria.friction is None else f"{criteria.friction:g}"
     dt = case.analysis.get("dt")
     step = "steps of a length that the error chooses" if dt is None else f"steps of {1e3 * dt:g} ms"
     return [
@@ -193,11 +192,22 @@ def _tabulate_materials(structure: Structure) -> list[Grid]:
 
 def build_dead_load_sections(data: ReportData) -> list[Section]:
     """Build the sections on dead load, modes, limit analysis, rating and assessment."""
+    caption = "Shapes of the modes about dead load."
+    remedy = "`archfem modes CASE.toml --out FOLDER` adds them to the folder."
+    modes = data.read_result("modes.txt", "modes.png", caption, "modes", remedy)
+    remedy = "A case with a load in its table [limit] includes it."
+    if data.case.limit is not None and data.case.limit.live:
+        remedy = "The case includes it: `archfem limit CASE.toml --out FOLDER` finds it."
+    caption = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
+    limit = data.read_result("limit.txt", "collapse.png", caption, "limit analysis", remedy)
+    remedy = "`archfem rate CASE.toml --vehicle LM1 --out FOLDER` adds it to the folder."
+    caption = "Factor along the bridge, and mechanism at the worst place."
+    rating = data.read_result("rating.txt", "rating.png", caption, "a rating", remedy)
     return [
         Section("Dead load", _build_dead_load(data)),
-        Section("Modes", _build_modes(data)),
-        Section("Limit analysis", _build_limit(data)),
-        Section("Rating for a vehicle", _build_rating(data)),
+        Section("Modes", modes),
+        Section("Limit analysis", limit),
+        Section("Rating for a vehicle", rating),
         Section("Kinematic assessment", _build_assessment(data)),
     ]
 
@@ -254,32 +264,6 @@ def _tabulate_dead_load(joints: xr.Dataset) -> Grid:
     return Grid(head, rows, "Joints of rings and piers under dead load")
 
 
-def _build_modes(data: ReportData) -> list[Any]:
-    """Build table and shapes of the modes from the files of the folder."""
-    missing = missing_note(
-        "modes", "`archfem modes CASE.toml --out FOLDER` adds them to the folder."
-    )
-    caption = "Shapes of the modes about dead load."
-    return data.read_result("modes.txt", "modes.png", caption, missing)
-
-
-def _build_limit(data: ReportData) -> list[Any]:
-    """Build text and mechanism of limit analysis from the files of the folder."""
-    remedy = "A case with a load in its table [limit] includes it."
-    if data.case.limit is not None and data.case.limit.live:
-        remedy = "The case includes it: `archfem limit CASE.toml --out FOLDER` finds it."
-    caption = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
-    missing = missing_note("limit analysis", remedy)
-    return data.read_result("limit.txt", "collapse.png", caption, missing)
-
-
-def _build_rating(data: ReportData) -> list[Any]:
-    """Build text and picture of a rating from the files of the folder."""
-    remedy = "`archfem rate CASE.toml --vehicle LM1 --out FOLDER` adds it to the folder."
-    caption = "Factor along the bridge, and mechanism at the worst place."
-    return data.read_result("rating.txt", "rating.png", caption, missing_note("a rating", remedy))
-
-
 def _build_assessment(data: ReportData) -> list[Any]:
     """Build text and pictures of kinematic assessments from the files of the folder."""
     text = data.read_text("assessment.txt")
@@ -297,16 +281,14 @@ def build_ground_section(data: ReportData) -> Section:
     """Build the section on ground motions and spectra."""
     motions = list(data.motions.values())
     if not motions:
-        remedy = "The case has none."
-        if data.case.has_motion:
-            remedy = "`archfem run` shakes the structure."
+        shaken = data.case.has_motion
+        remedy = "`archfem run` shakes the structure." if shaken else "The case has none."
         return Section("Ground motion", [missing_note("a motion of the ground", remedy)])
     caption = "Measures of the motions as applied, read at the steps that the runs recorded."
     blocks: list[Any] = [Grid(*tabulate_motions(motions), caption)]
     if data.case.suite is None:
-        blocks += [
-            FigureBlock.of(draw_motion(motion), "Ground motion as applied.") for motion in motions
-        ]
+        applied = "Ground motion as applied."
+        blocks += [FigureBlock.of(draw_motion(motion), applied) for motion in motions]
     blocks += _build_spectra(data.case, motions)
     return Section("Ground motion" if len(motions) == 1 else "Ground motions", blocks)
 
@@ -410,17 +392,11 @@ def _build_suite_response(data: ReportData) -> list[Any]:
     """Build the tables of all runs, and their envelopes."""
     (head, rows), columns = tabulate_runs(data.runs), len(RUN_COLUMNS)
     # The mechanisms have too many columns for a page: a line of text for each run instead.
-    mechanisms = [
-        (
-            row[0],
-            "; ".join(
-                f"{title}: {cell}"
-                for title, cell in zip(head[columns:], row[columns:], strict=True)
-                if cell != "-"
-            ),
-        )
-        for row in rows
-    ]
+    mechanisms = []
+    for row in rows:
+        cells = zip(head[columns:], row[columns:], strict=True)
+        named = (f"{title}: {cell}" for title, cell in cells if cell != "-")
+        mechanisms.append((row[0], "; ".join(named)))
     caption = "Outcome, PGA, and the critical joint of each run"
     blocks: list[Any] = [
         Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption),
@@ -445,12 +421,8 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     eccentricity = max(float(abs(each["eccentricity"]).max()) for each in joints)
     opened = " (joints came apart)" if any(bool(each["open"].any()) for each in joints) else ""
     friction = max(float(each["friction"].max()) for each in joints)
-    facts += [
-        ("PGA", f"{pga:.2f} m/s²"),
-        ("largest |e|", f"{eccentricity:.3f}{opened}"),
-        ("largest V / N", format_ratio(friction)),
-    ]
-    return facts
+    sizes = [("PGA", f"{pga:.2f} m/s²"), ("largest |e|", f"{eccentricity:.3f}{opened}")]
+    return [*facts, *sizes, ("largest V / N", format_ratio(friction))]
 
 
 def _verdict_facts(runs: Sequence[History]) -> list[tuple[str, str]]:
