@@ -259,13 +259,11 @@ def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
     check_type(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
     check_instant(structure, joints)
     fractions = contact_fractions(structure, joints["N"].values, joints["M"].values)
-    reduced = (
-        replace(
-            joint, contact=replace(joint.contact, cohesion=joint.contact.cohesion * float(part))
-        )
-        for joint, part in zip(structure.joints, fractions, strict=True)
-    )
-    return replace(structure, joints=tuple(reduced))
+    joints_closed = []
+    for joint, part in zip(structure.joints, fractions, strict=True):
+        contact = replace(joint.contact, cohesion=joint.contact.cohesion * float(part))
+        joints_closed.append(replace(joint, contact=contact))
+    return replace(structure, joints=tuple(joints_closed))
 
 
 def contact_fractions(structure: Structure, normal: Array, moment: Array) -> Array:

@@ -54,16 +54,13 @@ class PathEnd(StrEnum):
     @property
     def sentence(self) -> str:
         """Meaning of the reason, as a sentence."""
-        return _END_SENTENCES[self]
-
-
-_END_SENTENCES = {
-    PathEnd.FALLS: "at the end it falls without any horizontal force",
-    PathEnd.LOCKS: "at the end its contacts permit no further motion",
-    PathEnd.COLLIDES: "at the end it runs into blocks that it has no joint with",
-    PathEnd.UNRESOLVED: "at the end no mechanism was found whose faces slide flat",
-    PathEnd.ENDURES: "it still needs a horizontal force where the path is cut off",
-}
+        return {
+            PathEnd.FALLS: "at the end it falls without any horizontal force",
+            PathEnd.LOCKS: "at the end its contacts permit no further motion",
+            PathEnd.COLLIDES: "at the end it runs into blocks that it has no joint with",
+            PathEnd.UNRESOLVED: "at the end no mechanism was found whose faces slide flat",
+            PathEnd.ENDURES: "it still needs a horizontal force where the path is cut off",
+        }[self]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,15 +132,12 @@ class LinkageState:
     @cached_property
     def misfits(self) -> Array:
         """Violation of each constraint, gaps of all contacts and slips of sticking ones [m]."""
-        jumps = []
+        gaps, slips = [], []
         for contact, (_, on_face, _) in zip(self.contacts, self.linkage.anchors, strict=True):
-            jumps.append(contact.point - self.blocks.places(on_face[None, :], contact.face)[0])
-        gaps = [contact.normal @ jump for contact, jump in zip(self.contacts, jumps, strict=True)]
-        slips = [
-            tangent(contact.normal) @ jump
-            for contact, jump in zip(self.contacts, jumps, strict=True)
-            if not contact.slip
-        ]
+            jump = contact.point - self.blocks.places(on_face[None, :], contact.face)[0]
+            gaps.append(contact.normal @ jump)
+            if not contact.slip:
+                slips.append(tangent(contact.normal) @ jump)
         return np.array(gaps + slips)
 
     @cached_property
@@ -212,9 +206,8 @@ class LinkageState:
         Normal forces that equilibrium does not determine are undefined (NaN).
         """
         normal, along = self.rates
-        dead, live = (
-            self.bodies.generalised(load) for load in (self.blocks.dead, self.blocks.live)
-        )
+        dead = self.bodies.generalised(self.blocks.dead)
+        live = self.bodies.generalised(self.blocks.live)
         slipping = np.flatnonzero(~self.sticks)
         coefficient = friction[[contact.joint for contact in self.contacts]]
         forces = normal.copy()
@@ -241,13 +234,9 @@ class LinkageState:
         objective[-1] = 1.0
         scaled = columns.copy()
         scaled[:, -1] /= unit
-        result = linprog(
-            objective,
-            A_eq=scaled,
-            b_eq=loads / unit,
-            bounds=[(0.0, None)] * len(self.contacts) + free,
-            method="highs",
-        )
+        bounds = [(0.0, None)] * len(self.contacts) + free
+        equations = {"A_eq": scaled, "b_eq": loads / unit}
+        result = linprog(objective, **equations, bounds=bounds, method="highs")
         if result.status != 0:
             return fallback
         forces = result.x * unit
@@ -334,15 +323,9 @@ class PathFollower:
             if not self.factors:
                 raise
             end = PathEnd.UNRESOLVED
-        return MechanismPath(
-            self.blocks,
-            np.array(self.factors),
-            np.array(self.displacements),
-            motion,
-            tuple(mechanisms),
-            tuple(self.events),
-            end,
-        )
+        places = np.array(self.factors), np.array(self.displacements)
+        changes = tuple(mechanisms), tuple(self.events)
+        return MechanismPath(self.blocks, *places, motion, *changes, end)
 
     def _start(
         self, blocks: PlacedBlocks, mechanism: Mechanism
@@ -370,9 +353,8 @@ class PathFollower:
         for contact in [each for each in mechanism.contacts if each.slip]:
             others = tuple(each for each in mechanism.contacts if each is not contact)
             freed = replace(mechanism, contacts=others)
-            whole, state = (
-                LinkageState(Linkage(blocks, each), blocks) for each in (mechanism, freed)
-            )
+            whole = LinkageState(Linkage(blocks, mechanism), blocks)
+            state = LinkageState(Linkage(blocks, freed), blocks)
             ranks = [np.linalg.matrix_rank(each.jacobian, tol=1e-9) for each in (whole, state)]
             if ranks[0] == ranks[1] and self._leaves(whole, state, contact):
                 mechanism = freed
@@ -490,9 +472,8 @@ class PathFollower:
         if closes.any():
             return f"{join_joint_names([names[k] for k in np.flatnonzero(closes)])} closes"
         for contact, force in zip(state.contacts, normal_forces, strict=True):
-            if (
-                force < -1e-5 * self._force_unit
-            ):  # well above the tolerance of the programme that follows
+            # well above the tolerance of the programme that follows
+            if force < -1e-5 * self._force_unit:
                 return f"a contact of {names[contact.joint]} opens"
             if contact.slip and self._is_off(blocks, contact, near):
                 return f"a corner slides off its face at {names[contact.joint]}"

@@ -103,10 +103,7 @@ def study_table(findings: Mapping[str, Finding]) -> str:
         rows = [[*row, text or "-"] for row, text in zip(rows, falls, strict=True)]
     tables = [align_columns(head, rows), *_incomplete_runs(findings)]
     if any(finding.scales for finding in findings.values()):
-        rows = [
-            [name, *(_range_text(finding.least(kind)) for kind in MECHANISM_DEFINITIONS)]
-            for name, finding in findings.items()
-        ]
+        rows = [[name, *map(_range_text, each.factors.values())] for name, each in findings.items()]
         tables.append(align_columns(["factor at first mechanism", *MECHANISM_DEFINITIONS], rows))
     return "\n\n".join(tables)
 

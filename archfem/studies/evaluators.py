@@ -34,14 +34,19 @@ Findings = dict[str, Any]
 def evaluate_dead_load(case: Case) -> Findings:
     """Return the largest |e| and friction of joints under dead load, and the first mode."""
     result = dead_load_of(case)
-    joints, first = assessed_joints(result.dead.joints), first_mode(result)
+    joints = assessed_joints(result.dead.joints)
     return {
         "eccentricity": float(abs(joints["eccentricity"]).fillna(0.5).max()),
         "friction": float(joints["friction"].max()),
         "N": float(joints["N"].min()),
-        "frequency": float(first.frequencies[0]),
-        "mass": float(first.mass_ratios[0, 0]),
+        **_describe_first_mode(result),
     }
+
+
+def _describe_first_mode(result: DeadLoadResult) -> Findings:
+    """Return frequency and mass ratio of the first mode about the dead load."""
+    first = first_mode(result)
+    return {"frequency": float(first.frequencies[0]), "mass": float(first.mass_ratios[0, 0])}
 
 
 def evaluate_history(case: Case) -> Findings:
@@ -152,10 +157,9 @@ def evaluate_limit(case: Case) -> Findings:
 def evaluate_comparison(case: Case, scales: Mapping[str, Any] | None = None) -> Findings:
     """Return the findings of a case under the one pair of its suite."""
     result, motion = dead_load_of(case), ground_motion(case)
-    joints, first = assessed_joints(result.dead.joints), first_mode(result)
+    joints = assessed_joints(result.dead.joints)
     findings: Findings = {
-        "frequency": float(first.frequencies[0]),
-        "mass": float(first.mass_ratios[0, 0]),
+        **_describe_first_mode(result),
         **_prefix("role", part_roles(joints)),
         **_prefix("dead", _largest_by_part(abs(joints["eccentricity"]).fillna(0.5))),
     }

@@ -336,9 +336,8 @@ def _points(
         names = list((case.suite or {}).get("pairs", ()))
         if not names:
             raise InvalidInput("no motions were given, and the case has no [suite] of them")
-        return names, tuple(
-            Point(case.settings, case.folder, ((PAIR_KEY, name),)) for name in names
-        )
+        changes = [((PAIR_KEY, name),) for name in names]
+        return names, tuple(Point(case.settings, case.folder, change) for change in changes)
     if isinstance(motions, Mapping):
         named = dict(motions)
     else:

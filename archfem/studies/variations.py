@@ -242,20 +242,16 @@ def _single_changes(ranges: Mapping[str, Any], damping: Viscous | None) -> list[
     neutral = {**NEUTRAL, "damping_kind": _damping_kind(damping)}
     changes: list[dict[str, Any]] = [{}]
     for name, values in ranges.items():
-        options = list(values)
-        changes += [{name: value} for value in options if value != neutral.get(name)]
+        changes += [{name: value} for value in values if value != neutral.get(name)]
     return changes
 
 
 def _sample_changes(ranges: Mapping[str, Any], samples: int, seed: int) -> list[dict[str, Any]]:
     """Return a Latin hypercube over all properties."""
-    sampler = qmc.LatinHypercube(d=len(ranges), seed=seed)
+    shares = qmc.LatinHypercube(d=len(ranges), seed=seed).random(samples)
     return [
-        {
-            name: _value_at(values, share)
-            for (name, values), share in zip(ranges.items(), row, strict=True)
-        }
-        for row in sampler.random(samples)
+        {name: _value_at(ranges[name], share) for name, share in zip(ranges, row, strict=True)}
+        for row in shares
     ]
 
 
@@ -311,12 +307,11 @@ def _vary_contacts(
     """Return the structure with other stiffness and friction of its joints."""
     joints = []
     for joint in structure.joints:
-        contact = joint.contact
         contact = replace(
-            contact,
-            normal_stiffness=changes["k_n"] * contact.normal_stiffness,
-            shear_stiffness=changes["k_s"] * contact.shear_stiffness,
-            friction=max(contact.coefficient + changes["friction"], min_friction),
+            joint.contact,
+            normal_stiffness=changes["k_n"] * joint.contact.normal_stiffness,
+            shear_stiffness=changes["k_s"] * joint.contact.shear_stiffness,
+            friction=max(joint.contact.coefficient + changes["friction"], min_friction),
         )
         joints.append(replace(joint, contact=contact))
     return replace(structure, joints=tuple(joints))
@@ -326,9 +321,8 @@ def _run_elastic_joints(
     structure: Structure, motion: Motion, dt: float, base: RunSettings, changes: Mapping[str, Any]
 ) -> CollapseState:
     """Run a model with elastic joints, and return its state of collapse."""
-    rule: dict[str, Any] = {}
-    if changes["joint_rule"] == "three points":
-        rule = {"quadrature": "trapezoidal", "points": 3}
+    three = changes["joint_rule"] == "three points"
+    rule: dict[str, Any] = {"quadrature": "trapezoidal", "points": 3} if three else {}
     model = build(structure, fidelity=base.fidelity, displacements="large", **rule)
     kind = changes.get("damping_kind") or _damping_kind(base.damping)
     damping = _vary_damping(model, base.damping, kind, changes["damping_ratio"])
@@ -374,14 +368,9 @@ def _build_dataset(
     for name, values in ranges.items():
         first = "as given" if isinstance(values, Mapping) else neutral[name]
         columns[name] = "run", np.array([change.get(name, first) for change in changes])
-    for name, missing in (
-        ("outcome", "unknown"),
-        ("displacement", np.nan),
-        ("residual", np.nan),
-        ("time", np.nan),
-    ):
-        columns[name] = "run", np.array([row["found"].get(name, missing) for row in rows])
-    columns["error"] = "run", np.array([str(row["error"]) for row in rows])
+    columns["outcome"] = "run", np.array([row["found"].get("outcome", "unknown") for row in rows])
     for name, unit in (("displacement", "m"), ("residual", "m"), ("time", "s")):
-        columns[name] = (*columns[name], {"units": unit})
+        values = np.array([row["found"].get(name, np.nan) for row in rows])
+        columns[name] = "run", values, {"units": unit}
+    columns["error"] = "run", np.array([str(row["error"]) for row in rows])
     return xr.Dataset(columns, attrs={"properties": list(ranges)})
