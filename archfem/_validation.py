@@ -287,11 +287,9 @@ def _is_array(value: Any) -> bool:
 
 def _is_sequence(value: Any, kind: type, inner: tuple[Any, ...]) -> bool:
     """Return whether a value is a sequence of the annotated types and length."""
-    if isinstance(value, str | bytes | bytearray | memoryview | Mapping):
+    if isinstance(value, str | bytes | bytearray | memoryview | Mapping | np.ma.MaskedArray):
         return False
     if not isinstance(value, Collection) or (isinstance(value, np.ndarray) and not value.ndim):
-        return False
-    if isinstance(value, np.ma.MaskedArray):
         return False
     if kind is tuple and inner[-1] is not ...:
         return len(value) == len(inner) and all(map(matches_annotation, value, inner))

@@ -13,25 +13,8 @@ from typing import Any
 import tomli_w
 
 from archfem._validation import check_words, validate_arguments
-from archfem.cases.analysis_keys import (
-    AssessmentSettings,
-    LimitAnalysis,
-    check_scheme,
-    parse_analysis,
-    parse_assessment,
-    parse_damping,
-    parse_limit,
-    parse_rating,
-    parse_scheme,
-)
-from archfem.cases.motion_keys import (
-    build_motion,
-    build_pairs,
-    build_suite,
-    build_target_spectrum,
-    parse_motion,
-    parse_suite,
-)
+from archfem.cases import analysis_keys, motion_keys
+from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis
 from archfem.cases.provenance import load_extensions_of
 from archfem.cases.structure_keys import cached_structure, parse_stages
 from archfem.cases.toml_file import Table, apply_change, check_table, read_with_base, refuse_unknown
@@ -160,13 +143,13 @@ class Case:
             title=settings.get("title", "case"),
             structure=cached_structure(settings, folder),
             model={BUILD_KEYWORDS.get(key, key): value for key, value in model.items()},
-            motion=None if motion is None else parse_motion(motion),
-            suite=None if suite is None else parse_suite(suite),
-            analysis=parse_analysis(settings.get("analysis", {})),
+            motion=None if motion is None else motion_keys.parse_motion(motion),
+            suite=None if suite is None else motion_keys.parse_suite(suite),
+            analysis=analysis_keys.parse_analysis(settings.get("analysis", {})),
             criteria=Criteria(**criteria),
-            limit=None if limit is None else parse_limit(limit),
-            rating=parse_rating(settings.get("rating", {})),
-            assessment=parse_assessment(settings.get("assessment", {})),
+            limit=None if limit is None else analysis_keys.parse_limit(limit),
+            rating=analysis_keys.parse_rating(settings.get("rating", {})),
+            assessment=analysis_keys.parse_assessment(settings.get("assessment", {})),
             output=check_table(settings.get("output", {}), keys, "output"),
             settings=dict(settings),
             folder=folder,
@@ -179,7 +162,7 @@ class Case:
         # These properties parse and check their settings.
         _ = self.discretisation, self.tolerance, self.damping, self.scheme, self.joints
         _ = self.stages
-        check_scheme(self.analysis, self.structure, self.discretisation.displacements)
+        analysis_keys.check_scheme(self.analysis, self.structure, self.discretisation.displacements)
         step = self.analysis.get("dt", MIN_TIME_STEP)
         if not MIN_TIME_STEP <= step <= 0.1:
             raise InvalidInput(
@@ -227,7 +210,7 @@ class Case:
     @property
     def damping(self) -> Viscous | EffectiveDamping | None:
         """Damping of the time history; `EffectiveDamping` takes its frequencies from the modes."""
-        return parse_damping(self.analysis)
+        return analysis_keys.parse_damping(self.analysis)
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -237,7 +220,7 @@ class Case:
     @property
     def scheme(self) -> Scheme:
         """Time integration scheme."""
-        return parse_scheme(self.analysis)
+        return analysis_keys.parse_scheme(self.analysis)
 
     def ground_motion(self) -> Motion:
         """Return the ground motion, read or synthetic.
@@ -250,7 +233,7 @@ class Case:
         """
         if self.motion is None:
             raise InvalidInput("the case has no [motion]: give a file, or synthetic = { seed = 1 }")
-        return build_motion(self.motion, self.folder)
+        return motion_keys.build_motion(self.motion, self.folder)
 
     def ground_suite(self) -> Suite:
         """Return the suite of ground motions, matched to its target if the case says so.
@@ -264,7 +247,7 @@ class Case:
         """
         if self.suite is None:
             raise InvalidInput("the case has no [suite]: give a table for each of its pairs")
-        return build_suite(self.suite, self.folder)
+        return motion_keys.build_suite(self.suite, self.folder)
 
     def check_ground(self) -> None:
         """Refuse motions that cannot be read, before anything is computed.
@@ -275,12 +258,12 @@ class Case:
         if self.motion is not None:
             self.ground_motion()
         if self.suite is not None:
-            build_pairs(self.suite, self.folder)
+            motion_keys.build_pairs(self.suite, self.folder)
 
     @property
     def target(self) -> DesignSpectrum | None:
         """Target spectrum of the suite, or None."""
-        return build_target_spectrum(self.suite or {})
+        return motion_keys.build_target_spectrum(self.suite or {})
 
     def alone(self, *pairs: str) -> "Case":
         """Return the case with some pairs of its suite alone.

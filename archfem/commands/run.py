@@ -11,19 +11,10 @@ from typing import Any
 
 from archfem._files import DRAFT_PREFIX, create_result_folder, replace_results
 from archfem.cases import result_folder as results
+from archfem.cases import result_text
 from archfem.cases.analysis_keys import rate_case
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs
-from archfem.cases.result_text import (
-    describe_accuracy,
-    describe_collapse,
-    describe_dead_load,
-    describe_run,
-    describe_verdicts,
-    tabulate_matches,
-    tabulate_motions,
-    tabulate_runs,
-)
 from archfem.cases.run import DeadLoadResult, Result, Run, run_case
 from archfem.commands.cli import EXIT_DOUBTFUL
 from archfem.dynamics.history import Ending, History
@@ -101,11 +92,11 @@ def check(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
     print(case.title)
     if case.limit is not None and case.limit.live:
-        print(describe_collapse(case.structure, case.limit.solve(case.structure)))
+        print(result_text.describe_collapse(case.structure, case.limit.solve(case.structure)))
     # Unreadable records are errors before the dead load is computed.
     case.check_ground()
     at_rest = DeadLoadResult.of(case)
-    print(describe_dead_load(at_rest))
+    print(result_text.describe_dead_load(at_rest))
     if case.suite is not None:
         print_motions(case.ground_suite())
     elif case.motion is not None:
@@ -124,7 +115,7 @@ def modes(options: argparse.Namespace) -> None:
     print(case.title)
     with _replace_results("modes", case, folder) as draft:
         at_rest = DeadLoadResult.of(case)
-        print(describe_dead_load(at_rest))
+        print(result_text.describe_dead_load(at_rest))
         computed = print_modes(at_rest, options.count, draft)
         first = range(1, min(len(computed.frequencies), 2) + 1)
         print_written([film_modes(computed, draft / "modes.gif", first)])
@@ -136,7 +127,7 @@ def limit(options: argparse.Namespace) -> None:
     if case.limit is None:
         raise InvalidInput(f"{options.case} has no [limit]: give horizontal = 1.0, or a point load")
     found = case.limit.solve(case.structure)
-    text = describe_collapse(case.structure, found)
+    text = result_text.describe_collapse(case.structure, found)
     print(f"{case.title}\n{text}")
     write = partial(results.write_limit, case, found, text)
     _write_results("limit", case, options.out, write)
@@ -179,7 +170,7 @@ def accuracy(options: argparse.Namespace) -> None:
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     compared = case_accuracy(case, folder / "settings", workers=options.workers)
     with _replace_results("accuracy", case, folder) as draft:
-        text = describe_accuracy(compared)
+        text = result_text.describe_accuracy(compared)
         print(text)
         print_written(results.write_accuracy(compared, text, draft))
 
@@ -213,7 +204,7 @@ def motion(options: argparse.Namespace) -> None:
     given = {key: getattr(options, key) for key in ("column", "units", "dt", "response")}
     read, refused = _read_records(options.files, given)
     motions = results.with_unique_names(list(read.values()), [Path(path).name for path in read])
-    print(tabulate_motions(motions).text)
+    print(result_text.tabulate_motions(motions).text)
     print_written(results.write_motions(motions, folder))
     if refused:
         raise InvalidInput(
@@ -281,12 +272,12 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     runs: dict[str, History] = {}
     for result in found:
         if isinstance(result, Collapse):
-            text = describe_collapse(case.structure, result)
+            text = result_text.describe_collapse(case.structure, result)
             print(text)
             print_written(results.write_limit(case, result, text, folder))
         elif isinstance(result, DeadLoadResult):
             at_rest = result
-            print(describe_dead_load(at_rest))
+            print(result_text.describe_dead_load(at_rest))
             print_written(results.write_dead_load(at_rest, folder))
             if case.has_motion:
                 _print_first_modes(at_rest, folder)
@@ -300,7 +291,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
             runs[result.motion.name] = result.history
     if case.suite is not None:
         _print_pairs(suite, runs, at_rest, folder)
-    verdict = describe_verdicts(runs.values()) if runs else ""
+    verdict = result_text.describe_verdicts(runs.values()) if runs else ""
     return verdict, bool(at_rest.doubts) or any(run.doubts for run in runs.values())
 
 
@@ -343,7 +334,7 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
             f"{float(history.time[-1]):.2f} s in {run.seconds:.1f} s; {history.outcome}"
         )
         print_written([run.path])
-    text = describe_run(run.case.structure, history, at_rest.dead.joints)
+    text = result_text.describe_run(run.case.structure, history, at_rest.dead.joints)
     print(text)
     print_written(results.write_run(run, at_rest, text, run.path.parent))
     if history.ending is Ending.INTERRUPTED and run.case.suite is None:
@@ -354,7 +345,7 @@ def _print_pairs(
     suite: Suite, runs: dict[str, History], at_rest: DeadLoadResult, folder: Path
 ) -> None:
     """Print the table of a suite; interrupted or failed runs end the command with an error."""
-    text = tabulate_runs(runs).text
+    text = result_text.tabulate_runs(runs).text
     if doubtful := [name for name, run in runs.items() if run.doubts]:
         text += f"\n\nin doubt, as their summaries say: {', '.join(doubtful)}"
     print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{text}")
@@ -372,8 +363,10 @@ def _print_pairs(
 
 def print_motions(suite: Suite) -> None:
     """Print the result of spectral matching, or the measures of the motions."""
-    table = tabulate_matches(suite.matches) if suite.matches else tabulate_motions(suite.motions)
-    print(table.text)
+    if suite.matches:
+        print(result_text.tabulate_matches(suite.matches).text)
+    else:
+        print(result_text.tabulate_motions(suite.motions).text)
 
 
 def print_written(files: Iterable[Path]) -> None:

@@ -304,8 +304,8 @@ class FillProfile:
 
     def fan(self, point: Array, fill: Fill) -> tuple[NDArray[np.intp], Array, Array]:
         """Return the stones that a load reaches through the fill, points there, and its shares."""
-        halves = [self._half_fan(point, fill, sense) for sense in (1, -1)]
-        block, points, part = (np.concatenate(values) for values in zip(*halves, strict=True))
+        halves = (self._half_fan(point, fill, sense) for sense in (1, -1))
+        block, points, part = map(np.concatenate, zip(*halves, strict=True))
         return block, points, part
 
     def _half_fan(

@@ -211,9 +211,8 @@ def find_corners(structure: Structure) -> Array:
     near = TOUCHING * structure.size
     corners = np.empty((2, len(structure.joints), 2, 2))
     for number, joint in enumerate(structure.joints):
-        spans = np.array(
-            [_face_span(structure.blocks[k], joint.ends, near) for k in structure.pairs[number]]
-        )
+        pair = (structure.blocks[k] for k in structure.pairs[number])
+        spans = np.array([_face_span(block, joint.ends, near) for block in pair])
         # Where both faces extend beyond an end of the joint, they do not touch there: it ends both.
         beyond = np.abs(spans - [0.0, joint.depth]) > near
         spans = np.where(beyond.all(axis=0), [0.0, joint.depth], spans)
@@ -342,10 +341,8 @@ class Bodies:
 def largest_speed(blocks: PlacedBlocks, motion: Array) -> float:
     """Return the largest speed of a corner of any block [m/s]."""
     speeds = []
-    for outline, centroid, (u, v, turn) in zip(
-        blocks.outlines, blocks.centroids, motion, strict=True
-    ):
-        x, y = (outline - centroid).T
+    for number, (u, v, turn) in enumerate(motion):
+        x, y = (blocks.outlines[number] - blocks.centroids[number]).T
         speeds.append(np.hypot(u - turn * y, v + turn * x).max())
     return float(max(speeds))
 

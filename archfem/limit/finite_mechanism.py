@@ -75,9 +75,8 @@ class Linkage:
         """At rest: point on the corner's block, on the face's, normal of the face."""
         found = []
         for contact in self.mechanism.contacts:
-            on_corner, on_face = (
-                self._at_rest(contact.point, block) for block in (contact.corner, contact.face)
-            )
+            on_corner = self._at_rest(contact.point, contact.corner)
+            on_face = self._at_rest(contact.point, contact.face)
             turn = rotation(self.start.displacement[contact.face, 2])
             found.append((on_corner, on_face, contact.normal @ turn))
         return found
@@ -120,10 +119,8 @@ class LinkageState:
     @cached_property
     def contacts(self) -> list[Contact]:
         """Contacts at this place."""
-        moved = []
-        for contact, (on_corner, _, normal) in zip(
-            self.linkage.mechanism.contacts, self.linkage.anchors, strict=True
-        ):
+        moved, kept = [], self.linkage.mechanism.contacts
+        for contact, (on_corner, _, normal) in zip(kept, self.linkage.anchors, strict=True):
             turn = rotation(self.blocks.displacement[contact.face, 2])
             point = self.blocks.places(on_corner[None, :], contact.corner)[0]
             moved.append(contact._replace(point=point, normal=turn @ normal))
@@ -230,8 +227,7 @@ class LinkageState:
         """Return the forces of least factor where friction makes it indeterminate."""
         unit = np.abs(loads).max()
         free = [(None, None)] * (columns.shape[1] - len(self.contacts))
-        objective = np.zeros(columns.shape[1])
-        objective[-1] = 1.0
+        objective = np.append(np.zeros(columns.shape[1] - 1), 1.0)
         scaled = columns.copy()
         scaled[:, -1] /= unit
         bounds = [(0.0, None)] * len(self.contacts) + free
@@ -239,9 +235,7 @@ class LinkageState:
         result = linprog(objective, **equations, bounds=bounds, method="highs")
         if result.status != 0:
             return fallback
-        forces = result.x * unit
-        forces[-1] = result.x[-1]
-        return forces
+        return np.append(result.x[:-1] * unit, result.x[-1])
 
 
 @dataclass(frozen=True)
@@ -374,12 +368,8 @@ class PathFollower:
 
     def _opens_joints(self, state: LinkageState, velocity: Array) -> bool:
         """Return whether no contact closes."""
-        body = state.bodies.body
-        contacts = [
-            contact
-            for contact in state.blocks.touching(self.joints)
-            if body[contact.corner] != body[contact.face]
-        ]
+        body, touching = state.bodies.body, state.blocks.touching(self.joints)
+        contacts = [each for each in touching if body[each.corner] != body[each.face]]
         return bool((state.bodies.rates(contacts)[0] @ velocity >= -10.0 * STILL).all())
 
     def _presses(self, state: LinkageState, velocity: Array) -> bool:

@@ -158,9 +158,8 @@ def crushing_cuts(joints: NDArray[np.intp], at: Array, crushing: Array) -> Limit
     shape = (len(joints), count)
     tangent = sparse.csr_matrix((slope, (row, joints)), shape)
     end = sparse.csr_matrix((np.ones(len(joints)), (row, joints)), shape)
-    rows = sparse.bmat(
-        [[tangent - end, tangent, None], [tangent, tangent - end, sparse.csr_matrix(shape)]]
-    )
+    shear = sparse.csr_matrix(shape)
+    rows = sparse.bmat([[tangent - end, tangent, None], [tangent, tangent - end, shear]])
     return Limits(rows.tocsr(), np.tile(slope * at / 2.0, 2))
 
 

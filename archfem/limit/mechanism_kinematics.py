@@ -386,9 +386,8 @@ class LoopCheck:
         # some required joint must move: any one-way gap, or a two-way slip in one of its senses
         required = np.tile(self.loop_joints, 3)
         gaps = [np.where(required[rows] & (freedoms[rows] != 2.0), 1.0, 0.0)]
-        gaps += [
-            side * sense * (rows == slip) for slip in either[required[either]] for side in (1, -1)
-        ]
+        for slip in either[required[either]]:
+            gaps += [side * sense * (rows == slip) for side in (1, -1)]
         return any(_closes_loops(columns, gap) for gap in gaps)
 
 

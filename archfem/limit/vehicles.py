@@ -105,14 +105,14 @@ def _code_vehicles() -> dict[str, Vehicle]:
 
 def _dynamic_factors() -> dict[str, tuple[float, str]]:
     """Return dynamic factors of codes and their sources, by the first part of a vehicle's name."""
+    span = (
+        "none, to be given: EN 1991-2:2003, 6.4.5.2, 1.44 / (√L - 0.2) + 0.82 from 1 to 1.67, "
+        "with L in m, half the span of an arch; from memory"
+    )
     return {
         "LM1": (1.0, "EN 1991-2:2003, 4.2.1: in the weights; from memory"),
         "LM2": (1.0, "EN 1991-2:2003, 4.2.1: in the weights; from memory"),
-        "LM71": (
-            1.0,
-            "none, to be given: EN 1991-2:2003, 6.4.5.2, 1.44 / (√L - 0.2) + 0.82 from 1 to 1.67, "
-            "with L in m, half the span of an arch; from memory",
-        ),
+        "LM71": (1.0, span),
         "CS454": (1.8, "BD 21/01, here on all axles; from memory"),
         "HL93": (1.33, "AASHTO LRFD, 3.6.2, not reduced by depth of fill; from memory"),
     }
@@ -421,12 +421,9 @@ def _geometric_factor(
     axles = stones.load([load for load in moving.worst.live if isinstance(load, PointLoad)])
 
     def is_carried(share: float) -> bool:
-        changed = replace(
-            dead,
-            blocks=DeepenedBlocks(dead.blocks.structure, share),
-            cohesion=share * dead.cohesion,
-            crushing=None if dead.crushing is None else share * dead.crushing,
-        )
+        blocks = DeepenedBlocks(dead.blocks.structure, share)
+        crushing = None if dead.crushing is None else share * dead.crushing
+        changed = replace(dead, blocks=blocks, cohesion=share * dead.cohesion, crushing=crushing)
         if not is_balanced(changed.minimise_residual(), changed):
             return False
         optimum = changed.with_load_factor(axles).solve()

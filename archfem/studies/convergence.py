@@ -128,9 +128,7 @@ class MeshSensitivity:
     def paths(self) -> dict[str, tuple[Array, Array, float, float]]:
         """Sizes, values, limit and error bar of mesh and step, as `draw_convergence` draws them."""
         found = {"mesh": self.mesh} | ({} if self.step is None else {"step": self.step})
-        return {
-            key: (each.sizes, each.values, each.limit, each.error) for key, each in found.items()
-        }
+        return {name: (x.sizes, x.values, x.limit, x.error) for name, x in found.items()}
 
     def of(self, quantity: str) -> "MeshSensitivity":
         """Return the sensitivity of another finding.

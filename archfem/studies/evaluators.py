@@ -90,14 +90,15 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
         the largest energy error at any step over the exchanged energy [-]. `doubts`, the number of
         warnings.
     """
+    verdict = run.verdict
     findings: Findings = {
         "eccentricity": _largest(run, "eccentricity", 0.5),
         "friction": _largest(run, "friction", np.inf),
         **{name: _largest(run, name) for name in ("rotation", "opening", "slip")},
+        "outcome": verdict.outcome,
+        "largest_displacement": verdict.displacement,
+        "residual_displacement": verdict.residual,
     }
-    verdict = run.verdict
-    findings |= {"outcome": verdict.outcome, "largest_displacement": verdict.displacement}
-    findings["residual_displacement"] = verdict.residual
     for definition, first in (mechanisms or first_mechanisms(run)).items():
         findings[definition] = np.inf if first is None or first.time is None else first.time
         findings[f"{definition}, class"] = "" if first is None else str(first.kind)

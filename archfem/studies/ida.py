@@ -247,14 +247,13 @@ class Ida:
             fractile does not turn back where it ends. NaN if fewer than half of the motions were
             run at such an intensity.
         """
-        curves = [(x, y) for _, x, y in self.curves(measure, demand) if len(x)]
-        demands = np.array(
-            [
+        curves = []
+        for _, x, y in self.curves(measure, demand):
+            if len(x):
                 # an incomplete run is the end of its curve: the demand stays infinite
-                np.interp(intensity, [0, *x], [0, *y], right=inf if np.isinf(y[-1]) else np.nan)
-                for x, y in curves
-            ]
-        )
+                end = inf if np.isinf(y[-1]) else np.nan
+                curves.append(np.interp(intensity, [0, *x], [0, *y], right=end))
+        demands = np.array(curves)
         valid = ~np.isnan(demands)
         # the median, and one standard deviation to either side
         fractiles = np.full((3, demands.shape[1]), np.nan)
@@ -317,11 +316,8 @@ def ida(
     """
     for limit in limits or ():
         check_choice(limit, LIMIT_STATES, "limits")
-    options = {
-        "limits": None if limits is None else list(limits),
-        "precision": precision,
-        "between": [float(scale) for scale in between],
-    }
+    options: Findings = {"limits": None if limits is None else list(limits), "precision": precision}
+    options["between"] = [float(scale) for scale in between]
     names, points = _points(case, motions)
     axis = Axis("motion", ("motion",), tuple((name,) for name in names))
     study = Study(f"{case.title}: IDA", Evaluator(search_limit_states, options), (axis,), points)

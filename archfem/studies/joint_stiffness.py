@@ -21,7 +21,6 @@ References:
     range of these relations for weathered faces.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log10, radians, sqrt, tan
 from pathlib import Path
@@ -80,10 +79,8 @@ class JointStiffness:
 
     def table(self) -> str:
         """Return the ranges in MPa/mm and their sources as text."""
-        rows = [
-            [name, *(f"{value * mm / MPa:.3g}" for value in values)]
-            for name, values in (("k_n", self.normal), ("k_s", self.shear))
-        ]
+        ranges = {"k_n": self.normal, "k_s": self.shear}
+        rows = [[key, *(f"{value * mm / MPa:.3g}" for value in ranges[key])] for key in ranges]
         return "\n".join([align_columns(["MPa/mm", "low", "usual", "high"], rows), *self.sources])
 
 
@@ -186,13 +183,12 @@ def stiffness_report(
     Raises:
         InvalidInput: the function is invalid.
     """
-    keys = tuple(f"contacts.{contact}.{kind}_stiffness" for kind in ("normal", "shear"))
-    ranges = (stiffness.normal, stiffness.shear)
-    usual = {key: values[1] for key, values in zip(keys, ranges, strict=True)}
-    points: Sequence[dict[str, float]] = [
-        usual,
-        *(usual | {key: v[end]} for key, v in zip(keys, ranges, strict=True) for end in (0, 2)),
-    ]
+    ranges = {
+        f"contacts.{contact}.normal_stiffness": stiffness.normal,
+        f"contacts.{contact}.shear_stiffness": stiffness.shear,
+    }
+    usual = {key: values[1] for key, values in ranges.items()}
+    points = [usual, *(usual | {key: ranges[key][end]} for key in ranges for end in (0, 2))]
     return Study.of(case, points, find).run(folder, workers=workers)
 
 

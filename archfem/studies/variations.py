@@ -149,11 +149,9 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     points = [(k, Variation(base, _resolve_labels(ranges, each))) for k, each in enumerate(changes)]
     evaluator = Evaluator(evaluate_variation)
     rows: dict[int, dict[str, Any]] = {}
-    evaluated = (
-        evaluate_serially(points, evaluator)
-        if workers == 1
-        else evaluate_on_processes(points, evaluator, workers)
-    )
+    evaluated = evaluate_serially(points, evaluator)
+    if workers != 1:
+        evaluated = evaluate_on_processes(points, evaluator, workers)
     with tqdm(total=len(points), unit="run", disable=None, leave=False) as bar:
         for number, row in evaluated:
             rows[number] = row

@@ -7,17 +7,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.report.report_data import ReportData, build_player, missing_note
-from archfem.cases.result_text import (
-    RUN_COLUMNS,
-    ResultTable,
-    describe_verdicts,
-    format_ratio,
-    tabulate_joints,
-    tabulate_motions,
-    tabulate_runs,
-)
 from archfem.dynamics.history import SIGN_CONVENTION, History
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh
 from archfem.joints.criteria import assessed_joints
@@ -47,10 +39,8 @@ def build_case_sections(data: ReportData) -> list[Section]:
     """Build the sections on settings, assumptions, units, signs and geometry."""
     case = data.case
     described = ("title", "structure", "materials", "contacts")  # the geometry shows these
-    settings = [
-        row for key, table in case.settings.items() if key not in described
-        for row in _flatten(key, table)
-    ]  # fmt: skip
+    tables = [table for table in case.settings.items() if table[0] not in described]
+    settings = [row for key, table in tables for row in _flatten(key, table)]
     blocks: list[Any] = [Grid((), _list_assumptions(data), "Assumptions of the analysis")]
     if settings:
         blocks.append(Grid((), settings, "Settings of the case beside its structure"))
@@ -89,6 +79,10 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
     large = case.discretisation.displacements == "large"
     own_limit = "its own limit, μ + c A / N"
     sliding = own_limit if criteria.friction is None else f"{criteria.friction:g}"
+    count = (
+        f"{criteria.failures} joints of rings and piers that hinge or slide at once, for "
+        f"{criteria.duration:g} s at least"
+    )
     dt = case.analysis.get("dt")
     step = "steps of a length that the error chooses" if dt is None else f"steps of {1e3 * dt:g} ms"
     return [
@@ -101,11 +95,7 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
         ("time steps", f"{type(case.scheme).__name__.lower()} scheme, {step}"),
         ("a joint hinges", f"where |e| ≥ {criteria.hinge:g}"),
         ("a joint slides", f"where |V| / N reaches {sliding}"),
-        (
-            "a mechanism by count",
-            f"{criteria.failures} joints of rings and piers that hinge or slide at once, for "
-            f"{criteria.duration:g} s at least",
-        ),
+        ("a mechanism by count", count),
     ]
 
 
@@ -145,17 +135,11 @@ def _tabulate_parts(structure: Structure) -> Grid:
         free = [block for block in blocks if not block.fixed]
         depths = [joint.depth for joint in structure.joints if joint.part == part]
         weight = structure.width * sum(block.area * block.material.unit_weight for block in free)
-        rows.append(
-            [
-                part or "–",
-                blocks[0].role or "–",
-                str(len(blocks)),
-                str(len(blocks) - len(free)),
-                ", ".join(dict.fromkeys(block.material.name for block in blocks)),
-                f"{weight / kN:.4g}",
-                f"{min(depths):.3g} – {max(depths):.3g}" if depths else "–",
-            ]
-        )
+        row = [part or "–", blocks[0].role or "–", str(len(blocks)), str(len(blocks) - len(free))]
+        row.append(", ".join(dict.fromkeys(block.material.name for block in blocks)))
+        row.append(f"{weight / kN:.4g}")
+        row.append(f"{min(depths):.3g} – {max(depths):.3g}" if depths else "–")
+        rows.append(row)
     head = ["part", "role", "blocks", "of them fixed", "material", "weight [kN]", "joints [m]"]
     return Grid(head, rows, "Parts; the last column is the depth of their joints")
 
@@ -249,17 +233,10 @@ def _tabulate_dead_load(joints: xr.Dataset) -> Grid:
         names = selected["name"].values.astype(str)
         # e is undefined where a joint is open.
         largest = int(np.nanargmax(np.abs(e))) if np.isfinite(e).any() else 0
-        rows.append(
-            [
-                part or "–",
-                f"{np.nanmax(np.abs(e), initial=0.0):.3f}",
-                names[largest],
-                f"{np.nanmax(ratio, initial=0.0):.3f}",
-                f"{normal.min() / kN:.4g}",
-                f"{normal.max() / kN:.4g}",
-                str(int(selected["open"].sum())),
-            ]
-        )
+        row = [part or "–", f"{np.nanmax(np.abs(e), initial=0.0):.3f}", names[largest]]
+        row.append(f"{np.nanmax(ratio, initial=0.0):.3f}")
+        row += [f"{normal.min() / kN:.4g}", f"{normal.max() / kN:.4g}"]
+        rows.append([*row, str(int(selected["open"].sum()))])
     head = ["part", "max |e|", "in", "max V/N", "min N [kN]", "max N [kN]", "open joints"]
     return Grid(head, rows, "Joints of rings and piers under dead load")
 
@@ -285,7 +262,7 @@ def build_ground_section(data: ReportData) -> Section:
         remedy = "`archfem run` shakes the structure." if shaken else "The case has none."
         return Section("Ground motion", [missing_note("a motion of the ground", remedy)])
     caption = "Measures of the motions as applied, read at the steps that the runs recorded."
-    blocks: list[Any] = [Grid(*tabulate_motions(motions), caption)]
+    blocks: list[Any] = [Grid(*result_text.tabulate_motions(motions), caption)]
     if data.case.suite is None:
         applied = "Ground motion as applied."
         blocks += [FigureBlock.of(draw_motion(motion), applied) for motion in motions]
@@ -350,7 +327,7 @@ def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
     blocks.append(build_player(case, run, title, players))
     if case.suite is None:
         blocks.append(_build_envelope({name: run}, data))
-    blocks.append(_shorten_joint_table(tabulate_joints(run.joints, data.dead)))
+    blocks.append(_shorten_joint_table(result_text.tabulate_joints(run.joints, data.dead)))
     blocks.append(TextBlock(_sentence(utilisation_text(case.structure, run.joints))))
     return blocks
 
@@ -361,7 +338,7 @@ def _build_envelope(runs: Mapping[str, History], data: ReportData) -> FigureBloc
     return FigureBlock.of(draw_envelope(runs, dead=data.dead), caption)
 
 
-def _shorten_joint_table(table: ResultTable) -> Grid:
+def _shorten_joint_table(table: result_text.ResultTable) -> Grid:
     """Return the table of joints without empty columns, which the caption names."""
     head, rows = table
     # Most joints neither slide nor open in most runs.
@@ -390,7 +367,7 @@ def _build_mechanism(run: History) -> list[Any]:
 
 def _build_suite_response(data: ReportData) -> list[Any]:
     """Build the tables of all runs, and their envelopes."""
-    (head, rows), columns = tabulate_runs(data.runs), len(RUN_COLUMNS)
+    (head, rows), columns = result_text.tabulate_runs(data.runs), len(result_text.RUN_COLUMNS)
     # The mechanisms have too many columns for a page: a line of text for each run instead.
     mechanisms = []
     for row in rows:
@@ -422,13 +399,13 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     opened = " (joints came apart)" if any(bool(each["open"].any()) for each in joints) else ""
     friction = max(float(each["friction"].max()) for each in joints)
     sizes = [("PGA", f"{pga:.2f} m/s²"), ("largest |e|", f"{eccentricity:.3f}{opened}")]
-    return [*facts, *sizes, ("largest V / N", format_ratio(friction))]
+    return [*facts, *sizes, ("largest V / N", result_text.format_ratio(friction))]
 
 
 def _verdict_facts(runs: Sequence[History]) -> list[tuple[str, str]]:
     """Return outcome and doubts of a run, or how many of several runs have each."""
     verdicts = [run.verdict for run in runs]
-    facts = [("verdict", describe_verdicts(runs))]
+    facts = [("verdict", result_text.describe_verdicts(runs))]
     if len(verdicts) == 1:
         return [*facts, *(("in doubt", str(doubt)) for doubt in verdicts[0].doubts)]
     reasons = Counter(str(doubt) for verdict in verdicts for doubt in verdict.doubts)
