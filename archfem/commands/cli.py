@@ -20,13 +20,12 @@ AddArgument = Callable[..., Any]  # as `ArgumentParser.add_argument`
 # Exit codes: a shell expects 128 + the number of a signal that ended a command.
 EXIT_DOUBTFUL = 3
 EXIT_INTERRUPTED = 130
-EXIT_TERMINATED = 143
 
 EXIT_CODES = (
     "exit codes: 0, an answer; 1, an error in words, no answer; 2, the arguments are not "
     f"understood; {EXIT_DOUBTFUL}, an answer that is in doubt: summary.txt begins with why "
     "(energy that drifts, displacements that are not small, a fidelity that is wrong or errs "
-    f"by more than is permitted); {EXIT_INTERRUPTED}, ended by Ctrl-C, and {EXIT_TERMINATED}, "
+    f"by more than is permitted); {EXIT_INTERRUPTED}, ended by Ctrl-C, and 143, "
     "by SIGTERM: what was computed is kept."
 )
 
@@ -50,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     with _interrupt_on_sigterm() as signals:
         code = exit_code(lambda: _run_command(options))
-    return EXIT_TERMINATED if signals and code == EXIT_INTERRUPTED else code
+    return 128 + signal.SIGTERM if signals and code == EXIT_INTERRUPTED else code
 
 
 def _run_command(options: argparse.Namespace) -> int | None:

@@ -43,9 +43,6 @@ from archfem.studies.parameter_space import PAIR_KEY, Axis, Point
 from archfem.studies.shared_results import compute_once
 from archfem.studies.study import Study
 
-# Power of the scale of a motion with which an intensity measure grows
-SCALE_POWERS = {"pga": 1, "pgv": 1, "sa": 1, "arias": 2}
-
 # A joint of a ring or pier hinges; four of them fail at once; the failed joints permit a motion of
 # the blocks; blocks fall, for large displacements
 LIMIT_STATES = ("first hinge", "four failures", "verified", COLLAPSE_DEFINITION)
@@ -230,8 +227,8 @@ class Ida:
 
     def _measure(self, measure: str) -> tuple[Array, int]:
         """A measure of the unscaled motions, and the power of the scale with which it grows."""
-        check_choice(measure, SCALE_POWERS, "measure")
-        return self.table[measure].values, SCALE_POWERS[measure]
+        powers = {"pga": 1, "pgv": 1, "sa": 1, "arias": 2}
+        return self.table[measure].values, powers[check_choice(measure, powers, "measure")]
 
     def fractiles(self, intensity: Array, measure: str = "pga", demand: str = "rotation") -> Array:
         """Return the 16, 50 and 84 % fractiles of the demand at intensities.

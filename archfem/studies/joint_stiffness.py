@@ -38,15 +38,6 @@ from archfem.masonry.materials import Contact
 from archfem.studies.study import Study
 from archfem.units import MPa, mm
 
-# Smallest and largest joint roughness coefficient JRC, and strength of the faces over that of the
-# stone. Judgement: dressed faces are sound and between profiles 2 and 5 of Barton and Choubey
-# (1977); hewn ones are weaker and between profiles 3 and 7; weathered ones have a third of it.
-FACE_CONDITIONS = {
-    "dressed": ((4.0, 8.0), 1.0),
-    "hewn": ((6.0, 12.0), 0.6),
-    "weathered": ((6.0, 12.0), 0.33),
-}
-
 
 @validate_methods
 @dataclass(frozen=True)
@@ -129,8 +120,11 @@ def joint_stiffness(
         >>> low < usual < high
         True
     """
-    check_choice(condition, FACE_CONDITIONS, "condition")
-    (least, most), weathering = FACE_CONDITIONS[condition]
+    # Smallest and largest joint roughness coefficient JRC, and strength of the faces over that of
+    # the stone. Judgement: dressed faces are sound and between profiles 2 and 5 of Barton and
+    # Choubey (1977); hewn ones are weaker and between profiles 3 and 7; weathered have a third.
+    faces = {"dressed": (4.0, 8.0, 1.0), "hewn": (6.0, 12.0, 0.6), "weathered": (6.0, 12.0, 0.33)}
+    least, most, weathering = faces[check_choice(condition, faces, "condition")]
     for name, value in (("young", young), ("spacing", spacing), ("strength", strength)):
         if check_number(value, name, minimum=0.0) == 0.0:
             raise InvalidInput(f"{name} = {value!r} is not above 0: give it in SI")

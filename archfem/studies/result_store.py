@@ -38,7 +38,6 @@ logger = logging.getLogger("archfem")
 NETCDF_FILE = "results.nc"
 CSV_FILE = "results.csv"
 EXCEL_FILE = "results.xlsx"
-MAX_SHEET_ROWS = 1_048_575  # of Excel below the header
 
 # Time between lines of progress where the output is no terminal [s]
 PROGRESS_INTERVAL = 5.0
@@ -307,7 +306,7 @@ def write_table(table: xr.Dataset, folder: Path, inputs: str) -> None:
             quoted.to_csv(part, index=False)
         with suppress(ImportError), _files.atomic_write(draft / "results.parquet") as part:
             frame.to_parquet(part, index=False)
-        if len(frame) <= MAX_SHEET_ROWS:
+        if len(frame) <= 1_048_575:  # rows of a sheet of Excel below the header
             with suppress(ImportError), _files.atomic_write(draft / EXCEL_FILE) as part:
                 _write_sheet(quoted, part)
 

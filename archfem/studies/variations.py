@@ -36,12 +36,10 @@ from archfem.studies.cache import ground_motion
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.process_pool import evaluate_on_processes, evaluate_serially
 
-# Joint rules: exact integration, springs at the ends and the middle (as in 3DEC), rigid contact
-JOINT_RULES = ("exact", "three points", "rigid")
-
 # What is varied by default: values, of which numbers are the ends of a range
 DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
-    "joint_rule": JOINT_RULES,
+    # exact integration, springs at the ends and the middle (as in 3DEC), rigid contact
+    "joint_rule": ("exact", "three points", "rigid"),
     "k_n": (1.0 / 3.0, 3.0),
     "k_s": (1.0 / 3.0, 3.0),
     "friction": (-0.1, 0.1),

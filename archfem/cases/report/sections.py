@@ -25,15 +25,6 @@ from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
 from archfem.view.structure import draw_names, draw_structure
 from archfem.view.style import LINE_COLOURS
 
-# Kinematic assumption on blocks of each fidelity.
-BLOCK_ASSUMPTIONS = {
-    "rigid": "rigid; all compliance is in the joints",
-    "faces": "elastic; each face of a joint moves as a plane, the rest is condensed statically",
-    "condensed": "elastic; all nodes on joints are kept, the rest is condensed statically",
-    "full": "elastic finite elements, all nodes kept",
-    "monolithic": "elastic finite elements, all nodes kept, weak forms assembled each time",
-}
-
 
 def build_case_sections(data: ReportData) -> list[Section]:
     """Build the sections on settings, assumptions, units, signs and geometry."""
@@ -76,6 +67,13 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
     # Runs record the fidelity that "auto" selected.
     recorded = {str(run.dataset.attrs.get("fidelity", "")) for run in data.runs.values()}
     fidelity = ", ".join(sorted(recorded)) if recorded else case.discretisation.name
+    blocks = {
+        "rigid": "rigid; all compliance is in the joints",
+        "faces": "elastic; each face of a joint moves as a plane, the rest is condensed statically",
+        "condensed": "elastic; all nodes on joints are kept, the rest is condensed statically",
+        "full": "elastic finite elements, all nodes kept",
+        "monolithic": "elastic finite elements, all nodes kept, weak forms assembled each time",
+    }
     large = case.discretisation.displacements == "large"
     own_limit = "its own limit, μ + c A / N"
     sliding = own_limit if criteria.friction is None else f"{criteria.friction:g}"
@@ -87,7 +85,7 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
     step = "steps of a length that the error chooses" if dt is None else f"steps of {1e3 * dt:g} ms"
     return [
         ("structure", "plane; forces are those of the whole width"),
-        ("blocks", BLOCK_ASSUMPTIONS.get(fidelity, f"by part: {fidelity}")),
+        ("blocks", blocks.get(fidelity, f"by part: {fidelity}")),
         ("joints", "dry: no tension but where a bond is given; Coulomb friction; no crushing"),
         ("displacements", "of any size" if large else "small: equilibrium where blocks stood"),
         ("ground", "rigid, moves as one; abutments and foundations are fixed to it"),
