@@ -40,21 +40,18 @@ def check_file(path: str | os.PathLike[str], what: str, max_bytes: int = MAX_FIL
     try:
         place = Path(path)
         status = place.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise InvalidInput(f"{place} is a folder, a device or a pipe: give a {what}, a file")
-        if status.st_size > max_bytes:
-            raise InvalidInput(
-                f"{place} has {status.st_size} bytes, and a {what} at most {max_bytes}: give that "
-                "file"
-            )
     except FileNotFoundError as error:
         raise InvalidInput(
             f"there is no {what} {path}: check its name and the folder of its path"
         ) from error
-    except InvalidInput:
-        raise
     except (OSError, ValueError, TypeError) as error:
         raise InvalidInput(_read_error(path, what, error)) from error
+    if not stat.S_ISREG(status.st_mode):
+        raise InvalidInput(f"{place} is a folder, a device or a pipe: give a {what}, a file")
+    if status.st_size > max_bytes:
+        raise InvalidInput(
+            f"{place} has {status.st_size} bytes, and a {what} at most {max_bytes}: give that file"
+        )
     return place
 
 
@@ -306,7 +303,7 @@ def publish_draft(folder: Path, command: str, inputs: str) -> None:
     """Replace the files that a command has written earlier by those of its draft."""
     draft = folder / f"{DRAFT_PREFIX}{command}"
     paths = [path for path in draft.rglob("*") if path.is_file()]
-    files = {path.relative_to(draft).as_posix(): _hash_content(path) for path in paths}
+    files = {path.relative_to(draft).as_posix(): hash_content(path) for path in paths}
     # a report is of the run that it was written from
     replaced = {command, "report"} if command == "run" else {command}
     groups: dict[str, Any] = {command: {"inputs": inputs, "files": files}}
@@ -357,7 +354,7 @@ def _delete_within(folder: Path, name: str) -> None:
             path.parent.rmdir()
 
 
-def _hash_content(path: Path) -> str:
+def hash_content(path: Path) -> str:
     """Return the SHA-256 of a file, read in parts."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

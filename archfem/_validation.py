@@ -18,9 +18,6 @@ import numpy as np
 from archfem._typing import Array
 from archfem.errors import ArchfemError, InvalidInput
 
-# Length of a value that an error quotes, in characters
-MAX_REPR_LENGTH = 200
-
 _NUMBER_TYPES = (int, float, np.integer, np.floating)
 
 
@@ -43,15 +40,15 @@ def report_user_errors(what: str) -> Iterator[None]:
         raise InvalidInput(f"{what} failed{place}: {type(error).__name__}: {error}") from error
 
 
-def short_repr(value: Any) -> str:
+def short_repr(value: Any, max_length: int = 200) -> str:
     """Return the `repr` of any value, shortened for an error message."""
     try:
         text = repr(value)
     except Exception:  # integers of thousands of digits, or a faulty `__repr__`
         return f"<{type(value).__name__} that cannot be written>"
-    if len(text) <= MAX_REPR_LENGTH:
+    if len(text) <= max_length:
         return text
-    return f"{text[: MAX_REPR_LENGTH - 20]} … {text[-17:]}"
+    return f"{text[: max_length - 20]} … {text[-17:]}"
 
 
 def check_number(value: Any, name: str, *, minimum: float = -inf, maximum: float = inf) -> float:
@@ -165,8 +162,6 @@ def _example(count: int | None) -> str:
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Class = TypeVar("Class", bound=type)
-
-_TYPE_NAMES = {float: "a number", int: "a whole number", bool: "True or False", str: "words"}
 
 
 def validate_arguments(function: Function) -> Function:
@@ -287,11 +282,9 @@ def _is_array(value: Any) -> bool:
 
 def _is_sequence(value: Any, kind: type, inner: tuple[Any, ...]) -> bool:
     """Return whether a value is a sequence of the annotated types and length."""
-    if isinstance(value, str | bytes | bytearray | memoryview | Mapping):
+    if isinstance(value, str | bytes | bytearray | memoryview | Mapping | np.ma.MaskedArray):
         return False
     if not isinstance(value, Collection) or (isinstance(value, np.ndarray) and not value.ndim):
-        return False
-    if isinstance(value, np.ma.MaskedArray):
         return False
     if kind is tuple and inner[-1] is not ...:
         return len(value) == len(inner) and all(map(matches_annotation, value, inner))
@@ -316,4 +309,5 @@ def _describe(hint: Any) -> str:
         return f"a row of {', '.join(items)}"
     if hint in (None, NoneType):
         return "None"
-    return _TYPE_NAMES.get(hint, getattr(hint, "__name__", str(hint)))
+    names = {float: "a number", int: "a whole number", bool: "True or False", str: "words"}
+    return names.get(hint, getattr(hint, "__name__", str(hint)))

@@ -1,6 +1,6 @@
 """Sections [analysis], [limit], [rating] and [assessment]: time stepping, capacity, assessment."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,43 +35,52 @@ from archfem.statics.mechanism_assessment import (
     kinematic_assessment,
 )
 
-ANALYSIS_KEYS = {
-    **{"dt": "s", "scheme": str, "alpha": "1", "damping": dict},
-    **{"stop_at_mechanism": bool, "stop_at": str},
-}
-DAMPING_KEYS = {
-    **{"ratio": "1", "frequency": "Hz", "frequencies": ["Hz"], "modes": str, "kind": str},
-    **{"mass_share": "1", "joints": str},
-}
-LIMIT_KEYS = {"horizontal": "1", "vertical": "1", "point": dict, "friction": str, "fill": dict}
-POINT_LOAD_KEYS = {"x": "m", "force": ["N"]}
-ASSESSMENT_KEYS = {
-    **{"spectrum": dict, "direction": "1", "friction": str, "part": str, "blocks": [(int, str)]},
-    **{"loads": [dict], "limit_state": (str, dict), "q": "1", "confidence_factor": "1"},
-}
-RATING_KEYS = {"vehicle": (str, dict), "live": "1", "impact": "1", "dead": "1", "width": "m"}
-VEHICLE_KEYS = {"name": str, "axles": ["N"], "spacings": ["m"]}
-ATTACHED_LOAD_KEYS = {"block": (int, str), "point": ["m"], "weight": "N", "force": ["N"]}
-LIMIT_STATE_KEYS = {
-    **{"name": str, "share": "1", "period_factor": "1", "secant_share": "1", "damping": "1"},
-    "source": str,
-}
-FILL_KEYS = {
-    **{"friction_angle": "degree", "cohesion": "Pa", "mobilisation": "1", "active": "1"},
-    **{"dispersal": str, "spread": "degree"},
+# Keys of the tables by section, and the kind of each value
+SECTION_KEYS: Mapping[str, Table] = {
+    "analysis": {
+        **{"dt": "s", "scheme": str, "alpha": "1", "damping": dict},
+        **{"stop_at_mechanism": bool, "stop_at": str},
+    },
+    "analysis.damping": {
+        **{"ratio": "1", "frequency": "Hz", "frequencies": ["Hz"], "modes": str, "kind": str},
+        **{"mass_share": "1", "joints": str},
+    },
+    "limit": {"horizontal": "1", "vertical": "1", "point": dict, "friction": str, "fill": dict},
+    "limit.point": {"x": "m", "force": ["N"]},
+    "limit.fill": {
+        **{"friction_angle": "degree", "cohesion": "Pa", "mobilisation": "1", "active": "1"},
+        **{"dispersal": str, "spread": "degree"},
+    },
+    "rating": {"vehicle": (str, dict), "live": "1", "impact": "1", "dead": "1", "width": "m"},
+    "rating.vehicle": {"name": str, "axles": ["N"], "spacings": ["m"]},
+    "assessment": {
+        **{"spectrum": dict, "direction": "1", "friction": str, "part": str},
+        **{"blocks": [(int, str)], "loads": [dict], "limit_state": (str, dict), "q": "1"},
+        "confidence_factor": "1",
+    },
+    "assessment.loads": {"block": (int, str), "point": ["m"], "weight": "N", "force": ["N"]},
+    "assessment.limit_state": {
+        **{"name": str, "share": "1", "period_factor": "1", "secant_share": "1", "damping": "1"},
+        "source": str,
+    },
 }
 
 
 def parse_analysis(table: Any) -> dict[str, Any]:
     """Return the checked keys of [analysis]."""
-    analysis = check_table(table, ANALYSIS_KEYS, "analysis")
+    analysis = _check_section(table, "analysis")
     if "damping" in analysis:
-        analysis["damping"] = check_table(analysis["damping"], DAMPING_KEYS, "analysis.damping")
+        analysis["damping"] = _check_section(analysis["damping"], "analysis.damping")
     if "stop_at" in analysis:
         check_choice(analysis["stop_at"], REGISTERED_CRITERIA, "analysis.stop_at")
         if analysis.get("stop_at_mechanism", False):
             raise InvalidInput("analysis.stop_at and stop_at_mechanism: one condition ends a run")
     return analysis
+
+
+def _check_section(table: Any, section: str) -> dict[str, Any]:
+    """Check the keys of the table of a section, and convert its values to their kinds."""
+    return check_table(table, SECTION_KEYS[section], section)
 
 
 def parse_damping(analysis: Table) -> Viscous | EffectiveDamping | None:
@@ -162,21 +171,26 @@ class LimitAnalysis:
 
 def parse_limit(table: Any) -> LimitAnalysis:
     """Return the limit analysis of a case."""
-    values = check_table(table, LIMIT_KEYS, "limit")
+    values = _check_section(table, "limit")
     live: list[Action] = []
     if "horizontal" in values or "vertical" in values:
         live.append(BodyForce(values.get("horizontal", 0.0), values.get("vertical", 0.0)))
     if "point" in values:
         live.append(_point_load(values["point"]))
-    laws = ("coulomb", "nonassociated", "none")
-    friction = check_choice(values.get("friction", "coulomb"), laws, "limit.friction")
+    friction = _check_friction(values.get("friction", "coulomb"), "limit.friction")
     fill = _fill(values["fill"]) if "fill" in values else None
-    return LimitAnalysis(tuple(live), None if friction == "none" else friction, fill)
+    return LimitAnalysis(tuple(live), friction, fill)
+
+
+def _check_friction(value: Any, key: str) -> str | None:
+    """Return the friction law of limit analysis; None without sliding."""
+    law = check_choice(value, ("coulomb", "nonassociated", "none"), key)
+    return None if law == "none" else law
 
 
 def _fill(table: Any) -> Fill:
     """Return the strength of the fill."""
-    fill = check_table(table, FILL_KEYS, "limit.fill")
+    fill = _check_section(table, "limit.fill")
     if "friction_angle" not in fill:
         raise InvalidInput(
             f"limit.fill = {table} lacks its angle of friction: give friction_angle = "
@@ -187,8 +201,8 @@ def _fill(table: Any) -> Fill:
 
 def _point_load(table: Any) -> PointLoad:
     """Return a concentrated live load."""
-    point = check_table(table, POINT_LOAD_KEYS, "limit.point")
-    if set(point) != set(POINT_LOAD_KEYS) or len(point["force"]) != 2:
+    point = _check_section(table, "limit.point")
+    if len(point) < 2 or len(point["force"]) != 2:
         raise InvalidInput(
             f"limit.point = {table}: give a place and the two components of a force, e.g. "
             '{ x = "1.4 m", force = ["0 kN", "-1 kN"] }'
@@ -198,9 +212,9 @@ def _point_load(table: Any) -> PointLoad:
 
 def parse_rating(table: Any) -> Table:
     """Return the rating of a case: the arguments of `rate` that it gives."""
-    options = check_table(table, RATING_KEYS, "rating")
+    options = _check_section(table, "rating")
     if isinstance(vehicle := options.get("vehicle"), dict):
-        options["vehicle"] = _build("rating.vehicle", Vehicle, vehicle, VEHICLE_KEYS)
+        options["vehicle"] = _build("rating.vehicle", Vehicle, vehicle)
     return options
 
 
@@ -269,20 +283,19 @@ class AssessmentSettings:
             )
         found: dict[str, KinematicAssessment] = {}
         for direction in self.directions:
-            side, options = ("right", "left")[direction < 0.0], dict(self.options)
+            side, options = ("right", "left")[direction < 0.0], {**self.options}
+            options["direction"] = direction
             if parts:
-                each = assess_parts(structure, spectrum, direction=direction, **options)
+                each = assess_parts(structure, spectrum, **options)
                 found |= {f"{name or 'part'}, {side}": result for name, result in each.items()}
             else:
-                found[side] = kinematic_assessment(
-                    structure, spectrum, direction=direction, **options
-                )
+                found[side] = kinematic_assessment(structure, spectrum, **options)
         return found
 
 
 def parse_assessment(table: Any) -> AssessmentSettings:
     """Return the kinematic assessment of a case."""
-    options = check_table(table, ASSESSMENT_KEYS, "assessment")
+    options = _check_section(table, "assessment")
     spectrum = None
     if "spectrum" in options:
         spectrum = build_spectrum(options.pop("spectrum"), "assessment.spectrum")
@@ -293,26 +306,19 @@ def parse_assessment(table: Any) -> AssessmentSettings:
             "it out for both"
         )
     if "friction" in options:
-        laws = ("coulomb", "nonassociated", "none")
-        law = check_choice(options["friction"], laws, "assessment.friction")
-        options["friction"] = None if law == "none" else law
+        options["friction"] = _check_friction(options["friction"], "assessment.friction")
     if isinstance(state := options.get("limit_state"), dict):
-        options["limit_state"] = _build(
-            "assessment.limit_state", LimitState, state, LIMIT_STATE_KEYS
-        )
+        options["limit_state"] = _build("assessment.limit_state", LimitState, state)
     if "loads" in options:
-        options["loads"] = [
-            _build("assessment.loads", AttachedLoad, load, ATTACHED_LOAD_KEYS)
-            for load in options["loads"]
-        ]
+        loads = options["loads"]
+        options["loads"] = [_build("assessment.loads", AttachedLoad, load) for load in loads]
     return AssessmentSettings(spectrum, directions, options)
 
 
-def _build(section: str, kind: Callable[..., Any], table: Table, keys: Table) -> Any:
+def _build(section: str, kind: Callable[..., Any], table: Table) -> Any:
     """Return an object made of the keys of a table."""
     try:
-        return kind(**check_table(table, keys, section))
+        return kind(**_check_section(table, section))
     except TypeError as error:
-        raise InvalidInput(
-            f"{section} = {dict(table)}: {error}; its keys are {list(keys)}"
-        ) from error
+        keys = list(SECTION_KEYS[section])
+        raise InvalidInput(f"{section} = {dict(table)}: {error}; its keys are {keys}") from error

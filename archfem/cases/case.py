@@ -13,25 +13,8 @@ from typing import Any
 import tomli_w
 
 from archfem._validation import check_words, validate_arguments
-from archfem.cases.analysis_keys import (
-    AssessmentSettings,
-    LimitAnalysis,
-    check_scheme,
-    parse_analysis,
-    parse_assessment,
-    parse_damping,
-    parse_limit,
-    parse_rating,
-    parse_scheme,
-)
-from archfem.cases.motion_keys import (
-    build_motion,
-    build_pairs,
-    build_suite,
-    build_target_spectrum,
-    parse_motion,
-    parse_suite,
-)
+from archfem.cases import analysis_keys, motion_keys
+from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis
 from archfem.cases.provenance import load_extensions_of
 from archfem.cases.structure_keys import cached_structure, parse_stages
 from archfem.cases.toml_file import Table, apply_change, check_table, read_with_base, refuse_unknown
@@ -53,11 +36,6 @@ MODEL_KEYS = {
 }
 # Keywords of `build` which have another name in a case file.
 BUILD_KEYWORDS = {"max_cell_size": "coarse", "quadrature_points": "points", "mesh_file": "file"}
-CRITERIA_KEYS = {"hinge": "1", "failures": int, "friction": "1", "duration": "s"}
-OUTPUT_KEYS = {
-    **{"save_every": int, "save_fields_every": int, "joints": [(int, str)], "animation": bool},
-    "free_body": str,
-}
 TABLE_SECTIONS = (
     *("structure", "materials", "contacts", "model", "motion", "suite", "analysis"),
     *("criteria", "limit", "rating", "assessment", "dead_load", "output"),
@@ -153,8 +131,11 @@ class Case:
         for key in TABLE_SECTIONS:
             if not isinstance(settings.get(key, {}), dict):
                 raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
-        analysis = parse_analysis(settings.get("analysis", {}))
         model = check_table(settings.get("model", {}), MODEL_KEYS, "model")
+        keys: Table = {"hinge": "1", "failures": int, "friction": "1", "duration": "s"}
+        criteria = check_table(settings.get("criteria", {}), keys, "criteria")
+        keys = {"save_every": int, "save_fields_every": int, "joints": [(int, str)]}
+        keys |= {"animation": bool, "free_body": str}
         motion, suite, limit = (settings.get(key) for key in ("motion", "suite", "limit"))
         if motion is not None and suite is not None:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
@@ -162,16 +143,14 @@ class Case:
             title=settings.get("title", "case"),
             structure=cached_structure(settings, folder),
             model={BUILD_KEYWORDS.get(key, key): value for key, value in model.items()},
-            motion=None if motion is None else parse_motion(motion),
-            suite=None if suite is None else parse_suite(suite),
-            analysis=analysis,
-            criteria=Criteria(
-                **check_table(settings.get("criteria", {}), CRITERIA_KEYS, "criteria")
-            ),
-            limit=None if limit is None else parse_limit(limit),
-            rating=parse_rating(settings.get("rating", {})),
-            assessment=parse_assessment(settings.get("assessment", {})),
-            output=check_table(settings.get("output", {}), OUTPUT_KEYS, "output"),
+            motion=None if motion is None else motion_keys.parse_motion(motion),
+            suite=None if suite is None else motion_keys.parse_suite(suite),
+            analysis=analysis_keys.parse_analysis(settings.get("analysis", {})),
+            criteria=Criteria(**criteria),
+            limit=None if limit is None else analysis_keys.parse_limit(limit),
+            rating=analysis_keys.parse_rating(settings.get("rating", {})),
+            assessment=analysis_keys.parse_assessment(settings.get("assessment", {})),
+            output=check_table(settings.get("output", {}), keys, "output"),
             settings=dict(settings),
             folder=folder,
         )
@@ -183,7 +162,7 @@ class Case:
         # These properties parse and check their settings.
         _ = self.discretisation, self.tolerance, self.damping, self.scheme, self.joints
         _ = self.stages
-        check_scheme(self.analysis, self.structure, self.discretisation.displacements)
+        analysis_keys.check_scheme(self.analysis, self.structure, self.discretisation.displacements)
         step = self.analysis.get("dt", MIN_TIME_STEP)
         if not MIN_TIME_STEP <= step <= 0.1:
             raise InvalidInput(
@@ -231,7 +210,7 @@ class Case:
     @property
     def damping(self) -> Viscous | EffectiveDamping | None:
         """Damping of the time history; `EffectiveDamping` takes its frequencies from the modes."""
-        return parse_damping(self.analysis)
+        return analysis_keys.parse_damping(self.analysis)
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -241,7 +220,7 @@ class Case:
     @property
     def scheme(self) -> Scheme:
         """Time integration scheme."""
-        return parse_scheme(self.analysis)
+        return analysis_keys.parse_scheme(self.analysis)
 
     def ground_motion(self) -> Motion:
         """Return the ground motion, read or synthetic.
@@ -254,7 +233,7 @@ class Case:
         """
         if self.motion is None:
             raise InvalidInput("the case has no [motion]: give a file, or synthetic = { seed = 1 }")
-        return build_motion(self.motion, self.folder)
+        return motion_keys.build_motion(self.motion, self.folder)
 
     def ground_suite(self) -> Suite:
         """Return the suite of ground motions, matched to its target if the case says so.
@@ -268,7 +247,7 @@ class Case:
         """
         if self.suite is None:
             raise InvalidInput("the case has no [suite]: give a table for each of its pairs")
-        return build_suite(self.suite, self.folder)
+        return motion_keys.build_suite(self.suite, self.folder)
 
     def check_ground(self) -> None:
         """Refuse motions that cannot be read, before anything is computed.
@@ -279,12 +258,12 @@ class Case:
         if self.motion is not None:
             self.ground_motion()
         if self.suite is not None:
-            build_pairs(self.suite, self.folder)
+            motion_keys.build_pairs(self.suite, self.folder)
 
     @property
     def target(self) -> DesignSpectrum | None:
         """Target spectrum of the suite, or None."""
-        return build_target_spectrum(self.suite or {})
+        return motion_keys.build_target_spectrum(self.suite or {})
 
     def alone(self, *pairs: str) -> "Case":
         """Return the case with some pairs of its suite alone.
@@ -303,10 +282,7 @@ class Case:
         refuse_unknown(dict.fromkeys(pairs), self.suite["pairs"], "suite.pairs")
         # Checked keys and original tables must agree: the digest is that of the tables.
         suite, table = (
-            {
-                **keys,
-                "pairs": {name: keys["pairs"][name] for name in keys["pairs"] if name in pairs},
-            }
+            {**keys, "pairs": {key: pair for key, pair in keys["pairs"].items() if key in pairs}}
             for keys in (self.suite, self.settings["suite"])
         )
         return replace(self, suite=suite, settings={**self.settings, "suite": table})

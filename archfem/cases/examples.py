@@ -8,9 +8,6 @@ from pathlib import Path
 from archfem._files import create_result_folder
 from archfem.errors import InvalidInput
 
-# Name of a file beside a case, as the case writes it.
-_FILE_NAME = re.compile(r'"([\w.-]+\.(?:toml|geojson))"')
-
 
 def list_examples() -> dict[str, Path]:
     """Return the files of the example cases by name, in alphabetical order."""
@@ -64,5 +61,6 @@ def _example_path(name: str) -> Path:
 
 def _files_named_by(path: Path) -> list[Path]:
     """Return the existing files beside a case that it names, each once."""
-    names = dict.fromkeys(_FILE_NAME.findall(path.read_text(encoding="utf-8")))
+    pattern = r'"([\w.-]+\.(?:toml|geojson))"'  # name of a file, as the case writes it
+    names = dict.fromkeys(re.findall(pattern, path.read_text(encoding="utf-8")))
     return [path.with_name(name) for name in names if path.with_name(name).is_file()]

@@ -26,19 +26,9 @@ from archfem.motion.motion import Motion
 from archfem.motion.record_selection import RecordSelection
 from archfem.motion.suite import Suite
 
-SYNTHETIC_KEYS = {"duration": "s", "pga": "m/s**2", "seed": int, "dt": "s", "vertical_ratio": "1"}
 SOURCE_KEYS = {
     **{"file": str, "column": int, "units": str, "dt": "s", "response": str},
     **{"synthetic": dict, "samples": ["m/s**2"]},
-}
-MOTION_KEYS = {
-    **SOURCE_KEYS,
-    **{"vertical": (str, dict), "resample": "s", "start": "s", "end": "s", "scale": "1"},
-    "reversed": bool,
-}
-SUITE_KEYS = {
-    **{"name": str, "folder": str, "reversed": bool, "target": dict, "matched": bool},
-    **{"scale": "1", "reduction": "1", "pairs": dict},
 }
 # Design spectra for 5 % damping by name, with their keys; accelerations are in g.
 TARGET_SPECTRA: Mapping[str, tuple[Callable[..., DesignSpectrum], Table]] = {
@@ -56,7 +46,8 @@ TARGET_SPECTRA: Mapping[str, tuple[Callable[..., DesignSpectrum], Table]] = {
 
 def parse_motion(table: Any, section: str = "motion") -> dict[str, Any]:
     """Return the checked keys of one motion."""
-    settings = _parse_source(table, MOTION_KEYS, section)
+    own = {"vertical": (str, dict), "resample": "s", "start": "s", "end": "s", "scale": "1"}
+    settings = _parse_source(table, {**SOURCE_KEYS, **own, "reversed": bool}, section)
     if isinstance(settings.get("vertical"), dict):
         vertical = _parse_source(settings["vertical"], SOURCE_KEYS, f"{section}.vertical")
         if "vertical_ratio" in vertical.get("synthetic", {}):
@@ -91,7 +82,11 @@ def build_motion(settings: Table, folder: Path = Path(), section: str = "motion"
 
 def parse_suite(table: Any) -> dict[str, Any]:
     """Return the checked keys of a suite."""
-    settings = check_table(table, SUITE_KEYS, "suite")
+    keys = {
+        **{"name": str, "folder": str, "reversed": bool, "target": dict, "matched": bool},
+        **{"scale": "1", "reduction": "1", "pairs": dict},
+    }
+    settings = check_table(table, keys, "suite")
     pairs = settings.get("pairs", {})
     if not pairs:
         raise InvalidInput(
@@ -199,9 +194,8 @@ def _parse_source(table: Any, keys: Table, section: str) -> dict[str, Any]:
         )
     (source,) = sources
     if source == "synthetic":
-        settings["synthetic"] = check_table(
-            settings["synthetic"], SYNTHETIC_KEYS, f"{section}.synthetic"
-        )
+        own = {"duration": "s", "pga": "m/s**2", "seed": int, "dt": "s", "vertical_ratio": "1"}
+        settings[source] = check_table(settings[source], own, f"{section}.synthetic")
     # Keys that describe a file are errors beside another source; samples have a step.
     of_files = {"file": set(), "synthetic": {"column", "units", "dt", "response"}}
     if unused := sorted(of_files.get(source, {"column", "units", "response"}) & set(settings)):

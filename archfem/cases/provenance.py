@@ -20,7 +20,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from archfem._files import check_file
+from archfem._files import check_file, hash_content
 from archfem._validation import report_user_errors, validate_arguments
 from archfem.cases.toml_file import Table, check_table
 from archfem.errors import InvalidInput
@@ -51,8 +51,7 @@ def list_input_files(settings: Table, folder: Path = Path()) -> list[Path]:
 def hash_file(path: Path) -> str:
     """Return the SHA-256 of the content of a file; "missing" if it cannot be read."""
     try:
-        with check_file(path, "file", sys.maxsize).open("rb") as content:
-            return hashlib.file_digest(content, "sha256").hexdigest()
+        return hash_content(check_file(path, "file", sys.maxsize))
     except (OSError, InvalidInput):
         return "missing"
 

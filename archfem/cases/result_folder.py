@@ -13,21 +13,8 @@ from pathlib import Path
 
 import tomli_w
 
-from archfem._files import (
-    FINISHED_FOLDER,
-    LIST_FILE,
-    FileGroup,
-    atomic_write,
-    check_listed,
-    complete_publication,
-    intact_file_list,
-    lock_folder,
-    publish_draft,
-    read_bytes,
-    read_file_list,
-    replace_results,
-    start_draft,
-)
+from archfem import _files
+from archfem._files import FileGroup
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, list_input_files
@@ -46,12 +33,7 @@ from archfem.motion.suite import Suite
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.modes import Modes
 from archfem.statics.stress import strength_use_table
-from archfem.view.collapse import (
-    draw_collapse,
-    draw_fall,
-    draw_kinematic_assessment,
-    draw_rating,
-)
+from archfem.view.collapse import draw_collapse, draw_fall, draw_kinematic_assessment, draw_rating
 from archfem.view.histories import draw_envelope, draw_joints, most_stressed_joints
 from archfem.view.motions import draw_motion, draw_selection, draw_spectra, draw_suite
 from archfem.view.positions import decisive_instant
@@ -95,8 +77,8 @@ class ResultFolder(CaseResult):
         """
         if path is not None:
             return super().report(path)
-        inputs = read_file_list(self.folder)["run"].inputs
-        with replace_results(self.folder, "report", inputs) as draft:
+        inputs = _files.read_file_list(self.folder)["run"].inputs
+        with _files.replace_results(self.folder, "report", inputs) as draft:
             super().report(draft / "report.html")
         return self.folder / "report.html"
 
@@ -108,15 +90,15 @@ def replace_run(case: Case, folder: Path) -> Iterator[Path]:
     The draft has the case, and of a suite the histories of earlier calls. If the block fails, the
     folder keeps the results of an earlier run; without any it gets what was computed.
     """
-    with lock_folder(folder):
-        draft, inputs = start_draft(folder, "run"), hash_inputs(case.settings, case.folder)
+    with _files.lock_folder(folder):
+        draft, inputs = _files.start_draft(folder, "run"), hash_inputs(case.settings, case.folder)
         _prepare_draft(case, folder, draft)
         try:
             yield draft
         except BaseException:
             _keep_partial_results(folder, draft, inputs)
             raise
-        publish_draft(folder, "run", inputs)
+        _files.publish_draft(folder, "run", inputs)
 
 
 def _prepare_draft(case: Case, folder: Path, draft: Path) -> None:
@@ -130,7 +112,7 @@ def _prepare_draft(case: Case, folder: Path, draft: Path) -> None:
     for name in pairs:
         if (folder / name).is_file() and not (draft / name).exists():
             _link(folder / name, draft / name)
-    with atomic_write(left) as part:
+    with _files.atomic_write(left) as part:
         part.write_text(case.text(), encoding="utf-8")
 
 
@@ -138,8 +120,8 @@ def _keep_partial_results(folder: Path, draft: Path, inputs: str) -> None:
     """Publish the results of a run that failed, unless the folder has those of another run."""
     files = [path for path in draft.rglob("*") if path.is_file() and path.name != CASE_FILE]
     new = [path for path in files if not _is_linked(path, folder / path.relative_to(draft))]
-    if new and "run" not in intact_file_list(folder):
-        publish_draft(folder, "run", inputs)
+    if new and "run" not in _files.intact_file_list(folder):
+        _files.publish_draft(folder, "run", inputs)
         logger.warning("what was computed is kept in %s", folder)
     elif any(path.name == HISTORY_FILE for path in new):
         logger.warning(
@@ -181,9 +163,9 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
     place = Path(folder)
     if not place.is_dir():
         raise InvalidInput(f"there is no folder {place}: give one that `archfem run` has written")
-    if (place / FINISHED_FOLDER).is_dir():  # of a command that was killed
-        with lock_folder(place):
-            complete_publication(place)
+    if (place / _files.FINISHED_FOLDER).is_dir():  # of a command that was killed
+        with _files.lock_folder(place):
+            _files.complete_publication(place)
     if not (place / CASE_FILE).is_file():
         raise InvalidInput(_missing_case_message(place))
     case = _read_case(place, None if inputs is None else Path(inputs))
@@ -204,20 +186,18 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
 
 def _check_files(place: Path) -> FileGroup:
     """Return the files of the run in a folder; refuse any that was changed or is of another run."""
-    groups = read_file_list(place)
+    groups = _files.read_file_list(place)
     run = groups.get("run")
     if run is None:
         raise InvalidInput(
-            f"{place} has no finished run, whose files `archfem run` lists in {LIST_FILE}: run the "
-            "case again"
+            f"{place} has no finished run, whose files `archfem run` lists in {_files.LIST_FILE}: "
+            "run the case again"
         )
     # histories are checked as they are read, and an earlier report is replaced
-    listed = [
-        name for command, group in groups.items() if command != "report" for name in group.files
-    ]
-    for path in (place / name for name in listed):
+    written = [group for command, group in groups.items() if command != "report"]
+    for path in (place / name for group in written for name in group.files):
         if path.is_file() and path.name != HISTORY_FILE:
-            check_listed(path, read_bytes(path, "result", max_bytes=2**40))
+            _files.check_listed(path, _files.read_bytes(path, "result", max_bytes=2**40))
     return run
 
 
@@ -335,15 +315,14 @@ def adopt_files(run: Run) -> bool:
     """
     assert run.path is not None
     pair, draft, folder = run.path.parents[0].name, run.path.parents[1], run.path.parents[2]
-    listed = intact_file_list(folder).get("run")
+    listed = _files.intact_file_list(folder).get("run")
     names = [] if listed is None else [n for n in listed.files if n.startswith(f"{pair}/")]
-    if f"{pair}/{SUMMARY_FILE}" not in names or not _is_linked(
-        run.path, folder / pair / HISTORY_FILE
-    ):
+    same_history = _is_linked(run.path, folder / pair / HISTORY_FILE)
+    if f"{pair}/{SUMMARY_FILE}" not in names or not same_history:
         return False
     try:
         for name in names:
-            check_listed(folder / name, read_bytes(folder / name, "result"))
+            _files.check_listed(folder / name, _files.read_bytes(folder / name, "result"))
     except InvalidInput:
         return False
     for name in names:
@@ -361,10 +340,7 @@ def write_pairs(
     runs: Mapping[str, History], at_rest: DeadLoadResult, text: str, folder: Path
 ) -> list[Path]:
     """Write the table of a suite, and draw the envelopes of its runs."""
-    pairs, per_figure = (
-        list(runs.items()),
-        len(LINE_COLOURS),
-    )  # as many runs as there are line styles
+    pairs, per_figure = list(runs.items()), len(LINE_COLOURS)  # as many runs as line styles
     files = [_write_text(text, folder / "suite.txt")]
     for number, first in enumerate(range(0, len(pairs), per_figure), start=1):
         figure = draw_envelope(dict(pairs[first : first + per_figure]), dead=at_rest.dead.joints)
@@ -380,10 +356,8 @@ def write_modes(modes: Modes, text: str, folder: Path) -> list[Path]:
 
 def write_accuracy(accuracy: Accuracy, text: str, folder: Path) -> list[Path]:
     """Write and draw computing time against error."""
-    return [
-        _write_text(text, folder / "accuracy.txt"),
-        save(draw_accuracy(accuracy), folder / "accuracy.png"),
-    ]
+    figure = save(draw_accuracy(accuracy), folder / "accuracy.png")
+    return [_write_text(text, folder / "accuracy.txt"), figure]
 
 
 def write_verdict_range(verdicts: VerdictRange, folder: Path) -> list[Path]:
@@ -422,6 +396,6 @@ def with_unique_names(motions: Sequence[Motion], names: Sequence[str]) -> list[M
 
 def _write_text(text: str, path: Path) -> Path:
     """Write a text atomically."""
-    with atomic_write(path) as draft:
+    with _files.atomic_write(path) as draft:
         draft.write_text(text + "\n", encoding="utf-8")
     return path

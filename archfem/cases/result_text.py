@@ -11,11 +11,7 @@ from archfem._files import align_columns
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import Ending, History
-from archfem.dynamics.verdict import (
-    MECHANISM_DEFINITIONS,
-    PUBLISHED_DEFINITION,
-    DetectedMechanism,
-)
+from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION, DetectedMechanism
 from archfem.joints.criteria import (
     assessed_joints,
     envelope,
@@ -89,23 +85,14 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         apart = joints["open"].any("time")
         largest = size.max("time").where(~apart, 0.5)  # |e| is undefined while a joint is open
         horizontal, vertical = np.abs(run.dataset["ground"].values).max(axis=0)
-        rows.append(
-            [
-                name,
-                verdict.outcome,
-                str(len(verdict.doubts) or "none"),
-                f"{horizontal:.2f} m/s²",
-                f"{vertical:.2f} m/s²",
-                format_ratio(float(size.max())),
-                str(joints["name"].values[int(largest.values.argmax())]),
-                format_ratio(float(joints["friction"].max())),
-                f"{int(apart.sum())} joints" if apart.any() else "-",
-                f"{verdict.displacement / mm:.3g} mm",
-                f"{verdict.residual / mm:.3g} mm",
-                *(_mechanism_cell(verdict.mechanisms, definition) for definition in definitions),
-                f"{endings.get(run.ending, run.ending)} {run.time[-1]:.2f} s",
-            ]
-        )
+        row = [name, verdict.outcome, str(len(verdict.doubts) or "none")]
+        row += [f"{horizontal:.2f} m/s²", f"{vertical:.2f} m/s²", format_ratio(float(size.max()))]
+        row.append(str(joints["name"].values[int(largest.values.argmax())]))
+        row.append(format_ratio(float(joints["friction"].max())))
+        row.append(f"{int(apart.sum())} joints" if apart.any() else "-")
+        row += [f"{value / mm:.3g} mm" for value in (verdict.displacement, verdict.residual)]
+        row += [_mechanism_cell(verdict.mechanisms, definition) for definition in definitions]
+        rows.append([*row, f"{endings.get(run.ending, run.ending)} {run.time[-1]:.2f} s"])
     verdicts = [run.verdict for run in runs.values()]
     counts = [
         f"{sum(verdict.mechanisms.get(name) is not None for verdict in verdicts)} of {len(runs)}"
@@ -136,23 +123,15 @@ def tabulate_motions(motions: Sequence[Motion]) -> ResultTable:
     for motion in motions:
         for component in motion.components:
             measured = measure_intensity(motion, component)
-            rows.append(
-                [
-                    motion.name,
-                    # The only component of a record may have any direction.
-                    component if len(motion.components) > 1 else "only one",
-                    str(len(motion.component(component))),
-                    f"{motion.dt:g} s",
-                    f"{measured.pga / STANDARD_GRAVITY:.4f} g",
-                    f"{measured.pgv:.4f} m/s",
-                    f"{measured.pgd:.4f} m",
-                    f"{measured.arias:.3g} m/s",
-                    f"{measured.cav:.3g} m/s",
-                    f"{measured.housner:.3g} m",
-                    f"{measured.significant_duration:.2f} s",
-                    f"{measured.duration:.2f} s",
-                ]
-            )
+            # The only component of a record may have any direction.
+            row = [motion.name, component if len(motion.components) > 1 else "only one"]
+            row += [str(len(motion.component(component))), f"{motion.dt:g} s"]
+            row.append(f"{measured.pga / STANDARD_GRAVITY:.4f} g")
+            row += [f"{measured.pgv:.4f} m/s", f"{measured.pgd:.4f} m"]
+            row += [f"{value:.3g} m/s" for value in (measured.arias, measured.cav)]
+            row.append(f"{measured.housner:.3g} m")
+            durations = measured.significant_duration, measured.duration
+            rows.append([*row, *(f"{duration:.2f} s" for duration in durations)])
     return ResultTable(head, rows)
 
 
@@ -230,11 +209,9 @@ def describe_run_quality(run: History) -> str:
     """Describe how a run was computed, and the checks of its numbers."""
     attrs = run.dataset.attrs
     # Only fidelity "auto" predicts the error of its model and time step.
-    predicted = (
-        f"predicted to err by {attrs['predicted_error']:.2g} in the largest |e|"
-        if "predicted_error" in attrs
-        else 'its error in |e| was not predicted, as fidelity = "auto" does'
-    )
+    predicted = 'its error in |e| was not predicted, as fidelity = "auto" does'
+    if "predicted_error" in attrs:
+        predicted = f"predicted to err by {attrs['predicted_error']:.2g} in the largest |e|"
     return (
         f"outcome: {run.outcome}; {attrs['steps']} steps by '{attrs['method']}'\n"
         f"energy: drifts by {attrs['energy_drift']:+.1e} of the largest exchanged at most\n"

@@ -7,7 +7,7 @@ each keyword of `archfem.shapes` is a key of the same name.
 import inspect
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -46,22 +46,15 @@ KEY_KINDS: Table = {
     **dict.fromkeys(("normal_stiffness", "shear_stiffness"), "Pa/m"),
     "friction": NumberOrWord("1", {"none": None}),  # "none": a joint that never slides
 }
-JOINTED_FILL_KEYS = {"law": str, "piece_size": "m", "friction_angle": "degree", "cohesion": "Pa"}
-DEAD_LOAD_KEYS = {"stages": str, "layers": int, "stage": [dict]}
-STAGE_KEYS = {"name": str, "blocks": [(int, str)], "centring": bool, "strike": bool}
 
-_SHAPES = (
-    *(rings.circular_arch, rings.pointed_arch, rings.elliptical_arch, rings.flat_arch),
-    *(rings.arch_along, bridges.buttressed_arch, bridges.arcade, rings.column),
-    *(rings.arch_on_piers, bridges.bridge),
-)
-SHAPE_FUNCTIONS = {shape.__name__: shape for shape in _SHAPES} | {"outlines": surveyed}
-# Parts of a bridge of which there may be several, from left to right, each under its name.
-NAMED_PARTS = {
-    "arches": bridge_parts.Arch,
-    "piers": bridge_parts.Pier,
-    "sidewalls": bridge_parts.Sidewall,
-}
+SHAPE_FUNCTIONS: Mapping[str, Callable[..., Structure]] = {
+    shape.__name__: shape
+    for shape in (
+        *(rings.circular_arch, rings.pointed_arch, rings.elliptical_arch, rings.flat_arch),
+        *(rings.arch_along, bridges.buttressed_arch, bridges.arcade, rings.column),
+        *(rings.arch_on_piers, bridges.bridge),
+    )
+} | {"outlines": surveyed}
 
 _recent_structures: OrderedDict[str, Structure] = OrderedDict()
 
@@ -121,7 +114,8 @@ def _keys_of(function: Callable[..., Any]) -> dict[str, Any]:
 
 def _divide_fill(structure: Structure, table: Table) -> Structure:
     """Divide the backfill of a structure into pieces, if the case says so."""
-    fill = check_table(table, JOINTED_FILL_KEYS, "structure.fill")
+    keys = {"law": str, "piece_size": "m", "friction_angle": "degree", "cohesion": "Pa"}
+    fill = check_table(table, keys, "structure.fill")
     law = check_choice(fill.pop("law", "elastic"), ("elastic", "jointed"), "structure.fill.law")
     if law == "elastic":
         if fill:
@@ -129,16 +123,17 @@ def _divide_fill(structure: Structure, table: Table) -> Structure:
         return structure
     if missing := sorted({"piece_size", "friction_angle"} - set(fill)):
         raise InvalidInput(f"structure.fill lacks {missing}: a jointed fill needs both")
-    cohesion = fill.get("cohesion", 0.0)
-    return jointed_fill(
-        structure, fill["piece_size"], angle=fill["friction_angle"], cohesion=cohesion
-    )
+    angle, cohesion = fill["friction_angle"], fill.get("cohesion", 0.0)
+    return jointed_fill(structure, fill["piece_size"], angle=angle, cohesion=cohesion)
 
 
 def _bridge_parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
     """Return the arguments of `bridge`, with the parts that its tables describe."""
     parts = dict(values)
-    for key, part in NAMED_PARTS.items():
+    # there may be several of these, from left to right, each under its name
+    several = {"arches": bridge_parts.Arch, "piers": bridge_parts.Pier}
+    several |= {"sidewalls": bridge_parts.Sidewall}
+    for key, part in several.items():
         if key in parts:
             parts[key] = _build_parts(part, parts[key], f"structure.{key}")
     if "backfill" in parts:
@@ -229,21 +224,21 @@ def _resolve_preset(
 
 def parse_stages(table: Any, structure: Structure) -> Sequence[Stage] | None:
     """Return the construction stages of [dead_load]; None if the structure is built at once."""
-    values = check_table(table, DEAD_LOAD_KEYS, "dead_load")
+    keys = {"stages": str, "layers": int, "stage": [dict]}
+    values = check_table(table, keys, "dead_load")
+    keys = {"name": str, "blocks": [(int, str)], "centring": bool, "strike": bool}
     stages = [
-        Stage(**{"name": f"stage {k}", **check_table(stage, STAGE_KEYS, f"dead_load.stage[{k}]")})
+        Stage(**{"name": f"stage {k}", **check_table(stage, keys, f"dead_load.stage[{k}]")})
         for k, stage in enumerate(values.get("stage", []))
     ]
     if stages and len(values) > 1:
         raise InvalidInput("dead_load has stages of its own: take out stages and layers, or those")
     if stages:
-        resolve_stages(
-            structure, stages
-        )  # refuses stages which leave a block out or place it twice
+        # refuses stages which leave a block out or place it twice
+        resolve_stages(structure, stages)
         return stages
-    usual = (
-        check_choice(values.get("stages", "none"), ("none", "usual"), "dead_load.stages") == "usual"
-    )
+    kind = check_choice(values.get("stages", "none"), ("none", "usual"), "dead_load.stages")
+    usual = kind == "usual"
     if "layers" in values and not usual:
         raise InvalidInput("dead_load.layers needs stages = 'usual': add that, or take layers out")
     return usual_stages(structure, values.get("layers", 4)) if usual else None

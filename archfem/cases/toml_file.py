@@ -25,17 +25,6 @@ Table = Mapping[str, Any]
 # Limit of tables and lists inside each other [-].
 MAX_TABLE_DEPTH = 20
 
-# One part of a dotted key: bare or quoted. Possessive quantifiers (++, *+) keep matching linear.
-_KEY_PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
-_DEEP_KEY = re.compile(
-    rf"(?<![\w-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{MAX_TABLE_DEPTH}}}"
-)
-_DEEP_VALUE = re.compile(rf"(?:[\[{{]\s*+(?:{_KEY_PART}\s*+=\s*+)?+){{{MAX_TABLE_DEPTH}}}")
-# A path and a value on both sides of an equals sign that is not in quotes.
-_CHANGE_PATTERN = re.compile(r"""((?:[^"'=]|"[^"]*"|'[^']*')+)=(.*)""", re.DOTALL)
-# A dot between names that is not in quotes.
-_DOT_PATTERN = re.compile(r"""\.(?=(?:[^"']|"[^"]*"|'[^']*')*$)""")
-
 
 @dataclass(frozen=True)
 class NumberOrWord:
@@ -80,9 +69,13 @@ def read_tables(path: Path, what: str) -> dict[str, Any]:
 
 def parse_tables(text: str) -> dict[str, Any]:
     """Return the tables of a text in TOML."""
+    # One part of a dotted key, bare or quoted; possessive quantifiers (++, *+) keep matching linear
+    part, many = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')", f"{{{MAX_TABLE_DEPTH}}}"
+    deep_key = rf"(?<![\w-]){part}(?:[ \t]*+\.[ \t]*+{part}){many}"
+    deep_value = rf"(?:[\[{{]\s*+(?:{part}\s*+=\s*+)?+){many}"
     # Deep nesting is detected before parsing, whose time and memory would explode.
-    for pattern in (_DEEP_KEY, _DEEP_VALUE):
-        if match := pattern.search(text):
+    for pattern in (deep_key, deep_value):
+        if match := re.search(pattern, text):
             line = text.count("\n", 0, match.start()) + 1
             raise InvalidInput(
                 f"more than {MAX_TABLE_DEPTH} tables or lists in each other (line {line})"
@@ -133,7 +126,8 @@ def remove_key(settings: dict[str, Any], path: str) -> None:
 
 def apply_change(settings: dict[str, Any], text: str) -> None:
     """Set one value from "section.key=value", read as TOML, or else as a word."""
-    match = _CHANGE_PATTERN.fullmatch(text)
+    # A path and a value on both sides of an equals sign that is not in quotes.
+    match = re.fullmatch(r"""((?:[^"'=]|"[^"]*"|'[^']*')+)=(.*)""", text, re.DOTALL)
     if not match or not match[1].strip():
         raise InvalidInput(f"'{text}' is not a change: write section.key=value")
     path, word = match.groups()
@@ -158,7 +152,8 @@ def set_value(settings: dict[str, Any], path: str, value: Any) -> None:
 
 def split_key_path(path: str) -> list[str]:
     """Split "section.key" into the names of the tables and the key."""
-    names = [name.strip() for name in _DOT_PATTERN.split(path)]
+    # at each dot between names that is not in quotes
+    names = [name.strip() for name in re.split(r"""\.(?=(?:[^"']|"[^"]*"|'[^']*')*$)""", path)]
     names = [name[1:-1] if re.fullmatch(r"""".*"|'.*'""", name) else name for name in names]
     if not all(names) or any(mark in name for name in names for mark in "\"'"):
         raise InvalidInput(

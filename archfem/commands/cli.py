@@ -15,18 +15,17 @@ from typing import Any
 from archfem._files import describe_os_error
 from archfem.errors import ArchfemError, InvalidInput
 
-Command = Callable[[argparse.Namespace], int | None]
+AddArgument = Callable[..., Any]  # as `ArgumentParser.add_argument`
 
 # Exit codes: a shell expects 128 + the number of a signal that ended a command.
 EXIT_DOUBTFUL = 3
 EXIT_INTERRUPTED = 130
-EXIT_TERMINATED = 143
 
 EXIT_CODES = (
     "exit codes: 0, an answer; 1, an error in words, no answer; 2, the arguments are not "
     f"understood; {EXIT_DOUBTFUL}, an answer that is in doubt: summary.txt begins with why "
     "(energy that drifts, displacements that are not small, a fidelity that is wrong or errs "
-    f"by more than is permitted); {EXIT_INTERRUPTED}, ended by Ctrl-C, and {EXIT_TERMINATED}, "
+    f"by more than is permitted); {EXIT_INTERRUPTED}, ended by Ctrl-C, and 143, "
     "by SIGTERM: what was computed is kept."
 )
 
@@ -50,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     with _interrupt_on_sigterm() as signals:
         code = exit_code(lambda: _run_command(options))
-    return EXIT_TERMINATED if signals and code == EXIT_INTERRUPTED else code
+    return 128 + signal.SIGTERM if signals and code == EXIT_INTERRUPTED else code
 
 
 def _run_command(options: argparse.Namespace) -> int | None:
@@ -115,159 +114,149 @@ def _build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"archfem {release}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_case_commands(commands)
-    _add_report(commands.add_parser("report", help="one HTML page of a result folder, to print"))
-    about = "many cases: a table of results, on all cores or a cluster"
-    _add_study(commands.add_parser("study", help=about, description=about))
-    ready = commands.add_parser("compile", help="compile the time steps once: about a minute")
-    ready.add_argument("--jobs", type=int, help="processes that compile (one a core)")
-    ready.set_defaults(command=_load_command("run", "compile_steps"))
-    examples = commands.add_parser("examples", help="the cases that archfem brings, a line each")
-    examples.set_defaults(command=_load_command("tools", "examples"))
-    _add_example(commands.add_parser("example", help="print one of them, or copy it"))
-    doctor = commands.add_parser("doctor", help="what is installed, what is missing, how to get it")
-    doctor.set_defaults(command=_load_command("tools", "doctor"))
-    about = "film the history of a run"
-    _add_film(commands.add_parser("animate", help=about, description=about))
-    _add_motion(commands.add_parser("motion", help="measures and pictures of ground motions"))
-    about = "select recorded motions by the rule of a code"
-    _add_select(commands.add_parser("select", help=about, description=about))
+    _add_result_commands(commands)
+    _add_installation_commands(commands)
+    _add_film(commands)
+    _add_motion_commands(commands)
     return parser
+
+
+def _add_command(
+    commands: Any, name: str, about: str, module: str, function: str = "", **texts: str
+) -> AddArgument:
+    """Add a command, and return the function that adds its arguments."""
+
+    def command(options: argparse.Namespace) -> int | None:
+        # imported when the command is called, since imports take time
+        return getattr(import_module(f"archfem.commands.{module}"), function or name)(options)
+
+    parser = commands.add_parser(name, help=about, **texts)
+    parser.set_defaults(command=command)
+    return parser.add_argument
 
 
 def _add_case_commands(commands: Any) -> None:
     """Add the commands that take a case file."""
 
-    def add(name: str, about: str, out: str | None = "DIR") -> argparse.ArgumentParser:
-        command = commands.add_parser(name, help=about, description=about, epilog=EXIT_CODES)
-        command.set_defaults(command=_load_command("run", name))
-        command.add_argument("case", metavar="CASE.toml", help="the case file")
-        _add_changes(command)
-        if out is not None:
-            target = "folder for the results" if out == "DIR" else "the mesh file"
-            command.add_argument("--out", required=True, metavar=out, help=target)
-        return command
+    def add(
+        name: str, about: str, folder: str = "for the results", required: bool = True
+    ) -> AddArgument:
+        texts = {"description": about, "epilog": EXIT_CODES}
+        add_argument = _add_command(commands, name, about, "run", **texts)
+        add_argument("case", metavar="CASE.toml", help="the case file")
+        _add_changes(add_argument)
+        if folder:
+            text = f"folder {folder}{'' if required else ' (none)'}"
+            add_argument("--out", required=required, metavar="DIR", help=text)
+        return add_argument
 
-    run = add("run", "dead load, time histories, tables and pictures")
-    run.add_argument("--workers", type=int, default=1, help="processes for pairs of a suite (1)")
-    add("check", "read a case, build its model and find its dead load", None)
-    modes = add("modes", "frequencies, masses and shapes of vibrations about dead load")
-    modes.add_argument("--count", type=int, default=6, help="how many modes (6)")
-    limit = add("limit", "collapse factor and mechanism by limit analysis of the case alone", None)
-    limit.add_argument("--out", metavar="DIR", help="folder for text, table and picture (none)")
+    add_to = add("run", "dead load, time histories, tables and pictures")
+    add_to("--workers", type=int, default=1, help="processes for pairs of a suite (1)")
+    add("check", "read a case, build its model and find its dead load", "")
+    add_to = add("modes", "frequencies, masses and shapes of vibrations about dead load")
+    add_to("--count", type=int, default=6, help="how many modes (6)")
+    about = "collapse factor and mechanism by limit analysis of the case alone"
+    add("limit", about, "for text, table and picture", required=False)
     about = "kinematic assessment of the collapse mechanism against a design spectrum"
-    assess = add("assess", about, None)
-    assess.add_argument("--out", metavar="DIR", help="folder for text and pictures (none)")
-    assess.add_argument("--parts", action="store_true", help="each part by itself")
-    rate = add("rate", "rating of a bridge for a vehicle by limit analysis", None)
-    rate.add_argument("--vehicle", metavar="NAME", help="such as LM1 or LM71 (that of [rating])")
-    rate.add_argument("--live", type=float, help="partial factor on the vehicle (of its code)")
-    rate.add_argument("--impact", type=float, help="dynamic factor on the vehicle (of its code)")
-    rate.add_argument("--dead", type=float, help="partial factor on the weights (1)")
-    rate.add_argument("--width", type=float, help="width that carries one vehicle [m] (all)")
-    rate.add_argument("--out", metavar="DIR", help="folder for text, table and picture (none)")
-    add("mesh", "write the mesh of a case as a gmsh file", "FILE.msh")
-    verdict = add("verdict", "does it fall, whatever its uncertain properties are?", None)
-    verdict.add_argument("--out", metavar="DIR", help="folder for table and picture (none)")
-    verdict.add_argument("--workers", type=int, default=1, help="processes for the runs (1)")
-    verdict.add_argument("--samples", type=int, default=26, help="runs of the sample (26)")
-    about = "speed against error over fidelities, meshes, quadratures and steps"
-    accuracy = add("accuracy", about)
-    accuracy.add_argument("--workers", type=int, default=1, help="processes for settings (1)")
+    add_to = add("assess", about, "for text and pictures", required=False)
+    add_to("--parts", action="store_true", help="each part by itself")
+    about = "rating of a bridge for a vehicle by limit analysis"
+    add_to = add("rate", about, "")
+    add_to("--vehicle", metavar="NAME", help="such as LM1 or LM71 (that of [rating])")
+    add_to("--live", type=float, help="partial factor on the vehicle (of its code)")
+    add_to("--impact", type=float, help="dynamic factor on the vehicle (of its code)")
+    add_to("--dead", type=float, help="partial factor on the weights (1)")
+    add_to("--width", type=float, help="width that carries one vehicle [m] (all)")
+    add_to("--out", metavar="DIR", help="folder for text, table and picture (none)")
+    add_to = add("mesh", "write the mesh of a case as a gmsh file", "")
+    add_to("--out", required=True, metavar="FILE.msh", help="the mesh file")
+    about = "does it fall, whatever its uncertain properties are?"
+    add_to = add("verdict", about, "for table and picture", required=False)
+    add_to("--workers", type=int, default=1, help="processes for the runs (1)")
+    add_to("--samples", type=int, default=26, help="runs of the sample (26)")
+    add_to = add("accuracy", "speed against error over fidelities, meshes, quadratures and steps")
+    add_to("--workers", type=int, default=1, help="processes for settings (1)")
 
 
-def _load_command(module: str, name: str) -> Command:
-    """Return a command whose module is imported when it is called, since imports take time."""
-
-    def command(options: argparse.Namespace) -> int | None:
-        return getattr(import_module(f"archfem.commands.{module}"), name)(options)
-
-    return command
-
-
-def _add_changes(command: argparse.ArgumentParser) -> None:
+def _add_changes(add_argument: AddArgument) -> None:
     """Add the options that change values of a case, and permit its code."""
-    _add_own_code(command)
-    command.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="SECTION.KEY=VALUE",
-        dest="changes",
-        help="use this value instead of the file's; may be given again",
-    )
+    _add_own_code(add_argument)
+    about, metavar = "use this value instead of the file's; may be given again", "SECTION.KEY=VALUE"
+    add_argument("--set", action="append", default=[], metavar=metavar, dest="changes", help=about)
 
 
-def _add_own_code(command: argparse.ArgumentParser) -> None:
+def _add_own_code(add_argument: AddArgument) -> None:
     """Add the option that permits code of the user."""
     about = "run the Python modules that the file names: only if you trust them"
-    command.add_argument("--own-code", action="store_true", help=about)
+    add_argument("--own-code", action="store_true", help=about)
 
 
-def _add_report(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of `archfem report`."""
-    command.description = "Write one self-contained HTML page of what a result folder holds."
-    command.add_argument("folder", metavar="FOLDER", help="that `archfem run` has written")
-    command.add_argument("--out", metavar="FILE.html", help="the page (FOLDER/report.html)")
-    command.add_argument("--inputs", metavar="DIR", help="folder of the case's drawing (FOLDER)")
-    command.add_argument("--pdf", action="store_true", help="also print it, by Chromium or Chrome")
-    _add_own_code(command)
-    command.set_defaults(command=_load_command("run", "report"))
+def _add_result_commands(commands: Any) -> None:
+    """Add `archfem report` and `archfem study`."""
+    text = "Write one self-contained HTML page of what a result folder holds."
+    about = "one HTML page of a result folder, to print"
+    add = _add_command(commands, "report", about, "run", description=text)
+    add("folder", metavar="FOLDER", help="that `archfem run` has written")
+    add("--out", metavar="FILE.html", help="the page (FOLDER/report.html)")
+    add("--inputs", metavar="DIR", help="folder of the case's drawing (FOLDER)")
+    add("--pdf", action="store_true", help="also print it, by Chromium or Chrome")
+    _add_own_code(add)
+    about = "many cases: a table of results, on all cores or a cluster"
+    add = _add_command(commands, "study", about, "study", description=about)
+    add("case", nargs="?", metavar="STUDY.toml", help="the study's file")
+    _add_changes(add)
+    add("--out", metavar="DIR", help="folder for the results")
+    add("--workers", type=int, help="processes (one a core)")
+    add("--scheduler", metavar="tcp://HOST:PORT", help="of Dask, for a cluster")
+    add("--status", metavar="DIR", help="say how far the study in a folder is")
 
 
-def _add_study(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of `archfem study`."""
-    command.add_argument("case", nargs="?", metavar="STUDY.toml", help="the study's file")
-    _add_changes(command)
-    command.add_argument("--out", metavar="DIR", help="folder for the results")
-    command.add_argument("--workers", type=int, help="processes (one a core)")
-    command.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="of Dask, for a cluster")
-    command.add_argument("--status", metavar="DIR", help="say how far the study in a folder is")
-    command.set_defaults(command=_load_command("study", "study"))
+def _add_installation_commands(commands: Any) -> None:
+    """Add the commands on the installation and its example cases."""
+    about = "compile the time steps once: about a minute"
+    add = _add_command(commands, "compile", about, "run", "compile_steps")
+    add("--jobs", type=int, help="processes that compile (one a core)")
+    _add_command(commands, "examples", "the cases that archfem brings, a line each", "tools")
+    text = "Print a case, as in `archfem example ring > ring.toml`, or copy it."
+    about = "print one of them, or copy it"
+    add = _add_command(commands, "example", about, "tools", description=text)
+    add("name", metavar="NAME", help="as `archfem examples` lists them")
+    add("--out", metavar="DIR", help="copy it there, with all that it refers to")
+    about = "what is installed, what is missing, how to get it"
+    _add_command(commands, "doctor", about, "tools")
 
 
-def _add_example(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of `archfem example`."""
-    command.description = "Print a case, as in `archfem example ring > ring.toml`, or copy it."
-    command.add_argument("name", metavar="NAME", help="as `archfem examples` lists them")
-    command.add_argument("--out", metavar="DIR", help="copy it there, with all that it refers to")
-    command.set_defaults(command=_load_command("tools", "example"))
+def _add_film(commands: Any) -> None:
+    """Add `archfem animate`."""
+    about = "film the history of a run"
+    add = _add_command(commands, "animate", about, "tools", description=about)
+    add("history", metavar="HISTORY.nc", help="the history, which has fields")
+    add("--case", metavar="CASE.toml", help="its case (the one beside it)")
+    add("--out", metavar="FILM.mp4", help="the film, or a .gif (beside it)")
+    about = "slow motion around the mechanism, or a time [s]"
+    add("--window", metavar="auto|FROM,TO", help=about)
+    add("--colour", help="displacement or stress (displacement)")
+    add("--magnification", type=float, help="of displacements (chosen)")
+    add("--fps", type=float, help="frames a second, at most (20)")
+    add("--seconds", type=float, help="how long the film lasts (as the run)")
+    add("--size", metavar="WIDTHxHEIGHT", help="in pixels (1280x720)")
+    add("--renderer", help="matplotlib, or pyvista, also for .html (matplotlib)")
+    _add_own_code(add)
 
 
-def _add_film(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of `archfem animate`."""
-    command.add_argument("history", metavar="HISTORY.nc", help="the history, which has fields")
-    command.add_argument("--case", metavar="CASE.toml", help="its case (the one beside it)")
-    command.add_argument("--out", metavar="FILM.mp4", help="the film, or a .gif (beside it)")
-    command.add_argument(
-        "--window", metavar="auto|FROM,TO", help="slow motion around the mechanism, or a time [s]"
-    )
-    command.add_argument("--colour", help="displacement or stress (displacement)")
-    command.add_argument("--magnification", type=float, help="of displacements (chosen)")
-    command.add_argument("--fps", type=float, help="frames a second, at most (20)")
-    command.add_argument("--seconds", type=float, help="how long the film lasts (as the run)")
-    command.add_argument("--size", metavar="WIDTHxHEIGHT", help="in pixels (1280x720)")
-    command.add_argument("--renderer", help="matplotlib, or pyvista, also for .html (matplotlib)")
-    _add_own_code(command)
-    command.set_defaults(command=_load_command("tools", "animate"))
-
-
-def _add_motion(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of `archfem motion`."""
-    command.description = "Print the measures of records, draw them, their integrals and spectra."
-    command.add_argument("files", nargs="+", metavar="FILE", help="a record")
-    command.add_argument("--column", type=int, help="component or plain column, counted from 1")
-    command.add_argument("--units", help="of columns, miniSEED or SAC: g, m/s2, cm/s2 or gal")
-    command.add_argument("--dt", type=float, help="time between samples of plain columns [s]")
-    command.add_argument("--response", metavar="XML", help="StationXML of counts in miniSEED, SAC")
-    command.add_argument(
-        "--out", default="out/motions", metavar="DIR", help="folder for the pictures"
-    )
-    command.set_defaults(command=_load_command("run", "motion"))
-
-
-def _add_select(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of `archfem select`."""
-    add = command.add_argument
+def _add_motion_commands(commands: Any) -> None:
+    """Add `archfem motion` and `archfem select`."""
+    text = "Print the measures of records, draw them, their integrals and spectra."
+    about = "measures and pictures of ground motions"
+    add = _add_command(commands, "motion", about, "run", description=text)
+    add("files", nargs="+", metavar="FILE", help="a record")
+    add("--column", type=int, help="component or plain column, counted from 1")
+    add("--units", help="of columns, miniSEED or SAC: g, m/s2, cm/s2 or gal")
+    add("--dt", type=float, help="time between samples of plain columns [s]")
+    add("--response", metavar="XML", help="StationXML of counts in miniSEED, SAC")
+    add("--out", default="out/motions", metavar="DIR", help="folder for the pictures")
+    about = "select recorded motions by the rule of a code"
+    add = _add_command(commands, "select", about, "run", description=about)
     add("folder", metavar="FOLDER", help="folder of the records")
     about = 'design spectrum, as target of a case: \'{ code = "EC8", ag = 0.3, ground = "B" }\''
     add("--spectrum", required=True, metavar="TABLE", help=about)
@@ -279,4 +268,3 @@ def _add_select(command: argparse.ArgumentParser) -> None:
     about = "earthquake of files; may be given again"
     add("--event", action="append", default=[], metavar="FILES=NAME", dest="events", help=about)
     add("--out", metavar="DIR", help="folder for text, table, picture and [suite] (none)")
-    command.set_defaults(command=_load_command("run", "select"))

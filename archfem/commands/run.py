@@ -3,25 +3,18 @@
 import argparse
 import io
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from archfem._files import DRAFT_PREFIX, create_result_folder, replace_results
+from archfem.cases import result_folder as results
+from archfem.cases import result_text
 from archfem.cases.analysis_keys import rate_case
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs
-from archfem.cases.result_text import (
-    describe_accuracy,
-    describe_collapse,
-    describe_dead_load,
-    describe_run,
-    describe_verdicts,
-    tabulate_matches,
-    tabulate_motions,
-    tabulate_runs,
-)
 from archfem.cases.run import DeadLoadResult, Result, Run, run_case
 from archfem.commands.cli import EXIT_DOUBTFUL
 from archfem.dynamics.history import Ending, History
@@ -31,7 +24,7 @@ from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.modes import Modes
 
-# Modules that import matplotlib or pyvista, which are slow, are imported where they are needed.
+# Modules that import pyvista or studies, which are slow, are imported where they are needed.
 
 
 class FailedPairs(DidNotConverge):
@@ -40,14 +33,12 @@ class FailedPairs(DidNotConverge):
 
 def run(options: argparse.Namespace) -> int:
     """Carry out a case: limit analysis, dead load and time histories, tables and pictures."""
-    from archfem.cases.result_folder import replace_run
-
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     headline, failure = "", None
     output = io.StringIO()
     try:
         # All else is printed after the verdict, which is known last.
-        with replace_run(case, folder) as draft, redirect_stdout(output):
+        with results.replace_run(case, folder) as draft, redirect_stdout(output):
             if options.workers > 1 and case.suite is not None:
                 from archfem.studies.study import run_pairs
 
@@ -77,6 +68,15 @@ def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
         print(_name_published_files(output.getvalue(), folder, command), end="")
 
 
+def _write_results(
+    command: str, case: Case, out: str | None, write: Callable[[Path], Iterable[Path]]
+) -> None:
+    """Write the results of a command to its folder, if one is given."""
+    if out is not None:
+        with _replace_results(command, case, create_result_folder(out)) as draft:
+            print_written(write(draft))
+
+
 def _name_published_files(text: str, folder: Path, command: str) -> str:
     """Replace the names of files of a draft by those of the result folder, unless it is left."""
     draft = folder / f"{DRAFT_PREFIX}{command}"
@@ -92,11 +92,11 @@ def check(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
     print(case.title)
     if case.limit is not None and case.limit.live:
-        print(describe_collapse(case.structure, case.limit.solve(case.structure)))
+        print(result_text.describe_collapse(case.structure, case.limit.solve(case.structure)))
     # Unreadable records are errors before the dead load is computed.
     case.check_ground()
     at_rest = DeadLoadResult.of(case)
-    print(describe_dead_load(at_rest))
+    print(result_text.describe_dead_load(at_rest))
     if case.suite is not None:
         print_motions(case.ground_suite())
     elif case.motion is not None:
@@ -115,7 +115,7 @@ def modes(options: argparse.Namespace) -> None:
     print(case.title)
     with _replace_results("modes", case, folder) as draft:
         at_rest = DeadLoadResult.of(case)
-        print(describe_dead_load(at_rest))
+        print(result_text.describe_dead_load(at_rest))
         computed = print_modes(at_rest, options.count, draft)
         first = range(1, min(len(computed.frequencies), 2) + 1)
         print_written([film_modes(computed, draft / "modes.gif", first)])
@@ -127,13 +127,10 @@ def limit(options: argparse.Namespace) -> None:
     if case.limit is None:
         raise InvalidInput(f"{options.case} has no [limit]: give horizontal = 1.0, or a point load")
     found = case.limit.solve(case.structure)
-    text = describe_collapse(case.structure, found)
+    text = result_text.describe_collapse(case.structure, found)
     print(f"{case.title}\n{text}")
-    if options.out is not None:
-        from archfem.cases.result_folder import write_limit
-
-        with _replace_results("limit", case, create_result_folder(options.out)) as draft:
-            print_written(write_limit(case, found, text, draft))
+    write = partial(results.write_limit, case, found, text)
+    _write_results("limit", case, options.out, write)
 
 
 def assess(options: argparse.Namespace) -> None:
@@ -144,11 +141,7 @@ def assess(options: argparse.Namespace) -> None:
     found = case.assessment.solve(case.structure, demand, options.parts)
     text = "\n\n".join(f"{name}: {result}" for name, result in found.items())
     print(f"{case.title}\n{text}")
-    if options.out is not None:
-        from archfem.cases.result_folder import write_assessments
-
-        with _replace_results("assess", case, create_result_folder(options.out)) as draft:
-            print_written(write_assessments(found, text, draft))
+    _write_results("assess", case, options.out, partial(results.write_assessments, found, text))
 
 
 def rate(options: argparse.Namespace) -> None:
@@ -158,11 +151,7 @@ def rate(options: argparse.Namespace) -> None:
     given = {key: value for key in keys if (value := getattr(options, key)) is not None}
     found = rate_case(case.structure, case.rating, case.limit, given)
     print(f"{case.title}\n{found}")
-    if options.out is not None:
-        from archfem.cases.result_folder import write_rating
-
-        with _replace_results("rate", case, create_result_folder(options.out)) as draft:
-            print_written(write_rating(found, draft))
+    _write_results("rate", case, options.out, partial(results.write_rating, found))
 
 
 def mesh(options: argparse.Namespace) -> None:
@@ -176,38 +165,32 @@ def mesh(options: argparse.Namespace) -> None:
 
 def accuracy(options: argparse.Namespace) -> None:
     """Run a case over fidelities, meshes, quadratures and steps: table and picture."""
-    from archfem.cases.result_folder import write_accuracy
     from archfem.studies.convergence import case_accuracy
 
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     compared = case_accuracy(case, folder / "settings", workers=options.workers)
     with _replace_results("accuracy", case, folder) as draft:
-        text = describe_accuracy(compared)
+        text = result_text.describe_accuracy(compared)
         print(text)
-        print_written(write_accuracy(compared, text, draft))
+        print_written(results.write_accuracy(compared, text, draft))
 
 
 def verdict(options: argparse.Namespace) -> None:
     """Run a case over joint rules, stiffness, friction and damping: how often does it fall?"""
-    from archfem.cases.result_folder import write_verdict_range
     from archfem.studies.variations import verdict_range_of_case
 
     case = Case.read(options.case, options.changes)
-    # A folder that cannot be written is refused before the runs.
-    folder = None if options.out is None else create_result_folder(options.out)
+    if options.out is not None:  # a folder that cannot be written is refused before the runs
+        create_result_folder(options.out)
     print(case.title)
     computed = verdict_range_of_case(case, workers=options.workers, samples=options.samples)
     print(computed)
-    if folder is not None:
-        with _replace_results("verdict", case, folder) as draft:
-            print_written(write_verdict_range(computed, draft))
+    _write_results("verdict", case, options.out, partial(results.write_verdict_range, computed))
 
 
 def report(options: argparse.Namespace) -> None:
     """Write the report of a result folder."""
-    from archfem.cases.result_folder import open_results
-
-    path = open_results(options.folder, inputs=options.inputs).report(options.out)
+    path = results.open_results(options.folder, inputs=options.inputs).report(options.out)
     print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
     if options.pdf:
         from archfem.view.pages.document import print_page
@@ -217,14 +200,12 @@ def report(options: argparse.Namespace) -> None:
 
 def motion(options: argparse.Namespace) -> None:
     """Print the measures of records and draw them."""
-    from archfem.cases.result_folder import with_unique_names, write_motions
-
     folder = create_result_folder(options.out)
     given = {key: getattr(options, key) for key in ("column", "units", "dt", "response")}
     read, refused = _read_records(options.files, given)
-    motions = with_unique_names(list(read.values()), [Path(path).name for path in read])
-    print(tabulate_motions(motions).text)
-    print_written(write_motions(motions, folder))
+    motions = results.with_unique_names(list(read.values()), [Path(path).name for path in read])
+    print(result_text.tabulate_motions(motions).text)
+    print_written(results.write_motions(motions, folder))
     if refused:
         raise InvalidInput(
             f"{len(refused)} of {len(options.files)} files were refused, as said above"
@@ -234,7 +215,6 @@ def motion(options: argparse.Namespace) -> None:
 def select(options: argparse.Namespace) -> None:
     """Select records of a folder by a code's rule: text, table, picture, and [suite] of a case."""
     from archfem.cases.motion_keys import build_spectrum, tabulate_selection
-    from archfem.cases.result_folder import write_selection
     from archfem.cases.toml_file import parse_tables
     from archfem.motion.record_selection import select_records
 
@@ -253,7 +233,7 @@ def select(options: argparse.Namespace) -> None:
     print(found)
     if options.out is not None:
         suite = tabulate_selection(found, Path(options.folder).absolute(), target)
-        print_written(write_selection(found, suite, create_result_folder(options.out)))
+        print_written(results.write_selection(found, suite, create_result_folder(options.out)))
     if failure is not None:
         raise DidNotConverge("no set was found that meets the rule: above is the nearest")
 
@@ -286,34 +266,32 @@ def compile_steps(options: argparse.Namespace) -> None:
         print(f"{seconds:5.0f} s: {kind}", flush=True)
 
 
-def print_results(case: Case, results: Iterable[Result], folder: Path) -> tuple[str, bool]:
+def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[str, bool]:
     """Print results, write their files, and return the verdict and whether any is in doubt."""
-    from archfem.cases.result_folder import write_dead_load, write_limit, write_suite
-
     # `run_case` yields limit analysis, dead load, suite and runs in this order.
     runs: dict[str, History] = {}
-    for result in results:
+    for result in found:
         if isinstance(result, Collapse):
-            text = describe_collapse(case.structure, result)
+            text = result_text.describe_collapse(case.structure, result)
             print(text)
-            print_written(write_limit(case, result, text, folder))
+            print_written(results.write_limit(case, result, text, folder))
         elif isinstance(result, DeadLoadResult):
             at_rest = result
-            print(describe_dead_load(at_rest))
-            print_written(write_dead_load(at_rest, folder))
+            print(result_text.describe_dead_load(at_rest))
+            print_written(results.write_dead_load(at_rest, folder))
             if case.has_motion:
                 _print_first_modes(at_rest, folder)
         elif isinstance(result, Suite):
             suite = result
             print_motions(suite)
-            print_written(write_suite(suite, case.target, folder))
+            print_written(results.write_suite(suite, case.target, folder))
         else:
             print(f"{result.motion.name}: {result.history.outcome}", file=sys.stderr)
             _print_run(result, at_rest)
             runs[result.motion.name] = result.history
     if case.suite is not None:
         _print_pairs(suite, runs, at_rest, folder)
-    verdict = describe_verdicts(runs.values()) if runs else ""
+    verdict = result_text.describe_verdicts(runs.values()) if runs else ""
     return verdict, bool(at_rest.doubts) or any(run.doubts for run in runs.values())
 
 
@@ -328,25 +306,22 @@ def _print_first_modes(at_rest: DeadLoadResult, folder: Path, max_modes: int = 4
 
 def print_modes(at_rest: DeadLoadResult, count: int, folder: Path) -> Modes:
     """Print the first modes about dead load and the damping, and write table and shapes."""
-    from archfem.cases.result_folder import write_modes
     from archfem.statics.modes import modes as compute_modes
 
     computed = compute_modes(at_rest.dead.model, count, about=at_rest.dead)
     text = f"{computed.table()}\n\n{at_rest.damping[1]}"
     print(text)
-    print_written(write_modes(computed, text, folder))
+    print_written(results.write_modes(computed, text, folder))
     return computed
 
 
 def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
     """Print the result of a run and write its files, unless an earlier command has."""
-    from archfem.cases.result_folder import adopt_files, write_run
-
     assert run.path is not None  # `archfem run` always has a folder
     motion, history = run.motion, run.history
     if run.reused:
         print(f"{motion.name}: finished before, kept {run.path}")
-        if adopt_files(run):
+        if results.adopt_files(run):
             return
     elif run.error is not None:
         if run.case.suite is None:
@@ -359,9 +334,9 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
             f"{float(history.time[-1]):.2f} s in {run.seconds:.1f} s; {history.outcome}"
         )
         print_written([run.path])
-    text = describe_run(run.case.structure, history, at_rest.dead.joints)
+    text = result_text.describe_run(run.case.structure, history, at_rest.dead.joints)
     print(text)
-    print_written(write_run(run, at_rest, text, run.path.parent))
+    print_written(results.write_run(run, at_rest, text, run.path.parent))
     if history.ending is Ending.INTERRUPTED and run.case.suite is None:
         raise KeyboardInterrupt
 
@@ -370,13 +345,11 @@ def _print_pairs(
     suite: Suite, runs: dict[str, History], at_rest: DeadLoadResult, folder: Path
 ) -> None:
     """Print the table of a suite; interrupted or failed runs end the command with an error."""
-    from archfem.cases.result_folder import write_pairs
-
-    text = tabulate_runs(runs).text
+    text = result_text.tabulate_runs(runs).text
     if doubtful := [name for name, run in runs.items() if run.doubts]:
         text += f"\n\nin doubt, as their summaries say: {', '.join(doubtful)}"
     print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{text}")
-    print_written(write_pairs(runs, at_rest, text, folder))
+    print_written(results.write_pairs(runs, at_rest, text, folder))
     if any(run.ending is Ending.INTERRUPTED for run in runs.values()):
         print("run the same command again to compute the pairs that are left", file=sys.stderr)
         raise KeyboardInterrupt
@@ -390,8 +363,10 @@ def _print_pairs(
 
 def print_motions(suite: Suite) -> None:
     """Print the result of spectral matching, or the measures of the motions."""
-    table = tabulate_matches(suite.matches) if suite.matches else tabulate_motions(suite.motions)
-    print(table.text)
+    if suite.matches:
+        print(result_text.tabulate_matches(suite.matches).text)
+    else:
+        print(result_text.tabulate_motions(suite.motions).text)
 
 
 def print_written(files: Iterable[Path]) -> None:

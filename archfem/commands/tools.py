@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from archfem import _numba, _optional
 from archfem._files import check_listed, read_bytes
@@ -30,9 +30,15 @@ def animate(options: argparse.Namespace) -> None:
         raise InvalidInput(f"there is no history file {path}{remedy}")
     case = Case.read(options.case or _find_case(path))
     run = History.read(path, case.structure)
-    names = ("magnification", "colour", "fps", "seconds", "renderer")
+    names = ("window", "colour", "magnification", "fps", "seconds", "size", "renderer")
     settings = {key: getattr(options, key) for key in names}
-    settings |= {"window": _parse_window(options.window), "size": _parse_size(options.size)}
+    if settings["window"] not in (None, "auto"):
+        refusal = "give 'auto', or two times in seconds such as 8.0,9.5"
+        refusal = f"--window {options.window}: {refusal}"
+        settings["window"] = _parse_pair(options.window, float, ",", refusal)
+    if settings["size"] is not None:
+        refusal = f"--size {options.size}: give width and height, such as 1280x720"
+        settings["size"] = _parse_pair(options.size, int, "x", refusal)
     from archfem.view.films.film import film  # pyvista and the encoder are slow to import
 
     # Options that were not given keep the defaults of `film`.
@@ -53,28 +59,13 @@ def _find_case(path: Path, name: str = "case.toml") -> Path:
     )
 
 
-def _parse_window(text: str | None) -> str | tuple[float, float] | None:
-    """Parse "auto", or two times "8.0,9.5" [s]."""
-    if text is None or text == "auto":
-        return text
+def _parse_pair(text: str, number: type, separator: str, refusal: str) -> tuple[Any, Any]:
+    """Parse two numbers such as "1280x720"."""
     try:
-        start, end = (float(part) for part in text.split(","))
+        first, second = (number(part) for part in text.lower().split(separator))
     except ValueError as error:
-        raise InvalidInput(
-            f"--window {text}: give 'auto', or two times in seconds such as 8.0,9.5"
-        ) from error
-    return start, end
-
-
-def _parse_size(text: str | None) -> tuple[int, int] | None:
-    """Parse a width and a height such as "1280x720" [pixels]."""
-    if text is None:
-        return None
-    try:
-        width, height = (int(part) for part in text.lower().split("x"))
-    except ValueError as error:
-        raise InvalidInput(f"--size {text}: give width and height, such as 1280x720") from error
-    return width, height
+        raise InvalidInput(refusal) from error
+    return first, second
 
 
 def examples(options: argparse.Namespace) -> None:
@@ -134,11 +125,9 @@ def diagnose_installation() -> Iterator[Diagnosis]:
     yield Diagnosis("Python", f"{sys.version.split()[0]}, {sys.executable}")
     yield from _diagnose_requirements()
     yield from _diagnose_fenicsx()
-    if _optional.can_draw():
-        yield Diagnosis("library of the viewer", "found")
-    else:
-        remedy = _optional.OPTIONAL_PACKAGES["EGL"].remedy
-        yield Diagnosis("library of the viewer", "missing", remedy)
+    found = _optional.can_draw()
+    remedy = "" if found else _optional.OPTIONAL_PACKAGES["EGL"].remedy
+    yield Diagnosis("library of the viewer", "found" if found else "missing", remedy)
     yield _diagnose_ffmpeg()
     yield _diagnose_compiled_code()
     if find_spec("distributed") is None:
@@ -162,15 +151,13 @@ def _diagnose_requirements() -> Iterator[Diagnosis]:
 def _diagnose_package(name: str, min_version: str) -> Diagnosis:
     """Diagnose a package that must have a minimum version."""
     remedy = f"{PIP_INSTALL} '{name}>={min_version}'"
-    # These are also imported, since libraries of the system may be missing.
-    imports = {"numba": "numba", "gmsh": "gmsh", "netCDF4": "netCDF4"}
-    imports["matplotlib"] = "matplotlib.figure"
     try:
         version = metadata.version(name)
         if _numbers(version) < _numbers(min_version):
             return Diagnosis(name, f"{version}, older than {min_version}", remedy)
-        if name in imports:
-            import_module(imports[name])
+        # these are also imported, since libraries of the system may be missing
+        if name in ("numba", "gmsh", "netCDF4", "matplotlib"):
+            import_module("matplotlib.figure" if name == "matplotlib" else name)
     except metadata.PackageNotFoundError:
         return Diagnosis(name, "missing", remedy)
     except Exception as error:  # imports of other packages may raise errors of any class
@@ -218,12 +205,11 @@ def _diagnose_compiled_code() -> Diagnosis:
     count, folders = _numba.count_cached_functions(), _numba.cache_folders()
     if not count:
         return Diagnosis("compiled code", "none yet: the first run, or 'archfem compile', makes it")
-    state = f"{count} functions in {', '.join(map(str, folders))}"
+    state, remedy = f"{count} functions in {', '.join(map(str, folders))}", ""
     if damaged := _numba.find_damaged_files():
         remedy = "'archfem compile' makes them anew, as the next run does"
         state += f"; {len(damaged)} damaged files, the first {damaged[0]}"
-        return Diagnosis("compiled code", state, remedy)
-    return Diagnosis("compiled code", state)
+    return Diagnosis("compiled code", state, remedy)
 
 
 def _numbers(version: str) -> list[int]:

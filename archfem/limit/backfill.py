@@ -21,12 +21,7 @@ from scipy import sparse
 from archfem._typing import Array
 from archfem._validation import check_number, check_type, is_one_of, short_repr
 from archfem.errors import InvalidInput
-from archfem.limit.linear_programme import (
-    Optimum,
-    Programme,
-    RigidBlocks,
-    rigid_load,
-)
+from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks, rigid_load
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
 from archfem.masonry.loads import BodyForce, PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
@@ -41,9 +36,6 @@ from archfem.units import in_degrees
 logger = logging.getLogger("archfem")
 
 SELF_WEIGHT = BodyForce(0.0, -1.0)
-
-# Force missing for equilibrium, per weight of the free blocks, above which they do not stand [-]
-EQUILIBRIUM_TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,9 +181,15 @@ class BlockSlices:
     @property
     def middle(self) -> Array:
         """Centroid of each slice along x (n,) [m]."""
-        left, right = np.maximum(self.top - self.bottom, 0.0).T
-        share = (left + 2.0 * right) / np.maximum(3.0 * (left + right), np.finfo(float).tiny)
+        share = _centroid_share(np.maximum(self.top - self.bottom, 0.0))
         return np.asarray(self.side[:, 0] + share * (self.side[:, 1] - self.side[:, 0]))
+
+
+def _centroid_share(heights: Array) -> Array:
+    """Return where the centroids of trapezia are between their sides of given heights (n, 2)."""
+    left, right = heights.T
+    share = (left + 2.0 * right) / np.maximum(3.0 * (left + right), np.finfo(float).tiny)
+    return np.asarray(share)
 
 
 def slice_blocks(structure: Structure) -> BlockSlices:
@@ -306,8 +304,8 @@ class FillProfile:
 
     def fan(self, point: Array, fill: Fill) -> tuple[NDArray[np.intp], Array, Array]:
         """Return the stones that a load reaches through the fill, points there, and its shares."""
-        halves = [self._half_fan(point, fill, sense) for sense in (1, -1)]
-        block, points, part = (np.concatenate(values) for values in zip(*halves, strict=True))
+        halves = (self._half_fan(point, fill, sense) for sense in (1, -1))
+        block, points, part = map(np.concatenate, zip(*halves, strict=True))
         return block, points, part
 
     def _half_fan(
@@ -356,9 +354,9 @@ class FillContacts:
         """Return points and resultants (n, 2) of pressures that are linear along each piece."""
         rise = np.abs(self.ends[:, 1, 1] - self.ends[:, 0, 1])
         size = self.toward * pressure.mean(axis=1) * rise * width
-        first, last = pressure.T
-        share = (first + 2.0 * last) / np.maximum(3.0 * (first + last), np.finfo(float).tiny)
-        points = self.ends[:, 0] + share[:, None] * (self.ends[:, 1] - self.ends[:, 0])
+        points = self.ends[:, 0] + _centroid_share(pressure)[:, None] * (
+            self.ends[:, 1] - self.ends[:, 0]
+        )
         return points, np.stack([size, np.zeros(len(size))], axis=1)
 
 
@@ -405,13 +403,9 @@ class BlocksWithFill:
             stress += list(pairwise(over))
         assert self.fill is not None
         least, most = self.fill.pressures(np.array(stress, dtype=float).reshape(-1, 2))
-        return FillContacts(
-            np.array(block, dtype=np.intp),
-            np.array(ends, dtype=float).reshape(-1, 2, 2),
-            np.array(toward, dtype=float),
-            least,
-            most,
-        )
+        faces = np.array(ends, dtype=float).reshape(-1, 2, 2)
+        senses = np.array(toward, dtype=float)
+        return FillContacts(np.array(block, dtype=np.intp), faces, senses, least, most)
 
     def load(self, actions: Sequence[BodyForce | PointLoad]) -> Array:
         """Return the generalised forces of actions on the free stones (3 n_free,) [N, N, N m]."""
@@ -482,21 +476,16 @@ class BlocksWithFill:
         contacts = self.contacts
         share = share[len(share) - len(contacts.block) :]  # a load factor may stand before them
         least, most = contacts.least.mean(axis=1), contacts.most.mean(axis=1)
-        variables = {
-            "pressure": ("contact", least + share * (most - least), {"units": "Pa"}),
-            "least": ("contact", least, {"units": "Pa"}),
-            "most": ("contact", most, {"units": "Pa"}),
-        }
+        pressures = {"pressure": least + share * (most - least), "least": least, "most": most}
+        variables = {key: ("contact", value, {"units": "Pa"}) for key, value in pressures.items()}
         ends, numbers = ("contact", "end"), np.array(self.rigid_regions.blocks, dtype=np.intp)
-        return xr.Dataset(
-            variables,
-            {
-                "block": ("contact", numbers[contacts.block]),
-                "x": (ends, contacts.ends[:, :, 0], {"units": "m"}),
-                "y": (ends, contacts.ends[:, :, 1], {"units": "m"}),
-                "toward": ("contact", contacts.toward),
-            },
-        )
+        coordinates = {
+            "block": ("contact", numbers[contacts.block]),
+            "x": (ends, contacts.ends[:, :, 0], {"units": "m"}),
+            "y": (ends, contacts.ends[:, :, 1], {"units": "m"}),
+            "toward": ("contact", contacts.toward),
+        }
+        return xr.Dataset(variables, coordinates)
 
     def _apply_forces(
         self, block: NDArray[np.intp], points: Array, forces: Array
@@ -579,6 +568,6 @@ def self_weight_programme(
     return stones, dead.with_unknowns(pressures, np.zeros(pressures.shape[1]), 1.0)
 
 
-def is_balanced(fall: Optimum, dead: Programme) -> bool:
-    """Return whether the forces missing for equilibrium are within the tolerance."""
-    return fall.value <= EQUILIBRIUM_TOLERANCE * len(dead.blocks.structure.free)
+def is_balanced(fall: Optimum, dead: Programme, tolerance: float = 1e-8) -> bool:
+    """Return whether the forces missing for equilibrium are below a share of the weights."""
+    return fall.value <= tolerance * len(dead.blocks.structure.free)

@@ -259,13 +259,11 @@ def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
     check_type(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
     check_instant(structure, joints)
     fractions = contact_fractions(structure, joints["N"].values, joints["M"].values)
-    reduced = (
-        replace(
-            joint, contact=replace(joint.contact, cohesion=joint.contact.cohesion * float(part))
-        )
-        for joint, part in zip(structure.joints, fractions, strict=True)
-    )
-    return replace(structure, joints=tuple(reduced))
+    joints_closed = []
+    for joint, part in zip(structure.joints, fractions, strict=True):
+        contact = replace(joint.contact, cohesion=joint.contact.cohesion * float(part))
+        joints_closed.append(replace(joint, contact=contact))
+    return replace(structure, joints=tuple(joints_closed))
 
 
 def contact_fractions(structure: Structure, normal: Array, moment: Array) -> Array:
@@ -323,8 +321,7 @@ def _solve_collapse(
 
 def _without_forces(optimum: Optimum) -> Optimum:
     """Return the same mechanism with undefined forces (NaN)."""
-    sizes = optimum.forces.shape, optimum.unknowns.shape
-    forces, unknowns = (np.full(size, np.nan) for size in sizes)
+    forces, unknowns = (np.full_like(each, np.nan) for each in (optimum.forces, optimum.unknowns))
     return replace(optimum, forces=forces, unknowns=unknowns)
 
 
@@ -394,8 +391,7 @@ def warn_sliding(names: Sequence[str], factor: float) -> None:
         logger.warning(
             "joints slide (%s): with the dilatancy of associated flow the factor %.4g is an "
             "upper estimate; friction='nonassociated' does without it",
-            join_joint_names(names),
-            factor,
+            *(join_joint_names(names), factor),
         )
 
 
@@ -413,13 +409,10 @@ def warn_cohesion(
     strength[holds] += structure.friction[holds] * normal[holds]
     limit = (1.0 + tolerance) * strength + tolerance * structure.cohesion
     beyond = holds & (np.abs(shear) > limit)
-    overstrained = [number for number in sorted(failing) if beyond[number]]
-    if overstrained:
+    if overstrained := [number for number in sorted(failing) if beyond[number]]:
         logger.warning(
             "%d joints such as '%s' fail partly open, held by cohesion on all their area: the "
             "factor %.4g is an upper estimate; af.limit.closed_cohesion restricts it to the closed "
             "part in a state, such as the end of a pushover",
-            len(overstrained),
-            structure.joints[overstrained[0]].name,
-            factor,
+            *(len(overstrained), structure.joints[overstrained[0]].name, factor),
         )

@@ -8,6 +8,7 @@ that few rigid bodies remain.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -125,11 +126,8 @@ class PlacedBlocks:
     @cached_property
     def attached(self) -> list[tuple[int, Array, AttachedLoad]]:
         """Block and present place of each attached load [m]."""
-        numbers = [self.structure.block_number(load.block) for load in self.loads]
-        return [
-            (k, self.places(np.array([load.point]), k)[0], load)
-            for k, load in zip(numbers, self.loads, strict=True)
-        ]
+        loads = [(self.structure.block_number(load.block), load) for load in self.loads]
+        return [(k, self.places(np.array([load.point]), k)[0], load) for k, load in loads]
 
     @cached_property
     def dead(self) -> Array:
@@ -141,9 +139,8 @@ class PlacedBlocks:
     @cached_property
     def live(self) -> Array:
         """Horizontal forces at a factor of one, about the centroids (n_blocks, 3) [N, N, N m]."""
-        return self._resultants(
-            [(k, place, (self.direction * weight, 0.0)) for k, place, weight in self.masses]
-        )
+        pulls = [(k, place, (self.direction * weight, 0.0)) for k, place, weight in self.masses]
+        return self._resultants(pulls)
 
     def _resultants(self, forces: Sequence[tuple[int, Array, Sequence[float]]]) -> Array:
         """Return the resultants of forces on each block about its centroid (n_blocks, 3)."""
@@ -214,9 +211,8 @@ def find_corners(structure: Structure) -> Array:
     near = TOUCHING * structure.size
     corners = np.empty((2, len(structure.joints), 2, 2))
     for number, joint in enumerate(structure.joints):
-        spans = np.array(
-            [_face_span(structure.blocks[k], joint.ends, near) for k in structure.pairs[number]]
-        )
+        pair = (structure.blocks[k] for k in structure.pairs[number])
+        spans = np.array([_face_span(block, joint.ends, near) for block in pair])
         # Where both faces extend beyond an end of the joint, they do not touch there: it ends both.
         beyond = np.abs(spans - [0.0, joint.depth]) > near
         spans = np.where(beyond.all(axis=0), [0.0, joint.depth], spans)
@@ -280,10 +276,8 @@ class Bodies:
     @cached_property
     def references(self) -> Array:
         """Reference point of each body, the mean of its centroids (n_bodies, 2) [m]."""
-        moving = self.body >= 0
-        body = self.body[moving]
-        total = np.zeros((self.count, 2))
-        np.add.at(total, body, self.blocks.centroids[moving])
+        body, total = self.body[self.moving], np.zeros((self.count, 2))
+        np.add.at(total, body, self.blocks.centroids[self.moving])
         return total / np.bincount(body, minlength=self.count)[:, None]
 
     @cached_property
@@ -321,23 +315,10 @@ class Bodies:
 
     def rates(self, contacts: Sequence[Contact]) -> Array:
         """Return rates of the contacts' gaps and slips (2, n_contacts, 3 n_bodies)."""
-        rows, columns, values = self._rate_entries(contacts)
-        rates = np.zeros((2, len(contacts), 3 * self.count))
-        # the bodies of a contact differ, or the contact has no rate: no entry is met twice
-        rates[:, rows, columns] = values
-        return rates
+        return np.array([each.toarray() for each in self.sparse_rates(contacts)])
 
     def sparse_rates(self, contacts: Sequence[Contact]) -> tuple[csr_matrix, csr_matrix]:
         """Return the rates of gaps and of slips, each (n_contacts, 3 n_bodies)."""
-        rows, columns, values = self._rate_entries(contacts)
-        shape = (len(contacts), 3 * self.count)
-        gaps, slips = (csr_matrix((each, (rows, columns)), shape) for each in values)
-        return gaps, slips
-
-    def _rate_entries(
-        self, contacts: Sequence[Contact]
-    ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-        """Return rows, columns and values (2, n) of the rates of gaps and slips."""
         points = np.array([contact.point for contact in contacts]).reshape(-1, 2)
         normal = np.array([contact.normal for contact in contacts]).reshape(-1, 2)
         along = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
@@ -347,21 +328,21 @@ class Bodies:
         number, side = np.nonzero((body >= 0) & (body[:, :1] != body[:, 1:]))
         own, sign = body[number, side], np.where(side == 0, 1.0, -1.0)
         x, y = (points[number] - self.references[own]).T
-        values = []
+        place = np.repeat(number, 3), (3 * own[:, None] + np.arange(3)).ravel()
+        rates = []
         for axis in (normal[number], along[number]):
             turn = x * axis[:, 1] - y * axis[:, 0]
-            values.append((sign * np.stack([axis[:, 0], axis[:, 1], turn])).T.ravel())
-        columns = (3 * own[:, None] + np.arange(3)).ravel()
-        return np.repeat(number, 3), columns, np.array(values)
+            values = (sign * np.stack([axis[:, 0], axis[:, 1], turn])).T.ravel()
+            # the bodies of a contact differ, or the contact has no rate: no entry is met twice
+            rates.append(csr_matrix((values, place), (len(contacts), 3 * self.count)))
+        return rates[0], rates[1]
 
 
 def largest_speed(blocks: PlacedBlocks, motion: Array) -> float:
     """Return the largest speed of a corner of any block [m/s]."""
     speeds = []
-    for outline, centroid, (u, v, turn) in zip(
-        blocks.outlines, blocks.centroids, motion, strict=True
-    ):
-        x, y = (outline - centroid).T
+    for number, (u, v, turn) in enumerate(motion):
+        x, y = (blocks.outlines[number] - blocks.centroids[number]).T
         speeds.append(np.hypot(u - turn * y, v + turn * x).max())
     return float(max(speeds))
 
@@ -394,8 +375,7 @@ def find_mechanism(
         return None
     contacts = blocks.touching(joints)
     coefficient = friction[[contact.joint for contact in contacts]]
-    solution = _solve_static(bodies, contacts, coefficient)
-    if solution is None:
+    if (solution := _solve_static(bodies, contacts, coefficient)) is None:
         return None
     factor, velocity, forces = solution
     if flat:
@@ -412,10 +392,9 @@ def _solve_flat(
     """Return factor and velocities of sliding without dilatancy, from first normal forces."""
     before = np.inf
     for _ in range(40):
-        try:
+        solution = None
+        with suppress(NoEquilibrium):
             solution = _solve_static(bodies, contacts, coefficient, forces)
-        except NoEquilibrium:
-            break
         if solution is None:
             break
         factor, velocity, found = solution
@@ -430,10 +409,7 @@ def _solve_flat(
 
 
 def _solve_static(
-    bodies: Bodies,
-    contacts: Sequence[Contact],
-    coefficient: Array,
-    held: Array | None = None,
+    bodies: Bodies, contacts: Sequence[Contact], coefficient: Array, held: Array | None = None
 ) -> tuple[float, Array, Array] | None:
     """Return the largest factor, velocities by duality and normal forces [mean body weights].
 
@@ -492,11 +468,8 @@ def classify_motion(
     # associated flow opens a sliding contact by μ |slip|; flat sliding by nothing
     dilation = np.where(np.isfinite(coefficient), coefficient, 0.0) * np.abs(along)
     keeps = (np.abs(normal) <= STILL) | (np.abs(normal - dilation) <= STILL)
-    still = [
-        joint
-        for joint in range(len(blocks.structure.joints))
-        if joint not in set(joints) or _moves_as_one(blocks, joint, motion)
-    ]
+    every_joint, among = range(len(blocks.structure.joints)), set(joints)
+    still = [k for k in every_joint if k not in among or _moves_as_one(blocks, k, motion)]
     body = merge_blocks(blocks.structure, still)
     kept = tuple(
         _sliding_contact(blocks, contact, int(sense))

@@ -54,16 +54,13 @@ class PathEnd(StrEnum):
     @property
     def sentence(self) -> str:
         """Meaning of the reason, as a sentence."""
-        return _END_SENTENCES[self]
-
-
-_END_SENTENCES = {
-    PathEnd.FALLS: "at the end it falls without any horizontal force",
-    PathEnd.LOCKS: "at the end its contacts permit no further motion",
-    PathEnd.COLLIDES: "at the end it runs into blocks that it has no joint with",
-    PathEnd.UNRESOLVED: "at the end no mechanism was found whose faces slide flat",
-    PathEnd.ENDURES: "it still needs a horizontal force where the path is cut off",
-}
+        return {
+            PathEnd.FALLS: "at the end it falls without any horizontal force",
+            PathEnd.LOCKS: "at the end its contacts permit no further motion",
+            PathEnd.COLLIDES: "at the end it runs into blocks that it has no joint with",
+            PathEnd.UNRESOLVED: "at the end no mechanism was found whose faces slide flat",
+            PathEnd.ENDURES: "it still needs a horizontal force where the path is cut off",
+        }[self]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +75,8 @@ class Linkage:
         """At rest: point on the corner's block, on the face's, normal of the face."""
         found = []
         for contact in self.mechanism.contacts:
-            on_corner, on_face = (
-                self._at_rest(contact.point, block) for block in (contact.corner, contact.face)
-            )
+            on_corner = self._at_rest(contact.point, contact.corner)
+            on_face = self._at_rest(contact.point, contact.face)
             turn = rotation(self.start.displacement[contact.face, 2])
             found.append((on_corner, on_face, contact.normal @ turn))
         return found
@@ -123,10 +119,8 @@ class LinkageState:
     @cached_property
     def contacts(self) -> list[Contact]:
         """Contacts at this place."""
-        moved = []
-        for contact, (on_corner, _, normal) in zip(
-            self.linkage.mechanism.contacts, self.linkage.anchors, strict=True
-        ):
+        moved, kept = [], self.linkage.mechanism.contacts
+        for contact, (on_corner, _, normal) in zip(kept, self.linkage.anchors, strict=True):
             turn = rotation(self.blocks.displacement[contact.face, 2])
             point = self.blocks.places(on_corner[None, :], contact.corner)[0]
             moved.append(contact._replace(point=point, normal=turn @ normal))
@@ -135,15 +129,12 @@ class LinkageState:
     @cached_property
     def misfits(self) -> Array:
         """Violation of each constraint, gaps of all contacts and slips of sticking ones [m]."""
-        jumps = []
+        gaps, slips = [], []
         for contact, (_, on_face, _) in zip(self.contacts, self.linkage.anchors, strict=True):
-            jumps.append(contact.point - self.blocks.places(on_face[None, :], contact.face)[0])
-        gaps = [contact.normal @ jump for contact, jump in zip(self.contacts, jumps, strict=True)]
-        slips = [
-            tangent(contact.normal) @ jump
-            for contact, jump in zip(self.contacts, jumps, strict=True)
-            if not contact.slip
-        ]
+            jump = contact.point - self.blocks.places(on_face[None, :], contact.face)[0]
+            gaps.append(contact.normal @ jump)
+            if not contact.slip:
+                slips.append(tangent(contact.normal) @ jump)
         return np.array(gaps + slips)
 
     @cached_property
@@ -212,9 +203,8 @@ class LinkageState:
         Normal forces that equilibrium does not determine are undefined (NaN).
         """
         normal, along = self.rates
-        dead, live = (
-            self.bodies.generalised(load) for load in (self.blocks.dead, self.blocks.live)
-        )
+        dead = self.bodies.generalised(self.blocks.dead)
+        live = self.bodies.generalised(self.blocks.live)
         slipping = np.flatnonzero(~self.sticks)
         coefficient = friction[[contact.joint for contact in self.contacts]]
         forces = normal.copy()
@@ -237,22 +227,15 @@ class LinkageState:
         """Return the forces of least factor where friction makes it indeterminate."""
         unit = np.abs(loads).max()
         free = [(None, None)] * (columns.shape[1] - len(self.contacts))
-        objective = np.zeros(columns.shape[1])
-        objective[-1] = 1.0
+        objective = np.append(np.zeros(columns.shape[1] - 1), 1.0)
         scaled = columns.copy()
         scaled[:, -1] /= unit
-        result = linprog(
-            objective,
-            A_eq=scaled,
-            b_eq=loads / unit,
-            bounds=[(0.0, None)] * len(self.contacts) + free,
-            method="highs",
-        )
+        bounds = [(0.0, None)] * len(self.contacts) + free
+        equations = {"A_eq": scaled, "b_eq": loads / unit}
+        result = linprog(objective, **equations, bounds=bounds, method="highs")
         if result.status != 0:
             return fallback
-        forces = result.x * unit
-        forces[-1] = result.x[-1]
-        return forces
+        return np.append(result.x[:-1] * unit, result.x[-1])
 
 
 @dataclass(frozen=True)
@@ -334,15 +317,9 @@ class PathFollower:
             if not self.factors:
                 raise
             end = PathEnd.UNRESOLVED
-        return MechanismPath(
-            self.blocks,
-            np.array(self.factors),
-            np.array(self.displacements),
-            motion,
-            tuple(mechanisms),
-            tuple(self.events),
-            end,
-        )
+        places = np.array(self.factors), np.array(self.displacements)
+        changes = tuple(mechanisms), tuple(self.events)
+        return MechanismPath(self.blocks, *places, motion, *changes, end)
 
     def _start(
         self, blocks: PlacedBlocks, mechanism: Mechanism
@@ -370,9 +347,8 @@ class PathFollower:
         for contact in [each for each in mechanism.contacts if each.slip]:
             others = tuple(each for each in mechanism.contacts if each is not contact)
             freed = replace(mechanism, contacts=others)
-            whole, state = (
-                LinkageState(Linkage(blocks, each), blocks) for each in (mechanism, freed)
-            )
+            whole = LinkageState(Linkage(blocks, mechanism), blocks)
+            state = LinkageState(Linkage(blocks, freed), blocks)
             ranks = [np.linalg.matrix_rank(each.jacobian, tol=1e-9) for each in (whole, state)]
             if ranks[0] == ranks[1] and self._leaves(whole, state, contact):
                 mechanism = freed
@@ -392,12 +368,8 @@ class PathFollower:
 
     def _opens_joints(self, state: LinkageState, velocity: Array) -> bool:
         """Return whether no contact closes."""
-        body = state.bodies.body
-        contacts = [
-            contact
-            for contact in state.blocks.touching(self.joints)
-            if body[contact.corner] != body[contact.face]
-        ]
+        body, touching = state.bodies.body, state.blocks.touching(self.joints)
+        contacts = [each for each in touching if body[each.corner] != body[each.face]]
         return bool((state.bodies.rates(contacts)[0] @ velocity >= -10.0 * STILL).all())
 
     def _presses(self, state: LinkageState, velocity: Array) -> bool:
@@ -490,9 +462,8 @@ class PathFollower:
         if closes.any():
             return f"{join_joint_names([names[k] for k in np.flatnonzero(closes)])} closes"
         for contact, force in zip(state.contacts, normal_forces, strict=True):
-            if (
-                force < -1e-5 * self._force_unit
-            ):  # well above the tolerance of the programme that follows
+            # well above the tolerance of the programme that follows
+            if force < -1e-5 * self._force_unit:
                 return f"a contact of {names[contact.joint]} opens"
             if contact.slip and self._is_off(blocks, contact, near):
                 return f"a corner slides off its face at {names[contact.joint]}"

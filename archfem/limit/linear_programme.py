@@ -119,12 +119,11 @@ class RigidBlocks:
 
     def largest_displacement(self, motion: Array) -> float:
         """Return the largest displacement of a corner of any block [m]."""
-        return max(
-            float(
-                np.linalg.norm(rigid_motion_matrix(block.drawn(), block.centroid) @ u, axis=1).max()
-            )
-            for block, u in zip(self.structure.blocks, motion, strict=True)
-        )
+        largest = []
+        for block, u in zip(self.structure.blocks, motion, strict=True):
+            moved = rigid_motion_matrix(block.drawn(), block.centroid) @ u
+            largest.append(float(np.linalg.norm(moved, axis=1).max()))
+        return max(largest)
 
     def resultants(self, forces: Array) -> Array:
         """Return N, V, M of every joint (n_joints, 3) [N, N, N m]."""
@@ -159,9 +158,8 @@ def crushing_cuts(joints: NDArray[np.intp], at: Array, crushing: Array) -> Limit
     shape = (len(joints), count)
     tangent = sparse.csr_matrix((slope, (row, joints)), shape)
     end = sparse.csr_matrix((np.ones(len(joints)), (row, joints)), shape)
-    rows = sparse.bmat(
-        [[tangent - end, tangent, None], [tangent, tangent - end, sparse.csr_matrix(shape)]]
-    )
+    shear = sparse.csr_matrix(shape)
+    rows = sparse.bmat([[tangent - end, tangent, None], [tangent, tangent - end, shear]])
     return Limits(rows.tocsr(), np.tile(slope * at / 2.0, 2))
 
 
@@ -332,6 +330,7 @@ class ReducedProgramme:
         # Residuals of balance and limits in mean block weights. Where round-off stops the solver,
         # presolve changes its path, and then a coarser tolerance lets it end.
         for presolve, tolerance in ((False, 1e-9), (True, 1e-9), (True, 1e-8)):
+            feasibility = (f"{side}_feasibility_tolerance" for side in ("primal", "dual"))
             result = linprog(
                 self._cost,
                 A_ub=self._limits.rows @ self.map,
@@ -340,11 +339,7 @@ class ReducedProgramme:
                 b_eq=self._load,
                 bounds=self._bounds,
                 method=method,
-                options={
-                    "primal_feasibility_tolerance": tolerance,
-                    "dual_feasibility_tolerance": tolerance,
-                    "presolve": presolve,
-                },
+                options={**dict.fromkeys(feasibility, tolerance), "presolve": presolve},
             )
             if result.status in (0, 2, 3):  # optimal, infeasible, unbounded
                 break
@@ -376,10 +371,8 @@ def _find_chains(
     is_link[row[single[columns.indices]] // 3] = False
     links, number = np.flatnonzero(is_link), np.cumsum(is_link) - 1
     ends = (block >= 0) & is_link[block]
-    incidence = sparse.csr_matrix(
-        (np.ones(2 * len(links)), (number[block[ends]], joint[ends])),
-        (len(links), len(structure.pairs)),
-    )
+    entries = np.ones(2 * len(links)), (number[block[ends]], joint[ends])
+    incidence = sparse.csr_matrix(entries, (len(links), len(structure.pairs)))
     # n links in a row have n + 1 joints: any distinct ones can be solved for
     pivots = csgraph.maximum_bipartite_matching(incidence, perm_type="column")
     return links, np.asarray(pivots, dtype=np.intp)
@@ -403,10 +396,8 @@ def _cone_generators(
     columns = np.arange(len(rows) + extra)
     shear, slope = np.tile(both + 2 * count, 2), np.repeat([1.0, -1.0], len(both))
     entries = np.concatenate([np.ones(len(rows)), slope * np.tile(friction[both], 2)])
-    place = (
-        np.concatenate([rows, shear]),
-        np.concatenate([columns[: len(rows)], columns[: len(shear)]]),
-    )
+    across = np.concatenate([columns[: len(rows)], columns[: len(shear)]])
+    place = np.concatenate([rows, shear]), across
     return sparse.csr_matrix((entries, place), (3 * count, len(columns))), largest[alone]
 
 

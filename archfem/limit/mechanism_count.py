@@ -30,6 +30,13 @@ from archfem.units import mm
 # Classes of mechanisms, from narrow to wide
 MECHANISM_KINDS = ("local", "semi-global", "global")
 
+# Definitions by joints that have failed at once, and the classes that each of them finds
+DEFINITIONS_AT_ONCE = {
+    "any joints at once": MECHANISM_KINDS,
+    "one part at once": ("local",),
+    "ring and pier at once": ("semi-global",),
+}
+
 # Definition by which a joint that has once failed counts from then on
 OVER_RECORD = "one part over the record"
 
@@ -224,12 +231,11 @@ def counted_mechanisms(
         The first mechanism by each definition, or None, by the definition's name.
     """
     joints = with_failure_flags(joints, criteria)
-    return {
-        "any joints at once": counted_mechanism(joints),
-        "one part at once": counted_mechanism(joints, kinds=("local",)),
-        "ring and pier at once": counted_mechanism(joints, kinds=("semi-global",)),
-        OVER_RECORD: mechanism_over_record(joints),
+    found = {
+        definition: counted_mechanism(joints, kinds=kinds)
+        for definition, kinds in DEFINITIONS_AT_ONCE.items()
     }
+    return {**found, OVER_RECORD: mechanism_over_record(joints)}
 
 
 @validate_arguments
@@ -272,14 +278,9 @@ def matching_definitions(
     count: Mapping[str, int], roles: Mapping[str, str], failures: int
 ) -> frozenset[str]:
     """Return the definitions of `counted_mechanisms` that failed joints meet at an instant."""
-    definitions = {
-        "any joints at once": MECHANISM_KINDS,
-        "one part at once": ("local",),
-        "ring and pier at once": ("semi-global",),
-    }
     return frozenset(
         name
-        for name, kinds in definitions.items()
+        for name, kinds in DEFINITIONS_AT_ONCE.items()
         if _widest_group(count, roles, failures, kinds) is not None
     )
 

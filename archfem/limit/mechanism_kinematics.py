@@ -234,9 +234,8 @@ class Verifier:
     def parts(self) -> tuple[str, ...]:
         """Names of the parts whose motion decides the class."""
         rigid = self.rigid_regions.structure
-        return select_assessed_parts(
-            {rigid.blocks[n].part: rigid.blocks[n].role for n in rigid.free}
-        )
+        roles = {rigid.blocks[n].part: rigid.blocks[n].role for n in rigid.free}
+        return select_assessed_parts(roles)
 
     @cached_property
     def loop_check(self) -> "LoopCheck":
@@ -330,15 +329,10 @@ def _largest_motion(blocks: RigidBlocks, freedoms: Array) -> Array:
     gaps = blocks.kinematics @ sparse.diags(blocks.coordinate_units)
     free = sparse.diags(sense) @ gaps
     fixed = gaps[freedoms == 0.0]
-    result = linprog(
-        -np.asarray(free.sum(axis=0)).ravel(),
-        A_ub=-free[sense != 0.0],
-        b_ub=np.zeros(int(np.count_nonzero(sense))),
-        A_eq=fixed,
-        b_eq=np.zeros(fixed.shape[0]),
-        bounds=(-1.0, 1.0),
-        method="highs-ds",
-    )
+    one_way = {"A_ub": -free[sense != 0.0], "b_ub": np.zeros(int(np.count_nonzero(sense)))}
+    closed = {"A_eq": fixed, "b_eq": np.zeros(fixed.shape[0])}
+    cost = -np.asarray(free.sum(axis=0)).ravel()
+    result = linprog(cost, **one_way, **closed, bounds=(-1.0, 1.0), method="highs-ds")
     if result.status != 0:
         raise DidNotConverge(f"the linear programme found no motion: {result.message}")
     return result.x
@@ -392,9 +386,8 @@ class LoopCheck:
         # some required joint must move: any one-way gap, or a two-way slip in one of its senses
         required = np.tile(self.loop_joints, 3)
         gaps = [np.where(required[rows] & (freedoms[rows] != 2.0), 1.0, 0.0)]
-        gaps += [
-            side * sense * (rows == slip) for slip in either[required[either]] for side in (1, -1)
-        ]
+        for slip in either[required[either]]:
+            gaps += [side * sense * (rows == slip) for side in (1, -1)]
         return any(_closes_loops(columns, gap) for gap in gaps)
 
 

@@ -19,6 +19,7 @@ References: Drucker, J. Appl. Mech. 21 (1954) 71-74. Ferris and Tin-Loi, Int. J.
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -215,16 +216,15 @@ def search_nonassociated(
     joints = len(programme.blocks.structure.depths)
     number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
     starts = starting_forces(programme, start, number, 0)
-    solutions = [
-        iterate for forces in starts if (iterate := find_solution(programme, forces)) is not None
-    ]
+    iterates = [find_solution(programme, forces) for forces in starts]
+    solutions = [iterate for iterate in iterates if iterate is not None]
     normal = np.array([normal_forces(forces) for forces in starts])
     smallest = normal.reshape(-1, joints).min(axis=0, initial=np.inf)
     associated = -np.inf if start is None else start.value
     bound = max(associated, _bound_objective(programme, smallest))
     limits = scale * associated, scale * bound
     successful = len(solutions)
-    first = max(solutions, key=_objective, default=None)
+    first = max(solutions, key=lambda iterate: iterate.state.value, default=None)
     least = -np.inf
     if first is not None:
         least = first.state.value + OBJECTIVE_DECREASE * abs(first.state.value)
@@ -236,12 +236,8 @@ def search_nonassociated(
     )
     if not solutions:
         return None, bounds
-    weakest = max(solutions, key=_objective)
+    weakest = max(solutions, key=lambda iterate: iterate.state.value)
     return weakest.state, _with_residuals(programme, weakest, bounds)
-
-
-def _objective(iterate: AlternatingIterate) -> float:
-    return iterate.state.value
 
 
 def find_weakest(programme: Programme, starts: Sequence[Array]) -> Optimum | None:
@@ -255,22 +251,11 @@ def starting_forces(
     programme: Programme, start: Optimum | None, number: int, seed: int
 ) -> list[Array]:
     """Return the forces of the associated optimum and of a number of random vertices."""
-    forces = _random_vertices(programme, start, number, np.random.default_rng(seed))
-    return forces if start is None else [start.forces, *forces]
-
-
-def _random_vertices(
-    programme: Programme, start: Optimum | None, number: int, rng: np.random.Generator
-) -> list[Array]:
-    """Return forces of random vertices of the admissible states; fewer where there are none."""
-    forces = []
+    forces, rng = [] if start is None else [start.forces], np.random.default_rng(seed)
     for _ in range(number):
-        try:
-            state = _random_vertex(programme, start, rng)
-        except DidNotConverge:  # no equilibrium under so much load
-            continue
-        if state is not None:
-            forces.append(state.forces)
+        with suppress(DidNotConverge):  # no equilibrium under so much load
+            if (state := _random_vertex(programme, start, rng)) is not None:
+                forces.append(state.forces)
     return forces
 
 

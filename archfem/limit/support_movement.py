@@ -29,6 +29,7 @@ from archfem._validation import check_number, check_type, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import SELF_WEIGHT
 from archfem.limit.collapse import stands
+from archfem.limit.displaced_blocks import rotation
 from archfem.limit.linear_programme import (
     NoEquilibrium,
     Optimum,
@@ -86,9 +87,8 @@ class Stage:
 
     def __str__(self) -> str:
         """Describe the share of the movement, the work, and the hinges, in one line."""
-        hinges = [
-            f"{name} at the {side}" for (_, side), name in zip(self.hinges, self.names, strict=True)
-        ]
+        sides = zip(self.hinges, self.names, strict=True)
+        hinges = [f"{name} at the {side}" for (_, side), name in sides]
         return (
             f"from {self.share:.4f} of the movement, work {self.work:.4g} N m: "
             f"hinges: {join_names(hinges, '; ') or 'none'}"
@@ -210,24 +210,20 @@ class DisplacedBlocks(RigidBlocks):
     def current_points(self, points: Array, block: int) -> Array:
         """Return the present places of points that move with a block (p, 2) [m]."""
         centroid, (x, y, turn) = self.structure.blocks[block].centroid, self.displacement[block]
-        return centroid + (points - centroid) @ _rotation_matrix(turn).T + [x, y]
+        return centroid + (points - centroid) @ rotation(turn).T + [x, y]
 
     @cached_property
     def faces(self) -> Array:
         """Ends of the joints on the lower and on the higher blocks (2, n_joints, 2, 2) [m]."""
-        joints = self.structure.joints
-        return np.array(
-            [
-                [self.current_points(joint.ends, joint.lower) for joint in joints],
-                [self.current_points(joint.ends, joint.higher) for joint in joints],
-            ]
-        )
+        lower = [self.current_points(joint.ends, joint.lower) for joint in self.structure.joints]
+        higher = [self.current_points(joint.ends, joint.higher) for joint in self.structure.joints]
+        return np.array([lower, higher])
 
     @cached_property
     def axes(self) -> Array:
         """Normals and tangents of the lower blocks' faces (2, n_joints, 2)."""
         turns = self.displacement[[joint.lower for joint in self.structure.joints], 2]
-        rotations = np.array([_rotation_matrix(turn) for turn in turns])
+        rotations = np.array([rotation(turn) for turn in turns])
         initial = np.stack([self.structure.normals, self.structure.tangents])
         return np.einsum("jab,kjb->kja", rotations, initial)
 
@@ -264,11 +260,6 @@ class DisplacedBlocks(RigidBlocks):
     def gaps(self, motion: Array) -> Array:
         """Return the rates of openings and slip at the present places, as `RigidBlocks.gaps`."""
         return (self._rates @ motion.ravel()).reshape(3, -1)
-
-
-def _rotation_matrix(turn: float) -> Array:
-    """Return the matrix that turns vectors anticlockwise (2, 2)."""
-    return np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
 
 
 class _PathEnd(Exception):

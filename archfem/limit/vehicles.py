@@ -105,14 +105,14 @@ def _code_vehicles() -> dict[str, Vehicle]:
 
 def _dynamic_factors() -> dict[str, tuple[float, str]]:
     """Return dynamic factors of codes and their sources, by the first part of a vehicle's name."""
+    span = (
+        "none, to be given: EN 1991-2:2003, 6.4.5.2, 1.44 / (√L - 0.2) + 0.82 from 1 to 1.67, "
+        "with L in m, half the span of an arch; from memory"
+    )
     return {
         "LM1": (1.0, "EN 1991-2:2003, 4.2.1: in the weights; from memory"),
         "LM2": (1.0, "EN 1991-2:2003, 4.2.1: in the weights; from memory"),
-        "LM71": (
-            1.0,
-            "none, to be given: EN 1991-2:2003, 6.4.5.2, 1.44 / (√L - 0.2) + 0.82 from 1 to 1.67, "
-            "with L in m, half the span of an arch; from memory",
-        ),
+        "LM71": (1.0, span),
         "CS454": (1.8, "BD 21/01, here on all axles; from memory"),
         "HL93": (1.33, "AASHTO LRFD, 3.6.2, not reduced by depth of fill; from memory"),
     }
@@ -138,10 +138,8 @@ class MovingLoad(ResultDisplay):
 
     def _summary(self) -> str:
         """Describe the least factor and its place in one line."""
-        return (
-            f"MovingLoad: least factor {self.worst.factor:.4g}, at x = {self.position:.3g} m "
-            f"driving {self.direction}"
-        )
+        place = f"at x = {self.position:.3g} m driving {self.direction}"
+        return f"MovingLoad: least factor {self.worst.factor:.4g}, {place}"
 
     def __str__(self) -> str:
         """Describe the worst place and its collapse in one line."""
@@ -273,10 +271,9 @@ class Rating(ResultDisplay):
     def __str__(self) -> str:
         """Describe outcome, worst places, mechanism, factors and sources, a line each."""
         vehicle = self.vehicle
-        least = (
-            f"{way} {float(self.moving.factors['factor'].sel(direction=way).min()):.4g}"
-            for way in DRIVING_DIRECTIONS
-        )
+        factors = self.moving.factors["factor"].min("position")
+        least = (f"{way} {float(factors.sel(direction=way)):.4g}" for way in DRIVING_DIRECTIONS)
+        favourable = "EN 1990:2002, Table A2.4(B), favourable; from memory"
         return "\n".join(
             [
                 f"{self._summary()}",
@@ -287,7 +284,7 @@ class Rating(ResultDisplay):
                 f"over {self.width:.3g} m of width; {vehicle.source} ({vehicle.grade})",
                 f"live load by {self.live:g} ({self._source('live')})",
                 f"impact by {self.impact:g} ({self._source('impact')})",
-                f"dead load by {self.dead:g} ({self._dead_source()})",
+                f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
             ]
         )
 
@@ -305,11 +302,6 @@ class Rating(ResultDisplay):
         if self.geometric < 1.0:
             text += f", below 1: joints are too thin by {100.0 * (1.0 - self.geometric):.2g} %"
         return text
-
-    def _dead_source(self) -> str:
-        """Return where the factor on the dead load comes from."""
-        favourable = "EN 1990:2002, Table A2.4(B), favourable; from memory"
-        return favourable if self.dead == 1.0 else "given"
 
 
 @validate_arguments
@@ -400,13 +392,10 @@ def _scale_weights(structure: Structure, factor: float) -> Structure:
     """Return a structure whose blocks weigh a multiple."""
     if factor == 1.0:
         return structure
-    blocks = (
-        replace(
-            block,
-            material=replace(block.material, unit_weight=factor * block.material.unit_weight),
-        )
-        for block in structure.blocks
-    )
+    blocks = []
+    for block in structure.blocks:
+        material = replace(block.material, unit_weight=factor * block.material.unit_weight)
+        blocks.append(replace(block, material=material))
     return replace(structure, blocks=tuple(blocks))
 
 
@@ -432,12 +421,9 @@ def _geometric_factor(
     axles = stones.load([load for load in moving.worst.live if isinstance(load, PointLoad)])
 
     def is_carried(share: float) -> bool:
-        changed = replace(
-            dead,
-            blocks=DeepenedBlocks(dead.blocks.structure, share),
-            cohesion=share * dead.cohesion,
-            crushing=None if dead.crushing is None else share * dead.crushing,
-        )
+        blocks = DeepenedBlocks(dead.blocks.structure, share)
+        crushing = None if dead.crushing is None else share * dead.crushing
+        changed = replace(dead, blocks=blocks, cohesion=share * dead.cohesion, crushing=crushing)
         if not is_balanced(changed.minimise_residual(), changed):
             return False
         optimum = changed.with_load_factor(axles).solve()
@@ -517,9 +503,8 @@ def _collapse_factors(
         if np.abs(load).max() > 1e-9 * -sum(axle.force[1] for axle in row)
     }
     associated = {row: programme.solve() for row, programme in programmes.items()}
-    states = associated
-    if options["friction"] == "nonassociated":
-        states = _search_nonassociated(programmes, associated)
+    searched = options["friction"] == "nonassociated"
+    states = _search_nonassociated(programmes, associated) if searched else associated
     for row, state in states.items():
         if state is not None:
             factors[row] = -state.value
@@ -553,8 +538,7 @@ def _search_nonassociated(
 
 def _find_worst(factors: Array, count: NDArray[np.intp]) -> tuple[int, int]:
     """Return direction and position of the least factor; if none is finite, of the most axles."""
-    finite = np.isfinite(factors)
-    flat = count.argmax()
+    finite, flat = np.isfinite(factors), count.argmax()
     if finite.any():
         # of places that differ by round-off, as on a symmetric bridge, the first
         flat = (factors <= (1.0 + 1e-6) * factors[finite].min()).argmax()
@@ -565,13 +549,12 @@ def _find_worst(factors: Array, count: NDArray[np.intp]) -> tuple[int, int]:
 def _label_factors(places: Array, factors: Array, count: NDArray[np.intp]) -> xr.Dataset:
     """Return factors and numbers of axles over direction and position."""
     dims = ("direction", "position")
-    return xr.Dataset(
-        {
-            "factor": (dims, factors, {"units": "1", "long_name": "factor at collapse"}),
-            "axles": (dims, count, {"units": "1", "long_name": "axles on the structure"}),
-        },
-        {"direction": list(DRIVING_DIRECTIONS), "position": ("position", places, {"units": "m"})},
-    )
+    variables = {
+        "factor": (dims, factors, {"units": "1", "long_name": "factor at collapse"}),
+        "axles": (dims, count, {"units": "1", "long_name": "axles on the structure"}),
+    }
+    position = ("position", places, {"units": "m"})
+    return xr.Dataset(variables, {"direction": list(DRIVING_DIRECTIONS), "position": position})
 
 
 VEHICLES: Mapping[str, Vehicle] = _code_vehicles()

@@ -39,6 +39,8 @@ from archfem.studies.shared_results import compute_once
 
 Value = TypeVar("Value")
 
+MAX_MODELS = 4  # cached objects of a kind that are as large as a model
+
 _cache: dict[str, OrderedDict[str, Any]] = {}
 
 
@@ -76,8 +78,7 @@ class SharedStepper(Stepper):
 @cache
 def preload() -> None:
     """Load the compiled code of a usual run; on each machine one process compiles it first."""
-    digest = source_digest()
-    path = Path(tempfile.gettempdir()) / f"archfem-{os.getuid()}-{digest}.warm"
+    path = Path(tempfile.gettempdir()) / f"archfem-{os.getuid()}-{source_digest()}.warm"
     # a full disk stops no study: the points compile what they need
     with suppress(OSError), path.open("ab", buffering=0) as file:
         compiled = file.tell() > 0
@@ -100,7 +101,7 @@ def dead_load_of(case: Case) -> DeadLoadResult:
     """
     preload()
     key = _model_key(case)
-    dead: Equilibrium = _look_up_model("equilibria", key, lambda: dead_load_of_case(case))
+    dead: Equilibrium = _look_up("equilibria", key, lambda: dead_load_of_case(case), MAX_MODELS)
     result = DeadLoadResult(case, dead)
     damping_key = f"{key} {case.analysis.get('damping')!r}"
     # stored as the cached property `damping` of the result would store it
@@ -110,10 +111,8 @@ def dead_load_of(case: Case) -> DeadLoadResult:
 
 def first_mode(result: DeadLoadResult) -> Modes:
     """Compute the first mode about the dead load."""
-    dead = result.dead
-    return _look_up_model(
-        "modes", _model_key(result.case), lambda: modes(dead.model, 1, about=dead)
-    )
+    dead, key = result.dead, _model_key(result.case)
+    return _look_up("modes", key, lambda: modes(dead.model, 1, about=dead), MAX_MODELS)
 
 
 @validate_arguments
@@ -150,9 +149,8 @@ def ground_suite(case: Case) -> Suite:
     plain = replace(case, suite=_without(settings, keys))
     key = hash_sections(case.settings, case.folder, ("suite",), keys)
     suite = _look_up("suites", key, lambda: _match_once(plain, key))
-    suite = replace(
-        suite, scale=settings.get("scale", 1.0), reduction=settings.get("reduction", 1.0)
-    )
+    factors = {name: settings.get(name, 1.0) for name in ("scale", "reduction")}
+    suite = replace(suite, **factors)
     return suite.reversed() if settings.get("reversed", False) else suite
 
 
@@ -182,7 +180,7 @@ def stepper_of(result: DeadLoadResult, motion: Motion) -> Stepper:
         return SharedStepper(equation, select_solver(equation), {})
 
     key = f"{_model_key(result.case)} {damping!r} {scheme!r}"
-    return _look_up_model("steppers", key, make).under(motion)
+    return _look_up("steppers", key, make, MAX_MODELS).under(motion)
 
 
 def _model_key(case: Case) -> str:
@@ -194,11 +192,6 @@ def _model_key(case: Case) -> str:
 def _without(table: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
     """A table without some of its keys."""
     return {key: value for key, value in table.items() if key not in keys}
-
-
-def _look_up_model(kind: str, key: str, make: Callable[[], Value]) -> Value:
-    """As `_look_up`, for objects as large as a model."""
-    return _look_up(kind, key, make, limit=4)
 
 
 def _look_up(kind: str, key: str, make: Callable[[], Value], limit: int = 64) -> Value:

@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +26,11 @@ def evaluate_on_cluster(
     points: Sequence[tuple[int, Point]], evaluator: Evaluator, client: Any, shared: Path
 ) -> Iterator[tuple[int, Row]]:
     """Evaluate points on the workers of a scheduler, given by its client or address."""
-    if not isinstance(client, str):
+    with ExitStack() as stack:
+        if isinstance(client, str):
+            client = _connect(client)
+            stack.callback(client.close, timeout=SCHEDULER_TIMEOUT)
         yield from _evaluate(points, evaluator, client, shared)
-        return
-    own_client = _connect(client)
-    try:
-        yield from _evaluate(points, evaluator, own_client, shared)
-    finally:
-        own_client.close(timeout=SCHEDULER_TIMEOUT)
 
 
 def _connect(address: str) -> Client:
@@ -55,7 +53,9 @@ def _evaluate(
     """Submit points in batches and yield their rows as batches finish."""
     version = describe_version()
     try:
-        size = _batch_size(len(points), sum(client.nthreads().values()))
+        # 40 batches a worker for an even load; at most 200 points, which are lost with their worker
+        size = len(points) // (40 * max(sum(client.nthreads().values()), 1))
+        size = min(max(1, size), 200)
         batches = [points[first : first + size] for first in range(0, len(points), size)]
         # not pure: a batch that was evaluated before, and has failed, is to be evaluated again
         futures = {
@@ -103,9 +103,3 @@ def _receive(
             "workers run"
         )
     yield from rows
-
-
-def _batch_size(points: int, workers: int) -> int:
-    """Number of points in a batch."""
-    # 40 batches a worker for an even load; at most 200 points, which are lost with their worker
-    return min(max(1, points // (40 * max(workers, 1))), 200)

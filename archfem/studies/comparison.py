@@ -103,10 +103,7 @@ def study_table(findings: Mapping[str, Finding]) -> str:
         rows = [[*row, text or "-"] for row, text in zip(rows, falls, strict=True)]
     tables = [align_columns(head, rows), *_incomplete_runs(findings)]
     if any(finding.scales for finding in findings.values()):
-        rows = [
-            [name, *(_range_text(finding.least(kind)) for kind in MECHANISM_DEFINITIONS)]
-            for name, finding in findings.items()
-        ]
+        rows = [[name, *map(_range_text, each.factors.values())] for name, each in findings.items()]
         tables.append(align_columns(["factor at first mechanism", *MECHANISM_DEFINITIONS], rows))
     return "\n\n".join(tables)
 
@@ -196,17 +193,13 @@ def _build_finding(
 def _run_findings(row: Mapping[str, Any]) -> dict[str, Any]:
     """The findings of one run, from its row."""
     kinds, times = _select(row, "mechanism"), _select(row, "time")
-    return {
-        "eccentricity": _select(row, "eccentricity"),
-        "friction": _select(row, "friction"),
-        "mechanisms": {
-            name: {"kind": kinds[name], "time": times.get(name, nan)} if name in kinds else None
-            for name in (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
-        },
-        "fall": row["fall"] or None,
-        "ended": row["ended"],
-        "outcome": row["outcome"],
+    mechanisms = {
+        name: {"kind": kinds[name], "time": times.get(name, nan)} if name in kinds else None
+        for name in (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
     }
+    sizes = {name: _select(row, name) for name in ("eccentricity", "friction")}
+    end = {"fall": row["fall"] or None, "ended": row["ended"], "outcome": row["outcome"]}
+    return {**sizes, "mechanisms": mechanisms, **end}
 
 
 def _select(row: Mapping[str, Any], prefix: str) -> dict[str, Any]:

@@ -127,12 +127,8 @@ class MeshSensitivity:
     @property
     def paths(self) -> dict[str, tuple[Array, Array, float, float]]:
         """Sizes, values, limit and error bar of mesh and step, as `draw_convergence` draws them."""
-        found = {"mesh": self.mesh, "step": self.step}
-        return {
-            name: (path.sizes, path.values, path.limit, path.error)
-            for name, path in found.items()
-            if path is not None
-        }
+        found = {"mesh": self.mesh} | ({} if self.step is None else {"step": self.step})
+        return {name: (x.sizes, x.values, x.limit, x.error) for name, x in found.items()}
 
     def of(self, quantity: str) -> "MeshSensitivity":
         """Return the sensitivity of another finding.
@@ -148,7 +144,7 @@ class MeshSensitivity:
     def text(self) -> str:
         """Return a table with a line for mesh, step, and each quadrature and fidelity."""
         rows = []
-        for name, path in (("mesh", self.mesh), ("step", self.step)):
+        for name, path in {"mesh": self.mesh, "step": self.step}.items():
             if path is not None:
                 order = f"{path.order:.2f}" if isfinite(path.order) else "-"
                 finest, limit = f"{path.values[-1]:.6g}", f"{path.limit:.6g}"
@@ -208,9 +204,8 @@ def mesh_sensitivity(  # noqa: PLR0913  (each varied setting is a keyword with i
     study = Study.of(case, points, find, title=f"{case.title}: mesh and step")
     table = study.run(folder, workers=workers)
     kinds, values = (np.array(c, dtype=object) for c in list(zip(*variations, strict=True))[:2])
-    return _sensitivity(
-        table.assign_coords(varied=("point", kinds), to=("point", values)), quantity
-    )
+    table = table.assign_coords(varied=("point", kinds), to=("point", values))
+    return _sensitivity(table, quantity)
 
 
 def _sensitivity(table: xr.Dataset, quantity: str) -> MeshSensitivity:
@@ -235,10 +230,8 @@ def _sensitivity(table: xr.Dataset, quantity: str) -> MeshSensitivity:
             f"'{quantity}' is {invalid[0]} for a mesh or a step: take another finding. {errors}"
         )
     mesh, *step = (converged(list(map(float, path)), list(path.values())) for path in paths if path)
-    time_step = step[0] if step else None
-    return MeshSensitivity(
-        quantity, mesh, time_step, select("quadrature"), select("fidelity"), table
-    )
+    rules, rungs = select("quadrature"), select("fidelity")
+    return MeshSensitivity(quantity, mesh, step[0] if step else None, rules, rungs, table)
 
 
 @validate_arguments

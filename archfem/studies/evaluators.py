@@ -24,13 +24,7 @@ from archfem.joints.criteria import assessed_joints, part_roles
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import suggest_name
 from archfem.motion.motion import Motion
-from archfem.studies.cache import (
-    dead_load_of,
-    first_mode,
-    ground_motion,
-    ground_suite,
-    stepper_of,
-)
+from archfem.studies.cache import dead_load_of, first_mode, ground_motion, ground_suite, stepper_of
 from archfem.studies.parameter_space import Point
 
 # A flat table: numbers, texts and rows of numbers by name
@@ -40,14 +34,19 @@ Findings = dict[str, Any]
 def evaluate_dead_load(case: Case) -> Findings:
     """Return the largest |e| and friction of joints under dead load, and the first mode."""
     result = dead_load_of(case)
-    joints, first = assessed_joints(result.dead.joints), first_mode(result)
+    joints = assessed_joints(result.dead.joints)
     return {
         "eccentricity": float(abs(joints["eccentricity"]).fillna(0.5).max()),
         "friction": float(joints["friction"].max()),
         "N": float(joints["N"].min()),
-        "frequency": float(first.frequencies[0]),
-        "mass": float(first.mass_ratios[0, 0]),
+        **_describe_first_mode(result),
     }
+
+
+def _describe_first_mode(result: DeadLoadResult) -> Findings:
+    """Return frequency and mass ratio of the first mode about the dead load."""
+    first = first_mode(result)
+    return {"frequency": float(first.frequencies[0]), "mass": float(first.mass_ratios[0, 0])}
 
 
 def evaluate_history(case: Case) -> Findings:
@@ -91,14 +90,15 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
         the largest energy error at any step over the exchanged energy [-]. `doubts`, the number of
         warnings.
     """
+    verdict = run.verdict
     findings: Findings = {
         "eccentricity": _largest(run, "eccentricity", 0.5),
         "friction": _largest(run, "friction", np.inf),
         **{name: _largest(run, name) for name in ("rotation", "opening", "slip")},
+        "outcome": verdict.outcome,
+        "largest_displacement": verdict.displacement,
+        "residual_displacement": verdict.residual,
     }
-    verdict = run.verdict
-    findings |= {"outcome": verdict.outcome, "largest_displacement": verdict.displacement}
-    findings["residual_displacement"] = verdict.residual
     for definition, first in (mechanisms or first_mechanisms(run)).items():
         findings[definition] = np.inf if first is None or first.time is None else first.time
         findings[f"{definition}, class"] = "" if first is None else str(first.kind)
@@ -158,10 +158,9 @@ def evaluate_limit(case: Case) -> Findings:
 def evaluate_comparison(case: Case, scales: Mapping[str, Any] | None = None) -> Findings:
     """Return the findings of a case under the one pair of its suite."""
     result, motion = dead_load_of(case), ground_motion(case)
-    joints, first = assessed_joints(result.dead.joints), first_mode(result)
+    joints = assessed_joints(result.dead.joints)
     findings: Findings = {
-        "frequency": float(first.frequencies[0]),
-        "mass": float(first.mass_ratios[0, 0]),
+        **_describe_first_mode(result),
         **_prefix("role", part_roles(joints)),
         **_prefix("dead", _largest_by_part(abs(joints["eccentricity"]).fillna(0.5))),
     }

@@ -274,9 +274,8 @@ def _moments(low: Array, high: Array, mean: Array, deviation: Array) -> tuple[Ar
     share = np.where(exact, 1.0, np.maximum(_between(a, b), 1e-300))
     dense_a, dense_b = (np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi) for z in (a, b))
     shift = (dense_a - dense_b) / share
-    at_a, at_b = (
-        np.where(np.isfinite(z), z, 0.0) * dense for z, dense in ((a, dense_a), (b, dense_b))
-    )
+    at_a = np.where(np.isfinite(a), a, 0.0) * dense_a
+    at_b = np.where(np.isfinite(b), b, 0.0) * dense_b
     square = 1.0 + (at_a - at_b) / share
     first = np.where(exact, low, mean + deviation * shift)
     second = mean**2 + 2.0 * mean * deviation * shift + deviation**2 * square

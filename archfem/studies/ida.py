@@ -43,9 +43,6 @@ from archfem.studies.parameter_space import PAIR_KEY, Axis, Point
 from archfem.studies.shared_results import compute_once
 from archfem.studies.study import Study
 
-# Power of the scale of a motion with which an intensity measure grows
-SCALE_POWERS = {"pga": 1, "pgv": 1, "sa": 1, "arias": 2}
-
 # A joint of a ring or pier hinges; four of them fail at once; the failed joints permit a motion of
 # the blocks; blocks fall, for large displacements
 LIMIT_STATES = ("first hinge", "four failures", "verified", COLLAPSE_DEFINITION)
@@ -230,8 +227,8 @@ class Ida:
 
     def _measure(self, measure: str) -> tuple[Array, int]:
         """A measure of the unscaled motions, and the power of the scale with which it grows."""
-        check_choice(measure, SCALE_POWERS, "measure")
-        return self.table[measure].values, SCALE_POWERS[measure]
+        powers = {"pga": 1, "pgv": 1, "sa": 1, "arias": 2}
+        return self.table[measure].values, powers[check_choice(measure, powers, "measure")]
 
     def fractiles(self, intensity: Array, measure: str = "pga", demand: str = "rotation") -> Array:
         """Return the 16, 50 and 84 % fractiles of the demand at intensities.
@@ -247,14 +244,13 @@ class Ida:
             fractile does not turn back where it ends. NaN if fewer than half of the motions were
             run at such an intensity.
         """
-        curves = [(x, y) for _, x, y in self.curves(measure, demand) if len(x)]
-        demands = np.array(
-            [
+        curves = []
+        for _, x, y in self.curves(measure, demand):
+            if len(x):
                 # an incomplete run is the end of its curve: the demand stays infinite
-                np.interp(intensity, [0, *x], [0, *y], right=inf if np.isinf(y[-1]) else np.nan)
-                for x, y in curves
-            ]
-        )
+                end = inf if np.isinf(y[-1]) else np.nan
+                curves.append(np.interp(intensity, [0, *x], [0, *y], right=end))
+        demands = np.array(curves)
         valid = ~np.isnan(demands)
         # the median, and one standard deviation to either side
         fractiles = np.full((3, demands.shape[1]), np.nan)
@@ -317,11 +313,8 @@ def ida(
     """
     for limit in limits or ():
         check_choice(limit, LIMIT_STATES, "limits")
-    options = {
-        "limits": None if limits is None else list(limits),
-        "precision": precision,
-        "between": [float(scale) for scale in between],
-    }
+    options: Findings = {"limits": None if limits is None else list(limits), "precision": precision}
+    options["between"] = [float(scale) for scale in between]
     names, points = _points(case, motions)
     axis = Axis("motion", ("motion",), tuple((name,) for name in names))
     study = Study(f"{case.title}: IDA", Evaluator(search_limit_states, options), (axis,), points)
@@ -336,9 +329,8 @@ def _points(
         names = list((case.suite or {}).get("pairs", ()))
         if not names:
             raise InvalidInput("no motions were given, and the case has no [suite] of them")
-        return names, tuple(
-            Point(case.settings, case.folder, ((PAIR_KEY, name),)) for name in names
-        )
+        changes = [((PAIR_KEY, name),) for name in names]
+        return names, tuple(Point(case.settings, case.folder, change) for change in changes)
     if isinstance(motions, Mapping):
         named = dict(motions)
     else:

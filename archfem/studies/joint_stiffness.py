@@ -21,7 +21,6 @@ References:
     range of these relations for weathered faces.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log10, radians, sqrt, tan
 from pathlib import Path
@@ -38,15 +37,6 @@ from archfem.errors import InvalidInput
 from archfem.masonry.materials import Contact
 from archfem.studies.study import Study
 from archfem.units import MPa, mm
-
-# Smallest and largest joint roughness coefficient JRC, and strength of the faces over that of the
-# stone. Judgement: dressed faces are sound and between profiles 2 and 5 of Barton and Choubey
-# (1977); hewn ones are weaker and between profiles 3 and 7; weathered ones have a third of it.
-FACE_CONDITIONS = {
-    "dressed": ((4.0, 8.0), 1.0),
-    "hewn": ((6.0, 12.0), 0.6),
-    "weathered": ((6.0, 12.0), 0.33),
-}
 
 
 @validate_methods
@@ -80,10 +70,8 @@ class JointStiffness:
 
     def table(self) -> str:
         """Return the ranges in MPa/mm and their sources as text."""
-        rows = [
-            [name, *(f"{value * mm / MPa:.3g}" for value in values)]
-            for name, values in (("k_n", self.normal), ("k_s", self.shear))
-        ]
+        ranges = {"k_n": self.normal, "k_s": self.shear}
+        rows = [[key, *(f"{value * mm / MPa:.3g}" for value in ranges[key])] for key in ranges]
         return "\n".join([align_columns(["MPa/mm", "low", "usual", "high"], rows), *self.sources])
 
 
@@ -132,8 +120,11 @@ def joint_stiffness(
         >>> low < usual < high
         True
     """
-    check_choice(condition, FACE_CONDITIONS, "condition")
-    (least, most), weathering = FACE_CONDITIONS[condition]
+    # Smallest and largest joint roughness coefficient JRC, and strength of the faces over that of
+    # the stone. Judgement: dressed faces are sound and between profiles 2 and 5 of Barton and
+    # Choubey (1977); hewn ones are weaker and between profiles 3 and 7; weathered have a third.
+    faces = {"dressed": (4.0, 8.0, 1.0), "hewn": (6.0, 12.0, 0.6), "weathered": (6.0, 12.0, 0.33)}
+    least, most, weathering = faces[check_choice(condition, faces, "condition")]
     for name, value in (("young", young), ("spacing", spacing), ("strength", strength)):
         if check_number(value, name, minimum=0.0) == 0.0:
             raise InvalidInput(f"{name} = {value!r} is not above 0: give it in SI")
@@ -186,13 +177,12 @@ def stiffness_report(
     Raises:
         InvalidInput: the function is invalid.
     """
-    keys = tuple(f"contacts.{contact}.{kind}_stiffness" for kind in ("normal", "shear"))
-    ranges = (stiffness.normal, stiffness.shear)
-    usual = {key: values[1] for key, values in zip(keys, ranges, strict=True)}
-    points: Sequence[dict[str, float]] = [
-        usual,
-        *(usual | {key: v[end]} for key, v in zip(keys, ranges, strict=True) for end in (0, 2)),
-    ]
+    ranges = {
+        f"contacts.{contact}.normal_stiffness": stiffness.normal,
+        f"contacts.{contact}.shear_stiffness": stiffness.shear,
+    }
+    usual = {key: values[1] for key, values in ranges.items()}
+    points = [usual, *(usual | {key: ranges[key][end]} for key in ranges for end in (0, 2))]
     return Study.of(case, points, find).run(folder, workers=workers)
 
 

@@ -158,9 +158,7 @@ def _sample_axis(random: Mapping[str, Any], samples: Mapping[str, Any] | None) -
         )
     seed = check_integer(settings.get("seed", 0), "samples.seed", minimum=0)
     shares = samplers[method](len(random), seed=seed).random(count)  # between 0 and 1
-    columns = [
-        _quantiles(key, random[key], share) for key, share in zip(random, shares.T, strict=True)
-    ]
+    columns = [_quantiles(key, random[key], shares[:, k]) for k, key in enumerate(random)]
     return Axis("sample", tuple(random), tuple(zip(*columns, strict=True)))
 
 

@@ -23,17 +23,7 @@ import pandas as pd
 import xarray as xr
 from tqdm import tqdm
 
-from archfem._files import (
-    DISK_FULL_ERRORS,
-    align_columns,
-    atomic_write,
-    is_locked,
-    lock_folder,
-    read_sealed_json,
-    remove_leftovers,
-    stage_results,
-    write_sealed_json,
-)
+from archfem import _files
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, StudyStopped
@@ -48,7 +38,6 @@ logger = logging.getLogger("archfem")
 NETCDF_FILE = "results.nc"
 CSV_FILE = "results.csv"
 EXCEL_FILE = "results.xlsx"
-MAX_SHEET_ROWS = 1_048_575  # of Excel below the header
 
 # Time between lines of progress where the output is no terminal [s]
 PROGRESS_INTERVAL = 5.0
@@ -66,22 +55,22 @@ class Store:
     @contextmanager
     def lock(self) -> Iterator[None]:
         """Refuse other drivers while this one runs, and remove what a killed one has left."""
-        with lock_folder(self.folder):
+        with _files.lock_folder(self.folder):
             for draft in (*self._points.rglob(".*.part*"), *self.shared.rglob(".*")):
                 draft.unlink()
-            remove_leftovers(self.folder)
+            _files.remove_leftovers(self.folder)
             yield
 
     @property
     def busy(self) -> bool:
         """Whether a driver is running."""
-        return is_locked(self.folder)
+        return _files.is_locked(self.folder)
 
     def read_plan(self) -> dict[str, Any]:
         """Read the title, version and points of the study in the folder."""
         if not self._plan.is_file():
             raise InvalidInput(f"there is no study in {self.folder}: it has no {self._plan.name}")
-        plan: dict[str, Any] = read_sealed_json(self._plan, "study")
+        plan: dict[str, Any] = _files.read_sealed_json(self._plan, "study")
         return plan
 
     def write_plan(self, plan: dict[str, Any]) -> None:
@@ -116,14 +105,14 @@ class Store:
     def read_rate(self) -> float:
         """Read the points per second of the latest driver; 0 if unknown."""
         try:
-            return float(read_sealed_json(self._progress, "progress")["rate"])
+            return float(_files.read_sealed_json(self._progress, "progress")["rate"])
         except InvalidInput:
             return 0.0
 
     def _read_row(self, digest: str) -> Row | None:
         """Read a row; None if its file is damaged or of another point."""
         try:
-            row: Row = read_sealed_json(self._row_path(digest), "row of a study")
+            row: Row = _files.read_sealed_json(self._row_path(digest), "row of a study")
         except InvalidInput:
             return None
         return row if row.pop("point") == digest else None
@@ -135,7 +124,7 @@ class Store:
     def _write(self, path: Path, content: dict[str, Any]) -> None:
         """Write a JSON file whole or not at all."""
         with explain_full_disk(self.folder):
-            write_sealed_json(path, content)
+            _files.write_sealed_json(path, content)
 
 
 @contextmanager
@@ -144,7 +133,7 @@ def explain_full_disk(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno not in DISK_FULL_ERRORS:
+        if error.errno not in _files.DISK_FULL_ERRORS:
             raise
         raise StudyStopped(
             f"the disk of {folder} is full: finished points are kept; make room there and run the "
@@ -198,9 +187,8 @@ class Progress:
         self._total, self._done_before, self._failed = total, done, failed
         self._store, self._shared = store, shared
         self._done, self._start, self._written = 0, monotonic(), -inf
-        self._bar = tqdm(
-            total=total, initial=done, unit="point", disable=None, leave=False, desc="study"
-        )
+        options = {"unit": "point", "disable": None, "leave": False, "desc": "study"}
+        self._bar = tqdm(total=total, initial=done, **options)
         self._closed = Event()
         # a point may take minutes, in which the number of its runs shows how far it is
         self._reporter = Thread(target=self._report, daemon=True)
@@ -312,14 +300,14 @@ def write_table(table: xr.Dataset, folder: Path, inputs: str) -> None:
     """
     frame = _flatten(table)
     quoted = frame.map(_quote_formula).rename(columns=_quote_formula)
-    with explain_full_disk(folder), stage_results(folder, "study", inputs) as draft:
+    with explain_full_disk(folder), _files.stage_results(folder, "study", inputs) as draft:
         write_dataset(table, draft / NETCDF_FILE)
-        with atomic_write(draft / CSV_FILE) as part:
+        with _files.atomic_write(draft / CSV_FILE) as part:
             quoted.to_csv(part, index=False)
-        with suppress(ImportError), atomic_write(draft / "results.parquet") as part:
+        with suppress(ImportError), _files.atomic_write(draft / "results.parquet") as part:
             frame.to_parquet(part, index=False)
-        if len(frame) <= MAX_SHEET_ROWS:
-            with suppress(ImportError), atomic_write(draft / EXCEL_FILE) as part:
+        if len(frame) <= 1_048_575:  # rows of a sheet of Excel below the header
+            with suppress(ImportError), _files.atomic_write(draft / EXCEL_FILE) as part:
                 _write_sheet(quoted, part)
 
 
@@ -350,7 +338,7 @@ def format_table(table: xr.Dataset, max_rows: int = 50) -> str:
     units = {name: table[name].attrs.get("units") if name in table else None for name in names}
     head = [f"{name} [{units[name]}]" if units[name] else str(name) for name in names]
     shown = frame[names].head(max_rows).to_numpy(dtype=object)
-    text = [align_columns(head, [[_format_cell(value) for value in row] for row in shown])]
+    text = [_files.align_columns(head, [[_format_cell(value) for value in row] for row in shown])]
     text += [f"… {len(frame) - max_rows} more points"] if len(frame) > max_rows else []
     same = {name: _format_cell(frame[name].iloc[0]) for name in frame if name not in names}
     shared = "; ".join(f"{name} = {text}" for name, text in same.items() if text)

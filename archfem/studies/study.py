@@ -112,9 +112,7 @@ class Study:
             InvalidInput: there are no points, or the case of a point is invalid.
         """
         axes = parameter_axes(over, samples)
-        points = tuple(
-            Point(case.settings, case.folder, changes) for changes in changes_along(axes)
-        )
+        points = tuple(Point(case.settings, case.folder, each) for each in changes_along(axes))
         study = cls(title or case.title, Evaluator.of(find), axes, points, samples)
         study._check()
         return study

@@ -36,12 +36,10 @@ from archfem.studies.cache import ground_motion
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.process_pool import evaluate_on_processes, evaluate_serially
 
-# Joint rules: exact integration, springs at the ends and the middle (as in 3DEC), rigid contact
-JOINT_RULES = ("exact", "three points", "rigid")
-
 # What is varied by default: values, of which numbers are the ends of a range
 DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
-    "joint_rule": JOINT_RULES,
+    # exact integration, springs at the ends and the middle (as in 3DEC), rigid contact
+    "joint_rule": ("exact", "three points", "rigid"),
     "k_n": (1.0 / 3.0, 3.0),
     "k_s": (1.0 / 3.0, 3.0),
     "friction": (-0.1, 0.1),
@@ -149,11 +147,9 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     points = [(k, Variation(base, _resolve_labels(ranges, each))) for k, each in enumerate(changes)]
     evaluator = Evaluator(evaluate_variation)
     rows: dict[int, dict[str, Any]] = {}
-    evaluated = (
-        evaluate_serially(points, evaluator)
-        if workers == 1
-        else evaluate_on_processes(points, evaluator, workers)
-    )
+    evaluated = evaluate_serially(points, evaluator)
+    if workers != 1:
+        evaluated = evaluate_on_processes(points, evaluator, workers)
     with tqdm(total=len(points), unit="run", disable=None, leave=False) as bar:
         for number, row in evaluated:
             rows[number] = row
@@ -242,20 +238,16 @@ def _single_changes(ranges: Mapping[str, Any], damping: Viscous | None) -> list[
     neutral = {**NEUTRAL, "damping_kind": _damping_kind(damping)}
     changes: list[dict[str, Any]] = [{}]
     for name, values in ranges.items():
-        options = list(values)
-        changes += [{name: value} for value in options if value != neutral.get(name)]
+        changes += [{name: value} for value in values if value != neutral.get(name)]
     return changes
 
 
 def _sample_changes(ranges: Mapping[str, Any], samples: int, seed: int) -> list[dict[str, Any]]:
     """Return a Latin hypercube over all properties."""
-    sampler = qmc.LatinHypercube(d=len(ranges), seed=seed)
+    shares = qmc.LatinHypercube(d=len(ranges), seed=seed).random(samples)
     return [
-        {
-            name: _value_at(values, share)
-            for (name, values), share in zip(ranges.items(), row, strict=True)
-        }
-        for row in sampler.random(samples)
+        {name: _value_at(ranges[name], share) for name, share in zip(ranges, row, strict=True)}
+        for row in shares
     ]
 
 
@@ -311,12 +303,11 @@ def _vary_contacts(
     """Return the structure with other stiffness and friction of its joints."""
     joints = []
     for joint in structure.joints:
-        contact = joint.contact
         contact = replace(
-            contact,
-            normal_stiffness=changes["k_n"] * contact.normal_stiffness,
-            shear_stiffness=changes["k_s"] * contact.shear_stiffness,
-            friction=max(contact.coefficient + changes["friction"], min_friction),
+            joint.contact,
+            normal_stiffness=changes["k_n"] * joint.contact.normal_stiffness,
+            shear_stiffness=changes["k_s"] * joint.contact.shear_stiffness,
+            friction=max(joint.contact.coefficient + changes["friction"], min_friction),
         )
         joints.append(replace(joint, contact=contact))
     return replace(structure, joints=tuple(joints))
@@ -326,9 +317,8 @@ def _run_elastic_joints(
     structure: Structure, motion: Motion, dt: float, base: RunSettings, changes: Mapping[str, Any]
 ) -> CollapseState:
     """Run a model with elastic joints, and return its state of collapse."""
-    rule: dict[str, Any] = {}
-    if changes["joint_rule"] == "three points":
-        rule = {"quadrature": "trapezoidal", "points": 3}
+    three = changes["joint_rule"] == "three points"
+    rule: dict[str, Any] = {"quadrature": "trapezoidal", "points": 3} if three else {}
     model = build(structure, fidelity=base.fidelity, displacements="large", **rule)
     kind = changes.get("damping_kind") or _damping_kind(base.damping)
     damping = _vary_damping(model, base.damping, kind, changes["damping_ratio"])
@@ -374,14 +364,9 @@ def _build_dataset(
     for name, values in ranges.items():
         first = "as given" if isinstance(values, Mapping) else neutral[name]
         columns[name] = "run", np.array([change.get(name, first) for change in changes])
-    for name, missing in (
-        ("outcome", "unknown"),
-        ("displacement", np.nan),
-        ("residual", np.nan),
-        ("time", np.nan),
-    ):
-        columns[name] = "run", np.array([row["found"].get(name, missing) for row in rows])
-    columns["error"] = "run", np.array([str(row["error"]) for row in rows])
+    columns["outcome"] = "run", np.array([row["found"].get("outcome", "unknown") for row in rows])
     for name, unit in (("displacement", "m"), ("residual", "m"), ("time", "s")):
-        columns[name] = (*columns[name], {"units": unit})
+        values = np.array([row["found"].get(name, np.nan) for row in rows])
+        columns[name] = "run", values, {"units": unit}
+    columns["error"] = "run", np.array([str(row["error"]) for row in rows])
     return xr.Dataset(columns, attrs={"properties": list(ranges)})

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 
 import archfem as af
 from archfem.limit import Fill
-from archfem.limit.backfill import EQUILIBRIUM_TOLERANCE, FillProfile, is_balanced, slice_blocks
+from archfem.limit.backfill import FillProfile, is_balanced, slice_blocks
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 
 ROUND_OFF = 1e-12
@@ -292,5 +292,5 @@ def test_what_misses_the_structure_goes_into_the_ground():
 @pytest.mark.parametrize(("share", "stands"), [(0.98, True), (1.02, False)])
 def test_what_is_missing_may_be_the_rounding_of_as_many_blocks_as_move(free, share, stands):
     dead = SimpleNamespace(blocks=SimpleNamespace(structure=SimpleNamespace(free=range(free))))
-    fall = SimpleNamespace(value=share * EQUILIBRIUM_TOLERANCE * free)
+    fall = SimpleNamespace(value=share * 1e-8 * free)
     assert is_balanced(fall, dead) is stands

@@ -35,12 +35,12 @@ def build_check_section(data: ReportData) -> Section:
         blocks.append(missing_note("a predicted error of the model", remedy))
     caption = "Speed against error over fidelities, meshes and steps."
     remedy = "`archfem accuracy CASE.toml --out FOLDER` adds it to the folder."
-    missing = missing_note("a comparison of meshes and steps", remedy)
-    blocks += data.read_result("accuracy.txt", "accuracy.png", caption, missing)
+    what = "a comparison of meshes and steps"
+    blocks += data.read_result("accuracy.txt", "accuracy.png", caption, what, remedy)
     caption = "Residual displacement over each property; falls are above the line."
+    what = "the range of the verdict"
     remedy = "`archfem verdict CASE.toml --out FOLDER` adds it to the folder."
-    missing = missing_note("the range of the verdict", remedy)
-    blocks += data.read_result("verdict_range.txt", "verdict_range.png", caption, missing)
+    blocks += data.read_result("verdict_range.txt", "verdict_range.png", caption, what, remedy)
     return Section("Predicted error, checks and range of the verdict", blocks)
 
 
@@ -115,12 +115,9 @@ def _describe_model(data: ReportData) -> list[tuple[str, str]]:
     if discretisation.fidelity == "rigid":
         return [*rows, ("mesh", "none, for blocks are rigid"), rule]
     through, along = discretisation.cells
-    return [
-        *rows,
-        ("cells at least", f"{through} through the thickness, {along} along each block"),
-        ("elements", f"{discretisation.cell}s of degree {discretisation.degree}"),
-        rule,
-    ]
+    cells = ("cells at least", f"{through} through the thickness, {along} along each block")
+    elements = ("elements", f"{discretisation.cell}s of degree {discretisation.degree}")
+    return [*rows, cells, elements, rule]
 
 
 def build_source_section(data: ReportData) -> Section:
@@ -128,36 +125,25 @@ def build_source_section(data: ReportData) -> Section:
     runs = data.runs.items()
     # Usually one line: all runs were computed with the same versions.
     made = sorted({str(run.dataset.attrs.get("versions", "unknown")) for _, run in runs})
-    rows = [
-        *(("computed with", text) for text in made),
-        ("report written with", library_versions()),
-    ]
+    rows = [("computed with", text) for text in made]
+    rows.append(("report written with", library_versions()))
     rows += [
         (f"SHA-256 of case, files and program: {name}", str(run.dataset.attrs["inputs"]))
         for name, run in runs
         if "inputs" in run.dataset.attrs
     ]
-    rows.append(("SHA-256 of the case", hash_bytes(data.case.text().encode())))
+    rows.append(("SHA-256 of the case", sha256(data.case.text().encode()).hexdigest()))
     blocks: list[Any] = [Grid((), rows)]
     if data.folder is not None:
         files = sorted(path for path in data.files.values() if _is_source(path))
-        table = [
-            [
-                str(path.relative_to(data.folder)),
-                f"{path.stat().st_size / 1e3:.1f}",
-                hash_file(path)[:16],
-            ]
-            for path in files
-        ]
+        table = []
+        for path in files:
+            name, size = str(path.relative_to(data.folder)), f"{path.stat().st_size / 1e3:.1f}"
+            table.append([name, size, hash_file(path)[:16]])
         caption = "Files that the report was written from"
         blocks.append(Grid(["file", "kB", "SHA-256"], table, caption))
     blocks.append(TextBlock(data.case.text(), "lines"))
     return Section("Versions, hashes and the case as a file", blocks)
-
-
-def hash_bytes(content: bytes) -> str:
-    """Return the SHA-256 of bytes."""
-    return sha256(content).hexdigest()
 
 
 def _is_source(path: Path) -> bool:

@@ -1,9 +1,10 @@
 """HTML reports of cases, result folders and single histories."""
 
+from hashlib import sha256
 from pathlib import Path
 
 from archfem.cases.case import Case
-from archfem.cases.report.checks import build_check_section, build_source_section, hash_bytes
+from archfem.cases.report.checks import build_check_section, build_source_section
 from archfem.cases.report.report_data import ReportData, build_player
 from archfem.cases.report.sections import (
     build_case_sections,
@@ -32,7 +33,7 @@ def write_report(data: ReportData, path: str | Path) -> Path:
         build_check_section(data),
         build_source_section(data),
     ]
-    subtitle = f"archfem report · case {hash_bytes(case.text().encode())[:12]}"
+    subtitle = f"archfem report · case {sha256(case.text().encode()).hexdigest()[:12]}"
     footer = (
         "Written by archfem from the results named above; figures and numbers are theirs. On paper "
         "a player shows the instant and the joint that it showed on the screen."

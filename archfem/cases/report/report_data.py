@@ -43,12 +43,14 @@ class ReportData:
         """Ground motions as applied, from the recorded accelerations."""
         return {name: rebuild_motion(run, name) for name, run in self.runs.items()}
 
-    def read_result(self, text: str, figure: str, caption: str, missing: TextBlock) -> list[Any]:
+    def read_result(
+        self, text: str, figure: str, caption: str, what: str, remedy: str
+    ) -> list[Any]:
         """Return table and picture of a command in the folder, or a note if they are missing."""
         # a report shows what other commands left in the folder, and computes nothing itself
         lines = self.read_text(text)
         if lines is None:
-            return [missing]
+            return [missing_note(what, remedy)]
         return [TextBlock(lines, "lines"), *self.read_figure(figure, caption)]
 
     @cached_property

@@ -7,17 +7,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.report.report_data import ReportData, build_player, missing_note
-from archfem.cases.result_text import (
-    RUN_COLUMNS,
-    ResultTable,
-    describe_verdicts,
-    format_ratio,
-    tabulate_joints,
-    tabulate_motions,
-    tabulate_runs,
-)
 from archfem.dynamics.history import SIGN_CONVENTION, History
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh
 from archfem.joints.criteria import assessed_joints
@@ -33,24 +25,13 @@ from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
 from archfem.view.structure import draw_names, draw_structure
 from archfem.view.style import LINE_COLOURS
 
-# Kinematic assumption on blocks of each fidelity.
-BLOCK_ASSUMPTIONS = {
-    "rigid": "rigid; all compliance is in the joints",
-    "faces": "elastic; each face of a joint moves as a plane, the rest is condensed statically",
-    "condensed": "elastic; all nodes on joints are kept, the rest is condensed statically",
-    "full": "elastic finite elements, all nodes kept",
-    "monolithic": "elastic finite elements, all nodes kept, weak forms assembled each time",
-}
-
 
 def build_case_sections(data: ReportData) -> list[Section]:
     """Build the sections on settings, assumptions, units, signs and geometry."""
     case = data.case
     described = ("title", "structure", "materials", "contacts")  # the geometry shows these
-    settings = [
-        row for key, table in case.settings.items() if key not in described
-        for row in _flatten(key, table)
-    ]  # fmt: skip
+    tables = [table for table in case.settings.items() if table[0] not in described]
+    settings = [row for key, table in tables for row in _flatten(key, table)]
     blocks: list[Any] = [Grid((), _list_assumptions(data), "Assumptions of the analysis")]
     if settings:
         blocks.append(Grid((), settings, "Settings of the case beside its structure"))
@@ -86,15 +67,25 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
     # Runs record the fidelity that "auto" selected.
     recorded = {str(run.dataset.attrs.get("fidelity", "")) for run in data.runs.values()}
     fidelity = ", ".join(sorted(recorded)) if recorded else case.discretisation.name
+    blocks = {
+        "rigid": "rigid; all compliance is in the joints",
+        "faces": "elastic; each face of a joint moves as a plane, the rest is condensed statically",
+        "condensed": "elastic; all nodes on joints are kept, the rest is condensed statically",
+        "full": "elastic finite elements, all nodes kept",
+        "monolithic": "elastic finite elements, all nodes kept, weak forms assembled each time",
+    }
     large = case.discretisation.displacements == "large"
-    sliding = (
-        "its own limit, μ + c A / N" if criteria.friction is None else f"{criteria.friction:g}"
+    own_limit = "its own limit, μ + c A / N"
+    sliding = own_limit if criteria.friction is None else f"{criteria.friction:g}"
+    count = (
+        f"{criteria.failures} joints of rings and piers that hinge or slide at once, for "
+        f"{criteria.duration:g} s at least"
     )
     dt = case.analysis.get("dt")
     step = "steps of a length that the error chooses" if dt is None else f"steps of {1e3 * dt:g} ms"
     return [
         ("structure", "plane; forces are those of the whole width"),
-        ("blocks", BLOCK_ASSUMPTIONS.get(fidelity, f"by part: {fidelity}")),
+        ("blocks", blocks.get(fidelity, f"by part: {fidelity}")),
         ("joints", "dry: no tension but where a bond is given; Coulomb friction; no crushing"),
         ("displacements", "of any size" if large else "small: equilibrium where blocks stood"),
         ("ground", "rigid, moves as one; abutments and foundations are fixed to it"),
@@ -102,11 +93,7 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
         ("time steps", f"{type(case.scheme).__name__.lower()} scheme, {step}"),
         ("a joint hinges", f"where |e| ≥ {criteria.hinge:g}"),
         ("a joint slides", f"where |V| / N reaches {sliding}"),
-        (
-            "a mechanism by count",
-            f"{criteria.failures} joints of rings and piers that hinge or slide at once, for "
-            f"{criteria.duration:g} s at least",
-        ),
+        ("a mechanism by count", count),
     ]
 
 
@@ -146,17 +133,11 @@ def _tabulate_parts(structure: Structure) -> Grid:
         free = [block for block in blocks if not block.fixed]
         depths = [joint.depth for joint in structure.joints if joint.part == part]
         weight = structure.width * sum(block.area * block.material.unit_weight for block in free)
-        rows.append(
-            [
-                part or "–",
-                blocks[0].role or "–",
-                str(len(blocks)),
-                str(len(blocks) - len(free)),
-                ", ".join(dict.fromkeys(block.material.name for block in blocks)),
-                f"{weight / kN:.4g}",
-                f"{min(depths):.3g} – {max(depths):.3g}" if depths else "–",
-            ]
-        )
+        row = [part or "–", blocks[0].role or "–", str(len(blocks)), str(len(blocks) - len(free))]
+        row.append(", ".join(dict.fromkeys(block.material.name for block in blocks)))
+        row.append(f"{weight / kN:.4g}")
+        row.append(f"{min(depths):.3g} – {max(depths):.3g}" if depths else "–")
+        rows.append(row)
     head = ["part", "role", "blocks", "of them fixed", "material", "weight [kN]", "joints [m]"]
     return Grid(head, rows, "Parts; the last column is the depth of their joints")
 
@@ -193,11 +174,22 @@ def _tabulate_materials(structure: Structure) -> list[Grid]:
 
 def build_dead_load_sections(data: ReportData) -> list[Section]:
     """Build the sections on dead load, modes, limit analysis, rating and assessment."""
+    caption = "Shapes of the modes about dead load."
+    remedy = "`archfem modes CASE.toml --out FOLDER` adds them to the folder."
+    modes = data.read_result("modes.txt", "modes.png", caption, "modes", remedy)
+    remedy = "A case with a load in its table [limit] includes it."
+    if data.case.limit is not None and data.case.limit.live:
+        remedy = "The case includes it: `archfem limit CASE.toml --out FOLDER` finds it."
+    caption = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
+    limit = data.read_result("limit.txt", "collapse.png", caption, "limit analysis", remedy)
+    remedy = "`archfem rate CASE.toml --vehicle LM1 --out FOLDER` adds it to the folder."
+    caption = "Factor along the bridge, and mechanism at the worst place."
+    rating = data.read_result("rating.txt", "rating.png", caption, "a rating", remedy)
     return [
         Section("Dead load", _build_dead_load(data)),
-        Section("Modes", _build_modes(data)),
-        Section("Limit analysis", _build_limit(data)),
-        Section("Rating for a vehicle", _build_rating(data)),
+        Section("Modes", modes),
+        Section("Limit analysis", limit),
+        Section("Rating for a vehicle", rating),
         Section("Kinematic assessment", _build_assessment(data)),
     ]
 
@@ -239,45 +231,12 @@ def _tabulate_dead_load(joints: xr.Dataset) -> Grid:
         names = selected["name"].values.astype(str)
         # e is undefined where a joint is open.
         largest = int(np.nanargmax(np.abs(e))) if np.isfinite(e).any() else 0
-        rows.append(
-            [
-                part or "–",
-                f"{np.nanmax(np.abs(e), initial=0.0):.3f}",
-                names[largest],
-                f"{np.nanmax(ratio, initial=0.0):.3f}",
-                f"{normal.min() / kN:.4g}",
-                f"{normal.max() / kN:.4g}",
-                str(int(selected["open"].sum())),
-            ]
-        )
+        row = [part or "–", f"{np.nanmax(np.abs(e), initial=0.0):.3f}", names[largest]]
+        row.append(f"{np.nanmax(ratio, initial=0.0):.3f}")
+        row += [f"{normal.min() / kN:.4g}", f"{normal.max() / kN:.4g}"]
+        rows.append([*row, str(int(selected["open"].sum()))])
     head = ["part", "max |e|", "in", "max V/N", "min N [kN]", "max N [kN]", "open joints"]
     return Grid(head, rows, "Joints of rings and piers under dead load")
-
-
-def _build_modes(data: ReportData) -> list[Any]:
-    """Build table and shapes of the modes from the files of the folder."""
-    missing = missing_note(
-        "modes", "`archfem modes CASE.toml --out FOLDER` adds them to the folder."
-    )
-    caption = "Shapes of the modes about dead load."
-    return data.read_result("modes.txt", "modes.png", caption, missing)
-
-
-def _build_limit(data: ReportData) -> list[Any]:
-    """Build text and mechanism of limit analysis from the files of the folder."""
-    remedy = "A case with a load in its table [limit] includes it."
-    if data.case.limit is not None and data.case.limit.live:
-        remedy = "The case includes it: `archfem limit CASE.toml --out FOLDER` finds it."
-    caption = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
-    missing = missing_note("limit analysis", remedy)
-    return data.read_result("limit.txt", "collapse.png", caption, missing)
-
-
-def _build_rating(data: ReportData) -> list[Any]:
-    """Build text and picture of a rating from the files of the folder."""
-    remedy = "`archfem rate CASE.toml --vehicle LM1 --out FOLDER` adds it to the folder."
-    caption = "Factor along the bridge, and mechanism at the worst place."
-    return data.read_result("rating.txt", "rating.png", caption, missing_note("a rating", remedy))
 
 
 def _build_assessment(data: ReportData) -> list[Any]:
@@ -297,16 +256,14 @@ def build_ground_section(data: ReportData) -> Section:
     """Build the section on ground motions and spectra."""
     motions = list(data.motions.values())
     if not motions:
-        remedy = "The case has none."
-        if data.case.has_motion:
-            remedy = "`archfem run` shakes the structure."
+        shaken = data.case.has_motion
+        remedy = "`archfem run` shakes the structure." if shaken else "The case has none."
         return Section("Ground motion", [missing_note("a motion of the ground", remedy)])
     caption = "Measures of the motions as applied, read at the steps that the runs recorded."
-    blocks: list[Any] = [Grid(*tabulate_motions(motions), caption)]
+    blocks: list[Any] = [Grid(*result_text.tabulate_motions(motions), caption)]
     if data.case.suite is None:
-        blocks += [
-            FigureBlock.of(draw_motion(motion), "Ground motion as applied.") for motion in motions
-        ]
+        applied = "Ground motion as applied."
+        blocks += [FigureBlock.of(draw_motion(motion), applied) for motion in motions]
     blocks += _build_spectra(data.case, motions)
     return Section("Ground motion" if len(motions) == 1 else "Ground motions", blocks)
 
@@ -368,7 +325,7 @@ def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
     blocks.append(build_player(case, run, title, players))
     if case.suite is None:
         blocks.append(_build_envelope({name: run}, data))
-    blocks.append(_shorten_joint_table(tabulate_joints(run.joints, data.dead)))
+    blocks.append(_shorten_joint_table(result_text.tabulate_joints(run.joints, data.dead)))
     blocks.append(TextBlock(_sentence(utilisation_text(case.structure, run.joints))))
     return blocks
 
@@ -379,7 +336,7 @@ def _build_envelope(runs: Mapping[str, History], data: ReportData) -> FigureBloc
     return FigureBlock.of(draw_envelope(runs, dead=data.dead), caption)
 
 
-def _shorten_joint_table(table: ResultTable) -> Grid:
+def _shorten_joint_table(table: result_text.ResultTable) -> Grid:
     """Return the table of joints without empty columns, which the caption names."""
     head, rows = table
     # Most joints neither slide nor open in most runs.
@@ -408,19 +365,13 @@ def _build_mechanism(run: History) -> list[Any]:
 
 def _build_suite_response(data: ReportData) -> list[Any]:
     """Build the tables of all runs, and their envelopes."""
-    (head, rows), columns = tabulate_runs(data.runs), len(RUN_COLUMNS)
+    (head, rows), columns = result_text.tabulate_runs(data.runs), len(result_text.RUN_COLUMNS)
     # The mechanisms have too many columns for a page: a line of text for each run instead.
-    mechanisms = [
-        (
-            row[0],
-            "; ".join(
-                f"{title}: {cell}"
-                for title, cell in zip(head[columns:], row[columns:], strict=True)
-                if cell != "-"
-            ),
-        )
-        for row in rows
-    ]
+    mechanisms = []
+    for row in rows:
+        cells = zip(head[columns:], row[columns:], strict=True)
+        named = (f"{title}: {cell}" for title, cell in cells if cell != "-")
+        mechanisms.append((row[0], "; ".join(named)))
     caption = "Outcome, PGA, and the critical joint of each run"
     blocks: list[Any] = [
         Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption),
@@ -445,18 +396,14 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     eccentricity = max(float(abs(each["eccentricity"]).max()) for each in joints)
     opened = " (joints came apart)" if any(bool(each["open"].any()) for each in joints) else ""
     friction = max(float(each["friction"].max()) for each in joints)
-    facts += [
-        ("PGA", f"{pga:.2f} m/s²"),
-        ("largest |e|", f"{eccentricity:.3f}{opened}"),
-        ("largest V / N", format_ratio(friction)),
-    ]
-    return facts
+    sizes = [("PGA", f"{pga:.2f} m/s²"), ("largest |e|", f"{eccentricity:.3f}{opened}")]
+    return [*facts, *sizes, ("largest V / N", result_text.format_ratio(friction))]
 
 
 def _verdict_facts(runs: Sequence[History]) -> list[tuple[str, str]]:
     """Return outcome and doubts of a run, or how many of several runs have each."""
     verdicts = [run.verdict for run in runs]
-    facts = [("verdict", describe_verdicts(runs))]
+    facts = [("verdict", result_text.describe_verdicts(runs))]
     if len(verdicts) == 1:
         return [*facts, *(("in doubt", str(doubt)) for doubt in verdicts[0].doubts)]
     reasons = Counter(str(doubt) for verdict in verdicts for doubt in verdict.doubts)
