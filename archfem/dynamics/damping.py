@@ -36,8 +36,8 @@ from archfem.errors import InvalidInput
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.shapes.rings import column
+from archfem.models.linear_blocks import build_rigid_model
 from archfem.models.model import Model, check_model
-from archfem.models.rigid import build_rigid_model
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Equilibrium, dead_load, self_weight
 from archfem.statics.modes import Modes, modes
