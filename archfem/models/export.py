@@ -62,6 +62,13 @@ class Solids:
         ]
         return np.concatenate([self.model.cells.displacement(q), *fixed])
 
+    def cell_data(self, stress: Array | None) -> dict[str, NDArray[Any]]:
+        """Return block numbers and stresses (p, 3) [Pa] of the polygons, by name in a file."""
+        data: dict[str, NDArray[Any]] = {"block": self.cells.owner.astype(np.int64)}
+        if stress is not None:
+            data |= dict(zip(("stress_xx", "stress_yy", "stress_xy"), stress.T, strict=True))
+        return data
+
     def stress(self, q: Array) -> Array | None:
         """Return σ_xx, σ_yy and σ_xy of every polygon (p, 3) [Pa]; None where blocks are rigid."""
         if self.model.cells.stress is None:
@@ -202,15 +209,10 @@ def write_state(model: Model, q: Array, path: str | Path, *, magnification: floa
     displacement = solids.displacement(np.asarray(q, dtype=float))
     if path.suffix == ".dxf":
         return _write_drawing(solids, displacement, path, magnification)
-    data: dict[str, NDArray[Any]] = {"block": solids.cells.owner.astype(np.int64)}
-    stress = solids.stress(q)
-    if stress is not None:
-        names = ("stress_xx", "stress_yy", "stress_xy")
-        data |= dict(zip(names, stress.T, strict=True))
+    data = solids.cell_data(solids.stress(q))
     if path.suffix == ".vtu":
-        write_vtu(
-            path, solids.cells.places, solids.cells.polygons, {"displacement": displacement}, data
-        )
+        points = {"displacement": displacement}
+        write_vtu(path, solids.cells.places, solids.cells.polygons, points, data)
         return path
     return _write_with_meshio(solids, displacement, data, path)
 
