@@ -38,6 +38,7 @@ from archfem.view.style import (
     outline_bounds,
     set_title,
     style_axes,
+    style_length_axes,
     text_width,
     white_halo,
 )
@@ -243,8 +244,7 @@ def _draw_block_forces(
     axes: Axes, structure: Structure, body: FreeBody, colours: list[str]
 ) -> None:
     """Draw the block between its neighbours, and the forces on it."""
-    style_axes(axes, "x [m]", "y [m]")
-    axes.set_aspect("equal")
+    style_length_axes(axes)
     outline, number = body.block.drawn(), structure.blocks.index(body.block)
     for joint in (structure.joints[k] for k in body.joints):
         (other,) = set(joint.blocks) - {number}

@@ -32,9 +32,8 @@ from archfem.view.style import (
     add_legend_below,
     add_polygons,
     set_title,
-    structure_figure,
+    structure_axes,
     style_colour_bar,
-    style_structure_axes,
 )
 
 Numbers = NDArray[np.intp]
@@ -99,9 +98,8 @@ def draw_stress(
     blocks = _select_blocks(structure, parts)
     corners = (corner_stress_operator(cells) @ q).reshape(-1, 3)
     has_own_figure = axes is None
-    axes = structure_figure(structure).add_subplot() if axes is None else axes
+    axes = structure_axes(structure, axes)
     figure = cast(Figure, axes.figure)
-    style_structure_axes(axes, structure)
     draw_blocks(axes, structure)
     _shade(axes, cells, -principal_values(*corners.T)[1], blocks)
     outlines = [block.drawn() for block in structure.blocks]
