@@ -41,31 +41,28 @@ class EnergyMeter:
         self.weight = weight
         self.damping = damping
         self.damping_lag = damping_lag
-        self._last: tuple[Array, Array, float, float, Array] | None = None
 
     def measure_step(
         self, before: tuple[Array, Array], after: tuple[Array, Array], ground: Array
     ) -> Array:
         """Return kinetic and potential energy at the end of a step, its work and its loss (4,)."""
-        first, last = self._measure_state(*before), self._measure_state(*after)
-        increment = after[0] - before[0]
-        work = -float(increment @ (self.model.mass_influence @ ground))
-        loss = 0.5 * float(increment @ (first[4] + last[4]))
-        return np.array([last[2], last[3], work, loss])
-
-    def _measure_state(self, q: Array, velocity: Array) -> tuple[Array, Array, float, float, Array]:
-        """Return a state, its kinetic and potential energy, and its damping forces."""
-        # the end of one step is the start of the next, by identity of the arrays
-        if self._last is not None and self._last[0] is q and self._last[1] is velocity:
-            return self._last
+        q, velocity = after
         kinetic = 0.5 * float(velocity @ (self.model.mass @ velocity))
         potential = self.model.energy(q) - float(self.weight @ q)
-        forces = self.damping @ velocity
+        increment = q - before[0]
+        work = -float(increment @ (self.model.mass_influence @ ground))
+        loss = 0.5 * float(
+            increment @ (self._damping_forces(*before) + self._damping_forces(*after))
+        )
+        return np.array([kinetic, potential, work, loss])
+
+    def _damping_forces(self, q: Array, velocity: Array) -> Array:
+        """Return the damping forces in a state (n,)."""
+        forces: Array = self.damping @ velocity
         if self.damping_lag:
             delayed = self.model.force(q + self.damping_lag * velocity)
             forces += delayed - self.model.force(q)
-        self._last = (q, velocity, kinetic, potential, forces)
-        return self._last
+        return forces
 
 
 class EnergyBalance:

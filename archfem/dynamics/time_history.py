@@ -73,25 +73,9 @@ class Record:
 
     def __post_init__(self) -> None:
         """Refuse intervals below one."""
-        for key in ("every", "fields_every"):
-            value = getattr(self, key)
-            if key == "every" or value is not None:
-                check_integer(value, f"record {key}")
-
-
-# Classes of optional arguments, their names in messages, and valid examples
-_ARGUMENT_TYPES: dict[str, tuple[tuple[type, ...], str, str]] = {
-    "start": ((Equilibrium, State), "start", "give dead_load(model), or last_state(run)"),
-    "damping": (
-        (Rayleigh, StiffnessDamping),
-        "damping",
-        "give Rayleigh(0.05, (8.0, 16.0)), StiffnessDamping(0.05, 8.0), or None",
-    ),
-    "scheme": ((Conserving, Newmark, HHT), "scheme", "give Conserving(), Newmark() or HHT()"),
-    "record": ((Record,), "record", "give Record(every=…, fields_every=…)"),
-    "criteria": ((Criteria,), "criteria", "give Criteria(hinge=…, failures=…)"),
-    "newton": ((Newton,), "newton", "give Newton(tolerance=…)"),
-}
+        check_integer(self.every, "record every")
+        if self.fields_every is not None:
+            check_integer(self.fields_every, "record fields_every")
 
 
 @single_threaded
@@ -203,26 +187,22 @@ def _follow_fall(
     rocking_ratio: float | None,
 ) -> History:
     """Add the fall of loose or overturning blocks, and the state of collapse, to a history."""
-    start, state = states
+    (start, state), doubts = states, []
     tilts = history.ending is Ending.FINISHED and is_overturning(model, state)
-    if history.ending not in (Ending.PARTED, Ending.MET) and not tilts:
+    if tilts or history.ending in (Ending.PARTED, Ending.MET):
+        try:
+            frames, fall = simulate_fall(model, start, state, motion, rocking_ratio)
+        except DidNotConverge as error:
+            error.history = history
+            raise
+        dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
+        history = History(dataset, history.structure)
+        doubts = _doubt_impulses(history)
+    else:
         shaken = history.ending is not Ending.FINISHED
-        history = with_fall(history, standing_state(model, start, state, shaken))
-        return _doubt_kind(history, model)
-    try:
-        frames, fall = simulate_fall(model, start, state, motion, rocking_ratio)
-    except DidNotConverge as error:
-        error.history = history
-        raise
-    dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
-    history = with_fall(History(dataset, history.structure), fall)
-    return _doubt_kind(history.with_doubts((*history.doubts, *_doubt_impulses(history))), model)
-
-
-def _doubt_kind(history: History, model: Model) -> History:
-    """Return a history with the doubts of a structure near another kind of collapse."""
-    assert history.fall is not None
-    return history.with_doubts((*history.doubts, *doubt_collapse(model.structure, history.fall)))
+        fall = standing_state(model, start, state, shaken)
+    doubts += doubt_collapse(model.structure, fall)
+    return with_fall(history, fall).with_doubts((*history.doubts, *doubts))
 
 
 def _doubt_impulses(history: History, admissible: float = 0.02) -> list[Doubt]:
@@ -265,9 +245,22 @@ def _resolve_steps(
 
 def _check_types(**arguments: Any) -> None:
     """Refuse arguments of the wrong class; None stands for the default."""
+    # classes of optional arguments, their names in messages, and valid examples
+    kinds: dict[str, tuple[tuple[type, ...], str, str]] = {
+        "start": ((Equilibrium, State), "start", "give dead_load(model), or last_state(run)"),
+        "damping": (
+            (Rayleigh, StiffnessDamping),
+            "damping",
+            "give Rayleigh(0.05, (8.0, 16.0)), StiffnessDamping(0.05, 8.0), or None",
+        ),
+        "scheme": ((Conserving, Newmark, HHT), "scheme", "give Conserving(), Newmark() or HHT()"),
+        "record": ((Record,), "record", "give Record(every=…, fields_every=…)"),
+        "criteria": ((Criteria,), "criteria", "give Criteria(hinge=…, failures=…)"),
+        "newton": ((Newton,), "newton", "give Newton(tolerance=…)"),
+    }
     for name, value in arguments.items():
         if value is not None:
-            check_type(value, *_ARGUMENT_TYPES[name])
+            check_type(value, *kinds[name])
 
 
 def _start_batch(stepper: Stepper, start: State, dt: float) -> Batch:

@@ -43,9 +43,6 @@ from archfem.view.style import (
     white_halo,
 )
 
-# Largest displacement of a mode shape in a figure, relative to the size of the structure
-MODE_AMPLITUDE = 0.04
-
 
 @validate_arguments
 def draw_dead_load(dead: Equilibrium, *, criteria: Criteria | None = None) -> Figure:
@@ -134,7 +131,7 @@ def mode_panels(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, li
     chosen = list(range(1, count + 1) if numbers is None else numbers)
     if not chosen or not set(chosen) <= set(range(1, count + 1)):
         raise InvalidInput(f"modes {chosen} cannot be drawn: there are 1 to {count}")
-    amplitude = MODE_AMPLITUDE * modes.model.structure.size
+    amplitude = ModePanel.amplitude * modes.model.structure.size
     low, high = outline_bounds(modes.model.structure)
     low, high = low - 1.1 * amplitude, high + 1.1 * amplitude
     wide, tall = high - low
@@ -158,10 +155,12 @@ def mode_panels(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, li
 class ModePanel:
     """One mode shape on its axes."""
 
+    amplitude = 0.04  # largest displacement, relative to the size of the structure
+
     def __init__(self, axes: Axes, modes: Modes, number: int) -> None:
         cells = modes.model.cells
         shape = cells.displacement(modes.shapes[:, number - 1])
-        amplitude = MODE_AMPLITUDE * modes.model.structure.size
+        amplitude = ModePanel.amplitude * modes.model.structure.size
         self._displacements = shape * amplitude / np.linalg.norm(shape, axis=1).max()
         self._places, self._blocks = cells.places, DisplacedBlocks(axes, modes.model)
         frequency, (x, y) = modes.frequencies[number - 1], 100.0 * modes.mass_ratios[number - 1]

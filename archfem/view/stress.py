@@ -52,11 +52,11 @@ class Triangles:
         fine = UniformTriRefiner(unit).refine_triangulation(subdiv=refinements)
         shares = np.column_stack([1.0 - fine.x - fine.y, fine.x, fine.y])  # of the three corners
         count = len(shares)
-        rows = np.repeat(np.arange(count * len(corners)), 3)
         columns = np.repeat(corners, count, axis=0).ravel()
         values = np.tile(shares.ravel(), len(corners))
         shape = count * len(corners), len(cells.places)
-        self._interpolation = sparse.csr_matrix((values, (rows, columns)), shape)
+        starts = np.arange(0, len(values) + 1, 3)  # three values in each row
+        self._interpolation = sparse.csr_matrix((values, columns, starts), shape)
         first = count * np.arange(len(corners))
         self._corners = (first[:, None, None] + fine.triangles).reshape(-1, 3)
         owner = np.repeat(np.arange(len(cut)), [len(triangles) for triangles in cut])
