@@ -265,10 +265,10 @@ def _write_with_meshio(
     cells = [(t, np.array([solids.cells.polygons[k] for k in rows])) for t, rows in types.items()]
     cell_data = {name: [values[rows] for rows in types.values()] for name, values in data.items()}
     point_data = {"displacement": _spatial(displacement)}
-    mesh = meshio.Mesh(_spatial(solids.cells.places), cells, point_data, cell_data)
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        mesh.write(path)
+        # it refuses polygons of more than some corners, such as rigid blocks with arcs
+        meshio.Mesh(_spatial(solids.cells.places), cells, point_data, cell_data).write(path)
     except Exception as error:  # meshio and its formats raise exceptions of any class
         raise InvalidInput(
             f"meshio does not write this model as {path}: {error}; try .vtu or .vtk"
