@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from archfem._typing import Array
-from archfem._validation import check_integer, check_number, check_type, validate_arguments
+from archfem._validation import check_number, check_type, validate_arguments
 from archfem.dynamics.schemes import (
     DAMPING_KINDS,
     EFFECTIVE_MASS_SHARE,
@@ -36,8 +36,8 @@ from archfem.errors import InvalidInput
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.shapes.rings import column
+from archfem.models.linear_blocks import build_rigid_model
 from archfem.models.model import Model, check_model
-from archfem.models.rigid import build_rigid_model
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Equilibrium, dead_load, self_weight
 from archfem.statics.modes import Modes, modes
@@ -123,8 +123,6 @@ def effective_mode_range(
         raise InvalidInput(
             f"share {mass_share} of the mass is not between {FIRST_MASS_SHARE} and 1: 90 % is 0.9"
         )
-    initial_count = check_integer(initial_count, "modes to compute at first")
-    max_count = check_integer(max_count, "modes to compute at most")
     computed, shares = _modes_with_share(model, about, mass_share, initial_count, max_count)
     first = int(np.searchsorted(shares, FIRST_MASS_SHARE)) + 1
     last = min(int(np.searchsorted(shares, mass_share)) + 1, len(shares))

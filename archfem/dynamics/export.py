@@ -20,8 +20,6 @@ from archfem.errors import InvalidInput
 from archfem.models.export import Solids, write_collection, write_vtu
 from archfem.models.model import Model
 
-STRESS_COMPONENTS = ("stress_xx", "stress_yy", "stress_xy")
-
 
 @dataclass(frozen=True, eq=False)
 class FieldFrame:
@@ -40,14 +38,9 @@ def write_vtk(model: Model, run: xr.Dataset, path: str | Path) -> Path:
     joints = [np.arange(4 * k, 4 * k + 4) for k in range(len(model.structure.joints))]
     for number, frame in enumerate(frames(solids, run)):
         files = [folder / f"{part}_{number:05d}.vtu" for part in ("blocks", "joints")]
-        data: dict[str, NDArray[Any]] = {"block": solids.cells.owner.astype(np.int64)}
-        if frame.stress is not None:
-            data |= dict(zip(STRESS_COMPONENTS, frame.stress.T, strict=True))
-        moved = frame.displacement
-        write_vtu(
-            files[0], solids.cells.places, solids.cells.polygons, {"displacement": moved}, data
-        )
-        gaps = solids.joint_faces(moved).reshape(-1, 2)
+        cells, moved = solids.cells, {"displacement": frame.displacement}
+        write_vtu(files[0], cells.places, cells.polygons, moved, solids.cell_data(frame.stress))
+        gaps = solids.joint_faces(frame.displacement).reshape(-1, 2)
         corners = solids.corners.reshape(-1, 2)
         write_vtu(files[1], corners, joints, {"displacement": gaps}, _joint_data(run, frame.time))
         names = [f"{folder.name}/{file.name}" for file in files]
@@ -71,9 +64,9 @@ def write_xdmf(model: Model, run: xr.Dataset, path: str | Path) -> Path:
         # XDMF vectors have three components
         vectors = np.column_stack([frame.displacement, np.zeros(len(frame.displacement))])
         data[f"displacement_{number}"] = (("point", "xyz"), vectors)
-        if frame.stress is not None:
-            for name, row in zip(STRESS_COMPONENTS, frame.stress.T, strict=True):
-                data[f"{name}_{number}"] = (("cell",), row)
+        for name, values in solids.cell_data(frame.stress).items():
+            if name != "block":
+                data[f"{name}_{number}"] = (("cell",), values)
     with atomic_write(numbers) as draft:
         xr.Dataset(data).to_netcdf(draft, engine="netcdf4")
     with atomic_write(path) as draft:
@@ -160,10 +153,10 @@ def _xdmf_text(solids: Solids, series: list[FieldFrame], entries: int, file: str
             attribute("block", "Scalar", "Cell", item("block", str(cells), "Int")),
             attribute("displacement", "Vector", "Node", vectors),
         ]
-        if frame.stress is not None:
-            lines += [
-                attribute(name, "Scalar", "Cell", item(f"{name}_{number}", str(cells)))
-                for name in STRESS_COMPONENTS
-            ]
+        lines += [
+            attribute(name, "Scalar", "Cell", item(f"{name}_{number}", str(cells)))
+            for name in solids.cell_data(frame.stress)
+            if name != "block"
+        ]
         lines.append("</Grid>")
     return "\n".join([*lines, "</Grid></Domain></Xdmf>\n"])

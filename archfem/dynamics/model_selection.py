@@ -30,8 +30,8 @@ from archfem.masonry.stiffness_ratio import find_soft_blocks
 from archfem.masonry.structure import Structure
 from archfem.models import builder as plain
 from archfem.models.discretisation import Discretisation
+from archfem.models.linear_blocks import build_rigid_model
 from archfem.models.model import Doubt, Model, Prediction
-from archfem.models.rigid import build_rigid_model
 from archfem.motion.motion import Motion
 
 logger = logging.getLogger("archfem")

@@ -30,13 +30,6 @@ from archfem.models.model import Doubt, Model, Observer
 
 logger = logging.getLogger("archfem")
 
-# Energy drift, relative to the largest energy exchanged, above which the user is warned [-]:
-# amplitudes, which vary with the root of energy, are then off by 2.5 %
-ENERGY_DRIFT_WARNING = 0.05
-
-# Energy drift above which a run is wrong [-]: half of the energy comes from the scheme
-ENERGY_DRIFT_ERROR = 0.5
-
 
 class EnergyMeter:
     """Kinetic and potential energy, work and loss of the steps of a model."""
@@ -48,31 +41,28 @@ class EnergyMeter:
         self.weight = weight
         self.damping = damping
         self.damping_lag = damping_lag
-        self._last: tuple[Array, Array, float, float, Array] | None = None
 
     def measure_step(
         self, before: tuple[Array, Array], after: tuple[Array, Array], ground: Array
     ) -> Array:
         """Return kinetic and potential energy at the end of a step, its work and its loss (4,)."""
-        first, last = self._measure_state(*before), self._measure_state(*after)
-        increment = after[0] - before[0]
-        work = -float(increment @ (self.model.mass_influence @ ground))
-        loss = 0.5 * float(increment @ (first[4] + last[4]))
-        return np.array([last[2], last[3], work, loss])
-
-    def _measure_state(self, q: Array, velocity: Array) -> tuple[Array, Array, float, float, Array]:
-        """Return a state, its kinetic and potential energy, and its damping forces."""
-        # the end of one step is the start of the next, by identity of the arrays
-        if self._last is not None and self._last[0] is q and self._last[1] is velocity:
-            return self._last
+        q, velocity = after
         kinetic = 0.5 * float(velocity @ (self.model.mass @ velocity))
         potential = self.model.energy(q) - float(self.weight @ q)
-        forces = self.damping @ velocity
+        increment = q - before[0]
+        work = -float(increment @ (self.model.mass_influence @ ground))
+        loss = 0.5 * float(
+            increment @ (self._damping_forces(*before) + self._damping_forces(*after))
+        )
+        return np.array([kinetic, potential, work, loss])
+
+    def _damping_forces(self, q: Array, velocity: Array) -> Array:
+        """Return the damping forces in a state (n,)."""
+        forces: Array = self.damping @ velocity
         if self.damping_lag:
             delayed = self.model.force(q + self.damping_lag * velocity)
             forces += delayed - self.model.force(q)
-        self._last = (q, velocity, kinetic, potential, forces)
-        return self._last
+        return forces
 
 
 class EnergyBalance:
@@ -182,7 +172,8 @@ class RunMonitor:
             self._worst_time = float(batch.times[worst])
         if self._drift_error is None:
             signed = fractions if self._damps else np.abs(fractions)
-            beyond = np.flatnonzero(signed > ENERGY_DRIFT_ERROR)
+            # a run is wrong where half of the energy comes from the scheme
+            beyond = np.flatnonzero(signed > 0.5)
             if len(beyond):
                 first = int(beyond[0])
                 self._drift_error = float(batch.times[first]), float(fractions[first])
@@ -197,7 +188,10 @@ class RunMonitor:
         if self._small:
             rotation = float(np.abs(self._observer.faces(readings)[:, 1]).max())
             self.largest_turn = max(self.largest_turn, rotation)
-            self._watch_meeting(replace(batch, readings=readings))
+            if self._met is None:
+                met = self._meeting.find_first(replace(batch, readings=readings))
+                # time of the first meeting of stones outside their joints
+                self._met = None if met is None else (float(batch.times[met[0]]), met[1])
         # facets cost a sparse product, hence not at every step
         for k in range(-self._steps % facet_check_interval, len(batch.times), facet_check_interval):
             slip = self.model.face_mismatch(batch.state(k).q)
@@ -205,11 +199,6 @@ class RunMonitor:
         self._steps += len(batch.times)
         self._before, self._last = self._last, batch.state(len(batch.times) - 1)
         return drift
-
-    def _watch_meeting(self, batch: Batch) -> None:
-        """Store the first meeting of stones outside their joints."""
-        if self._met is None and (met := self._meeting.find_first(batch)):
-            self._met = float(batch.times[met[0]]), met[1]
 
     def check_run(self) -> None:
         """Raise an error if the steps added are wrong, and warn if they are doubtful."""
@@ -240,9 +229,10 @@ class RunMonitor:
         if self._small:
             self._check_small_displacements(time)
 
-    def _check_energy(self) -> None:
-        """Warn of energy drift."""
-        if abs(self.worst_drift) > ENERGY_DRIFT_WARNING:
+    def _check_energy(self, doubtful: float = 0.05) -> None:
+        """Warn of energy drift, relative to the largest energy exchanged."""
+        # amplitudes, which vary with the root of energy, are then off by 2.5 %
+        if abs(self.worst_drift) > doubtful:
             change = "had come from nowhere" if self.worst_drift > 0.0 else "was lost to the scheme"
             self._add_doubt(
                 "energy",

@@ -19,12 +19,7 @@ from archfem._files import align_columns
 from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.fall import FALLEN_STATES, CollapseState
-from archfem.dynamics.history import (
-    Ending,
-    History,
-    first_mechanisms,
-    partial_history,
-)
+from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
@@ -60,21 +55,10 @@ class ScaledRun:
         """Whether Ctrl-C ended the run; later mechanisms are then unknown."""
         return self.ending is Ending.INTERRUPTED
 
-    @property
-    def has_failed(self) -> bool:
-        """Whether a step had no equilibrium."""
-        return self.ending is Ending.FAILED
-
-    @property
-    def has_fallen(self) -> bool:
-        """Whether blocks of the structure have fallen."""
-        return self.fall is not None and self.fall.kind in FALLEN_STATES
-
     def has_answer(self, definition: str) -> bool:
         """Return whether the run decides on a limit state.
 
-        Without a state of collapse it does not decide on a fall. A step of small displacements
-        without equilibrium counts as a mechanism.
+        Without a state of collapse it does not decide on a fall.
         """
         if definition == COLLAPSE_DEFINITION:
             return self.fall is not None and not self.is_interrupted
@@ -83,8 +67,9 @@ class ScaledRun:
     def fails(self, definition: str) -> bool:
         """Return whether the limit state was met."""
         if definition == COLLAPSE_DEFINITION:
-            return self.has_fallen
-        return self.mechanisms[definition] is not None or self.has_failed
+            return self.fall is not None and self.fall.kind in FALLEN_STATES
+        # a step without equilibrium counts as a mechanism
+        return self.mechanisms[definition] is not None or self.ending is Ending.FAILED
 
     def survives(self, definition: str) -> bool:
         """Return whether the whole motion passed without the limit state."""

@@ -1,6 +1,7 @@
 """Recording of a run: joint resultants, block displacements, solver effort and energy drift."""
 
-from dataclasses import dataclass
+from collections import defaultdict
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -20,29 +21,6 @@ from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 
 
-class GrowingArray:
-    """Array filled row by row, reallocated at twice the size when full."""
-
-    def __init__(self, capacity: int, shape: tuple[int, ...] = (), dtype: type = float) -> None:
-        self._array: NDArray[Any] = np.empty((capacity, *shape), dtype)
-        self.count = 0
-
-    def add(self, rows: NDArray[Any]) -> None:
-        """Fill the next rows."""
-        if self.count + len(rows) > len(self._array):
-            capacity = 2 * self.count + len(rows)
-            longer = np.empty((capacity, *self._array.shape[1:]), self._array.dtype)
-            longer[: self.count] = self.values
-            self._array = longer
-        self._array[self.count : self.count + len(rows)] = rows
-        self.count += len(rows)
-
-    @property
-    def values(self) -> NDArray[Any]:
-        """Rows filled so far (count, …)."""
-        return self._array[: self.count]
-
-
 @dataclass(kw_only=True)
 class Recorder:
     """Record of a run from its start, with its validity checks."""
@@ -50,66 +28,61 @@ class Recorder:
     model: Model
     method: str  # name of the solver
     dt: float | None  # constant time step [s]; None for steps of varying length
-    steps: int  # largest number of steps of the run, its start not counted
     every: int  # interval of steps at which joint resultants are recorded
     fields_every: int | None  # interval at which coordinates are recorded; None for none
     criteria: Criteria  # for the failure flags of joints
     monitor: RunMonitor
     state: State  # at the end of the steps added last
     fallback: int = 0  # number of steps at which a compiled solver fell back to SNES
+    count: int = 0  # number of steps added, the start of the run among them
+    # rows of each quantity, one array for each batch
+    _rows: dict[str, list[NDArray[Any]]] = field(default_factory=lambda: defaultdict(list))
 
     def __post_init__(self) -> None:
-        capacity = self.steps + 1
-        frames = self.steps // (self.fields_every or self.steps + 1) + 1
-        # two more: the start, and the last step if an event ends the run
-        records = self.steps // self.every + 2
-        self._iterations = GrowingArray(capacity, dtype=np.int64)
-        self._smallest, self._drift = GrowingArray(capacity), GrowingArray(capacity)
-        self._numbers, self._times = GrowingArray(records, dtype=np.intp), GrowingArray(records)
-        joints = len(self.model.structure.joints)
         self._observer = self.model.observer()
-        self._faces = GrowingArray(records, (3, joints))
-        self._resultants = GrowingArray(records, (joints, 3))
-        self._frames, self._fields = GrowingArray(frames), GrowingArray(frames, (self.model.size,))
 
     def add(self, batch: Batch, *, last: bool = False) -> None:
         """Record the steps of a batch that are due, and check all of them."""
         self.state = batch.state(len(batch.times) - 1)
         readings = batch.read(self._observer)
         drift = self.monitor.add(batch, readings)
-        numbers = self._drift.count + np.arange(len(batch.times))
+        numbers = self.count + np.arange(len(batch.times))
         due = numbers % self.every == 0
         due[-1] |= last
         # Ctrl-C may come between any two: the number of resultants, filled last, counts
-        for rows, values in (
-            (self._iterations, batch.iterations),
-            (self._smallest, batch.smallest_step),
-            (self._drift, drift),
-            (self._numbers, numbers[due]),
-            (self._times, batch.times[due]),
-            (self._faces, self._observer.faces(readings[due])),
-            (self._resultants, batch.resultants[due]),
-        ):
-            rows.add(values)
+        rows = {
+            "iterations": batch.iterations,
+            "smallest_step": batch.smallest_step,
+            "drift": drift,
+            "numbers": numbers[due],
+            "times": batch.times[due],
+            "faces": self._observer.faces(readings[due]),
+            "resultants": batch.resultants[due],
+        }
+        for name, values in rows.items():
+            self._rows[name].append(np.array(values))
+        self.count += len(batch.times)
         self.fallback += batch.fallback * len(batch.times)
         if self.fields_every:
             for k in np.flatnonzero(numbers % self.fields_every == 0).tolist():
-                self._frames.add(batch.times[k : k + 1])
-                self._fields.add(batch.state(k).q[None])
+                self._rows["frames"].append(batch.times[k : k + 1])
+                self._rows["fields"].append(np.array(batch.state(k).q[None]))
         self.monitor.check_run()
+
+    def _recorded(self, name: str) -> NDArray[Any]:
+        """Return all rows of a quantity, in order of the steps."""
+        return np.concatenate(self._rows[name])
 
     def build_history(self, motion: Motion, ending: Ending, outcome: str) -> History:
         """Return the record as a history."""
+        since = "since the last record"
         effort_attributes = {
-            "iterations": {"long_name": "Newton iterations, or passes, since the last record"},
-            "smallest_step": {
-                "units": "s",
-                "long_name": "smallest step taken since the last record",
-            },
+            "iterations": {"long_name": f"Newton iterations, or passes, {since}"},
+            "smallest_step": {"units": "s", "long_name": f"smallest step taken {since}"},
             "energy_drift": {"units": "J", "long_name": "energy from nowhere since the start"},
         }
-        structure, resultants = self.model.structure, self._resultants.values
-        times, faces = (rows.values[: len(resultants)] for rows in (self._times, self._faces))
+        structure, resultants = self.model.structure, self._recorded("resultants")
+        times, faces = (self._recorded(name)[: len(resultants)] for name in ("times", "faces"))
         moved = self.model.large_displacements
         dataset = joint_dataset(
             structure, resultants, times, self.criteria, faces=faces, moved=moved
@@ -117,7 +90,9 @@ class Recorder:
         attributes = {"units": "m/s2", "long_name": "acceleration of the ground"}
         variables: dict[str, Any] = self._block_displacements()
         variables["ground"] = ("time", "axis"), motion.at(times), attributes
-        for (name, attrs), values in zip(effort_attributes.items(), self._effort(), strict=True):
+        for (name, attrs), values in zip(
+            effort_attributes.items(), self._effort(len(resultants)), strict=True
+        ):
             variables[name] = "time", values, attrs
         dataset = dataset.assign_coords(
             block=[block.name for block in structure.blocks], axis=["x", "y"]
@@ -129,21 +104,15 @@ class Recorder:
 
     def _block_displacements(self) -> dict[str, tuple[str, Array, dict[str, str]]]:
         """Return displacements of all blocks as variables of a dataset; zero for fixed blocks."""
-        displacements = self.monitor.displacements
-        subject = "displacement of its farthest corner"
-        columns = {
-            "largest_displacement": (displacements.largest, "m", f"largest {subject}"),
-            "largest_displacement_time": (
-                displacements.time,
-                "s",
-                f"time of the largest {subject}",
-            ),
-            "residual_displacement": (displacements.residual, "m", f"{subject} at the end"),
-        }
+        moved, subject = self.monitor.displacements, "displacement of its farthest corner"
         variables = {}
-        for name, (values, units, text) in columns.items():
+        for name, values, units, text in (
+            ("largest_displacement", moved.largest, "m", f"largest {subject}"),
+            ("largest_displacement_time", moved.time, "s", f"time of the largest {subject}"),
+            ("residual_displacement", moved.residual, "m", f"{subject} at the end"),
+        ):
             of_all = np.zeros(len(self.model.structure.blocks))
-            of_all[displacements.blocks] = values
+            of_all[moved.blocks] = values
             variables[name] = "block", of_all, {"units": units, "long_name": text}
         return variables
 
@@ -161,7 +130,8 @@ class Recorder:
 
     def _attributes(self, motion: Motion, ending: Ending, outcome: str) -> dict[str, Any]:
         """Return the scalar results and settings of the run."""
-        structure, monitor, smallest = self.model.structure, self.monitor, self._smallest.values
+        structure, monitor = self.model.structure, self.monitor
+        smallest = self._recorded("smallest_step")
         stones = np.isin(monitor.displacements.blocks, list_stones(structure))
         attributes = {
             "title": f"{structure.name}: {motion.name or 'time history'}",
@@ -180,7 +150,7 @@ class Recorder:
             # halved steps are dt/2 or shorter; 0.75 lies clear of round-off
             "halved_steps": int(np.sum(smallest < 0.75 * self.dt)) if self.dt else 0,
             "shortest_step": float(smallest[1:].min(initial=np.inf)),
-            "steps": self._drift.count - 1,
+            "steps": self.count - 1,
             "fallback_steps": self.fallback,
             "signs": SIGN_CONVENTION,
             "versions": library_versions(),
@@ -189,22 +159,24 @@ class Recorder:
             attributes["predicted_error"] = self.model.prediction.error
         return attributes
 
-    def _effort(self) -> tuple[NDArray[np.int64], Array, Array]:
+    def _effort(self, records: int) -> tuple[NDArray[np.int64], Array, Array]:
         """Return iterations and smallest step since the previous record, and drift, by record."""
-        ends = self._numbers.values[: self._resultants.count]
+        ends = self._recorded("numbers")[:records]
         starts, recorded = np.append(0, ends[:-1] + 1), ends[-1] + 1
         return (
-            np.add.reduceat(self._iterations.values[:recorded], starts),
-            np.minimum.reduceat(self._smallest.values[:recorded], starts),
-            self._drift.values[ends],
+            np.add.reduceat(self._recorded("iterations")[:recorded], starts),
+            np.minimum.reduceat(self._recorded("smallest_step")[:recorded], starts),
+            self._recorded("drift")[ends],
         )
 
     def _with_coordinates(self, dataset: xr.Dataset) -> xr.Dataset:
         """Return the dataset with the recorded coordinates and the state at the end."""
-        if frames := self._fields.count:
-            dataset.coords["frame_time"] = "frame", self._frames.values[:frames], {"units": "s"}
-            dataset["q"] = ("frame", "coordinate"), self._fields.values
-            dataset.update(corner_displacements(self.model, self._fields.values))
+        if "fields" in self._rows:
+            fields = self._recorded("fields")
+            times = self._recorded("frames")[: len(fields)]
+            dataset.coords["frame_time"] = "frame", times, {"units": "s"}
+            dataset["q"] = ("frame", "coordinate"), fields
+            dataset.update(corner_displacements(self.model, fields))
         last: dict[str, Any] = {
             f"last_{name}": ("coordinate", getattr(self.state, name))
             for name in ("q", "velocity", "acceleration")

@@ -57,9 +57,6 @@ from archfem.statics.newton import Newton
 
 logger = logging.getLogger("archfem")
 
-# Typical step where steps vary in length, for the size of records [s]
-NOMINAL_TIME_STEP = 0.005
-
 
 @dataclass(frozen=True, kw_only=True)
 class Record:
@@ -76,25 +73,9 @@ class Record:
 
     def __post_init__(self) -> None:
         """Refuse intervals below one."""
-        for key in ("every", "fields_every"):
-            value = getattr(self, key)
-            if key == "every" or value is not None:
-                check_integer(value, f"record {key}")
-
-
-# Classes of optional arguments, their names in messages, and valid examples
-_ARGUMENT_TYPES: dict[str, tuple[tuple[type, ...], str, str]] = {
-    "start": ((Equilibrium, State), "start", "give dead_load(model), or last_state(run)"),
-    "damping": (
-        (Rayleigh, StiffnessDamping),
-        "damping",
-        "give Rayleigh(0.05, (8.0, 16.0)), StiffnessDamping(0.05, 8.0), or None",
-    ),
-    "scheme": ((Conserving, Newmark, HHT), "scheme", "give Conserving(), Newmark() or HHT()"),
-    "record": ((Record,), "record", "give Record(every=…, fields_every=…)"),
-    "criteria": ((Criteria,), "criteria", "give Criteria(hinge=…, failures=…)"),
-    "newton": ((Newton,), "newton", "give Newton(tolerance=…)"),
-}
+        check_integer(self.every, "record every")
+        if self.fields_every is not None:
+            check_integer(self.fields_every, "record fields_every")
 
 
 @single_threaded
@@ -173,8 +154,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         start = equation.at_rest(rest.q, memory=rest.model.memory)
     start.check(model)
     stepper = stepper_for(method, equation, newton)
-    first = _start_batch(stepper, start, dt or NOMINAL_TIME_STEP)
-    recorder = _make_recorder(stepper, first, dt, motion.duration, record or Record(), criteria)
+    first = _start_batch(stepper, start, dt or 0.005)  # typical where steps vary in length
+    recorder = _make_recorder(stepper, first, dt, record or Record(), criteria)
     adaptive = None if dt else AdaptiveStepper(stepper, tolerance, first)
     try:
         recorder.add(first)
@@ -206,55 +187,43 @@ def _follow_fall(
     rocking_ratio: float | None,
 ) -> History:
     """Add the fall of loose or overturning blocks, and the state of collapse, to a history."""
-    start, state = states
+    (start, state), doubts = states, []
     tilts = history.ending is Ending.FINISHED and is_overturning(model, state)
-    if history.ending not in (Ending.PARTED, Ending.MET) and not tilts:
+    if tilts or history.ending in (Ending.PARTED, Ending.MET):
+        try:
+            frames, fall = simulate_fall(model, start, state, motion, rocking_ratio)
+        except DidNotConverge as error:
+            error.history = history
+            raise
+        dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
+        history = History(dataset, history.structure)
+        doubts = _doubt_impulses(history)
+    else:
         shaken = history.ending is not Ending.FINISHED
-        history = with_fall(history, standing_state(model, start, state, shaken))
-        return _doubt_kind(history, model)
-    try:
-        frames, fall = simulate_fall(model, start, state, motion, rocking_ratio)
-    except DidNotConverge as error:
-        error.history = history
-        raise
-    dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
-    history = with_fall(History(dataset, history.structure), fall)
-    return _doubt_kind(history.with_doubts((*history.doubts, *_doubt_impulses(history))), model)
+        fall = standing_state(model, start, state, shaken)
+    doubts += doubt_collapse(model.structure, fall)
+    return with_fall(history, fall).with_doubts((*history.doubts, *doubts))
 
 
-def _doubt_kind(history: History, model: Model) -> History:
-    """Return a history with the doubts of a structure near another kind of collapse."""
-    assert history.fall is not None
-    return history.with_doubts((*history.doubts, *doubt_collapse(model.structure, history.fall)))
-
-
-def _doubt_impulses(history: History) -> list[Doubt]:
+def _doubt_impulses(history: History, admissible: float = 0.02) -> list[Doubt]:
     """Return a doubt where impulses of a fall did not settle in more than a share of its steps."""
-    attrs = history.dataset.attrs
-    share = attrs["fall_unsettled"]
-    cause = (
+    share, violation = (history.dataset.attrs[f"fall_{key}"] for key in ("unsettled", "violation"))
+    doubt = Doubt(
         f"impulses of loose blocks did not settle in {share:.0%} of the steps of the fall, and "
-        f"violate contacts by up to {attrs['fall_violation']:.2g} of a step's weight impulse"
+        f"violate contacts by up to {violation:.2g} of a step's weight impulse",
+        "compare with `dynamics.RigidBlockSimulation` at half the time step",
     )
-    remedy = "compare with `dynamics.RigidBlockSimulation` at half the time step"
-    return _doubt_share(share, cause, remedy)
+    return [doubt] if share > admissible else []
 
 
-def _doubt_tolerance(history: History) -> list[Doubt]:
+def _doubt_tolerance(history: History, admissible: float = 0.02) -> list[Doubt]:
     """Return a doubt where the tolerance of the steps was missed in more than a share of them."""
-    attrs = history.dataset.attrs
-    share = attrs["tolerance_unmet"]
-    cause = (
-        f"the shortest steps erred by more than {attrs['tolerance']:g} in |e| in {share:.0%} of "
-        "the run"
+    tolerance, share = (history.dataset.attrs[key] for key in ("tolerance", "tolerance_unmet"))
+    doubt = Doubt(
+        f"the shortest steps erred by more than {tolerance:g} in |e| in {share:.0%} of the run",
+        "compare with a constant dt of 0.1 ms or less, or with more damping",
     )
-    remedy = "compare with a constant dt of 0.1 ms or less, or with more damping"
-    return _doubt_share(share, cause, remedy)
-
-
-def _doubt_share(share: float, cause: str, remedy: str, admissible: float = 0.02) -> list[Doubt]:
-    """Return a doubt where a share of the steps is above an admissible one [-]."""
-    return [Doubt(cause, remedy)] if share > admissible else []
+    return [doubt] if share > admissible else []
 
 
 def _resolve_steps(
@@ -276,9 +245,22 @@ def _resolve_steps(
 
 def _check_types(**arguments: Any) -> None:
     """Refuse arguments of the wrong class; None stands for the default."""
+    # classes of optional arguments, their names in messages, and valid examples
+    kinds: dict[str, tuple[tuple[type, ...], str, str]] = {
+        "start": ((Equilibrium, State), "start", "give dead_load(model), or last_state(run)"),
+        "damping": (
+            (Rayleigh, StiffnessDamping),
+            "damping",
+            "give Rayleigh(0.05, (8.0, 16.0)), StiffnessDamping(0.05, 8.0), or None",
+        ),
+        "scheme": ((Conserving, Newmark, HHT), "scheme", "give Conserving(), Newmark() or HHT()"),
+        "record": ((Record,), "record", "give Record(every=…, fields_every=…)"),
+        "criteria": ((Criteria,), "criteria", "give Criteria(hinge=…, failures=…)"),
+        "newton": ((Newton,), "newton", "give Newton(tolerance=…)"),
+    }
     for name, value in arguments.items():
         if value is not None:
-            check_type(value, *_ARGUMENT_TYPES[name])
+            check_type(value, *kinds[name])
 
 
 def _start_batch(stepper: Stepper, start: State, dt: float) -> Batch:
@@ -295,15 +277,14 @@ def _start_batch(stepper: Stepper, start: State, dt: float) -> Batch:
 
 
 def _make_recorder(
-    stepper: Stepper, first: Batch, dt: float | None, end: float, record: Record, criteria: Criteria
+    stepper: Stepper, first: Batch, dt: float | None, record: Record, criteria: Criteria
 ) -> Recorder:
     """Return the recorder of a run, with its validity checks."""
-    model, start = stepper.equation.model, first.state(0)
+    model = stepper.equation.model
     return Recorder(
         model=model,
         method=stepper.name,
         dt=dt,
-        steps=max(0, round((end - start.time) / (dt or NOMINAL_TIME_STEP))),
         every=record.every,
         fields_every=record.fields_every,
         criteria=criteria,
@@ -313,7 +294,7 @@ def _make_recorder(
             damps=isinstance(stepper.equation.scheme, HHT),
             mass_damping=stepper.equation.drag,
         ),
-        state=start,
+        state=first.state(0),
     )
 
 
@@ -326,11 +307,11 @@ def _run_steps(
 ) -> tuple[Ending, str]:
     """Record steps up to an event or the end of the motion; return how and why the run ended."""
     start = recorder.state
-    batches = (
-        stepper.batches(start, end)
-        if isinstance(stepper, AdaptiveStepper)
-        else stepper.batches(start, recorder.dt or NOMINAL_TIME_STEP, end)
-    )
+    if isinstance(stepper, AdaptiveStepper):
+        batches = stepper.batches(start, end)
+    else:
+        assert recorder.dt is not None
+        batches = stepper.batches(start, recorder.dt, end)
     duration = round(end - start.time, 4)
     with tqdm(total=duration, unit="s", disable=None, leave=False) as bar:
         for batch in batches:

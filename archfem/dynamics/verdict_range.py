@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import betaincinv
+from scipy.stats import rankdata
 
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
@@ -98,9 +99,8 @@ class VerdictRange(ResultDisplay):
         fallen = np.isin(rows["outcome"].values, FALLEN_STATES)
         residual = np.where(fallen, 0.0, rows["residual"].values)
         damage = np.where(fallen, 10.0 + kind, residual / max(residual.max(), 1e-12))
-        _, places, counts = np.unique(damage, return_inverse=True, return_counts=True)
         # runs of equal damage share the mean of their ranks
-        return (np.cumsum(counts) - 0.5 * (counts - 1))[places]
+        return rankdata(damage)
 
     @property
     def sentence(self) -> str:

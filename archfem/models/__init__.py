@@ -6,15 +6,13 @@
     discretisation  Discretisation
     export          DXF, VTU and meshio files of one state
     fem             finite elements: gmsh meshes, function spaces and UFL forms
-    full            all nodes
     large           models with large displacements, in corotational coordinates
-    linear_blocks   linear blocks between joints
+    linear_blocks   linear or rigid blocks between joints, and what is read from them
     model           protocol Model, Prediction, cells for drawing
-    observation     joint and block displacements from coordinates
-    reference       reference model: UFL forms assembled at every iteration
-    rigid           rigid blocks
+    reference       all nodes; reference model: UFL forms assembled at every iteration
 
-Imports `masonry`, `joints` and the support modules. Start reading at `model`, then at `rigid`.
+Imports `masonry`, `joints` and the support modules. Start reading at `model`, then at
+`linear_blocks`.
 """
 
 import lazy_loader

@@ -9,8 +9,8 @@ from archfem.masonry.stiffness_ratio import estimate_block_stiffness, find_soft_
 from archfem.masonry.structure import Structure
 from archfem.models.condensed import condense_blocks
 from archfem.models.discretisation import Discretisation
+from archfem.models.linear_blocks import build_rigid_model
 from archfem.models.model import Doubt, Model
-from archfem.models.rigid import build_rigid_model
 
 logger = logging.getLogger("archfem")
 
@@ -41,8 +41,7 @@ def _build_small(structure: Structure, settings: Discretisation) -> Model:
     # imported here: rigid models do not need DOLFINx
     from archfem.models.fem.mesh import get_mesh, read_mesh
     from archfem.models.fem.space import build_broken_space
-    from archfem.models.full import build_full_model
-    from archfem.models.reference import MonolithicModel
+    from archfem.models.reference import MonolithicModel, build_full_model
 
     if settings.file is None:
         mesh = get_mesh(structure, settings)

@@ -8,11 +8,9 @@ from archfem._validation import check_integer, check_number, check_sequence, is_
 from archfem.errors import InvalidInput
 from archfem.joints.quadrature import Quadrature
 
-# Fidelities of a block, the one with the fewest coordinates first
-BLOCK_FIDELITIES = ("rigid", "faces", "condensed", "full")
-
-# Fidelities of a model: those of blocks, and the reference model
-MODEL_FIDELITIES = (*BLOCK_FIDELITIES, "monolithic")
+# Fidelities of a model: those of a block, the one with the fewest coordinates first, and the
+# reference model
+MODEL_FIDELITIES = ("rigid", "faces", "condensed", "full", "monolithic")
 
 
 @dataclass(frozen=True)
@@ -119,11 +117,10 @@ def _check_fidelity(fidelity: object) -> None:
     """Refuse unknown fidelities."""
     if isinstance(fidelity, Mapping):
         values = fidelity.values()
-        unknown = sorted({str(name) for name in values if not is_one_of(name, BLOCK_FIDELITIES)})
+        of_blocks = MODEL_FIDELITIES[:-1]
+        unknown = sorted({str(name) for name in values if not is_one_of(name, of_blocks)})
         if unknown:
-            raise InvalidInput(
-                f"fidelities {unknown} are not known: use some of {BLOCK_FIDELITIES}"
-            )
+            raise InvalidInput(f"fidelities {unknown} are not known: use some of {of_blocks}")
     elif not is_one_of(fidelity, MODEL_FIDELITIES):
         raise InvalidInput(
             f"fidelity {short_repr(fidelity)} is not known: use one of {MODEL_FIDELITIES}, or "

@@ -62,6 +62,13 @@ class Solids:
         ]
         return np.concatenate([self.model.cells.displacement(q), *fixed])
 
+    def cell_data(self, stress: Array | None) -> dict[str, NDArray[Any]]:
+        """Return block numbers and stresses (p, 3) [Pa] of the polygons, by name in a file."""
+        data: dict[str, NDArray[Any]] = {"block": self.cells.owner.astype(np.int64)}
+        if stress is not None:
+            data |= dict(zip(("stress_xx", "stress_yy", "stress_xy"), stress.T, strict=True))
+        return data
+
     def stress(self, q: Array) -> Array | None:
         """Return σ_xx, σ_yy and σ_xy of every polygon (p, 3) [Pa]; None where blocks are rigid."""
         if self.model.cells.stress is None:
@@ -202,15 +209,10 @@ def write_state(model: Model, q: Array, path: str | Path, *, magnification: floa
     displacement = solids.displacement(np.asarray(q, dtype=float))
     if path.suffix == ".dxf":
         return _write_drawing(solids, displacement, path, magnification)
-    data: dict[str, NDArray[Any]] = {"block": solids.cells.owner.astype(np.int64)}
-    stress = solids.stress(q)
-    if stress is not None:
-        names = ("stress_xx", "stress_yy", "stress_xy")
-        data |= dict(zip(names, stress.T, strict=True))
+    data = solids.cell_data(solids.stress(q))
     if path.suffix == ".vtu":
-        write_vtu(
-            path, solids.cells.places, solids.cells.polygons, {"displacement": displacement}, data
-        )
+        points = {"displacement": displacement}
+        write_vtu(path, solids.cells.places, solids.cells.polygons, points, data)
         return path
     return _write_with_meshio(solids, displacement, data, path)
 
@@ -263,10 +265,10 @@ def _write_with_meshio(
     cells = [(t, np.array([solids.cells.polygons[k] for k in rows])) for t, rows in types.items()]
     cell_data = {name: [values[rows] for rows in types.values()] for name, values in data.items()}
     point_data = {"displacement": _spatial(displacement)}
-    mesh = meshio.Mesh(_spatial(solids.cells.places), cells, point_data, cell_data)
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        mesh.write(path)
+        # it refuses polygons of more than some corners, such as rigid blocks with arcs
+        meshio.Mesh(_spatial(solids.cells.places), cells, point_data, cell_data).write(path)
     except Exception as error:  # meshio and its formats raise exceptions of any class
         raise InvalidInput(
             f"meshio does not write this model as {path}: {error}; try .vtu or .vtk"

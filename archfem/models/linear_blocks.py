@@ -1,22 +1,29 @@
 """Linear elastic or rigid blocks between dry joints, in any coordinates.
 
 Internal forces are f(q) = K q + Gᵀ W t(G q), with K the stiffness of the blocks and t the tractions
-of the joints. The joints are the only nonlinearity.
+of the joints. The joints are the only nonlinearity. What an observer reads is linear, D q + d: at
+each joint the gap at mid-depth, rotation and slip of its faces, and the displacements of the
+corners of all free blocks.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import Self
+from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem._typing import Array
 from archfem.joints.operator import JointOperator, Pattern
-from archfem.joints.rigid_kinematics import block_motion_gaps
+from archfem.joints.quadrature import Quadrature
+from archfem.joints.resultants import face_matrix
+from archfem.joints.rigid_kinematics import block_motion_gaps, rigid_joint_operator
 from archfem.joints.step_average import StepForces
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.models.model import Cells, Model, ModelStep, Observer
-from archfem.models.observation import linear_observer
 
 
 class LinearBlockModel(Model):
@@ -163,3 +170,129 @@ class LinearBlockStep:
         change = q - self.joints.start
         of_blocks = float(change @ (self.model.block_stiffness @ change))
         return self.joints.dissipation(q) + self.joints.damping_lag * of_blocks
+
+
+def build_rigid_model(
+    structure: Structure, cells: int = 4, rule: Quadrature | None = None
+) -> LinearBlockModel:
+    """Build the model of rigid blocks, in the motions (u, v, θ) of their centroids [m, m, rad]."""
+    rule = rule or Quadrature("exact")
+    # Gaps of rigid faces are linear: one exact facet suffices without friction and bonds, which
+    # vary along it. Trapezoidal points, if given, are those of the whole joint.
+    linear = not np.isfinite(structure.friction).any() and not structure.tension.any()
+    whole = rule.rule == "exact" and linear
+    whole |= rule.rule == "trapezoidal" and rule.points is not None
+    facets = 1 if whole else cells
+    free = [structure.blocks[number] for number in structure.free]
+    density = np.array([structure.density(block) * structure.width for block in free])
+    mass = density * [block.area for block in free]
+    inertia = density * [block.polar_moment for block in free]
+    diagonal = np.column_stack([mass, mass, inertia]).ravel()
+    size = 3 * len(free)
+    influence = np.zeros((size, 2))
+    influence[0::3, 0] = influence[1::3, 1] = mass
+    return LinearBlockModel(
+        structure,
+        "rigid",
+        mass=sparse.diags(diagonal).tocsr(),
+        block_stiffness=sparse.csr_matrix((size, size)),
+        mass_influence=influence,
+        operator=rigid_joint_operator(structure, facets, rule),
+        cells=_rigid_cells(structure),
+    )
+
+
+def _rigid_cells(structure: Structure) -> Cells:
+    """Return one polygon for each free block."""
+    outlines = [structure.blocks[number].drawn() for number in structure.free]
+    starts = np.cumsum([0, *map(len, outlines)])
+    motions = [
+        rigid_motion_matrix(outline, structure.blocks[number].centroid).reshape(-1, 3)
+        for number, outline in zip(structure.free, outlines, strict=True)
+    ]
+    return Cells(
+        places=np.concatenate(outlines),
+        block=np.repeat(structure.free, [len(outline) for outline in outlines]),
+        polygons=tuple(np.arange(a, b) for a, b in pairwise(starts)),
+        shape_functions=sparse.block_diag(motions, format="csr"),
+    )
+
+
+_observers: WeakKeyDictionary[Model, "LinearObserver"] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True, eq=False)
+class LinearObserver(Observer):
+    """Observer of a model of small displacements."""
+
+    matrix: sparse.csr_matrix  # D, from coordinates to readings (r, n)
+    offset: Array  # d, readings at q = 0, due to moved supports and construction (r,)
+    joint_count: int
+    corner_blocks: NDArray[np.intp]
+    structure: Structure
+    cells: Cells
+    support_motion: Array  # (n_blocks, 3) [m, m, rad]
+
+    def read(self, q: Array) -> Array:
+        """Return gaps, rotations and slips of joints, then corner displacements, in a row (r,)."""
+        return np.asarray(self.matrix @ q + self.offset)
+
+    def read_many(self, states: Array) -> Array:
+        """Return the rows of `read` for many states (steps, r)."""
+        return np.asarray((self.matrix @ states.T).T + self.offset)
+
+    def joint_ends(self, q: Array) -> Array:
+        """Return the displacements of both ends of each joint (n_joints, 2, 2) [m]."""
+        return (self._end_rows @ q).reshape(-1, 2, 2) + self._end_shift
+
+    @cached_property
+    def _end_rows(self) -> sparse.csr_matrix:
+        """Matrix from coordinates to displacements of the joint ends (4 n_joints, n)."""
+        # an end is midway between its two blocks, and supports do not depend on the coordinates
+        fixed = sparse.csr_matrix((2, self.matrix.shape[1]))
+        rows = [
+            sum(
+                fixed
+                if self.structure.blocks[number].fixed
+                else 0.5 * self.cells.displacement_rows(number, end)
+                for number in joint.blocks
+            )
+            for joint in self.structure.joints
+            for end in joint.ends
+        ]
+        return sparse.vstack(rows, format="csr")
+
+    @cached_property
+    def _end_shift(self) -> Array:
+        """Displacements of the joint ends due to moved supports (n_joints, 2, 2) [m]."""
+        shift = np.zeros((len(self.structure.joints), 2, 2))
+        for number, joint in enumerate(self.structure.joints):
+            for block in joint.blocks:
+                motion = rigid_motion_matrix(joint.ends, self.structure.blocks[block].centroid)
+                shift[number] += 0.5 * motion @ self.support_motion[block]
+        return shift
+
+
+def linear_observer(model: Model, operator: JointOperator) -> LinearObserver:
+    """Return the observer of a model of small displacements, built once for each model."""
+    if model not in _observers:
+        _observers[model] = _build_observer(model, operator)
+    return _observers[model]
+
+
+def _build_observer(model: Model, operator: JointOperator) -> LinearObserver:
+    """Build an observer from the joint operator and the cells."""
+    structure, cells = model.structure, model.cells
+    of_faces, face_offset = face_matrix(operator)
+    corners = cells.corners(structure)
+    of_corners = cells.shape_functions[np.add.outer(2 * corners, (0, 1)).ravel()]
+    return LinearObserver(
+        sparse.vstack([of_faces, of_corners], "csr"),
+        # corners are read from zero on
+        np.concatenate([face_offset, np.zeros(2 * len(corners))]),
+        len(structure.joints),
+        cells.block[corners],
+        structure,
+        cells,
+        model.support_motion,
+    )

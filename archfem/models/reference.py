@@ -1,6 +1,7 @@
-"""The reference model: weak forms assembled by DOLFINx at every iteration, without condensation.
+"""Models with all nodes: linear blocks assembled once, and the reference without any shortcut.
 
-It shares no shortcut with the other models and is the independent check of them.
+Both are of elastic blocks, meshed by gmsh and assembled by DOLFINx. The reference assembles its
+weak forms at every iteration; it is the independent check of the other models.
 
 For a step along which displacements are linear from u_0 to u_1, with the tractions of
 `joints.contact_law` averaged over the step, internal forces are, for all v,
@@ -18,6 +19,7 @@ from typing import Any, Self
 import numpy as np
 import ufl
 from dolfinx import fem
+from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem._typing import Array
@@ -28,10 +30,45 @@ from archfem.masonry.structure import rigid_motion_matrix
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.forms import Fields, Forms
 from archfem.models.fem.joint_facets import PointReader
-from archfem.models.fem.space import BrokenSpace
-from archfem.models.full import build_full_model
-from archfem.models.model import Model, ModelStep, Observer
-from archfem.models.observation import linear_observer
+from archfem.models.fem.space import BrokenSpace, build_joint_operator
+from archfem.models.linear_blocks import LinearBlockModel, linear_observer
+from archfem.models.model import Cells, Model, ModelStep, Observer
+
+
+def build_full_model(space: BrokenSpace, rule: Quadrature) -> LinearBlockModel:
+    """Build the model in nodal displacements of the free blocks, x and y in turn [m]."""
+    forms = Forms(space, rule)
+    free = space.free
+    mass = forms.mass()[free][:, free]
+    axes = np.zeros((len(free), 2))
+    axes[0::2, 0] = axes[1::2, 1] = 1.0
+    return LinearBlockModel(
+        space.mesh.structure,
+        "full",
+        mass=mass,
+        block_stiffness=forms.stiffness()[free][:, free],
+        mass_influence=mass @ axes,
+        operator=build_joint_operator(space, rule),
+        cells=_build_cells(space, forms, free),
+    )
+
+
+def _build_cells(space: BrokenSpace, forms: Forms, free: NDArray[np.intp]) -> Cells:
+    """Return the cells of the free blocks as polygons."""
+    moving = np.isin(space.mesh.blocks, space.mesh.structure.free)
+    nodes = free[0::2] // 2
+    number = np.full(len(space.places), -1)
+    number[nodes] = np.arange(len(nodes))
+    # DOLFINx orders the corners of quadrilaterals like a tensor product
+    corners = [0, 1, 3, 2] if space.cells.shape[1] in (4, 9) else [0, 1, 2]
+    rows = (3 * np.flatnonzero(moving)[:, None] + np.arange(3)).ravel()
+    return Cells(
+        places=space.places[nodes],
+        block=space.owner[nodes].astype(int),
+        polygons=tuple(number[space.cells[moving][:, corners]]),
+        shape_functions=sparse.identity(len(free), format="csr"),
+        stress=forms.stress()[rows][:, free].tocsr(),
+    )
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ from archfem.view.style import (
     structure_figure,
     style_axes,
     style_colour_bar,
+    style_length_axes,
     white_halo,
 )
 
@@ -66,15 +67,9 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse) -> None:
     """Draw mechanism, hinges, thrust line and loads over a structure that is drawn already."""
     if found.motion.any():
         motion = scale_motion(structure, found.motion)
-        style = {"edge": Colour.MECHANISM, "width": 0.8, "zorder": 2, "label": "mechanism"}
-        outlines = outline_moving_blocks(structure, motion)
-        add_polygons(axes, outlines, f"{Colour.MECHANISM}30", **style)
-        axes.autoscale_view()
-        _mark_hinges(axes, structure, found, motion)
-        if found.sliding:
-            ends = structure.ends[list(found.sliding)]
-            style = {"colors": Colour.SLIDING, "linewidths": 2.4, "zorder": 4}
-            axes.add_collection(LineCollection(ends, label="sliding joint", **style))
+        _draw_motion(axes, outline_moving_blocks(structure, motion), "mechanism")
+        _mark_hinges(axes, structure, found, motion, {"label": "hinge", "ms": 7.5})
+        _mark_sliding(axes, structure, found.sliding)
     line = thrust_line(structure, found.joints).values
     # arches and piers that share no block have lines of their own
     pairs = [set(joint.blocks) for joint in structure.joints]
@@ -195,8 +190,7 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
     left, right = figure.subplots(1, 2, width_ratios=widths)
     _draw_displaced_mechanism(left, found)
     _draw_capacity_curve(right, found)
-    handles, labels = left.get_legend_handles_labels()
-    add_legend_below(figure, handles=handles, labels=labels)
+    add_legend_below(figure, handles=left.get_legend_handles_labels()[0])
     return figure
 
 
@@ -208,19 +202,10 @@ def _draw_displaced_mechanism(axes: Axes, found: KinematicAssessment) -> None:
     place = min(place, len(path.displacements) - 1)
     blocks = path.blocks.moved(path.displacements[place])
     moved = [k for k in structure.free if np.abs(path.displacements[place, k]).max() > 1e-9]
-    style = {"edge": Colour.MECHANISM, "width": 0.8, "zorder": 2, "label": "mechanism at d_u*"}
-    outlines = [blocks.outlines[k] for k in moved]
-    add_polygons(axes, outlines, f"{Colour.MECHANISM}30", **style)
-    ends = {"intrados": 0, "extrados": 1}
-    points = [structure.ends[joint, ends[end]] for joint, end in found.hinges]
-    if points:
-        style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.8, "ms": 6.5, "zorder": 6}
-        axes.plot(*np.array(points).T, "o", label="hinge at rest", **style)
-    if found.sliding:
-        style = {"colors": Colour.SLIDING, "linewidths": 2.4, "zorder": 4}
-        lines = structure.ends[list(found.sliding)]
-        axes.add_collection(LineCollection(lines, label="sliding joint", **style))
-    axes.autoscale_view()
+    _draw_motion(axes, [blocks.outlines[k] for k in moved], "mechanism at d_u*")
+    rest = np.zeros((len(structure.blocks), 3))
+    _mark_hinges(axes, structure, found, rest, {"label": "hinge at rest", "ms": 6.5})
+    _mark_sliding(axes, structure, found.sliding)
     set_title(axes, f"{structure.name}: alpha_0 = {found.alpha_0:.3f}, e* = {found.e_star:.2f}")
 
 
@@ -289,7 +274,20 @@ def draw_capacity(
     return figure
 
 
-def _mark_hinges(axes: Axes, structure: Structure, found: Collapse, motion: Array) -> None:
+def _draw_motion(axes: Axes, outlines: Sequence[Array], label: str) -> None:
+    """Draw displaced blocks over a structure that is drawn already."""
+    style = {"edge": Colour.MECHANISM, "width": 0.8, "zorder": 2, "label": label}
+    add_polygons(axes, outlines, f"{Colour.MECHANISM}30", **style)
+    axes.autoscale_view()
+
+
+def _mark_hinges(
+    axes: Axes,
+    structure: Structure,
+    found: Collapse | KinematicAssessment,
+    motion: Array,
+    style: dict[str, Any],
+) -> None:
     """Mark each hinge at the face where its blocks stay in contact, displaced."""
     points = []
     for number, side in found.hinges:
@@ -298,8 +296,16 @@ def _mark_hinges(axes: Axes, structure: Structure, found: Collapse, motion: Arra
         matrix = rigid_motion_matrix(end[None, :], structure.blocks[joint.lower].centroid)[0]
         points.append(end + matrix @ motion[joint.lower])
     if points:
-        style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.8, "ms": 7.5, "zorder": 6}
-        axes.plot(*np.array(points).T, "o", label="hinge", **style)
+        style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.8, "zorder": 6} | style
+        axes.plot(*np.array(points).T, "o", **style)
+
+
+def _mark_sliding(axes: Axes, structure: Structure, joints: Sequence[int]) -> None:
+    """Mark sliding joints as built."""
+    if joints:
+        style = {"colors": Colour.SLIDING, "linewidths": 2.4, "zorder": 4}
+        lines = structure.ends[list(joints)]
+        axes.add_collection(LineCollection(lines, label="sliding joint", **style))
 
 
 def _outcome_text(found: Collapse) -> str:
@@ -372,8 +378,7 @@ def _select_instants(
 def _draw_instant(axes: Axes, falls: FallingBlocks, time: float) -> None:
     """Draw the loose blocks and the ground at one instant."""
     structure = falls.structure
-    style_axes(axes, "x [m]", "y [m]")
-    axes.set_aspect("equal")
+    style_length_axes(axes)
     axes.axhline(falls.level, color=Colour.EDGE, lw=1.2, zorder=0)
     built = [block.drawn() for block in structure.blocks]
     add_polygons(axes, built, "none", edge=Colour.UNDEFORMED, width=0.6)

@@ -227,8 +227,8 @@ def _finish_panels(panels: Mapping[str, Axes]) -> Figure:
     if len(panels) == 1:
         add_legend(first)
     else:
-        handles, labels = first.get_legend_handles_labels()
-        add_legend_below(figure, 2 + len(LINE_COLOURS), handles=handles, labels=labels)
+        handles = first.get_legend_handles_labels()[0]
+        add_legend_below(figure, 2 + len(LINE_COLOURS), handles=handles)
     return figure
 
 

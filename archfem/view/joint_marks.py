@@ -38,15 +38,13 @@ class Marks:
     thrust: Array = field(default_factory=lambda: np.zeros((0, 2)))
     # segments of the thrust line across the blocks between two such joints (n_links, 2, 2) [m]
     links: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
-    hinges: Array = field(
-        default_factory=lambda: np.zeros((0, 2))
-    )  # contact points of hinged joints (n_hinges, 2) [m]
+    # contact points of hinged joints (n_hinges, 2) [m]
+    hinges: Array = field(default_factory=lambda: np.zeros((0, 2)))
     # outlines of two opposite arrows beside each sliding joint: the upper block's, then the
     # lower's (2 n_sliding, 7, 2) [m]
     slips: Array = field(default_factory=lambda: np.zeros((0, 7, 2)))
-    gaps: Array = field(
-        default_factory=lambda: np.zeros((0, 2, 2))
-    )  # ends of the open joints (n_open, 2, 2) [m]
+    # ends of the open joints (n_open, 2, 2) [m]
+    gaps: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
 
 class Marker:

@@ -191,7 +191,7 @@ def _add_common_legend(figure: Figure, axes: Sequence[Axes]) -> None:
     """Explain the lines below all panels; the first panel has a line of every motion."""
     handles, names = axes[0].get_legend_handles_labels()
     columns = 4 if max(map(len, names)) < 20 else 2
-    add_legend_below(figure, columns, handles=handles, labels=names)
+    add_legend_below(figure, columns, handles=handles)
 
 
 def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:

@@ -38,12 +38,10 @@ from archfem.view.style import (
     outline_bounds,
     set_title,
     style_axes,
+    style_length_axes,
     text_width,
     white_halo,
 )
-
-# Largest displacement of a mode shape in a figure, relative to the size of the structure
-MODE_AMPLITUDE = 0.04
 
 
 @validate_arguments
@@ -133,7 +131,7 @@ def mode_panels(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, li
     chosen = list(range(1, count + 1) if numbers is None else numbers)
     if not chosen or not set(chosen) <= set(range(1, count + 1)):
         raise InvalidInput(f"modes {chosen} cannot be drawn: there are 1 to {count}")
-    amplitude = MODE_AMPLITUDE * modes.model.structure.size
+    amplitude = ModePanel.amplitude * modes.model.structure.size
     low, high = outline_bounds(modes.model.structure)
     low, high = low - 1.1 * amplitude, high + 1.1 * amplitude
     wide, tall = high - low
@@ -157,10 +155,12 @@ def mode_panels(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, li
 class ModePanel:
     """One mode shape on its axes."""
 
+    amplitude = 0.04  # largest displacement, relative to the size of the structure
+
     def __init__(self, axes: Axes, modes: Modes, number: int) -> None:
         cells = modes.model.cells
         shape = cells.displacement(modes.shapes[:, number - 1])
-        amplitude = MODE_AMPLITUDE * modes.model.structure.size
+        amplitude = ModePanel.amplitude * modes.model.structure.size
         self._displacements = shape * amplitude / np.linalg.norm(shape, axis=1).max()
         self._places, self._blocks = cells.places, DisplacedBlocks(axes, modes.model)
         frequency, (x, y) = modes.frequencies[number - 1], 100.0 * modes.mass_ratios[number - 1]
@@ -243,8 +243,7 @@ def _draw_block_forces(
     axes: Axes, structure: Structure, body: FreeBody, colours: list[str]
 ) -> None:
     """Draw the block between its neighbours, and the forces on it."""
-    style_axes(axes, "x [m]", "y [m]")
-    axes.set_aspect("equal")
+    style_length_axes(axes)
     outline, number = body.block.drawn(), structure.blocks.index(body.block)
     for joint in (structure.joints[k] for k in body.joints):
         (other,) = set(joint.blocks) - {number}

@@ -32,9 +32,8 @@ from archfem.view.style import (
     add_legend_below,
     add_polygons,
     set_title,
-    structure_figure,
+    structure_axes,
     style_colour_bar,
-    style_structure_axes,
 )
 
 Numbers = NDArray[np.intp]
@@ -53,11 +52,11 @@ class Triangles:
         fine = UniformTriRefiner(unit).refine_triangulation(subdiv=refinements)
         shares = np.column_stack([1.0 - fine.x - fine.y, fine.x, fine.y])  # of the three corners
         count = len(shares)
-        rows = np.repeat(np.arange(count * len(corners)), 3)
         columns = np.repeat(corners, count, axis=0).ravel()
         values = np.tile(shares.ravel(), len(corners))
         shape = count * len(corners), len(cells.places)
-        self._interpolation = sparse.csr_matrix((values, (rows, columns)), shape)
+        starts = np.arange(0, len(values) + 1, 3)  # three values in each row
+        self._interpolation = sparse.csr_matrix((values, columns, starts), shape)
         first = count * np.arange(len(corners))
         self._corners = (first[:, None, None] + fine.triangles).reshape(-1, 3)
         owner = np.repeat(np.arange(len(cut)), [len(triangles) for triangles in cut])
@@ -99,9 +98,8 @@ def draw_stress(
     blocks = _select_blocks(structure, parts)
     corners = (corner_stress_operator(cells) @ q).reshape(-1, 3)
     has_own_figure = axes is None
-    axes = structure_figure(structure).add_subplot() if axes is None else axes
+    axes = structure_axes(structure, axes)
     figure = cast(Figure, axes.figure)
-    style_structure_axes(axes, structure)
     draw_blocks(axes, structure)
     _shade(axes, cells, -principal_values(*corners.T)[1], blocks)
     outlines = [block.drawn() for block in structure.blocks]

@@ -39,8 +39,8 @@ from archfem.view.style import (
     new_figure,
     outline_bounds,
     set_title,
+    structure_axes,
     structure_figure,
-    style_structure_axes,
     text_width,
     white_halo,
 )
@@ -74,8 +74,7 @@ def draw_structure(
     Raises:
         InvalidInput: `joints` has several instants, or belongs to another structure.
     """
-    axes = structure_figure(structure).add_subplot() if axes is None else axes
-    style_structure_axes(axes, structure)
+    axes = structure_axes(structure, axes)
     draw_blocks(axes, structure)
     if joints is not None:
         check_instant(structure, joints)
@@ -110,7 +109,7 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
         if axes.get_legend() is not None:
             axes.get_legend().remove()
     if marks:  # one legend explains the marks of all panels
-        add_legend_below(figure, handles=list(marks.values()), labels=list(marks))
+        add_legend_below(figure, handles=list(marks.values()))
     return figure
 
 
@@ -209,9 +208,7 @@ def draw_names(structure: Structure) -> Figure:
     Returns:
         The figure.
     """
-    page = structure_figure(structure)
-    axes = page.add_subplot()
-    style_structure_axes(axes, structure)
+    axes = structure_axes(structure)
     draw_blocks(axes, structure)
     shown = [joint for joint, own in zip(structure.joints, structure.judged, strict=True) if own]
     inch = 1.0 / drawing_scale(structure)  # [m]
@@ -225,7 +222,7 @@ def draw_names(structure: Structure) -> Figure:
         _name_part(axes, [joint for joint in shown if joint.part == part], inch)
     example = shown[len(shown) // 2].name
     set_title(axes, f"{structure.name}: names of joints, such as '{example}'")
-    return page
+    return cast(Figure, axes.figure)
 
 
 def _name_part(axes: Axes, joints: Sequence[Joint], inch: float) -> None:
@@ -283,8 +280,7 @@ def draw_displaced(
     model, q = model_and_coordinates(model, q)
     joints = joints_of_state(model, q, joints, criteria)
     structure, cells = model.structure, model.cells
-    axes = structure_figure(structure).add_subplot() if axes is None else axes
-    style_structure_axes(axes, structure)
+    axes = structure_axes(structure, axes)
     places = cells.places + magnification * cells.displacement(q)
     DisplacedBlocks(axes, model, magnification).move(places)
     axes.update_datalim(places)

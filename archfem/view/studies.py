@@ -234,8 +234,7 @@ def draw_ida(
     left.set_ylim(bottom=0.0)
     left.legend(frameon=False, fontsize=LABEL_SIZE, loc="lower right")
     _draw_capacities(right, capacities)
-    handles, labels = right.get_legend_handles_labels()
-    add_legend_below(figure, handles=handles, labels=labels)
+    add_legend_below(figure, handles=right.get_legend_handles_labels()[0])
     return figure
 
 
@@ -377,8 +376,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set_yscale("log")
         axes.set_ylim(0.7e-3 * top, 4.0 * top)
-    handles, words = panels[0].get_legend_handles_labels()
-    add_legend_below(figure, 2, handles=handles, labels=words)
+    add_legend_below(figure, 2, handles=panels[0].get_legend_handles_labels()[0])
     figure.suptitle(verdicts.sentence, fontsize=TITLE_SIZE, color=Colour.TEXT, wrap=True)
     return figure
 

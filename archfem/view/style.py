@@ -107,14 +107,21 @@ def style_axes(axes: Axes, x: str = "", y: str = "", size: float = LABEL_SIZE) -
     axes.tick_params(labelsize=size, color=Colour.EDGE, width=0.8, length=3.0)
 
 
-def style_structure_axes(axes: Axes, structure: Structure) -> None:
-    """Style axes that show a structure true to scale."""
+def style_length_axes(axes: Axes) -> None:
+    """Style axes that show lengths [m] true to scale."""
     style_axes(axes, "x [m]", "y [m]")
     axes.set_aspect("equal")
+
+
+def structure_axes(structure: Structure, axes: Axes | None = None) -> Axes:
+    """Return styled axes that show a structure true to scale, by default those of a new figure."""
+    axes = structure_figure(structure).add_subplot() if axes is None else axes
+    style_length_axes(axes)
     low, high = outline_bounds(structure)
     # a tick label takes about 0.55 inch
     ticks = np.clip(drawing_scale(structure) * (high - low)[0] / 0.55, 1, 9)
     axes.xaxis.set_major_locator(MaxNLocator(int(ticks), steps=[1, 2, 2.5, 5, 10]))
+    return axes
 
 
 def style_colour_bar(bar: Colorbar, label: str, size: float = LABEL_SIZE) -> None:

@@ -128,8 +128,6 @@ def test_too_few_effective_modes():
         effective_mode_range(block(), mass_share=0.5)
     with pytest.raises(af.InvalidInput, match=r"share 5\.0 of the mass"):
         effective_mode_range(block(), mass_share=5.0)
-    with pytest.raises(af.InvalidInput, match="modes to compute at first = 0"):
-        effective_mode_range(block(), initial_count=0)
     with pytest.raises(af.InvalidInput, match="damping kind = 'mass': use one of"):
         effective_damping(block(), kind="mass")
 

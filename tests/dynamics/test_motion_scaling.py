@@ -10,10 +10,8 @@ from glued import glued
 import archfem as af
 from archfem.dynamics import CollapseScale, mechanism_scales
 from archfem.dynamics.motion_scaling import (
-    COLLAPSE_DEFINITION,
     MechanismScales,
     ScaledRun,
-    collapse_scale,
     largest_allowed_scale,
     search_scales,
 )
@@ -167,7 +165,7 @@ def test_what_a_failed_run_met_is_kept(ring, monkeypatch):
     ours = af.Criteria(hinge=0.5, failures=18, friction=10.0)
     found = mechanism_scales(model, motion, criteria=ours, between=(1.0, 1.0), dt=0.005)
     (run,) = found.runs
-    assert run.has_failed
+    assert run.ending is af.dynamics.Ending.FAILED
     assert run.outcome.startswith("failed at")
     assert found["any joints at once"].upper == 1.0
 
@@ -228,7 +226,7 @@ def fallen(*scales):
         for s in scales
     )
     runs = (ScaledRun(abs(s), {}, Ending.PARTED, "", f) for s, f in zip(scales, made, strict=True))
-    return MechanismScales((COLLAPSE_DEFINITION,), tuple(runs))
+    return MechanismScales(("collapse",), tuple(runs))
 
 
 def test_collapse_is_between_what_stands_and_what_falls_by_every_step():
@@ -250,16 +248,16 @@ def test_no_bracket_rests_on_a_run_without_an_answer():
         state = af.dynamics.CollapseState(kind, None, (), 0.1, 0.1, True)
         return ScaledRun(scale, {}, Ending.FINISHED, "", state)
 
-    found = search_scales(shaken, (COLLAPSE_DEFINITION,), 0.05, (0.1, 4.0))
-    bracket = found[COLLAPSE_DEFINITION]
+    found = search_scales(shaken, ("collapse",), 0.05, (0.1, 4.0))
+    bracket = found["collapse"]
     assert bracket.lower < 1.9 < bracket.upper <= 1.05 * ROUND_OFF * bracket.lower
     assert bracket.unanswered == (pytest.approx(np.sqrt(2.0)),)
     scales = CollapseScale({0.005: found})
     assert scales.unanswered == bracket.unanswered
     assert "no answer" in scales.table()
     (run,) = [run for run in found.runs if run.fall is None]
-    assert not run.survives(COLLAPSE_DEFINITION)
-    assert not run.fails(COLLAPSE_DEFINITION)
+    assert not run.survives("collapse")
+    assert not run.fails("collapse")
 
 
 @pytest.mark.parametrize(
@@ -276,7 +274,7 @@ def test_collapse_is_not_sought_beyond_what_a_motion_may_be(between, limits, mon
     block = af.column(breadth=1.0, heights=[1.0])
     model = af.build(block, fidelity="rigid", displacements="large")
     strong = af.Motion(np.array([0.0, 20.0, 0.0]), dt=0.01)
-    collapse_scale(model, strong, between=between)
+    af.collapse_scale(model, strong, between=between)
     assert asked == [pytest.approx(limits)] * 2
 
 

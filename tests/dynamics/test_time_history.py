@@ -10,7 +10,7 @@ from glued import glued
 
 import archfem as af
 from archfem.dynamics import Ending, Record, last_state
-from archfem.dynamics.time_history import _find_end, _resolve_steps, time_history
+from archfem.dynamics.time_history import _find_end, _resolve_steps
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 GIVEN = {"damping": DAMPING, "dt": 0.005}
@@ -26,14 +26,14 @@ def test_a_model_knows_what_was_predicted_of_it(model):
     chosen = model.with_prediction(foreseen)
     assert (chosen.prediction, model.prediction) == (foreseen, None)
     assert chosen.with_support_motion(chosen.support_motion).prediction == foreseen
-    short = time_history(chosen, af.Motion.synthetic(duration=0.25, seed=2))
+    short = af.time_history(chosen, af.Motion.synthetic(duration=0.25, seed=2))
     assert np.diff(short.time) == pytest.approx(0.0025)
     assert short.dataset.attrs["predicted_error"] == 0.003
 
 
 def test_an_event_ends_the_run(run, model, motion):
     assert run.mechanism is not None
-    halted = time_history(model, motion, **GIVEN, until=af.CountedMechanism())
+    halted = af.time_history(model, motion, **GIVEN, until=af.CountedMechanism())
     assert halted.time[-1] == pytest.approx(run.mechanism.time)
     assert "a mechanism of arch by joints " in halted.outcome
     assert halted.mechanism == run.mechanism
@@ -52,8 +52,8 @@ def weak(motion):
     "event", [af.CountedMechanism(limit=0.38), af.CountedMechanism(criteria=LOOSE)]
 )
 def test_criteria_of_the_event_are_those_of_the_run(model, weak, event):
-    assert time_history(model, weak, **GIVEN).mechanism is None
-    halted = time_history(model, weak, **GIVEN, until=event)
+    assert af.time_history(model, weak, **GIVEN).mechanism is None
+    halted = af.time_history(model, weak, **GIVEN, until=event)
     assert halted.ending is af.dynamics.Ending.EVENT
     assert halted.criteria == LOOSE
     assert halted.mechanism.time == halted.time[-1]
@@ -62,8 +62,8 @@ def test_criteria_of_the_event_are_those_of_the_run(model, weak, event):
 @pytest.mark.parametrize("event", [af.CountedMechanism(), af.dynamics.MovingMechanism()])
 def test_an_event_obeys_the_criteria_of_the_run(model, motion, event):
     criteria = af.Criteria(hinge=0.42, friction=0.4)
-    whole = time_history(model, motion, **GIVEN, criteria=criteria)
-    halted = time_history(model, motion, **GIVEN, criteria=criteria, until=event)
+    whole = af.time_history(model, motion, **GIVEN, criteria=criteria)
+    halted = af.time_history(model, motion, **GIVEN, criteria=criteria, until=event)
     found = whole.mechanism if event == af.CountedMechanism() else whole.verified.moved
     assert halted.time[-1] == found.time
     ended_by = halted.mechanism if event == af.CountedMechanism() else halted.verified.moved
@@ -73,9 +73,9 @@ def test_an_event_obeys_the_criteria_of_the_run(model, motion, event):
 def test_criteria_of_run_and_event_must_be_the_same(model, motion):
     given = {**GIVEN, "criteria": af.Criteria(hinge=0.4)}
     with pytest.raises(af.InvalidInput, match=r"hinge=0\.4.*hinge=0\.38.*to the run alone"):
-        time_history(model, motion, until=af.CountedMechanism(limit=0.38), **given)
+        af.time_history(model, motion, until=af.CountedMechanism(limit=0.38), **given)
     short = motion.cut(0.0, 0.5)
-    same = time_history(model, short, until=af.CountedMechanism(limit=0.4), **given)
+    same = af.time_history(model, short, until=af.CountedMechanism(limit=0.4), **given)
     assert same.criteria == given["criteria"]
 
 
@@ -83,15 +83,15 @@ def test_criteria_of_run_and_event_must_be_the_same(model, motion):
     "event", [af.dynamics.EveryMechanism(), af.CountedMechanism(), af.dynamics.MovingMechanism()]
 )
 def test_an_event_begins_afresh_in_each_run(model, motion, event):
-    first, second = (time_history(model, motion, **GIVEN, until=event) for _ in range(2))
+    first, second = (af.time_history(model, motion, **GIVEN, until=event) for _ in range(2))
     assert first.ending is second.ending is af.dynamics.Ending.EVENT
     assert first.outcome == second.outcome
     assert first.time[-1] == second.time[-1]
 
 
 def test_a_run_goes_on_where_it_stopped(run, model, motion):
-    first = time_history(model, motion.cut(0.0, 1.5), **GIVEN)
-    second = time_history(model, motion, **GIVEN, start=last_state(first))
+    first = af.time_history(model, motion.cut(0.0, 1.5), **GIVEN)
+    second = af.time_history(model, motion, **GIVEN, start=last_state(first))
     assert second.time[0] == pytest.approx(1.5)
     whole = run.joints["M"].sel(time=slice(1.501, None)).values  # the first is no mean yet
     assert second.joints["M"].values[1:] == pytest.approx(whole, rel=1e-6, abs=1e-3)
@@ -107,7 +107,7 @@ def test_ctrl_c_keeps_what_was_computed(model, motion):
             os.kill(os.getpid(), signal.SIGINT)
 
     try:
-        run = time_history(model, motion, **GIVEN, until=press)
+        run = af.time_history(model, motion, **GIVEN, until=press)
     finally:
         signal.signal(signal.SIGINT, before)
     assert "interrupted at" in run.outcome
@@ -120,7 +120,7 @@ def test_ctrl_c_keeps_what_was_computed(model, motion):
 def test_a_failure_carries_the_history(model, motion, breaking):
     stepper = breaking(model, motion, lambda time, _: time > 0.2)
     with pytest.raises(af.DidNotConverge, match="made to fail") as caught:
-        time_history(model, motion, dt=0.005, method=stepper)
+        af.time_history(model, motion, dt=0.005, method=stepper)
     assert caught.value.history.time[-1] == pytest.approx(0.205, abs=0.006)
     assert caught.value.last.time == pytest.approx(0.205, abs=0.006)
     assert "failed at" in caught.value.history.outcome
@@ -131,7 +131,7 @@ def test_hht_damps_less_than_it_changes(ring, motion):
     """At α = -0.05 the largest eccentricity stays within 5 % of average acceleration's."""
     model, weak = af.build(glued(ring), fidelity="rigid"), motion.scaled(0.3)
     peaks = [
-        float(abs(time_history(model, weak, scheme=s, **GIVEN).joints["eccentricity"]).max())
+        float(abs(af.time_history(model, weak, scheme=s, **GIVEN).joints["eccentricity"]).max())
         for s in (af.dynamics.Newmark(), af.HHT(-0.05))
     ]
     assert peaks[0] == pytest.approx(peaks[1], rel=0.05)
@@ -139,7 +139,7 @@ def test_hht_damps_less_than_it_changes(ring, motion):
 
 def test_refusals(model, motion):
     with pytest.raises(af.InvalidInput, match=r"dt 0\.5 s"):
-        time_history(model, motion, dt=0.5)
+        af.time_history(model, motion, dt=0.5)
     with pytest.raises(af.InvalidInput, match="record every = 0"):
         Record(every=0)
 

@@ -8,7 +8,6 @@ import pytest
 
 import archfem as af
 from archfem.dynamics import State
-from archfem.dynamics.motion_scaling import collapse_scale
 from archfem.errors import InvalidInput
 
 RECORDS = Path(__file__).parents[2].parent / "shared" / "records"
@@ -165,7 +164,7 @@ def test_a_column_that_still_topples_as_its_motion_ends_is_followed_to_the_groun
 
 
 def test_the_scale_at_which_it_falls_is_between_a_run_that_stands_and_one_that_falls():
-    found = collapse_scale(
+    found = af.collapse_scale(
         model(),
         PULSE,
         damping=DAMPED,
@@ -198,4 +197,4 @@ def test_what_is_not_known_for_large_displacements_is_refused():
     with pytest.raises(InvalidInput, match="tension"):
         af.build(glued, fidelity="rigid", displacements="large")
     with pytest.raises(InvalidInput, match="displacements='large'"):
-        collapse_scale(model(displacements="small"), SHAKE)
+        af.collapse_scale(model(displacements="small"), SHAKE)

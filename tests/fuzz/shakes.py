@@ -3,7 +3,6 @@
 import runpy
 from pathlib import Path
 
-from archfem.dynamics.monitor import ENERGY_DRIFT_ERROR
 from fuzz.trial import ANSWERED, FOREIGN, NONSENSE, REFUSED, Came
 
 SCRIPT = Path(__file__).parents[1] / "benchmarks" / "random_structures.py"
@@ -23,6 +22,6 @@ def trial(seed: int, number: int, folder: Path) -> Came:
     came = tried(1000 * seed + number, displacements)
     if came.kind == "FOREIGN":
         return Came(FOREIGN, came.words, told)
-    if came.steps and not abs(came.drift) <= ENERGY_DRIFT_ERROR:
+    if came.steps and not abs(came.drift) <= 0.5:  # the monitor ends a run above
         return Came(NONSENSE, f"drift {came.drift:.0%}; {came.words}", told)
     return Came(ANSWERED if came.steps else REFUSED, came.words, told)

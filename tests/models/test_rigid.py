@@ -5,7 +5,7 @@ import pytest
 
 import archfem as af
 from archfem.joints import Quadrature
-from archfem.models.rigid import build_rigid_model
+from archfem.models.linear_blocks import build_rigid_model
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from archfem.dynamics.accuracy import Setting
 from archfem.dynamics.error_estimation import default_damping, largest_difference, run_peaks
 from archfem.dynamics.model_selection import TRIED_SETTINGS, exact_discretisation, select_model
 from archfem.models.builder import build as plain
-from archfem.models.rigid import build_rigid_model
+from archfem.models.linear_blocks import build_rigid_model
 
 STIFF = af.Contact(1.48e10, 0.3e10)
 SCENES = {

@@ -80,7 +80,7 @@ BLOCKS = {
     "limit.thickness.minimum_thickness": {"tolerance": 1e-6},
     "models.discretisation.Discretisation": {"cells": (4, 4), "degree": 1},
     "models.export.write_state": {"magnification": 1.0},
-    "models.rigid.build_rigid_model": {"cells": 4},
+    "models.linear_blocks.build_rigid_model": {"cells": 4},
     "models.model.Prediction": {"small_displacement_error": 0.0},
     "statics.pushover.Stop": {"slope": 1e-6, "displacement": 0.1, "steps": 400},
     "statics.newton.Newton": {"tolerance": 1e-10},

@@ -99,7 +99,7 @@ def test_broken_space_tied_together_is_the_conforming_one(stack, degree):
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
 def test_operator_equals_forms(ring, rule, degree, cell, verified):
     """Force and tangent of the sparse products and of the compiled UFL forms."""
-    from archfem.models.full import build_full_model
+    from archfem.models.reference import build_full_model
 
     space = build_broken_space(
         generate_mesh(ring, af.models.Discretisation(cells=(3, 2), cell=cell)), degree

@@ -5,7 +5,6 @@ import pytest
 
 import archfem as af
 from archfem.view import draw_modes
-from archfem.view.statics import MODE_AMPLITUDE
 
 
 def drawn(axes):
@@ -23,7 +22,7 @@ def test_picture_of_shapes(ring_model):
     assert len(blocks) == len(ring_model.cells.polygons)
     cells, size = ring_model.cells, ring_model.structure.size
     moves = cells.displacement(found.shapes[:, 0])
-    moved = cells.places + MODE_AMPLITUDE * size * moves / np.linalg.norm(moves, axis=1).max()
+    moved = cells.places + 0.04 * size * moves / np.linalg.norm(moves, axis=1).max()
     for corner in np.concatenate(blocks):
         assert np.linalg.norm(moved - corner, axis=1).min() < 1e-9 * size
     for numbers in ([], [0], [4]):

@@ -8,7 +8,6 @@ import pytest
 import archfem as af
 from archfem.motion import Match
 from archfem.view import draw_motion, draw_spectra, draw_suite
-from archfem.view.motions import SPECTRUM_PERIODS
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +31,8 @@ def test_spectra_show_horizontal_and_vertical(shaking):
     level, upright = figure.get_axes()
     assert len(level.get_lines()) == 2
     assert len(upright.get_lines()) == 1
-    expected = af.response_spectrum(shaking, SPECTRUM_PERIODS) / af.units.STANDARD_GRAVITY
+    periods = np.geomspace(0.02, 3.0, 150)
+    expected = af.response_spectrum(shaking, periods) / af.units.STANDARD_GRAVITY
     assert level.get_lines()[0].get_ydata() == pytest.approx(expected)
     with pytest.raises(af.InvalidInput, match="no motion"):
         draw_spectra([])
@@ -42,10 +42,11 @@ def test_suite_spectra_show_mean_and_target(shaking):
     suite = af.Suite("two", (shaking, shaking.scaled(3.0)), reduction=3.0)
     target = af.Tbec2018(ss=1.0, s1=0.3, site="ZC")
     level, upright = draw_suite(suite, target).get_axes()
+    periods = np.geomspace(0.02, 3.0, 150)
     first, _, mean, aim = (line.get_ydata() for line in level.get_lines())
     assert mean == pytest.approx(2.0 * first)
-    assert aim == pytest.approx(target.horizontal(SPECTRUM_PERIODS))
-    assert upright.get_lines()[-1].get_ydata() == pytest.approx(target.vertical(SPECTRUM_PERIODS))
+    assert aim == pytest.approx(target.horizontal(periods))
+    assert upright.get_lines()[-1].get_ydata() == pytest.approx(target.vertical(periods))
 
 
 def test_target_is_drawn_where_it_is_defined(shaking):

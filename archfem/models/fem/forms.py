@@ -38,6 +38,7 @@ from archfem.joints.contact_law import (
 )
 from archfem.joints.operator import SLIP_LIMIT_TOLERANCE
 from archfem.joints.quadrature import Quadrature
+from archfem.masonry.materials import Material
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.joint_facets import JointFacets, Patch, PointReader
 from archfem.models.fem.space import BrokenSpace
@@ -242,23 +243,22 @@ class Forms:
     def _width(self) -> Any:
         return self._number(self.space.mesh.structure.width)
 
+    def _stress(self, u: Any, material: Material) -> Any:
+        return plane_stress(u, self._number(material.young), self._number(material.poisson))
+
     def block_work(self, u: Any, v: Any) -> Any:
         """Return ∫ w σ(u):ε(v), a UFL form."""
         width = self._width
-        terms = [
-            width
-            * ufl.inner(plane_stress(u, self._number(m.young), self._number(m.poisson)), strain(v))
-            * dx
-            for m, dx in self._measures
-        ]
-        return sum(terms[1:], terms[0])
+        return sum(
+            width * ufl.inner(self._stress(u, material), strain(v)) * dx
+            for material, dx in self._measures
+        )
 
     def over_joints(self, densities: list[Any]) -> Any:
         """Return Σ ∫ w d over the joints, a UFL form."""
         width = self._width
         pairs = zip(densities, self.faces, strict=True)
-        terms = [width * density * faces.patch.measure for density, faces in pairs]
-        return sum(terms[1:], terms[0])
+        return sum(width * density * faces.patch.measure for density, faces in pairs)
 
     def joint_work(self, tractions: list[Fields], v: Any) -> Any:
         """Return Σ ∫ w (t_n ⟦v⟧·n + t_s ⟦v⟧·t), a UFL form."""
@@ -280,11 +280,11 @@ class Forms:
         structure = self.space.mesh.structure
         u, v = ufl.TrialFunction(self.space.functions), ufl.TestFunction(self.space.functions)
         width = self._number(structure.width)
-        terms = [
+        integral = sum(
             width * self._number(m.unit_weight / structure.gravity) * ufl.inner(u, v) * dx
             for m, dx in self._measures
-        ]
-        return _fenicsx.assemble_matrix(fem.form(sum(terms[1:], terms[0])))
+        )
+        return _fenicsx.assemble_matrix(fem.form(integral))
 
     @cached_property
     def _displacements(self) -> Fields:
@@ -346,10 +346,10 @@ class Forms:
         cellwise = _fenicsx.vector_space(grid, "DG", 0, 3)
         u, test = ufl.TrialFunction(self.space.functions), ufl.TestFunction(cellwise)
         terms = []
-        for m, dx in self._measures:
-            s = plane_stress(u, self._number(m.young), self._number(m.poisson))
+        for material, dx in self._measures:
+            s = self._stress(u, material)
             terms.append(ufl.inner(ufl.as_vector([s[0, 0], s[1, 1], s[0, 1]]), test) * dx)
-        integral = _fenicsx.assemble_matrix(fem.form(sum(terms[1:], terms[0])))
+        integral = _fenicsx.assemble_matrix(fem.form(sum(terms)))
         ones = ufl.inner(ufl.as_vector([1.0, 1.0, 1.0]), test) * ufl.dx(domain=grid)
         areas = _fenicsx.assemble_vector(fem.form(ones))
         # σ_xx, σ_yy, σ_xy of each cell in turn

@@ -229,7 +229,7 @@ class JointFacets:
             of_colour = [test[patch.colour * size + k] for k in range(size)]
             pairs = zip(products, of_colour, strict=True)
             terms.append(sum(value * each for value, each in pairs) * patch.measure)
-        return PointReader(fem.form(sum(terms[1:], terms[0])), places)
+        return PointReader(fem.form(sum(terms)), places)
 
     def read(self, reader: PointReader) -> Array:
         """Return values at the points of each facet (n, f, k)."""

@@ -87,6 +87,11 @@ def test_what_cannot_be_written(tmp_path):
         write_state(model, np.zeros(3), tmp_path / "column.words")
     with pytest.raises(af.InvalidInput, match="the model has 3"):
         write_state(model, np.zeros(4), tmp_path / "column.dxf")
+    arc = af.build(
+        af.circular_arch(radius=3.0, thickness=0.6, embrace=150.0, voussoirs=5), fidelity="rigid"
+    )
+    with pytest.raises(af.InvalidInput, match="meshio does not write this model as"):
+        write_state(arc, np.zeros(arc.size), tmp_path / "arch.vtk")
 
 
 @pytest.mark.parametrize("suffix", [".vtk", ".vtu"])

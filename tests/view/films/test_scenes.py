@@ -9,11 +9,9 @@ import archfem as af
 from archfem.view import film, picture
 from archfem.view.films.frames import even_timing
 from archfem.view.positions import fields_at
-from archfem.view.style import Colour
 
 SIZE = (640, 400)  # small: rendering takes the time
-RED = np.array([int(Colour.HINGE[k : k + 2], 16) for k in (1, 3, 5)])
-GREEN = np.array([int(Colour.MECHANISM[k : k + 2], 16) for k in (1, 3, 5)])
+RED, GREEN = np.array([215, 38, 30]), np.array([0, 158, 115])  # of hinges and mechanisms
 
 
 def reds(image):
