@@ -307,7 +307,7 @@ def _cache_folder() -> Path | None:
     atexit.register(shutil.rmtree, temporary, ignore_errors=True)
     logger.warning(
         "compiled code cannot be stored: neither beside %s nor in %s may be written, so that every "
-        "run compiles for a minute; set %s to a folder that you may write to",
+        "run compiles for a minute or more; set %s to a folder that you may write to",
         SOURCE_FOLDERS[0],
         " or ".join(map(str, places)),
         CACHE_VARIABLE,

@@ -6,6 +6,7 @@ import traceback
 import unicodedata
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from functools import cache, wraps
 from math import inf, isfinite
 from numbers import Integral
@@ -38,6 +39,24 @@ def report_user_errors(what: str) -> Iterator[None]:
         ]
         place = f" at {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
         raise InvalidInput(f"{what} failed{place}: {type(error).__name__}: {error}") from error
+
+
+def read_field_kinds(what: str, cls: type) -> dict[str, Any]:
+    """Return the kinds of the keys of a case that are fields of a dataclass of the user.
+
+    Numbers are without unit, or have that of `field(metadata={"unit": …})`.
+    """
+    if not is_dataclass(cls):
+        raise InvalidInput(f"{what}: {cls!r} is no dataclass: write @dataclass(frozen=True)")
+    with report_user_errors(what):
+        hints = get_type_hints(cls)
+    kinds: dict[str, Any] = {}
+    for each in fields(cls):
+        kind = hints[each.name]
+        if kind not in (float, int, str):
+            raise InvalidInput(f"{what}, {each.name}: {kind!r} is none of float, int and str")
+        kinds[each.name] = each.metadata.get("unit", "1") if kind is float else kind
+    return kinds
 
 
 def short_repr(value: Any, max_length: int = 200) -> str:

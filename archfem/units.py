@@ -133,13 +133,19 @@ def in_si_unit(values: Sequence[Any]) -> tuple[list[Any], str]:
 
 
 def _check_text(text: str, unit: str, key: str) -> None:
-    """Refuse long text and high powers, which pint would evaluate for hours."""
+    """Refuse commas, and long text and high powers, which pint would evaluate for hours."""
     power_pattern = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-+]?\s*(\d{1,2}(?![\deE]))?")
     superscript_pattern = re.compile(r"[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
     if len(text) > 100:
         raise InvalidInput(
             f"{key} = {short_repr(text)} is no quantity, for it has {len(text)} letters: write a "
             f"number in {unit}"
+        )
+    # pint would take the comma out: 2,95 m for 295 m
+    if comma := re.search(r"\d,\d", text):
+        raise InvalidInput(
+            f"{key} = {text!r} has a comma in its number, {comma[0]!r}: write a point for "
+            "decimals, and nothing between thousands"
         )
     powers = [match[1] for match in power_pattern.finditer(text)]
     # no unit of mechanics has a power above 12

@@ -2,18 +2,24 @@
 
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
 from chromium import BROWSER
 
 import archfem as af
+from archfem.cases.provenance import OWN_CODE_VARIABLE
 
 PAGE = (Path(__file__).parents[1] / "docs" / "howto" / "tasks.md").read_text(encoding="utf-8")
 TASKS = dict(re.findall(r"^## (.*?)\n(.*?)(?=^## |\Z)", PAGE, re.DOTALL | re.MULTILINE))
 
-FILES = dict(re.findall(r"`([\w.]+)`[^`]*\n\n```toml\n(.*?)```", PAGE, re.DOTALL))
-"""Case files of all tasks, under the name in the line above."""
+FILES = dict(
+    match
+    for kind, language in (("toml", "toml"), ("py", "python"))
+    for match in re.findall(rf"`(\w+\.{kind})`[^`]*\n\n```{language}\n(.*?)```", PAGE, re.DOTALL)
+)
+"""Case files and modules of all tasks, under the name in the line above."""
 
 BLOCK = re.compile(r"```(python|sh)\n(.*?)```(?:\n\n```text\n(.*?)```)?", re.DOTALL)
 
@@ -49,6 +55,8 @@ def test_a_task_runs_and_prints_what_it_shows(task, tmp_path, monkeypatch, capsy
     if "--pdf" in TASKS[task] and BROWSER is None:
         pytest.skip("there is no chromium: apt-get install chromium")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(OWN_CODE_VARIABLE, "")  # permissions end with the test
+    monkeypatch.setattr(sys, "path", list(sys.path))
     for name, content in FILES.items():
         Path(name).write_text(content, encoding="utf-8")
     space = {"__name__": "__main__"}

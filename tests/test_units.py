@@ -27,6 +27,12 @@ def test_a_common_unit_of_another_dimension_is_refused(text, si):
         af.units.in_unit(text, si, "length")
 
 
+@pytest.mark.parametrize("text", ["2,95 m", "1,000 m", "-0,5e3 mm"])
+def test_a_comma_in_a_number_is_refused(text):
+    with pytest.raises(af.InvalidInput, match=r"has a comma in its number.*write a point"):
+        af.units.in_unit(text, "m", "length")
+
+
 @pytest.mark.parametrize("mass", ["10 t", "10000 kg"])
 def test_a_mass_in_place_of_a_weight_is_refused_with_its_weight(mass):
     with pytest.raises(af.InvalidInput, match=r"is a mass: give its weight, '98\.1 kN'"):

@@ -122,9 +122,8 @@ def build_spectrum(table: Table, section: str) -> DesignSpectrum:
     known = [*TARGET_SPECTRA, *REGISTERED_SPECTRA]
     code = check_choice(values.pop("code", None), known, f"{section}.code")
     if code not in TARGET_SPECTRA:
-        kinds = {float: "1", int: int, str: str}
-        own = {key: kinds[kind] for key, kind in REGISTERED_SPECTRA[code][1].items()}
-        return build_registered_spectrum(code, check_table(values, own, section))
+        own = check_table(values, REGISTERED_SPECTRA[code][1], section)
+        return build_registered_spectrum(code, own)
     spectrum, keys = TARGET_SPECTRA[code]
     try:
         return spectrum(**check_table(values, keys, section))

@@ -7,6 +7,9 @@ Python modules of the user, which a case names in `extensions`, are such files. 
 no file runs by itself: a module is loaded after `load_extension`, or by a command with
 `--own-code`.
 Permissions are stored in the environment, which worker processes inherit.
+
+Installed packages may add to archfem as well, by entry points of the group `archfem.extensions`.
+They need no permission: the user has installed them. Their version is part of a digest.
 """
 
 import hashlib
@@ -16,6 +19,7 @@ import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -41,7 +45,8 @@ def list_input_files(settings: Table, folder: Path = Path()) -> list[Path]:
         for section, key in named
         if key in (table := _as_table(settings.get(section)))
     ]
-    files += [folder / str(name) for name in settings.get("extensions", ())]
+    own = map(str, settings.get("extensions", ()))
+    files += [folder / name for name in own if name.endswith(".py")]
     files += [folder / name for name in _record_names(settings.get("motion"))]
     for pair in _as_table(suite.get("pairs")).values():
         files += [folder / str(suite.get("folder", "")) / name for name in _record_names(pair)]
@@ -74,6 +79,7 @@ def _hash_modules() -> str:
 def hash_inputs(settings: Table, folder: Path = Path()) -> str:
     """Return the SHA-256 of a case, its input files and the program."""
     files = [(path.name, hash_file(path)) for path in list_input_files(settings, folder)]
+    files += _package_versions(settings)
     # Names without folders: a case that is moved with its files stays the same.
     # Keys are sorted, but the order of arches and piers is their order in the bridge.
     order = _tables_within(settings.get("structure"))
@@ -93,6 +99,7 @@ def hash_sections(
     # any section may name what a module of the user has registered
     named = tables | {"extensions": settings.get("extensions", ())}
     files = [(str(path), hash_file(path)) for path in list_input_files(named, folder)]
+    files += _package_versions(named)
     # keys are not sorted: the order of arches and piers is that in the bridge
     return hashlib.sha256(json.dumps([tables, files], default=str).encode()).hexdigest()
 
@@ -138,18 +145,21 @@ def load_extension(path: str | Path) -> ModuleType:
     in `extensions` may load it as well from then on, also in worker processes.
 
     Args:
-        path: file of the module; modules beside it can be imported by it.
+        path: file of the module, *.py; modules beside it can be imported by it. Or the name of an
+            installed extension, an entry point of the group `archfem.extensions`.
 
     Returns:
         The module.
 
     Raises:
-        InvalidInput: there is no such file, it ends in an error, its name is that of another
-            module, or it was changed after it had been loaded.
+        InvalidInput: there is no such file or package, it ends in an error, its name is that of
+            another module, or it was changed after it had been loaded.
     """
+    if not str(path).endswith(".py"):
+        return _load_package(str(path))
     path = Path(path)
     digest, name = hash_file(path), path.stem
-    if digest == "missing" or path.suffix != ".py":
+    if digest == "missing":
         raise InvalidInput(f"extension {path} is no file of a Python module: give its path, *.py")
     path = path.resolve()
     if _loaded.setdefault(name, digest) != digest:
@@ -171,6 +181,38 @@ def load_extension(path: str | Path) -> ModuleType:
     return module
 
 
+def _find_packages(name: str | None = None) -> list[EntryPoint]:
+    """Return the installed extensions of a name, or all."""
+    found = entry_points(group="archfem.extensions")
+    # a distribution that is on the path twice is listed twice
+    distinct = {(entry.name, entry.value): entry for entry in found}
+    return [entry for entry in distinct.values() if name in (None, entry.name)]
+
+
+def _package_versions(settings: Table) -> list[tuple[str, str]]:
+    """Return names and versions of the installed packages that a case names in `extensions`."""
+    names = [str(name) for name in settings.get("extensions", ())]
+    return [
+        (name, entry.dist.version if entry.dist else "unknown")
+        for name in names
+        for entry in _find_packages(name)
+    ]
+
+
+def _load_package(name: str) -> ModuleType:
+    """Import the module of an installed extension, which adds to archfem."""
+    found = _find_packages(name)
+    if len(found) != 1:
+        known = sorted({entry.name for entry in _find_packages()})
+        raise InvalidInput(
+            f"extension '{name}' is that of {len(found)} installed packages: name one of {known}, "
+            "or a file *.py"
+        )
+    with report_user_errors(f"extension '{name}'"):
+        module: ModuleType = found[0].load()
+    return module
+
+
 def permit_extensions() -> None:
     """Permit the extensions of all cases that this process and its workers read."""
     _permit("*")
@@ -186,6 +228,9 @@ def load_extensions_of(settings: Table, folder: Path) -> None:
     """Load the extensions of a case, or refuse those that are not permitted."""
     given = {key: settings[key] for key in ("extensions",) if key in settings}
     for name in check_table(given, {"extensions": [str]}, "case").get("extensions", []):
+        if not name.endswith(".py"):
+            _load_package(name)
+            continue
         path = (folder / name).resolve()
         # a report reads its case without the files of it
         if path.stem in _loaded and not path.exists():

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from archfem.cases.provenance import hash_file, list_input_files
 from archfem.cases.toml_file import NumberOrWord, Table, check_choice, check_table
 from archfem.errors import InvalidInput
+from archfem.joints.own_law import REGISTERED_LAWS, JointLaw, build_registered_law
 from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.construction import Stage, resolve_stages, usual_stages
 from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, Contact, Material
@@ -34,7 +35,7 @@ KEY_KINDS: Table = {
     **dict.fromkeys(("material", "contact", "state", "unit", "measured"), str),
     **dict.fromkeys(("part", "role"), str),
     **dict.fromkeys(("arches", "piers", "sidewalls", "backfill", "paving"), dict),
-    **dict.fromkeys(("layers", "contacts"), dict),
+    **dict.fromkeys(("layers", "contacts", "law"), dict),
     **dict.fromkeys(("fixed", "ignore"), bool),
     **dict.fromkeys(("embrace", "skewback"), "degree"),
     "embraces": ["degree"],
@@ -219,7 +220,16 @@ def _resolve_preset(
     keys = _keys_of(cls)
     values = {key: getattr(presets[name], key) for key in keys} if name in presets else {}
     values |= check_table(tables.get(name, {}), keys, f"{section}.{name}")
+    if values.get("law") is not None:
+        values["law"] = _joint_law(values["law"], f"{section}.{name}.law")
     return _call(cls, f"{section}.{name}", **values, name=name)
+
+
+def _joint_law(table: Table, section: str) -> JointLaw:
+    """Return a joint law that a module of the user has registered."""
+    values = dict(table)
+    name = check_choice(values.pop("name", None), REGISTERED_LAWS, f"{section}.name")
+    return build_registered_law(name, check_table(values, REGISTERED_LAWS[name][1], section))
 
 
 def parse_stages(table: Any, structure: Structure) -> Sequence[Stage] | None:

@@ -213,7 +213,7 @@ def _add_result_commands(commands: Any) -> None:
 
 def _add_installation_commands(commands: Any) -> None:
     """Add the commands on the installation and its example cases."""
-    about = "compile the time steps once: about a minute"
+    about = "compile the time steps once: a minute or two"
     add = _add_command(commands, "compile", about, "run", "compile_steps")
     add("--jobs", type=int, help="processes that compile (one a core)")
     _add_command(commands, "examples", "the cases that archfem brings, a line each", "tools")

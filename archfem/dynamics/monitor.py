@@ -272,11 +272,12 @@ class RunMonitor:
         slip, name = self._mismatch
         if slip <= doubtful:
             return
+        rigid = self.model.fidelity == "rigid"
+        coarser = "" if rigid else ", fidelity 'faces' or 'rigid' for stones"
         doubt = Doubt(
             f"by t = {time:.4g} s the faces of '{name}' had slid by {slip:.2g} of a facet, though "
             "they are paired as meshed",
-            "take fewer cells, fidelity 'faces' or 'rigid' for stones, or cut the fill with "
-            "jointed_fill",
+            f"take fewer cells{coarser}, or cut the fill with jointed_fill",
         )
         if slip > 1.0:
             raise DidNotConverge(str(doubt), last=self._before)

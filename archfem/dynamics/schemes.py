@@ -241,6 +241,11 @@ def check_friction_scheme(scheme: Scheme, structure: Structure) -> None:
     if isinstance(scheme, Conserving):
         return
     name, friction = type(scheme).__name__, structure.friction
+    if structure.has_own_laws:
+        raise InvalidInput(
+            f"{name} follows no history, and contacts have a law of their own: use "
+            "scheme=Conserving(), the default"
+        )
     if np.isfinite(friction).any():
         raise InvalidInput(
             f"{name} follows no sliding, and joints slide at "

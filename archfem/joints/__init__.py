@@ -1,10 +1,10 @@
 """Mechanics of dry joints: contact law, quadrature, resultants and failure criteria.
 
-    bonds             dilatancy and tensile bonds
-    contact_law       traction of a dry joint, instant and step mean
+    contact_law       traction of a dry joint, instant and step mean; dilatancy and bonds
     criteria          Criteria, failure flags, durations
     large             joints between blocks with large displacements and rotations, compiled
     operator          joint operator G, forces, tangent, slip memory
+    own_law           joint laws of the user: tractions, tangent and history
     quadrature        quadrature rules and points
     resultants        N, V, M, e; opening, rotation, slip; tables
     rigid_kinematics  G of rigid blocks

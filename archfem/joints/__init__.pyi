@@ -3,6 +3,9 @@ from .criteria import assessed_joints as assessed_joints
 from .criteria import failure_flags as failure_flags
 from .criteria import part_roles as part_roles
 from .operator import JointOperator as JointOperator
+from .own_law import DryJoint as DryJoint
+from .own_law import JointLaw as JointLaw
+from .own_law import register_joint_law as register_joint_law
 from .quadrature import Quadrature as Quadrature
 from .resultants import joint_dataset as joint_dataset
 from .resultants import joint_table as joint_table

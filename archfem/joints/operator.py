@@ -3,7 +3,7 @@
 The sparse operator G takes coordinates q to (opening, slip) at points along the joints, its
 transpose takes forces there to generalised forces. Whatever the coordinates are (nodal
 displacements, rigid motions, modes), the joint forces are Gᵀ f(G q) and their tangent is Gᵀ f' G,
-with the law f of `contact_law` and the effects of dilatancy and tensile bonds of `bonds`.
+with the law f of `contact_law`, which has dilatancy and tensile bonds as well.
 
 Joints have memory: the irreversible slip of each point, and which bonds are broken. Forces follow
 from the displacements since the memory was updated.
@@ -20,8 +20,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem._typing import Array
-from archfem.joints.bonds import Bonds, dilatancy_opening
-from archfem.joints.contact_law import Facets, Law, clip_to_friction
+from archfem.joints.contact_law import (
+    Bonds,
+    Facets,
+    Law,
+    clip_to_friction,
+    dilatancy_opening,
+)
 from archfem.joints.quadrature import JointPoints
 
 Flags = NDArray[np.bool_]

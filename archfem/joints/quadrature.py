@@ -137,6 +137,7 @@ class JointPoints:
     joint_count: int
     dilatancy: Array | None = None  # tan ψ (p,) [-]; None without dilatancy at any point
     tension: Array | None = None  # tensile strength f_t (p,) [Pa]; None without bonds
+    has_own_laws: bool = False  # whether any point has a law of the user
 
     @classmethod
     def on(cls, structure: Structure, rules: list[tuple[Array, Array]]) -> "JointPoints":
@@ -155,6 +156,7 @@ class JointPoints:
             len(rules),
             _spread_if_any([contact.dilatancy for contact in contacts], joint),
             _spread_if_any([contact.tension for contact in contacts], joint),
+            structure.has_own_laws,
         )
 
     def selected(self, rows: Numbers, weight: Array) -> "JointPoints":
@@ -165,8 +167,8 @@ class JointPoints:
 
     @property
     def is_plain(self) -> bool:
-        """Whether no point has dilatancy or a bond."""
-        return self.dilatancy is None and self.tension is None
+        """Whether no point has dilatancy, a bond or a law of the user."""
+        return self.dilatancy is None and self.tension is None and not self.has_own_laws
 
     @cached_property
     def slides(self) -> NDArray[np.bool_]:

@@ -4,8 +4,8 @@ import numpy as np
 from scipy import sparse
 
 from archfem._typing import Array
-from archfem.joints.contact_law import choose_law
 from archfem.joints.operator import JointOperator
+from archfem.joints.own_law import make_operator
 from archfem.joints.quadrature import JointPoints, Numbers, Quadrature
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 
@@ -23,7 +23,7 @@ def rigid_joint_operator(structure: Structure, cells: int, rule: Quadrature) -> 
     jump = _jump_entries(structure, points, places)
     size = 3 * len(structure.free)
     opening, slip = (_component(directions, jump, size) for directions in (normals, tangents))
-    return JointOperator(choose_law(rule, points), opening, slip)
+    return make_operator(structure, rule, points, opening, slip)
 
 
 def block_motion_gaps(structure: Structure, points: JointPoints, motion: Array) -> Array:

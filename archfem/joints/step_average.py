@@ -16,10 +16,10 @@ from functools import cached_property
 import numpy as np
 
 from archfem._typing import Array
-from archfem.joints.bonds import dilatancy_opening
 from archfem.joints.contact_law import (
     ZERO_DIVISION_GUARD,
     clip_to_friction,
+    dilatancy_opening,
     friction_excess,
     shear_over_step,
 )

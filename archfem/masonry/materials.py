@@ -1,5 +1,6 @@
 """Block materials and joint contacts, with presets of Demirel and Aldemir (2021)."""
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from math import inf, nextafter
 from typing import Any
@@ -91,6 +92,9 @@ class Contact:
         dilatancy: tan ψ of the saw teeth, from 0 to μ; 0 slides flat [-].
         tension: tensile strength f_t of the bond, up to c / μ, the apex of Coulomb's limit; 0 has
             no bond [Pa].
+        law: law of the user in place of this one, as `archfem.joints.JointLaw`, or None. The
+            stiffnesses are then those of modes and damping, and friction is that of limit analysis
+            and of the criteria; cohesion, dilatancy and tension are left to the law.
 
     Example:
         >>> af.Contact(1.48e9, 0.30e9, friction=0.6, cohesion=5e3).slides
@@ -104,6 +108,7 @@ class Contact:
     cohesion: float = 0.0
     dilatancy: float = 0.0
     tension: float = 0.0
+    law: Any = None
 
     def __post_init__(self) -> None:
         """Check that the values are possible, which detects wrong units."""
@@ -130,6 +135,22 @@ class Contact:
             "give the tensile strength in Pa, up to cohesion / friction, where Coulomb's limit ends"
         )
         _check_range(self, "tension", 0.0, apex, " Pa", f"0 and {apex:.3g} Pa", remedy)
+        if self.law is not None:
+            self._check_law()
+
+    def _check_law(self) -> None:
+        """Check that a law of the user is frozen, and that it alone has cohesion and the like."""
+        if not isinstance(self.law, Hashable) or isinstance(self.law, str | type):
+            raise InvalidInput(
+                f"law {self.law!r} of '{self.name}' is no frozen object: give an object of a class "
+                "with @dataclass(frozen=True)"
+            )
+        for key in ("cohesion", "dilatancy", "tension"):
+            if getattr(self, key) != 0.0:
+                raise InvalidInput(
+                    f"{key} {getattr(self, key):.3g} of '{self.name}' beside a law: leave it out: "
+                    "it is part of the law"
+                )
 
     @property
     def coefficient(self) -> float:

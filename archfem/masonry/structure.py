@@ -193,6 +193,11 @@ class Structure(ResultDisplay):
         return float(np.linalg.norm(np.ptp(points, axis=0)))
 
     @cached_property
+    def has_own_laws(self) -> bool:
+        """Whether any joint has a law of the user."""
+        return any(joint.contact.law is not None for joint in self.joints)
+
+    @cached_property
     def fingerprint(self) -> str:
         """Digest of the geometry, rounded to a billionth of its size."""
         points = [*(block.points for block in self.blocks), *(joint.ends for joint in self.joints)]

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from archfem._threads import single_threaded
 from archfem.errors import InvalidInput
@@ -33,6 +34,8 @@ def build(structure: Structure, settings: Discretisation) -> Model:
 
 def _build_small(structure: Structure, settings: Discretisation) -> Model:
     """Build a model of small displacements."""
+    if structure.has_own_laws:
+        settings = _use_quadrature_points(settings)
     fidelities = _block_fidelities(structure, settings.fidelity)
     if settings.fidelity == "monolithic":
         _check_plain_joints(structure)
@@ -68,6 +71,21 @@ def _block_fidelities(structure: Structure, fidelity: str | Mapping[str, str]) -
         )
     default = fidelity.get("rest", "full")
     return [fidelity.get(b.name, fidelity.get(b.part, default)) for b in structure.blocks]
+
+
+def _use_quadrature_points(settings: Discretisation) -> Discretisation:
+    """Return settings with the points that laws of the user need, or refuse where none can act."""
+    what = "contacts have a law of their own, which "
+    if settings.displacements == "large":
+        raise InvalidInput(f"{what}does not exist with large displacements: use 'small'")
+    if settings.fidelity == "monolithic":
+        raise InvalidInput(f"{what}is not written in UFL: use fidelity='full', the same model")
+    if settings.quadrature == "exact":
+        raise InvalidInput(
+            f"{what}acts at points, and 'exact' quadrature has none: leave quadrature out, or use "
+            "'lobatto', 'trapezoidal', 'nodal' or 'gauss'"
+        )
+    return replace(settings, quadrature=settings.quadrature or "lobatto")
 
 
 def _check_plain_joints(structure: Structure) -> None:

@@ -18,6 +18,7 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem.joints.operator import JointOperator, Pattern
+from archfem.joints.own_law import OwnLawOperator, OwnLawStep
 from archfem.joints.quadrature import Quadrature
 from archfem.joints.resultants import face_matrix
 from archfem.joints.rigid_kinematics import block_motion_gaps, rigid_joint_operator
@@ -91,6 +92,8 @@ class LinearBlockModel(Model):
 
     def begin_step(self, start: Array, damping_lag: float) -> ModelStep:
         """Return a time step from a state with the present joint memory."""
+        if isinstance(self.operator, OwnLawOperator):
+            return LinearBlockStep(self, OwnLawStep(self.operator, start, damping_lag))
         return LinearBlockStep(self, StepForces(self.operator, start, damping_lag))
 
     def observer(self) -> Observer:
@@ -138,7 +141,7 @@ class LinearBlockStep:
     """A time step of linear blocks between joints."""
 
     model: LinearBlockModel  # with the joint memory at the start
-    joints: StepForces  # the same step of the joints alone
+    joints: StepForces | OwnLawStep  # the same step of the joints alone
 
     def force(self, q: Array) -> Array:
         """Return the mean of the internal forces of blocks and joints (n,)."""

@@ -1,8 +1,8 @@
 """Elastic design spectra in g: Turkish, European, Italian and American codes, and tables."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, is_dataclass
-from typing import Any, ClassVar, Protocol, get_type_hints
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from archfem._validation import (
     check_fields,
     check_number,
     is_one_of,
+    read_field_kinds,
     report_user_errors,
     validate_arguments,
 )
@@ -589,17 +590,10 @@ def register_spectrum(name: str, spectrum: type) -> None:
     Raises:
         InvalidInput: the class is no such dataclass.
     """
-    if not is_dataclass(spectrum):
-        raise InvalidInput(f"spectrum '{name}': {spectrum!r} is no dataclass: write @dataclass")
+    kinds = read_field_kinds(f"spectrum '{name}'", spectrum)
     for method in ("horizontal", "vertical"):
         if not callable(getattr(spectrum, method, None)):
             raise InvalidInput(f"spectrum '{name}' has no method {method}(periods)")
-    with report_user_errors(f"spectrum '{name}'"):
-        hints = get_type_hints(spectrum)
-    kinds: dict[str, Any] = {each.name: hints[each.name] for each in fields(spectrum)}
-    for key, kind in kinds.items():
-        if kind not in (float, int, str):
-            raise InvalidInput(f"spectrum '{name}', {key}: {kind!r} is none of float, int and str")
     REGISTERED_SPECTRA[name] = spectrum, kinds
 
 

@@ -171,6 +171,11 @@ def dead_load(
         raise InvalidInput(
             f"a model '{model.fidelity}' cannot be built in stages: use 'full', which is the same"
         )
+    if small.structure.has_own_laws:
+        raise InvalidInput(
+            "contacts have a law of their own, with which nothing is built in stages: leave out "
+            "the stages"
+        )
     small = small.with_support_motion(np.zeros_like(model.support_motion))
     solver = _create_solver(small, newton)
     built = _build_in_stages(solver, small, stages)

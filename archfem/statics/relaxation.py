@@ -119,7 +119,8 @@ def _solve_creep_step(
     try:
         return _solve_with_drag(solver, model, load, (start, start), drag, ("basic",))
     except DidNotConverge:
-        if not isinstance(model, LinearBlockModel):
+        # laws of the user have no limit of friction to update
+        if not isinstance(model, LinearBlockModel) or model.structure.has_own_laws:
             raise
     joints = model.operator
     limit, q, iterations = np.full(len(joints.points.offset), load_magnitude(load)), start, 0
@@ -164,7 +165,7 @@ def _relaxation_tolerance(solver: EquilibriumSolver, model: Model, q: Array, sca
 
 
 def has_irreversible_joints(model: Model) -> bool:
-    """Return whether joint memory may change joint forces: dilatancy or bonds."""
+    """Return whether joint memory may change joint forces: dilatancy, bonds or own laws."""
     return model.operator is not None and not model.operator.points.is_plain
 
 

@@ -82,7 +82,7 @@ def preload() -> None:
     # a full disk stops no study: the points compile what they need
     with suppress(OSError), path.open("ab", buffering=0) as file:
         compiled = file.tell() > 0
-        if not compiled:  # many workers of a cluster would compile the same for a minute
+        if not compiled:  # many workers of a cluster would compile the same for minutes
             fcntl.flock(file, fcntl.LOCK_EX)
         compile_variant("compliance, Conserving")
         if not compiled:

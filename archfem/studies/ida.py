@@ -272,7 +272,7 @@ class Ida:
 @validate_arguments
 def ida(
     case: Case,
-    motions: Sequence[Any] | Mapping[str, Any] | None = None,
+    motions: Motion | str | Path | Sequence[Any] | Mapping[str, Any] | None = None,
     *,
     limits: Sequence[str] | None = None,
     precision: float = 0.05,
@@ -290,8 +290,8 @@ def ida(
     Args:
         case: case of the structure; with `model.displacements = "large"` collapse is a limit state.
         motions: motions by name or in a sequence, each a `Motion`, the file of a record, relative
-            to the case's folder, or a table as [motion]; by default the pairs of the suite, scaled
-            and reduced as the case says.
+            to the case's folder, or a table as [motion]; a single `Motion` or file; by default the
+            pairs of the suite, scaled and reduced as the case says.
         limits: limit states, "first hinge", "four failures", "verified", "collapse"; by default all
             that the structure and model permit.
         precision: relative width of the final brackets [-].
@@ -322,7 +322,7 @@ def ida(
 
 
 def _points(
-    case: Case, motions: Sequence[Any] | Mapping[str, Any] | None
+    case: Case, motions: Motion | str | Path | Sequence[Any] | Mapping[str, Any] | None
 ) -> tuple[list[str], tuple[Point, ...]]:
     """Names of motions, and the case under each of them."""
     if motions is None:
@@ -331,6 +331,8 @@ def _points(
             raise InvalidInput("no motions were given, and the case has no [suite] of them")
         changes = [((PAIR_KEY, name),) for name in names]
         return names, tuple(Point(case.settings, case.folder, change) for change in changes)
+    if isinstance(motions, Motion | str | Path):
+        motions = [motions]
     if isinstance(motions, Mapping):
         named = dict(motions)
     else:

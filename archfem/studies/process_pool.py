@@ -6,6 +6,7 @@ these a model that no other worker has, so that each model is built once. A work
 replaced.
 """
 
+import atexit
 import logging
 import os
 import pickle
@@ -76,14 +77,10 @@ def evaluate_serially(
     points: Sequence[tuple[int, StudyPoint]], evaluator: Evaluator
 ) -> Iterator[tuple[int, Row]]:
     """Evaluate points in this process, one after another; a repeated warning is logged once."""
-    warnings: Counter[str] = Counter()
+    warnings = RunWarnings()
 
     def is_new(record: logging.LogRecord) -> bool:
-        if record.levelno != logging.WARNING:
-            return True
-        kind = re.sub(r"[\d.]+(e[-+]\d+)?", "#", record.getMessage())  # numbers differ by the run
-        warnings[kind] += 1
-        return warnings[kind] == 1
+        return record.levelno != logging.WARNING or warnings.is_new(record.getMessage())
 
     for number, point in points:
         logger.addFilter(is_new)
@@ -92,8 +89,25 @@ def evaluate_serially(
         finally:
             logger.removeFilter(is_new)
         yield number, row
-    if repeated := warnings.total() - len(warnings):
-        logger.warning("%d more warnings as above, of other runs, are not repeated", repeated)
+    warnings.log_repeated()
+
+
+class RunWarnings:
+    """Warnings of many runs, of which each kind is logged once."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[str] = Counter()
+
+    def is_new(self, message: str) -> bool:
+        """Count a warning; return whether it is the first of its kind."""
+        kind = re.sub(r"[\d.]+(e[-+]\d+)?", "#", message)  # numbers differ by the run
+        self._counts[kind] += 1
+        return self._counts[kind] == 1
+
+    def log_repeated(self) -> None:
+        """Log how many warnings were not repeated."""
+        if repeated := self._counts.total() - len(self._counts):
+            logger.warning("%d more warnings as above, of other runs, are not repeated", repeated)
 
 
 def evaluate_on_processes(
@@ -176,6 +190,7 @@ class Worker:
             _start(self._process)
         self.task: Task | None = None
         self.model: str | None = None
+        self.warnings: list[str] = []  # of the last task
 
     def send(self, task: Task) -> None:
         """Send a task; `receive` notices a worker that has died."""
@@ -186,11 +201,17 @@ class Worker:
     def receive(self) -> Row | None:
         """Receive the row of the task; None if the worker has died."""
         try:
-            row: Row = self.pipe.recv()
+            row: Row
+            row, self.warnings = self.pipe.recv()
         except (EOFError, OSError, pickle.UnpicklingError):
             return None
         self.task = None
         return row
+
+    def kill(self) -> None:
+        """Kill the process without waiting for its end."""
+        with suppress(ValueError):  # it has ended
+            self._process.kill()
 
     def end(self) -> str:
         """Kill the process unless it has ended, and describe its exit code."""
@@ -218,6 +239,10 @@ class WorkerPool:
         self._tasks, self._max_workers, self._log, self._shared = tasks, max_workers, log, shared
         self._workers: list[Worker] = []
         self._deaths: Counter[int] = Counter()
+        self._warnings = RunWarnings()
+        # a second Ctrl-C may come before or while `close` runs; at its end Python waits for all
+        # processes that are left, as long as their points take
+        atexit.register(self._kill)
 
     def rows(self) -> Iterator[tuple[int, Row]]:
         """Yield number and row of points as they finish."""
@@ -228,11 +253,19 @@ class WorkerPool:
                 self._assign()  # before the caller stores this row: no worker waits for that
                 if finished is not None:
                     yield finished
+        self._warnings.log_repeated()
 
     def close(self) -> None:
         """End all workers."""
+        self._kill()
         for worker in self._workers:
             worker.end()
+        atexit.unregister(self._kill)
+
+    def _kill(self) -> None:
+        """Kill all workers before any is waited for."""
+        for worker in self._workers:
+            worker.kill()
 
     def _assign(self) -> None:
         """Give a task to each free worker, and to new workers up to the largest number."""
@@ -252,6 +285,9 @@ class WorkerPool:
         task = worker.task
         assert task is not None
         row = worker.receive()
+        for message in filter(self._warnings.is_new, worker.warnings):
+            logger.warning("%s", message)
+        worker.warnings = []
         if row is not None:
             return task.number, row
         self._workers.remove(worker)
@@ -306,16 +342,27 @@ def _serve(pipe: Connection, log: str, shared: Path | None) -> None:
         for stream in (1, 2):
             os.dup2(file.fileno(), stream)
     np.random.seed()  # noqa: NPY002  (for users' functions: all workers would draw the same)
-    logging.getLogger("archfem").setLevel(logging.ERROR)  # warnings of one run of thousands
+    # the driver logs the warnings, each kind once
+    warnings: list[str] = []
+    logger.addFilter(lambda record: _keep_warning(record, warnings))
     with suppress(EOFError, OSError), threadpool_limits(1), share_results(shared):
         while True:
             message = pipe.recv_bytes()
             try:
                 point, evaluator = pickle.loads(message)
             except Exception as error:  # a function of a module that the worker cannot import
-                pipe.send(make_row({}, f"{type(error).__name__}: {error}", ours=False))
+                row = make_row({}, f"{type(error).__name__}: {error}", ours=False)
             else:
-                pipe.send(evaluate_point(point, evaluator))
+                row = evaluate_point(point, evaluator)
+            pipe.send((row, warnings))
+            warnings.clear()
+
+
+def _keep_warning(record: logging.LogRecord, warnings: list[str]) -> bool:
+    """Keep the text of a warning instead of logging it; return whether to log the record."""
+    if record.levelno == logging.WARNING:
+        warnings.append(record.getMessage())
+    return record.levelno != logging.WARNING
 
 
 def _end_with_driver() -> None:

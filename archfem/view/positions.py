@@ -34,6 +34,11 @@ def decisive_instant(run: History) -> float:
     """Return the time of collapse, else first mechanism, else largest |e| of a joint [s]."""
     if "fall_pose" in run.dataset:
         return float(run.dataset["fall_time"][0])
+    return first_motion_instant(run)
+
+
+def first_motion_instant(run: History) -> float:
+    """Return the time of the first mechanism, else of the largest |e| of a joint [s]."""
     # enough joints may fail while no block can move: a verified motion comes first
     verified = run.verified if run.structure is not None else None
     found = run.mechanism if verified is None else verified.moved

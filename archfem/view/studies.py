@@ -28,6 +28,18 @@ from archfem.view.style import (
 )
 
 
+class FragilityCurve(Protocol):
+    """Fragility curve, as far as it is drawn."""
+
+    median: float
+
+    def probability(self, intensity: Any) -> Array:
+        """Return the probability of the limit state at intensities."""
+
+    def band(self, intensity: Any) -> tuple[Array, Array]:
+        """Return the lower and the upper end of the confidence band at intensities."""
+
+
 class ConvergencePaths(Protocol):
     """Result of `mesh_sensitivity`, as far as it is drawn."""
 
@@ -271,8 +283,8 @@ def _explain_capacities(axes: Axes, capacities: Mapping[str, tuple[Array, Array]
 
 
 def draw_fragility(
-    curves: Mapping[str, tuple[Array, Array, Array]],
-    intensity: Array,
+    curves: FragilityCurve | Mapping[str, FragilityCurve | tuple[Array, Array, Array]],
+    intensity: Array | None = None,
     *,
     data: Mapping[str, tuple[Array, Array]] | None = None,
     measure: str = "peak ground acceleration [m/s²]",
@@ -280,18 +292,32 @@ def draw_fragility(
     """Draw fragility curves with their confidence bands, and the data to which they were fitted.
 
     Args:
-        curves: by limit state the probability, and the lower and upper end of its band (n,) [-].
-        intensity: intensities of the curves (n,).
+        curves: a `Fragility`; or by limit state such a curve, or the probability and the lower and
+            upper end of its band (n,) [-].
+        intensity: intensities of the curves (n,); by default up to three times the largest median.
         data: by limit state intensities and fractions of failures, drawn as marks.
         measure: label of the intensity axis.
 
     Returns:
         The figure.
+
+    Raises:
+        InvalidInput: probabilities are given without their intensities.
     """
+    named = curves if isinstance(curves, Mapping) else {"limit state": curves}
+    if intensity is None:
+        if any(isinstance(curve, tuple) for curve in named.values()):
+            raise InvalidInput("probabilities have no intensities: give intensity, or a Fragility")
+        largest = max(curve.median for curve in named.values())
+        intensity = np.linspace(0.0, 3.0 * largest, 301)[1:]
     figure = new_figure(COLUMN_WIDTH, 0.7 * COLUMN_WIDTH)
     axes = figure.add_subplot()
     style_axes(axes, measure, "probability of the limit state [-]")
-    for (name, (middle, low, high)), colour in zip(curves.items(), LINE_COLOURS, strict=False):
+    for (name, curve), colour in zip(named.items(), LINE_COLOURS, strict=False):
+        if isinstance(curve, tuple):
+            middle, low, high = curve
+        else:
+            middle, (low, high) = curve.probability(intensity), curve.band(intensity)
         axes.fill_between(intensity, low, high, color=colour, alpha=0.15, lw=0.0)
         axes.plot(intensity, middle, color=colour, lw=1.8, label=name)
         if data is not None and name in data:

@@ -12,7 +12,7 @@ import pytest
 
 import archfem as af
 from archfem.cases.motion_keys import build_spectrum
-from archfem.cases.provenance import OWN_CODE_VARIABLE
+from archfem.cases.provenance import OWN_CODE_VARIABLE, hash_inputs
 from archfem.dynamics.events import REGISTERED_CRITERIA
 from archfem.motion.records import reader
 
@@ -146,6 +146,56 @@ def test_a_module_that_has_changed_is_refused(permitted):
     path.write_text("# changed")
     with pytest.raises(af.InvalidInput, match="has changed since it was loaded"):
         af.cases.load_extension(path)
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """A distribution on the path, as pip leaves it, whose module registers a joint law."""
+    made = tmp_path / "site"
+    about = made / "ourlab-1.0.dist-info"
+    about.mkdir(parents=True)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: ourlab\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(
+        "[archfem.extensions]\nourlab = ourlab_additions\nbroken = ourlab_missing\n"
+    )
+    (made / "ourlab_additions.py").write_text(
+        "import archfem as af\naf.joints.register_joint_law('ours', af.joints.DryJoint)\n"
+    )
+    monkeypatch.syspath_prepend(str(made))
+    return about
+
+
+PACKAGED = """
+extensions = ["ourlab"]
+
+[structure]
+shape = "column"
+breadth = "0.6 m"
+heights = ["1.2 m"]
+
+[contacts."stone to stone".law]
+name = "ours"
+normal_stiffness = "2 MPa/mm"
+shear_stiffness = "1e9 Pa/m"
+"""
+
+
+def test_an_installed_package_adds_to_archfem(installed, permitted):
+    path = permitted / "case.toml"
+    path.write_text(PACKAGED)
+    case = af.Case.read(path)
+    law = af.joints.DryJoint(2e9, 1e9)
+    assert case.structure.joints[0].contact.law == law
+    digests = {hash_inputs(case.settings, case.folder)}
+    (installed / "METADATA").write_text("Metadata-Version: 2.1\nName: ourlab\nVersion: 1.1\n")
+    digests.add(hash_inputs(case.settings, case.folder))
+    assert len(digests) == 2
+    assert af.cases.load_extension("ourlab").__name__ == "ourlab_additions"
+    with pytest.raises(af.InvalidInput, match="extension 'broken' failed: ModuleNotFoundError"):
+        af.cases.load_extension("broken")
+    path.write_text(PACKAGED.replace("ourlab", "theirlab"))
+    with pytest.raises(af.InvalidInput, match=r"'theirlab' is that of 0 installed.*'ourlab'"):
+        af.Case.read(path)
 
 
 class Flat:

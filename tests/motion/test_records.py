@@ -312,6 +312,8 @@ def test_rounded_times_still_tell_the_step(write):
         ("0.00 1\n0.01 4\n0.02 5\n", {"units": "gal", "column": 1}, "choose from 2 to 2"),
         ("1 2\n3\n1 5\n", {"units": "gal", "dt": 0.01, "column": 1}, "line 2: 1 columns"),
         ("0,1\n0,2\n", {"units": "gal", "dt": 0.01, "column": 1}, "decimal commas"),
+        ("0.00;0,1\n0.01;0,2\n", {"units": "gal", "column": 2}, "line 1: .*decimal commas"),
+        ("# dt = 0,01 s\n1.0\n2.0\n", {"units": "gal"}, "'dt = 0,01': these look like decimal"),
         ("5\n", {"units": "gal", "dt": 0.01}, "one row is no accelerogram"),
         ("1\n2\n", {"units": "gal", "dt": "fast"}, "a number in seconds"),
         ("1\n2\nend\n", {"units": "gal", "dt": 0.01}, "line 3: numbers expected, got 'end'"),

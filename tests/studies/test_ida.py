@@ -65,6 +65,20 @@ def test_measures_grow_with_the_scale_as_they_do(small_ida):
     assert float(found.table["sa"][0]) == pytest.approx(sa)
 
 
+def test_a_motion_alone_is_a_list_of_one(small_ida, monkeypatch):
+    case, motion = small_ida[0], af.Motion.synthetic(duration=0.6, pga=9.0, seed=1)
+    points = []
+
+    def keep(study, *_, **__):
+        points.append(study.points)
+
+    monkeypatch.setattr(ida_module.Study, "run", keep)
+    for given in (motion, [motion]):
+        af.ida(case, given)
+    assert points[0][0].changes == points[1][0].changes
+    assert len(points[0]) == 1
+
+
 def test_it_goes_on_where_it_ended(small_ida, monkeypatch):
     case, folder, found = small_ida
 

@@ -1,5 +1,6 @@
 """Workers of a study: how they end, what they inherit, and who outlives whom."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -119,8 +120,12 @@ def test_a_script_without_a_main_guard_is_not_run_by_workers(small_ring, tmp_pat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
-def test_no_worker_outlives_a_driver_that_is_ended(small_ring, tmp_path, finders, ending):
+@pytest.mark.parametrize(
+    "endings",
+    [(signal.SIGKILL,), (signal.SIGINT,), (signal.SIGINT, signal.SIGINT)],
+    ids=["killed", "interrupted", "interrupted twice"],
+)
+def test_no_worker_outlives_a_driver_that_is_ended(small_ring, tmp_path, finders, endings):
     code = (
         f"import sys; sys.path.insert(0, {str(finders)!r})\n"
         "import archfem as af\n"
@@ -128,7 +133,8 @@ def test_no_worker_outlives_a_driver_that_is_ended(small_ring, tmp_path, finders
         "find = {'name': 'finders_of_tests:slowly', 'seconds': 60.0}\n"
         "af.Study.of(case, {'motion.scale': [1.0, 2.0, 3.0]}, find).run(workers=2)\n"
     )
-    driver = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
+    command = [sys.executable, "-c", code]
+    driver = subprocess.Popen(command, stderr=subprocess.DEVNULL, start_new_session=True)
     begun, workers, until = [], [], time.monotonic() + 60.0
     while len(workers) < 2 and time.monotonic() < until:
         time.sleep(0.05)
@@ -136,6 +142,8 @@ def test_no_worker_outlives_a_driver_that_is_ended(small_ring, tmp_path, finders
         workers = [worker for process in begun for worker in children(process)]
     assert len(workers) == 2
     time.sleep(0.2)
-    driver.send_signal(ending)
-    driver.wait()
+    for ending in endings:  # to all of them, as Ctrl-C in a terminal, but for a kill
+        os.kill(driver.pid, ending) if len(endings) == 1 else os.killpg(driver.pid, ending)
+        time.sleep(0.05)
+    driver.wait(timeout=20.0)
     assert all_end([*begun, *workers], within=5.0)  # long before their points would

@@ -1,7 +1,9 @@
 """Incremental dynamic analysis and fragility: what is drawn where."""
 
 import numpy as np
+import pytest
 
+import archfem as af
 from archfem.view import draw_fragility, draw_ida
 
 
@@ -38,6 +40,17 @@ def test_fragility_has_its_band_and_its_data():
     assert np.isclose(low, 0.0)
     named = [text.get_text() for text in axes.get_legend().get_texts()]
     assert named == ["verified", "confidence band", "data of the fit"]
+
+
+def test_fitted_curves_are_drawn_as_they_are():
+    curve = af.studies.stripe_fragility([1.0, 2.0, 3.0], [1, 10, 19], [20, 20, 20])
+    for given, name in ((curve, "limit state"), ({"verified": curve}, "verified")):
+        (axes,) = draw_fragility(given).axes
+        x, y = axes.lines[0].get_data()
+        assert np.interp(curve.median, x, y) == pytest.approx(0.5, abs=1e-3)
+        assert axes.get_legend().get_texts()[0].get_text() == name
+    with pytest.raises(af.InvalidInput, match="give intensity, or a Fragility"):
+        draw_fragility({"verified": (x, x, x)})
 
 
 def test_a_median_and_brackets_alone_are_named_alone():

@@ -156,7 +156,7 @@ def _tabulate_materials(structure: Structure) -> list[Grid]:
     ]
     contacts = [
         [
-            contact.name,
+            contact.name if contact.law is None else f"{contact.name}: {contact.law}",
             f"{contact.normal_stiffness / 1e9:.3g}",
             f"{contact.shear_stiffness / 1e9:.3g}",
             f"{contact.coefficient:g}" if contact.slides else "never slides",

@@ -161,7 +161,11 @@ def make_bodies(
 
 
 def check_cohesionless(structure: Structure) -> None:
-    """Refuse joints with cohesion, and warn of soft blocks, which are not rigid."""
+    """Refuse cohesion and laws of the user, and warn of soft blocks, which are not rigid."""
+    if structure.has_own_laws:
+        raise InvalidInput(
+            "contacts have a law of their own, which blocks that fall do not follow: leave it out"
+        )
     for joint in structure.joints:
         if joint.contact.cohesion > 0.0:
             raise InvalidInput(

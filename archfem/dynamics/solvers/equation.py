@@ -103,8 +103,8 @@ class Equation:
     def joints(self) -> JointOperator | None:
         """The joints, where these are all that is not linear and their law is compiled.
 
-        The compiled law covers neither dilatancy nor bonds; supports that have moved it covers for
-        the conserving scheme only.
+        The compiled law covers neither dilatancy nor bonds nor laws of the user; supports that
+        have moved it covers for the conserving scheme only.
         """
         joints = self.model.operator
         if joints is None or not joints.points.is_plain:
@@ -113,9 +113,10 @@ class Equation:
 
     @cached_property
     def remembers(self) -> int:
-        """Number of joint points whose irreversible slip is stored."""
-        slides = bool(np.isfinite(self.model.structure.friction).any())
-        return len(self.model.memory) if slides else 0
+        """Number of values of the joint memory that are stored."""
+        structure = self.model.structure
+        slides = bool(np.isfinite(structure.friction).any())
+        return len(self.model.memory) if slides or structure.has_own_laws else 0
 
     @cached_property
     def meter(self) -> EnergyMeter:

@@ -42,9 +42,9 @@ def stepper_for(
             raise InvalidInput(
                 f"method '{method}' does not apply to this model of fidelity "
                 f"'{equation.model.fidelity}': compliance needs small displacements; both need "
-                "joints that neither dilate nor resist tension and, with Newmark's method or HHT, "
-                "whose supports have not moved; neither applies to monolithic models; use "
-                "method='auto' or 'snes'"
+                "joints that neither dilate, nor resist tension, nor have a law of their own, and, "
+                "with Newmark's method or HHT, whose supports have not moved; neither applies to "
+                "monolithic models; use method='auto' or 'snes'"
             )
     return Stepper(equation, solver, exact=SnesSolver(equation, newton))
 
@@ -60,7 +60,7 @@ def select_solver(equation: Equation) -> StepSolver | None:
     if newton is None:
         operator = equation.model.operator
         if operator is not None and not operator.points.is_plain:
-            logger.info("joints dilate or resist tension: every step is solved by SNES")
+            logger.info("joints dilate, resist tension or have an own law: SNES solves every step")
         return None
     narrow = newton.half_width <= MAX_NEWTON_HALF_WIDTH
     return newton if equation.model.large_displacements or narrow else ComplianceSolver.of(equation)

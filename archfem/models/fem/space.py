@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem._typing import Array
-from archfem.joints.contact_law import choose_law
 from archfem.joints.operator import JointOperator
+from archfem.joints.own_law import make_operator
 from archfem.joints.quadrature import JointPoints, Quadrature
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.mesh import Mesh
@@ -81,7 +81,7 @@ def build_joint_operator(space: BrokenSpace, rule: Quadrature) -> JointOperator:
         _component(jumps, directions)[:, space.free].tocsr()
         for directions in (structure.normals[points.joint], structure.tangents[points.joint])
     )
-    return JointOperator(choose_law(rule, points), opening, slip)
+    return make_operator(structure, rule, points, opening, slip)
 
 
 def _joint_nodes(space: BrokenSpace) -> list[Nodes]:

@@ -62,12 +62,26 @@ def _read_table(text: RecordText) -> tuple[Array, list[int], str]:
                     "neither a table nor a known format",
                     line,
                 )
-    if "." not in "".join(text.lines[start:]) and text.contains(r"\d,\d", len(text.lines), start):
-        raise text.error("these look like decimal commas: write points", start)
+    _refuse_decimal_commas(text, start, "\n".join(comments))
     text.check_end()
     if len(table) < 2:
         raise text.error("one row is no accelerogram", start)
     return np.array(table), lines, "\n".join(comments)
+
+
+def _refuse_decimal_commas(text: RecordText, start: int, comments: str) -> None:
+    """Refuse numbers like 0,01, whose parts would be read as two columns or as a step of 0 s."""
+    remedy = "these look like decimal commas: write points, and separate columns by ; or ,"
+    step = r"(?:\bdt|\bdelta\s*t|\bstep|interval)\b[^\d\n]{0,12}\d+,\d+"
+    if stated := re.search(step, comments, re.IGNORECASE):
+        raise text.error(f"{stated[0]!r}: {remedy}")
+    # beside semicolons, or without any point, a comma between digits separates no columns
+    rows = text.lines[start:]
+    if text.contains(r"\d,\d", len(text.lines), start) and "." not in "".join(rows):
+        raise text.error(remedy, start)
+    for line, row in enumerate(rows, start):
+        if ";" in row and re.search(r"\d,\d", row):
+            raise text.error(remedy, line)
 
 
 def _is_time(rows: Array) -> bool:

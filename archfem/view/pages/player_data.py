@@ -24,7 +24,13 @@ from archfem.masonry.block import Block
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.models.model import Model, check_coordinate_count, check_model
 from archfem.view.joint_marks import DRAWN_DISPLACEMENT, joint_pairs
-from archfem.view.positions import FallingBlocks, block_kinds, ground_acceleration, recorded_fields
+from archfem.view.positions import (
+    FallingBlocks,
+    block_kinds,
+    first_motion_instant,
+    ground_acceleration,
+    recorded_fields,
+)
 
 # Default size of the packed part of a player [bytes]
 MAX_PACKED_BYTES = 3_000_000
@@ -215,10 +221,14 @@ class Scene:
     @cached_property
     def initial_time(self) -> float:
         """Time shown at first, and in print [s]: of the first mechanism, or the largest |e|."""
-        if self.run.mechanism is not None and self.run.mechanism.time is not None:
-            return float(self.run.mechanism.time)
-        e = abs(assessed_joints(self.run.joints)["eccentricity"]).max("joint").fillna(0.0)
-        return float(self.run.time[int(e.argmax("time"))])
+        return first_motion_instant(self.run)
+
+    @cached_property
+    def marks(self) -> set[str]:
+        """Kinds of marks that any instant shows: "hinge", "slip", "gap"."""
+        flags = _encode_flags(assessed_joints(self.run.joints)).astype(int)
+        shown = {"hinge": (flags & 3) != 1, "slip": (flags & 4) != 0, "gap": (flags & 8) != 0}
+        return {kind for kind, found in shown.items() if found.any()}
 
     @cached_property
     def initial_joint(self) -> int:

@@ -72,3 +72,20 @@ def test_scenes_of_another_structure_or_model_are_refused(rocked, ring):
     dataset = run.dataset.isel(coordinate=slice(3)).drop_vars(["last_q"])
     with pytest.raises(af.InvalidInput, match="there are 3 coordinates, and the model has 6"):
         Scene(model.structure, af.History(dataset), model)
+
+
+def test_the_legend_names_what_some_instant_shows(rocked):
+    model, run = rocked
+    legend = {
+        "hinge": ">hinge</span>",
+        "slip": ">sliding joint</span>",
+        "gap": ">open joint</span>",
+    }
+    still = af.time_history(model, af.Motion(np.zeros(11), 0.005), dt=0.005)
+    for each in (run, still):
+        flags, page = af.joints.assessed_joints(each.joints), each.player(model).page
+        shown = {"hinge": flags["hinge"] != 0, "slip": flags["slide"], "gap": flags["open"]}
+        for kind, text in legend.items():
+            assert (text in page) == bool(shown[kind].any()), kind
+    assert ">hinge</span>" in run.player(model).page
+    assert ">sliding joint</span>" not in still.player(model).page
