@@ -15,6 +15,7 @@ from scene_tools import (
     at_time,
     bisect,
     history,
+    impact_time,
     is_convex,
     polar_moment,
     rocking_ratio,
@@ -35,6 +36,9 @@ settings: dict[str, list[dict[str, Any]]] = {
 cannot = {
     "S03": "its blocks are convex, and stones with curved faces are not",
     "S10": "a wall takes it minutes",
+    "S12_1r": "its impacts take no ratio of angular velocities",
+    "S12_2r": "its impacts take no ratio of angular velocities",
+    "S12_3r": "its impacts take no ratio of angular velocities",
 }
 
 
@@ -189,11 +193,14 @@ def find_rocking(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, A
     angles = [tilt - float(pose[0, 2]) for _, pose in frames]
     (left, low), (right, _), (_, high) = block["outline"][:3]
     slenderness = float(np.arctan2(right - left, high - low))
-    first = next(time for (time, _), angle in zip(frames, angles, strict=True) if angle < 0.0)
-    ratio = rocking_ratio(angles, slenderness, scene["action"]["impacts"])
-    values = {"ratio": ratio, "first impact": first}
+    times = [time for time, _ in frames]
+    find = {
+        "ratio": lambda: rocking_ratio(angles, slenderness, scene["action"]["impacts"]),
+        "first impact": lambda: impact_time(times, angles, 1),
+        "seventh impact": lambda: impact_time(times, angles, 7),
+    }
     said = "peaks of the rotation"
-    return {"values": {name: values[name] for name in scene["quantities"]}, "said": said}
+    return {"values": {name: find[name]() for name in scene["quantities"]}, "said": said}
 
 
 QUESTIONS = {
