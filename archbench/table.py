@@ -146,7 +146,7 @@ def cell(row: Row, program: str) -> str:
     low, high = shown[numbers.index(min(numbers))], shown[numbers.index(max(numbers))]
     text = shown[0] if low == high else f"{shown[0]} ({low}–{high})"
     cost = row.cost(program)
-    times = f", {cost:.2g}×" if cost and program != "archfem" else ""
+    times = f", {float(f'{cost:.2g}'):g}×" if cost else ""
     outside = row.is_inside(program) is False
     return f"{text}{' ◦' if outside else ''}{times}"
 

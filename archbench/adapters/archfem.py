@@ -113,11 +113,17 @@ def find_factor(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, An
     """Find the horizontal acceleration at collapse by limit analysis."""
     ring = structure(scene)
     rules = {"factor": "coulomb", "associated": "coulomb", "flat": "nonassociated"}
-    values = {
-        name: af.collapse_factor(ring, live=af.BodyForce(1.0), friction=rules[name]).factor
+    found = {
+        name: af.collapse_factor(ring, live=af.BodyForce(1.0), friction=rules[name])
         for name in scene["quantities"]
     }
-    return {"values": values, "said": "limit analysis"}
+    # without a state the factor is a bound, which is no answer
+    values = {
+        name: result.factor
+        for name, result in found.items()
+        if result.solutions is None or np.isfinite(result.solutions.between[0])
+    }
+    return {"values": values, "said": "; ".join(str(result) for result in found.values())}
 
 
 def find_spread(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]:
