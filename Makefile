@@ -66,7 +66,7 @@ fuzz: .venv/compiled  ## malformed input by the thousand, a table; COUNT=100 for
 bench: .venv/bench  ## speed beside error, against OpenSees and a bare compiled loop
 	$(PYTHON) tests/benchmarks/run.py
 
-archbench: .venv/compiled  ## every program on every scene of Arch-Bench, its table and figures (15 min)
+archbench: .venv/compiled  ## every program on every scene of Arch-Bench, its table and figures (10 min)
 	$(PYTHON) -m archbench.run --install
 	$(PYTHON) -m archbench.table
 	$(PYTHON) -m archbench.figures

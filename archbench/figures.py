@@ -27,7 +27,8 @@ def measured(found: list[Row]) -> Figure:
         memory = row.grade == "m"
         axes.barh(place, 2 * half / middle, left=1 - half / middle, color="0.85", height=0.6)
         title = row.title.split(",")[0].removeprefix("free rocking: ")
-        labels.append(f"{title}{' (from memory)' if memory else ''}")
+        mark = " (from memory)" if memory else " (lengths from memory)" if row.from_memory else ""
+        labels.append(title + mark)
         answered = [name for name in PROGRAMS if row.numbers(name)]
         for step, name in enumerate(answered):
             numbers = np.array(row.numbers(name)) / middle

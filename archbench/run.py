@@ -1,86 +1,134 @@
 """Run programs on scenes and store their answers: `python -m archbench.run`.
 
-Each run is a process of its own with a time limit. A program that hangs, dies or gives no number
-is reported in its results, and on the last lines printed.
+Each program answers a scene in a process of its own with a time limit. A program that hangs, dies
+or gives no number is reported in its results, and on the last lines printed.
 """
 
 import argparse
 import json
 import math
 import os
+import resource
+import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from archbench.programs import Program, programs
 from archbench.scene import HERE, BenchError, read_references, read_scene, scene_names
 from archbench.worker import load
 
+ROOT = HERE.parent
 RESULTS = HERE / "results"
 
 # A run beyond this is ended [s]
-TIME_LIMIT = 90.0
+TIME_LIMIT = 60.0
 
 Answer = dict[str, Any]
 
 
-def run_once(
-    program: Program, scene: dict[str, Any], settings: dict[str, Any], limit: float = TIME_LIMIT
-) -> Answer:
-    """Run a program on a scene with given settings.
+class Process:
+    """A process of a program that answers a scene, by one settings after another.
 
-    Args:
-        program: to run.
-        scene: as read.
-        settings: of the program.
-        limit: on the time of the process [s].
-
-    Returns:
-        The answer of the adapter with its settings. Without one, "failed" says why.
+    It starts when it is first asked, and anew after it died or was ended.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        files = {name: Path(folder) / f"{name}.json" for name in ("scene", "settings", "answer")}
-        files["scene"].write_text(json.dumps(scene), encoding="utf-8")
-        files["settings"].write_text(json.dumps(settings), encoding="utf-8")
-        worker = str(HERE / "worker.py")
-        command = [str(program.executable), worker, str(program.adapter), *map(str, files.values())]
-        failed = _run_process(command, Path(folder), limit)
+
+    def __init__(self, program: Program, scene: dict[str, Any], limit: float = TIME_LIMIT) -> None:
+        """Prepare a process.
+
+        Args:
+            program: to run.
+            scene: as read.
+            limit: on the time of each answer [s].
+        """
+        self.program, self.scene, self.limit = program, scene, limit
+        self.process: subprocess.Popen[str] | None = None
+        self.count = 0
+
+    def __enter__(self) -> Self:
+        """Make a folder for the files."""
+        self.folder = Path(tempfile.mkdtemp())
+        (self.folder / "scene.json").write_text(json.dumps(self.scene), encoding="utf-8")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the process and remove its files."""
+        self._end()
+        shutil.rmtree(self.folder)
+
+    def ask(self, settings: dict[str, Any]) -> Answer:
+        """Return the answer of the adapter with its settings. Without one, "failed" says why."""
         found: Answer = {"settings": settings}
-        if not failed and files["answer"].exists():
-            found |= json.loads(files["answer"].read_text(encoding="utf-8"))
-            failed = _missing_numbers(found, scene)
+        self.count += 1
+        path = self.folder / f"answer {self.count}.json"
+        try:
+            process = self._started()
+            assert process.stdin is not None
+            print(json.dumps({"settings": settings, "answer": str(path)}), file=process.stdin)
+            process.stdin.flush()
+        except BrokenPipeError:
+            failed = self._said()
+        except OSError as error:
+            failed = f"does not start: {error}"
+        else:
+            failed = self._wait(process, path)
+        if not failed:
+            found |= json.loads(path.read_text(encoding="utf-8"))
+            failed = _missing_numbers(found, self.scene)
         return found | ({"failed": failed} if failed else {})
 
+    def _started(self) -> "subprocess.Popen[str]":
+        """Return the process, started where there is none."""
+        if self.process is None:
+            worker, scene = str(HERE / "worker.py"), str(self.folder / "scene.json")
+            one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+            paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+            with (self.folder / "errors.txt").open("w") as errors:
+                self.process = subprocess.Popen(
+                    [str(self.program.executable), worker, str(self.program.adapter), scene],
+                    cwd=self.folder,
+                    env={**os.environ, **one_thread, "PYTHONPATH": paths},
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.DEVNULL,
+                    stderr=errors,
+                    text=True,
+                )
+        return self.process
 
-def _run_process(command: Sequence[str], folder: Path, limit: float) -> str:
-    """Run a command; return why it failed, or nothing."""
-    one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    paths = [str(HERE.parent), os.environ.get("PYTHONPATH", "")]
-    environment = {**os.environ, **one_thread, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
-    try:
-        done = subprocess.run(
-            command,
-            cwd=folder,
-            env=environment,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=limit,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return f"no answer within {limit:g} s"
-    except OSError as error:
-        return f"does not start: {error}"
-    if done.returncode == 0:
+    def _wait(self, process: "subprocess.Popen[str]", path: Path, pause: float = 0.01) -> str:
+        """Wait for an answer; return why there is none, or nothing."""
+        latest = time.monotonic() + self.limit
+        while not path.exists():
+            if process.poll() is not None:
+                # it may have ended right after its answer
+                return "" if path.exists() else self._said()
+            if time.monotonic() > latest:
+                self._end()
+                return f"no answer within {self.limit:g} s"
+            time.sleep(pause)
         return ""
-    if done.returncode < 0:
-        return f"died of signal {-done.returncode}"
-    return (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+
+    def _said(self) -> str:
+        """Return why a process ended without an answer."""
+        assert self.process is not None
+        code = self.process.wait()
+        self._end()
+        if code < 0:
+            return f"died of signal {-code}"
+        text = (self.folder / "errors.txt").read_text(encoding="utf-8", errors="replace")
+        return (text.strip().splitlines() or [f"exit code {code}"])[-1]
+
+    def _end(self) -> None:
+        """End the process where there is one."""
+        if self.process is not None:
+            self.process.kill()
+            self.process.communicate()
+        self.process = None
 
 
 def _missing_numbers(found: Answer, scene: dict[str, Any]) -> str:
@@ -95,13 +143,62 @@ def _missing_numbers(found: Answer, scene: dict[str, Any]) -> str:
     return f"no number for {', '.join(missing)}" if missing else ""
 
 
-def run_scene(program: Program, name: str, limit: float = TIME_LIMIT) -> Answer:
-    """Run a program on a scene with each of its settings."""
+def run_scene(chosen: Sequence[Program], name: str, limit: float = TIME_LIMIT) -> dict[str, Answer]:
+    """Run programs on a scene with each of their settings; return the answers by program.
+
+    Beside the first settings of each other program archfem runs its own in turn with it, and the
+    processor times of both are the "cost" of the answer.
+    """
     scene = read_scene(name)
-    if why := program.refusal(scene):
-        return {"cannot": why}
-    settings = program.settings[scene["action"]["kind"]]
-    return {"runs": [run_once(program, scene, each, limit) for each in settings]}
+    kind = scene["action"]["kind"]
+    found: dict[str, Answer] = {}
+    (archfem,) = (program for program in programs() if program.name == "archfem")
+    with Process(archfem, scene, limit) as beside:
+        for program in chosen:
+            if why := program.refusal(scene):
+                found[program.name] = {"cannot": why}
+                continue
+            first, *others = program.settings[kind]
+            if program.name == "archfem":
+                found["archfem"] = {"runs": [beside.ask(each) for each in (first, *others)]}
+                continue
+            with Process(program, scene, limit) as process:
+                answer, cost = process.ask(first), {}
+                if "failed" not in answer and not archfem.refusal(scene):
+                    other = archfem.settings[kind][0]
+                    cost = {"cost": times_in_turn((process, first, answer), (beside, other))}
+                runs = [answer, *map(process.ask, others)]
+                found[program.name] = {"runs": runs, **cost}
+    return found
+
+
+def times_in_turn(
+    own: tuple[Process, dict[str, Any], Answer],
+    archfem: tuple[Process, dict[str, Any]],
+    turns: int = 3,
+    long: float = 3.0,
+) -> dict[str, list[float]]:
+    """Return processor times of a program and of archfem, run in turn [s].
+
+    Args:
+        own: process, settings and first answer of the program.
+        archfem: process and settings of archfem.
+        turns: number of runs of each.
+        long: a program whose answer takes longer is not run again [s].
+    """
+    (process, settings, answer), (beside, others) = own, archfem
+    found: dict[str, list[float]] = {"own": [], "archfem": []}
+    for _ in range(turns):
+        if answer["cpu_s"] <= long:
+            answer = process.ask(settings)
+        run = beside.ask(others)
+        if "failed" in answer or "failed" in run:
+            break
+        found["own"].append(answer["cpu_s"])
+        found["archfem"].append(run["cpu_s"])
+        if answer["cpu_s"] > long:
+            break
+    return found
 
 
 def results_of(program: str, folder: Path = RESULTS) -> dict[str, Answer]:
@@ -201,22 +298,44 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"{program.name}: skipped, not installed. {why}".rstrip())
         else:
             ready.append(program)
-    # all programs run a scene at about the same time, so that their costs compare
-    pairs = [(program, name) for name in names for program in ready]
-    found: dict[str, dict[str, Answer]] = {
-        program.name: results_of(program.name) for program in ready
-    }
-    with ThreadPoolExecutor(chosen.workers) as pool:
-        runs = [pool.submit(run_scene, *pair, chosen.limit) for pair in pairs]
-        for (program, name), run in zip(pairs, runs, strict=True):
-            found[program.name][name] = run.result()
-            store(program.name, found[program.name])
-            print(f"{name} {program.name}: {summary(found[program.name][name])}", flush=True)
-    for program in ready:
-        fresh = {name: found[program.name][name] for name in names}
-        wrong += failures(program.name, fresh)
+    start = time.monotonic()
+    wrong += run_all(ready, names, chosen.limit, chosen.workers)
     print(*wrong, f"{len(wrong)} things went wrong", sep="\n")
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    print(
+        f"{used.ru_utime + used.ru_stime:.0f} s of processor time in "
+        f"{time.monotonic() - start:.0f} s, {chosen.workers} scenes at a time"
+    )
     return len(wrong)
+
+
+def run_all(
+    chosen: Sequence[Program], names: Sequence[str], limit: float, workers: int
+) -> list[str]:
+    """Run programs on scenes, store and print the answers; return the runs without one."""
+    found = {program.name: results_of(program.name) for program in chosen}
+
+    def cost(name: str) -> float:
+        return sum(stored_cost(answers.get(name, {})) for answers in found.values())
+
+    fresh: list[str] = []
+    with ThreadPoolExecutor(workers) as pool:
+        # the longest scenes first, so that no worker is left with one at the end
+        order = sorted(names, key=cost, reverse=True)
+        runs = {pool.submit(run_scene, chosen, name, limit): name for name in order}
+        for run in as_completed(runs):
+            name = runs[run]
+            for program, answer in run.result().items():
+                found[program][name] = answer
+                store(program, found[program])
+                fresh += failures(program, {name: answer})
+                print(f"{name} {program}: {summary(answer)}", flush=True)
+    return fresh
+
+
+def stored_cost(answer: Answer) -> float:
+    """Return the processor time of a stored answer; a failed run counts its limit [s]."""
+    return sum(run.get("cpu_s", TIME_LIMIT) for run in answer.get("runs", ()))
 
 
 def summary(answer: Answer) -> str:

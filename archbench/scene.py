@@ -22,7 +22,7 @@ ACTIONS: dict[str, set[str]] = {
     "load": {"patch", "fill", "strength"},
     "motion": {"times", "accelerations", "end"},
     "scaled motion": {"times", "accelerations", "end", "between"},
-    "rocking": {"tilt", "impacts"},
+    "rocking": {"tilt", "impacts", "ratio"},
 }
 
 KINDS = {"E": "measured", "A": "closed form", "P": "program"}
@@ -138,7 +138,7 @@ def scene_problems(scene: dict[str, Any]) -> list[str]:
     if missing := needed - set(scene):
         return [f"{sorted(missing)} are missing"]
     found = []
-    if unknown := set(scene) - needed - {"note", "damping", "observe"}:
+    if unknown := set(scene) - needed - {"note", "damping", "observe", "from_memory"}:
         found.append(f"keys {sorted(unknown)} are unknown")
     action = dict(scene["action"])
     kind = action.pop("kind", None)
@@ -153,6 +153,11 @@ def scene_problems(scene: dict[str, Any]) -> list[str]:
     for name, quantity in scene["quantities"].items():
         if set(quantity) != {"unit", "meaning"}:
             found.append(f"quantity {name!r} needs a unit and a meaning")
+    found += [
+        f"from_memory has {name!r}, no name of what was not read"
+        for name in scene.get("from_memory", ())
+        if not isinstance(name, str)
+    ]
     if not scene["quantities"]:
         found.append("no quantity is in question")
     return found

@@ -154,6 +154,15 @@ def rocking_ratio(angles: list[float], slenderness: float, impacts: int) -> floa
     return float((energy[-1] / energy[0]) ** (0.5 / impacts))
 
 
+def impact_time(times: list[float], angles: list[float], number: int) -> float:
+    """Return when a rocking block passes the upright position for the n-th time [s]."""
+    pairs = zip(pairwise(times), pairwise(angles), strict=True)
+    found = [t + (u - t) * a / (a - b) for (t, u), (a, b) in pairs if a * b < 0.0]
+    if len(found) < number:
+        raise RuntimeError(f"only {len(found)} impacts, not {number}")
+    return found[number - 1]
+
+
 def is_convex(outline: list[list[float]], tolerance: float = 1e-9) -> bool:
     """Return whether an anticlockwise polygon is convex."""
     count = len(outline)

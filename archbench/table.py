@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from archbench.programs import NO_ACTION
@@ -33,6 +34,7 @@ class Row:
         unit: of the quantity.
         references: values of the strongest kind, one or several.
         answers: stored answers by program.
+        from_memory: what of the scene's geometry was not read in a source.
     """
 
     scene: str
@@ -41,6 +43,7 @@ class Row:
     unit: str
     references: tuple[Reference, ...]
     answers: dict[str, dict[str, Any]]
+    from_memory: tuple[str, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -84,10 +87,12 @@ class Row:
         return abs(numbers[0] - middle) <= half * (1.0 + 1e-9)
 
     def cost(self, program: str) -> float | None:
-        """Return the processor time over that of archfem, both of their first run."""
-        first = [self.answers.get(name, {}).get("runs", [{}])[0] for name in (program, "archfem")]
-        times = [run.get("cpu_s") for run in first]
-        return times[0] / times[1] if times[0] and times[1] else None
+        """Return the processor time over that of archfem, medians of runs in turn."""
+        times = self.answers.get(program, {}).get("cost", {})
+        if not times.get("own"):
+            return None
+        # a run shorter than the clock's step has no ratio
+        return median(times["own"]) / median(times["archfem"]) if all(times["archfem"]) else None
 
 
 def rows(results: Path = RESULTS) -> list[Row]:
@@ -107,7 +112,8 @@ def _rows_of(name: str, stored: dict[str, dict[str, Any]]) -> Iterator[Row]:
         chosen = tuple(value for value in values if value.kind == best)
         # of several grades, those that were read count
         read = tuple(value for value in chosen if value.grade != "m") or chosen
-        yield Row(name, scene["title"], quantity, about["unit"], read, answers)
+        memory = tuple(scene.get("from_memory", ()))
+        yield Row(name, scene["title"], quantity, about["unit"], read, answers, memory)
 
 
 def number(value: float) -> str:
@@ -140,9 +146,14 @@ def cell(row: Row, program: str) -> str:
     low, high = shown[numbers.index(min(numbers))], shown[numbers.index(max(numbers))]
     text = shown[0] if low == high else f"{shown[0]} ({low}–{high})"
     cost = row.cost(program)
-    times = f", {cost:.2g}×" if cost and program != "archfem" else ""
+    times = f", {float(f'{cost:.2g}'):g}×" if cost else ""
     outside = row.is_inside(program) is False
     return f"{text}{' ◦' if outside else ''}{times}"
+
+
+def marked(name: str, row: Row) -> str:
+    """Return a name, marked where lengths of the scene are from memory."""
+    return f"{name} **g**" if row.from_memory else name
 
 
 def known_programs(found: Sequence[Row]) -> list[str]:
@@ -162,23 +173,19 @@ def markdown(found: Sequence[Row], programs: Sequence[str]) -> str:
             reference = f"{row.kind} {number(middle)} ± {rounded(half)}{mark}"
         unit = "" if row.unit == "-" else f" [{row.unit}]"
         cells = [cell(row, program) for program in programs]
-        name = f"{row.scene}, {row.title}"
+        name = marked(f"{row.scene}, {row.title}", row)
         lines.append(f"| {' | '.join([name, row.quantity + unit, reference, *cells])} |")
     return "\n".join(lines)
 
 
-def head(found: Sequence[Row], programs: Sequence[str]) -> str:
-    """Return measured rows that were read, short, of the programs that answer any of them."""
-    shown = [row for row in found if row.kind == "E" and row.grade != "m"]
-    answering = [name for name in programs if any(row.numbers(name) for row in shown)]
-    lines = [
-        f"| test | measured | {' | '.join(answering)} |",
-        f"|---|---|{'---|' * len(answering)}",
-    ]
-    for row in shown:
-        cells = [cell(row, program).split(",")[0] or "–" for program in answering]
-        title = row.title.split(",")[0]
-        lines.append(f"| {title} | {measure(row)} | {' | '.join(cells)} |")
+def head(found: Sequence[Row]) -> str:
+    """Return measured rows that were read and that archfem answers, short."""
+    lines = ["| test (**g**: lengths from memory) | measured | archfem (range; ◦ outside) |"]
+    lines.append("|---|---|---|")
+    for row in found:
+        if row.kind == "E" and row.grade != "m" and row.numbers("archfem"):
+            title = marked(row.title.split(",")[0], row)
+            lines.append(f"| {title} | {measure(row)} | {cell(row, 'archfem')} |")
     return "\n".join(lines)
 
 
@@ -191,9 +198,12 @@ def measure(row: Row) -> str:
 
 def scores(found: Sequence[Row], programs: Sequence[str]) -> str:
     """Return the share of rows inside their uncertainty, with their number, as a table."""
+    measured = [row for row in found if row.kind == "E"]
+    read = [row for row in measured if row.grade != "m"]
     groups = {
-        "measured, source read": [r for r in found if r.kind == "E" and r.grade != "m"],
-        "measured, from memory": [r for r in found if r.kind == "E" and r.grade == "m"],
+        "measured, source read": [r for r in read if not r.from_memory],
+        "the same, lengths of the scene from memory": [r for r in read if r.from_memory],
+        "measured, from memory": [r for r in measured if r.grade == "m"],
         "closed form": [r for r in found if r.kind == "A"],
         "other programs": [r for r in found if r.kind == "P"],
     }
@@ -280,7 +290,7 @@ def bridges(found: Sequence[Row]) -> str:
         default, *others = (f"{run['values']['load'] / middle:.2f}" for run in runs)
         mark = " **m**" if row.grade == "m" else ""
         cells = [others[0], f"**{default}**", *others[1:]]
-        name = row.title.split(",")[0]
+        name = marked(row.title.split(",")[0], row)
         lines.append(f"| {name} | {number(middle)}{mark} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -289,7 +299,9 @@ def sources(found: Sequence[Row]) -> str:
     """Return the references with sources, one line each."""
     lines = []
     for row in found:
-        for value in row.references:
+        # those of weaker kinds too, which are in no ratio
+        values = [v for v in read_references(row.scene) if v.quantity == row.quantity]
+        for value in values:
             note = f"; {value.note}" if value.note else ""
             read = value.read_by or "from memory"
             place = value.url if not value.url.startswith("http") else f"<{value.url}>"
@@ -298,6 +310,8 @@ def sources(found: Sequence[Row]) -> str:
                 f"{number(value.number)} ± {rounded(value.uncertainty)}, "
                 f"{value.kind}{value.grade}. {value.source}. {place}; {read}{note}."
             )
+        if row.from_memory:
+            lines.append(f"- {row.scene}: {', '.join(row.from_memory)} from memory.")
     return "\n".join(dict.fromkeys(lines))
 
 
@@ -324,7 +338,7 @@ def sections(found: Sequence[Row]) -> dict[str, str]:
         "bridges": bridges(found),
         "sources": sources(found),
         "versions": versions(found, programs),
-        "head": head(found, programs),
+        "head": head(found),
     }
 
 

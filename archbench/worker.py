@@ -1,12 +1,13 @@
-"""Run one adapter on one scene in this process, and write its answer: started by `run.py`.
+"""Answer one scene by one adapter, once for each line on standard input: started by `run.py`.
 
-`python worker.py ADAPTER.py SCENE.json SETTINGS.json ANSWER.json`. The Python is that of the
-program's environment, so nothing beyond the standard library is imported here. Adapters find
-`scene_tools` beside this file.
+`python worker.py ADAPTER.py SCENE.json`, and lines of JSON with "settings" and the path "answer".
+The Python is that of the program's environment, so nothing beyond the standard library is imported
+here. Adapters find `scene_tools` beside this file.
 """
 
 import importlib.util
 import json
+import os
 import sys
 import time
 from pathlib import Path
@@ -33,19 +34,22 @@ def timed(module: ModuleType, scene: Any, settings: Any) -> tuple[dict[str, Any]
     return found, time.process_time() - start
 
 
-def main(adapter: str, scene: str, settings: str, answer: str) -> None:
-    """Run an adapter and write its answer, with the processor time of the call alone."""
+def main(adapter: str, scene: str, short: float = 5.0) -> None:
+    """Answer until the input ends; a short first call [s] is repeated, and the repetition timed."""
     module = load(Path(adapter))
     given = json.loads(Path(scene).read_text(encoding="utf-8"))
-    chosen = json.loads(Path(settings).read_text(encoding="utf-8"))
-    found, cost = timed(module, given, chosen)
-    if cost < 1.0:
-        # a first call loads modules on demand; of a short run it would be all that is measured
-        found, cost = timed(module, given, chosen)
-    found["cpu_s"] = cost
-    found["version"] = module.version()
-    Path(answer).write_text(json.dumps(found), encoding="utf-8")
+    for number, line in enumerate(sys.stdin):
+        asked = json.loads(line)
+        found, cost = timed(module, given, asked["settings"])
+        if number == 0 and cost < short:
+            # modules and compiled kernels are loaded on first use, which is no cost of the answer
+            found, cost = timed(module, given, asked["settings"])
+        found |= {"cpu_s": cost, "version": module.version()}
+        # complete once it is there under its name
+        unfinished = Path(f"{asked['answer']}.part")
+        unfinished.write_text(json.dumps(found), encoding="utf-8")
+        os.replace(unfinished, asked["answer"])
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main(sys.argv[1], sys.argv[2])

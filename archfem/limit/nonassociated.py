@@ -216,8 +216,12 @@ def search_nonassociated(
     joints = len(programme.blocks.structure.depths)
     number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
     starts = starting_forces(programme, start, number, 0)
-    iterates = [find_solution(programme, forces) for forces in starts]
-    solutions = [iterate for iterate in iterates if iterate is not None]
+    solutions = _find_solutions(programme, starts)
+    for seed in (1, 2, 3):  # in walls one start of four leads to a solution
+        if not solutions and joints > MAX_FULL_SEARCH_JOINTS:
+            more = _random_vertices(programme, start, number, np.random.default_rng(seed))
+            starts += more
+            solutions = _find_solutions(programme, more)
     normal = np.array([normal_forces(forces) for forces in starts])
     smallest = normal.reshape(-1, joints).min(axis=0, initial=np.inf)
     associated = -np.inf if start is None else start.value
@@ -240,10 +244,15 @@ def search_nonassociated(
     return weakest.state, _with_residuals(programme, weakest, bounds)
 
 
+def _find_solutions(programme: Programme, starts: Sequence[Array]) -> list[AlternatingIterate]:
+    """Return the solutions to which given forces lead."""
+    iterates = [find_solution(programme, forces) for forces in starts]
+    return [iterate for iterate in iterates if iterate is not None]
+
+
 def find_weakest(programme: Programme, starts: Sequence[Array]) -> Optimum | None:
     """Return the solution of largest objective found from given forces, or None."""
-    iterates = [find_solution(programme, forces) for forces in starts]
-    solutions = [iterate.state for iterate in iterates if iterate is not None]
+    solutions = [iterate.state for iterate in _find_solutions(programme, starts)]
     return max(solutions, key=lambda state: state.value, default=None)
 
 
@@ -251,7 +260,15 @@ def starting_forces(
     programme: Programme, start: Optimum | None, number: int, seed: int
 ) -> list[Array]:
     """Return the forces of the associated optimum and of a number of random vertices."""
-    forces, rng = [] if start is None else [start.forces], np.random.default_rng(seed)
+    forces = _random_vertices(programme, start, number, np.random.default_rng(seed))
+    return forces if start is None else [start.forces, *forces]
+
+
+def _random_vertices(
+    programme: Programme, start: Optimum | None, number: int, rng: np.random.Generator
+) -> list[Array]:
+    """Return forces of random vertices of the admissible states; fewer where there are none."""
+    forces = []
     for _ in range(number):
         with suppress(DidNotConverge):  # no equilibrium under so much load
             if (state := _random_vertex(programme, start, rng)) is not None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from archbench import run, table
+from archbench import figures, run, table
 from archbench.programs import Program, programs, read_manifest
 from archbench.scene import BenchError, read_references, read_scene, scene_names
 
@@ -30,8 +30,14 @@ def toy(tmp_path, code, manifest=MANIFEST):
     return read_manifest(path)
 
 
+def answer(program, settings, limit=60.0):
+    """The answer of a program to the scene."""
+    with run.Process(program, SCENE, limit) as process:
+        return process.ask(settings)
+
+
 def test_a_run_returns_the_answer_with_version_settings_and_cost(tmp_path):
-    found = run.run_once(toy(tmp_path, GOOD), SCENE, {"n": 1})
+    found = answer(toy(tmp_path, GOOD), {"n": 1})
     assert found["values"] == {"factor": 0.5}
     assert found["settings"] == {"n": 1}
     assert found["version"] == "toy 1"
@@ -49,10 +55,63 @@ def test_a_run_returns_the_answer_with_version_settings_and_cost(tmp_path):
     ],
 )
 def test_a_run_that_goes_wrong_says_so(tmp_path, old, new, message):
-    found = run.run_once(toy(tmp_path, GOOD.replace(old, new)), SCENE, {"n": 1}, limit=2.0)
+    found = answer(toy(tmp_path, GOOD.replace(old, new)), {"n": 1}, limit=2.0)
     assert message in found["failed"]
     assert run.failures("toy", {"S04": {"runs": [found]}}) == [f"toy S04: {found['failed']}"]
     assert found["failed"] in run.summary({"runs": [found]})
+
+
+def test_a_program_that_died_answers_the_next_settings(tmp_path):
+    code = GOOD.replace(
+        "    return {", '    if settings["n"] == 1:\n        import os; os.abort()\n    return {'
+    )
+    with run.Process(toy(tmp_path, code), SCENE) as process:
+        assert "died" in process.ask({"n": 1})["failed"]
+        assert process.ask({"n": 2})["values"] == {"factor": 0.5}
+    assert not process.folder.exists()
+
+
+def test_archfem_runs_in_turn_with_every_other_program(tmp_path, monkeypatch):
+    log = tmp_path / "log"
+    code = f"""
+def run(scene, settings):
+    with open({str(log)!r}, "a") as file:
+        file.write(f"NAME {{settings['n']}}\\n")
+    return {{"values": {{"factor": 0.5}}}}
+
+def version():
+    return "toy 1"
+"""
+    both = []
+    for name in ("archfem", "other"):
+        path = tmp_path / f"{name}.py"
+        path.write_text(MANIFEST + code.replace("NAME", name), encoding="utf-8")
+        both.append(read_manifest(path))
+    monkeypatch.setattr(run, "programs", lambda: both)
+    found = run.run_scene(both, "S04")
+    # the first answer of a process is a repetition, after modules are loaded
+    asked = ["archfem 1"] * 2 + ["archfem 2"] + ["other 1"] * 2
+    asked += ["other 1", "archfem 1"] * 3 + ["other 2"]
+    assert log.read_text(encoding="utf-8").split("\n")[:-1] == asked
+    cost = found["other"]["cost"]
+    assert len(cost["own"]) == len(cost["archfem"]) == 3
+    assert "cost" not in found["archfem"]
+    assert [len(each["runs"]) for each in found.values()] == [2, 2]
+
+
+def test_a_long_run_is_timed_once():
+    class Told:
+        def __init__(self, cost):
+            self.cost, self.count = cost, 0
+
+        def ask(self, _):
+            self.count += 1
+            return {"cpu_s": self.cost}
+
+    program, archfem = Told(4.0), Told(0.1)
+    cost = run.times_in_turn((program, {}, {"cpu_s": 4.0}), (archfem, {}), long=3.0)
+    assert cost == {"own": [4.0], "archfem": [0.1]}
+    assert (program.count, archfem.count) == (0, 1)
 
 
 def test_a_program_that_is_not_installed_is_skipped(tmp_path):
@@ -105,7 +164,7 @@ def test_every_program_answers_one_scene_where_it_is_installed(name):
     if not program.is_installed():
         pytest.skip(f"{name} is not installed")
     settings = program.settings["sideways"][0]
-    found = run.run_once(program, SCENE, settings, limit=60.0)
+    found = answer(program, settings)
     (reference,) = read_references("S04")
     assert "failed" not in found
     # impulses of Siconos do not converge within its sweeps; the others are within a per cent
@@ -133,14 +192,30 @@ def test_no_value_from_memory_is_shown_without_its_mark():
         assert ("**m**" in shown) == (row.grade == "m")
 
 
+def test_no_length_from_memory_is_shown_without_its_mark():
+    for row in table.rows():
+        shown = table.markdown([row], ["archfem"]).splitlines()[-1]
+        memory = read_scene(row.scene).get("from_memory")
+        assert ("**g**" in shown) == bool(memory)
+        if row.kind == "E" and row.numbers("archfem") and row.grade != "m":
+            assert ("**g**" in table.head([row]).splitlines()[-1]) == bool(memory)
+        if memory:
+            assert f"{row.scene}: {', '.join(memory)} from memory" in table.sources([row])
+    measured = [row for row in table.rows() if row.kind == "E"]
+    labels = [text.get_text() for text in figures.measured(measured).axes[0].get_yticklabels()]
+    for row, label in zip(measured, labels, strict=True):
+        assert ("from memory" in label) == bool(row.from_memory or row.grade == "m")
+
+
 def test_a_row_counts_what_lies_inside_the_uncertainty():
     (row,) = (row for row in table.rows() if row.scene == "S03")
     told = {"settings": {}, "values": {"factor": 0.37}, "cpu_s": 1.0}
     for value, inside in ((row.reference[0], True), (1.1 * row.reference[0], False)):
         runs = [{**told, "values": {"factor": value}}, {**told, "values": {"factor": 0.5}}]
-        answered = replace(row, answers={"toy": {"runs": runs}, "archfem": {"runs": [told]}})
+        cost = {"own": [3.0, 2.0, 9.0], "archfem": [1.0, 2.0, 0.5]}
+        answered = replace(row, answers={"toy": {"runs": runs, "cost": cost}})
         assert answered.is_inside("toy") is inside
-        assert answered.cost("toy") == 1.0
+        assert answered.cost("toy") == 3.0  # of medians
         assert "◦" in table.cell(answered, "toy") or inside
     failed = replace(row, answers={"toy": {"runs": [{"settings": {}, "failed": "it died"}]}})
     assert table.cell(failed, "toy") == "failed"

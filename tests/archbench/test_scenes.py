@@ -53,6 +53,14 @@ def test_at_least_eight_measured_rows_were_read_in_a_source():
     assert len(read) >= 8
 
 
+def test_bridges_name_the_lengths_that_were_not_read():
+    bridges = [read_scene(name) for name in NAMES if name.startswith(("S20", "S21", "S22"))]
+    assert len(bridges) == 8
+    assert all("cover" in scene["from_memory"] for scene in bridges)
+    # a note is no substitute for the list
+    assert not any("memory" in read_scene(name).get("note", "") for name in NAMES)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_joints_lie_on_the_edges_of_both_blocks(name):
     scene = read_scene(name)
@@ -93,6 +101,7 @@ def broken(**changes):
     [
         ({}, "are missing"),
         (broken(colour="red"), "unknown"),
+        (broken(from_memory=[1.5]), "not read"),
         (broken(action={"kind": "prayer"}), "is none of"),
         (broken(action={"kind": "sideways", "force": 1}), "has keys"),
         (broken(quantities={}), "no quantity"),

@@ -10,7 +10,7 @@ from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
 
 import archfem as af
-from archfem.limit import Outcome
+from archfem.limit import Outcome, nonassociated
 from archfem.limit.backfill import self_weight_programme
 from archfem.limit.linear_programme import RigidBlocks, rigid_load
 from archfem.limit.nonassociated import MAX_START_COUNT, descend, find_solution, starting_forces
@@ -185,6 +185,27 @@ def test_walls_of_ferris_and_tin_loi(number):
     check(structure, SIDEWAYS, found)
     assert found.factor < associated == pytest.approx(found.solutions.bracket[1], rel=EXACT)
     assert found.factor == pytest.approx(LEAST[number], rel=1e-4)
+
+
+def test_a_wall_is_searched_from_more_states_where_the_first_lead_nowhere(monkeypatch):
+    structure = af.circular_arch(
+        radius=3.0, thickness=0.6, embrace=120.0, voussoirs=7, contact=rough(0.5)
+    )
+    push = af.PointLoad(0.0, (-1e3, 0.0))
+    usual = af.collapse_factor(structure, live=push, friction="nonassociated")
+    find, calls = nonassociated.find_solution, []
+
+    def fail_first(programme, forces):
+        calls.append(forces)
+        return find(programme, forces) if len(calls) > 3 else None
+
+    # as in a wall of many joints: the associated state and two others
+    monkeypatch.setattr(nonassociated, "MAX_FULL_SEARCH_JOINTS", 0)
+    monkeypatch.setattr(nonassociated, "find_solution", fail_first)
+    found = af.collapse_factor(structure, live=push, friction="nonassociated")
+    assert found.solutions.starts[0] > 3
+    check(structure, push, found)
+    assert found.factor == pytest.approx(usual.factor, rel=EXACT)
 
 
 HALVES = [[0.5, 0.5], [1.0]]
