@@ -1,14 +1,13 @@
 """A-posteriori error of model, time step and small displacements, from short runs.
 
 The measure is the largest |e| of every joint, by which hinges are detected. Settings are run over
-the strongest part of the motion, each with half the cell size and half the time step of the one
-before. With P_k the peaks of setting k, and n the finest,
+the strongest part of the motion, each with half the time step of the one before. With P_k the peaks
+of setting k, and n the finest,
 
     error of n = |P_n - P_(n-1)| / (2^p - 1),    error of k = |P_k - P_n| + error of n,
 
-for the joint with the largest difference. The first is Richardson's extrapolation. The order p
-is 1.5: forces converge with order 2 where joints stay open or closed, and with order 1 where they
-open, close and slide.
+for the joint with the largest difference. The first is Richardson's extrapolation. The order p is
+2, that of the scheme in the time step.
 
 *Small displacements.* Where joints rotate, the thrust moves with them. This error is estimated from
 the largest rotation of a joint.
@@ -38,7 +37,7 @@ ERROR_PER_ROTATION = 3.0
 
 
 def strongest_window(
-    motion: Motion, share: float = 0.7, least: float = 4.0, lead: float = 0.5
+    motion: Motion, share: float = 0.6, least: float = 3.5, lead: float = 0.5
 ) -> Motion:
     """Return the shortest part with a share of the Arias intensity, and the time before it [s]."""
     energy = np.cumsum(np.append(0.0, motion.horizontal**2))
@@ -116,10 +115,9 @@ def run_peaks(
 def estimate_errors(runs: list[RunPeaks]) -> list[float]:
     """Return the error of each run in the largest |e| of a joint [-].
 
-    Each run has half the cell size and half the time step of the one before.
+    Each run has half the time step of the one before.
     """
-    # order with which errors vanish as cells and time steps shrink together [-]
-    convergence_order = 1.5
+    convergence_order = 2  # of the scheme in the time step [-]
     finest = runs[-1].peaks
     if len(runs) < 2 or finest is None or runs[-2].peaks is None:
         return [np.inf] * len(runs)

@@ -1,12 +1,12 @@
 """Building of models, and selection of a model and time step by predicted error.
 
-The selection runs settings over the strongest part of the motion, each with half the cell size and
-half the time step of the one before, until the predicted error is within the tolerance
-(`dynamics.error_estimation`). The series of their costs is geometric, so that a selection takes no
-longer than the run for which it selects.
+The selection runs settings over the strongest part of the motion, each with half the time step of
+the one before, until the predicted error is within the tolerance (`dynamics.error_estimation`). The
+first two share one model, so that a selection takes about as long as the run for which it selects.
 """
 
 import logging
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,12 +41,10 @@ DampingChoice = Viscous | Callable[[Model], Viscous | None] | None
 
 Builder = Callable[[Structure, Discretisation], Model]
 
-# Fidelity, cells and time step [s] of the settings tried. The first is left out where the tolerance
-# is below COARSE_TOLERANCE. Condensed 8×8 has the cells of the setting before, since faces 16×16
-# miss the deformation of faces, which is then the larger part of the error
+# Fidelity, cells and time step [s] of the settings tried. The first two share a mesh: the error of
+# the step is the larger, and a second mesh costs as much to build as the window to run
 TRIED_SETTINGS = (
-    ("faces", (2, 2), 0.01),
-    ("faces", (4, 4), 0.005),
+    ("faces", (8, 8), 0.005),
     ("faces", (8, 8), 0.0025),
     ("condensed", (8, 8), 0.00125),
     ("condensed", (16, 16), 0.000625),
@@ -165,14 +163,12 @@ def select_model(
     Without any, the most accurate of those tried is returned with a warning.
     """
     Discretisation(displacements=displacements)  # refuses values other than small and large
-    settings = _settings_to_try(structure, tolerance, dt)
+    settings = _settings_to_try(structure, dt)
     trials, history = _try_settings(structure, settings, tolerance, motion, damping, builder)
-    # a coarser setting is chosen where running it takes longer than finding it: each setting takes
-    # two to three times as long as the one before, over a quarter of the motion at most
-    coarser = trials[-1].share <= 0.25 and dt is None
-    within = [number for number, error in enumerate(history[-1]) if error <= tolerance]
-    chosen = within[0] if within and coarser else len(trials) - 1
-    trial, error = trials[chosen], history[-1][chosen]
+    if dt is None:
+        trial, error = _select_trial(trials, history[-1], tolerance)
+    else:
+        trial, error = trials[-1], history[-1][-1]
     names = (f"{discretisation_label(each.settings)} {1e3 * each.dt:g} ms" for each in trials)
     model, small = trial.model, ERROR_PER_ROTATION * max(each.run.rotation for each in trials)
     if displacements == "large":
@@ -188,22 +184,12 @@ def select_model(
     return model
 
 
-def _settings_to_try(
-    structure: Structure, tolerance: float, dt: float | None
-) -> list[tuple[Discretisation, float]]:
+def _settings_to_try(structure: Structure, dt: float | None) -> list[tuple[Discretisation, float]]:
     """Return discretisations and steps to try, coarsest first; a given `dt` is tried after 2 dt."""
-    # smallest tolerance on |e| that faces 4×4 in steps of 5 ms may meet [-]: in twelve scenes they
-    # erred by 0.003 to 0.024
-    coarse_tolerance = 0.02
-    if dt is not None:
-        tried = tuple(
-            (*setting[:2], step)
-            for setting, step in zip(TRIED_SETTINGS[1:], (2.0 * dt, dt), strict=False)
-        )
-    else:
-        tried = TRIED_SETTINGS[int(tolerance < coarse_tolerance) :]
+    steps = [setting[2] for setting in TRIED_SETTINGS] if dt is None else [2.0 * dt, dt]
     return [
-        (exact_discretisation(structure, fidelity, cells), step) for fidelity, cells, step in tried
+        (exact_discretisation(structure, fidelity, cells), step)
+        for (fidelity, cells, _), step in zip(TRIED_SETTINGS, steps, strict=False)
     ]
 
 
@@ -233,7 +219,8 @@ def _try_settings(
     for discretisation, dt in tqdm(
         settings, unit="run", disable=None, leave=False, desc="choosing a model"
     ):
-        model = builder(structure, discretisation)
+        same = trials and trials[-1].settings == discretisation
+        model = trials[-1].model if same else builder(structure, discretisation)
         excitation = excitation or _resolve_excitation(model, motion, damping)
         window, viscous, share = excitation
         run = run_peaks(model, window, viscous, dt)
@@ -242,6 +229,25 @@ def _try_settings(
         if history[-1][-1] <= tolerance or _stagnates(history):
             break
     return trials, history
+
+
+def _select_trial(
+    trials: Sequence[_Trial], errors: Sequence[float], tolerance: float
+) -> tuple[_Trial, float]:
+    """Return the coarsest setting within the tolerance that is worth its choice, and its error."""
+    last, error = trials[-1], errors[-1]
+    # the share of the motion up to which running the coarser of two settings takes longer than
+    # finding it: the second takes 1.6 times as long as the first, the third five times the second
+    if last.share > (0.4 if len(trials) == 2 else 0.25) or error > tolerance:
+        return last, error
+    if len(trials) > 2:
+        chosen = next(number for number, each in enumerate(errors) if each <= tolerance)
+        return trials[chosen], errors[chosen]
+    # one model in two steps: at order 2 its error is known for all steps between, and near the
+    # tolerance it is that of the steps; far below, errors of plane faces and of steps cancel
+    longest = last.dt * math.sqrt(tolerance / max(error, tolerance / 4.0))
+    dt = max(last.dt, 0.0005 * math.floor(longest / 0.0005 + 1e-6))  # multiples of 0.5 ms
+    return replace(last, dt=dt), error * (dt / last.dt) ** 2
 
 
 def _resolve_excitation(

@@ -101,13 +101,10 @@ def test_each_model_is_built_once_and_the_first_is_asked_for_the_damping(ring, d
 
     motion = af.Motion.synthetic(duration=0.25, pga=1.0, seed=1)
     select_model(ring, 1e-9, motion, damping, dt, builder=builder)
-    tried = [each for each, _ in built]
-    assert (
-        tried
-        == [
-            exact_discretisation(ring, fidelity, cells) for fidelity, cells, _ in TRIED_SETTINGS[1:]
-        ][: len(tried)]
-    )
+    ladder = TRIED_SETTINGS[1:]  # its first setting shares the model of the second
+    ladder = ladder[:1] if dt else ladder
+    wanted = [exact_discretisation(ring, fidelity, cells) for fidelity, cells, _ in ladder]
+    assert [each for each, _ in built] == wanted[: len(built)]
     assert asked == [built[0][1]]
 
 
