@@ -27,7 +27,7 @@ def run(model, motion, dt, velocity=None, damping=None):
     equation, dead = af.dynamics.Equation(model, motion, damping), af.dead_load(model)
     start = equation.at_rest(dead.q, memory=dead.model.memory)
     if velocity is not None:
-        start = equation.released(replace(start, velocity=np.array(velocity)))
+        start = equation.accelerated(replace(start, velocity=np.array(velocity)))
     stepper = stepper_for("auto", equation)
     assert stepper.name == "snes"
     batches = list(stepper.batches(start, dt, motion.duration))

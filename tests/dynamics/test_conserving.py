@@ -167,7 +167,7 @@ def swing(built, dt, damping):
     equation = af.dynamics.Equation(built, af.Motion(np.zeros(2), 0.5), damping)
     dead = dead_load(built)
     start = equation.at_rest(dead.q, memory=dead.model.memory)
-    start = equation.released(replace(start, velocity=np.array([0.25, 0.0, -0.25 / 1.2])))
+    start = equation.accelerated(replace(start, velocity=np.array([0.25, 0.0, -0.25 / 1.2])))
     *_, last = stepper_for("auto", equation, TIGHT).batches(start, dt, 0.5)
     return last.state(len(last.times) - 1).q
 

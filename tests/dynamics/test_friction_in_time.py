@@ -225,7 +225,7 @@ def test_no_shear_passes_a_joint_that_is_open():
     dead = af.dead_load(model)
     motion = af.Motion(np.zeros(2), 0.3)
     equation = af.dynamics.Equation(model, motion)
-    thrown = equation.released(
+    thrown = equation.accelerated(
         replace(equation.at_rest(dead.q), velocity=np.array([0.7, 1.0, 0.0]))
     )
     states, resultants, _ = run(model, motion, 1e-3, thrown)

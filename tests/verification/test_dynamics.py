@@ -34,7 +34,7 @@ def swinging(model, dead, mode):
     equation = af.dynamics.Equation(model, STILL)
     state = equation.at_rest(dead.q, memory=dead.model.memory)
     shape = 1e-9 * shapes[:, mode] / np.abs(shapes[:, mode]).max()
-    return equation.released(replace(state, q=dead.q + shape)), shape, np.sqrt(squares[mode])
+    return equation.accelerated(replace(state, q=dead.q + shape)), shape, np.sqrt(squares[mode])
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def pushed(model, dead):
     opened = ~is_closed(model.operator.effective_gaps(dead.q + 0.01 * velocity))
     assert opened.any()
     state = replace(equation.at_rest(dead.q, memory=dead.model.memory), velocity=velocity)
-    return equation.released(state), 0.5 * velocity @ (model.mass @ velocity)
+    return equation.accelerated(state), 0.5 * velocity @ (model.mass @ velocity)
 
 
 @pytest.mark.slow

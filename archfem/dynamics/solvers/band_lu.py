@@ -21,7 +21,7 @@ Indices = NDArray[np.int64]
 class Band(NamedTuple):
     """A matrix of which some entries change, as a band, and its factor."""
 
-    half: int  # half-width b
+    half_width: int  # b
     base: Array  # entries without changes (n w,)
     entries: Array  # of the matrix, then of its triangles, pivots inverted (n w,)
     pivots: Indices  # row with which each was exchanged, and entries right of it (2, n)
@@ -39,7 +39,7 @@ def band_of(matrix: sparse.csr_matrix, half: int) -> Band:
 
 def band_places(band: Band, rows: Any, columns: Any) -> Indices:
     """Return the positions in `entries` of the matrix entries at some rows and columns (k,)."""
-    return np.asarray(band.half + 3 * band.half * rows + columns)
+    return np.asarray(band.half_width + 3 * band.half_width * rows + columns)
 
 
 def half_width(matrix: sparse.csr_matrix) -> int:
@@ -60,14 +60,14 @@ def narrow_order(pattern: sparse.csr_matrix) -> tuple[Any, int]:
 @view_kernel
 def _rows(band):  # type: ignore
     """Return a view of the band whose indices are row and column of the full matrix."""
-    half, size = band.half, band.pivots.shape[1]
+    half, size = band.half_width, band.pivots.shape[1]
     return band.entries[half : half + 3 * half * size].reshape((size, 3 * half))
 
 
 @summing_kernel
 def factorise_band(band):  # type: ignore
     """Factorise the matrix in `entries` in place; returns whether it is regular."""
-    matrix, half, size = _rows(band), band.half, band.pivots.shape[1]
+    matrix, half, size = _rows(band), band.half_width, band.pivots.shape[1]
     far = 0  # last column in which any row so far has an entry
     for k in range(size):
         last = min(k + half, size - 1)
@@ -111,7 +111,7 @@ def _choose_pivot(matrix, k, last):  # type: ignore
 @summing_kernel
 def solve_band(band, vector):  # type: ignore
     """Solve in place by the factor."""
-    matrix, half, size = _rows(band), band.half, len(vector)
+    matrix, half, size = _rows(band), band.half_width, len(vector)
     for k in range(size):
         # row exchanges are interleaved with the elimination, as they were in the factor
         pivot = band.pivots[0, k]

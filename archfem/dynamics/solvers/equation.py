@@ -112,14 +112,14 @@ class Equation:
         return joints if self.conserving or joints.gap_offset is None else None
 
     @cached_property
-    def remembers(self) -> int:
+    def memory_size(self) -> int:
         """Number of values of the joint memory that are stored."""
         structure = self.model.structure
         slides = bool(np.isfinite(structure.friction).any())
         return len(self.model.memory) if slides or structure.has_own_laws else 0
 
     @cached_property
-    def meter(self) -> EnergyMeter:
+    def energy_meter(self) -> EnergyMeter:
         """Evaluates energies from state to state."""
         return EnergyMeter(self.model, self.weight, self.viscous, self.lag)
 
@@ -166,10 +166,10 @@ class Equation:
             time: since the motion began [s].
             memory: irreversible slip of each joint point (p,) [m].
         """
-        return self.released(State(time, q, np.zeros_like(q), np.zeros_like(q), memory))
+        return self.accelerated(State(time, q, np.zeros_like(q), np.zeros_like(q), memory))
 
-    def released(self, state: State) -> State:
-        """Return the same state with the acceleration due to its forces.
+    def accelerated(self, state: State) -> State:
+        """Return a state with the acceleration that its forces cause.
 
         Args:
             state: of the structure; its acceleration is ignored.

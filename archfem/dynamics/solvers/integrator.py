@@ -149,7 +149,7 @@ class Stepper:
     def _state(self, time: float, vectors: Array, memory: Array) -> State:
         """Return a state from the vectors of the solver."""
         q, velocity, acceleration = vectors[:, self._place]
-        return State(time, q, velocity, acceleration, memory if self.equation.remembers else None)
+        return State(time, q, velocity, acceleration, memory if self.equation.memory_size else None)
 
     @cached_property
     def _place(self) -> NDArray[Any]:
@@ -169,8 +169,8 @@ class Stepper:
         steps, joints = len(times), len(self.equation.model.structure.joints)
         series = np.empty((steps + 1, 3, len(state.q)))
         series[0] = np.stack([state.q, state.velocity, state.acceleration])[:, self.solver.order]
-        memories = np.zeros((steps + 1, self.equation.remembers))
-        if state.memory is not None and self.equation.remembers:
+        memories = np.zeros((steps + 1, self.equation.memory_size))
+        if state.memory is not None and self.equation.memory_size:
             memories[0] = state.memory
         iterations = np.zeros(steps, dtype=np.int64)
         results = (np.empty((steps, joints, 3)), iterations, np.empty((steps, 4)))

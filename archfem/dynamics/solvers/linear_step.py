@@ -82,10 +82,14 @@ class JointRows(NamedTuple):
     pairs: Any  # rows of λ and z of each derivative (q, 2)
 
 
-def pair_blocks(gaps: SparseRows, pairs: NDArray[np.int64]) -> tuple[NDArray[np.int64], Any, Any]:
-    """Return where each pair's tangent block begins among all entries, and their rows and columns.
+def find_tangent_blocks(
+    gaps: SparseRows, pairs: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], Any, Any]:
+    """List rows and columns of the tangent's entries that joints change, block after block.
 
-    Rows that move with the same coordinates, as those of one joint, share a block.
+    The derivative of force i by gap j changes a block: rows of all coordinates on which force i
+    does work, columns of all that move gap j. Pairs of the same coordinates, as within a joint,
+    share a block. The first result is where the block of each pair begins among the entries.
     """
     indptr, indices, _ = gaps
     moved = [tuple(indices[a:b].tolist()) for a, b in itertools.pairwise(indptr)]
@@ -427,8 +431,8 @@ def subtract_derivatives(system, count):  # type: ignore
     entries, places, (line, dense) = system.tangent.entries, system.places, system.blocks
     while k < count:
         begin = system.begin[rows[k, 2]]
-        width = indptr[rows[k, 1] + 1] - indptr[rows[k, 1]]
-        size = width * (indptr[rows[k, 0] + 1] - indptr[rows[k, 0]])
+        width = np.int64(indptr[rows[k, 1] + 1] - indptr[rows[k, 1]])
+        size = width * np.int64(indptr[rows[k, 0] + 1] - indptr[rows[k, 0]])
         for m in range(size):
             dense[m] = 0.0
         while k < count and system.begin[rows[k, 2]] == begin:
@@ -437,11 +441,11 @@ def subtract_derivatives(system, count):  # type: ignore
             for j in range(width):
                 line[j] = 0.0
             while k < count and rows[k, 0] == row and system.begin[rows[k, 2]] == begin:
-                first = indptr[rows[k, 1]]
+                first = np.int64(indptr[rows[k, 1]])
                 for j in range(width):
                     line[j] += values[k] * data[first + j]
                 k += 1
-            place = 0
+            place: Any = 0
             for entry in range(indptr[row], indptr[row + 1]):
                 for j in range(width):
                     dense[place + j] += data[entry] * line[j]

@@ -43,9 +43,9 @@ from archfem.dynamics.solvers.linear_step import (
     LinearSystem,
     effective_matrix,
     evaluate_released,
+    find_tangent_blocks,
     linear_system,
     linear_workspace,
-    pair_blocks,
     solve_contact,
     subtract_derivatives,
     tangent_pattern,
@@ -180,20 +180,20 @@ class NewtonSolver:
         """Return a copy for another run."""
         return deepcopy(system)
 
-    def _tangent(self, matrix: sparse.csr_matrix, rows: Any, columns: Any) -> tuple[Any, Indices]:
-        """Return a matrix as a tangent, and the positions in it of entries that joints change."""
+    def _store_tangent(self, matrix: sparse.csr_matrix, rows: Any, columns: Any) -> tuple[Any, Any]:
+        """Store a matrix for factorisation; returns also where its entries (row, column) are."""
         if self._elimination is None:
             band = band_of(matrix, self.half_width)
-            return band, band_places(band, rows, columns)
+            return band, band_places(band, rows, columns).astype(np.uint64)
         panels = panels_of(matrix, self._elimination, rows, columns)
-        return panels, panel_places(panels, rows, columns)
+        return panels, panel_places(panels, rows, columns).astype(np.uint64)
 
     def _small_system(self, dt: float) -> "SmallSystem":
         """Return the data of steps with small displacements."""
         linear, pairs = linear_system(self._equation, self.order, dt)
         effective, law = effective_matrix(self._equation, self.order, dt), linear.law
-        begin, *ends = pair_blocks(linear.gaps, pairs)
-        tangent, places = self._tangent(effective, *ends)
+        begin, *ends = find_tangent_blocks(linear.gaps, pairs)
+        tangent, places = self._store_tangent(effective, *ends)
         widest = int(np.diff(linear.gaps[0]).max(initial=0))
         blocks = np.zeros(widest), np.zeros(widest**2)
         entries = np.zeros((len(pairs), 3), np.int64), np.zeros(len(pairs))
@@ -204,7 +204,7 @@ class NewtonSolver:
             linear_workspace(linear),
             tangent,
             begin,
-            places.astype(np.uint64),  # compiled indices without a sign need no check of it
+            places,
             blocks,
             entries,
             factored,
@@ -228,7 +228,7 @@ class NewtonSolver:
             allocate_step_forces(model.joints),
         )
         sides = sides._replace(index=place[sides.index])
-        tangent, places = self._tangent(effective, *find_rate_pairs(sides))
+        tangent, places = self._store_tangent(effective, *find_rate_pairs(sides))
         # energy then drifts by 1e-8 of what is exchanged; reused factors round ten times as much
         balance = 1e-9 if self._elimination is None else 1e-8
         balance *= float(np.linalg.norm(equation.weight))
@@ -428,7 +428,7 @@ class LargeSystem(NamedTuple):
     viscous: SparseRows  # C
     effective: SparseRows  # 2 M/Δt² + C/Δt + (½ + β/Δt) K
     tangent: Any  # the same, to which joints add
-    places: Indices  # entry of the tangent that each rate of the joints adds to (e,)
+    places: Any  # entry of the tangent that each rate of the joints adds to (e,)
     faces: Array  # workspace of `assemble_rates` (2, 2, 4, s)
     weight: Array  # forces of gravity (n,)
     body: Array  # forces per unit ground acceleration (2, n)

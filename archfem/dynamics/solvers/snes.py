@@ -132,7 +132,7 @@ class SnesSolver:
         new = end(solved.q)
         ground = equation.motion.at(np.array([state.time, state.time + dt])).mean(axis=0)
         ends = (state.q, state.velocity), (new.q, new.velocity)
-        energy = equation.meter.measure_step(*ends, ground)
+        energy = equation.energy_meter.measure_step(*ends, ground)
         resultants = equation.model.resultants(equation.contact(new))
         return Step(new, resultants, solved.iterations, dt, energy)
 
@@ -169,7 +169,7 @@ class SnesSolver:
                 matrix.data = matrix.data + linear.data / numbers.gain
                 return matrix
 
-            searches = SLIDING_SEARCHES if equation.remembers else CONVEX_SEARCHES
+            searches = SLIDING_SEARCHES if equation.memory_size else CONVEX_SEARCHES
             try:
                 return self._solver.solve(residual, tangent, guess, self._scale, searches)
             except DidNotConverge:  # an impact of stiff joints: the velocity leads too far

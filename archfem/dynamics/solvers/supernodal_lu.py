@@ -127,11 +127,11 @@ class Panels(NamedTuple):
 
     first: Indices  # first column of each group, and the number of columns (groups + 1,)
     below: Indices  # begin of its rows in `rows` (groups + 1,)
-    rows: Indices  # rows below the columns of each group
+    rows: Any  # rows below the columns of each group
     parent: Indices  # group of the first row below, -1 where there is none (groups,)
     places: Indices  # begin of its entries: its rows, then columns below them (groups + 1,)
     updates: Indices  # begin of its targets (groups + 1,)
-    targets: Indices  # entries that its elimination changes further down, row by row
+    targets: Any  # entries that its elimination changes further down, row by row
     changing: Indices  # groups to eliminate once entries change
     base: Array  # entries without changes, of all other groups eliminated
     entries: Array  # of the matrix, then of its triangles, pivots inverted
@@ -165,7 +165,7 @@ class SymmetricFactor(NamedTuple):
 
     first: Indices  # first column of each group, and the number of columns (groups + 1,)
     below: Indices  # begin of its rows in `rows` (groups + 1,)
-    rows: Indices  # rows below the columns of each group
+    rows: Any  # rows below the columns of each group
     parent: Indices  # group of the first row below, -1 where there is none (groups,)
     places: Indices  # begin of its panel (groups + 1,)
     panels: Array  # column by column
@@ -200,12 +200,13 @@ def _layout(matrix: sparse.csr_matrix, elimination: Elimination, smallest: float
     """Return the panels of a matrix, with the targets of the elimination of all groups."""
     size, counts = matrix.shape[0], np.array([len(own) for own in elimination.rows])
     first = np.array([start for start, _ in elimination.groups] + [size], np.int64)
-    width, rows = np.diff(first), np.concatenate(elimination.rows).astype(np.int64)
+    # compiled indices without a sign need no check of it
+    width, rows = np.diff(first), np.concatenate(elimination.rows).astype(np.uint32)
     sizes = width * (width + 2 * counts)
     below, places, updates = (
         np.concatenate([[0], np.cumsum(each)]) for each in (counts, sizes, counts**2)
     )
-    none, entries = np.zeros(0, np.int64), np.zeros(places[-1])
+    none, entries = np.zeros(0, np.uint64), np.zeros(places[-1])
     groups, image = np.arange(len(width)), np.zeros(2 * size)
     panels = Panels(
         *(first, below, rows, elimination.parent, places, updates, none, groups),
@@ -215,7 +216,7 @@ def _layout(matrix: sparse.csr_matrix, elimination: Elimination, smallest: float
     ends = (np.concatenate([each[k].ravel() for each in targets]) for k in range(2))
     of_matrix = matrix.tocoo()
     np.add.at(entries, panel_places(panels, of_matrix.row, of_matrix.col), of_matrix.data)
-    return panels._replace(targets=panel_places(panels, *ends))
+    return panels._replace(targets=panel_places(panels, *ends).astype(np.uint64))
 
 
 def panel_places(panels: Panels, rows: Any, columns: Any) -> Indices:
