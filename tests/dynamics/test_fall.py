@@ -137,6 +137,28 @@ def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypat
     assert (dataset.attrs["fall_violation"], dataset.attrs["fall_unsettled"]) == (0.25, 0.5)
 
 
+@pytest.mark.parametrize("ratio", [0.9, 0.8, None])
+def test_a_block_handed_over_rocks_on_with_the_restitution_of_its_damping(ratio):
+    """Rocking energies of the first three tilts; without a ratio, Housner's 1 - 3/2 sin² α.
+
+    Parabolas through frames 20 ms apart give the tilts, to 1 % of the ratio of speeds.
+    """
+    breadth, height, tilt = 0.6, 1.0, np.arctan(0.6)
+    column = af.column(breadth=breadth, heights=[height], contact=af.Contact(1e10, 1e10, 5.0))
+    model = af.build(column, fidelity="rigid", displacements="large")
+    damping = replace(af.StiffnessDamping(0.3, 30.0), restitution=ratio)
+    ground = af.Motion(np.r_[np.full(31, -8.4), np.zeros(10)], 0.01)
+    run = af.time_history(model, ground, dt=2e-3, damping=damping)
+    turn = np.abs(run.dataset["fall_pose"].values[:, 1, 2])
+    tops = 1 + np.flatnonzero((turn[1:-1] > turn[:-2]) & (turn[1:-1] >= turn[2:]))[:3]
+    before, top, after = turn[tops - 1], turn[tops], turn[tops + 1]
+    peaks = top + (after - before) ** 2 / (8.0 * (2.0 * top - before - after))
+    energies = np.cos(tilt - peaks) - np.cos(tilt)
+    wanted = ratio or 1.0 - 1.5 * np.sin(tilt) ** 2
+    assert peaks[0] > 0.3
+    assert np.sqrt(energies[1:] / energies[:-1]) == pytest.approx(np.full(2, wanted), rel=0.01)
+
+
 @pytest.mark.parametrize("longest", [5e-4, 3e-4, 1.25e-4, 1e-4])
 def test_a_fall_that_fails_is_repeated_with_shorter_steps(tower, monkeypatch, longest):
     """Down to an eighth of a millisecond, beyond which the error says what a user can do."""
