@@ -153,8 +153,8 @@ def find_contacts(bodies, world, contacts):  # type: ignore
 @allocating_entry
 def sort_contacts(contacts, count):  # type: ignore
     """Sort contacts by height, the highest first; the points of a face remain together."""
-    # Sweeps carry the load, and with it Coulomb's limit, downward at once. Where courses of a wall
-    # slide, they are half to a quarter as many as in the order in which contacts are found.
+    # Sweeps carry the load, and with it Coulomb's limit, downward at once. Where many courses
+    # of a wall slide, half to a quarter as many are needed as in the order of detection.
     falling = -contacts.point[:count, 1]
     for k in range(1, count):
         if has_partner(contacts, k - 1, count):
