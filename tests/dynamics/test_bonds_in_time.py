@@ -195,7 +195,7 @@ def test_a_history_can_be_continued_from_its_file(tmp_path):
 
 def test_compiled_methods_and_old_schemes_say_that_they_cannot():
     model = block(1e9, friction=0.3, dilatancy=0.1)
-    with pytest.raises(af.InvalidInput, match="neither dilate nor resist tension"):
+    with pytest.raises(af.InvalidInput, match="neither dilate, nor resist tension"):
         af.time_history(model, STILL, dt=1e-3, method="newton")
     bonded = block(1e9, friction=None, tension=1e3)
     with pytest.raises(af.InvalidInput, match="follows no bonds"):
