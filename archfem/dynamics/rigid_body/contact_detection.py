@@ -151,24 +151,6 @@ def find_contacts(bodies, world, contacts):  # type: ignore
 
 
 @allocating_entry
-def sort_contacts(contacts, count):  # type: ignore
-    """Sort contacts by height, the highest first; the points of a face remain together."""
-    # Sweeps carry the load, and with it Coulomb's limit, downward at once. Where many courses
-    # of a wall slide, half to a quarter as many are needed as in the order of detection.
-    falling = -contacts.point[:count, 1]
-    for k in range(1, count):
-        if has_partner(contacts, k - 1, count):
-            falling[k] = falling[k - 1]
-    # a stable sort keeps the two points of a face, which have the same number here, in sequence
-    order = np.argsort(falling, kind="mergesort")
-    contacts.bodies[:count] = contacts.bodies[order]
-    contacts.key[:count] = contacts.key[order]
-    contacts.point[:count] = contacts.point[order]
-    contacts.normal[:count] = contacts.normal[order]
-    contacts.gap[:count] = contacts.gap[order]
-
-
-@allocating_entry
 def _touch_ground(bodies, world, piece, contacts, count):  # type: ignore
     """Add the outermost vertices of a piece that touch the ground, one or two."""
     left, right = -1, -1

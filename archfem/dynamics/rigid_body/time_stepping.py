@@ -6,12 +6,11 @@ middle of the step, q + ½ Δt v,
     M (v₁ - v₀) = Δt p + Hᵀ P,   0 <= u_N1 + e u_N0 ⊥ P_N >= 0,   q₁ = q₀ + ½ Δt (v₀ + v₁),
 
 |P_T| <= μ P_N, and P_T opposes u_T1 where that is not zero (Moreau, in: Nonsmooth Mechanics and
-Applications, 1988; Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235). Sweeps over the faces
-from top to bottom, each with both of its points at once, solve for the impulses P, from those of
-the step before. They have momentum with restart (Nesterov, Soviet Math. Dokl. 27 (1983) 372;
-O'Donoghue and Candès, Found. Comput. Math. 15 (2015) 715), and end once no contact violates its
-conditions by more than a stated speed. Rebounds are reduced where they would add energy. Overlaps
-are corrected in positions.
+Applications, 1988; Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235). Sweeps over the faces,
+each with both of its points at once, solve for the impulses P, from those of the step before. They
+have momentum with restart (Nesterov, Soviet Math. Dokl. 27 (1983) 372; O'Donoghue and Candès,
+Found. Comput. Math. 15 (2015) 715), and end once no contact violates its conditions by more than a
+stated speed. Rebounds are reduced where they would add energy. Overlaps are corrected in positions.
 """
 
 from collections.abc import Iterator, Mapping
@@ -50,7 +49,6 @@ from archfem.dynamics.rigid_body.contact_detection import (
     relative_speed,
     restore_impulses,
     solve_face,
-    sort_contacts,
     store_impulses,
 )
 from archfem.errors import DidNotConverge, InvalidInput
@@ -454,7 +452,6 @@ def _begin_step(bodies, parameters, workspace, state):  # type: ignore
     touching = find_contacts(bodies, workspace.world, contacts)
     if touching < 0:
         return -1, False
-    sort_contacts(contacts, touching)
     restore_impulses(bodies, middle, contacts, touching, workspace.stored)
     # targets follow from the velocities before the step, hence first
     speeds[:count] = v

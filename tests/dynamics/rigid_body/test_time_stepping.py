@@ -1,7 +1,7 @@
 """Rigid blocks from a pose to rest: overturning, dominoes, arches, energy."""
 
 from dataclasses import replace
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -301,24 +301,6 @@ def test_impulses_that_are_cut_short_are_counted(monkeypatch, chords):
     cut = RigidBlockSimulation(chords).final_frame(start, 0.1, pulse(0.7, 0.5)).settling
     assert cut.unsettled_share > 0.1
     assert cut.residual > time_stepping.SETTLED
-
-
-@pytest.mark.slow
-def test_impulses_of_a_wall_settle_while_its_courses_slide():
-    """At 0.8 g; with contacts in the order in which they are found, 44 % of the steps do not."""
-    blocks = [af.Block(((0, -0.3), (10.4, -0.3), (10.4, 0), (0, 0)), af.STONE, "0", fixed=True)]
-    for course in range(30):
-        ends = np.arange(0.4 if course % 2 else 0.8, 10.4 - 1e-9, 0.8)
-        for left, right in pairwise([0.0, *ends.tolist(), 10.4]):
-            low, high = 0.3 * course, 0.3 * (course + 1)
-            outline = ((left, low), (right, low), (right, high), (left, high))
-            blocks.append(af.Block(outline, af.STONE, f"{len(blocks)}", part="wall", role="other"))
-    wall = af.masonry.assembled(blocks, af.masonry.STONE_TO_STONE)
-    ground = af.Motion(np.full(301, 0.8 * G), 1e-3)
-    start = LooseBlocks.as_built(wall)
-    end = RigidBlockSimulation(wall, dt=1e-3).final_frame(start, 0.3, ground)
-    assert np.abs(end.poses[:, 0]).max() > 0.1
-    assert end.settling.unsettled_share < 0.03
 
 
 def test_stones_of_a_fall_end_beside_each_other(chords):
