@@ -67,12 +67,12 @@ class Process:
         self.count += 1
         path = self.folder / f"answer {self.count}.json"
         try:
-            process = self._started()
+            process = self._start()
             assert process.stdin is not None
             print(json.dumps({"settings": settings, "answer": str(path)}), file=process.stdin)
             process.stdin.flush()
         except BrokenPipeError:
-            failed = self._said()
+            failed = self._failure()
         except OSError as error:
             failed = f"does not start: {error}"
         else:
@@ -82,8 +82,8 @@ class Process:
             failed = _missing_numbers(found, self.scene)
         return found | ({"failed": failed} if failed else {})
 
-    def _started(self) -> "subprocess.Popen[str]":
-        """Return the process, started where there is none."""
+    def _start(self) -> "subprocess.Popen[str]":
+        """Start the process where there is none, and return it."""
         if self.process is None:
             worker, scene = str(HERE / "worker.py"), str(self.folder / "scene.json")
             one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -106,14 +106,14 @@ class Process:
         while not path.exists():
             if process.poll() is not None:
                 # it may have ended right after its answer
-                return "" if path.exists() else self._said()
+                return "" if path.exists() else self._failure()
             if time.monotonic() > latest:
                 self._end()
                 return f"no answer within {self.limit:g} s"
             time.sleep(pause)
         return ""
 
-    def _said(self) -> str:
+    def _failure(self) -> str:
         """Return why a process ended without an answer."""
         assert self.process is not None
         code = self.process.wait()

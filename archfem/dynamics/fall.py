@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem._validation import validate_arguments
-from archfem.dynamics.rigid_body.bodies import Bodies, FallFrame, LooseBlocks, make_bodies
+from archfem.dynamics.rigid_body.bodies import (
+    Bodies,
+    FallFrame,
+    LooseBlocks,
+    find_unkept_ratios,
+    make_bodies,
+)
 from archfem.dynamics.rigid_body.contact_detection import (
     PlacedPieces,
     allocate_pieces,
@@ -446,14 +452,18 @@ def simulate_fall(
     """Follow loose blocks until they rest, or until `settling_time` after the motion has ended [s].
 
     Displacements count from the start of the run. Steps are shortened where they fail. The ratio is
-    that of `RigidBlockSimulation`.
+    that of `RigidBlockSimulation`, for the joints where it has an effect.
     """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + settling_time
     loose = _with_sliding_joints(model.structure)
+    ratios: float | dict[str, float] | None = rocking_ratio
+    if rocking_ratio is not None and (unkept := find_unkept_ratios(loose, rocking_ratio)):
+        names = {joint.name for joint in loose.joints} - unkept.keys()
+        ratios = dict.fromkeys(names, rocking_ratio)
     failure = None
     for dt in FALL_STEPS:
-        simulation = RigidBlockSimulation(loose, dt=dt, rocking_ratio=rocking_ratio)
+        simulation = RigidBlockSimulation(loose, dt=dt, rocking_ratio=ratios)
         try:
             frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
         except DidNotConverge as error:
@@ -495,6 +505,19 @@ def _fall_dataset(
             "fall_unsettled": settling.unsettled_share,
         },
     )
+
+
+def doubt_rocking_ratio(structure: Structure, ratio: float | None) -> list[Doubt]:
+    """Return a doubt where loose blocks keep more at an impact than the damping was to give."""
+    unkept = {} if ratio is None else find_unkept_ratios(_with_sliding_joints(structure), ratio)
+    if not unkept:
+        return []
+    doubt = Doubt(
+        f"the damping was to give a restitution of {ratio:g}, but loose blocks keep at least "
+        f"{min(unkept.values()):.4g} at {join_names(sorted(unkept))} (Housner)",
+        "give `restitution_damping` at least that",
+    )
+    return [doubt]
 
 
 def standing_state(model: Model, start: State, state: State, shaken: bool) -> CollapseState:

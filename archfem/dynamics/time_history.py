@@ -25,6 +25,7 @@ from archfem.dynamics.fall import (
     MeetingMonitor,
     SeparationMonitor,
     doubt_collapse,
+    doubt_rocking_ratio,
     is_overturning,
     simulate_fall,
     standing_state,
@@ -197,7 +198,7 @@ def _follow_fall(
             raise
         dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
         history = History(dataset, history.structure)
-        doubts = _doubt_impulses(history)
+        doubts = [*_doubt_impulses(history), *doubt_rocking_ratio(model.structure, rocking_ratio)]
     else:
         shaken = history.ending is not Ending.FINISHED
         fall = standing_state(model, start, state, shaken)

@@ -240,8 +240,8 @@ class WorkerPool:
         self._workers: list[Worker] = []
         self._deaths: Counter[int] = Counter()
         self._warnings = RunWarnings()
-        # a second Ctrl-C may come before or while `close` runs; at its end Python waits for all
-        # processes that are left, as long as their points take
+        # A second Ctrl-C may end `close` early, and Python waits at its end for all processes that
+        # are left, until their points are computed
         atexit.register(self._kill)
 
     def rows(self) -> Iterator[tuple[int, Row]]:

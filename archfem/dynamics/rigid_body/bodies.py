@@ -6,6 +6,7 @@ American Mathematical Monthly 82 (1975) 648), and triangles are merged while the
 """
 
 import logging
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations, pairwise
@@ -207,18 +208,60 @@ def _friction_table(structure: Structure, default: float | None) -> Array:
     return np.minimum(np.where(has_joint, table, general), 1e3)
 
 
+def find_unkept_ratios(
+    structure: Structure, ratio: float | Mapping[str, float], error: float = 0.002
+) -> dict[str, float]:
+    """Return Housner's ratio of the joints where the one given is less, by more than an error.
+
+    Those of blocks on one joint to a fixed block; of others it depends on what they touch. By their
+    time steps simulations err by as much as the error.
+    """
+    counts = Counter(number for joint in structure.joints for number in joint.blocks)
+    unkept = {}
+    for joint, friction in zip(structure.joints, structure.friction, strict=True):
+        free, support = sorted(joint.blocks, key=lambda number: structure.blocks[number].fixed)
+        block = structure.blocks[free]
+        if counts[free] > 1 or block.fixed or not structure.blocks[support].fixed:
+            continue
+        given = ratio.get(joint.name, 1.0) if isinstance(ratio, Mapping) else ratio
+        arms, least = block.centroid - joint.ends, 1.0
+        for before, after in (arms, arms[::-1]):
+            # the impulse passes through the closing end, about which turning is conserved
+            inertia = block.polar_moment + block.area * np.array([before @ after, after @ after])
+            kept = inertia[0] / inertia[1]
+            # where friction does not hold that end, it slides, and less may be kept
+            change = kept * after - before
+            normal, shear = joint.tangent @ change, np.cross(joint.tangent, change)
+            least = min(least, kept if abs(shear) <= friction * abs(normal) else 0.0)
+        if given < least - error:
+            unkept[joint.name] = float(least)
+    return unkept
+
+
 def _rocking_table(structure: Structure, ratio: float | Mapping[str, float] | None) -> Array:
     """Return the rocking restitution between any two bodies, zero where none is given."""
     count = len(structure.blocks) + 1
-    if not isinstance(ratio, Mapping):
-        return np.full((count, count), 0.0 if ratio is None else _check_ratio(ratio))
     table = np.zeros((count, count))
-    pairs = {joint.name: joint.blocks for joint in structure.joints}
-    for name, value in ratio.items():
-        if name not in pairs:
-            raise InvalidInput(f"rocking_ratio names joint {name!r}, which the structure has not")
-        a, b = pairs[name]
-        table[a, b] = table[b, a] = _check_ratio(value)
+    if ratio is None:
+        return table
+    if isinstance(ratio, Mapping):
+        pairs = {joint.name: joint.blocks for joint in structure.joints}
+        for name, value in ratio.items():
+            if name not in pairs:
+                raise InvalidInput(
+                    f"rocking_ratio names joint {name!r}, which the structure has not"
+                )
+            a, b = pairs[name]
+            table[a, b] = table[b, a] = _check_ratio(value)
+    else:
+        table[:] = _check_ratio(ratio)
+    for name, least in find_unkept_ratios(structure, ratio).items():
+        given = ratio[name] if isinstance(ratio, Mapping) else ratio
+        raise InvalidInput(
+            f"rocking_ratio {given:g} of joint {name!r} has no effect: by its shape the block "
+            f"keeps {least:.4g} at an impact (Housner). Give ratios above, by the names of joints, "
+            "and none for this one"
+        )
     return table
 
 

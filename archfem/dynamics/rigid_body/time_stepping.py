@@ -131,11 +131,13 @@ class RigidBlockSimulation:
         level: height of the ground [m]; None takes the lowest point of the fixed blocks.
         rocking_ratio: angular velocity after over that before, where a face that turns about one
             end closes at the other: of all faces, or by names of joints [-]. None, and joints not
-            named, take that of an impact at the closing end alone (Housner's), which is the least.
+            named, take that of an impact at the closing end alone (Housner's), which is the least:
+            smaller ones have no effect. They are refused for blocks on one joint to a fixed block;
+            of others the least depends on what they touch, and is not checked.
 
     Raises:
-        InvalidInput: a number is out of range, there is no coefficient of friction, a joint has
-            cohesion, or the ground lies above the foot of a free block.
+        InvalidInput: a number is out of range, a ratio has no effect, there is no coefficient of
+            friction, a joint has cohesion, or the ground lies above the foot of a free block.
     """
 
     structure: Structure

@@ -154,3 +154,21 @@ def test_ratios_that_cannot_be_meant_are_refused():
     for ratio in (0.0, 1.1, {"joint 1": -0.5}, {"joint 7": 0.9}):
         with pytest.raises(af.errors.InvalidInput, match="rocking_ratio"):
             RigidBlockSimulation(structure, rocking_ratio=ratio)
+
+
+def test_ratios_without_effect_are_refused():
+    """Housner's ratios of rectangles bound what is given, except where the closing end slides."""
+    structure = floor((-1.0, 0.0, -0.4, 2.4), (0.4, 0.0, 1.0, 1.2))
+    slender, stocky = 1.0 - 1.5 * 0.6**2 / (0.6**2 + np.array([2.4, 1.2]) ** 2)
+    with pytest.raises(
+        af.errors.InvalidInput, match=rf"0\.85 of joint 'joint 1' .* keeps {slender:.4g}"
+    ):
+        RigidBlockSimulation(structure, rocking_ratio=0.85)
+    with pytest.raises(af.errors.InvalidInput, match="'joint 2'"):
+        RigidBlockSimulation(structure, rocking_ratio={"joint 2": stocky - 0.003})
+    for given in ({"joint 2": 0.85}, {"joint 2": stocky - 0.001}, slender):
+        RigidBlockSimulation(structure, rocking_ratio=given)
+    smooth = floor((-0.3, 0.0, 0.3, 2.4), friction=0.1)
+    RigidBlockSimulation(smooth, rocking_ratio=0.85)
+    # the lower of two blocks carries the other, whose support is not fixed
+    RigidBlockSimulation(af.column(breadth=0.6, heights=[2.4, 2.4]), rocking_ratio=0.5)
