@@ -53,6 +53,8 @@ if [ ! -f "$folder/made" ]; then
 	touch "$folder/made"
 fi
 mkdir -p "$folder/archfem"
+# files of an earlier tree would be tested too; the environment stays
+find "$folder/archfem" -mindepth 1 -maxdepth 1 ! -name .venv -exec rm -rf {} +
 tar -C "$tree" --exclude=./.venv --exclude=./.git --exclude=./out --exclude=__pycache__ -c . \
 	| tar -C "$folder/archfem" -x
 within env -C /archfem "$@"
