@@ -18,10 +18,11 @@ from archfem.statics.newton_iteration import (
     Equations,
 )
 
-# by SNES converged reason
+# by SNES converged reason; numbers, since PETSc 3.25 renames that of a NaN
+_NAN_REASON = -4
 _FAILURE_MESSAGES = {
     -3: SINGULAR_TANGENT,
-    -4: NOT_A_NUMBER,
+    _NAN_REASON: NOT_A_NUMBER,
     -5: TOO_MANY_ITERATIONS,
     -6: LINE_SEARCH_FAILED,
 }
@@ -101,7 +102,7 @@ class PetscNewton:
     ) -> int:
         reasons = PETSc.SNES.ConvergedReason
         if not np.isfinite(norms[2]):
-            return int(reasons.DIVERGED_FNORM_NAN)
+            return _NAN_REASON
         converged = self._is_converged(norms[2])
         return int(reasons.CONVERGED_FNORM_ABS if converged else reasons.ITERATING)
 

@@ -231,7 +231,8 @@ def find_unkept_ratios(
             kept = inertia[0] / inertia[1]
             # where friction does not hold that end, it slides, and less may be kept
             change = kept * after - before
-            normal, shear = joint.tangent @ change, np.cross(joint.tangent, change)
+            normal = joint.tangent @ change
+            shear = joint.tangent[0] * change[1] - joint.tangent[1] * change[0]
             least = min(least, kept if abs(shear) <= friction * abs(normal) else 0.0)
         if given < least - error:
             unkept[joint.name] = float(least)
