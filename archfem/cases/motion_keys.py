@@ -26,10 +26,6 @@ from archfem.motion.motion import Motion
 from archfem.motion.record_selection import RecordSelection
 from archfem.motion.suite import Suite
 
-SOURCE_KEYS = {
-    **{"file": str, "column": int, "units": str, "dt": "s", "response": str},
-    **{"synthetic": dict, "samples": ["m/s**2"]},
-}
 # Design spectra for 5 % damping by name, with their keys; accelerations are in g.
 TARGET_SPECTRA: Mapping[str, tuple[Callable[..., DesignSpectrum], Table]] = {
     "TBEC-2018": (Tbec2018, {"ss": "1", "s1": "1", "site": str}),
@@ -47,9 +43,11 @@ TARGET_SPECTRA: Mapping[str, tuple[Callable[..., DesignSpectrum], Table]] = {
 def parse_motion(table: Any, section: str = "motion") -> dict[str, Any]:
     """Return the checked keys of one motion."""
     own = {"vertical": (str, dict), "resample": "s", "start": "s", "end": "s", "scale": "1"}
-    settings = _parse_source(table, {**SOURCE_KEYS, **own, "reversed": bool}, section)
+    source: Table = {"file": str, "column": int, "units": str, "dt": "s", "response": str}
+    source |= {"synthetic": dict, "samples": ["m/s**2"]}
+    settings = _parse_source(table, {**source, **own, "reversed": bool}, section)
     if isinstance(settings.get("vertical"), dict):
-        vertical = _parse_source(settings["vertical"], SOURCE_KEYS, f"{section}.vertical")
+        vertical = _parse_source(settings["vertical"], source, f"{section}.vertical")
         if "vertical_ratio" in vertical.get("synthetic", {}):
             raise InvalidInput(
                 f"{section}.vertical.synthetic.vertical_ratio: a vertical has none, its pga is its "

@@ -25,29 +25,6 @@ from archfem.masonry.survey.outlines import Layer, surveyed
 
 Described = TypeVar("Described")
 
-# Kind of each argument of shapes, parts, materials and contacts that is a key of a case file.
-KEY_KINDS: Table = {
-    **dict.fromkeys(("radius", "span", "rise", "thickness", "width", "breadth", "height"), "m"),
-    **dict.fromkeys(("course", "pier_breadth", "gap", "length", "above", "setback"), "m"),
-    **dict.fromkeys(("cover", "erosion", "hump", "spandrels", "snap"), "m"),
-    **{key: ["m"] for key in ("heights", "courses", "spans", "breadths", "thicknesses", "rises")},
-    **dict.fromkeys(("voussoirs", "chords"), int),
-    **dict.fromkeys(("material", "contact", "state", "unit", "measured"), str),
-    **dict.fromkeys(("part", "role"), str),
-    **dict.fromkeys(("arches", "piers", "sidewalls", "backfill", "paving"), dict),
-    **dict.fromkeys(("layers", "contacts", "law"), dict),
-    **dict.fromkeys(("fixed", "ignore"), bool),
-    **dict.fromkeys(("embrace", "skewback"), "degree"),
-    "embraces": ["degree"],
-    "intrados": [["m"]],
-    "gravity": "m/s**2",
-    **dict.fromkeys(("young", "strength", "cohesion", "tension"), "Pa"),
-    **dict.fromkeys(("poisson", "dilatancy"), "1"),
-    "unit_weight": "N/m**3",
-    **dict.fromkeys(("normal_stiffness", "shear_stiffness"), "Pa/m"),
-    "friction": NumberOrWord("1", {"none": None}),  # "none": a joint that never slides
-}
-
 SHAPE_FUNCTIONS: Mapping[str, Callable[..., Structure]] = {
     shape.__name__: shape
     for shape in (
@@ -110,7 +87,29 @@ def build_structure(settings: Table, folder: Path = Path()) -> Structure:
 
 def _keys_of(function: Callable[..., Any]) -> dict[str, Any]:
     """Return keys and kinds of the arguments of a shape, part or material."""
-    return {k: KEY_KINDS[k] for k in inspect.signature(function).parameters if k in KEY_KINDS}
+    # kind of each argument of shapes, parts, materials and contacts that is a key of a case file
+    kinds: Table = {
+        **dict.fromkeys(("radius", "span", "rise", "thickness", "width", "breadth", "height"), "m"),
+        **dict.fromkeys(("course", "pier_breadth", "gap", "length", "above", "setback"), "m"),
+        **dict.fromkeys(("cover", "erosion", "hump", "spandrels", "snap"), "m"),
+        **{key: ["m"] for key in ("heights", "courses", "spans", "breadths", "thicknesses", "rises")},
+        **dict.fromkeys(("voussoirs", "chords"), int),
+        **dict.fromkeys(("material", "contact", "state", "unit", "measured"), str),
+        **dict.fromkeys(("part", "role"), str),
+        **dict.fromkeys(("arches", "piers", "sidewalls", "backfill", "paving"), dict),
+        **dict.fromkeys(("layers", "contacts", "law"), dict),
+        **dict.fromkeys(("fixed", "ignore"), bool),
+        **dict.fromkeys(("embrace", "skewback"), "degree"),
+        "embraces": ["degree"],
+        "intrados": [["m"]],
+        "gravity": "m/s**2",
+        **dict.fromkeys(("young", "strength", "cohesion", "tension"), "Pa"),
+        **dict.fromkeys(("poisson", "dilatancy"), "1"),
+        "unit_weight": "N/m**3",
+        **dict.fromkeys(("normal_stiffness", "shear_stiffness"), "Pa/m"),
+        "friction": NumberOrWord("1", {"none": None}),  # "none": a joint that never slides
+    }
+    return {k: kinds[k] for k in inspect.signature(function).parameters if k in kinds}
 
 
 def _divide_fill(structure: Structure, table: Table) -> Structure:

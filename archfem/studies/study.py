@@ -57,12 +57,6 @@ from archfem.studies.shared_results import share_results
 
 logger = logging.getLogger("archfem")
 
-# Keys of a study file and their kinds
-STUDY_KEYS: Mapping[str, Any] = {
-    **{"title": str, "case": str, "cases": dict, "set": [str], "pairs": [str]},
-    **{"vary": (dict, list), "samples": dict, "compute": (str, dict), "scales": (bool, dict)},
-}
-
 
 @validate_methods
 @dataclass(frozen=True, eq=False)
@@ -339,8 +333,12 @@ def _read_study(
     """Return the study of the tables of a file."""
     if {"structure", "base"} & set(tables):
         raise InvalidInput('this is a case: name it in the file of a study, case = "CASE.toml"')
-    refuse_unknown(tables, STUDY_KEYS)
-    settings = check_table(tables, STUDY_KEYS, "study")
+    keys = {
+        **{"title": str, "case": str, "cases": dict, "set": [str], "pairs": [str]},
+        **{"vary": (dict, list), "samples": dict, "compute": (str, dict), "scales": (bool, dict)},
+    }
+    refuse_unknown(tables, keys)
+    settings = check_table(tables, keys, "study")
     missing = [] if {"case", "cases"} & set(settings) else ["case"]
     missing += [] if {"cases", "vary"} & set(settings) else ["vary"]
     if missing or {"case", "cases"} <= set(settings):
