@@ -174,8 +174,8 @@ _announced: set[str] = set()
 
 def _announce_compilation(module: str) -> None:
     """Write which part of a run is compiled, and for how long, once for each part."""
-    # what is compiled at once, by the module of its first kernel, and the time of that as a multiple
-    # of the time of the reference function
+    # what is compiled at once, by the module of its first kernel, and its time as a multiple of
+    # that of the reference function
     parts = {
         "rigid_body.time_stepping": ("fall of loose blocks", 270.0),
         "solvers.supernodal_lu": ("steps of elastic blocks", 290.0),

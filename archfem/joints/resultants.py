@@ -147,6 +147,29 @@ def joint_dataset(
     return xr.Dataset(variables, coordinates, criteria.attributes)
 
 
+def _describe_variables(
+    dims: tuple[str, ...], values: dict[str, Array]
+) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:
+    """Return variables of joints with their units and meaning."""
+    meaning = {
+        "N": ("N", "normal force, compression positive"),
+        "V": ("N", "shear force"),
+        "M": ("N m", "moment about mid-depth, positive toward the extrados"),
+        "eccentricity": ("1", "M / (N h), +0.5 at the extrados; undefined in an open joint"),
+        "friction": ("1", "mobilised friction |V| / N; undefined in an open joint"),
+        "opening": (
+            "m",
+            "largest gap between the faces, at the end that is more open; 0 where closed",
+        ),
+        "rotation": ("rad", "turn of the higher face, positive where it opens the intrados"),
+        "slip": ("m", "mean slip of the higher block, positive toward the extrados"),
+    }
+    return {
+        key: (dims, value, {"units": meaning[key][0], "long_name": meaning[key][1]})
+        for key, value in values.items()
+    }
+
+
 def _overlap(depth: Array, faces: Array | None) -> Array:
     """Return the length over which the faces of joints overlap (…, n_joints) [m]."""
     return depth if faces is None else np.maximum(depth - np.abs(faces[..., 2, :]), 0.0)
@@ -267,26 +290,3 @@ def write_joint_table(joints: xr.Dataset, path: str | Path) -> Path:
             "pip install 'archfem[tables]', or write .csv"
         ) from error
     return path
-
-
-def _describe_variables(
-    dims: tuple[str, ...], values: Mapping[str, Array]
-) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:
-    """Return variables of joints with their units and meaning."""
-    meaning = {
-        "N": ("N", "normal force, compression positive"),
-        "V": ("N", "shear force"),
-        "M": ("N m", "moment about mid-depth, positive toward the extrados"),
-        "eccentricity": ("1", "M / (N h), +0.5 at the extrados; undefined in an open joint"),
-        "friction": ("1", "mobilised friction |V| / N; undefined in an open joint"),
-        "opening": (
-            "m",
-            "largest gap between the faces, at the end that is more open; 0 where closed",
-        ),
-        "rotation": ("rad", "turn of the higher face, positive where it opens the intrados"),
-        "slip": ("m", "mean slip of the higher block, positive toward the extrados"),
-    }
-    return {
-        key: (dims, value, {"units": meaning[key][0], "long_name": meaning[key][1]})
-        for key, value in values.items()
-    }

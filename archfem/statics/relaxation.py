@@ -235,5 +235,3 @@ def solve_or_relax(
         if has_irreversible_joints(model):
             return solve_irreversible(solver, model, load, solution.q)
         return model, solution
-
-

@@ -26,12 +26,13 @@ from archfem.dynamics.history import Ending
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.studies.comparison import Finding, build_findings, file_name, parse_search
 from archfem.studies.evaluators import (
-    MOTION_EVALUATORS,
     Evaluator,
     Findings,
     evaluate_comparison,
     evaluate_dead_load,
+    evaluate_history,
     evaluate_limit,
+    evaluate_scales,
     refuse_code,
 )
 from archfem.studies.parameter_space import (
@@ -351,7 +352,9 @@ def _read_study(
     cases = _read_cases(settings, path.parent, changes)
     vary, samples = settings.get("vary"), settings.get("samples")
     varied = () if vary is None else parameter_axes(vary, samples)
-    by_pair = asked.find in MOTION_EVALUATORS and all(PAIR_KEY not in axis.keys for axis in varied)
+    # findings of one motion: a case with a suite is evaluated under each of its pairs
+    of_motions = asked.find in (evaluate_history, evaluate_scales, evaluate_comparison)
+    by_pair = of_motions and all(PAIR_KEY not in axis.keys for axis in varied)
     rows = _pair_cases(cases, settings.get("pairs"), asked, by_pair)
     if any(axis.name == "point" for axis in varied):  # the name of the cases with their pairs
         varied = tuple(replace(axis, name="variation") for axis in varied) if rows[1:] else varied
