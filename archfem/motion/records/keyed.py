@@ -6,12 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from archfem._typing import Array
-from archfem.motion.records.record_file import (
-    COUNT_PATTERN,
-    NUMBER_PATTERN,
-    Channel,
-    RecordText,
-)
+from archfem.motion.records.record_file import COUNT_PATTERN, NUMBER_PATTERN, Channel, RecordText
 
 
 def read_afad(text: RecordText) -> list[Channel]:

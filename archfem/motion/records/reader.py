@@ -36,11 +36,7 @@ _RECORD_FORMATS = tuple(
             ((volumes.VOLUME_1_PATTERN, 120),),
             volumes.read_volume_1,
         ),
-        (
-            "AFAD",
-            ((r"^\s*NUMBER OF DATA\s*:", 40), (r"SAMPLING INTERVAL", 40)),
-            keyed.read_afad,
-        ),
+        ("AFAD", ((r"^\s*NUMBER OF DATA\s*:", 40), (r"SAMPLING INTERVAL", 40)), keyed.read_afad),
         ("UNAM", (("^ARCHIVO ESTANDAR DE ACELERACION", 20),), keyed.read_unam),
         ("CWB", ((r"^#DataSequence:\s*Time", 30),), keyed.read_cwb),
         ("ESM", ((r"^\s*NDATA\s*:|^\s*SAMPLING_INTERVAL_S\s*:", 80),), keyed.read_esm),
