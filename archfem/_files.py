@@ -31,12 +31,10 @@ LIST_FILE = "archfem.json"
 DRAFT_PREFIX = ".unfinished-"
 FINISHED_FOLDER = ".finished"
 
-# Limit for files that are read at once: a record of 10⁷ samples is smaller.
-MAX_FILE_BYTES = 2**28
 
-
-def check_file(path: str | os.PathLike[str], what: str, max_bytes: int = MAX_FILE_BYTES) -> Path:
+def check_file(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) -> Path:
     """Refuse a path that is no regular file, or one that is too large."""
+    # by default larger than a record of 10⁷ samples
     try:
         place = Path(path)
         status = place.stat()
@@ -55,7 +53,7 @@ def check_file(path: str | os.PathLike[str], what: str, max_bytes: int = MAX_FIL
     return place
 
 
-def read_bytes(path: str | os.PathLike[str], what: str, max_bytes: int = MAX_FILE_BYTES) -> bytes:
+def read_bytes(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) -> bytes:
     """Read a file."""
     try:
         return check_file(path, what, max_bytes).read_bytes()
@@ -68,7 +66,7 @@ def _read_error(path: Any, what: str, error: Exception) -> str:
     return f"cannot read the {what} {short_repr(path)}: {describe_os_error(error)}"
 
 
-def read_text(path: str | os.PathLike[str], what: str, max_bytes: int = MAX_FILE_BYTES) -> str:
+def read_text(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) -> str:
     """Read a text file in UTF-8, with or without a byte order mark."""
     try:
         return read_bytes(path, what, max_bytes).decode("utf-8-sig")

@@ -169,21 +169,21 @@ class CompilationNotice(event.Listener):
         pass
 
 
-# Parts of a run that are compiled at once, by the module of their first kernel: what is compiled,
-# and its time as a multiple of that of the reference function
-_COMPILED_PARTS = {
-    "rigid_body.time_stepping": ("fall of loose blocks", 270.0),
-    "solvers.supernodal_lu": ("steps of elastic blocks", 290.0),
-    "joints.large": ("time steps", 225.0),
-    "": ("time steps", 150.0),  # of rigid blocks with small displacements
-}
 _announced: set[str] = set()
 
 
 def _announce_compilation(module: str) -> None:
     """Write which part of a run is compiled, and for how long, once for each part."""
-    key = next(part for part in _COMPILED_PARTS if part in module)
-    part, multiple = _COMPILED_PARTS[key]
+    # what is compiled at once, by the module of its first kernel, and its time as a multiple of
+    # that of the reference function
+    parts = {
+        "rigid_body.time_stepping": ("fall of loose blocks", 270.0),
+        "solvers.supernodal_lu": ("steps of elastic blocks", 290.0),
+        "joints.large": ("time steps", 225.0),
+        "": ("time steps", 150.0),  # of rigid blocks with small displacements
+    }
+    key = next(part for part in parts if part in module)
+    part, multiple = parts[key]
     if part in _announced:
         return
     # kernels of large displacements include those of elastic blocks

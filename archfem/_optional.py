@@ -12,9 +12,6 @@ from typing import NamedTuple
 
 from archfem.errors import NotInstalled
 
-# FEniCSx and the packages it is built on
-FENICSX_PACKAGES = ("dolfinx", "petsc4py", "slepc4py", "mpi4py")
-
 
 class Requirement(NamedTuple):
     """A package that may be missing."""

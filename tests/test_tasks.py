@@ -9,7 +9,6 @@ import pytest
 from chromium import BROWSER
 
 import archfem as af
-from archfem.cases.provenance import OWN_CODE_VARIABLE
 
 PAGE = (Path(__file__).parents[1] / "docs" / "howto" / "tasks.md").read_text(encoding="utf-8")
 TASKS = dict(re.findall(r"^## (.*?)\n(.*?)(?=^## |\Z)", PAGE, re.DOTALL | re.MULTILINE))
@@ -55,7 +54,7 @@ def test_a_task_runs_and_prints_what_it_shows(task, tmp_path, monkeypatch, capsy
     if "--pdf" in TASKS[task] and BROWSER is None:
         pytest.skip("there is no chromium: apt-get install chromium")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv(OWN_CODE_VARIABLE, "")  # permissions end with the test
+    monkeypatch.setenv("ARCHFEM_OWN_CODE", "")  # permissions end with the test
     monkeypatch.setattr(sys, "path", list(sys.path))
     for name, content in FILES.items():
         Path(name).write_text(content, encoding="utf-8")

@@ -7,7 +7,7 @@ from typing import Any
 from archfem._validation import validate_methods
 from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.toml_file import Table, check_choice, check_table
-from archfem.dynamics.events import REGISTERED_CRITERIA
+from archfem.dynamics.events import registered_criteria
 from archfem.dynamics.schemes import (
     HHT,
     Conserving,
@@ -72,7 +72,7 @@ def parse_analysis(table: Any) -> dict[str, Any]:
     if "damping" in analysis:
         analysis["damping"] = _check_section(analysis["damping"], "analysis.damping")
     if "stop_at" in analysis:
-        check_choice(analysis["stop_at"], REGISTERED_CRITERIA, "analysis.stop_at")
+        check_choice(analysis["stop_at"], registered_criteria, "analysis.stop_at")
         if analysis.get("stop_at_mechanism", False):
             raise InvalidInput("analysis.stop_at and stop_at_mechanism: one condition ends a run")
     return analysis

@@ -36,10 +36,6 @@ MODEL_KEYS = {
 }
 # Keywords of `build` which have another name in a case file.
 BUILD_KEYWORDS = {"max_cell_size": "coarse", "quadrature_points": "points", "mesh_file": "file"}
-TABLE_SECTIONS = (
-    *("structure", "materials", "contacts", "model", "motion", "suite", "analysis"),
-    *("criteria", "limit", "rating", "assessment", "dead_load", "output"),
-)
 
 
 @dataclass(frozen=True)
@@ -125,10 +121,14 @@ class Case:
         """
         if "structure" not in settings and {"case", "cases"} & set(settings):
             raise InvalidInput("this is a study of cases: compute it by `archfem study`")
-        refuse_unknown(settings, ("title", "extensions", *TABLE_SECTIONS))
+        sections = (
+            *("structure", "materials", "contacts", "model", "motion", "suite", "analysis"),
+            *("criteria", "limit", "rating", "assessment", "dead_load", "output"),
+        )
+        refuse_unknown(settings, ("title", "extensions", *sections))
         load_extensions_of(settings, folder)
         check_words(settings.get("title", ""), "title", 'write words in quotes: title = "…"')
-        for key in TABLE_SECTIONS:
+        for key in sections:
             if not isinstance(settings.get(key, {}), dict):
                 raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
         model = check_table(settings.get("model", {}), MODEL_KEYS, "model")

@@ -12,7 +12,6 @@ from archfem._typing import Array
 from archfem.cases.toml_file import Table, check_choice, check_table
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import (
-    REGISTERED_SPECTRA,
     Asce2022,
     DesignSpectrum,
     Eurocode8,
@@ -21,35 +20,23 @@ from archfem.motion.design_spectra import (
     TableSpectrum,
     Tbec2018,
     build_registered_spectrum,
+    registered_spectra,
 )
 from archfem.motion.motion import Motion
 from archfem.motion.record_selection import RecordSelection
 from archfem.motion.suite import Suite
 
-SOURCE_KEYS = {
-    **{"file": str, "column": int, "units": str, "dt": "s", "response": str},
-    **{"synthetic": dict, "samples": ["m/s**2"]},
-}
-# Design spectra for 5 % damping by name, with their keys; accelerations are in g.
-TARGET_SPECTRA: Mapping[str, tuple[Callable[..., DesignSpectrum], Table]] = {
-    "TBEC-2018": (Tbec2018, {"ss": "1", "s1": "1", "site": str}),
-    "EC8": (Eurocode8, {"ag": "1", "ground": str, "type": int}),
-    "NTC-2018": (Ntc2018, {"ag": "1", "f0": "1", "tc_star": "s", "site": str, "topography": "1"}),
-    "ASCE-7-22": (Asce2022, {"sds": "1", "sd1": "1", "tl": "s"}),
-    "EC8-2024": (
-        Eurocode2024,
-        {"s_alpha": "1", "s_beta": "1", "f_alpha": "1", "f_beta": "1", "topography": "1"},
-    ),
-    "table": (TableSpectrum, {"periods": ["s"], "values": ["1"], "vertical_values": ["1"]}),
-}
-
 
 def parse_motion(table: Any, section: str = "motion") -> dict[str, Any]:
     """Return the checked keys of one motion."""
     own = {"vertical": (str, dict), "resample": "s", "start": "s", "end": "s", "scale": "1"}
-    settings = _parse_source(table, {**SOURCE_KEYS, **own, "reversed": bool}, section)
+    source: Table = {
+        **{"file": str, "column": int, "units": str, "dt": "s", "response": str},
+        **{"synthetic": dict, "samples": ["m/s**2"]},
+    }
+    settings = _parse_source(table, {**source, **own, "reversed": bool}, section)
     if isinstance(settings.get("vertical"), dict):
-        vertical = _parse_source(settings["vertical"], SOURCE_KEYS, f"{section}.vertical")
+        vertical = _parse_source(settings["vertical"], source, f"{section}.vertical")
         if "vertical_ratio" in vertical.get("synthetic", {}):
             raise InvalidInput(
                 f"{section}.vertical.synthetic.vertical_ratio: a vertical has none, its pga is its "
@@ -118,13 +105,28 @@ def build_target_spectrum(settings: Table) -> DesignSpectrum | None:
 
 def build_spectrum(table: Table, section: str) -> DesignSpectrum:
     """Return the design spectrum of a table with its code."""
+    # design spectra for 5 % damping by name, with their keys; accelerations are in g
+    spectra: Mapping[str, tuple[Callable[..., DesignSpectrum], Table]] = {
+        "TBEC-2018": (Tbec2018, {"ss": "1", "s1": "1", "site": str}),
+        "EC8": (Eurocode8, {"ag": "1", "ground": str, "type": int}),
+        "NTC-2018": (
+            Ntc2018,
+            {"ag": "1", "f0": "1", "tc_star": "s", "site": str, "topography": "1"},
+        ),
+        "ASCE-7-22": (Asce2022, {"sds": "1", "sd1": "1", "tl": "s"}),
+        "EC8-2024": (
+            Eurocode2024,
+            {"s_alpha": "1", "s_beta": "1", "f_alpha": "1", "f_beta": "1", "topography": "1"},
+        ),
+        "table": (TableSpectrum, {"periods": ["s"], "values": ["1"], "vertical_values": ["1"]}),
+    }
     values = dict(table)
-    known = [*TARGET_SPECTRA, *REGISTERED_SPECTRA]
+    known = [*spectra, *registered_spectra]
     code = check_choice(values.pop("code", None), known, f"{section}.code")
-    if code not in TARGET_SPECTRA:
-        own = check_table(values, REGISTERED_SPECTRA[code][1], section)
+    if code not in spectra:
+        own = check_table(values, registered_spectra[code][1], section)
         return build_registered_spectrum(code, own)
-    spectrum, keys = TARGET_SPECTRA[code]
+    spectrum, keys = spectra[code]
     try:
         return spectrum(**check_table(values, keys, section))
     except TypeError as error:

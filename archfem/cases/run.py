@@ -22,7 +22,7 @@ from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs
 from archfem.dynamics.damping import effective_mode_range, first_effective_mode
-from archfem.dynamics.events import REGISTERED_CRITERIA, CountedMechanism, StopCondition
+from archfem.dynamics.events import CountedMechanism, StopCondition, registered_criteria
 from archfem.dynamics.history import Ending, History, partial_history
 from archfem.dynamics.model_selection import DampingChoice, select_model
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, StiffnessDamping, Viscous
@@ -364,7 +364,7 @@ def run_time_history(
 def _stop_condition(case: Case) -> StopCondition | None:
     """Return the event that ends a run before its motion does, if any."""
     if "stop_at" in case.analysis:
-        return REGISTERED_CRITERIA[case.analysis["stop_at"]]
+        return registered_criteria[case.analysis["stop_at"]]
     return CountedMechanism() if case.analysis.get("stop_at_mechanism", False) else None
 
 

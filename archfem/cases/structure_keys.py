@@ -7,7 +7,7 @@ each keyword of `archfem.shapes` is a key of the same name.
 import inspect
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,47 +15,21 @@ from typing import Any, TypeVar
 from archfem.cases.provenance import hash_file, list_input_files
 from archfem.cases.toml_file import NumberOrWord, Table, check_choice, check_table
 from archfem.errors import InvalidInput
-from archfem.joints.own_law import REGISTERED_LAWS, JointLaw, build_registered_law
+from archfem.joints.own_law import JointLaw, build_registered_law, registered_laws
 from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.construction import Stage, resolve_stages, usual_stages
-from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, Contact, Material
+from archfem.masonry.materials import (
+    MATERIAL_PRESETS,
+    SOIL_TO_STONE,
+    STONE_TO_STONE,
+    Contact,
+    Material,
+)
 from archfem.masonry.shapes import bridge_parts, bridges, rings
 from archfem.masonry.structure import Structure
 from archfem.masonry.survey.outlines import Layer, surveyed
 
 Described = TypeVar("Described")
-
-# Kind of each argument of shapes, parts, materials and contacts that is a key of a case file.
-KEY_KINDS: Table = {
-    **dict.fromkeys(("radius", "span", "rise", "thickness", "width", "breadth", "height"), "m"),
-    **dict.fromkeys(("course", "pier_breadth", "gap", "length", "above", "setback"), "m"),
-    **dict.fromkeys(("cover", "erosion", "hump", "spandrels", "snap"), "m"),
-    **{key: ["m"] for key in ("heights", "courses", "spans", "breadths", "thicknesses", "rises")},
-    **dict.fromkeys(("voussoirs", "chords"), int),
-    **dict.fromkeys(("material", "contact", "state", "unit", "measured"), str),
-    **dict.fromkeys(("part", "role"), str),
-    **dict.fromkeys(("arches", "piers", "sidewalls", "backfill", "paving"), dict),
-    **dict.fromkeys(("layers", "contacts", "law"), dict),
-    **dict.fromkeys(("fixed", "ignore"), bool),
-    **dict.fromkeys(("embrace", "skewback"), "degree"),
-    "embraces": ["degree"],
-    "intrados": [["m"]],
-    "gravity": "m/s**2",
-    **dict.fromkeys(("young", "strength", "cohesion", "tension"), "Pa"),
-    **dict.fromkeys(("poisson", "dilatancy"), "1"),
-    "unit_weight": "N/m**3",
-    **dict.fromkeys(("normal_stiffness", "shear_stiffness"), "Pa/m"),
-    "friction": NumberOrWord("1", {"none": None}),  # "none": a joint that never slides
-}
-
-SHAPE_FUNCTIONS: Mapping[str, Callable[..., Structure]] = {
-    shape.__name__: shape
-    for shape in (
-        *(rings.circular_arch, rings.pointed_arch, rings.elliptical_arch, rings.flat_arch),
-        *(rings.arch_along, bridges.buttressed_arch, bridges.arcade, rings.column),
-        *(rings.arch_on_piers, bridges.bridge),
-    )
-} | {"outlines": surveyed}
 
 _recent_structures: OrderedDict[str, Structure] = OrderedDict()
 
@@ -82,9 +56,15 @@ def cached_structure(settings: Table, folder: Path = Path(), max_cached: int = 8
 
 def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     """Build the structure of a case."""
+    shapes = (
+        *(rings.circular_arch, rings.pointed_arch, rings.elliptical_arch, rings.flat_arch),
+        *(rings.arch_along, bridges.buttressed_arch, bridges.arcade, rings.column),
+        *(rings.arch_on_piers, bridges.bridge),
+    )
+    functions = {shape.__name__: shape for shape in shapes} | {"outlines": surveyed}
     table = settings.get("structure", {})
-    name = check_choice(table.get("shape"), SHAPE_FUNCTIONS, "structure.shape")
-    keys = {**_keys_of(SHAPE_FUNCTIONS[name]), "shape": str, "fill": dict}
+    name = check_choice(table.get("shape"), functions, "structure.shape")
+    keys = {**_keys_of(functions[name]), "shape": str, "fill": dict}
     if name == "arcade":  # one number of voussoirs for each of its arches
         keys["voussoirs"] = [int]
     elif name == "outlines":
@@ -104,13 +84,38 @@ def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     elif name == "outlines":
         values = _outline_arguments(values, settings, folder)
     section = f"structure of shape {name!r}"
-    structure = _call(SHAPE_FUNCTIONS[name], section, material=stone, contact=contact, **values)
+    structure = _call(functions[name], section, material=stone, contact=contact, **values)
     return _divide_fill(structure, fill)
 
 
 def _keys_of(function: Callable[..., Any]) -> dict[str, Any]:
     """Return keys and kinds of the arguments of a shape, part or material."""
-    return {k: KEY_KINDS[k] for k in inspect.signature(function).parameters if k in KEY_KINDS}
+    # kind of each argument of shapes, parts, materials and contacts that is a key of a case file
+    kinds: Table = {
+        **dict.fromkeys(("radius", "span", "rise", "thickness", "width", "breadth", "height"), "m"),
+        **dict.fromkeys(("course", "pier_breadth", "gap", "length", "above", "setback"), "m"),
+        **dict.fromkeys(("cover", "erosion", "hump", "spandrels", "snap"), "m"),
+        **{
+            key: ["m"]
+            for key in ("heights", "courses", "spans", "breadths", "thicknesses", "rises")
+        },
+        **dict.fromkeys(("voussoirs", "chords"), int),
+        **dict.fromkeys(("material", "contact", "state", "unit", "measured"), str),
+        **dict.fromkeys(("part", "role"), str),
+        **dict.fromkeys(("arches", "piers", "sidewalls", "backfill", "paving"), dict),
+        **dict.fromkeys(("layers", "contacts", "law"), dict),
+        **dict.fromkeys(("fixed", "ignore"), bool),
+        **dict.fromkeys(("embrace", "skewback"), "degree"),
+        "embraces": ["degree"],
+        "intrados": [["m"]],
+        "gravity": "m/s**2",
+        **dict.fromkeys(("young", "strength", "cohesion", "tension"), "Pa"),
+        **dict.fromkeys(("poisson", "dilatancy"), "1"),
+        "unit_weight": "N/m**3",
+        **dict.fromkeys(("normal_stiffness", "shear_stiffness"), "Pa/m"),
+        "friction": NumberOrWord("1", {"none": None}),  # "none": a joint that never slides
+    }
+    return {k: kinds[k] for k in inspect.signature(function).parameters if k in kinds}
 
 
 def _divide_fill(structure: Structure, table: Table) -> Structure:
@@ -203,7 +208,8 @@ def _material(settings: Table, name: str) -> Material:
 
 def _contact(settings: Table, name: str) -> Contact:
     """Return a contact: a preset, or described or changed by a table of the case."""
-    return _resolve_preset(settings, "contacts", name, CONTACT_PRESETS, Contact)
+    presets = {contact.name: contact for contact in (STONE_TO_STONE, SOIL_TO_STONE)}
+    return _resolve_preset(settings, "contacts", name, presets, Contact)
 
 
 def _resolve_preset(
@@ -228,8 +234,8 @@ def _resolve_preset(
 def _joint_law(table: Table, section: str) -> JointLaw:
     """Return a joint law that a module of the user has registered."""
     values = dict(table)
-    name = check_choice(values.pop("name", None), REGISTERED_LAWS, f"{section}.name")
-    return build_registered_law(name, check_table(values, REGISTERED_LAWS[name][1], section))
+    name = check_choice(values.pop("name", None), registered_laws, f"{section}.name")
+    return build_registered_law(name, check_table(values, registered_laws[name][1], section))
 
 
 def parse_stages(table: Any, structure: Structure) -> Sequence[Stage] | None:

@@ -22,9 +22,6 @@ from archfem.units import in_degrees, in_unit
 
 Table = Mapping[str, Any]
 
-# Limit of tables and lists inside each other [-].
-MAX_TABLE_DEPTH = 20
-
 
 @dataclass(frozen=True)
 class NumberOrWord:
@@ -67,39 +64,35 @@ def read_tables(path: Path, what: str) -> dict[str, Any]:
         raise InvalidInput(f"{path} is not TOML: {error}") from error
 
 
-def parse_tables(text: str) -> dict[str, Any]:
+def parse_tables(text: str, max_depth: int = 20) -> dict[str, Any]:
     """Return the tables of a text in TOML."""
     # One part of a dotted key, bare or quoted; possessive quantifiers (++, *+) keep matching linear
-    part, many = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')", f"{{{MAX_TABLE_DEPTH}}}"
+    part, many = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')", f"{{{max_depth}}}"
     deep_key = rf"(?<![\w-]){part}(?:[ \t]*+\.[ \t]*+{part}){many}"
     deep_value = rf"(?:[\[{{]\s*+(?:{part}\s*+=\s*+)?+){many}"
     # Deep nesting is detected before parsing, whose time and memory would explode.
     for pattern in (deep_key, deep_value):
         if match := re.search(pattern, text):
             line = text.count("\n", 0, match.start()) + 1
-            raise InvalidInput(
-                f"more than {MAX_TABLE_DEPTH} tables or lists in each other (line {line})"
-            )
+            raise InvalidInput(f"more than {max_depth} tables or lists in each other (line {line})")
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InvalidInput(str(error)) from error
-    _check_nesting(tables, "", 0)
+    _check_nesting(tables, "", 0, max_depth)
     return tables
 
 
-def _check_nesting(value: Any, key: str, depth: int) -> None:
+def _check_nesting(value: Any, key: str, depth: int, max_depth: int) -> None:
     """Refuse integers beyond 64 bits and values that are nested too deeply."""
-    if depth > MAX_TABLE_DEPTH:
-        raise InvalidInput(
-            f"{key:.80} has more than {MAX_TABLE_DEPTH} tables or lists in each other"
-        )
+    if depth > max_depth:
+        raise InvalidInput(f"{key:.80} has more than {max_depth} tables or lists in each other")
     if isinstance(value, int) and not -(2**63) <= value < 2**63:  # range of integers in TOML
         raise InvalidInput(f"{key} is a whole number beyond ±2⁶³")
     if isinstance(value, list):
         value = dict(enumerate(value))
     for name, inner in value.items() if isinstance(value, Mapping) else ():
-        _check_nesting(inner, f"{key}.{name}".removeprefix("."), depth + 1)
+        _check_nesting(inner, f"{key}.{name}".removeprefix("."), depth + 1, max_depth)
 
 
 def merge_tables(below: Table, above: Table) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from enum import IntEnum
 from importlib import import_module
 from io import TextIOWrapper
 from typing import Any
@@ -17,15 +18,19 @@ from archfem.errors import ArchfemError, InvalidInput
 
 AddArgument = Callable[..., Any]  # as `ArgumentParser.add_argument`
 
-# Exit codes: a shell expects 128 + the number of a signal that ended a command.
-EXIT_DOUBTFUL = 3
-EXIT_INTERRUPTED = 130
+
+class ExitCode(IntEnum):
+    """Exit codes besides 0, 1 and 2."""
+
+    DOUBTFUL = 3
+    INTERRUPTED = 130  # a shell expects 128 + the number of a signal that ended a command
+
 
 EXIT_CODES = (
     "exit codes: 0, an answer; 1, an error in words, no answer; 2, the arguments are not "
-    f"understood; {EXIT_DOUBTFUL}, an answer that is in doubt: summary.txt begins with why "
+    f"understood; {ExitCode.DOUBTFUL}, an answer that is in doubt: summary.txt begins with why "
     "(energy that drifts, displacements that are not small, a fidelity that is wrong or errs "
-    f"by more than is permitted); {EXIT_INTERRUPTED}, ended by Ctrl-C, and 143, "
+    f"by more than is permitted); {ExitCode.INTERRUPTED}, ended by Ctrl-C, and 143, "
     "by SIGTERM: what was computed is kept."
 )
 
@@ -49,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     with _interrupt_on_sigterm() as signals:
         code = exit_code(lambda: _run_command(options))
-    return 128 + signal.SIGTERM if signals and code == EXIT_INTERRUPTED else code
+    return 128 + signal.SIGTERM if signals and code == ExitCode.INTERRUPTED else code
 
 
 def _run_command(options: argparse.Namespace) -> int | None:
@@ -96,7 +101,7 @@ def exit_code(command: Callable[[], int | None]) -> int:
         return 1
     except KeyboardInterrupt:
         print("archfem: interrupted", file=sys.stderr)
-        return EXIT_INTERRUPTED
+        return ExitCode.INTERRUPTED
     except BrokenPipeError:  # the reader of the output has ended, as in `archfem … | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:  # a folder that cannot be made, a full disk

@@ -16,7 +16,7 @@ from archfem.cases.analysis_keys import rate_case
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs
 from archfem.cases.run import DeadLoadResult, Result, Run, run_case
-from archfem.commands.cli import EXIT_DOUBTFUL
+from archfem.commands.cli import ExitCode
 from archfem.dynamics.history import Ending, History
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.limit.collapse import Collapse
@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
         print(_name_published_files(output.getvalue(), folder, "run"), end="")
     if failure is not None:
         raise failure
-    return EXIT_DOUBTFUL if doubtful else 0
+    return ExitCode.DOUBTFUL if doubtful else 0
 
 
 @contextmanager
@@ -104,7 +104,7 @@ def check(options: argparse.Namespace) -> int:
         print(f"motion: {motion.name}, {motion.duration:.2f} s, PGA {motion.pga:.3f} m/s²")
     ready = f"in doubt, {len(at_rest.doubts)} times, as above" if at_rest.doubts else "ready"
     print(f"{options.case}: {ready}; dead load in {at_rest.dead.iterations} iterations")
-    return EXIT_DOUBTFUL if at_rest.doubts else 0
+    return ExitCode.DOUBTFUL if at_rest.doubts else 0
 
 
 def modes(options: argparse.Namespace) -> None:

@@ -9,7 +9,7 @@ import xarray as xr
 
 from archfem._files import atomic_write, create_result_folder
 from archfem.errors import InvalidInput
-from archfem.studies.result_store import CSV_FILE, EXCEL_FILE, NETCDF_FILE, format_table, status
+from archfem.studies.result_store import RESULT_FILES, format_table, status
 
 if TYPE_CHECKING:
     from archfem.studies.study import Study
@@ -35,7 +35,7 @@ def study(options: argparse.Namespace) -> int:
     for error in sorted({error for error in errors if error}):
         print(f"{errors.count(error)} ended in {error}")
     _write_results(definition, table, folder)
-    for name in ("study.txt", "study.png", NETCDF_FILE, CSV_FILE, EXCEL_FILE):
+    for name in ("study.txt", "study.png", *RESULT_FILES):
         if (folder / name).is_file():
             print(f"wrote {folder / name}")
     return 1 if all(errors) else 0

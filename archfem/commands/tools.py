@@ -184,7 +184,7 @@ def _diagnose_fenicsx() -> Iterator[Diagnosis]:
         else:
             yield Diagnosis("FEniCSx", f"does not load: {error.__cause__}", remedy)
         return
-    for name in _optional.FENICSX_PACKAGES:
+    for name in ("dolfinx", "petsc4py", "slepc4py", "mpi4py"):
         yield Diagnosis(name, str(import_module(name).__version__))
     compiler = shutil.which(os.environ.get("CC", "cc")) or shutil.which("gcc")
     remedy = "'apt-get install gcc libc6-dev', elsewhere 'conda install -c conda-forge c-compiler'"

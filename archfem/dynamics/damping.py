@@ -24,8 +24,8 @@ from scipy.optimize import brentq
 from archfem._typing import Array
 from archfem._validation import check_number, check_type, validate_arguments
 from archfem.dynamics.schemes import (
-    DAMPING_KINDS,
     EFFECTIVE_MASS_SHARE,
+    EffectiveDamping,
     Rayleigh,
     StiffnessDamping,
     Viscous,
@@ -199,8 +199,7 @@ def effective_damping(
         InvalidInput: a value is out of range, or a single mode has the share.
         DidNotConverge: the structure is a mechanism in that state, or modes were not computed.
     """
-    if kind not in DAMPING_KINDS:
-        raise InvalidInput(f"damping kind = {kind!r}: use one of {DAMPING_KINDS}")
+    EffectiveDamping(ratio, kind, joints)  # refuses values out of range
     if kind == "rayleigh":
         effective = effective_mode_range(model, about, mass_share=mass_share)
         return Rayleigh(ratio, effective.frequencies, joints)

@@ -31,10 +31,6 @@ from archfem.statics.equilibrium import Equilibrium, dead_load, self_weight
 from archfem.statics.newton import EquilibriumSolver
 from archfem.statics.relaxation import solve_local
 
-# Change of |e| by large displacements, over the rotation of a joint [1/rad]: median of eleven
-# structures under two motions each, with values from 0.5 to 8.5
-ERROR_PER_ROTATION = 3.0
-
 
 def strongest_window(
     motion: Motion, share: float = 0.6, least: float = 3.5, lead: float = 0.5

@@ -164,7 +164,7 @@ class Event(Protocol):
 StopCondition = Event | Callable[[Structure, Array], str | None]
 
 # Criteria of the user by name
-REGISTERED_CRITERIA: dict[str, Callable[[Structure, Array], str | None]] = {}
+registered_criteria: dict[str, Callable[[Structure, Array], str | None]] = {}
 
 
 @validate_arguments
@@ -196,7 +196,7 @@ def register_criterion(name: str, criterion: Callable[[Structure, Array], str | 
             raise InvalidInput(f"criterion '{name}' returned {reason!r}: return a text, or None")
         return reason
 
-    REGISTERED_CRITERIA[name] = check
+    registered_criteria[name] = check
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -45,14 +45,8 @@ logger = logging.getLogger("archfem")
 # Kinds of collapse, in order of severity
 COLLAPSE_STATES = ("stands", "dislocated", "partly fallen", "fallen")
 
-# Time steps of loose blocks, each tried where those before failed [s]
-FALL_STEPS = (5e-4, 2.5e-4, 1.25e-4)
-
 # Displacement above which a structure is dislocated, over the depth of the shallowest joint [-]
 DISLOCATION = 0.1
-
-# Coordinates x and y as one complex number
-_PLANE = np.array([1.0, 1.0j])
 
 # Kinds of collapse with lost blocks
 FALLEN_STATES = COLLAPSE_STATES[2:]
@@ -385,8 +379,7 @@ class MeetingMonitor:
     def _places(self) -> NDArray[np.complex128]:
         """Corners as built, x + i y, so that a rotation is a product (c,) [m]."""
         cells = self.model.cells
-        places: NDArray[np.complex128] = cells.places[cells.corners(self.model.structure)] @ _PLANE
-        return places
+        return _as_complex(cells.places[cells.corners(self.model.structure)])
 
     @cached_property
     def _corners(self) -> Array:
@@ -411,16 +404,21 @@ class MeetingMonitor:
             means: NDArray[Any] = np.add.reduceat(values, first, axis=-1) / counts
             return means
 
-        middle, moved = mean(places), mean(corners @ _PLANE)
+        middle, moved = mean(places), mean(_as_complex(corners))
         arms = places - np.repeat(middle, counts)
-        after = arms + corners @ _PLANE - np.repeat(moved, counts, axis=-1)
+        after = arms + _as_complex(corners) - np.repeat(moved, counts, axis=-1)
         # least squares: the angle of the sum of the products
         turn = np.angle(mean(np.conj(arms) * after))
-        centroids = np.array([structure.blocks[k].centroid for k in free]) @ _PLANE
+        centroids = _as_complex(np.array([structure.blocks[k].centroid for k in free]))
         motion = moved + (np.exp(1.0j * turn) - 1.0) * (centroids - middle)
         poses = np.tile(self.model.support_motion, (len(corners), 1, 1))
         poses[:, free] = np.stack([motion.real, motion.imag, turn], axis=-1)
         return poses
+
+
+def _as_complex(points: Array) -> NDArray[np.complex128]:
+    """Return points (…, 2) as complex numbers x + i y (…,)."""
+    return points[..., 0] + 1.0j * points[..., 1]
 
 
 def _between_stones(structure: Structure) -> NDArray[np.bool_]:
@@ -461,8 +459,8 @@ def simulate_fall(
     if rocking_ratio is not None and (unkept := find_unkept_ratios(loose, rocking_ratio)):
         names = {joint.name for joint in loose.joints} - unkept.keys()
         ratios = dict.fromkeys(names, rocking_ratio)
-    failure = None
-    for dt in FALL_STEPS:
+    failure, steps = None, (5e-4, 2.5e-4, 1.25e-4)  # [s]
+    for dt in steps:
         simulation = RigidBlockSimulation(loose, dt=dt, rocking_ratio=ratios)
         try:
             frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
@@ -475,7 +473,7 @@ def simulate_fall(
         return _fall_dataset(frames, motion, released).assign_attrs(fall_step=dt), fall
     raise DidNotConverge(
         f"loose blocks could not be followed from {state.time:.4g} s on, by steps of "
-        f"{1e3 * FALL_STEPS[0]:g} to {1e3 * FALL_STEPS[-1]:g} ms ('{failure}'): compare with "
+        f"{1e3 * steps[0]:g} to {1e3 * steps[-1]:g} ms ('{failure}'): compare with "
         "another dt of time_history, or with archfem.dynamics.RigidBlockSimulation from the start"
     ) from failure
 

@@ -28,11 +28,7 @@ from archfem.dynamics.verdict import (
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria, with_failure_flags
 from archfem.joints.resultants import select_joint, write_joint_table
-from archfem.limit.mechanism_count import (
-    Mechanism,
-    counted_mechanism,
-    demirel_aldemir_mechanism,
-)
+from archfem.limit.mechanism_count import Mechanism, counted_mechanism, demirel_aldemir_mechanism
 from archfem.limit.mechanism_kinematics import (
     VerifiedMechanism,
     first_verified_mechanism,

@@ -17,9 +17,6 @@ from archfem.masonry.structure import Structure
 # Shortest time step accepted [s]: anything below is a slip of the unit
 MIN_TIME_STEP = 1e-6
 
-# Kinds of damping whose frequencies are taken from the modes
-DAMPING_KINDS = ("stiffness", "rayleigh")
-
 # Share of the mass along x up to the last effective mode (EN 1998-1, 4.3.3.3.1(3)) [-]
 EFFECTIVE_MASS_SHARE = 0.90
 
@@ -133,8 +130,9 @@ class EffectiveDamping:
         """Refuse values out of range and unknown options."""
         _check_ratio(self.ratio)
         _check_joints(self.joints)
-        if not is_one_of(self.kind, DAMPING_KINDS):
-            raise InvalidInput(f"damping kind = {self.kind!r}: use one of {DAMPING_KINDS}")
+        kinds = ("stiffness", "rayleigh")
+        if not is_one_of(self.kind, kinds):
+            raise InvalidInput(f"damping kind = {self.kind!r}: use one of {kinds}")
         if not 0.0 < check_number(self.mass_share, "damping share [-]") < 1.0:
             raise InvalidInput(f"share {self.mass_share} of the mass is not between 0 and 1")
 

@@ -17,7 +17,7 @@ from archfem._validation import check_integer, check_number, check_type, validat
 from archfem.errors import InvalidInput
 from archfem.masonry.parts import select_assessed_parts
 
-T = TypeVar("T")
+Found = TypeVar("Found")
 
 # Coordinate of a dataset with the tensile strengths of its joints; absent without bonds
 TENSION_COORDINATE = "tension"
@@ -46,8 +46,8 @@ class DurationCounter:
 
 
 def find_lasting(
-    instants: Iterable[int], time: Array, duration: float, evaluate: Callable[[int], T | None]
-) -> T | None:
+    instants: Iterable[int], time: Array, duration: float, evaluate: Callable[[int], Found | None]
+) -> Found | None:
     """Return the first result, not None, of a sequence of records that lasts for a duration."""
     lengths, counter = step_lengths(time), DurationCounter(duration if len(time) > 1 else 0.0)
     previous, first = -1, None

@@ -20,13 +20,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem._typing import Array
-from archfem.joints.contact_law import (
-    Bonds,
-    Facets,
-    Law,
-    clip_to_friction,
-    dilatancy_opening,
-)
+from archfem.joints.contact_law import Bonds, Facets, Law, clip_to_friction, dilatancy_opening
 from archfem.joints.quadrature import JointPoints
 
 Flags = NDArray[np.bool_]

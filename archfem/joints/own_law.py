@@ -117,7 +117,7 @@ class DryJoint:
 
 
 # Laws that case files can name, each with the kinds of its keys
-REGISTERED_LAWS: dict[str, tuple[Callable[..., JointLaw], dict[str, Any]]] = {}
+registered_laws: dict[str, tuple[Callable[..., JointLaw], dict[str, Any]]] = {}
 
 
 @validate_arguments
@@ -137,7 +137,7 @@ def register_joint_law(name: str, law: type) -> None:
     """
     kinds = read_field_kinds(f"joint law '{name}'", law)
     _check_methods(law, f"joint law '{name}'")
-    REGISTERED_LAWS[name] = law, kinds
+    registered_laws[name] = law, kinds
 
 
 def _check_methods(law: Any, what: str) -> None:
@@ -497,4 +497,4 @@ class OwnLawStep:
 def build_registered_law(name: str, values: dict[str, Any]) -> JointLaw:
     """Return a registered law from the values of its fields."""
     with report_user_errors(f"joint law '{name}'"):
-        return REGISTERED_LAWS[name][0](**values)
+        return registered_laws[name][0](**values)

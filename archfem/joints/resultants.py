@@ -33,13 +33,6 @@ from archfem.masonry.structure import Structure, find_number
 if TYPE_CHECKING:
     import pandas as pd
 
-# Unit and meaning of the relative displacements of faces
-FACE_MEASURES = {
-    "opening": ("m", "largest gap between the faces, at the end that is more open; 0 where closed"),
-    "rotation": ("rad", "turn of the higher face, positive where it opens the intrados"),
-    "slip": ("m", "mean slip of the higher block, positive toward the extrados"),
-}
-
 
 def face_matrix(operator: JointOperator) -> tuple[sparse.csr_matrix, Array]:
     """Return the matrix from coordinates to gap, rotation and slip of all joints, and its offset.
@@ -79,16 +72,6 @@ def face_measures(faces: Array, depth: Array) -> dict[str, Array]:
     gap, rotation, slip = np.moveaxis(faces, -2, 0)
     opening = np.maximum(gap + 0.5 * depth * np.abs(rotation), 0.0)
     return {"opening": opening, "rotation": rotation, "slip": slip}
-
-
-# Unit and meaning of the resultants
-RESULTANT_UNITS = {
-    "N": ("N", "normal force, compression positive"),
-    "V": ("N", "shear force"),
-    "M": ("N m", "moment about mid-depth, positive toward the extrados"),
-    "eccentricity": ("1", "M / (N h), +0.5 at the extrados; undefined in an open joint"),
-    "friction": ("1", "mobilised friction |V| / N; undefined in an open joint"),
-}
 
 
 def eccentricity_and_friction(resultants: Array, depth: Array) -> tuple[Array, Array]:
@@ -138,14 +121,11 @@ def joint_dataset(
     dims = ("joint",) if time is None else ("time", "joint")
     depth, criteria = structure.depths, criteria or Criteria()
     ratios = eccentricity_and_friction(resultants, _overlap(depth, faces) if moved else depth)
-    values = dict(zip(RESULTANT_UNITS, (*np.moveaxis(resultants, -1, 0), *ratios), strict=True))
+    names = ("N", "V", "M", "eccentricity", "friction")
+    values = dict(zip(names, (*np.moveaxis(resultants, -1, 0), *ratios), strict=True))
     if faces is not None:
         values |= face_measures(faces, depth)
-    units = RESULTANT_UNITS | FACE_MEASURES
-    variables = {
-        key: (dims, value, {"units": units[key][0], "long_name": units[key][1]})
-        for key, value in values.items()
-    }
+    variables = _describe_variables(dims, values)
     laws = criteria.coefficients(structure.friction), criteria.cohesions(structure.cohesion)
     limits = sliding_ratio(resultants[..., 0], ratios[0], *laws)
     normal = tension_margin(resultants[..., 0], structure.tension)
@@ -165,6 +145,29 @@ def joint_dataset(
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
     return xr.Dataset(variables, coordinates, criteria.attributes)
+
+
+def _describe_variables(
+    dims: tuple[str, ...], values: dict[str, Array]
+) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:
+    """Return variables of joints with their units and meaning."""
+    meaning = {
+        "N": ("N", "normal force, compression positive"),
+        "V": ("N", "shear force"),
+        "M": ("N m", "moment about mid-depth, positive toward the extrados"),
+        "eccentricity": ("1", "M / (N h), +0.5 at the extrados; undefined in an open joint"),
+        "friction": ("1", "mobilised friction |V| / N; undefined in an open joint"),
+        "opening": (
+            "m",
+            "largest gap between the faces, at the end that is more open; 0 where closed",
+        ),
+        "rotation": ("rad", "turn of the higher face, positive where it opens the intrados"),
+        "slip": ("m", "mean slip of the higher block, positive toward the extrados"),
+    }
+    return {
+        key: (dims, value, {"units": meaning[key][0], "long_name": meaning[key][1]})
+        for key, value in values.items()
+    }
 
 
 def _overlap(depth: Array, faces: Array | None) -> Array:

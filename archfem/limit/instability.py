@@ -14,9 +14,6 @@ from archfem.limit.backfill import is_balanced, self_weight_programme
 from archfem.limit.linear_programme import Programme, RigidBlocks
 from archfem.masonry.structure import Structure, join_joint_names
 
-# Depth of joints, as a multiple of that given, and friction from which more does not help [-]
-UNLIMITED_DEPTH, UNLIMITED_FRICTION = 1e3, 1e3
-
 
 @dataclass(frozen=True, eq=False)
 class DeepenedBlocks(RigidBlocks):
@@ -57,19 +54,21 @@ def explain_instability(structure: Structure) -> str | None:
     names = np.array([structure.joints[number].name for number in stones.rigid_regions.joints])
     sliding = join_joint_names(names[np.abs(slip) > moving])
     turning = join_joint_names(names[np.abs(extrados - intrados) > moving])
-    if _stands(dead, friction=UNLIMITED_FRICTION):
+    # depth, as a multiple of that given, and friction from which more does not help [-]
+    unlimited = 1e3
+    if _stands(dead, friction=unlimited):
         least = _least_value(dead, "friction", float(dead.blocks.structure.friction.min()), 10.0)
         text = f"joints slide ({sliding}): it stands from a coefficient of friction of {least:.2g}"
-        if not _stands(dead, depth=UNLIMITED_DEPTH):
+        if not _stands(dead, depth=unlimited):
             text += ", and no thickness helps"
         return text
-    if _stands(dead, depth=UNLIMITED_DEPTH):
-        least = _least_value(dead, "depth", 1.0, UNLIMITED_DEPTH)
+    if _stands(dead, depth=unlimited):
+        least = _least_value(dead, "depth", 1.0, unlimited)
         return (
             f"joints hinge ({turning}): it stands if they are {least:.3g} times as deep, at the "
             "same weight; no friction helps"
         )
-    if _stands(dead, friction=UNLIMITED_FRICTION, depth=UNLIMITED_DEPTH):
+    if _stands(dead, friction=unlimited, depth=unlimited):
         return (
             f"joints slide ({sliding}) and hinge ({turning}): it needs more friction and deeper "
             "joints"

@@ -32,9 +32,6 @@ from archfem.units import in_degrees
 if TYPE_CHECKING:
     from shapely import Polygon
 
-# Radius of the inscribed circle of a whole piece over its longest side [-]
-INCIRCLE_RATIO = (sqrt(3.0) - 1.0) / 4.0
-
 
 class _Piece(NamedTuple):
     """Part of a tile inside the outline, and the incentre of the whole tile."""
@@ -78,7 +75,9 @@ def jointed_fill(
     )
     soft = find_yielding_blocks(structure)
     _check_fill(structure, soft, check_number(size, "size of the pieces [m]"))
-    fill = _FillAssembly(structure, set(soft), law, INCIRCLE_RATIO * size)
+    # radius of the inscribed circle of a whole piece, whose longest side is `size`
+    radius = (sqrt(3.0) - 1.0) / 4.0 * size
+    fill = _FillAssembly(structure, set(soft), law, radius)
     blocks: list[Block] = []
     for number, block in enumerate(structure.blocks):
         pieces = _cut_block(block, size) if number in soft else []

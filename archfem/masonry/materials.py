@@ -163,13 +163,11 @@ class Contact:
         return self.coefficient < inf
 
 
+# Presets, Table 2 of Demirel and Aldemir (2021); it gives no μ for soil
 STONE = Material(30.0 * GPa, 0.2, 20.0 * kN, 56.0 * MPa, "stone")
 BACKFILL = Material(6.25 * MPa, 0.2, 18.0 * kN, None, "backfill")
 STONE_TO_STONE = Contact(1.48e9, 0.30e9, 0.60, "stone to stone")
 SOIL_TO_STONE = Contact(0.30e9, 0.24e9, 0.60, "soil to stone")
 
-# Named presets, Table 2 of Demirel and Aldemir (2021)
+# Named presets
 MATERIAL_PRESETS = {material.name: material for material in (STONE, BACKFILL)}
-
-# The table gives no μ for soil.
-CONTACT_PRESETS = {contact.name: contact for contact in (STONE_TO_STONE, SOIL_TO_STONE)}

@@ -42,16 +42,6 @@ class DesignSpectrum(Protocol):
         """
 
 
-# Site factors of TBEC-2018, table 2.1: linear between the columns, constant outside
-_SHORT_PERIOD_FACTORS = {
-    "ZA": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
-    "ZB": (0.9, 0.9, 0.9, 0.9, 0.9, 0.9),
-    "ZC": (1.3, 1.3, 1.2, 1.2, 1.2, 1.2),
-    "ZD": (1.6, 1.4, 1.2, 1.1, 1.0, 1.0),
-    "ZE": (2.4, 1.7, 1.3, 1.1, 0.9, 0.8),
-}
-
-
 @dataclass(frozen=True)
 class Tbec2018:
     """Elastic spectra of the Turkish Building Earthquake Code 2018, 5 % damping.
@@ -77,6 +67,15 @@ class Tbec2018:
         [0.476, 1.19, 0.625]
     """
 
+    # Site factors of TBEC-2018, table 2.1: linear between the columns, constant outside
+    _short_period_factors: ClassVar = {
+        "ZA": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
+        "ZB": (0.9, 0.9, 0.9, 0.9, 0.9, 0.9),
+        "ZC": (1.3, 1.3, 1.2, 1.2, 1.2, 1.2),
+        "ZD": (1.6, 1.4, 1.2, 1.1, 1.0, 1.0),
+        "ZE": (2.4, 1.7, 1.3, 1.1, 0.9, 0.8),
+    }
+
     ss: float
     s1: float
     site: str
@@ -89,14 +88,14 @@ class Tbec2018:
         check_fields(self)
         if self.site == "ZF":
             raise InvalidInput("ground class ZF has no code spectrum: it needs a site study")
-        if self.site not in _SHORT_PERIOD_FACTORS:
+        if self.site not in self._short_period_factors:
             raise InvalidInput(f"ground class {self.site!r} is unknown: use ZA, ZB, ZC, ZD or ZE")
 
     @property
     def sds(self) -> float:
         """Design spectral acceleration at short periods S_DS = F_S S_S [g]."""
         levels = 0.25, 0.50, 0.75, 1.00, 1.25, 1.50
-        return self.ss * float(np.interp(self.ss, levels, _SHORT_PERIOD_FACTORS[self.site]))
+        return self.ss * float(np.interp(self.ss, levels, self._short_period_factors[self.site]))
 
     @property
     def sd1(self) -> float:
@@ -137,26 +136,6 @@ class Tbec2018:
         return 0.8 * self.sds * spectrum_shape(periods, 3.0, corners, lowest=0.4)
 
 
-# EN 1998-1:2004, tables 3.2 to 3.4: soil factor S and the periods T_B, T_C, T_D [s].
-_GROUND_TYPES = {
-    1: {
-        "A": (1.0, 0.15, 0.4, 2.0),
-        "B": (1.2, 0.15, 0.5, 2.0),
-        "C": (1.15, 0.20, 0.6, 2.0),
-        "D": (1.35, 0.20, 0.8, 2.0),
-        "E": (1.4, 0.15, 0.5, 2.0),
-    },
-    2: {
-        "A": (1.0, 0.05, 0.25, 1.2),
-        "B": (1.35, 0.05, 0.25, 1.2),
-        "C": (1.5, 0.10, 0.25, 1.2),
-        "D": (1.8, 0.10, 0.30, 1.2),
-        "E": (1.6, 0.05, 0.25, 1.2),
-    },
-}
-_VERTICAL_PERIODS = (0.05, 0.15, 1.0)  # T_B, T_C, T_D [s]
-
-
 @dataclass(frozen=True)
 class Eurocode8:
     """Elastic spectra of Eurocode 8 (2004) with the recommended values.
@@ -182,6 +161,24 @@ class Eurocode8:
         [0.345, 0.8625, 0.2588]
     """
 
+    # EN 1998-1:2004, tables 3.2 to 3.4: soil factor S and the periods T_B, T_C, T_D [s].
+    _ground_types: ClassVar = {
+        1: {
+            "A": (1.0, 0.15, 0.4, 2.0),
+            "B": (1.2, 0.15, 0.5, 2.0),
+            "C": (1.15, 0.20, 0.6, 2.0),
+            "D": (1.35, 0.20, 0.8, 2.0),
+            "E": (1.4, 0.15, 0.5, 2.0),
+        },
+        2: {
+            "A": (1.0, 0.05, 0.25, 1.2),
+            "B": (1.35, 0.05, 0.25, 1.2),
+            "C": (1.5, 0.10, 0.25, 1.2),
+            "D": (1.8, 0.10, 0.30, 1.2),
+            "E": (1.6, 0.05, 0.25, 1.2),
+        },
+    }
+
     ag: float
     ground: str
     type: int = 1
@@ -195,7 +192,7 @@ class Eurocode8:
                 f"{MAX_SPECTRAL_ACCELERATION:g}"
             )
         check_fields(self)
-        if self.type not in _GROUND_TYPES or self.ground not in _GROUND_TYPES[1]:
+        if self.type not in self._ground_types or self.ground not in self._ground_types[1]:
             raise InvalidInput(
                 f"Eurocode 8 type {self.type!r} on ground {self.ground!r}: expected type 1 or 2 on "
                 "ground A, B, C, D or E (S1 and S2 need a site study)"
@@ -211,7 +208,7 @@ class Eurocode8:
         Raises:
             InvalidInput: a period is negative, or beyond 4 s, where these clauses give none.
         """
-        soil, *corners = _GROUND_TYPES[self.type][self.ground]
+        soil, *corners = self._ground_types[self.type][self.ground]
         top = 2.5 * damping_correction(self.damping)
         return self.ag * soil * top * spectrum_shape(periods, 4.0, corners, lowest=1.0 / top)
 
@@ -226,7 +223,7 @@ class Eurocode8:
         """
         ratio = {1: 0.90, 2: 0.45}[self.type]  # a_vg / a_g [-]
         top = 3.0 * damping_correction(self.damping)
-        shape = spectrum_shape(periods, 4.0, _VERTICAL_PERIODS, lowest=1.0 / top)
+        shape = spectrum_shape(periods, 4.0, (0.05, 0.15, 1.0), lowest=1.0 / top)
         return self.ag * ratio * top * shape
 
 
@@ -326,16 +323,6 @@ def spectrum_shape(
     return np.where(natural < rise, lowest + (1.0 - lowest) * natural / rise, falling)
 
 
-# NTC 2018, table 3.2.IV: S_S = a - b F_0 a_g/g within its bounds, and C_C = c (T_C*)^d.
-_SUBSOIL_FACTORS = {
-    "A": ((1.00, 0.00), (1.00, 1.00), (1.00, 0.00)),
-    "B": ((1.40, 0.40), (1.00, 1.20), (1.10, -0.20)),
-    "C": ((1.70, 0.60), (1.00, 1.50), (1.05, -0.33)),
-    "D": ((2.40, 1.50), (0.90, 1.80), (1.25, -0.50)),
-    "E": ((2.00, 1.10), (1.00, 1.60), (1.15, -0.40)),
-}
-
-
 @dataclass(frozen=True)
 class Ntc2018:
     """Elastic spectra of the Italian technical standards for constructions of 2018.
@@ -361,6 +348,15 @@ class Ntc2018:
         D.M. 17 January 2018, sections 3.2.3.2.1 and 3.2.3.2.2, tables 3.2.IV to 3.2.VI.
     """
 
+    # NTC 2018, table 3.2.IV: S_S = a - b F_0 a_g/g within its bounds, and C_C = c (T_C*)^d.
+    _subsoil_factors: ClassVar = {
+        "A": ((1.00, 0.00), (1.00, 1.00), (1.00, 0.00)),
+        "B": ((1.40, 0.40), (1.00, 1.20), (1.10, -0.20)),
+        "C": ((1.70, 0.60), (1.00, 1.50), (1.05, -0.33)),
+        "D": ((2.40, 1.50), (0.90, 1.80), (1.25, -0.50)),
+        "E": ((2.00, 1.10), (1.00, 1.60), (1.15, -0.40)),
+    }
+
     ag: float
     f0: float
     tc_star: float
@@ -369,7 +365,7 @@ class Ntc2018:
     damping: float = 0.05
 
     def __post_init__(self) -> None:
-        if not is_one_of(self.site, _SUBSOIL_FACTORS):
+        if not is_one_of(self.site, self._subsoil_factors):
             raise InvalidInput(f"subsoil {self.site!r} is unknown: use A, B, C, D or E")
         if not (
             _check_positive(self.ag, "a_g [g]") < 2.0
@@ -388,13 +384,13 @@ class Ntc2018:
     @property
     def soil(self) -> float:
         """Amplification by the subsoil S_S [-]."""
-        (level, slope), (least, most), _ = _SUBSOIL_FACTORS[self.site]
+        (level, slope), (least, most), _ = self._subsoil_factors[self.site]
         return min(max(level - slope * self.f0 * self.ag, least), most)
 
     @property
     def corners(self) -> tuple[float, float, float]:
         """Periods T_B, T_C and T_D of the horizontal spectrum [s]."""
-        factor, power = _SUBSOIL_FACTORS[self.site][2]
+        factor, power = self._subsoil_factors[self.site][2]
         falls = factor * self.tc_star**power * self.tc_star
         return falls / 3.0, falls, 4.0 * self.ag + 1.6
 
@@ -421,7 +417,7 @@ class Ntc2018:
             InvalidInput: a period is negative, or beyond 4 s, where the code gives none.
         """
         top = damping_correction(self.damping) * self.f0
-        shape = spectrum_shape(periods, 4.0, _VERTICAL_PERIODS, lowest=1.0 / top)
+        shape = spectrum_shape(periods, 4.0, (0.05, 0.15, 1.0), lowest=1.0 / top)
         # table 3.2.VI has the periods of Eurocode 8, and S_S = 1
         factor = 1.35 * float(self.ag) ** 1.5 * self.topography
         return factor * top * shape
@@ -573,7 +569,7 @@ def _check_positive(value: float, name: str) -> float:
 
 
 # Spectra of the user by name, each with its fields and their types
-REGISTERED_SPECTRA: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {}
+registered_spectra: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {}
 
 
 @validate_arguments
@@ -594,14 +590,14 @@ def register_spectrum(name: str, spectrum: type) -> None:
     for method in ("horizontal", "vertical"):
         if not callable(getattr(spectrum, method, None)):
             raise InvalidInput(f"spectrum '{name}' has no method {method}(periods)")
-    REGISTERED_SPECTRA[name] = spectrum, kinds
+    registered_spectra[name] = spectrum, kinds
 
 
 def build_registered_spectrum(name: str, values: dict[str, Any]) -> DesignSpectrum:
     """Return a spectrum of the user after a check of its values up to 4 s."""
     periods = np.linspace(0.0, 4.0, 81)
     with report_user_errors(f"spectrum '{name}'"):
-        spectrum: DesignSpectrum = REGISTERED_SPECTRA[name][0](**values)
+        spectrum: DesignSpectrum = registered_spectra[name][0](**values)
     for direction in ("horizontal", "vertical"):
         with report_user_errors(f"spectrum '{name}', {direction}"):
             found = np.asarray(getattr(spectrum, direction)(periods), dtype=float)

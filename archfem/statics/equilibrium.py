@@ -34,10 +34,11 @@ from archfem.models.linear_blocks import LinearBlockModel
 from archfem.models.model import Doubt, Model, check_model
 from archfem.statics.newton import EquilibriumSolver, Newton
 from archfem.statics.relaxation import (
-    LOAD_SEARCHES,
-    SUPPORT_SEARCHES,
     SearchSequence,
     linear_predictor,
+    solve_irreversible,
+    solve_local,
+    solve_or_relax,
 )
 from archfem.units import mm
 
@@ -274,7 +275,10 @@ def _move_supports(
     def at(part: float) -> tuple[Model, Array]:
         return state.model.with_support_motion(part * motion), load
 
-    return _increment_load(solver, state, at, "settlement", SUPPORT_SEARCHES)
+    # where full Newton steps do not converge the motion is halved, since a search far from the
+    # start may end in an equilibrium that the loading path does not reach
+    searches = solve_local, solve_local, solve_or_relax
+    return _increment_load(solver, state, at, "settlement", searches)
 
 
 def _build_in_stages(
@@ -308,9 +312,10 @@ def _increment_load(
     state: Equilibrium,
     at: Callable[[float], tuple[Model, Array]],
     what: str,
-    searches: SearchSequence = LOAD_SEARCHES,
+    searches: SearchSequence = (solve_or_relax, solve_irreversible, solve_irreversible),
 ) -> Equilibrium:
     """Follow an equilibrium while a load or motion grows; `at(factor)` returns model and load."""
+    # by default the structure may relax, once, to all of a load
     # share of a load or a settlement to which steps are halved before the search fails
     min_load_step = 1.0 / 64.0
     find, find_halved, find_smallest = searches

@@ -90,16 +90,22 @@ class LimitState:
                 )
 
 
-_CLAUSES_2019 = "Circolare 7/2019, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq. C8.7.1."
-_CLAUSES_2008 = "Circolare 617/2009, C8A.4.2.2 and C8A.4.2.3, from memory: its text was not read"
-
 # Displacement checks by name. The 2019 values were read in a transcription of the Circolare.
 LIMIT_STATES: Mapping[str, LimitState] = {
     state.name: state
     for state in (
-        LimitState("NTC-2018 SLV", 0.4, 1.68, 1.0, 0.08, _CLAUSES_2019 + "10"),
-        LimitState("NTC-2018 SLC", 0.6, 1.56, 1.0, 0.10, _CLAUSES_2019 + "11"),
-        LimitState("NTC-2008 SLV", 0.4, 2.0, 0.4, 0.05, _CLAUSES_2008),
+        LimitState(
+            *("NTC-2018 SLV", 0.4, 1.68, 1.0, 0.08),
+            "Circolare 7/2019, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq. C8.7.1.10",
+        ),
+        LimitState(
+            *("NTC-2018 SLC", 0.6, 1.56, 1.0, 0.10),
+            "Circolare 7/2019, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq. C8.7.1.11",
+        ),
+        LimitState(
+            *("NTC-2008 SLV", 0.4, 2.0, 0.4, 0.05),
+            "Circolare 617/2009, C8A.4.2.2 and C8A.4.2.3, from memory: its text was not read",
+        ),
     )
 }
 

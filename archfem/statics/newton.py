@@ -30,8 +30,8 @@ MAX_ROUND_OFF_RESIDUAL = 1e-7
 # Coordinates up to which SciPy takes about as long as PETSc, 5 to 9 ms a dead load
 MAX_SCIPY_UNKNOWNS = 300
 
-# Line searches in the order tried: along an energy, and down the residual where joints slide
-CONVEX_SEARCHES, SLIDING_SEARCHES = ("basic", "cp"), ("basic", "bt")
+# Line searches in the order tried along an energy
+CONVEX_SEARCHES = ("basic", "cp")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,6 +6,7 @@ searches are those of SNES: none ("basic"), for the point where the slope of the
 """
 
 from collections.abc import Callable
+from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -18,10 +19,14 @@ from archfem._typing import Array
 Residual = Callable[[Array], Array]
 Tangent = Callable[[Array], sparse.csr_matrix]
 
-SINGULAR_TANGENT = "the tangent is singular"
-NOT_A_NUMBER = "the residual is not a number"
-TOO_MANY_ITERATIONS = "too many iterations"
-LINE_SEARCH_FAILED = "the line search found no way down"
+
+class Failure(StrEnum):
+    """Reasons why Newton's method ends without a solution."""
+
+    SINGULAR_TANGENT = "the tangent is singular"
+    NOT_A_NUMBER = "the residual is not a number"
+    TOO_MANY_ITERATIONS = "too many iterations"
+    LINE_SEARCH_FAILED = "the line search found no way down"
 
 
 class Equations(NamedTuple):
@@ -59,11 +64,11 @@ class ScipyNewton:
             residual = equations.residual(q)
             norm = float(np.linalg.norm(residual))
             if not np.isfinite(norm):
-                failure = NOT_A_NUMBER
+                failure = Failure.NOT_A_NUMBER
             elif equations.is_converged(norm, q, tangent):
                 break
             elif number == max_iterations:
-                failure = TOO_MANY_ITERATIONS
+                failure = Failure.TOO_MANY_ITERATIONS
             else:
                 tangent = equations.tangent(q)
                 step, failure = self._step(equations.residual, tangent, q, residual, search)
@@ -81,18 +86,18 @@ class ScipyNewton:
             try:
                 self._inverse = splu(tangent.tocsc()).solve
             except RuntimeError:  # SuperLU: a pivot is zero
-                return residual, SINGULAR_TANGENT
+                return residual, Failure.SINGULAR_TANGENT
             self._tangent = tangent
         step = -self._inverse(residual)
         if not np.isfinite(step).all():
-            return residual, SINGULAR_TANGENT
+            return residual, Failure.SINGULAR_TANGENT
         if search == "basic":
             return step, ""
         if search == "bt":
             share = _backtrack(lambda along: float(np.linalg.norm(function(q + along * step))))
         else:
             share = _find_critical_point(lambda along: float(step @ function(q + along * step)))
-        return share * step, "" if share > 0.0 else LINE_SEARCH_FAILED
+        return share * step, "" if share > 0.0 else Failure.LINE_SEARCH_FAILED
 
 
 def _find_critical_point(slope: Callable[[float], float], max_doublings: int = 20) -> float:

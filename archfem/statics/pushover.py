@@ -25,8 +25,6 @@ from archfem.statics.equilibrium import Equilibrium, dead_load
 
 Path = LoadPath | SupportPath
 
-PUSHOVER_CONTROLS = ("displacement", "arc length", "path", "force")
-
 # Growth of steps from one to the next [-]
 STEP_GROWTH = 1.1
 
@@ -176,8 +174,8 @@ def pushover(
         Riks, Int. J. Solids Struct. 15 (1979) 529-551.
     """
     check_model(model)
-    if control not in PUSHOVER_CONTROLS:
-        raise InvalidInput(f"control {control!r} is not known: use one of {PUSHOVER_CONTROLS}")
+    if control not in (controls := ("displacement", "arc length", "path", "force")):
+        raise InvalidInput(f"control {control!r} is not known: use one of {controls}")
     for value, kind in ((start, Equilibrium), (stop, Stop), (criteria, Criteria)):
         if value is not None:
             check_type(value, kind, kind.__name__.lower(), f"give a {kind.__name__}")

@@ -235,11 +235,3 @@ def solve_or_relax(
         if has_irreversible_joints(model):
             return solve_irreversible(solver, model, load, solution.q)
         return model, solution
-
-
-# While a load grows: the structure may relax, once, to all of it
-LOAD_SEARCHES: SearchSequence = (solve_or_relax, solve_irreversible, solve_irreversible)
-
-# While supports move: where full Newton steps do not converge the motion is halved, since a search
-# far from the start may end in an equilibrium that the loading path does not reach
-SUPPORT_SEARCHES: SearchSequence = (solve_local, solve_local, solve_or_relax)

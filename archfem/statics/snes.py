@@ -9,22 +9,15 @@ from scipy import sparse
 
 from archfem._petsc import PETSc
 from archfem._typing import Array
-from archfem.statics.newton_iteration import (
-    LINE_SEARCH_FAILED,
-    NOT_A_NUMBER,
-    SINGULAR_TANGENT,
-    TOO_MANY_ITERATIONS,
-    Attempt,
-    Equations,
-)
+from archfem.statics.newton_iteration import Attempt, Equations, Failure
 
 # by SNES converged reason; numbers, since PETSc 3.25 renames that of a NaN
 _NAN_REASON = -4
 _FAILURE_MESSAGES = {
-    -3: SINGULAR_TANGENT,
-    _NAN_REASON: NOT_A_NUMBER,
-    -5: TOO_MANY_ITERATIONS,
-    -6: LINE_SEARCH_FAILED,
+    -3: Failure.SINGULAR_TANGENT,
+    _NAN_REASON: Failure.NOT_A_NUMBER,
+    -5: Failure.TOO_MANY_ITERATIONS,
+    -6: Failure.LINE_SEARCH_FAILED,
 }
 # PETSc's options are global: every solver has a prefix of its own
 _prefixes = (f"archfem_{number}_" for number in count())
@@ -67,7 +60,7 @@ class PetscNewton:
         failure = "" if reason > 0 else _FAILURE_MESSAGES.get(reason, f"SNES reason {reason}")
         # SNES may report success after a line search broke down at the start: check again.
         if not failure and not self._is_converged(norm):
-            failure = LINE_SEARCH_FAILED
+            failure = Failure.LINE_SEARCH_FAILED
         return Attempt(self._solution.array.copy(), snes.getIterationNumber(), norm, failure)
 
     def _create_snes(self, search: str, max_iterations: int) -> PETSc.SNES:

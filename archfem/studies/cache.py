@@ -39,8 +39,6 @@ from archfem.studies.shared_results import compute_once
 
 Value = TypeVar("Value")
 
-MAX_MODELS = 4  # cached objects of a kind that are as large as a model
-
 _cache: dict[str, OrderedDict[str, Any]] = {}
 
 
@@ -101,7 +99,7 @@ def dead_load_of(case: Case) -> DeadLoadResult:
     """
     preload()
     key = _model_key(case)
-    dead: Equilibrium = _look_up("equilibria", key, lambda: dead_load_of_case(case), MAX_MODELS)
+    dead: Equilibrium = _look_up("equilibria", key, lambda: dead_load_of_case(case))
     result = DeadLoadResult(case, dead)
     damping_key = f"{key} {case.analysis.get('damping')!r}"
     # stored as the cached property `damping` of the result would store it
@@ -112,7 +110,7 @@ def dead_load_of(case: Case) -> DeadLoadResult:
 def first_mode(result: DeadLoadResult) -> Modes:
     """Compute the first mode about the dead load."""
     dead, key = result.dead, _model_key(result.case)
-    return _look_up("modes", key, lambda: modes(dead.model, 1, about=dead), MAX_MODELS)
+    return _look_up("modes", key, lambda: modes(dead.model, 1, about=dead))
 
 
 @validate_arguments
@@ -180,7 +178,7 @@ def stepper_of(result: DeadLoadResult, motion: Motion) -> Stepper:
         return SharedStepper(equation, select_solver(equation), {})
 
     key = f"{_model_key(result.case)} {damping!r} {scheme!r}"
-    return _look_up("steppers", key, make, MAX_MODELS).under(motion)
+    return _look_up("steppers", key, make).under(motion)
 
 
 def _model_key(case: Case) -> str:
@@ -194,8 +192,10 @@ def _without(table: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
     return {key: value for key, value in table.items() if key not in keys}
 
 
-def _look_up(kind: str, key: str, make: Callable[[], Value], limit: int = 64) -> Value:
+def _look_up(kind: str, key: str, make: Callable[[], Value]) -> Value:
     """Return a cached object of a kind, or make it; the least recently used one is dropped."""
+    # few objects that are as large as a model
+    limit = 4 if kind in ("equilibria", "modes", "steppers") else 64
     objects = _cache.setdefault(kind, OrderedDict())
     if key not in objects:
         objects[key] = make()

@@ -215,9 +215,6 @@ NAMED_EVALUATORS: Mapping[str, Callable[..., Findings]] = {
     "comparison": evaluate_comparison,
 }
 
-# Those of them that need one motion: a case with a suite is evaluated under each of its pairs
-MOTION_EVALUATORS = (evaluate_history, evaluate_scales, evaluate_comparison)
-
 
 _registered_findings: dict[str, Callable[..., Findings]] = {}
 

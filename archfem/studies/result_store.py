@@ -34,10 +34,8 @@ from archfem.units import in_si_unit
 
 logger = logging.getLogger("archfem")
 
-# Files of the table
-NETCDF_FILE = "results.nc"
-CSV_FILE = "results.csv"
-EXCEL_FILE = "results.xlsx"
+# Files of the table as NetCDF, CSV and for Excel
+RESULT_FILES = "results.nc", "results.csv", "results.xlsx"
 
 # Time between lines of progress where the output is no terminal [s]
 PROGRESS_INTERVAL = 5.0
@@ -301,13 +299,14 @@ def write_table(table: xr.Dataset, folder: Path, inputs: str) -> None:
     frame = _flatten(table)
     quoted = frame.map(_quote_formula).rename(columns=_quote_formula)
     with explain_full_disk(folder), _files.stage_results(folder, "study", inputs) as draft:
-        write_dataset(table, draft / NETCDF_FILE)
-        with _files.atomic_write(draft / CSV_FILE) as part:
+        netcdf, csv, excel = (draft / name for name in RESULT_FILES)
+        write_dataset(table, netcdf)
+        with _files.atomic_write(csv) as part:
             quoted.to_csv(part, index=False)
         with suppress(ImportError), _files.atomic_write(draft / "results.parquet") as part:
             frame.to_parquet(part, index=False)
         if len(frame) <= 1_048_575:  # rows of a sheet of Excel below the header
-            with suppress(ImportError), _files.atomic_write(draft / EXCEL_FILE) as part:
+            with suppress(ImportError), _files.atomic_write(excel) as part:
                 _write_sheet(quoted, part)
 
 

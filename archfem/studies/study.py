@@ -26,12 +26,13 @@ from archfem.dynamics.history import Ending
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.studies.comparison import Finding, build_findings, file_name, parse_search
 from archfem.studies.evaluators import (
-    MOTION_EVALUATORS,
     Evaluator,
     Findings,
     evaluate_comparison,
     evaluate_dead_load,
+    evaluate_history,
     evaluate_limit,
+    evaluate_scales,
     refuse_code,
 )
 from archfem.studies.parameter_space import (
@@ -56,12 +57,6 @@ from archfem.studies.result_store import (
 from archfem.studies.shared_results import share_results
 
 logger = logging.getLogger("archfem")
-
-# Keys of a study file and their kinds
-STUDY_KEYS: Mapping[str, Any] = {
-    **{"title": str, "case": str, "cases": dict, "set": [str], "pairs": [str]},
-    **{"vary": (dict, list), "samples": dict, "compute": (str, dict), "scales": (bool, dict)},
-}
 
 
 @validate_methods
@@ -339,8 +334,12 @@ def _read_study(
     """Return the study of the tables of a file."""
     if {"structure", "base"} & set(tables):
         raise InvalidInput('this is a case: name it in the file of a study, case = "CASE.toml"')
-    refuse_unknown(tables, STUDY_KEYS)
-    settings = check_table(tables, STUDY_KEYS, "study")
+    keys = {
+        **{"title": str, "case": str, "cases": dict, "set": [str], "pairs": [str]},
+        **{"vary": (dict, list), "samples": dict, "compute": (str, dict), "scales": (bool, dict)},
+    }
+    refuse_unknown(tables, keys)
+    settings = check_table(tables, keys, "study")
     missing = [] if {"case", "cases"} & set(settings) else ["case"]
     missing += [] if {"cases", "vary"} & set(settings) else ["vary"]
     if missing or {"case", "cases"} <= set(settings):
@@ -353,7 +352,9 @@ def _read_study(
     cases = _read_cases(settings, path.parent, changes)
     vary, samples = settings.get("vary"), settings.get("samples")
     varied = () if vary is None else parameter_axes(vary, samples)
-    by_pair = asked.find in MOTION_EVALUATORS and all(PAIR_KEY not in axis.keys for axis in varied)
+    # findings of one motion: a case with a suite is evaluated under each of its pairs
+    of_motions = asked.find in (evaluate_history, evaluate_scales, evaluate_comparison)
+    by_pair = of_motions and all(PAIR_KEY not in axis.keys for axis in varied)
     rows = _pair_cases(cases, settings.get("pairs"), asked, by_pair)
     if any(axis.name == "point" for axis in varied):  # the name of the cases with their pairs
         varied = tuple(replace(axis, name="variation") for axis in varied) if rows[1:] else varied

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from archfem.errors import ArchfemError
+from archfem import ArchfemError
 from archfem.motion import RecordText
 from archfem.motion.records.reader import find_format, read_channels
 from archfem.motion.records.waveforms import find_waveform_format

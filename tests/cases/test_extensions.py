@@ -12,8 +12,8 @@ import pytest
 
 import archfem as af
 from archfem.cases.motion_keys import build_spectrum
-from archfem.cases.provenance import OWN_CODE_VARIABLE, hash_inputs
-from archfem.dynamics.events import REGISTERED_CRITERIA
+from archfem.cases.provenance import hash_inputs
+from archfem.dynamics.events import registered_criteria
 from archfem.motion.records import reader
 
 ROOT = Path(__file__).parents[2]
@@ -110,7 +110,7 @@ def test_no_case_runs_code_by_itself(folder):
 
 @pytest.fixture
 def permitted(monkeypatch, tmp_path):
-    monkeypatch.setenv(OWN_CODE_VARIABLE, "")
+    monkeypatch.setenv("ARCHFEM_OWN_CODE", "")
     monkeypatch.setattr(sys, "path", list(sys.path))
     return tmp_path
 
@@ -266,7 +266,7 @@ def test_a_criterion_is_checked():
     ):
         af.dynamics.register_criterion("mine", criterion)
         with pytest.raises(af.InvalidInput, match=said):
-            REGISTERED_CRITERIA["mine"](column, np.zeros((1, 3)))
+            registered_criteria["mine"](column, np.zeros((1, 3)))
 
 
 def test_a_finding_is_checked():

@@ -6,7 +6,6 @@ from kernels import from_python
 
 from archfem.dynamics.solvers import active_compliance, active_rows, joint_law
 from archfem.dynamics.solvers.active_compliance import ActiveRows
-from archfem.dynamics.solvers.active_rows import MAX_DIRECT_ROWS
 
 add_columns = from_python(active_compliance.add_columns)
 add_gaps = from_python(active_compliance.add_gaps)
@@ -16,8 +15,8 @@ prepare_equations = from_python(active_rows.prepare_equations)
 solve_equations = from_python(active_rows.solve_equations)
 hold_reversed = from_python(joint_law.hold_reversed)
 
-FEW, MANY = MAX_DIRECT_ROWS // 2, 2 * MAX_DIRECT_ROWS
-"""Rows that are solved for by a factor, and by minimal residuals."""
+FEW, MANY = 50, 200
+"""Rows that are solved for by a factor, as up to 100 are, and by minimal residuals."""
 
 RESIDUAL = 3e-4
 """Of minimal residuals, relative to the first."""

@@ -17,7 +17,7 @@ from archfem.dynamics.solvers.band_lu import (
     narrow_order,
 )
 from archfem.dynamics.solvers.newton import NewtonSolver
-from archfem.dynamics.solvers.selection import MAX_NEWTON_HALF_WIDTH, select_solver, stepper_for
+from archfem.dynamics.solvers.selection import select_solver, stepper_for
 
 DT = 0.005
 
@@ -77,7 +77,7 @@ def test_the_width_of_the_band_selects(ring, fidelity, scheme, damping, method):
     equation = af.dynamics.Equation(model, MOTION, rayleigh, scheme)
     assert stepper_for("auto", equation).name == method
     if method != "snes":
-        narrow = NewtonSolver.of(equation).half_width <= MAX_NEWTON_HALF_WIDTH
+        narrow = NewtonSolver.of(equation).half_width <= 12
         assert narrow == (method == "newton")
 
 

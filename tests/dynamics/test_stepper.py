@@ -6,7 +6,7 @@ from glued import glued
 
 import archfem as af
 from archfem.dynamics import Stepper
-from archfem.dynamics.solvers.base import MAX_ITERATIONS, advance
+from archfem.dynamics.solvers.base import advance
 from archfem.dynamics.solvers.compliance import ComplianceSolver
 from archfem.dynamics.solvers.newton import NewtonSolver
 
@@ -29,7 +29,7 @@ def test_a_stepper_falls_back(ring, rule, scheme, solver):
     run = af.time_history(model, short, method=stepper, **given)
     assert run.dataset.attrs["fallback_steps"] > 10
     assert exact.dataset.attrs["fallback_steps"] == 0
-    assert run.dataset["iterations"].max() > MAX_ITERATIONS
+    assert run.dataset["iterations"].max() > 40  # all of the solver, and those of SNES
     off = np.abs(run.joints["M"] - exact.joints["M"]).max()
     assert off < 1e-8 * np.abs(exact.joints["M"]).max()
     drifts = [each.dataset["energy_drift"].values for each in (run, exact)]

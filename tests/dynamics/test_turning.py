@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem import InvalidInput
 from archfem.dynamics import State
-from archfem.errors import InvalidInput
 
 RECORDS = Path(__file__).parents[2].parent / "shared" / "records"
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from archfem.errors import InvalidInput
+from archfem import InvalidInput
 from archfem.motion.records.reader import read_channels
 
 WAVE = 0.5 * np.sin(0.7 * np.arange(40)) - 0.5 * np.sin(0.7 * np.arange(40)).mean()  # m/s²

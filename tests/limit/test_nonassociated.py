@@ -13,7 +13,7 @@ import archfem as af
 from archfem.limit import Outcome, nonassociated
 from archfem.limit.backfill import self_weight_programme
 from archfem.limit.linear_programme import RigidBlocks, rigid_load
-from archfem.limit.nonassociated import MAX_START_COUNT, descend, find_solution, starting_forces
+from archfem.limit.nonassociated import descend, find_solution, starting_forces
 
 EXACT = 1e-7
 """Relative: the programme is solved to 1e-9 block weights."""
@@ -285,7 +285,7 @@ def test_from_the_strongest_solution_the_search_goes_down_to_the_weakest():
     structure = random_structure(10)
     _, dead = self_weight_programme(structure, "nonassociated", None, None)
     asked = dead.with_load_factor(rigid_load(structure, [SIDEWAYS]))
-    starts = starting_forces(asked, asked.solve(), MAX_START_COUNT, 0)
+    starts = starting_forces(asked, asked.solve(), 40, 0)
     found = [turn for forces in starts if (turn := find_solution(asked, forces))]
     strongest = min(found, key=lambda turn: turn.state.value)
     assert -strongest.state.value == pytest.approx(0.67229, rel=1e-4)

@@ -8,7 +8,7 @@ import shapely
 
 import archfem as af
 from archfem.masonry import BACKFILL, SOIL_TO_STONE, jointed_fill
-from archfem.masonry.backfill import INCIRCLE_RATIO, _incentre, _merge_slivers, _Piece, _tile_box
+from archfem.masonry.backfill import _incentre, _merge_slivers, _Piece, _tile_box
 from archfem.masonry.stiffness_ratio import find_soft_blocks, find_yielding_blocks
 from archfem.statics import Stop
 
@@ -271,7 +271,7 @@ def test_pieces_are_halves_of_equilateral_triangles():
         assert sorted(lengths) == pytest.approx([0.4, 0.4 * sqrt(3.0), 0.8])
         arm = np.array(_incentre(corners)) - corners
         away = (sides[:, 0] * arm[:, 1] - sides[:, 1] * arm[:, 0]) / lengths
-        assert away == pytest.approx(INCIRCLE_RATIO * size)
+        assert away == pytest.approx((sqrt(3.0) - 1.0) / 4.0 * size)
     whole = np.concatenate(pieces)
     assert whole[:, 1].min() == 0.0
     assert whole[:, 1].max() == pytest.approx(1.2)

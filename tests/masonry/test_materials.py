@@ -3,8 +3,7 @@
 import pytest
 
 import archfem as af
-from archfem.masonry import BACKFILL
-from archfem.masonry.materials import CONTACT_PRESETS
+from archfem.masonry import BACKFILL, SOIL_TO_STONE, STONE_TO_STONE
 
 
 @pytest.mark.parametrize(
@@ -38,7 +37,7 @@ def test_presets_are_those_of_table_2():
     """Demirel and Aldemir (2021), Table 2, copied a second time: k_n, k_s [MPa/mm], E [MPa]."""
     table = {"stone to stone": (1.48, 0.30), "soil to stone": (0.30, 0.24)}
     for name, (normal, shear) in table.items():
-        contact = CONTACT_PRESETS[name]
+        contact = next(each for each in (STONE_TO_STONE, SOIL_TO_STONE) if each.name == name)
         assert contact.normal_stiffness == pytest.approx(1e9 * normal)
         assert contact.shear_stiffness == pytest.approx(1e9 * shear)
         assert contact.friction == 0.60

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.errors import InvalidInput
+from archfem import InvalidInput
 from archfem.masonry import Stage, usual_stages
 from archfem.models.construction import PartialStructure
 from archfem.statics import self_weight

@@ -12,7 +12,8 @@ from glued import glued
 from scipy.linalg import eigh
 
 import archfem as af
-from archfem.statics.modes import _shape_signs, modes
+from archfem import modes
+from archfem.statics.modes import _shape_signs
 
 GRAVITY = 9.81
 DENSITY = 2000.0

@@ -4,12 +4,6 @@ import pytest
 
 PETSc = pytest.importorskip("petsc4py.PETSc")
 
-from archfem.statics.newton_iteration import (  # noqa: E402
-    LINE_SEARCH_FAILED,
-    NOT_A_NUMBER,
-    SINGULAR_TANGENT,
-    TOO_MANY_ITERATIONS,
-)
 from archfem.statics.snes import _FAILURE_MESSAGES  # noqa: E402
 
 
@@ -18,8 +12,8 @@ def test_reasons_are_those_of_petsc():
     known = PETSc.SNES.ConvergedReason
     nan = "DIVERGED_FNORM_NAN" if PETSc.Sys.getVersion() < (3, 25) else "DIVERGED_FUNCTION_NANORINF"
     assert {
-        known.DIVERGED_LINEAR_SOLVE: SINGULAR_TANGENT,
-        getattr(known, nan): NOT_A_NUMBER,
-        known.DIVERGED_MAX_IT: TOO_MANY_ITERATIONS,
-        known.DIVERGED_LINE_SEARCH: LINE_SEARCH_FAILED,
+        known.DIVERGED_LINEAR_SOLVE: "the tangent is singular",
+        getattr(known, nan): "the residual is not a number",
+        known.DIVERGED_MAX_IT: "too many iterations",
+        known.DIVERGED_LINE_SEARCH: "the line search found no way down",
     } == _FAILURE_MESSAGES

@@ -5,8 +5,9 @@ import pytest
 import xarray as xr
 
 import archfem as af
+from archfem import ida
 from archfem.studies import ida as ida_module
-from archfem.studies.ida import ida, measure_intensities
+from archfem.studies.ida import measure_intensities
 
 
 def made(count):

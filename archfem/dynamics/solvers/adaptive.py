@@ -17,12 +17,6 @@ from archfem._typing import Array
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.state import Batch, State
 
-# Lengths that are not halved, and not doubled, any more [s]
-SHORTEST_STEP, LONGEST_STEP = 1e-4, 2e-2
-
-# Least compression of joints in the error, relative to dead load [-]
-MIN_COMPRESSION = 0.5
-
 
 @dataclass(eq=False)
 class AdaptiveStepper:
@@ -40,7 +34,8 @@ class AdaptiveStepper:
         judged = structure.judged if structure.judged.any() else np.ones_like(structure.judged)
         self._judged, self._depths = np.flatnonzero(judged), structure.depths[judged]
         rest = self.first.resultants[0, self._judged, 0]
-        self._least = MIN_COMPRESSION * np.maximum(rest, MIN_COMPRESSION * np.mean(np.abs(rest)))
+        # least compression of joints in the error: half of that under dead load
+        self._least = 0.5 * np.maximum(rest, 0.5 * np.mean(np.abs(rest)))
 
     @property
     def unmet_share(self) -> float:
@@ -50,8 +45,9 @@ class AdaptiveStepper:
     def batches(self, start: State, end: float) -> Iterator[Batch]:
         """Yield the steps from a state to a time [s], some at a time."""
         sample = self.stepper.equation.motion.dt
-        finest = int(np.floor(np.log2(SHORTEST_STEP / sample) + 0.5))
-        coarsest = max(int(np.floor(np.log2(LONGEST_STEP / sample))), finest)
+        shortest, longest = 1e-4, 2e-2  # not halved, and not doubled, any more [s]
+        finest = int(np.floor(np.log2(shortest / sample) + 0.5))
+        coarsest = max(int(np.floor(np.log2(longest / sample))), finest)
         tick, level, done = sample * 2.0**finest, 0, 0
         level = min(max(-finest - 1, 0), coarsest - finest)
         total, state = round((end - start.time) / tick), start

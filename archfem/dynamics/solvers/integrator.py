@@ -20,9 +20,6 @@ from archfem.dynamics.solvers.snes import SnesSolver
 from archfem.dynamics.state import Batch, State, Step
 from archfem.errors import DidNotConverge
 
-# Steps between two checks of events, Ctrl-C and the progress bar
-STEPS_PER_BATCH = 128
-
 
 class Stepper:
     """Steps an equation of motion by a solver, and by SNES where that gives up.
@@ -70,7 +67,8 @@ class Stepper:
         total = round((end - start.time) / dt)
         state, done = start, 0
         while done < total:
-            last = min(done + STEPS_PER_BATCH, total)
+            # steps between two checks of events, Ctrl-C and the progress bar
+            last = min(done + 128, total)
             times = start.time + dt * np.arange(done + 1, last + 1)
             batch = self.advance_batch(state, dt, times)
             if len(batch.times):

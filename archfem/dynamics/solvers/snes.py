@@ -19,7 +19,6 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.model import ModelStep
 from archfem.statics.newton import (
     CONVEX_SEARCHES,
-    SLIDING_SEARCHES,
     EquilibriumSolver,
     Newton,
     Solution,
@@ -169,7 +168,8 @@ class SnesSolver:
                 matrix.data = matrix.data + linear.data / numbers.gain
                 return matrix
 
-            searches = SLIDING_SEARCHES if equation.memory_size else CONVEX_SEARCHES
+            # without an energy where joints slide: down the residual
+            searches = ("basic", "bt") if equation.memory_size else CONVEX_SEARCHES
             try:
                 return self._solver.solve(residual, tangent, guess, self._scale, searches)
             except DidNotConverge:  # an impact of stiff joints: the velocity leads too far

@@ -14,12 +14,7 @@ from typing import Any
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import (
-    check_integer,
-    check_number,
-    check_numbers,
-    validate_arguments,
-)
+from archfem._validation import check_integer, check_number, check_numbers, validate_arguments
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point, check_points
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material

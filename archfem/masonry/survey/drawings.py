@@ -25,9 +25,6 @@ from archfem.errors import InvalidInput
 from archfem.masonry.structure import suggest_name
 from archfem.units import in_unit
 
-# Largest size of a drawing [bytes]
-MAX_DRAWING_BYTES = 2**25
-
 # Entities of a DXF file that are read; with other curves stones are drawn too, but not outlined
 POLYLINES = ("LWPOLYLINE", "POLYLINE")
 OTHER_CURVES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT")
@@ -54,7 +51,7 @@ def read_drawing(
     readers |= {".dxf": _read_dxf, ".msh": _read_msh}
     if (read := readers.get(path.suffix.lower())) is None:
         raise InvalidInput(f"{path} is no drawing: give a .geojson, a .dxf or a .msh file")
-    check_file(path, "drawing", MAX_DRAWING_BYTES)
+    check_file(path, "drawing", max_bytes=2**25)
     try:
         outlines = list(read(path, unit, ignored))
         _check_sizes(outlines)
@@ -121,7 +118,7 @@ def _check_sizes(outlines: list[Outline]) -> None:
 def _read_geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
     """Read the polygons of a GeoJSON file."""
     try:
-        found = json.loads(read_text(path, "drawing", MAX_DRAWING_BYTES))
+        found = json.loads(read_text(path, "drawing"))
     except (ValueError, RecursionError) as error:
         raise InvalidInput(f"it is not JSON: {error}") from error
     if not isinstance(found, dict) or not isinstance(found.get("features"), list):

@@ -31,9 +31,6 @@ from archfem.units import G, in_unit
 # Materials by name
 Materials = Mapping[str, Material]
 
-# Contact of blocks of two preset materials
-DEFAULT_CONTACTS = {"stone/backfill": SOIL_TO_STONE}
-
 logger = logging.getLogger("archfem")
 
 
@@ -127,7 +124,7 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
     material: Material = STONE,
     materials: Materials = MATERIAL_PRESETS,
     contact: Contact = STONE_TO_STONE,
-    contacts: Mapping[str, Contact] = DEFAULT_CONTACTS,
+    contacts: Mapping[str, Contact] = {"stone/backfill": SOIL_TO_STONE},
     width: float = 1.0,
     gravity: float = G,
 ) -> Structure:

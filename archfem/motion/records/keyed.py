@@ -6,16 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from archfem._typing import Array
-from archfem.motion.records.record_file import (
-    COUNT_PATTERN,
-    NUMBER_PATTERN,
-    Channel,
-    RecordFormat,
-    RecordText,
-)
+from archfem.motion.records.record_file import COUNT_PATTERN, NUMBER_PATTERN, Channel, RecordText
 
 
-def _read_afad(text: RecordText) -> list[Channel]:
+def read_afad(text: RecordText) -> list[Channel]:
     """Read the three components of a file of AFAD (Turkish national network)."""
     count_line, count = text.find(rf"^\s*NUMBER OF DATA\s*:\s*({COUNT_PATTERN})\s*$")
     step_line, step = text.find(rf"SAMPLING INTERVAL\s*\(sec\)\s*:\s*({NUMBER_PATTERN})\s*$")
@@ -30,7 +24,7 @@ def _read_afad(text: RecordText) -> list[Channel]:
     return _create_channels(table, text.check_step(float(step[1]), step_line), names.groups())
 
 
-def _read_unam(text: RecordText) -> list[Channel]:
+def read_unam(text: RecordText) -> list[Channel]:
     """Read the components of a standard acceleration file of UNAM (Mexico)."""
     count = _list_unam_values(text, r"NUM\. TOTAL DE MUESTRAS")
     steps = _list_unam_values(text, r"INTERVALO DE MUESTREO")
@@ -56,7 +50,7 @@ def _list_unam_values(text: RecordText, key: str) -> list[str]:
     return [value.strip() for value in found[1].split("/")]
 
 
-def _read_cwb(text: RecordText) -> list[Channel]:
+def read_cwb(text: RecordText) -> list[Channel]:
     """Read the three components of a file of CWB (Taiwan), whose first column is time."""
     rate_line, rate = text.find(rf"^#SampleRate\(Hz\):\s*({NUMBER_PATTERN})")
     duration = float(text.find(rf"^#RecordLength\(sec\):\s*({NUMBER_PATTERN})")[1][1])
@@ -106,7 +100,7 @@ def _create_channels(table: Array, dt: float, names: Sequence[str]) -> list[Chan
     ]
 
 
-def _read_esm(text: RecordText) -> list[Channel]:
+def read_esm(text: RecordText) -> list[Channel]:
     """Read the single component of a file of ESM, ITACA or AFAD-TADAS (DYNA 1.x)."""
     kind = _find_value(text, "DATA_TYPE")
     if kind.upper() != "ACCELERATION":
@@ -146,7 +140,7 @@ def _parse_count(text: RecordText, value: str) -> int:
     return int(value)
 
 
-def _read_knet(text: RecordText) -> list[Channel]:
+def read_knet(text: RecordText) -> list[Channel]:
     """Read the single component of a file of K-NET or KiK-net, and subtract its mean."""
     # the number of samples is the product of frequency and duration in the header
     rate_line, rate = text.find(rf"^\s*Sampling Freq\(Hz\)\s+({NUMBER_PATTERN})\s*Hz")
@@ -170,11 +164,7 @@ def _read_knet(text: RecordText) -> list[Channel]:
     return [Channel.from_direction(samples, dt, name)]
 
 
-# Files in the wild begin with blank lines or lack one of the four lines of the header.
-_PEER_LINES = 12
-
-
-def _read_peer(text: RecordText) -> list[Channel]:
+def read_peer(text: RecordText) -> list[Channel]:
     """Read the single component of a file of PEER or PEER NGA (`.AT2`), in g."""
     # Count and step follow their names (`NPTS= 5437, DT= .0050 SEC`), in either order, on one line
     # or two, or both precede or follow the names (`4096 0.0100 NPTS, DT`). The rest of the header
@@ -190,19 +180,20 @@ def _read_peer(text: RecordText) -> list[Channel]:
     return [Channel.from_direction(samples, text.check_step(dt, line), direction)]
 
 
-def _find_count_and_step(text: RecordText) -> tuple[int, float, int]:
+def _find_count_and_step(text: RecordText, max_lines: int = 12) -> tuple[int, float, int]:
     """Return NPTS, DT [s] and the index of the last header line."""
+    # files in the wild begin with blank lines or lack one of the four lines of the header
     pair = rf"({COUNT_PATTERN})[\s,]+({NUMBER_PATTERN})"
     values_before_names = rf"^\s*{pair}[\s,]+NPTS[\s,]*DT\b"
     values_after_names = rf"\bNPTS[\s,]+DT\s*[=:]?\s*{pair}"
-    together = text.search(values_before_names, stop=_PEER_LINES)
-    together = together or text.search(values_after_names, stop=_PEER_LINES)
+    together = text.search(values_before_names, stop=max_lines)
+    together = together or text.search(values_after_names, stop=max_lines)
     if together:
         line, values = together
         return int(values[1]), float(values[2]), line
     count_pattern = rf"\bNPTS\s*[=:]?\s*({COUNT_PATTERN})\b(?!\.)"
-    count_line, count = text.find(count_pattern, stop=_PEER_LINES)
-    step_line, step = text.find(rf"\bDT\s*[=:]?\s*({NUMBER_PATTERN})", stop=_PEER_LINES)
+    count_line, count = text.find(count_pattern, stop=max_lines)
+    step_line, step = text.find(rf"\bDT\s*[=:]?\s*({NUMBER_PATTERN})", stop=max_lines)
     return int(count[1]), float(step[1]), max(count_line, step_line)
 
 
@@ -211,12 +202,3 @@ def _find_peer_direction(text: RecordText, line: int) -> str:
     title = next((content for content in text.lines[1:line] if content.count(",") >= 2), "")
     direction = re.sub(r"\([^()]*\)?", "", title).rpartition(",")[2].strip()
     return direction if len(direction) <= 12 else ""
-
-
-_AFAD_MARKS = (r"^\s*NUMBER OF DATA\s*:", 40), (r"SAMPLING INTERVAL", 40)
-AFAD = RecordFormat("AFAD", _AFAD_MARKS, _read_afad)
-CWB = RecordFormat("CWB", ((r"^#DataSequence:\s*Time", 30),), _read_cwb)
-ESM = RecordFormat("ESM", ((r"^\s*NDATA\s*:|^\s*SAMPLING_INTERVAL_S\s*:", 80),), _read_esm)
-KNET = RecordFormat("K-NET", ((r"^\s*Scale Factor\s|^\s*Sampling Freq\(Hz\)", 20),), _read_knet)
-UNAM = RecordFormat("UNAM", (("^ARCHIVO ESTANDAR DE ACELERACION", 20),), _read_unam)
-PEER = RecordFormat("PEER", ((r"\bNPTS\b", _PEER_LINES), (r"\bDT\b", _PEER_LINES)), _read_peer)

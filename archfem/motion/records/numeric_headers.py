@@ -8,7 +8,6 @@ from archfem._typing import Array
 from archfem.motion.records.record_file import (
     COUNT_PATTERN,
     Channel,
-    RecordFormat,
     RecordText,
     find_column_width,
     space_evenly,
@@ -17,7 +16,7 @@ from archfem.motion.records.record_file import (
 _HEADER_PATTERN = rf"^\s*({COUNT_PATTERN})\s+%s-header values follow"
 
 
-def _read_cosmos(text: RecordText) -> list[Channel]:
+def read_cosmos(text: RecordText) -> list[Channel]:
     """Read the acceleration of every channel of a COSMOS file."""
     channels: list[Channel] = []
     start = 0
@@ -66,12 +65,7 @@ def _read_header(text: RecordText, kind: str, start: int) -> tuple[list[float], 
     return numbers.tolist(), after
 
 
-COSMOS = RecordFormat(
-    "COSMOS", ((r"\(Format v\d|^\s*\d+\s+Integer-header values follow", 40),), _read_cosmos
-)
-
-
-def _read_smc(text: RecordText) -> list[Channel]:
+def read_smc(text: RecordText) -> list[Channel]:
     """Read the single component of an SMC file, with samples in cm/s²."""
     # first lines of the headers and of the comments, counted from 0
     integer_line, real_line, comment_line = 11, 17, 27
@@ -111,6 +105,3 @@ def _read_samples(
         # one line may be left over in the last block of a tape
         raise text.error(f"more follows after the {count} numbers of the header", after)
     return space_evenly(text, numbers, start)
-
-
-SMC = RecordFormat("SMC", ((r"^\s*\d\s+[A-Z ]+$", 1), (r"^\s*\*\s*$", 11)), _read_smc)

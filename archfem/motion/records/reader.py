@@ -13,13 +13,37 @@ from archfem.motion import signal_processing
 from archfem.motion.records import columns, keyed, numeric_headers, volumes, waveforms
 from archfem.motion.records.record_file import Channel, RecordFormat, RecordText, parse_unit
 
+# Each format with patterns, and the number of lines from the first in which they must be found.
 # Old formats with unspecific headers come last.
-_RECORD_FORMATS = (
-    *(numeric_headers.SMC, numeric_headers.COSMOS),
-    *(volumes.GEONET, volumes.BHRC, volumes.CSMIP, volumes.VOLUME_1),
-    *(keyed.AFAD, keyed.UNAM, keyed.CWB, keyed.ESM, keyed.KNET, keyed.PEER),
+_RECORD_FORMATS = tuple(
+    RecordFormat(*form)
+    for form in (
+        ("SMC", ((r"^\s*\d\s+[A-Z ]+$", 1), (r"^\s*\*\s*$", 11)), numeric_headers.read_smc),
+        (
+            "COSMOS",
+            ((r"\(Format v\d|^\s*\d+\s+Integer-header values follow", 40),),
+            numeric_headers.read_cosmos,
+        ),
+        ("GeoNet", ((r"CORRECTED ACCELEROGRAM .*GNS Science", 1),), volumes.read_geonet),
+        ("BHRC", ((r"^\W*VOL1DS FILE", 3),), volumes.read_bhrc),
+        (
+            "CSMIP",
+            ((f"{volumes.SPACED_PATTERN}|{volumes.SPECTRA_PATTERN}", 120),),
+            volumes.read_spaced,
+        ),
+        (
+            "volume 1 (CDMG, USC, RENADIC)",
+            ((volumes.VOLUME_1_PATTERN, 120),),
+            volumes.read_volume_1,
+        ),
+        ("AFAD", ((r"^\s*NUMBER OF DATA\s*:", 40), (r"SAMPLING INTERVAL", 40)), keyed.read_afad),
+        ("UNAM", (("^ARCHIVO ESTANDAR DE ACELERACION", 20),), keyed.read_unam),
+        ("CWB", ((r"^#DataSequence:\s*Time", 30),), keyed.read_cwb),
+        ("ESM", ((r"^\s*NDATA\s*:|^\s*SAMPLING_INTERVAL_S\s*:", 80),), keyed.read_esm),
+        ("K-NET", ((r"^\s*Scale Factor\s|^\s*Sampling Freq\(Hz\)", 20),), keyed.read_knet),
+        ("PEER", ((r"\bNPTS\b", 12), (r"\bDT\b", 12)), keyed.read_peer),
+    )
 )
-
 
 _registered_formats: dict[str, RecordFormat] = {}
 

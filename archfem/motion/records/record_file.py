@@ -251,16 +251,6 @@ class RecordFormat(NamedTuple):
         return all(text.contains(pattern, lines) for pattern, lines in self.marks)
 
 
-# Longer units first: each match is removed before the search for the next.
-_UNIT_PATTERNS = (
-    (r"mm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-3),
-    (r"cms?\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-2),
-    (r"\bgals?\b", 1e-2),
-    (r"\bm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1.0),
-    (r"units?\s*(?:of|:|=|in)?\s*\(?g\b|[(\[]\s*g\s*[)\]]|\bin\s+g\b", STANDARD_GRAVITY),
-)
-
-
 def parse_unit(name: str) -> float:
     """Return the value of a unit of acceleration by its name [m/s²]."""
     unit_names = {"g": STANDARD_GRAVITY, "m/s2": 1.0, "cm/s2": 1e-2, "gal": 1e-2, "mm/s2": 1e-3}
@@ -272,8 +262,16 @@ def parse_unit(name: str) -> float:
 
 def find_units(header: str) -> set[float]:
     """Return the values of the units of acceleration in a header [m/s²]."""
+    # longer units first: each match is removed before the search for the next
+    patterns = (
+        (r"mm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-3),
+        (r"cms?\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-2),
+        (r"\bgals?\b", 1e-2),
+        (r"\bm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1.0),
+        (r"units?\s*(?:of|:|=|in)?\s*\(?g\b|[(\[]\s*g\s*[)\]]|\bin\s+g\b", STANDARD_GRAVITY),
+    )
     units = set()
-    for pattern, unit in _UNIT_PATTERNS:
+    for pattern, unit in patterns:
         header, count = re.subn(pattern, " ", header, flags=re.IGNORECASE)
         if count:
             units.add(unit)

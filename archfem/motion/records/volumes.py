@@ -10,7 +10,6 @@ from archfem.motion.records.record_file import (
     COUNT_PATTERN,
     NUMBER_PATTERN,
     Channel,
-    RecordFormat,
     RecordText,
     find_column_width,
     find_units,
@@ -19,24 +18,24 @@ from archfem.motion.records.record_file import (
 from archfem.units import STANDARD_GRAVITY
 
 # Volume 2, and volume 1 of digital instruments: a line announces equally spaced samples.
-_SPACED_PATTERN = (
+SPACED_PATTERN = (
     rf"^\s*({COUNT_PATTERN})\s+(?:POINTS OF ACC\w* DATA EQUALLY SPACED AT|ACCELEROGRAM POINTS AT)"
     rf"\s+({NUMBER_PATTERN})\s*(SEC|PTS/SEC)(.*)$"
 )
-_COUNT_PATTERN = (
+VOLUME_1_PATTERN = (
     rf"^\s*NO\. OF POINTS\s*=\s*({COUNT_PATTERN})\s+(?:RECORD LENGTH|DURATION)\s*="
     rf"\s*({NUMBER_PATTERN})"
 )
-_SPECTRA_PATTERN = r"^\s*RESPONSE AND FOURIER AMPLITUDE SPECTRA"
+SPECTRA_PATTERN = r"^\s*RESPONSE AND FOURIER AMPLITUDE SPECTRA"
 _PEAK_PATTERN = (
     rf"(?:PEAK ACCELERATION\s*=|(?<!UNCOR )MAX\s*=|^ACCELERATION:\s+PEAK)\s*({NUMBER_PATTERN})"
     r"\s*(G|MM/S/S|CMS?/SEC/SEC)\b"
 )
 
 
-def _read_spaced(text: RecordText) -> list[Channel]:
+def read_spaced(text: RecordText) -> list[Channel]:
     """Read the acceleration of every channel that a line announces."""
-    if text.search(_SPECTRA_PATTERN, stop=1):
+    if text.search(SPECTRA_PATTERN, stop=1):
         raise text.error("response spectra (volume 3), no accelerogram: use volume 2", 0)
     return [_read_spaced_channel(text, *bounds) for bounds in _find_bounds(text)]
 
@@ -61,7 +60,7 @@ def _find_bounds(
 
 def _read_spaced_channel(text: RecordText, start: int, end: int) -> Channel:
     """Read the equally spaced channel between two lines."""
-    line, block = _find_once(text, _SPACED_PATTERN, start, end)
+    line, block = _find_once(text, SPACED_PATTERN, start, end)
     spacing = float(block[2])
     by_rate = block[3].upper().startswith("PTS")
     dt = text.check_step(1.0 / max(spacing, 1e-9) if by_rate else spacing, line)
@@ -89,7 +88,7 @@ def _check_end(text: RecordText, after: int, end: int, count: int) -> None:
         raise text.error(f"more numbers follow after the {count} samples stated", after)
 
 
-def _read_volume_1(text: RecordText) -> list[Channel]:
+def read_volume_1(text: RecordText) -> list[Channel]:
     """Read every channel of an uncorrected file of pairs of a time and a sample."""
     return [_read_pairs(text, *bounds) for bounds in _find_bounds(text)]
 
@@ -115,12 +114,12 @@ def _read_pairs(text: RecordText, start: int, end: int) -> Channel:
 
 def _find_volume_1_header(text: RecordText, start: int, end: int) -> tuple[int, int, float, float]:
     """Return the line of the unit, the number of points, the duration [s] and the unit [m/s²]."""
-    line, found = _find_once(text, _COUNT_PATTERN, start, end)
+    line, found = _find_once(text, VOLUME_1_PATTERN, start, end)
     unit_line, unit = text.find(r"^\s*UNITS\b.* ARE SEC\w* AND G\s*(/10)?", line, end)
     return unit_line, int(found[1]), float(found[2]), STANDARD_GRAVITY / (10.0 if unit[1] else 1.0)
 
 
-def _read_bhrc(text: RecordText) -> list[Channel]:
+def read_bhrc(text: RecordText) -> list[Channel]:
     """Read the three uncorrected channels of a file of BHRC (Iran), evenly spaced."""
     channels = []
     for start, end in _find_bounds(text, r"COMP [LVT]\d"):
@@ -132,7 +131,7 @@ def _read_bhrc(text: RecordText) -> list[Channel]:
     return channels
 
 
-def _read_geonet(text: RecordText) -> list[Channel]:
+def read_geonet(text: RecordText) -> list[Channel]:
     """Read the three channels of a file of GeoNet (New Zealand), volume 1 or 2."""
     channels = []
     for start, end in _find_bounds(text):
@@ -167,9 +166,3 @@ def _create_channel(
     direction = text.find(name_pattern, *header)[1][1]
     # BHRC numbers its components: L1, V2 and T3
     return Channel.from_direction(samples, dt, re.sub(r"^([LVT])\d$", r"\1", direction))
-
-
-BHRC = RecordFormat("BHRC", ((r"^\W*VOL1DS FILE", 3),), _read_bhrc)
-CSMIP = RecordFormat("CSMIP", ((f"{_SPACED_PATTERN}|{_SPECTRA_PATTERN}", 120),), _read_spaced)
-GEONET = RecordFormat("GeoNet", ((r"CORRECTED ACCELEROGRAM .*GNS Science", 1),), _read_geonet)
-VOLUME_1 = RecordFormat("volume 1 (CDMG, USC, RENADIC)", ((_COUNT_PATTERN, 120),), _read_volume_1)
