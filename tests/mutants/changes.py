@@ -175,6 +175,8 @@ def _changed(node: ast.AST) -> ast.expr | None:
         return ast.Constant(float(f"{FACTOR * node.value or 0.1:.12g}"))
     if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
         return ast.BinOp(node.left, OPERATORS[type(node.op)](), node.right)
+    if isinstance(node, ast.BoolOp):
+        return ast.BoolOp(ast.Or() if isinstance(node.op, ast.And) else ast.And(), node.values)
     if isinstance(node, ast.Compare) and type(node.ops[0]) in COMPARISONS:
         ops = [COMPARISONS[type(node.ops[0])](), *node.ops[1:]]
         return ast.Compare(node.left, ops, node.comparators)
