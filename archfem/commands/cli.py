@@ -230,7 +230,7 @@ def _add_film(commands: Any) -> None:
     """Add `archfem animate`."""
     about = "film the history of a run"
     add = _add_command(commands, "animate", about, "tools", description=about)
-    add("history", metavar="HISTORY.nc", help="the history, which has fields")
+    add("history", metavar="HISTORY.nc", help="the history, which has fields, or its folder")
     add("--case", metavar="CASE.toml", help="its case (the one beside it)")
     add("--out", metavar="FILM.mp4", help="the film, or a .gif (beside it)")
     about = "slow motion around the mechanism, or a time [s]"

@@ -15,7 +15,7 @@ from archfem import _numba, _optional
 from archfem._files import check_listed, read_bytes
 from archfem.cases.case import Case
 from archfem.cases.examples import copy_example, list_example_titles, read_example
-from archfem.cases.run import dead_load_of_case
+from archfem.cases.run import HISTORY_FILE, dead_load_of_case
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput, NotInstalled
 
@@ -25,10 +25,10 @@ PIP_INSTALL = f"{sys.executable} -m pip install"
 def animate(options: argparse.Namespace) -> None:
     """Film the history of a run."""
     path = Path(options.history)
+    path = path / HISTORY_FILE if path.is_dir() else path
     if not path.is_file():
-        remedy = ": name the history.nc in it" if path.is_dir() else ""
-        raise InvalidInput(f"there is no history file {path}{remedy}")
-    case = Case.read(options.case or _find_case(path))
+        raise InvalidInput(f"there is no history file {path}")
+    case = _read_case(path) if options.case is None else Case.read(options.case)
     run = History.read(path, case.structure)
     names = ("window", "colour", "magnification", "fps", "seconds", "size", "renderer")
     settings = {key: getattr(options, key) for key in names}
@@ -47,12 +47,16 @@ def animate(options: argparse.Namespace) -> None:
     print(f"wrote {film(dead_load_of_case(case).model, run, target, **settings)}")
 
 
-def _find_case(path: Path, name: str = "case.toml") -> Path:
-    """Return the case of a run: beside its history, or beside the folder of its pair."""
+def _read_case(path: Path, name: str = "case.toml") -> Case:
+    """Read the case of a run: beside its history, or beside the folder of its pair."""
     for folder in (path.parent, path.absolute().parent.parent):
         if (folder / name).is_file():
             check_listed(folder / name, read_bytes(folder / name, "case file"))
-            return folder / name
+            try:
+                return Case.read(folder / name)
+            except InvalidInput as error:
+                # such as a drawing, which lies beside the case that was run
+                raise InvalidInput(f"{error}; or give that case, --case CASE.toml") from error
     raise InvalidInput(
         f"there is no {name} beside {path}, as `archfem run` writes one: give the case of the "
         "run, --case CASE.toml"
