@@ -84,6 +84,7 @@ def test_each_is_told_in_a_line_or_two(things):
 def test_pictures_are_loaded_when_asked_for():
     script = """
 import sys, archfem as af
+import archfem.commands.tools  # of `archfem check`
 repr(af.column(breadth=0.4, heights=[0.8]))
 print("matplotlib" in sys.modules)
 """

@@ -139,10 +139,14 @@ def _add_case_commands(commands: Any) -> None:
     """Add the commands that take a case file."""
 
     def add(
-        name: str, about: str, folder: str = "for the results", required: bool = True
+        name: str,
+        about: str,
+        folder: str = "for the results",
+        required: bool = True,
+        module: str = "run",
     ) -> AddArgument:
         texts = {"description": about, "epilog": EXIT_CODES}
-        add_argument = _add_command(commands, name, about, "run", **texts)
+        add_argument = _add_command(commands, name, about, module, **texts)
         add_argument("case", metavar="CASE.toml", help="the case file")
         _add_changes(add_argument)
         if folder:
@@ -152,7 +156,7 @@ def _add_case_commands(commands: Any) -> None:
 
     add_to = add("run", "dead load, time histories, tables and pictures")
     add_to("--workers", type=int, default=1, help="processes for pairs of a suite (1)")
-    add("check", "read a case, build its model and find its dead load", "")
+    add("check", "read a case, build its model and find its dead load", "", module="tools")
     add_to = add("modes", "frequencies, masses and shapes of vibrations about dead load")
     add_to("--count", type=int, default=6, help="how many modes (6)")
     about = "collapse factor and mechanism by limit analysis of the case alone"

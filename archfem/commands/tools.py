@@ -1,4 +1,7 @@
-"""Commands animate, examples, example and doctor: films, shipped cases, and the installation."""
+"""Commands check, animate, examples, example and doctor: they write no folder of results.
+
+The module does not import drawing, so that `archfem check` starts at once.
+"""
 
 import argparse
 import os
@@ -13,13 +16,36 @@ from typing import Any, NamedTuple
 
 from archfem import _numba, _optional
 from archfem._files import check_listed, read_bytes
+from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.examples import copy_example, list_example_titles, read_example
-from archfem.cases.run import HISTORY_FILE, dead_load_of_case
+from archfem.cases.run import HISTORY_FILE, DeadLoadResult, dead_load_of_case
+from archfem.commands.cli import EXIT_DOUBTFUL
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput, NotInstalled
+from archfem.motion.suite import Suite
 
 PIP_INSTALL = f"{sys.executable} -m pip install"
+
+
+def check(options: argparse.Namespace) -> int:
+    """Read a case and its motions, and compute limit analysis and dead load."""
+    case = Case.read(options.case, options.changes)
+    print(case.title)
+    if case.limit is not None and case.limit.live:
+        print(result_text.describe_collapse(case.structure, case.limit.solve(case.structure)))
+    # Unreadable records are errors before the dead load is computed.
+    case.check_ground()
+    at_rest = DeadLoadResult.of(case)
+    print(result_text.describe_dead_load(at_rest))
+    if case.suite is not None:
+        print_motions(case.ground_suite())
+    elif case.motion is not None:
+        motion = case.ground_motion()
+        print(f"motion: {motion.name}, {motion.duration:.2f} s, PGA {motion.pga:.3f} m/s²")
+    ready = f"in doubt, {len(at_rest.doubts)} times, as above" if at_rest.doubts else "ready"
+    print(f"{options.case}: {ready}; dead load in {at_rest.dead.iterations} iterations")
+    return EXIT_DOUBTFUL if at_rest.doubts else 0
 
 
 def animate(options: argparse.Namespace) -> None:
@@ -96,6 +122,14 @@ def example(options: argparse.Namespace) -> None:
             f"`archfem example {options.name} --out DIR` copies all of them",
             file=sys.stderr,
         )
+
+
+def print_motions(suite: Suite) -> None:
+    """Print the result of spectral matching, or the measures of the motions."""
+    if suite.matches:
+        print(result_text.tabulate_matches(suite.matches).text)
+    else:
+        print(result_text.tabulate_motions(suite.motions).text)
 
 
 class Diagnosis(NamedTuple):
