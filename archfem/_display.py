@@ -19,6 +19,7 @@ LATE_BOUND_METHODS: Mapping[str, str] = {
     "History.player": "view.pages.player:player",
     "History.plot": "view.histories:draw_joints",
     "History.report": "cases.report.report:write_report_of_history",
+    "Ida.plot": "studies.ida:draw_ida_result",
     "KinematicAssessment.plot": "view.collapse:draw_kinematic_assessment",
     "Modes.plot": "view.statics:draw_modes",
     "Motion.plot": "view.motions:draw_motion",
@@ -46,7 +47,7 @@ class ResultDisplay:
         Args:
             options: of that function: `draw_structure`, `draw_dead_load`, `draw_joints` for a
                 history, `draw_pushover`, `draw_collapse`, `draw_modes`, `draw_motion` or
-                `draw_selection`.
+                `draw_selection`; of an IDA `measure` and `demand` as for `Ida.curves`.
 
         Returns:
             A matplotlib figure, which `archfem.view.save` writes.

@@ -186,6 +186,8 @@ def _convert(text: str, unit: str, key: str) -> float:
     except InvalidInput:
         raise
     except pint.DimensionalityError as error:
+        if unit == "1":
+            raise InvalidInput(f"{key} = {text!r} has a unit, and this is a pure number") from error
         raise InvalidInput(f"{key} = {text!r} is not in a unit like {target}: {error}") from error
     except (pint.UndefinedUnitError, pint.PintError, ValueError, TypeError) as error:
         raise InvalidInput(

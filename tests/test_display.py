@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib.figure import Figure
 
 import archfem as af
@@ -31,6 +32,18 @@ def things():
         af.moving_load(stones, 1e3),
         af.rate(stones, "LM1"),
         af.verdict_range(stones, motion, samples=2, vary={"joint_rule": "exact"}),
+        af.studies.Ida(
+            xr.Dataset(
+                {
+                    "pga": ("motion", [2.0]),
+                    "verified": ("motion", [1.5]),
+                    "verified, survives": ("motion", [1.0]),
+                    "scale": (("motion", "entry"), [[1.0, 1.5]]),
+                    "rotation": (("motion", "entry"), [[0.01, 0.02]]),
+                },
+                {"motion": ["tap"]},
+            )
+        ),
         af.motion.RecordSelection(
             rule=af.motion.SELECTION_RULES["NTC-2018"],
             measure="horizontal",
@@ -47,7 +60,7 @@ def things():
     ]
 
 
-def test_there_are_eleven_kinds(things):
+def test_there_is_one_of_each_kind(things):
     assert {type(each) for each in things} == set(ResultDisplay.__subclasses__())
 
 
@@ -71,6 +84,7 @@ def test_each_is_told_in_a_line_or_two(things):
 def test_pictures_are_loaded_when_asked_for():
     script = """
 import sys, archfem as af
+import archfem.commands.tools  # of `archfem check`
 repr(af.column(breadth=0.4, heights=[0.8]))
 print("matplotlib" in sys.modules)
 """

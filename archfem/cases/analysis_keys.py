@@ -99,9 +99,10 @@ def parse_damping(analysis: Table) -> Viscous | EffectiveDamping | None:
     elif keys == {"ratio", "frequencies"} and len(damping["frequencies"]) == 2:
         return Rayleigh(**{**damping, "frequencies": tuple(damping["frequencies"])})
     raise InvalidInput(
-        f"analysis.damping = {analysis['damping']}: give a ratio and a frequency, e.g. "
-        "{ ratio = 0.05, frequency = 8.0 }, two for Rayleigh damping, frequencies = [8.0, "
-        '16.0], or modes = "effective" for them, with kind = "rayleigh" (and a mass_share) for two'
+        f"analysis.damping = {analysis['damping']}: write "
+        '{ ratio = 0.05, modes = "effective" }, or a frequency = 8.0 in place of modes; for '
+        'Rayleigh damping frequencies = [8.0, 16.0], or kind = "rayleigh" (and a mass_share) '
+        'beside modes = "effective"'
     )
 
 

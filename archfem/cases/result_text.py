@@ -182,7 +182,7 @@ def describe_collapse(structure: Structure, collapse: Collapse) -> str:
     hinges = [f"{joints[number].name} at the {side}" for number, side in collapse.hinges]
     sliding = [joints[number].name for number in collapse.sliding]
     lines = [outcome]
-    lines += [f"hinges, by the face in contact: {join_names(hinges)}"] if hinges else []
+    lines += [f"hinges, by the face in contact: {join_names(hinges, '; ')}"] if hinges else []
     lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []
     return "\n".join(lines)

@@ -195,8 +195,13 @@ def _call(function: Callable[..., Described], section: str, **values: Any) -> De
     parameters = inspect.signature(function).parameters.values()
     required = [key.name for key in parameters if key.default is key.empty]
     if missing := [key for key in required if key not in values]:
+        contacts = [STONE_TO_STONE.name, SOIL_TO_STONE.name]
+        presets: Table = {"contacts": contacts, "materials": MATERIAL_PRESETS}
+        known = sorted(presets.get(section.partition(".")[0], ()))
+        names = f"; tables of these names change what is there: {known}" if known else ""
         raise InvalidInput(
-            f"{section} lacks {', '.join(missing)}: give them, or correct the name of the table"
+            f"{section} lacks {', '.join(missing)}: give them, or correct the name of the "
+            f"table{names}"
         )
     return function(**values)
 
@@ -235,7 +240,13 @@ def _joint_law(table: Table, section: str) -> JointLaw:
     """Return a joint law that a module of the user has registered."""
     values = dict(table)
     name = check_choice(values.pop("name", None), registered_laws, f"{section}.name")
-    return build_registered_law(name, check_table(values, registered_laws[name][1], section))
+    keys = registered_laws[name][1]
+    if units := [k for k, v in values.items() if isinstance(v, str) and keys.get(k) == "1"]:
+        raise InvalidInput(
+            f"{section}.{units[0]} = {values[units[0]]!r} has a unit, and the field of the "
+            'class has none: write it there, as in field(metadata={"unit": "Pa/m"})'
+        )
+    return build_registered_law(name, check_table(values, keys, section))
 
 
 def parse_stages(table: Any, structure: Structure) -> Sequence[Stage] | None:

@@ -159,7 +159,9 @@ def split_key_path(path: str) -> list[str]:
 def check_table(table: Any, keys: Table, section: str) -> dict[str, Any]:
     """Check the keys of a table, and convert its values to their kinds."""
     if not isinstance(table, Mapping):
-        raise InvalidInput(f"{section} = {table!r} is not a table")
+        raise InvalidInput(
+            f"{section} = {table!r} is not a table: the keys of one are {sorted(keys)}"
+        )
     refuse_unknown(table, keys, section)
     return {key: _convert(value, keys[key], f"{section}.{key}") for key, value in table.items()}
 
@@ -197,7 +199,8 @@ def _convert(value: Any, kind: Any, key: str) -> Any:
     kinds = kind if isinstance(kind, tuple) else (kind,)
     # bool is a subclass of int, and `voussoirs = true` is an error.
     if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
-        words = {int: "a whole number", str: "a word", bool: "true or false", dict: "a table"}
+        table = f"a table, as in {key.rpartition('.')[2]} = {{ … }}"
+        words = {int: "a whole number", str: "a word", bool: "true or false", dict: table}
         raise InvalidInput(f"{key} = {value!r} is not {' or '.join(words[each] for each in kinds)}")
     return value
 

@@ -144,10 +144,14 @@ def _add_case_commands(commands: Any) -> None:
     """Add the commands that take a case file."""
 
     def add(
-        name: str, about: str, folder: str = "for the results", required: bool = True
+        name: str,
+        about: str,
+        folder: str = "for the results",
+        required: bool = True,
+        module: str = "run",
     ) -> AddArgument:
         texts = {"description": about, "epilog": EXIT_CODES}
-        add_argument = _add_command(commands, name, about, "run", **texts)
+        add_argument = _add_command(commands, name, about, module, **texts)
         add_argument("case", metavar="CASE.toml", help="the case file")
         _add_changes(add_argument)
         if folder:
@@ -157,7 +161,7 @@ def _add_case_commands(commands: Any) -> None:
 
     add_to = add("run", "dead load, time histories, tables and pictures")
     add_to("--workers", type=int, default=1, help="processes for pairs of a suite (1)")
-    add("check", "read a case, build its model and find its dead load", "")
+    add("check", "read a case, build its model and find its dead load", "", module="tools")
     add_to = add("modes", "frequencies, masses and shapes of vibrations about dead load")
     add_to("--count", type=int, default=6, help="how many modes (6)")
     about = "collapse factor and mechanism by limit analysis of the case alone"
@@ -235,7 +239,7 @@ def _add_film(commands: Any) -> None:
     """Add `archfem animate`."""
     about = "film the history of a run"
     add = _add_command(commands, "animate", about, "tools", description=about)
-    add("history", metavar="HISTORY.nc", help="the history, which has fields")
+    add("history", metavar="HISTORY.nc", help="the history, which has fields, or its folder")
     add("--case", metavar="CASE.toml", help="its case (the one beside it)")
     add("--out", metavar="FILM.mp4", help="the film, or a .gif (beside it)")
     about = "slow motion around the mechanism, or a time [s]"

@@ -1,4 +1,4 @@
-"""Commands on cases: run, check, modes, limit, assess, rate, mesh, accuracy, report; others."""
+"""Commands on cases: run, modes, limit, assess, rate, mesh, accuracy, report; others."""
 
 import argparse
 import io
@@ -17,6 +17,7 @@ from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs
 from archfem.cases.run import DeadLoadResult, Result, Run, run_case
 from archfem.commands.cli import ExitCode
+from archfem.commands.tools import print_motions
 from archfem.dynamics.history import Ending, History
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.limit.collapse import Collapse
@@ -85,26 +86,6 @@ def _name_published_files(text: str, folder: Path, command: str) -> str:
     lines = text.replace(str(draft), str(folder)).splitlines(keepends=True)
     # a draft that failed may have been deleted
     return "".join(x for x in lines if x[:6] != "wrote " or Path(x[6:].strip()).exists())
-
-
-def check(options: argparse.Namespace) -> int:
-    """Read a case and its motions, and compute limit analysis and dead load."""
-    case = Case.read(options.case, options.changes)
-    print(case.title)
-    if case.limit is not None and case.limit.live:
-        print(result_text.describe_collapse(case.structure, case.limit.solve(case.structure)))
-    # Unreadable records are errors before the dead load is computed.
-    case.check_ground()
-    at_rest = DeadLoadResult.of(case)
-    print(result_text.describe_dead_load(at_rest))
-    if case.suite is not None:
-        print_motions(case.ground_suite())
-    elif case.motion is not None:
-        motion = case.ground_motion()
-        print(f"motion: {motion.name}, {motion.duration:.2f} s, PGA {motion.pga:.3f} m/s²")
-    ready = f"in doubt, {len(at_rest.doubts)} times, as above" if at_rest.doubts else "ready"
-    print(f"{options.case}: {ready}; dead load in {at_rest.dead.iterations} iterations")
-    return ExitCode.DOUBTFUL if at_rest.doubts else 0
 
 
 def modes(options: argparse.Namespace) -> None:
@@ -359,14 +340,6 @@ def _print_pairs(
             f"{len(failed)} of {len(runs)} pairs have no equilibrium at some step: "
             f"{', '.join(failed)}; what was computed is kept"
         )
-
-
-def print_motions(suite: Suite) -> None:
-    """Print the result of spectral matching, or the measures of the motions."""
-    if suite.matches:
-        print(result_text.tabulate_matches(suite.matches).text)
-    else:
-        print(result_text.tabulate_motions(suite.motions).text)
 
 
 def print_written(files: Iterable[Path]) -> None:

@@ -1,4 +1,7 @@
-"""Commands animate, examples, example and doctor: films, shipped cases, and the installation."""
+"""Commands check, animate, examples, example and doctor: they write no folder of results.
+
+The module does not import drawing, so that `archfem check` starts at once.
+"""
 
 import argparse
 import os
@@ -13,22 +16,45 @@ from typing import Any, NamedTuple
 
 from archfem import _numba, _optional
 from archfem._files import check_listed, read_bytes
+from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.examples import copy_example, list_example_titles, read_example
-from archfem.cases.run import dead_load_of_case
+from archfem.cases.run import HISTORY_FILE, DeadLoadResult, dead_load_of_case
+from archfem.commands.cli import ExitCode
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput, NotInstalled
+from archfem.motion.suite import Suite
 
 PIP_INSTALL = f"{sys.executable} -m pip install"
+
+
+def check(options: argparse.Namespace) -> int:
+    """Read a case and its motions, and compute limit analysis and dead load."""
+    case = Case.read(options.case, options.changes)
+    print(case.title)
+    if case.limit is not None and case.limit.live:
+        print(result_text.describe_collapse(case.structure, case.limit.solve(case.structure)))
+    # Unreadable records are errors before the dead load is computed.
+    case.check_ground()
+    at_rest = DeadLoadResult.of(case)
+    print(result_text.describe_dead_load(at_rest))
+    if case.suite is not None:
+        print_motions(case.ground_suite())
+    elif case.motion is not None:
+        motion = case.ground_motion()
+        print(f"motion: {motion.name}, {motion.duration:.2f} s, PGA {motion.pga:.3f} m/s²")
+    ready = f"in doubt, {len(at_rest.doubts)} times, as above" if at_rest.doubts else "ready"
+    print(f"{options.case}: {ready}; dead load in {at_rest.dead.iterations} iterations")
+    return ExitCode.DOUBTFUL if at_rest.doubts else 0
 
 
 def animate(options: argparse.Namespace) -> None:
     """Film the history of a run."""
     path = Path(options.history)
+    path = path / HISTORY_FILE if path.is_dir() else path
     if not path.is_file():
-        remedy = ": name the history.nc in it" if path.is_dir() else ""
-        raise InvalidInput(f"there is no history file {path}{remedy}")
-    case = Case.read(options.case or _find_case(path))
+        raise InvalidInput(f"there is no history file {path}")
+    case = _read_case(path) if options.case is None else Case.read(options.case)
     run = History.read(path, case.structure)
     names = ("window", "colour", "magnification", "fps", "seconds", "size", "renderer")
     settings = {key: getattr(options, key) for key in names}
@@ -47,12 +73,16 @@ def animate(options: argparse.Namespace) -> None:
     print(f"wrote {film(dead_load_of_case(case).model, run, target, **settings)}")
 
 
-def _find_case(path: Path, name: str = "case.toml") -> Path:
-    """Return the case of a run: beside its history, or beside the folder of its pair."""
+def _read_case(path: Path, name: str = "case.toml") -> Case:
+    """Read the case of a run: beside its history, or beside the folder of its pair."""
     for folder in (path.parent, path.absolute().parent.parent):
         if (folder / name).is_file():
             check_listed(folder / name, read_bytes(folder / name, "case file"))
-            return folder / name
+            try:
+                return Case.read(folder / name)
+            except InvalidInput as error:
+                # such as a drawing, which lies beside the case that was run
+                raise InvalidInput(f"{error}; or give that case, --case CASE.toml") from error
     raise InvalidInput(
         f"there is no {name} beside {path}, as `archfem run` writes one: give the case of the "
         "run, --case CASE.toml"
@@ -92,6 +122,14 @@ def example(options: argparse.Namespace) -> None:
             f"`archfem example {options.name} --out DIR` copies all of them",
             file=sys.stderr,
         )
+
+
+def print_motions(suite: Suite) -> None:
+    """Print the result of spectral matching, or the measures of the motions."""
+    if suite.matches:
+        print(result_text.tabulate_matches(suite.matches).text)
+    else:
+        print(result_text.tabulate_motions(suite.motions).text)
 
 
 class Diagnosis(NamedTuple):

@@ -294,7 +294,7 @@ def _doubts(prediction: Prediction, *, stagnates: bool, prescribed: bool) -> Ite
             "to take displacements as small errs by about "
             f"{prediction.small_displacement_error:.2g} in |e|, and the tolerance is "
             f"{prediction.tolerance:g}: joints turn and slide too far",
-            "build(…, displacements='large') follows them",
+            "displacements='large' follows them",
         )
 
 

@@ -249,14 +249,14 @@ class RunMonitor:
                 "turn",
                 f"by t = {time:.4g} s a joint had turned by {self.largest_turn:.2g} rad: to take "
                 "displacements as small errs by 0.01 and more in |e| there",
-                "compare with build(…, displacements='large')",
+                "compare with displacements='large'",
             )
         if self._met is not None:
             self._add_doubt(
                 "meeting",
                 f"at t = {self._met[0]:.4g} s {self._met[1]}, with which it shares no joint: small "
                 "displacements let stones pass through each other",
-                "follow them with build(…, displacements='large')",
+                "follow them with displacements='large'",
             )
         if self.largest_displacement > self._depth:
             self._add_doubt(
@@ -264,7 +264,7 @@ class RunMonitor:
                 f"by t = {time:.4g} s blocks had moved {self.largest_displacement:.3g} m, more "
                 f"than a joint is deep, {self._depth:.3g} m: what follows is beyond the small "
                 "displacements that this model assumes",
-                "read it as collapse, or follow it with build(…, displacements='large')",
+                "read it as collapse, or follow it with displacements='large'",
             )
 
     def _check_facets(self, time: float, doubtful: float = 0.1) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import betaincinv
-from scipy.stats import rankdata
 
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
@@ -99,6 +98,8 @@ class VerdictRange(ResultDisplay):
         fallen = np.isin(rows["outcome"].values, FALLEN_STATES)
         residual = np.where(fallen, 0.0, rows["residual"].values)
         damage = np.where(fallen, 10.0 + kind, residual / max(residual.max(), 1e-12))
+        from scipy.stats import rankdata  # slow to import, and of no use to a single run
+
         # runs of equal damage share the mean of their ranks
         return rankdata(damage)
 

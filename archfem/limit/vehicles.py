@@ -454,7 +454,8 @@ def _parse_axles(axles: float | Sequence[float], spacings: Sequence[float]) -> A
         )
     if len(gaps) != len(weights) - 1:
         raise InvalidInput(
-            f"{len(weights)} axles and {len(gaps)} spacings: give one between each two axles"
+            f"{len(weights)} axles and {len(gaps)} spacings: give one between each two axles, "
+            "as in spacings = [1.3] m"
         )
     behind = np.concatenate([[0.0], np.cumsum(gaps)])
     return np.stack([weights, behind[-1] / 2.0 - behind], axis=1)

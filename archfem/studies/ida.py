@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from archfem._display import ResultDisplay
 from archfem._typing import Array
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
@@ -145,8 +146,8 @@ def _applicable_limits(result: DeadLoadResult, limits: Sequence[str] | None) -> 
 
 
 @validate_methods
-@dataclass(frozen=True, eq=False)
-class Ida:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ida(ResultDisplay):
     """Result of incremental dynamic analysis.
 
     Attributes:
@@ -157,6 +158,14 @@ class Ida:
     """
 
     table: xr.Dataset
+
+    def _summary(self) -> str:
+        """Return the peak accelerations at which limit states are reached."""
+        words = []
+        for limit in self.limits:
+            high = self.capacities(limit)[1]
+            words.append(f"{limit} at {high.min():.3g} to {high.max():.3g} m/s²")
+        return f"Ida: {self.table.sizes['motion']} motions, by PGA: {', '.join(words)}"
 
     @property
     def limits(self) -> tuple[str, ...]:
@@ -267,6 +276,34 @@ class Ida:
         """
         above = self.table[f"{limit}, survives above"].values
         return [str(name) for name in self.table["motion"].values[above > 0.0]]
+
+
+def draw_ida_result(found: Ida, measure: str = "pga", demand: str = "rotation") -> Any:
+    """Draw the curves, fractiles and limit states of an IDA."""
+    from archfem.view.studies import draw_ida  # matplotlib is slow to import
+
+    measures = {
+        "pga": "peak ground acceleration [m/s²]",
+        "pgv": "peak ground velocity [m/s]",
+        "sa": "spectral acceleration at the first mode, 5 % [m/s²]",
+        "arias": "Arias intensity [m/s]",
+    }
+    demands = {
+        "rotation": "largest rotation of a joint [rad]",
+        "eccentricity": "largest |e| of a joint [-]",
+        "slip": "largest slip of a joint [m]",
+        "largest_displacement": "largest displacement of a corner [m]",
+        "residual_displacement": "residual displacement of a corner [m]",
+    }
+    curves = list(found.curves(measure, demand))  # which refuse other words
+    intensity = np.linspace(0.0, max(float(x.max(initial=0.0)) for _, x, _ in curves), 301)[1:]
+    return draw_ida(
+        curves,
+        {limit: found.capacities(limit, measure) for limit in found.limits},
+        fractiles=(intensity, found.fractiles(intensity, measure, demand)),
+        measure=measures[measure],
+        demand=demands[demand],
+    )
 
 
 @validate_arguments

@@ -100,12 +100,14 @@ class Store:
         """Write the progress, for another process to read."""
         self._write(self._progress, asdict(status))
 
-    def read_rate(self) -> float:
-        """Read the points per second of the latest driver; 0 if unknown."""
+    def read_rates(self) -> dict[str, float]:
+        """Read what the latest driver knew of its speed; nothing if unknown."""
         try:
-            return float(_files.read_sealed_json(self._progress, "progress")["rate"])
+            progress = _files.read_sealed_json(self._progress, "progress")
         except InvalidInput:
-            return 0.0
+            return {}
+        names = ("rate", "run_rate", "runs_left")
+        return {name: float(progress[name]) for name in names if name in progress}
 
     def _read_row(self, digest: str) -> Row | None:
         """Read a row; None if its file is damaged or of another point."""
@@ -150,6 +152,9 @@ class Status:
         rate: points per second of the latest driver; 0 if it has finished none.
         running: whether a driver is running.
         runs: number of finished runs of searches, of unfinished points too.
+        run_rate: runs of searches per second of the latest driver; 0 if there are none.
+        runs_left: runs that are left, if each search takes as many as the finished ones; 0 if
+            none has finished.
     """
 
     total: int
@@ -158,20 +163,26 @@ class Status:
     rate: float = 0.0
     running: bool = False
     runs: int = 0
+    run_rate: float = 0.0
+    runs_left: float = 0.0
 
     @property
     def remaining(self) -> float:
-        """Remaining time at this rate [s]; infinite if the rate is unknown."""
-        left = self.total - self.done
-        return 0.0 if not left else left / self.rate if self.rate > 0.0 else inf
+        """Remaining time at this rate [s], of runs if points are searches; infinite if unknown."""
+        left, rate = float(self.total - self.done), self.rate
+        if self.run_rate:  # points of an IDA take minutes
+            left, rate = (self.runs_left, self.run_rate) if self.runs_left else (left, 0.0)
+        return 0.0 if self.done == self.total else left / rate if rate > 0.0 else inf
 
     def __str__(self) -> str:
         """One line of text."""
         words = [f"{self.done} of {self.total} points done", f"{self.failed} failed"]
         words += [f"{self.runs} runs kept"] if self.runs else []
         if self.done < self.total:
-            words.append(f"{self.rate:.3g} a second")
-            words.append(f"{self.remaining:.0f} s remaining" if self.rate else "time unknown")
+            rate = f"{self.run_rate:.3g} runs" if self.run_rate else f"{self.rate:.3g}"
+            words.append(f"{rate} a second")
+            known = self.remaining < inf
+            words.append(f"{self.remaining:.0f} s remaining" if known else "time unknown")
         words.append("running" if self.running else "not running")
         return ", ".join(words)
 
@@ -185,16 +196,20 @@ class Progress:
         self._total, self._done_before, self._failed = total, done, failed
         self._store, self._shared = store, shared
         self._done, self._start, self._written = 0, monotonic(), -inf
-        options = {"unit": "point", "disable": None, "leave": False, "desc": "study"}
-        self._bar = tqdm(total=total, initial=done, **options)
+        self._runs_before, self._point_runs = count_results(shared, "runs"), 0
+        options = {"disable": None, "leave": False, "desc": "study"}
+        # without the remaining time of tqdm, which does not count runs
+        layout = "{desc}: {percentage:3.0f}% |{bar}| {n_fmt} of {total_fmt}{postfix}"
+        self._bar = tqdm(total=total, initial=done, bar_format=layout, **options)
         self._closed = Event()
         # a point may take minutes, in which the number of its runs shows how far it is
         self._reporter = Thread(target=self._report, daemon=True)
         self._reporter.start()
 
-    def add(self, *, failed: bool) -> None:
-        """Count a finished point."""
+    def add(self, *, failed: bool, runs: int = 0) -> None:
+        """Count a finished point, and the runs of its search."""
         self._done += 1
+        self._point_runs += runs
         self._failed += failed
         self._bar.update()
         if monotonic() - self._written >= 1.0:  # points may take milliseconds
@@ -216,17 +231,21 @@ class Progress:
     @property
     def _status(self) -> Status:
         """The progress at this instant."""
-        rate = self._done / max(monotonic() - self._start, 1e-9)
+        seconds = max(monotonic() - self._start, 1e-9)
         runs = count_results(self._shared, "runs")
-        done = self._done_before + self._done
-        return Status(self._total, done, self._failed, rate, running=True, runs=runs)
+        new, done = runs - self._runs_before, self._done_before + self._done
+        # of the searches that are under way some runs are done
+        left = self._point_runs / max(self._done, 1) * (self._total - done)
+        left = max(left - max(new - self._point_runs, 0), 0.0)
+        rates = {"rate": self._done / seconds, "run_rate": new / seconds, "runs_left": left}
+        return Status(self._total, done, self._failed, running=True, runs=runs, **rates)
 
     def _report(self) -> None:
         """Show the progress at intervals until it is closed, on the bar or in lines of a file."""
         while not self._closed.wait(PROGRESS_INTERVAL if self._bar.disable else 1.0):
             status = self._status
             if not self._bar.disable:
-                self._bar.set_postfix(failed=status.failed, runs=status.runs)
+                self._bar.set_postfix_str(str(status).partition(", ")[2])
             elif isinstance(sys.stderr, io.TextIOWrapper):  # not that of a notebook
                 sys.stderr.write(f"study: {status}\n")
                 sys.stderr.flush()
@@ -247,7 +266,8 @@ def status(folder: str | Path) -> Status:
     rows = store.load_rows(digests)
     failed = sum(bool(row["error"]) for row in rows.values())
     runs = count_results(store.shared, "runs")
-    return Status(len(digests), len(rows), failed, store.read_rate(), store.busy, runs)
+    rates: dict[str, Any] = store.read_rates()
+    return Status(len(digests), len(rows), failed, running=store.busy, runs=runs, **rates)
 
 
 def build_table(

@@ -217,7 +217,9 @@ class Study:
                 rows[digests[number]] = row
                 if store is not None:
                     self._store(store, number, digests[number], row)
-                progress.add(failed=bool(row["error"]))
+                scales = row["found"].get("scale")  # of the runs of an IDA
+                runs = len(scales) if isinstance(scales, list) else 0
+                progress.add(failed=bool(row["error"]), runs=runs)
         return [rows[digest] for digest in digests]
 
     def _store(self, store: Store, number: int, digest: str, row: Row) -> None:

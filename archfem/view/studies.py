@@ -243,9 +243,9 @@ def draw_ida(
             x, y = values[known], fractiles[0][known]
             left.plot(x, y, dashes, color=LINE_COLOURS[0], lw=1.8, label=name)
     left.set_xlim(0.0, 1.1 * end or 1.0)
-    left.set_ylim(bottom=0.0)
     left.legend(frameon=False, fontsize=LABEL_SIZE, loc="lower right")
     _draw_capacities(right, capacities)
+    left.set_ylim(bottom=0.0)  # last, since it fixes the upper end as well
     add_legend_below(figure, handles=right.get_legend_handles_labels()[0])
     return figure
 

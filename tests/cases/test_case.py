@@ -56,7 +56,7 @@ def test_changes_from_the_command_line():
         ("model.cells=[0, 4]", "ring_paper.toml: cells through = 0 is not a whole number"),
         ("model.tolerance=2", "ring_paper.toml: tolerance 2 on .e. is not between 0 and 1"),
         ("model.fidelity=modal", "fidelity 'modal' is not known: use one of"),
-        ("analysis.damping={ratio=0.05}", "give a ratio and a frequency"),
+        ("analysis.damping={ratio=0.05}", r"write \{ ratio = 0.05, modes"),
         ("analysis.scheme=euler", "use 'conserving', 'newmark', or 'hht'"),
         ("analysis.alpha=-0.1", "'conserving' with alpha -0.1: use .* 'hht' and alpha"),
         ("contacts.stone to stone.friction=nun", "friction = 'nun' is not .*, or \"none\""),

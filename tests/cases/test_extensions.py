@@ -180,6 +180,18 @@ shear_stiffness = "1e9 Pa/m"
 """
 
 
+def test_a_field_without_its_unit_is_told(installed, permitted):
+    @dataclass(frozen=True)
+    class Plain(af.joints.DryJoint):
+        softening: float = 0.0
+
+    af.joints.register_joint_law("plain", Plain)
+    path = permitted / "case.toml"
+    path.write_text(PACKAGED.replace('"ours"', '"plain"\nsoftening = "1 Pa"'))
+    with pytest.raises(af.InvalidInput, match=r"law\.softening = '1 Pa' has a unit, and the field"):
+        af.Case.read(path)
+
+
 def test_an_installed_package_adds_to_archfem(installed, permitted):
     path = permitted / "case.toml"
     path.write_text(PACKAGED)

@@ -87,7 +87,7 @@ def kept(tmp_path_factory):
 def test_a_history_is_filmed_beside_its_case(kept, capsys):
     film = kept / "film.gif"
     given = ["--out", str(film), "--size", "480x320", "--window", "0.1,0.15", "--fps", "10"]
-    assert af.commands.main(["animate", str(kept / "pair" / "history.nc"), *given]) == 0
+    assert af.commands.main(["animate", str(kept / "pair"), *given]) == 0  # the folder of one
     assert str(film) in capsys.readouterr().out
     frames = imageio.mimread(film)
     assert frames[0].shape[:2] == (320, 480)
@@ -100,7 +100,7 @@ def test_a_history_is_filmed_beside_its_case(kept, capsys):
         (["pair/history.nc", "--window", "soon"], "--window soon: give 'auto', or two times"),
         (["pair/history.nc", "--size", "big"], "--size big: give width and height"),
         (["none.nc"], "there is no history file"),
-        (["pair"], "pair: name the history.nc in it"),
+        (["."], "there is no history file"),
     ],
 )
 def test_what_cannot_be_meant_is_told(kept, capsys, given, said):
@@ -114,6 +114,11 @@ def test_a_history_without_a_case_says_how_to_give_one(kept, tmp_path, capsys):
     alone.write_bytes((kept / "pair" / "history.nc").read_bytes())
     assert af.commands.main(["animate", str(alone)]) == 1
     assert "--case CASE.toml" in capsys.readouterr().err
+    # the drawing of a case lies beside the case that was run, not beside its results
+    drawn = '[structure]\nshape = "outlines"\nfile = "drawing.dxf"\n'
+    (alone.parent / "case.toml").write_text(drawn)
+    assert af.commands.main(["animate", str(alone)]) == 1
+    assert "or give that case, --case CASE.toml" in capsys.readouterr().err
 
 
 def test_a_case_gives_its_title_to_its_structure(kept):

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from archfem.commands import run
+from archfem.commands import tools
 from fuzz import odd
 from fuzz.trial import Came, judged
 
@@ -196,7 +196,7 @@ def checked(path: Path) -> str | None:
     """Check a case and say what is wrong with what is printed."""
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
-        run.check(argparse.Namespace(case=str(path), changes=[]))
+        tools.check(argparse.Namespace(case=str(path), changes=[]))
     if "dead load in" not in said.getvalue():
         return "nothing is said of the dead load"
     found = re.search(r"^.*\b(nan|inf)\b.*$", said.getvalue(), re.MULTILINE)

@@ -6,6 +6,8 @@ import os
 import re
 import subprocess
 from contextlib import ExitStack
+from dataclasses import replace
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -373,6 +375,25 @@ def test_status_tells_how_far_a_study_is(study_file, tmp_path, capsys):
     assert "needs a file and a folder" in capsys.readouterr().err
     assert str(af.studies.Status(4, 2, 1, 0.5)).startswith("2 of 4 points done, 1 failed, 0.5 a")
     assert af.studies.Status(4, 2, 1, 0.5).remaining == pytest.approx(4.0)
+
+
+def test_a_search_counts_its_runs(tmp_path):
+    """Two of four motions took 10 runs each, in 40 s with 4 runs of the third: 16 are left."""
+    known = {"running": True, "runs": 24, "run_rate": 24 / 40, "runs_left": 16.0}
+    searched = af.studies.Status(4, 2, 0, 2 / 40, **known)
+    assert searched.remaining == pytest.approx(16 / (24 / 40))
+    assert "24 runs kept, 0.6 runs a second, 27 s remaining" in str(searched)
+    begun = replace(searched, done=0, rate=0.0, runs_left=0.0)
+    assert begun.remaining == inf
+    assert "0.6 runs a second, time unknown" in str(begun)
+    progress = result_store.Progress(4, 0, 0, None, tmp_path)
+    (tmp_path / "runs").mkdir()
+    for number in range(24):
+        (tmp_path / "runs" / f"{number}.json").touch()
+    for _ in range(2):
+        progress.add(failed=False, runs=10)
+    assert progress._status.runs_left == pytest.approx(16.0)
+    progress.close()
 
 
 @pytest.mark.parametrize("method", ["latin", "sobol"])

@@ -55,6 +55,8 @@ def test_fitted_curves_are_drawn_as_they_are():
 
 def test_a_median_and_brackets_alone_are_named_alone():
     low = np.array([1.0, 1.2, 1.5])
+    (left, _) = draw_ida([("a", low, low)], {"collapse": (low + 5.0, low + 6.0)}).axes
+    assert left.get_ylim()[1] > 7.5  # a fall has no demand: its bracket is above all curves
     figure = draw_ida([("a", low, low)], {"verified": (low, low + 0.1)})
     named = [text.get_text() for text in figure.legends[0].get_texts()]
     assert named == ["bracket of a motion", "median"]

@@ -21,6 +21,7 @@ from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.modes import Modes
 from archfem.view.films.encoder import Image, film_path, write_film
 from archfem.view.films.frames import (
+    Frame,
     FrameTiming,
     Window,
     frame_of_state,
@@ -38,6 +39,7 @@ from archfem.view.joint_marks import (
 )
 from archfem.view.positions import FallingBlocks, fields_at, recorded_fields
 from archfem.view.statics import ModePanel, mode_panels
+from archfem.view.stress import Triangles
 
 
 @validate_arguments
@@ -83,7 +85,7 @@ def film(  # noqa: PLR0913  (a film has many settings)
             for the time around the instant of collapse, or else of the first mechanism by count.
             Slow motion has a tenth of the speed, or more if few fields were recorded.
         renderer: "matplotlib", or "pyvista" to draw blocks and marks by VTK. The latter also writes
-            an .html page of the decisive instant, to move and enlarge.
+            an .html page of up to 60 instants with a slider, to move and enlarge.
 
     Returns:
         The path of the film.
@@ -100,17 +102,42 @@ def film(  # noqa: PLR0913  (a film has many settings)
     known = recorded_fields(run)[0]
     known = known if falls is None else np.append(known, falls.times[1:])
     timing = frame_timing(run, known, fps, seconds, window)
-    held = timing.times if falls is None else timing.times[timing.times < falls.times[0]]
+    held = _times_before_fall(timing.times, falls)
     setup = Setup.of(model, fields_at(run, held), colour, magnification).with_falls(falls)
     if mechanism is not None and mechanism.moved.blocks:
         motion = scale_motion(model.structure, mechanism.motion)
         outlines = outline_moving_blocks(model.structure, motion)
         setup = setup.with_outlines(outlines, mechanism.moved.time or 0.0)
     if page:
-        from archfem.view.films.viewer import write_scene
+        from archfem.view.films.viewer import write_scenes
 
-        return write_scene(target, setup, run)
+        frames = _frames(setup, run, _thin(timing.times, model), falls)
+        return write_scenes(target, setup, run, frames)
     return write_film(target, _draw_frames(setup, run, timing, falls, size, painter), timing.fps)
+
+
+def _thin(times: Array, model: Model) -> Array:
+    """Return at most 60 of the times: a page holds the blocks of each, and has some 10 MB."""
+    most = int(np.clip(100_000 / len(Triangles(model.cells).cell), 5, 60))
+    chosen = np.linspace(0, len(times) - 1, min(len(times), most))
+    thinned: Array = times[chosen.round().astype(int)]
+    return thinned
+
+
+def _times_before_fall(times: Array, falls: FallingBlocks | None) -> Array:
+    """Return the times at which no block is loose."""
+    return times if falls is None else times[times < falls.times[0]]
+
+
+def _frames(
+    setup: Setup, run: History, times: Array, falls: FallingBlocks | None
+) -> Iterator[Frame]:
+    """Yield the frames of a run, and of the fall that may follow."""
+    held = _times_before_fall(times, falls)
+    frames = frames_of_run(setup, run, held, fields_at(run, held))
+    return (
+        frames if falls is None else chain(frames, frames_of_fall(setup, falls, times[len(held) :]))
+    )
 
 
 @validate_arguments
@@ -171,13 +198,9 @@ def _draw_frames(
     painter: type[Painter],
 ) -> Iterator[Image]:
     """Yield the images of a film, with a progress bar."""
-    times = timing.times
-    held = times if falls is None else times[times < falls.times[0]]
     layout = FrameLayout(setup, size, run.joints, run, painter)
-    frames = frames_of_run(setup, run, held, fields_at(run, held))
-    if falls is not None:
-        frames = chain(frames, frames_of_fall(setup, falls, times[len(held) :]))
-    bar = tqdm(frames, total=len(times), unit="frame", disable=None, leave=False)
+    frames = _frames(setup, run, timing.times, falls)
+    bar = tqdm(frames, total=len(timing.times), unit="frame", disable=None, leave=False)
     for frame, speed in zip(bar, timing.speeds, strict=True):
         yield layout.compose(frame, float(speed))
 

@@ -1,8 +1,10 @@
 """Structures drawn by pyvista: a viewer with a slider over time, and the blocks of films."""
 
+import json
 import os
 import re
 import sys
+from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,7 @@ from archfem.view.films.frames import Frame, frames_of_run
 from archfem.view.films.renderer import Canvas
 from archfem.view.films.settings import Setup, check_film, polygon_sides
 from archfem.view.joint_marks import support_outlines
+from archfem.view.pages.document import render
 from archfem.view.positions import decisive_instant, fields_at, recorded_fields
 from archfem.view.stress import Triangles
 from archfem.view.style import Colour
@@ -68,6 +71,30 @@ class Scene:
             self._mappers[kind].dataset = mesh
         self.plotter.render()
 
+    def keep(self, frame: Frame) -> tuple[float, int]:
+        """Add a copy of all that a frame has; return its time [s], and the number of actors."""
+        self.show(frame)
+        # the exporter leaves out empty meshes
+        moving = [actor for actor in self._moving if actor.mapper.dataset.n_points]
+        for actor in moving:
+            copy, mesh = actor.copy(), actor.mapper.dataset.copy()
+            copy.mapper.dataset = mesh
+            # a new mesh sets these to the range of its own values
+            copy.mapper.scalar_range = copy.mapper.lookup_table.scalar_range = self._ends
+            self.plotter.add_actor(copy, render=False, reset_camera=False)
+        return frame.time, len(moving)
+
+    def count_static(self) -> int:
+        """Return the number of actors that do not move."""
+        actors = [
+            each for each in self.plotter.renderer.actors.values() if each not in self._moving
+        ]
+        return sum(actor.mapper.dataset.n_points > 0 for actor in actors)
+
+    def remove_moving(self) -> None:
+        """Remove the actors that move, of which only copies are left."""
+        self.plotter.remove_actor(self._moving, render=False, reset_camera=False)
+
     def add_colour_bar(self) -> None:
         """Add the colour bar of the blocks."""
         style = {"title_font_size": 14, "label_font_size": 12, "color": Colour.EDGE}
@@ -81,12 +108,12 @@ class Scene:
         self.blocks.copy_from(pv.PolyData.from_regular_faces(self._in_layer(corners, 0), faces))
         self.blocks["shade"] = np.zeros(len(corners))
         norm = setup.scale.norm
-        ends = (float(norm.vmin or 0.0), float(norm.vmax or 0.0))
+        ends = self._ends = (float(norm.vmin or 0.0), float(norm.vmax or 0.0))
         # a table of colours, since the scale of a fall is not linear
         shades = setup.scale.shades(norm(np.linspace(*ends, 256)))
         table = pv.LookupTable(values=(255.0 * shades).astype(np.uint8), scalar_range=ends)
         style = {"lighting": False, "show_scalar_bar": False}
-        self.plotter.add_mesh(self.blocks, scalars="shade", cmap=table, **style)
+        self._moving = [self.plotter.add_mesh(self.blocks, scalars="shade", cmap=table, **style)]
         for outline in self._supports:
             self._add(self._polygons(outline[None], 0), Colour.SUPPORT)
         self._add(self._segments(polygon_sides(self._supports), 1), Colour.EDGE, 1.5)
@@ -103,7 +130,9 @@ class Scene:
             **{"thrust": (Colour.THRUST, 4.0 * line), "joints": (Colour.THRUST,)},
             **{"slips": (Colour.SLIDING,), "rims": ("white",), "hinges": (Colour.HINGE,)},
         }
-        self._mappers = {kind: self._add(pv.PolyData(), *each) for kind, each in styles.items()}
+        marks = {kind: self._add(pv.PolyData(), *each) for kind, each in styles.items()}
+        self._moving += marks.values()
+        self._mappers = {kind: actor.mapper for kind, actor in marks.items()}
 
     def _set_camera(self) -> None:
         """Look straight at the visible region, which fills the window."""
@@ -120,14 +149,13 @@ class Scene:
 
     def _add(
         self, mesh: pv.PolyData, colour: str, width: float = 1.0, opacity: float = 1.0
-    ) -> pv.DataSetMapper:
+    ) -> pv.Actor:
         """Add a mesh, which may be empty, in one colour; `width` is that of lines [pixels]."""
-        mapper = pv.DataSetMapper(mesh)
-        actor = pv.Actor(mapper=mapper)
+        actor = pv.Actor(mapper=pv.DataSetMapper(mesh))
         actor.prop.color, actor.prop.lighting, actor.prop.opacity = colour, False, opacity
         actor.prop.line_width = width
         self.plotter.add_actor(actor, render=False, reset_camera=False)
-        return mapper
+        return actor
 
     def _polygons(self, outlines: Array, layer: int) -> pv.PolyData:
         """Return filled polygons of equal numbers of corners (n, k, 2) as a mesh."""
@@ -182,19 +210,29 @@ def _export_page(plotter: pv.Plotter) -> str:
             del modules[unused]
 
 
-def write_scene(path: Path, setup: Setup, run: History) -> Path:
-    """Write an HTML page of a run at its decisive instant, which can be moved and enlarged."""
-    scene, instant = Scene(setup), np.array([decisive_instant(run)])
-    scene.show(next(frames_of_run(setup, run, instant, fields_at(run, instant))))
+def write_scenes(path: Path, setup: Setup, run: History, frames: Iterable[Frame]) -> Path:
+    """Write an HTML page with all frames in one scene, of which a slider shows one at a time."""
+    scene = Scene(setup)
+    static = scene.count_static()
+    shown = [scene.keep(frame) for frame in frames]
+    scene.remove_moving()
     scene.add_colour_bar()
     page = _export_page(scene.plotter)
-    title = f"{run.dataset.attrs['title']}: {run.verdict.outcome}, t = {instant[0]:.3f} s"
-    # by style, since the page's script replaces its body; characters are written as CSS codes
-    content = "".join(f"\\{ord(character):x} " for character in title)
-    style = f'body::before {{ content: "{content}"; position: fixed; z-index: 9; padding: 1em }}'
+    title = f"{run.dataset.attrs['title']}: {run.verdict.outcome}"
     page = re.sub("<title>.*?</title>", lambda _: f"<title>{escape(title)}</title>", page, count=1)
+    times = np.array([time for time, _ in shown])
+    known = {
+        **{"title": title, "static": static, "counts": [count for _, count in shown]},
+        **{"times": times.round(4).tolist()},
+        "first": int(np.argmin(np.abs(times - decisive_instant(run)))),
+    }
+    # a tag in the title must not end the script
+    controls = render("scenes.html", known=json.dumps(known).replace("<", "\\u003c"))
+    # in the head, since the script of the scene empties the body; and its icons would be downloaded
+    page = page.replace("</head>", f"{controls}</head>", 1)
+    page = page.replace("https://kitware.github.io/vtk-js/icon/", "data:,")
     with atomic_write(path) as draft:
-        draft.write_text(page.replace("</style>", f"{style}\n</style>", 1), "utf-8")
+        draft.write_text(page, "utf-8")
     return path
 
 

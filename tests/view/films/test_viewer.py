@@ -1,9 +1,14 @@
 """pyvista's viewer of a run: blocks are where the history has them, at any time."""
 
+import base64
+import json
 import re
+from io import BytesIO
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
+from chromium import browser, complaints
 from PIL import Image, ImageSequence
 
 import archfem as af
@@ -73,8 +78,65 @@ def test_pyvista_writes_a_page_without_links(shaken, tmp_path):
     model, run = shaken
     path = af.view.film(model, run, tmp_path / "run.html", renderer="pyvista")
     page = path.read_text("utf-8")
-    assert f"<title>{run.dataset.attrs['title']}: {run.verdict.outcome}, t = " in page
+    assert f"<title>{run.dataset.attrs['title']}: {run.verdict.outcome}</title>" in page
     assert re.search(r"<(script|link)[^>]*(src|href)=", page) is None
+    assert "vtk-js/icon" not in page  # which its script would download
+
+
+def colour_ranges(page):
+    """The ranges of the colours of all meshes in the scene of a page."""
+    packed = re.search(r'const base64Str = "([^"]+)"', page)[1]
+    with ZipFile(BytesIO(base64.b64decode(packed))) as files:
+        text = files.read("index.json").decode()
+    found = re.findall(r'"scalarRange": (\[[^]]*\])', text)
+    return {tuple(json.loads(each)) for each in found}
+
+
+def test_a_page_has_its_instants_in_one_scene_with_one_scale(shaken, tmp_path):
+    pytest.importorskip("trame", reason="the extra for notebooks is not installed")
+    model, run = shaken
+    page = af.view.film(model, run, tmp_path / "run.html", renderer="pyvista").read_text("utf-8")
+    known = json.loads(re.search(r"const known = (.*);", page)[1])
+    times = run.dataset["frame_time"].values
+    assert len(known["counts"]) == len(known["times"]) <= len(times)
+    assert [known["times"][0], known["times"][-1]] == pytest.approx([times[0], times[-1]])
+    # blocks, edges and the thrust line with its halo and joints, at least
+    assert min(known["counts"]) >= 5
+    largest = 1e3 * np.hypot(*model.cells.displacement(run.dataset["q"].values[-1]).T).max()
+    low, high = max(colour_ranges(page))
+    assert colour_ranges(page) <= {(0.0, 1.0), (low, high)}
+    assert low == 0.0
+    assert high >= 0.99 * largest
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wide", [390, 1280])
+def test_the_slider_of_a_page_shows_one_instant(shaken, tmp_path, wide):
+    pytest.importorskip("trame", reason="the extra for notebooks is not installed")
+    model, run = shaken
+    path = af.view.film(model, run, tmp_path / "run.html", renderer="pyvista")
+    known = json.loads(re.search(r"const known = (.*);", path.read_text("utf-8"))[1])
+    shown = (
+        "return [document.querySelector('#instants input').value, global.renderWindow"
+        ".getRenderers().flatMap(each => each.getViewProps())"
+        ".filter(prop => prop.getClassName() === 'vtkActor' && prop.getVisibility()).length]"
+    )
+    with browser(wide, 700) as driver:
+        from selenium.webdriver.support.ui import WebDriverWait
+
+        driver.get(path.resolve().as_uri())
+        find = "return document.querySelector('#instants input')"
+        slider = WebDriverWait(driver, 30).until(lambda d: d.execute_script(find))
+        for key, number in (("\ue011", 0), ("\ue014", 1), ("\ue010", len(known["times"]) - 1)):
+            slider.send_keys(key)  # home, right, end
+            visible = known["static"] + known["counts"][number]
+            assert driver.execute_script(shown) == [str(number), visible]
+        width = "return [document.documentElement.scrollWidth, innerWidth]"
+        scrolled, inner = driver.execute_script(width)
+        assert scrolled <= inner
+        said = [each["message"] for each in complaints(driver)]
+    # of a machine without graphics
+    assert not [text for text in said if "WebGL" not in text]
 
 
 @pytest.mark.parametrize(("renderer", "suffix"), [("vtk", ".mp4"), ("matplotlib", ".html")])
