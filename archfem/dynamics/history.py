@@ -278,14 +278,14 @@ class History(ResultDisplay):
         Returns:
             The file.
         """
-        encoding = {name: {"zlib": True} for name, v in self.dataset.items() if v.ndim > 1}
+        encoding: dict[Any, dict[str, Any]] = {
+            name: {"zlib": True} for name, variable in self.dataset.items() if variable.ndim > 1
+        }
+        for name, variable in self.dataset.items():
+            if variable.dtype == np.float64 and "joint" in variable.dims:
+                encoding.setdefault(name, {})["dtype"] = "float32"
         with np.errstate(over="ignore", under="ignore"):  # |V| / N just before a joint opens
-            rounded = {
-                name: variable.astype(np.float32)
-                for name, variable in self.dataset.items()
-                if variable.dtype == np.float64 and "joint" in variable.dims
-            }
-        return write_dataset(self.dataset.assign(rounded), Path(path), encoding)
+            return write_dataset(self.dataset, Path(path), encoding)
 
     @classmethod
     @validate_arguments
@@ -314,9 +314,10 @@ class History(ResultDisplay):
                 f"{path} does not say which parts are rings and piers, as files of earlier "
                 "versions do not: give the structure that was shaken too"
             )
-        # arithmetic with single precision would round again
-        widened = {k: v.astype(np.float64) for k, v in dataset.items() if v.dtype == np.float32}
-        return cls(with_failure_flags(dataset.assign(widened)), structure)
+        for name in [name for name, values in dataset.items() if values.dtype == np.float32]:
+            # arithmetic with single precision would round again; one by one, for they are large
+            dataset[name] = dataset[name].astype(np.float64)
+        return cls(with_failure_flags(dataset), structure)
 
     def to_vtk(self, model: Model, path: str | Path) -> Path:
         """Write a series for ParaView: blocks, and joints as the gaps between their faces.

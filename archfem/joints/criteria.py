@@ -305,4 +305,6 @@ def assessed_joints(joints: xr.Dataset) -> xr.Dataset:
     Args:
         joints: with the coordinate `judged`, as made by `joint_dataset`.
     """
-    return joints.isel(joint=joints["judged"].values)
+    judged = joints["judged"].values
+    # a selection is a copy, which is large of a long record
+    return joints if judged.all() else joints.isel(joint=judged)

@@ -8,8 +8,10 @@ to the openings at the joint points, by least squares with the points' areas, an
 For rigid blocks both are exact.
 """
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -74,13 +76,6 @@ def _fit_matrices(
     return mean, sparse.csr_matrix((slope, entries), shape)
 
 
-def face_measures(faces: Array, depth: Array) -> dict[str, Array]:
-    """Return opening, rotation and slip of joints, from gaps at mid-depth, rotations and slips."""
-    gap, rotation, slip = np.moveaxis(faces, -2, 0)
-    opening = np.maximum(gap + 0.5 * depth * np.abs(rotation), 0.0)
-    return {"opening": opening, "rotation": rotation, "slip": slip}
-
-
 # Unit and meaning of the resultants
 RESULTANT_UNITS = {
     "N": ("N", "normal force, compression positive"),
@@ -137,19 +132,12 @@ def joint_dataset(
     """
     dims = ("joint",) if time is None else ("time", "joint")
     depth, criteria = structure.depths, criteria or Criteria()
-    ratios = eccentricity_and_friction(resultants, _overlap(depth, faces) if moved else depth)
-    values = dict(zip(RESULTANT_UNITS, (*np.moveaxis(resultants, -1, 0), *ratios), strict=True))
+    values = dict(zip(("N", "V", "M"), np.moveaxis(resultants, -1, 0), strict=True))
     if faces is not None:
-        values |= face_measures(faces, depth)
-    units = RESULTANT_UNITS | FACE_MEASURES
-    variables = {
-        key: (dims, value, {"units": units[key][0], "long_name": units[key][1]})
-        for key, value in values.items()
-    }
-    laws = criteria.coefficients(structure.friction), criteria.cohesions(structure.cohesion)
-    limits = sliding_ratio(resultants[..., 0], ratios[0], *laws)
-    normal = tension_margin(resultants[..., 0], structure.tension)
-    variables |= failure_flags(dims, normal, ratios, limits, criteria.hinge)
+        values |= {"rotation": faces[..., 1, :], "slip": faces[..., 2, :]}
+    derive = partial(_derive_variables, structure, criteria, moved)
+    variables = {key: _with_units(key, dims, value) for key, value in values.items()}
+    variables |= _derive_in_parts(derive, resultants, faces)
     coordinates = {
         "joint": np.arange(len(structure.joints)),
         "name": ("joint", [joint.name for joint in structure.joints]),
@@ -165,6 +153,56 @@ def joint_dataset(
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
     return xr.Dataset(variables, coordinates, criteria.attributes)
+
+
+def _derive_in_parts(
+    derive: Callable[[Array, Array | None], dict[str, Any]],
+    resultants: Array,
+    faces: Array | None,
+    size: int = 8192,
+) -> dict[str, Any]:
+    """Derive variables some steps at a time: those of a long record need no large temporaries."""
+    steps = len(resultants)
+    if resultants.ndim < 3 or steps <= size:
+        return derive(resultants, faces)
+    variables: dict[str, Any] = {}
+    for start in range(0, steps, size):
+        part = slice(start, start + size)
+        some = derive(resultants[part], None if faces is None else faces[part])
+        for name, (dims, values, attributes) in some.items():
+            if name not in variables:
+                whole = np.empty((steps, *values.shape[1:]), values.dtype)
+                variables[name] = dims, whole, attributes
+            variables[name][1][part] = values
+    return variables
+
+
+def _derive_variables(
+    structure: Structure,
+    criteria: Criteria,
+    moved: bool,
+    resultants: Array,
+    faces: Array | None,
+) -> dict[str, Any]:
+    """Return eccentricity, friction, opening and failure flags of joints as variables."""
+    dims = ("time", "joint")[3 - resultants.ndim :]
+    depth, normal = structure.depths, resultants[..., 0]
+    ratios = eccentricity_and_friction(resultants, _overlap(depth, faces) if moved else depth)
+    values = dict(zip(("eccentricity", "friction"), ratios, strict=True))
+    if faces is not None:
+        gap, rotation = faces[..., 0, :], faces[..., 1, :]
+        values["opening"] = np.maximum(gap + 0.5 * depth * np.abs(rotation), 0.0)
+    variables = {key: _with_units(key, dims, value) for key, value in values.items()}
+    laws = criteria.coefficients(structure.friction), criteria.cohesions(structure.cohesion)
+    limits = sliding_ratio(normal, ratios[0], *laws)
+    margin = tension_margin(normal, structure.tension)
+    return variables | failure_flags(dims, margin, ratios, limits, criteria.hinge)
+
+
+def _with_units(name: str, dims: tuple[str, ...], values: Array) -> tuple[Any, ...]:
+    """Return a variable of a dataset with its unit and meaning."""
+    unit, meaning = (RESULTANT_UNITS | FACE_MEASURES)[name]
+    return dims, values, {"units": unit, "long_name": meaning}
 
 
 def _overlap(depth: Array, faces: Array | None) -> Array:
