@@ -15,6 +15,7 @@ import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from glob import escape
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -83,9 +84,13 @@ def atomic_write(path: Path) -> Iterator[Path]:
     An error or a kill leaves the old file or the new one, never a part of it.
     """
     _refuse_null(path)
-    draft = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    machine = os.uname().nodename
+    draft = path.with_name(f".{path.stem}.{machine}.{os.getpid()}.part{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        for left in path.parent.glob(f".{escape(path.stem)}.{machine}.*.part{escape(path.suffix)}"):
+            if not _is_running(left.name.removesuffix(f".part{path.suffix}").rpartition(".")[2]):
+                left.unlink(missing_ok=True)  # of a process that was killed
         yield draft
         with draft.open("rb+") as file:
             os.fsync(file.fileno())
@@ -101,6 +106,30 @@ def atomic_write(path: Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):  # the folder may be none, which was said above
             draft.unlink(missing_ok=True)
+
+
+def _is_running(process: str) -> bool:
+    """Return whether there is a process of this number."""
+    try:
+        os.kill(int(process), 0)
+    except PermissionError:  # of another user
+        return True
+    except (OSError, ValueError, OverflowError):
+        return False
+    return True
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Yield a folder that is deleted when the block ends, or if killed, by the next call."""
+    prefix = "archfem-temporary-"
+    for left in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
+        with suppress(OSError):
+            if (left / ".lock").exists() and not is_locked(left):
+                shutil.rmtree(left)
+    made = tempfile.TemporaryDirectory(prefix=prefix, ignore_cleanup_errors=True)
+    with made as name, lock_folder(Path(name)):
+        yield Path(name)
 
 
 def _refuse_null(path: Path) -> None:

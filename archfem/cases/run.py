@@ -231,7 +231,7 @@ def run_case(
         try:
             for result in carry_out(case, draft, pairs=pairs, run_motion=run_motion):
                 if isinstance(result, Run):
-                    result = _publish_run(result, folder, draft, inputs)  # noqa: PLW2901
+                    result = _publish_run(result, folder, draft, inputs)
                     kept = draft.exists()
                     if not kept:  # for the next pair
                         _start_draft(case, folder, inputs)
@@ -536,7 +536,8 @@ def _start_draft(case: Case, folder: Path, inputs: str) -> Path:
     """Return a draft with the case, and of a suite the histories that earlier calls computed."""
     draft, listed = _files.start_draft(folder, "run"), _files.intact_file_list(folder).get("run")
     pairs = {f"{name}/{HISTORY_FILE}": name for name in (case.suite or {}).get("pairs", ())}
-    own = {name: hash_inputs(case.alone(pair).settings, case.folder) for name, pair in pairs.items()}
+    alone = {name: case.alone(pair) for name, pair in pairs.items()}
+    own = {name: hash_inputs(each.settings, case.folder) for name, each in alone.items()}
     for path in [path for path in draft.rglob("*") if path.is_file()]:
         name = path.relative_to(draft).as_posix()
         if name not in own or not _has_inputs(path, own[name]):
@@ -544,7 +545,7 @@ def _start_draft(case: Case, folder: Path, inputs: str) -> Path:
     for name in pairs:
         # histories of this very case need not be read again
         known = listed is not None and listed.inputs == inputs and name in listed.files
-        usable = known and (folder / name).is_file() or _has_inputs(folder / name, own[name])
+        usable = (known and (folder / name).is_file()) or _has_inputs(folder / name, own[name])
         if usable and not (draft / name).exists():
             link_file(folder / name, draft / name)
     with _files.atomic_write(draft / CASE_FILE) as part:

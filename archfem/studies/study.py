@@ -10,13 +10,12 @@ from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Self
 
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from archfem._files import hash_json
+from archfem._files import hash_json, temporary_folder
 from archfem._validation import check_integer, validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import describe_version
@@ -178,8 +177,7 @@ class Study:
         store = None if folder is None else Store(Path(folder))
         with ExitStack() as stack:
             if store is None:
-                temporary = TemporaryDirectory(prefix="archfem-", ignore_cleanup_errors=True)
-                shared = Path(stack.enter_context(temporary), "shared")
+                shared = stack.enter_context(temporary_folder()) / "shared"
             else:
                 stack.enter_context(store.lock())
                 shared = store.shared.resolve()
