@@ -32,6 +32,9 @@ LIST_FILE = "archfem.json"
 DRAFT_PREFIX = ".unfinished-"
 FINISHED_FOLDER = ".finished"
 
+# Results that are written from those of another command, and vanish when these are replaced
+DERIVED = {"run": "report", "study": "study summary"}
+
 # Limit for files that are read at once: a record of 10⁷ samples is smaller.
 MAX_FILE_BYTES = 2**28
 
@@ -268,10 +271,14 @@ def read_file_list(folder: Path) -> dict[str, FileGroup]:
     path = folder / LIST_FILE
     if not path.is_file():
         return {}
-    return {
-        command: FileGroup(str(group["inputs"]), dict(group["files"]))
-        for command, group in read_sealed_json(path, "list of results").items()
-    }
+    content = read_sealed_json(path, "list of results")
+    try:
+        return {
+            command: FileGroup(str(group["inputs"]), dict(group["files"]))
+            for command, group in content.items()
+        }
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise InvalidInput(f"{path} is no list of results, but another file: run again") from error
 
 
 def check_listed(path: Path, content: bytes) -> None:
@@ -333,10 +340,11 @@ def publish_draft(folder: Path, command: str, inputs: str) -> None:
     draft = folder / f"{DRAFT_PREFIX}{command}"
     paths = [path for path in draft.rglob("*") if path.is_file()]
     files = {path.relative_to(draft).as_posix(): hash_content(path) for path in paths}
-    # a report is of the run that it was written from
-    replaced = {command, "report"} if command == "run" else {command}
+    listed = intact_file_list(folder)
+    same = command in listed and listed[command].files == files
+    replaced = {command} if same else {command, DERIVED.get(command)}
     groups: dict[str, Any] = {command: {"inputs": inputs, "files": files}}
-    for name, group in intact_file_list(folder).items():
+    for name, group in listed.items():
         if name not in replaced:
             others = {file: digest for file, digest in group.files.items() if file not in files}
             groups[name] = {"inputs": group.inputs, "files": others}

@@ -1,5 +1,6 @@
 """History of a run: recorded joints and fields, first mechanisms, verdict, and its file."""
 
+import logging
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -41,11 +42,17 @@ from archfem.limit.mechanism_kinematics import (
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt, Model
 
+logger = logging.getLogger("archfem")
+
 SIGN_CONVENTION = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
     "higher block slips toward the extrados; rotation > 0 opens the intrados; "
     "gravity along -y; displacements relative to the ground"
 )
+
+# Number of the coordinates of elastic blocks in large displacements; 1, which files do not say,
+# were those of a dense basis
+COORDINATES_VERSION = 2
 
 
 class Ending(StrEnum):
@@ -317,7 +324,7 @@ class History(ResultDisplay):
         for name in [name for name, values in dataset.items() if values.dtype == np.float32]:
             # arithmetic with single precision would round again; one by one, for they are large
             dataset[name] = dataset[name].astype(np.float64)
-        return cls(with_failure_flags(dataset), structure)
+        return cls(with_failure_flags(_without_other_coordinates(path, dataset)), structure)
 
     def to_vtk(self, model: Model, path: str | Path) -> Path:
         """Write a series for ParaView: blocks, and joints as the gaps between their faces.
@@ -399,6 +406,20 @@ class History(ResultDisplay):
             InvalidInput: the run was made in Python, without a case.
         """
         return call_late_bound("History.report", self, path)
+
+
+def _without_other_coordinates(path: str | Path, dataset: xr.Dataset) -> xr.Dataset:
+    """Return a file's content without coordinates that had another meaning when it was written."""
+    attrs = dataset.attrs
+    elastic = attrs.get("displacements") == "large" and attrs.get("fidelity") != "rigid"
+    if not elastic or attrs.get("coordinates_version", 1) == COORDINATES_VERSION:
+        return dataset
+    logger.warning(
+        "%s has elastic blocks in coordinates of an earlier version: it is read without them, and "
+        "films, stress and last_state need a new run",
+        path,
+    )
+    return dataset.drop_dims("coordinate", errors="ignore")
 
 
 def _check_structure(path: str | Path, dataset: xr.Dataset, structure: Structure) -> None:

@@ -71,6 +71,8 @@ class Store:
         if not self._plan.is_file():
             raise InvalidInput(f"there is no study in {self.folder}: it has no {self._plan.name}")
         plan: dict[str, Any] = _files.read_sealed_json(self._plan, "study")
+        if not isinstance(plan, dict) or "points" not in plan:
+            raise InvalidInput(f"{self._plan} is no study, but another file: run the study again")
         return plan
 
     def write_plan(self, plan: dict[str, Any]) -> None:
@@ -106,7 +108,7 @@ class Store:
         """Read the points per second of the latest driver; 0 if unknown."""
         try:
             return float(_files.read_sealed_json(self._progress, "progress")["rate"])
-        except InvalidInput:
+        except (InvalidInput, KeyError, TypeError):  # missing, damaged or another file
             return 0.0
 
     def _read_row(self, digest: str) -> Row | None:
@@ -115,7 +117,7 @@ class Store:
             row: Row = _files.read_sealed_json(self._row_path(digest), "row of a study")
         except InvalidInput:
             return None
-        return row if row.pop("point") == digest else None
+        return row if isinstance(row, dict) and row.pop("point", "") == digest else None
 
     def _row_path(self, digest: str) -> Path:
         """Path of a row; subfolders keep the number of files in a folder small."""

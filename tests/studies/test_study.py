@@ -5,7 +5,8 @@ import json
 import os
 import re
 import subprocess
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -169,6 +170,35 @@ def test_rows_that_were_changed_are_computed_again(what, study_file, tmp_path, c
     assert "1 of the stored points" in caplog.text
     assert again.identical(first)
     assert json.loads(row.read_text()) == content
+
+
+@pytest.mark.slow
+def test_no_file_of_a_study_stands_for_another(study_file, tmp_path, capsys):
+    """Each file is replaced by every other one, also by those of another study: 300 swaps."""
+    folder, other = tmp_path / "a", tmp_path / "b"
+    command = ["study", str(study_file), "--own-code", "--workers", "1", "--out"]
+    assert af.commands.main([*command, str(folder)]) == 0
+    assert af.commands.main([*command, str(other), "--set", "structure.voussoirs=11"]) == 0
+    names = {path: path.relative_to(folder) for path in folder.rglob("*") if path.is_file()}
+    whole = {path: path.read_bytes() for path in names}
+    others = {path: path.read_bytes() for path in other.rglob("*") if path.is_file()}
+    results = {path for path in whole if path.name != "progress.json"}
+    swaps = 0
+    for path, (source, content) in product(whole, (whole | others).items()):
+        if content == whole[path]:
+            continue
+        path.write_bytes(content)
+        swaps += 1
+        with suppress(af.ArchfemError):
+            af.studies.status(folder)
+        if path.name in ("results.nc", "archfem.json"):
+            with pytest.raises(af.InvalidInput, match="not the file|no list|damaged"):
+                af.studies.read_table(folder / "results.nc")
+        assert af.commands.main([*command, str(folder)]) == 0, (path, source)
+        for each in results:
+            assert each.read_bytes() == whole[each], (path, source, each)
+    assert swaps > 300
+    capsys.readouterr()
 
 
 def test_a_table_of_another_study_is_refused(study_file, tmp_path):
