@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from archfem._files import DERIVED, atomic_write, create_result_folder, hash_content, replace_results
+from archfem._files import (
+    DERIVED,
+    atomic_write,
+    create_result_folder,
+    hash_content,
+    replace_results,
+)
 from archfem.errors import InvalidInput
 from archfem.studies.result_store import CSV_FILE, EXCEL_FILE, NETCDF_FILE, format_table, status
 

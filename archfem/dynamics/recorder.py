@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem.dynamics.fall import list_stones
-from archfem.dynamics.history import COORDINATES_VERSION, SIGN_CONVENTION, Ending, History, corner_displacements
+from archfem.dynamics.history import (
+    COORDINATES_VERSION,
+    SIGN_CONVENTION,
+    Ending,
+    History,
+    corner_displacements,
+)
 from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.state import Batch, State
 from archfem.joints.criteria import Criteria

@@ -192,7 +192,7 @@ def test_no_file_of_a_study_stands_for_another(study_file, tmp_path, capsys):
         with suppress(af.ArchfemError):
             af.studies.status(folder)
         if path.name in ("results.nc", "archfem.json"):
-            with pytest.raises(af.InvalidInput, match="not the file|no list|damaged"):
+            with pytest.raises(af.InvalidInput, match=r"not the file|no list|damaged"):
                 af.studies.read_table(folder / "results.nc")
         assert af.commands.main([*command, str(folder)]) == 0, (path, source)
         for each in results:
