@@ -283,17 +283,31 @@ def read_file_list(folder: Path) -> dict[str, FileGroup]:
 
 def check_listed(path: Path, content: bytes) -> None:
     """Refuse a file of a result folder that is not the one which archfem wrote there."""
+    for listed in _listed_digests(path):
+        if listed != hashlib.sha256(content).hexdigest():
+            raise InvalidInput(
+                f"{path} is not the file that archfem wrote there, by the digest in "
+                f"{LIST_FILE}: it was changed, or is of another run; run again"
+            )
+
+
+def refuse_listed(path: Path) -> None:
+    """Refuse to replace a file of a result folder, which belongs to the others there."""
+    if path.is_file() and list(_listed_digests(path)):
+        raise InvalidInput(
+            f"{path} is a result of `archfem run` or a study, with others of the same folder: "
+            "give another name, or delete that folder"
+        )
+
+
+def _listed_digests(path: Path) -> Iterator[str]:
+    """Yield the digests that a file has in the lists of its folders."""
     path = path.absolute()
     # the history of a pair is in a folder within the result folder
     for folder in (path.parent, path.parent.parent):
         name = path.relative_to(folder).as_posix()
-        for group in read_file_list(folder).values():
-            listed = group.files.get(name)
-            if listed is not None and listed != hashlib.sha256(content).hexdigest():
-                raise InvalidInput(
-                    f"{path} is not the file that archfem wrote there, by the digest in "
-                    f"{LIST_FILE}: it was changed, or is of another run; run again"
-                )
+        groups = read_file_list(folder).values()
+        yield from (group.files[name] for group in groups if name in group.files)
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from typing import Any
 import netCDF4
 import xarray as xr
 
-from archfem._files import atomic_write, check_listed, read_bytes
+from archfem._files import atomic_write, check_listed, read_bytes, refuse_listed
 from archfem.errors import InvalidInput
 
 # Precedes the digest at the end of a file.
@@ -27,6 +27,7 @@ def write_dataset(
     dataset: xr.Dataset, path: Path, encoding: Mapping[Any, Any] = MappingProxyType({})
 ) -> Path:
     """Write a dataset atomically: a killed run leaves the old file or the new one."""
+    refuse_listed(path)
     file = netCDF4.Dataset(path.name, "w", memory=1)
     try:
         store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]

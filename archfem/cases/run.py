@@ -536,29 +536,29 @@ def _start_draft(case: Case, folder: Path, inputs: str) -> Path:
     """Return a draft with the case, and of a suite the histories that earlier calls computed."""
     draft, listed = _files.start_draft(folder, "run"), _files.intact_file_list(folder).get("run")
     pairs = {f"{name}/{HISTORY_FILE}": name for name in (case.suite or {}).get("pairs", ())}
-    alone = {name: case.alone(pair) for name, pair in pairs.items()}
-    own = {name: hash_inputs(each.settings, case.folder) for name, each in alone.items()}
     for path in [path for path in draft.rglob("*") if path.is_file()]:
         name = path.relative_to(draft).as_posix()
-        if name not in own or not _has_inputs(path, own[name]):
+        if name not in pairs or not _is_of(path, case.alone(pairs[name])):
             path.unlink()
-    for name in pairs:
-        # histories of this very case need not be read again
-        known = listed is not None and listed.inputs == inputs and name in listed.files
-        usable = (known and (folder / name).is_file()) or _has_inputs(folder / name, own[name])
-        if usable and not (draft / name).exists():
-            link_file(folder / name, draft / name)
+    for name, pair in pairs.items():
+        path = folder / name
+        if path.is_file() and not (draft / name).exists():
+            # histories of this very case need not be read again
+            known = listed is not None and listed.inputs == inputs and name in listed.files
+            if known or _is_of(path, case.alone(pair)):
+                link_file(path, draft / name)
     with _files.atomic_write(draft / CASE_FILE) as part:
         part.write_text(case.text(), encoding="utf-8")
     return draft
 
 
-def _has_inputs(path: Path, inputs: str) -> bool:
-    """Return whether a file is the history of these inputs."""
+def _is_of(path: Path, case: Case) -> bool:
+    """Return whether a file is a history of a case and its input files by this program."""
     try:
-        return bool(read_dataset(path, "history file").attrs.get("inputs") == inputs)
+        stored = read_dataset(path, "history file").attrs.get("inputs")
     except InvalidInput:
         return False
+    return bool(stored == hash_inputs(case.settings, case.folder))
 
 
 def _publish_run(run: Run, folder: Path, draft: Path, inputs: str) -> Run:

@@ -284,6 +284,9 @@ class History(ResultDisplay):
 
         Returns:
             The file.
+
+        Raises:
+            InvalidInput: it cannot be written, or is a result of `archfem run`.
         """
         encoding: dict[Any, dict[str, Any]] = {
             name: {"zlib": True} for name, variable in self.dataset.items() if variable.ndim > 1

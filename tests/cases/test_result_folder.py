@@ -91,6 +91,16 @@ def test_no_reader_takes_a_file_of_another_run(two_runs, capsys):
     assert af.cases.open_results(folder).missing == ()
 
 
+def test_saving_replaces_no_file_of_a_run(two_runs, tmp_path):
+    folder, _ = two_runs
+    path = folder / "first" / "history.nc"
+    before, history = path.read_bytes(), af.History.read(path)
+    with pytest.raises(af.InvalidInput, match="is a result of `archfem run`"):
+        history.save(path)
+    assert path.read_bytes() == before
+    assert af.History.read(history.save(folder / "first" / "copy.nc")).outcome == history.outcome
+
+
 def test_a_run_redoes_what_is_of_another_run(two_runs):
     folder, other = two_runs
     for name in ("first/history.nc", "second/summary.txt"):
