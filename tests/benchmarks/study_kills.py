@@ -3,7 +3,7 @@
     python tests/benchmarks/study_kills.py --kills 60
     python tests/benchmarks/study_kills.py --what suite --kills 20 --seed 2
 
-Commands are a run of one motion, a suite of four pairs, a study, an incremental dynamic analysis, a
+Commands are a run of one motion, a suite of three pairs, a study, an incremental dynamic analysis, a
 range of verdicts, and `run_case` in Python. The process that was started, its workers and their
 fork server are ended in turn, by SIGKILL and by SIGTERM, after a time drawn evenly; a command whose
 own process was ended is started again. Should it end before, it begins anew in another folder,
@@ -46,11 +46,11 @@ fidelity = "rigid"
 dt = 0.005
 damping = { ratio = 0.05, frequency = 8.0 }
 [motion]
-synthetic = { seed = 1, duration = 4.0, pga = 3.0 }
+synthetic = { seed = 1, duration = 1.0, pga = 3.0 }
 """
 PAIRS = "".join(
-    f"pair{seed} = {{ synthetic = {{ seed = {seed}, duration = 4.0, pga = 3.0 }} }}\n"
-    for seed in range(1, 5)
+    f"pair{seed} = {{ synthetic = {{ seed = {seed}, duration = 1.0, pga = 3.0 }} }}\n"
+    for seed in range(1, 4)
 )
 CALLS = """
 import sys
@@ -146,7 +146,7 @@ class Command:
                 break
             kind, number = kills[0]
             # a command that goes on where it was would end before a late kill
-            time.sleep(chance.uniform(0.0, (0.5 if self.what in RESUMED else 1.0) * self.spent))
+            time.sleep(chance.uniform(0.0, (0.9 if self.what == "run" else 0.6) * self.spent))
             begun = {"server": servers(process.pid), "worker": workers(process.pid)}
             met.update(each for some in begun.values() for each in some)
             victims = begun.get(kind, [process.pid])
@@ -252,7 +252,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Compare commands left alone with others that were not."""
     parser = plain_options(__doc__)
     parser.add_argument("--what", choices=COMMANDS, action="append", help="by default all")
-    parser.add_argument("--points", type=int, default=80)
+    parser.add_argument("--points", type=int, default=40)
     parser.add_argument("--kills", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args(arguments)
