@@ -232,8 +232,8 @@ def run_case(
             for result in carry_out(case, draft, pairs=pairs, run_motion=run_motion):
                 if isinstance(result, Run):
                     result = _publish_run(result, folder, draft, inputs)
-                    kept = draft.exists()
-                    if not kept:  # for the next pair
+                    kept = result.path is not None and result.path.is_relative_to(draft)
+                    if not draft.exists():  # for the next pair
                         _start_draft(case, folder, inputs)
                 yield result
         finally:
@@ -564,15 +564,20 @@ def _is_of(path: Path, case: Case) -> bool:
 def _publish_run(run: Run, folder: Path, draft: Path, inputs: str) -> Run:
     """Move a run from its draft to its place, unless it is incomplete and would replace another."""
     assert run.path is not None
-    name, listed = run.path.relative_to(draft), _files.intact_file_list(folder).get("run")
-    other = listed is not None and (listed.inputs != inputs or name.as_posix() in listed.files)
-    # of a suite the other pairs are run nevertheless
-    broken_off = run.error is not None and run.case.suite is None
-    if other and (broken_off or run.history.ending is Ending.INTERRUPTED):
-        logger.warning(EARLIER_KEPT, folder, draft)
-        return run
+    name = run.path.relative_to(draft)
+    place, listed = folder / name, _files.intact_file_list(folder).get("run")
+    if listed is not None:
+        same = listed.inputs == inputs and name.as_posix() in listed.files
+        if same and place.is_file() and _files.hash_content(place) == _files.hash_content(run.path):
+            return replace(run, path=place)  # pictures and summary of it stay
+        # of a suite the other pairs are run nevertheless
+        broken_off = run.error is not None and run.case.suite is None
+        replaces = same or listed.inputs != inputs
+        if replaces and (broken_off or run.history.ending is Ending.INTERRUPTED):
+            logger.warning(EARLIER_KEPT, folder, draft)
+            return run
     _files.publish_draft(folder, "run", inputs)
-    return replace(run, path=folder / name)
+    return replace(run, path=place)
 
 
 def _keep_partial_results(folder: Path, draft: Path, inputs: str) -> None:

@@ -3,8 +3,8 @@
     python tests/benchmarks/study_kills.py --kills 60
     python tests/benchmarks/study_kills.py --what suite --kills 20 --seed 2
 
-Commands are a run of one motion, a suite of three pairs, a study, an incremental dynamic analysis, a
-range of verdicts, and `run_case` in Python. The process that was started, its workers and their
+Commands are a run of one motion, a suite of three pairs, a study, an incremental dynamic analysis,
+a range of verdicts, and `run_case` in Python. The process that was started, its workers and their
 fork server are ended in turn, by SIGKILL and by SIGTERM, after a time drawn evenly; a command whose
 own process was ended is started again. Should it end before, it begins anew in another folder,
 which is compared as well.
@@ -157,6 +157,7 @@ class Command:
             kills.pop(0)
             if kind == "driver":
                 process.wait()
+                print(f"{self.what}: {sum(self.ended.values())} kills", flush=True)
                 self.check_between(out)
                 process = self.start(out)
         if process.returncode:

@@ -227,6 +227,23 @@ def test_in_python_too_a_run_replaces_another_as_a_whole(two_runs):
     assert list(opened.runs) == ["synthetic 0"]
 
 
+def test_what_is_read_in_python_keeps_its_pictures(two_runs):
+    """Pairs are reused, and one that was swapped is computed anew: then the old pictures go."""
+    folder, other = two_runs
+    before = {name: (folder / name).read_bytes() for name in files_below(folder)}
+    case = af.Case.read(folder / "case.toml")
+    runs = [each for each in af.cases.run_case(case, folder) if isinstance(each, af.cases.Run)]
+    assert [(run.reused, run.path.is_relative_to(folder)) for run in runs] == [(True, True)] * 2
+    assert {name: (folder / name).read_bytes() for name in files_below(folder)} == before
+    path = folder / "first" / "history.nc"
+    path.write_bytes((other / "first" / "history.nc").read_bytes())
+    runs = [each for each in af.cases.run_case(case, folder) if isinstance(each, af.cases.Run)]
+    assert [run.reused for run in runs] == [False, True]
+    assert path.read_bytes() == before["first/history.nc"]
+    assert "suite.txt" not in files_below(folder)
+    assert af.cases.open_results(folder).missing == ()
+
+
 def test_in_python_too_a_folder_has_one_run_at_a_time(tmp_path):
     first = af.cases.run_case(af.Case.of(COLUMN), tmp_path)
     next(first)
