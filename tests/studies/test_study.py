@@ -22,6 +22,7 @@ from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import group_by_model
 from archfem.studies.process_pool import TaskQueue
 from archfem.studies.result_store import Store
+from archfem.studies.shared_results import compute_once, share_results
 
 
 @pytest.fixture
@@ -201,6 +202,16 @@ def test_no_file_of_a_study_stands_for_another(study_file, tmp_path):
             for each in {*whole} - {folder / "progress.json"}:
                 assert each.read_bytes() == whole[each], (path, each)
     assert swaps > 50
+
+
+def test_a_shared_result_of_another_key_is_computed_again(tmp_path):
+    with share_results(tmp_path / "shared"):
+        assert [compute_once("runs", key, key.upper) for key in "ab"] == ["A", "B"]
+        first, second = (tmp_path / "shared" / "runs").iterdir()
+        second.write_bytes(first.read_bytes())
+        again = [compute_once("runs", key, lambda: "again") for key in "ab"]
+        assert sorted(again) in (["A", "again"], ["B", "again"])
+        assert [compute_once("runs", key, lambda: "third") for key in "ab"] == again
 
 
 def test_a_table_of_another_study_is_refused(study_file, tmp_path):
