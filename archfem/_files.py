@@ -15,6 +15,7 @@ import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from glob import escape
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,6 +31,9 @@ LIST_FILE = "archfem.json"
 # Folders in a result folder: drafts of commands, and the draft whose files are being moved
 DRAFT_PREFIX = ".unfinished-"
 FINISHED_FOLDER = ".finished"
+
+# Results that are written from those of another command, and vanish when these are replaced
+DERIVED = {"run": "report", "study": "study summary"}
 
 
 def check_file(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) -> Path:
@@ -81,9 +85,13 @@ def atomic_write(path: Path) -> Iterator[Path]:
     An error or a kill leaves the old file or the new one, never a part of it.
     """
     _refuse_null(path)
-    draft = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    machine = os.uname().nodename
+    draft = path.with_name(f".{path.stem}.{machine}.{os.getpid()}.part{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        for left in path.parent.glob(f".{escape(path.stem)}.{machine}.*.part{escape(path.suffix)}"):
+            if not _is_running(left.name.removesuffix(f".part{path.suffix}").rpartition(".")[2]):
+                left.unlink(missing_ok=True)  # of a process that was killed
         yield draft
         with draft.open("rb+") as file:
             os.fsync(file.fileno())
@@ -99,6 +107,30 @@ def atomic_write(path: Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):  # the folder may be none, which was said above
             draft.unlink(missing_ok=True)
+
+
+def _is_running(process: str) -> bool:
+    """Return whether there is a process of this number."""
+    try:
+        os.kill(int(process), 0)
+    except PermissionError:  # of another user
+        return True
+    except (OSError, ValueError, OverflowError):
+        return False
+    return True
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Yield a folder that is deleted when the block ends, or if killed, by the next call."""
+    prefix = "archfem-temporary-"
+    for left in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
+        with suppress(OSError):
+            if (left / ".lock").exists() and not is_locked(left):
+                shutil.rmtree(left)
+    made = tempfile.TemporaryDirectory(prefix=prefix, ignore_cleanup_errors=True)
+    with made as name, lock_folder(Path(name)):
+        yield Path(name)
 
 
 def _refuse_null(path: Path) -> None:
@@ -237,25 +269,43 @@ def read_file_list(folder: Path) -> dict[str, FileGroup]:
     path = folder / LIST_FILE
     if not path.is_file():
         return {}
-    return {
-        command: FileGroup(str(group["inputs"]), dict(group["files"]))
-        for command, group in read_sealed_json(path, "list of results").items()
-    }
+    content = read_sealed_json(path, "list of results")
+    try:
+        return {
+            command: FileGroup(str(group["inputs"]), dict(group["files"]))
+            for command, group in content.items()
+        }
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise InvalidInput(f"{path} is no list of results, but another file: run again") from error
 
 
 def check_listed(path: Path, content: bytes) -> None:
     """Refuse a file of a result folder that is not the one which archfem wrote there."""
+    for listed in _listed_digests(path):
+        if listed != hashlib.sha256(content).hexdigest():
+            raise InvalidInput(
+                f"{path} is not the file that archfem wrote there, by the digest in "
+                f"{LIST_FILE}: it was changed, or is of another run; run again"
+            )
+
+
+def refuse_listed(path: Path) -> None:
+    """Refuse to replace a file of a result folder, which belongs to the others there."""
+    if path.is_file() and list(_listed_digests(path)):
+        raise InvalidInput(
+            f"{path} is a result of `archfem run` or a study, with others of the same folder: "
+            "give another name, or delete that folder"
+        )
+
+
+def _listed_digests(path: Path) -> Iterator[str]:
+    """Yield the digests that a file has in the lists of its folders."""
     path = path.absolute()
     # the history of a pair is in a folder within the result folder
     for folder in (path.parent, path.parent.parent):
         name = path.relative_to(folder).as_posix()
-        for group in read_file_list(folder).values():
-            listed = group.files.get(name)
-            if listed is not None and listed != hashlib.sha256(content).hexdigest():
-                raise InvalidInput(
-                    f"{path} is not the file that archfem wrote there, by the digest in "
-                    f"{LIST_FILE}: it was changed, or is of another run; run again"
-                )
+        groups = read_file_list(folder).values()
+        yield from (group.files[name] for group in groups if name in group.files)
 
 
 @contextmanager
@@ -302,10 +352,11 @@ def publish_draft(folder: Path, command: str, inputs: str) -> None:
     draft = folder / f"{DRAFT_PREFIX}{command}"
     paths = [path for path in draft.rglob("*") if path.is_file()]
     files = {path.relative_to(draft).as_posix(): hash_content(path) for path in paths}
-    # a report is of the run that it was written from
-    replaced = {command, "report"} if command == "run" else {command}
+    listed = intact_file_list(folder)
+    same = command in listed and listed[command].files == files
+    replaced = {command} if same else {command, DERIVED.get(command)}
     groups: dict[str, Any] = {command: {"inputs": inputs, "files": files}}
-    for name, group in intact_file_list(folder).items():
+    for name, group in listed.items():
         if name not in replaced:
             others = {file: digest for file, digest in group.files.items() if file not in files}
             groups[name] = {"inputs": group.inputs, "files": others}

@@ -13,7 +13,7 @@ from typing import Any
 import netCDF4
 import xarray as xr
 
-from archfem._files import atomic_write, check_listed, read_bytes
+from archfem._files import atomic_write, check_listed, read_bytes, refuse_listed
 from archfem.errors import InvalidInput
 
 # Precedes the digest at the end of a file.
@@ -27,12 +27,20 @@ def write_dataset(
     dataset: xr.Dataset, path: Path, encoding: Mapping[Any, Any] = MappingProxyType({})
 ) -> Path:
     """Write a dataset atomically: a killed run leaves the old file or the new one."""
+    refuse_listed(path)
     file = netCDF4.Dataset(path.name, "w", memory=1)
     try:
         store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
-        dataset.assign_attrs({CHECKSUM_ATTRIBUTE: 1}).dump_to_store(store, encoding=dict(encoding))
+        large = [name for name, values in dataset.items() if values.ndim > 1]
+        small = dataset.drop_vars(large).assign_attrs({CHECKSUM_ATTRIBUTE: 1})
+        # encoding copies: of a long history one variable at a time
+        for part in (small, *(dataset[[name]] for name in large)):
+            own = {name: encoding[name] for name in part if name in encoding}
+            part.dump_to_store(store, encoding=own)
+            for name in own:
+                file[name].set_var_chunk_cache(1)  # compresses it now, and frees its values
     finally:
-        content = file.close()  # a view of memory, which is not copied: a history may be large
+        content = file.close()  # a view of memory, which is not copied
     with atomic_write(path) as draft, draft.open("wb") as target:
         target.write(content)
         target.write(CHECKSUM_MARK + _digest(content))
@@ -43,21 +51,22 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     """Read a NetCDF file and verify its checksum; in a result folder also that of the list."""
     # a history has no other limit of size than the disk's
     content = read_bytes(path, what, max_bytes=2**40)
-    before, mark, digest = content.rpartition(CHECKSUM_MARK)
+    end = content.rfind(CHECKSUM_MARK)
     damaged = InvalidInput(
         f"{path} is damaged: it is not what was written there; delete it and run again"
     )
-    if mark and digest != _digest(before):
+    # no part of it is copied: a history may be large
+    if end >= 0 and content[end + len(CHECKSUM_MARK) :] != _digest(memoryview(content)[:end]):
         raise damaged
     check_listed(Path(path), content)
     try:
-        file = netCDF4.Dataset(Path(path).name, memory=before if mark else content)
+        file = netCDF4.Dataset(Path(path).name, memory=content)
         store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
         with xr.open_dataset(store) as opened:
             dataset = opened.load()
     except Exception as error:  # HDF5, NetCDF and xarray raise errors of many classes
         raise InvalidInput(f"{path} is not a NetCDF file: {error}") from error
-    if dataset.attrs.pop(CHECKSUM_ATTRIBUTE, None) is not None and not mark:
+    if dataset.attrs.pop(CHECKSUM_ATTRIBUTE, None) is not None and end < 0:
         raise damaged
     return dataset
 

@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -16,6 +18,7 @@ from archfem._files import (
     read_file_list,
     read_sealed_json,
     replace_results,
+    temporary_folder,
     write_sealed_json,
 )
 
@@ -43,6 +46,43 @@ def test_what_breaks_off_leaves_the_old_file(tmp_path):
         broken_off()
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.fixture
+def dead_process():
+    """Number of a process that has ended."""
+    process = subprocess.Popen(["true"])
+    process.wait()
+    return process.pid
+
+
+def test_drafts_of_killed_processes_are_removed_by_the_next_writer(tmp_path, dead_process):
+    """Those of processes that run, here or on other machines, stay."""
+    machine = os.uname().nodename
+    names = {
+        number: f".run.{machine}.{number}.part.txt" for number in (dead_process, os.getppid(), "x")
+    }
+    others = (f".run.elsewhere.{dead_process}.part.txt", f".run2.{machine}.{dead_process}.part.txt")
+    for name in (*names.values(), *others):
+        (tmp_path / name).touch()
+    with atomic_write(tmp_path / "run.txt") as draft:
+        draft.write_text("whole")
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == {"run.txt", names[os.getppid()], *others}
+
+
+def test_temporary_folders_of_killed_processes_are_removed_by_the_next(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    code = "import os, archfem._files as f\nwith f.temporary_folder() as x: (x / 'a').touch(); "
+    killed = [sys.executable, "-c", f"{code}os.kill(os.getpid(), 9)"]
+    subprocess.run(killed, env=os.environ | {"TMPDIR": str(tmp_path)}, check=False)
+    (left,) = tmp_path.iterdir()
+    assert {path.name for path in left.iterdir()} == {".lock", "a"}
+    with temporary_folder() as folder:
+        assert list(tmp_path.iterdir()) == [folder]
+        with temporary_folder() as other:
+            assert set(tmp_path.iterdir()) == {folder, other}
+    assert list(tmp_path.iterdir()) == []
 
 
 def contents(folder):
@@ -78,6 +118,18 @@ def test_results_of_a_command_are_replaced_together(tmp_path):
     assert {name: group.inputs for name, group in groups.items()} == {"run": "two", "modes": "one"}
     write(tmp_path, "run", "two", modes_txt="of two")
     assert read_file_list(tmp_path)["modes"].files == {}
+
+
+def test_what_was_written_from_other_results_vanishes_with_these(tmp_path):
+    """A report stays only where the very same run is repeated."""
+    for text, left in (("first", True), ("first", True), ("second", False)):
+        write(tmp_path, "run", "inputs", case_toml=text)
+        if text == "first":
+            write(tmp_path, "report", "inputs", report_html="of the first")
+        assert (tmp_path / "report.html").exists() == left
+    write(tmp_path, "report", "inputs", report_html="of the second")
+    write(tmp_path, "run", "other inputs", case_toml="second")
+    assert (tmp_path / "report.html").exists()
 
 
 def test_a_command_that_fails_leaves_the_folder_as_it_was(tmp_path):

@@ -3,11 +3,7 @@
 The files of a run appear in its folder together, when all of them exist (`archfem._files`).
 """
 
-import logging
-import os
-import shutil
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,8 +13,16 @@ from archfem import _files
 from archfem._files import FileGroup
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
-from archfem.cases.provenance import hash_inputs, list_input_files
-from archfem.cases.run import HISTORY_FILE, CaseResult, DeadLoadResult, Run
+from archfem.cases.provenance import list_input_files
+from archfem.cases.run import (
+    CASE_FILE,
+    HISTORY_FILE,
+    CaseResult,
+    DeadLoadResult,
+    Run,
+    is_linked,
+    link_file,
+)
 from archfem.cases.toml_file import Table, read_tables
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import History
@@ -43,9 +47,6 @@ from archfem.view.structure import draw_during, draw_names
 from archfem.view.studies import draw_accuracy, draw_verdict_range
 from archfem.view.style import LINE_COLOURS, save
 
-logger = logging.getLogger("archfem")
-
-CASE_FILE = "case.toml"
 SUMMARY_FILE = "summary.txt"
 
 
@@ -81,68 +82,6 @@ class ResultFolder(CaseResult):
         with _files.replace_results(self.folder, "report", inputs) as draft:
             super().report(draft / "report.html")
         return self.folder / "report.html"
-
-
-@contextmanager
-def replace_run(case: Case, folder: Path) -> Iterator[Path]:
-    """Yield a draft folder whose files replace those of an earlier run when the block ends.
-
-    The draft has the case, and of a suite the histories of earlier calls. If the block fails, the
-    folder keeps the results of an earlier run; without any it gets what was computed.
-    """
-    with _files.lock_folder(folder):
-        draft, inputs = _files.start_draft(folder, "run"), hash_inputs(case.settings, case.folder)
-        _prepare_draft(case, folder, draft)
-        try:
-            yield draft
-        except BaseException:
-            _keep_partial_results(folder, draft, inputs)
-            raise
-        _files.publish_draft(folder, "run", inputs)
-
-
-def _prepare_draft(case: Case, folder: Path, draft: Path) -> None:
-    """Write the case to a draft, and add the histories of its pairs that earlier calls computed."""
-    pairs = {f"{name}/{HISTORY_FILE}" for name in (case.suite or {}).get("pairs", ())}
-    left = draft / CASE_FILE
-    same = left.is_file() and left.read_bytes() == case.text().encode()
-    for path in [path for path in draft.rglob("*") if path.is_file()]:
-        if not same or path.relative_to(draft).as_posix() not in pairs:
-            path.unlink()
-    for name in pairs:
-        if (folder / name).is_file() and not (draft / name).exists():
-            _link(folder / name, draft / name)
-    with _files.atomic_write(left) as part:
-        part.write_text(case.text(), encoding="utf-8")
-
-
-def _keep_partial_results(folder: Path, draft: Path, inputs: str) -> None:
-    """Publish the results of a run that failed, unless the folder has those of another run."""
-    files = [path for path in draft.rglob("*") if path.is_file() and path.name != CASE_FILE]
-    new = [path for path in files if not _is_linked(path, folder / path.relative_to(draft))]
-    if new and "run" not in _files.intact_file_list(folder):
-        _files.publish_draft(folder, "run", inputs)
-        logger.warning("what was computed is kept in %s", folder)
-    elif any(path.name == HISTORY_FILE for path in new):
-        logger.warning(
-            "%s keeps the results of an earlier run; what was computed now is in %s", folder, draft
-        )
-    else:
-        shutil.rmtree(draft, ignore_errors=True)
-
-
-def _link(source: Path, target: Path) -> None:
-    """Link a file, or copy it where the disk has no links."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        os.link(source, target)
-    except OSError:
-        shutil.copy2(source, target)
-
-
-def _is_linked(path: Path, other: Path) -> bool:
-    """Return whether two paths are of the same file."""
-    return other.is_file() and path.samefile(other)
 
 
 @validate_arguments
@@ -317,7 +256,7 @@ def adopt_files(run: Run) -> bool:
     pair, draft, folder = run.path.parents[0].name, run.path.parents[1], run.path.parents[2]
     listed = _files.intact_file_list(folder).get("run")
     names = [] if listed is None else [n for n in listed.files if n.startswith(f"{pair}/")]
-    same_history = _is_linked(run.path, folder / pair / HISTORY_FILE)
+    same_history = is_linked(run.path, folder / pair / HISTORY_FILE)
     if f"{pair}/{SUMMARY_FILE}" not in names or not same_history:
         return False
     try:
@@ -327,7 +266,7 @@ def adopt_files(run: Run) -> bool:
         return False
     for name in names:
         if not (draft / name).exists():
-            _link(folder / name, draft / name)
+            link_file(folder / name, draft / name)
     return True
 
 

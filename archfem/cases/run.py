@@ -5,9 +5,11 @@ an earlier call are reused if case, input files, program and ground motion are t
 """
 
 import logging
+import os
+import shutil
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,7 +19,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 import xarray as xr
 
+from archfem import _files
 from archfem._display import call_late_bound
+from archfem._netcdf import read_dataset
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs
@@ -43,8 +47,12 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("archfem")
 
-# Name of the file of a history in a result folder.
+# Names of files in a result folder.
+CASE_FILE = "case.toml"
 HISTORY_FILE = "history.nc"
+
+# Warning of a run that was broken off
+EARLIER_KEPT = "%s keeps the results of an earlier run; what was computed now is in %s"
 
 # Integrates a motion of a case from its dead load, with damping, as `run_time_history` does.
 RunMotion = Callable[[Case, Motion, Equilibrium, Viscous | None], History]
@@ -192,9 +200,11 @@ def run_case(
     """Carry out a case, and yield each result as soon as it is computed.
 
     With a folder each history is saved: that of one motion as history.nc, that of a pair of a suite
-    in a folder of the pair's name. Pairs that an earlier call has finished are reused, if case,
-    input files, program and motion are the same, so that an interrupted call can be repeated. A
-    failed step ends its run alone; Ctrl-C ends the run, which is still yielded, and the suite.
+    in a folder of the pair's name. Case, history and list of files appear together, in place of
+    those of another case; `open_results` reads them. Pairs that an earlier call has finished are
+    reused, if case, input files, program and motion are the same, so that an interrupted call can
+    be repeated. A failed step ends its run alone; Ctrl-C ends the run, which is still yielded, and
+    the suite; neither replaces a run that was finished before.
 
     Args:
         case: the case.
@@ -207,12 +217,39 @@ def run_case(
         is one; and a `Run` for each motion.
 
     Raises:
-        InvalidInput: a motion cannot be read, or limit analysis is not possible.
+        InvalidInput: a motion cannot be read, limit analysis is not possible, or another command
+            writes to the folder.
         DidNotConverge: the structure has no equilibrium under dead load, a motion cannot be
             matched, or the first step of a run failed.
     """
+    if folder is None:
+        yield from carry_out(case, None, pairs=pairs, run_motion=run_motion)
+        return
+    folder, inputs = Path(folder), hash_inputs(case.settings, case.folder)
+    with _files.lock_folder(folder):
+        draft, kept = _start_draft(case, folder, inputs), False
+        try:
+            for result in carry_out(case, draft, pairs=pairs, run_motion=run_motion):
+                if isinstance(result, Run):
+                    result = _publish_run(result, folder, draft, inputs)
+                    kept = result.path is not None and result.path.is_relative_to(draft)
+                    if not draft.exists():  # for the next pair
+                        _start_draft(case, folder, inputs)
+                yield result
+        finally:
+            if not kept:
+                shutil.rmtree(draft, ignore_errors=True)
+
+
+def carry_out(
+    case: Case,
+    folder: Path | None,
+    *,
+    pairs: Collection[str] | None = None,
+    run_motion: RunMotion | None = None,
+) -> Iterator[Result]:
+    """Yield the results of `run_case`, with histories in a draft of a result folder."""
     run_motion = run_motion or run_time_history
-    folder = None if folder is None else Path(folder)
     # Unreadable records are errors before the dead load is computed.
     selected = case if pairs is None else case.alone(*pairs)
     selected.check_ground()
@@ -412,8 +449,10 @@ def _run_motion(
     doubts = (*at_rest.doubts, *history.doubts, *doubt_fidelity(at_rest, motion, history))
     history = history.with_doubts(doubts)
     if path is not None:
+        history.save(path)
+        del history  # of a long run it takes hundreds of megabytes
         # as later calls read it, so that their tables have the same digits
-        history = History.read(history.save(path), case.structure)
+        history = History.read(path, case.structure)
     return Run(case, motion, history, path, seconds=seconds, error=failure)
 
 
@@ -448,7 +487,7 @@ def doubt_fidelity(
     end = min(float(history.time[-1]), float(run.time[-1]))
     sizes = []
     for each in (history, run):
-        joints = assessed_joints(each.joints).sel(time=slice(None, end))
+        joints = assessed_joints(each.joints.sel(time=slice(None, end)))
         sizes.append(abs(joints["eccentricity"]).max("time").values)
     worst = float(np.nanmax(np.abs(sizes[0] - sizes[1]), initial=0.0))
     if worst <= tolerance:
@@ -473,3 +512,96 @@ def load_finished_run(path: Path, case: Case, motion: Motion) -> History | None:
     # Spectral matching reproduces accelerations up to round-off, far below 1e-6 m/s².
     saved, applied = run.dataset["ground"].values, motion.at(run.time)
     return run if np.allclose(saved, applied, rtol=0.0, atol=1e-6) else None
+
+
+@contextmanager
+def replace_run(case: Case, folder: Path) -> Iterator[Path]:
+    """Yield a draft folder whose files replace those of an earlier run when the block ends.
+
+    The draft has the case, and of a suite the histories of earlier calls. If the block fails, the
+    folder keeps the results of an earlier run; without any it gets what was computed.
+    """
+    inputs = hash_inputs(case.settings, case.folder)
+    with _files.lock_folder(folder):
+        draft = _start_draft(case, folder, inputs)
+        try:
+            yield draft
+        except BaseException:
+            _keep_partial_results(folder, draft, inputs)
+            raise
+        _files.publish_draft(folder, "run", inputs)
+
+
+def _start_draft(case: Case, folder: Path, inputs: str) -> Path:
+    """Return a draft with the case, and of a suite the histories that earlier calls computed."""
+    draft, listed = _files.start_draft(folder, "run"), _files.intact_file_list(folder).get("run")
+    pairs = {f"{name}/{HISTORY_FILE}": name for name in (case.suite or {}).get("pairs", ())}
+    for path in [path for path in draft.rglob("*") if path.is_file()]:
+        name = path.relative_to(draft).as_posix()
+        if name not in pairs or not _is_of(path, case.alone(pairs[name])):
+            path.unlink()
+    for name, pair in pairs.items():
+        path = folder / name
+        if path.is_file() and not (draft / name).exists():
+            # histories of this very case need not be read again
+            known = listed is not None and listed.inputs == inputs and name in listed.files
+            if known or _is_of(path, case.alone(pair)):
+                link_file(path, draft / name)
+    with _files.atomic_write(draft / CASE_FILE) as part:
+        part.write_text(case.text(), encoding="utf-8")
+    return draft
+
+
+def _is_of(path: Path, case: Case) -> bool:
+    """Return whether a file is a history of a case and its input files by this program."""
+    try:
+        stored = read_dataset(path, "history file").attrs.get("inputs")
+    except InvalidInput:
+        return False
+    return bool(stored == hash_inputs(case.settings, case.folder))
+
+
+def _publish_run(run: Run, folder: Path, draft: Path, inputs: str) -> Run:
+    """Move a run from its draft to its place, unless it is incomplete and would replace another."""
+    assert run.path is not None
+    name = run.path.relative_to(draft)
+    place, listed = folder / name, _files.intact_file_list(folder).get("run")
+    if listed is not None:
+        same = listed.inputs == inputs and name.as_posix() in listed.files
+        if same and place.is_file() and _files.hash_content(place) == _files.hash_content(run.path):
+            return replace(run, path=place)  # pictures and summary of it stay
+        # of a suite the other pairs are run nevertheless
+        broken_off = run.error is not None and run.case.suite is None
+        replaces = same or listed.inputs != inputs
+        if replaces and (broken_off or run.history.ending is Ending.INTERRUPTED):
+            logger.warning(EARLIER_KEPT, folder, draft)
+            return run
+    _files.publish_draft(folder, "run", inputs)
+    return replace(run, path=place)
+
+
+def _keep_partial_results(folder: Path, draft: Path, inputs: str) -> None:
+    """Publish the results of a run that failed, unless the folder has those of another run."""
+    files = [path for path in draft.rglob("*") if path.is_file() and path.name != CASE_FILE]
+    new = [path for path in files if not is_linked(path, folder / path.relative_to(draft))]
+    if new and "run" not in _files.intact_file_list(folder):
+        _files.publish_draft(folder, "run", inputs)
+        logger.warning("what was computed is kept in %s", folder)
+    elif any(path.name == HISTORY_FILE for path in new):
+        logger.warning(EARLIER_KEPT, folder, draft)
+    else:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def link_file(source: Path, target: Path) -> None:
+    """Link a file, or copy it where the disk has no links."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copy2(source, target)
+
+
+def is_linked(path: Path, other: Path) -> bool:
+    """Return whether two paths are of the same file."""
+    return other.is_file() and path.samefile(other)

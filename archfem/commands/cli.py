@@ -146,7 +146,7 @@ def _add_case_commands(commands: Any) -> None:
     def add(
         name: str,
         about: str,
-        folder: str = "for the results",
+        folder: str = "folder for the results",
         required: bool = True,
         module: str = "run",
     ) -> AddArgument:
@@ -155,8 +155,7 @@ def _add_case_commands(commands: Any) -> None:
         add_argument("case", metavar="CASE.toml", help="the case file")
         _add_changes(add_argument)
         if folder:
-            text = f"folder {folder}{'' if required else ' (none)'}"
-            add_argument("--out", required=required, metavar="DIR", help=text)
+            add_argument("--out", required=required, metavar="DIR", help=folder)
         return add_argument
 
     add_to = add("run", "dead load, time histories, tables and pictures")
@@ -165,9 +164,9 @@ def _add_case_commands(commands: Any) -> None:
     add_to = add("modes", "frequencies, masses and shapes of vibrations about dead load")
     add_to("--count", type=int, default=6, help="how many modes (6)")
     about = "collapse factor and mechanism by limit analysis of the case alone"
-    add("limit", about, "for text, table and picture", required=False)
+    add("limit", about, "folder for text, table and picture (none)", required=False)
     about = "kinematic assessment of the collapse mechanism against a design spectrum"
-    add_to = add("assess", about, "for text and pictures", required=False)
+    add_to = add("assess", about, "folder for text and pictures (none)", required=False)
     add_to("--parts", action="store_true", help="each part by itself")
     about = "rating of a bridge for a vehicle by limit analysis"
     add_to = add("rate", about, "")
@@ -180,7 +179,7 @@ def _add_case_commands(commands: Any) -> None:
     add_to = add("mesh", "write the mesh of a case as a gmsh file", "")
     add_to("--out", required=True, metavar="FILE.msh", help="the mesh file")
     about = "does it fall, whatever its uncertain properties are?"
-    add_to = add("verdict", about, "for table and picture", required=False)
+    add_to = add("verdict", about, "folder for table and picture (none)", required=False)
     add_to("--workers", type=int, default=1, help="processes for the runs (1)")
     add_to("--samples", type=int, default=26, help="runs of the sample (26)")
     add_to = add("accuracy", "speed against error over fidelities, meshes, quadratures and steps")

@@ -15,7 +15,7 @@ from archfem.cases import result_text
 from archfem.cases.analysis_keys import rate_case
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs
-from archfem.cases.run import DeadLoadResult, Result, Run, run_case
+from archfem.cases.run import DeadLoadResult, Result, Run, carry_out, replace_run
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions
 from archfem.dynamics.history import Ending, History
@@ -39,14 +39,14 @@ def run(options: argparse.Namespace) -> int:
     output = io.StringIO()
     try:
         # All else is printed after the verdict, which is known last.
-        with results.replace_run(case, folder) as draft, redirect_stdout(output):
+        with replace_run(case, folder) as draft, redirect_stdout(output):
             if options.workers > 1 and case.suite is not None:
-                from archfem.studies.study import run_pairs
+                from archfem.studies.study import compute_pairs
 
-                # Workers save the histories, which `run_case` reuses below.
-                run_pairs(case, draft, workers=options.workers)
+                # Workers save the histories, which are reused below.
+                compute_pairs(case, draft, workers=options.workers)
             try:
-                headline, doubtful = print_results(case, run_case(case, draft), draft)
+                headline, doubtful = print_results(case, carry_out(case, draft), draft)
             except FailedPairs as error:
                 failure = error
     finally:
@@ -249,7 +249,7 @@ def compile_steps(options: argparse.Namespace) -> None:
 
 def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[str, bool]:
     """Print results, write their files, and return the verdict and whether any is in doubt."""
-    # `run_case` yields limit analysis, dead load, suite and runs in this order.
+    # `carry_out` yields limit analysis, dead load, suite and runs in this order.
     runs: dict[str, History] = {}
     for result in found:
         if isinstance(result, Collapse):

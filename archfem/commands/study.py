@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from archfem._files import atomic_write, create_result_folder
+from archfem._files import (
+    DERIVED,
+    atomic_write,
+    create_result_folder,
+    hash_content,
+    replace_results,
+)
 from archfem.errors import InvalidInput
 from archfem.studies.result_store import RESULT_FILES, format_table, status
 
@@ -34,7 +40,10 @@ def study(options: argparse.Namespace) -> int:
     errors = table["error"].values.ravel().tolist()
     for error in sorted({error for error in errors if error}):
         print(f"{errors.count(error)} ended in {error}")
-    _write_results(definition, table, folder)
+    # of this very table
+    inputs = hash_content(folder / RESULT_FILES[0])
+    with replace_results(folder, DERIVED["study"], inputs) as draft:
+        _write_results(definition, table, draft)
     for name in ("study.txt", "study.png", *RESULT_FILES):
         if (folder / name).is_file():
             print(f"wrote {folder / name}")
@@ -56,7 +65,6 @@ def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> None
     with atomic_write(folder / "study.txt") as draft:
         draft.write_text(f"{definition.title}\n\n{text}\n", encoding="utf-8")
     picture = folder / "study.png"
-    picture.unlink(missing_ok=True)  # it would be of another table
     factors = {name: finding.factors for name, finding in findings.items() if finding.scales}
     try:
         if isinstance(definition, Comparison) and factors:

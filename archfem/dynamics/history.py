@@ -1,5 +1,6 @@
 """History of a run: recorded joints and fields, first mechanisms, verdict, and its file."""
 
+import logging
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -37,11 +38,17 @@ from archfem.limit.mechanism_kinematics import (
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt, Model
 
+logger = logging.getLogger("archfem")
+
 SIGN_CONVENTION = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
     "higher block slips toward the extrados; rotation > 0 opens the intrados; "
     "gravity along -y; displacements relative to the ground"
 )
+
+# Number of the coordinates of elastic blocks in large displacements; 1, which files do not say,
+# were those of a dense basis
+COORDINATES_VERSION = 2
 
 
 class Ending(StrEnum):
@@ -273,15 +280,18 @@ class History(ResultDisplay):
 
         Returns:
             The file.
+
+        Raises:
+            InvalidInput: it cannot be written, or is a result of `archfem run`.
         """
-        encoding = {name: {"zlib": True} for name, v in self.dataset.items() if v.ndim > 1}
+        encoding: dict[Any, dict[str, Any]] = {
+            name: {"zlib": True} for name, variable in self.dataset.items() if variable.ndim > 1
+        }
+        for name, variable in self.dataset.items():
+            if variable.dtype == np.float64 and "joint" in variable.dims:
+                encoding.setdefault(name, {})["dtype"] = "float32"
         with np.errstate(over="ignore", under="ignore"):  # |V| / N just before a joint opens
-            rounded = {
-                name: variable.astype(np.float32)
-                for name, variable in self.dataset.items()
-                if variable.dtype == np.float64 and "joint" in variable.dims
-            }
-        return write_dataset(self.dataset.assign(rounded), Path(path), encoding)
+            return write_dataset(self.dataset, Path(path), encoding)
 
     @classmethod
     @validate_arguments
@@ -310,9 +320,10 @@ class History(ResultDisplay):
                 f"{path} does not say which parts are rings and piers, as files of earlier "
                 "versions do not: give the structure that was shaken too"
             )
-        # arithmetic with single precision would round again
-        widened = {k: v.astype(np.float64) for k, v in dataset.items() if v.dtype == np.float32}
-        return cls(with_failure_flags(dataset.assign(widened)), structure)
+        for name in [name for name, values in dataset.items() if values.dtype == np.float32]:
+            # arithmetic with single precision would round again; one by one, for they are large
+            dataset[name] = dataset[name].astype(np.float64)
+        return cls(with_failure_flags(_without_other_coordinates(path, dataset)), structure)
 
     def to_vtk(self, model: Model, path: str | Path) -> Path:
         """Write a series for ParaView: blocks, and joints as the gaps between their faces.
@@ -394,6 +405,20 @@ class History(ResultDisplay):
             InvalidInput: the run was made in Python, without a case.
         """
         return call_late_bound("History.report", self, path)
+
+
+def _without_other_coordinates(path: str | Path, dataset: xr.Dataset) -> xr.Dataset:
+    """Return a file's content without coordinates that had another meaning when it was written."""
+    attrs = dataset.attrs
+    elastic = attrs.get("displacements") == "large" and attrs.get("fidelity") != "rigid"
+    if not elastic or attrs.get("coordinates_version", 1) == COORDINATES_VERSION:
+        return dataset
+    logger.warning(
+        "%s has elastic blocks in coordinates of an earlier version: it is read without them, and "
+        "films, stress and last_state need a new run",
+        path,
+    )
+    return dataset.drop_dims("coordinate", errors="ignore")
 
 
 def _check_structure(path: str | Path, dataset: xr.Dataset, structure: Structure) -> None:

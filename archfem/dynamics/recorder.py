@@ -12,13 +12,45 @@ from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem.dynamics.fall import list_stones
-from archfem.dynamics.history import SIGN_CONVENTION, Ending, History, corner_displacements
+from archfem.dynamics.history import (
+    COORDINATES_VERSION,
+    SIGN_CONVENTION,
+    Ending,
+    History,
+    corner_displacements,
+)
 from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.state import Batch, State
 from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_dataset
 from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
+
+
+class GrowingArray:
+    """Rows that are added batch by batch, in one piece of memory."""
+
+    def __init__(self) -> None:
+        self._memory: NDArray[Any] | None = None
+        self._count = 0
+
+    def add(self, rows: NDArray[Any]) -> None:
+        """Add rows at the end."""
+        end = self._count + len(rows)
+        if self._memory is None or end > len(self._memory):
+            # the system provides memory once it is written to: the second half costs nothing
+            grown = np.empty((2 * end, *rows.shape[1:]), rows.dtype)
+            if self._count:
+                grown[: self._count] = self.rows
+            self._memory = grown
+        self._memory[self._count : end] = rows
+        self._count = end  # last, for Ctrl-C
+
+    @property
+    def rows(self) -> NDArray[Any]:
+        """All rows."""
+        assert self._memory is not None
+        return self._memory[: self._count]
 
 
 @dataclass(kw_only=True)
@@ -35,8 +67,7 @@ class Recorder:
     state: State  # at the end of the steps added last
     fallback: int = 0  # number of steps at which a compiled solver fell back to SNES
     count: int = 0  # number of steps added, the start of the run among them
-    # rows of each quantity, one array for each batch
-    _rows: dict[str, list[NDArray[Any]]] = field(default_factory=lambda: defaultdict(list))
+    _rows: dict[str, "GrowingArray"] = field(default_factory=lambda: defaultdict(GrowingArray))
 
     def __post_init__(self) -> None:
         self._observer = self.model.observer()
@@ -60,18 +91,18 @@ class Recorder:
             "resultants": batch.resultants[due],
         }
         for name, values in rows.items():
-            self._rows[name].append(np.array(values))
+            self._rows[name].add(values)
         self.count += len(batch.times)
         self.fallback += batch.fallback * len(batch.times)
         if self.fields_every:
             for k in np.flatnonzero(numbers % self.fields_every == 0).tolist():
-                self._rows["frames"].append(batch.times[k : k + 1])
-                self._rows["fields"].append(np.array(batch.state(k).q[None]))
+                self._rows["frames"].add(batch.times[k : k + 1])
+                self._rows["fields"].add(batch.state(k).q[None])
         self.monitor.check_run()
 
     def _recorded(self, name: str) -> NDArray[Any]:
         """Return all rows of a quantity, in order of the steps."""
-        return np.concatenate(self._rows[name])
+        return self._rows[name].rows
 
     def build_history(self, motion: Motion, ending: Ending, outcome: str) -> History:
         """Return the record as a history."""
@@ -142,6 +173,7 @@ class Recorder:
             "structure": structure.fingerprint,
             "method": self.method,
             "last_time": self.state.time,
+            "coordinates_version": COORDINATES_VERSION,
             "energy_drift": monitor.worst_drift,
             "displacements": "large" if self.model.large_displacements else "small",
             "displacement": float(monitor.displacements.largest[stones].max()),

@@ -237,7 +237,7 @@ def extremes_remark(dataset: xr.Dataset) -> list[str]:
     if "rotation" not in dataset:
         return []
     # rotations of joints while they hinge, slips of all joints, both of rings and piers
-    joints = assessed_joints(dataset)
+    joints = assessed_joints(dataset[["rotation", "slip", "hinge"]])
     rotations = abs(joints["rotation"]).where(joints["hinge"] != 0, 0.0)
     if float(rotations.max()) > 0.0:
         rotation = f"largest hinge rotation {_peak_text(rotations, 1e-3, 'mrad')}"

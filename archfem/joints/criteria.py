@@ -262,8 +262,10 @@ def first_time(flags: xr.DataArray) -> xr.DataArray:
 
 def longest_duration(flags: xr.DataArray) -> xr.DataArray:
     """Return the longest unbroken time for which each joint is flagged [s]."""
-    longest = unbroken_durations(flags.transpose("time", ...).values, flags["time"].values)
-    return xr.DataArray(longest.max(axis=0), {"joint": flags["joint"]}, ("joint",))
+    time, columns = flags["time"].values, flags.transpose("joint", "time").values
+    # one joint at a time: the record may be long
+    longest = [float(unbroken_durations(each[:, None], time).max()) for each in columns]
+    return xr.DataArray(longest, {"joint": flags["joint"]}, ("joint",))
 
 
 def unbroken_durations(flagged: NDArray[np.bool_], time: Array) -> Array:
@@ -305,4 +307,6 @@ def assessed_joints(joints: xr.Dataset) -> xr.Dataset:
     Args:
         joints: with the coordinate `judged`, as made by `joint_dataset`.
     """
-    return joints.isel(joint=joints["judged"].values)
+    judged = joints["judged"].values
+    # a selection is a copy, which is large of a long record
+    return joints if judged.all() else joints.isel(joint=judged)

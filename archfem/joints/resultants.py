@@ -8,8 +8,10 @@ to the openings at the joint points, by least squares with the points' areas, an
 For rigid blocks both are exact.
 """
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -67,13 +69,6 @@ def _fit_matrices(
     return mean, sparse.csr_matrix((slope, entries), shape)
 
 
-def face_measures(faces: Array, depth: Array) -> dict[str, Array]:
-    """Return opening, rotation and slip of joints, from gaps at mid-depth, rotations and slips."""
-    gap, rotation, slip = np.moveaxis(faces, -2, 0)
-    opening = np.maximum(gap + 0.5 * depth * np.abs(rotation), 0.0)
-    return {"opening": opening, "rotation": rotation, "slip": slip}
-
-
 def eccentricity_and_friction(resultants: Array, depth: Array) -> tuple[Array, Array]:
     """Return eccentricity and mobilised friction of joints; undefined (NaN) where they are open."""
     normal, shear, moment = np.moveaxis(resultants, -1, 0)
@@ -120,16 +115,12 @@ def joint_dataset(
     """
     dims = ("joint",) if time is None else ("time", "joint")
     depth, criteria = structure.depths, criteria or Criteria()
-    ratios = eccentricity_and_friction(resultants, _overlap(depth, faces) if moved else depth)
-    names = ("N", "V", "M", "eccentricity", "friction")
-    values = dict(zip(names, (*np.moveaxis(resultants, -1, 0), *ratios), strict=True))
+    values = dict(zip(("N", "V", "M"), np.moveaxis(resultants, -1, 0), strict=True))
     if faces is not None:
-        values |= face_measures(faces, depth)
-    variables = _describe_variables(dims, values)
-    laws = criteria.coefficients(structure.friction), criteria.cohesions(structure.cohesion)
-    limits = sliding_ratio(resultants[..., 0], ratios[0], *laws)
-    normal = tension_margin(resultants[..., 0], structure.tension)
-    variables |= failure_flags(dims, normal, ratios, limits, criteria.hinge)
+        values |= {"rotation": faces[..., 1, :], "slip": faces[..., 2, :]}
+    derive = partial(_derive_variables, structure, criteria, moved)
+    variables = {key: _with_units(key, dims, value) for key, value in values.items()}
+    variables |= _derive_in_parts(derive, resultants, faces)
     coordinates = {
         "joint": np.arange(len(structure.joints)),
         "name": ("joint", [joint.name for joint in structure.joints]),
@@ -147,11 +138,53 @@ def joint_dataset(
     return xr.Dataset(variables, coordinates, criteria.attributes)
 
 
-def _describe_variables(
-    dims: tuple[str, ...], values: dict[str, Array]
-) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:
-    """Return variables of joints with their units and meaning."""
-    meaning = {
+def _derive_in_parts(
+    derive: Callable[[Array, Array | None], dict[str, Any]],
+    resultants: Array,
+    faces: Array | None,
+    size: int = 8192,
+) -> dict[str, Any]:
+    """Derive variables some steps at a time: those of a long record need no large temporaries."""
+    steps = len(resultants)
+    if resultants.ndim < 3 or steps <= size:
+        return derive(resultants, faces)
+    variables: dict[str, Any] = {}
+    for start in range(0, steps, size):
+        part = slice(start, start + size)
+        some = derive(resultants[part], None if faces is None else faces[part])
+        for name, (dims, values, attributes) in some.items():
+            if name not in variables:
+                whole = np.empty((steps, *values.shape[1:]), values.dtype)
+                variables[name] = dims, whole, attributes
+            variables[name][1][part] = values
+    return variables
+
+
+def _derive_variables(
+    structure: Structure,
+    criteria: Criteria,
+    moved: bool,
+    resultants: Array,
+    faces: Array | None,
+) -> dict[str, Any]:
+    """Return eccentricity, friction, opening and failure flags of joints as variables."""
+    dims = ("time", "joint")[3 - resultants.ndim :]
+    depth, normal = structure.depths, resultants[..., 0]
+    ratios = eccentricity_and_friction(resultants, _overlap(depth, faces) if moved else depth)
+    values = dict(zip(("eccentricity", "friction"), ratios, strict=True))
+    if faces is not None:
+        gap, rotation = faces[..., 0, :], faces[..., 1, :]
+        values["opening"] = np.maximum(gap + 0.5 * depth * np.abs(rotation), 0.0)
+    variables = {key: _with_units(key, dims, value) for key, value in values.items()}
+    laws = criteria.coefficients(structure.friction), criteria.cohesions(structure.cohesion)
+    limits = sliding_ratio(normal, ratios[0], *laws)
+    margin = tension_margin(normal, structure.tension)
+    return variables | failure_flags(dims, margin, ratios, limits, criteria.hinge)
+
+
+def _with_units(name: str, dims: tuple[str, ...], values: Array) -> tuple[Any, ...]:
+    """Return a variable of a dataset with its unit and meaning."""
+    meanings = {
         "N": ("N", "normal force, compression positive"),
         "V": ("N", "shear force"),
         "M": ("N m", "moment about mid-depth, positive toward the extrados"),
@@ -164,10 +197,8 @@ def _describe_variables(
         "rotation": ("rad", "turn of the higher face, positive where it opens the intrados"),
         "slip": ("m", "mean slip of the higher block, positive toward the extrados"),
     }
-    return {
-        key: (dims, value, {"units": meaning[key][0], "long_name": meaning[key][1]})
-        for key, value in values.items()
-    }
+    attributes = dict(zip(("units", "long_name"), meanings[name], strict=True))
+    return dims, values, attributes
 
 
 def _overlap(depth: Array, faces: Array | None) -> Array:

@@ -215,16 +215,21 @@ def _in_mpa(stress: xr.DataArray) -> str:
 
 def utilisation_text(structure: Structure, joints: xr.Dataset) -> str:
     """Return the largest use of strength over a run as text, without joints that hinge."""
-    # A hinge rests on a strip whose width does not follow from N and e.
-    use = utilisation(structure, joints).where((joints["hinge"] == 0) & ~joints["open"])
-    if not use.notnull().any():
+    largest, found = -np.inf, None
+    steps = 8192  # at a time: a long record has no room for more of its size
+    for start in range(0, joints.sizes["time"], steps):
+        some = joints.isel(time=slice(start, start + steps))
+        # A hinge rests on a strip whose width does not follow from N and e.
+        use = utilisation(structure, some).where((some["hinge"] == 0) & ~some["open"])
+        if use.notnull().any() and float(use.max()) > largest:
+            step, number = np.unravel_index(np.nanargmax(use.values), use.shape)
+            largest, found = float(use[step, number]), some.isel(time=step, joint=number)
+            stress = float(joint_stress(structure, some)[step, number]) / MPa
+    if found is None:
         return "no use of strength is known: all joints hinge or are open, or no strength is given"
-    step, number = np.unravel_index(np.nanargmax(use.values), use.shape)
-    stress = float(joint_stress(structure, joints)[step, number]) / MPa
     return (
         f"largest compression at the edge of a joint that does not hinge: {stress:.3f} MPa, "
-        f"{float(use[step, number]):.2%} of strength, in {joints['name'].values[number]} "
-        f"at {float(joints['time'][step]):.3f} s"
+        f"{largest:.2%} of strength, in {found['name'].values} at {float(found['time']):.3f} s"
     )
 
 

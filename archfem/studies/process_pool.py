@@ -16,9 +16,10 @@ import sys
 import threading
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
+from functools import cache
 from itertools import islice
-from multiprocessing import Pipe, forkserver, get_context, parent_process
+from multiprocessing import Pipe, current_process, forkserver, get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -28,6 +29,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from archfem._files import temporary_folder
 from archfem.cases.provenance import describe_version
 from archfem.errors import ArchfemError, InvalidInput, StudyStopped
 from archfem.studies.evaluators import Evaluator
@@ -234,6 +236,7 @@ class WorkerPool:
         with suppress(ValueError):
             signal.signal(signal.SIGPIPE, signal.SIG_IGN)
         forkserver.set_forkserver_preload(["archfem.studies.fork_server"])
+        _make_socket_folder()
         with _isolate_start():
             forkserver.ensure_running()
         self._tasks, self._max_workers, self._log, self._shared = tasks, max_workers, log, shared
@@ -305,6 +308,15 @@ class WorkerPool:
             return None
         text = f"{MAX_DEATHS_PER_POINT} processes that computed this point ended"
         return task.number, make_row({}, f"WorkerDied: {text}, the last with {reason}", ours=False)
+
+
+@cache
+def _make_socket_folder() -> None:
+    """Give multiprocessing a folder for the fork server's socket that no kill leaves for good."""
+    stack = ExitStack()
+    folder = stack.enter_context(temporary_folder())
+    current_process()._config["tempdir"] = str(folder)  # type: ignore[attr-defined]
+    atexit.register(stack.close)
 
 
 def _start(process: BaseProcess, attempts: int = 10) -> None:

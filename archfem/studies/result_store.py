@@ -69,6 +69,8 @@ class Store:
         if not self._plan.is_file():
             raise InvalidInput(f"there is no study in {self.folder}: it has no {self._plan.name}")
         plan: dict[str, Any] = _files.read_sealed_json(self._plan, "study")
+        if not isinstance(plan, dict) or "points" not in plan:
+            raise InvalidInput(f"{self._plan} is no study, but another file: run the study again")
         return plan
 
     def write_plan(self, plan: dict[str, Any]) -> None:
@@ -104,7 +106,7 @@ class Store:
         """Read what the latest driver knew of its speed; nothing if unknown."""
         try:
             progress = _files.read_sealed_json(self._progress, "progress")
-        except InvalidInput:
+        except InvalidInput:  # missing, damaged or another file
             return {}
         names = ("rate", "run_rate", "runs_left")
         return {name: float(progress[name]) for name in names if name in progress}
@@ -115,7 +117,7 @@ class Store:
             row: Row = _files.read_sealed_json(self._row_path(digest), "row of a study")
         except InvalidInput:
             return None
-        return row if row.pop("point") == digest else None
+        return row if isinstance(row, dict) and row.pop("point", "") == digest else None
 
     def _row_path(self, digest: str) -> Path:
         """Path of a row; subfolders keep the number of files in a folder small."""

@@ -44,7 +44,7 @@ def compute_once(kind: str, key: str, compute: Callable[[], Any]) -> Any:
             content = compute()
             # where the disk is full it is not shared
             with suppress(OSError, InvalidInput):
-                write_sealed_json(path, content)
+                write_sealed_json(path, {"key": digest, "result": content})
     return content
 
 
@@ -54,11 +54,13 @@ def count_results(folder: Path, kind: str) -> int:
 
 
 def _read(path: Path) -> Any:
-    """Read a result; None if there is none, or it is damaged."""
+    """Read a result; None if there is none, or it is damaged or of another key."""
     try:
-        return read_sealed_json(path, "shared result")
+        content = read_sealed_json(path, "shared result")
     except InvalidInput:
         return None
+    is_own = isinstance(content, dict) and content.get("key") == path.stem
+    return content.get("result") if is_own else None
 
 
 @contextmanager

@@ -10,17 +10,16 @@ from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Self
 
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from archfem._files import hash_json
+from archfem._files import hash_json, temporary_folder
 from archfem._validation import check_integer, validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import describe_version
-from archfem.cases.run import Run, run_case
+from archfem.cases.run import Run, carry_out, replace_run
 from archfem.cases.toml_file import check_table, read_tables, refuse_unknown
 from archfem.dynamics.history import Ending
 from archfem.errors import ArchfemError, InvalidInput
@@ -173,8 +172,7 @@ class Study:
         store = None if folder is None else Store(Path(folder))
         with ExitStack() as stack:
             if store is None:
-                temporary = TemporaryDirectory(prefix="archfem-", ignore_cleanup_errors=True)
-                shared = Path(stack.enter_context(temporary), "shared")
+                shared = stack.enter_context(temporary_folder()) / "shared"
             else:
                 stack.enter_context(store.lock())
                 shared = store.shared.resolve()
@@ -476,21 +474,27 @@ def run_pairs(
     Raises:
         InvalidInput: the case has no suite, or selects its model by one pair for all.
     """
+    with replace_run(case, Path(folder)) as draft:
+        return compute_pairs(case, draft, workers=workers, client=client)
+
+
+def compute_pairs(case: Case, draft: Path, **options: Any) -> list[str]:
+    """Run the pairs of a suite as `run_pairs` does, into the draft of a result folder."""
     if case.suite is None or case.selects_model:
         raise InvalidInput(
             "pairs run in parallel only if a case has a [suite] and names its model: "
             "model.fidelity = 'auto' selects one by the first pair for all"
         )
     pairs = list(case.suite["pairs"])
-    find = {"name": save_pair, "folder": str(Path(folder).resolve())}
-    table = Study.of(case, {PAIR_KEY: pairs}, find).run(workers=workers, client=client)
+    find = {"name": save_pair, "folder": str(draft.resolve())}
+    table = Study.of(case, {PAIR_KEY: pairs}, find).run(**options)
     endings = table["ended"].values if "ended" in table else [""] * len(pairs)
     return [a or b for a, b in zip(table["error"].values.tolist(), endings, strict=True)]
 
 
 def save_pair(case: Case, folder: str) -> Findings:
     """Run the only pair of a case, and save its history."""
-    (run,) = (result for result in run_case(case, folder) if isinstance(result, Run))
+    (run,) = (result for result in carry_out(case, Path(folder)) if isinstance(result, Run))
     if run.history.ending is Ending.INTERRUPTED:
         raise KeyboardInterrupt
     return {"ended": str(run.history.ending)}

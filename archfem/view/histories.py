@@ -153,7 +153,8 @@ def _draw_faces(axes: Axes, hinge: float) -> None:
 
 def _joints_of_part(joints: xr.Dataset, part: str) -> xr.Dataset:
     """Return the joints of one part."""
-    return joints.isel(joint=np.flatnonzero(joints["part"].values.astype(str) == part))
+    own = joints["part"].values.astype(str) == part
+    return joints if own.all() else joints.isel(joint=own)
 
 
 def _make_panels(states: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[str, Axes]:

@@ -118,7 +118,7 @@ def tried(seed: int, displacements: str, duration: float = 4.0) -> Came:
     told, finite = run.dataset.attrs, bool(np.isfinite(run.joints["N"]).all())
     steps, drift = told["steps"], float(told["energy_drift"])
     counts = steps, told["halved_steps"], told["fallback_steps"], drift
-    words = f"{built.name}, {rung}: {run.fall.words if run.fall else run.outcome}"[:WIDTH]
+    words = f"{built.name}, {rung}: {run.fall.text if run.fall else run.outcome}"[:WIDTH]
     kind = run.fall.kind if run.fall else "answer"
     wrong = not finite or abs(drift) > RISE
     return Came("WRONG" if wrong else kind, words, *counts, spent / steps)

@@ -14,7 +14,7 @@ import archfem as af
 from archfem._files import read_file_list, replace_results
 from archfem.cases.report.checks import supported_weight_ratio
 from archfem.cases.report.report_data import rebuild_motion
-from archfem.cases.result_folder import replace_run
+from archfem.cases.run import carry_out, replace_run
 
 CASE = """
 title = "a column <b>& more</b> under two pairs"
@@ -41,7 +41,7 @@ def carried_out(tmp_path_factory):
     folder = tmp_path_factory.mktemp("suite")
     case = af.Case.of(tomllib.loads(CASE))
     with replace_run(case, folder) as draft:
-        list(af.cases.run_case(case, draft))
+        list(carry_out(case, draft))
     return folder
 
 

@@ -8,6 +8,7 @@ import pytest
 import archfem as af
 from archfem._files import read_file_list, replace_results
 from archfem.cases import result_folder as results
+from archfem.cases.run import carry_out, link_file, replace_run
 
 
 def test_more_pairs_than_colours_share_several_pictures(small, tmp_path):
@@ -33,8 +34,8 @@ second = { synthetic = { seed = 2, duration = 0.3, pga = 1.0 } }
 def run_into(folder, small, change):
     """Carry out a suite of two pairs as `archfem run` does; its figures are texts."""
     case = af.Case.read(small, [change, "output.save_fields_every=10"])
-    with results.replace_run(case, folder) as draft:
-        for result in af.cases.run_case(case, draft):
+    with replace_run(case, folder) as draft:
+        for result in carry_out(case, draft):
             if isinstance(result, af.cases.Run):
                 result.path.with_name("summary.txt").write_text(f"{change}: {result.motion.name}")
                 result.path.with_name("envelope.png").write_text(change)
@@ -90,14 +91,24 @@ def test_no_reader_takes_a_file_of_another_run(two_runs, capsys):
     assert af.cases.open_results(folder).missing == ()
 
 
+def test_saving_replaces_no_file_of_a_run(two_runs, tmp_path):
+    folder, _ = two_runs
+    path = folder / "first" / "history.nc"
+    before, history = path.read_bytes(), af.History.read(path)
+    with pytest.raises(af.InvalidInput, match="is a result of `archfem run`"):
+        history.save(path)
+    assert path.read_bytes() == before
+    assert af.History.read(history.save(folder / "first" / "copy.nc")).outcome == history.outcome
+
+
 def test_a_run_redoes_what_is_of_another_run(two_runs):
     folder, other = two_runs
     for name in ("first/history.nc", "second/summary.txt"):
         (folder / name).write_bytes((other / name).read_bytes())
     case = af.Case.read(folder / "case.toml")
     found = {}
-    with results.replace_run(case, folder) as draft:
-        for result in af.cases.run_case(case, draft):
+    with replace_run(case, folder) as draft:
+        for result in carry_out(case, draft):
             if isinstance(result, af.cases.Run):
                 found[result.motion.name] = result.reused, results.adopt_files(result)
         assert not (draft / "second" / "summary.txt").exists()
@@ -109,8 +120,8 @@ def test_what_an_earlier_call_finished_is_taken_over(two_runs):
     folder, _ = two_runs
     before = {name: (folder / name).read_bytes() for name in files_below(folder)}
     case = af.Case.read(folder / "case.toml")
-    with results.replace_run(case, folder) as draft:
-        for result in af.cases.run_case(case, draft):
+    with replace_run(case, folder) as draft:
+        for result in carry_out(case, draft):
             if isinstance(result, af.cases.Run):
                 assert results.adopt_files(result)
     for name in ("first/history.nc", "first/summary.txt", "second/envelope.png"):
@@ -122,7 +133,7 @@ def test_a_second_run_in_a_folder_is_refused(two_runs, small, capsys):
     folder, _ = two_runs
     case = af.Case.read(small)
     before = files_below(folder)
-    with results.replace_run(case, folder):
+    with replace_run(case, folder):
         assert af.commands.main(["run", str(small), "--out", str(folder)]) == 1
         assert "another driver runs in" in capsys.readouterr().err
         assert af.cases.open_results(folder).missing == ()  # the earlier run, until the end
@@ -144,7 +155,7 @@ def test_a_run_that_fails_replaces_no_other(earlier, two_runs, small, tmp_path, 
     case = af.Case.read(small)
 
     def run(**histories):
-        with results.replace_run(case, folder) as draft:
+        with replace_run(case, folder) as draft:
             fail_after(draft, **histories)
 
     with pytest.raises(af.DidNotConverge):
@@ -161,19 +172,98 @@ def test_a_run_that_fails_replaces_no_other(earlier, two_runs, small, tmp_path, 
         assert files_below(folder) == {"archfem.json", "case.toml", "first/history.nc"}
 
 
-def test_pairs_of_a_run_that_was_killed_are_used_again_for_the_same_case(two_runs, small):
-    folder, _ = two_runs
-    draft, case = folder / ".unfinished-run", af.Case.read(small)
-    for name in ("first", "other"):
-        (draft / name).mkdir(parents=True)
-        (draft / name / "history.nc").write_text("of the killed run")
+def test_pairs_of_a_run_that_was_killed_are_used_again_for_the_same_case(two_runs):
+    folder, other = two_runs
+    case, draft = af.Case.read(folder / "case.toml"), folder / ".unfinished-run"
+    (draft / "third").mkdir(parents=True)
+    shutil.copytree(folder / "first", draft / "first")  # with a summary, which is written again
+    shutil.copytree(other / "second", draft / "second")
     (draft / "dead.png").touch()
-    (draft / "case.toml").write_text(case.text())
-    results._prepare_draft(case, folder, draft)
-    assert files_below(draft) == {"case.toml", "first/history.nc", "second/history.nc"}
-    assert (draft / "first" / "history.nc").read_text() == "of the killed run"
-    results._prepare_draft(af.Case.read(small, ["suite.scale=3"]), folder, draft)
-    assert (draft / "first" / "history.nc").samefile(folder / "first" / "history.nc")
+    (draft / "third" / "history.nc").write_text("of a pair that the case has no more")
+    own = draft / "first" / "history.nc", draft / "second" / "history.nc"
+    with replace_run(case, folder):
+        assert files_below(draft) == {"case.toml", "first/history.nc", "second/history.nc"}
+        linked = [path.samefile(folder / path.relative_to(draft)) for path in own]
+        assert linked == [False, True]
+    with replace_run(af.Case.read(folder / "case.toml", ["suite.scale=3"]), folder):
+        assert files_below(draft) == {"case.toml"}
+
+
+COLUMN = {
+    "structure": {"shape": "column", "breadth": 1.0, "heights": [1.0]},
+    "model": {"fidelity": "rigid"},
+    "motion": {"synthetic": {"duration": 0.3, "pga": 0.1}},
+}
+
+
+def run_one(folder, scale, **options):
+    """Run one motion in Python."""
+    tables = {**COLUMN, "motion": {**COLUMN["motion"], "scale": scale}}
+    *_, run = af.cases.run_case(af.Case.of(tables), folder, **options)
+    return run
+
+
+def break_off(case, motion, *given):
+    """Integrate a motion as if a step failed."""
+    history = af.cases.run_time_history(case, motion, *given)
+    history.dataset.attrs["ended"] = "failed"
+    raise af.DidNotConverge("no equilibrium", history=history)
+
+
+def test_in_python_too_a_run_replaces_another_as_a_whole(two_runs):
+    """Files of the suite that was there vanish with it; a run that fails replaces none."""
+    folder, _ = two_runs
+    before = {name: (folder / name).read_bytes() for name in files_below(folder)}
+    failed = run_one(folder, 1.0, run_motion=break_off)
+    assert failed.path.is_relative_to(folder / ".unfinished-run")
+    after = {name: (folder / name).read_bytes() for name in before}
+    assert after == before
+    run = run_one(folder, 1.0)
+    assert run.path == folder / "history.nc"
+    # modes.txt is of another command
+    assert files_below(folder) == {"archfem.json", "case.toml", "history.nc", "modes.txt"}
+    opened = af.cases.open_results(folder)
+    assert opened.case.motion["scale"] == 1.0
+    assert list(opened.runs) == ["synthetic 0"]
+
+
+def test_what_is_read_in_python_keeps_its_pictures(two_runs):
+    """Pairs are reused, and one that was swapped is computed anew: then the old pictures go."""
+    folder, other = two_runs
+    before = {name: (folder / name).read_bytes() for name in files_below(folder)}
+    case = af.Case.read(folder / "case.toml")
+    runs = [each for each in af.cases.run_case(case, folder) if isinstance(each, af.cases.Run)]
+    assert [(run.reused, run.path.is_relative_to(folder)) for run in runs] == [(True, True)] * 2
+    assert {name: (folder / name).read_bytes() for name in files_below(folder)} == before
+    path = folder / "first" / "history.nc"
+    path.write_bytes((other / "first" / "history.nc").read_bytes())
+    runs = [each for each in af.cases.run_case(case, folder) if isinstance(each, af.cases.Run)]
+    assert [run.reused for run in runs] == [False, True]
+    assert path.read_bytes() == before["first/history.nc"]
+    assert "suite.txt" not in files_below(folder)
+    assert af.cases.open_results(folder).missing == ()
+
+
+def test_in_python_too_a_folder_has_one_run_at_a_time(tmp_path):
+    first = af.cases.run_case(af.Case.of(COLUMN), tmp_path)
+    next(first)
+    with pytest.raises(af.InvalidInput, match="another driver runs in"):
+        run_one(tmp_path, 1.0)
+    first.close()
+    assert list(tmp_path.iterdir()) == []
+    assert run_one(tmp_path, 1.0).path.is_file()
+
+
+def test_no_pair_of_another_case_stays_among_those_of_a_suite(two_runs):
+    folder, _ = two_runs
+    case = af.Case.read(folder / "case.toml", ["suite.scale=3"])
+    list(af.cases.run_case(case, folder, pairs=["second"]))
+    opened = af.cases.open_results(folder)
+    assert (list(opened.runs), opened.missing) == (["second"], ("first",))
+    reused = [
+        each.reused for each in af.cases.run_case(case, folder) if isinstance(each, af.cases.Run)
+    ]
+    assert reused == [False, True]
 
 
 def test_disks_without_links_get_copies(two_runs, tmp_path, monkeypatch):
@@ -181,7 +271,7 @@ def test_disks_without_links_get_copies(two_runs, tmp_path, monkeypatch):
         raise OSError("no links")
 
     monkeypatch.setattr("os.link", refuse)
-    results._link(two_runs[0] / "suite.txt", tmp_path / "new" / "suite.txt")
+    link_file(two_runs[0] / "suite.txt", tmp_path / "new" / "suite.txt")
     assert (tmp_path / "new" / "suite.txt").read_text() == "suite.scale=1"
 
 

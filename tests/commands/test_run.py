@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 import archfem as af
+from archfem.cases.run import carry_out
 from archfem.commands.run import print_results
 from archfem.units import STANDARD_GRAVITY
 
@@ -129,7 +130,7 @@ def test_one_line_runs_all_and_the_same_line_keeps_what_is_finished(small, undra
 def told(small, shake):
     """Carry out a case with something else than `shaken`, as `archfem run` does."""
     case, out = af.Case.read(small), small.parent / "out"
-    print_results(case, af.cases.run_case(case, out, run_motion=shake), out)
+    print_results(case, carry_out(case, out, run_motion=shake), out)
 
 
 @pytest.mark.slow

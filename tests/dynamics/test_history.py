@@ -67,6 +67,21 @@ def test_file_and_back(run, tmp_path):
     assert [each.name for each in path.parent.iterdir()] == ["run.nc"]
 
 
+def test_coordinates_of_another_meaning_are_not_read(run, tmp_path, caplog):
+    """Elastic blocks with large displacements had other coordinates in earlier versions."""
+    elastic = run.dataset.assign_attrs(displacements="large", fidelity="faces")
+    path = History(elastic).save(tmp_path / "run.nc")
+    assert af.dynamics.last_state(History.read(path)).q.shape == run.dataset["last_q"].shape
+    assert not caplog.text
+    del elastic.attrs["coordinates_version"]
+    old = History.read(History(elastic).save(path))
+    assert "coordinates of an earlier version" in caplog.text
+    with pytest.raises(af.InvalidInput, match="does not hold the state"):
+        af.dynamics.last_state(old)
+    assert "q" not in old.dataset
+    assert old.joints["N"].equals(History.read(run.save(path)).joints["N"])
+
+
 def test_what_is_kept_over_time_and_joint_is_packed(run, tmp_path):
     with xr.open_dataset(run.save(tmp_path / "run.nc")) as plain:
         assert plain["N"].ndim == 2

@@ -1,14 +1,57 @@
 """What is recorded of a run, and how often."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
 import archfem as af
 from archfem.dynamics.monitor import RunMonitor
-from archfem.dynamics.recorder import Recorder
+from archfem.dynamics.recorder import GrowingArray, Recorder
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 MOTION = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3)
+
+
+def test_batches_of_any_length_follow_one_another():
+    rows, whole = np.arange(60.0).reshape(20, 3), GrowingArray()
+    for start, end in ((0, 1), (1, 2), (2, 9), (9, 9), (9, 20)):
+        whole.add(rows[start:end])
+        assert np.array_equal(whole.rows, rows[:end])
+
+
+MEMORY = """
+import resource, sys
+import archfem as af
+from archfem import _petsc  # as in a run whose modes are computed
+
+ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+model = af.build(ring, fidelity="rigid", displacements="large")
+motion = af.Motion.synthetic(duration=float(sys.argv[1]), pga=3.0, seed=3)
+run = af.time_history(model, motion, dt=0.002, damping=af.StiffnessDamping(0.05, 8.0))
+run.save(sys.argv[2])
+structure, size = run.structure, run.joints["N"].size
+del run
+str(af.History.read(sys.argv[2], structure).verdict)
+print(size, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.mark.slow
+def test_a_long_run_needs_little_more_memory_than_its_record(tmp_path):
+    """A joint and step has 8 numbers of 8 bytes: 64 bytes, and 25 in the file while it is written.
+
+    The bound leaves room for temporaries; with copies of the record it was 240.
+    """
+    measured = []
+    for duration in (10.0, 200.0):
+        command = [sys.executable, "-c", MEMORY, str(duration), str(tmp_path / "run.nc")]
+        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        measured.append([int(word) for word in text.split()])
+    (size, peak), (long_size, long_peak) = measured
+    assert long_size - size == 95_000 * 18
+    assert 1024 * (long_peak - peak) / (long_size - size) < 140
 
 
 def test_what_is_recorded(run, model, motion):

@@ -1,12 +1,15 @@
 """Random structures under random motions, displacements small and large."""
 
 import runpy
+import sys
 from pathlib import Path
 
 from fuzz.trial import ANSWERED, FOREIGN, NONSENSE, REFUSED, Came
 
 SCRIPT = Path(__file__).parents[1] / "benchmarks" / "random_structures.py"
+sys.path.insert(0, str(SCRIPT.parent))  # for the modules beside it
 tried = runpy.run_path(str(SCRIPT))["tried"]
+sys.path.remove(str(SCRIPT.parent))
 
 
 def ready() -> None:

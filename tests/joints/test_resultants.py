@@ -58,3 +58,19 @@ def test_faces_that_slid_are_judged_by_what_still_lies_on_the_other(ring):
     assert moved[:2] == pytest.approx([0.055 / 0.44, 0.055 / 0.275])
     assert np.isnan(moved[2])
     assert moved[3:] == pytest.approx(0.1)
+
+
+def test_variables_of_a_long_record_are_those_of_its_steps(ring):
+    """Eccentricity, friction, opening and flags are derived 8192 steps at a time."""
+    rng, steps = np.random.default_rng(1), (0, 8191, 8192, 9999)
+    resultants = rng.normal(size=(10_000, 18, 3)) * (1e4, 6e3, 2e3)
+    faces = 1e-3 * rng.normal(size=(10_000, 3, 18))
+    given = {"moved": True, "time": np.arange(10_000.0)}
+    whole = af.joints.joint_dataset(ring, resultants, faces=faces, **given)
+    assert whole["hinge"].dtype == np.int8
+    for step in steps:
+        alone = af.joints.joint_dataset(ring, resultants[step], faces=faces[step], moved=True)
+        assert whole.isel(time=step, drop=True).identical(alone)
+    assert {0, 1, -1} == set(np.unique(whole["hinge"]))
+    assert whole["open"].any()
+    assert whole["slide"].any()

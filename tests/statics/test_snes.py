@@ -1,5 +1,8 @@
-"""Why PETSc's solver ended, in our words."""
+"""Why PETSc's solver ended, in our words; and what loading PETSc changes."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 PETSc = pytest.importorskip("petsc4py.PETSc")
@@ -17,3 +20,16 @@ def test_reasons_are_those_of_petsc():
         known.DIVERGED_MAX_IT: "too many iterations",
         known.DIVERGED_LINE_SEARCH: "the line search found no way down",
     } == _FAILURE_MESSAGES
+
+
+def test_memory_that_is_freed_goes_back_to_the_system():
+    """MPI, which PETSc loads, lets the process keep it: RSS stayed at its largest value."""
+
+    def resident():
+        return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+
+    before = resident()
+    values = np.ones(10_000_000)
+    assert resident() > before + 70e6
+    del values
+    assert resident() < before + 10e6

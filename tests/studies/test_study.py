@@ -5,7 +5,7 @@ import json
 import os
 import re
 import subprocess
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -24,6 +24,7 @@ from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import group_by_model
 from archfem.studies.process_pool import TaskQueue
 from archfem.studies.result_store import Store
+from archfem.studies.shared_results import compute_once, share_results
 
 
 @pytest.fixture
@@ -171,6 +172,48 @@ def test_rows_that_were_changed_are_computed_again(what, study_file, tmp_path, c
     assert "1 of the stored points" in caplog.text
     assert again.identical(first)
     assert json.loads(row.read_text()) == content
+
+
+@pytest.mark.slow
+def test_no_file_of_a_study_stands_for_another(study_file, tmp_path):
+    """Each is replaced by that of another study, and by others of its own: refused or redone."""
+    folder, other = tmp_path / "a", tmp_path / "b"
+    command = ["study", str(study_file), "--own-code", "--workers", "1", "--out"]
+    assert af.commands.main([*command, str(folder)]) == 0
+    assert af.commands.main([*command, str(other), "--set", "structure.voussoirs=11"]) == 0
+    whole, others = (
+        {path: path.read_bytes() for path in sorted(each.rglob("*")) if path.is_file()}
+        for each in (folder, other)
+    )
+    kinds = {path.name if path.parent == folder else path.parts[-3]: path for path in whole}
+    kinds = {kind: kinds[kind] for kind in ("archfem.json", "points", "results.nc")}
+    counterparts = dict(zip(whole, others.items(), strict=True))
+    swaps = 0
+    for path, before in whole.items():
+        for content in {counterparts[path][1], *(whole[source] for source in kinds.values())}:
+            if content == before or path.name == "progress.json":
+                continue
+            path.write_bytes(content)
+            swaps += 1
+            with suppress(af.ArchfemError):
+                af.studies.status(folder)
+            if path.name in ("results.nc", "archfem.json"):
+                with pytest.raises(af.InvalidInput, match=r"not the file|no list|damaged"):
+                    af.studies.read_table(folder / "results.nc")
+            assert af.commands.main([*command, str(folder)]) == 0
+            for each in {*whole} - {folder / "progress.json"}:
+                assert each.read_bytes() == whole[each], (path, each)
+    assert swaps > 50
+
+
+def test_a_shared_result_of_another_key_is_computed_again(tmp_path):
+    with share_results(tmp_path / "shared"):
+        assert [compute_once("runs", key, key.upper) for key in "ab"] == ["A", "B"]
+        first, second = (tmp_path / "shared" / "runs").iterdir()
+        second.write_bytes(first.read_bytes())
+        again = [compute_once("runs", key, lambda: "again") for key in "ab"]
+        assert sorted(again) in (["A", "again"], ["B", "again"])
+        assert [compute_once("runs", key, lambda: "third") for key in "ab"] == again
 
 
 def test_a_table_of_another_study_is_refused(study_file, tmp_path):

@@ -11,13 +11,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem._files import atomic_write
+from archfem._files import atomic_write, temporary_folder
 from archfem._optional import require_package
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, MeshError
@@ -99,9 +98,9 @@ def read_mesh(structure: Structure, path: str | Path) -> Mesh:
             f"{path} does not begin with {header.decode()}: gmsh would run it as a script, shell "
             "commands included; give a mesh as gmsh saves it"
         )
-    with _gmsh_model(structure.name), TemporaryDirectory() as folder:
+    with _gmsh_model(structure.name), temporary_folder() as folder:
         # a folder without options beside the mesh, which gmsh would run too
-        copy = Path(folder) / "mesh.msh"
+        copy = folder / "mesh.msh"
         copy.write_bytes(content)
         try:
             gmsh.merge(str(copy))

@@ -9,7 +9,6 @@ from pathlib import Path
 from re import sub
 from shutil import which
 from subprocess import run
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import matplotlib
@@ -17,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from archfem._files import atomic_write
+from archfem._files import atomic_write, temporary_folder
 from archfem._optional import missing_package_message
 from archfem.errors import InvalidInput, NotInstalled
 from archfem.view.style import disable_math
@@ -120,7 +119,7 @@ def print_page(page: Path, target: Path) -> Path:
     )
     if browser is None:
         raise NotInstalled(missing_package_message("Chromium", "it is not on the PATH"))
-    with atomic_write(target) as draft, TemporaryDirectory() as profile:
+    with atomic_write(target) as draft, temporary_folder() as profile:
         # the page is our own and loads no other file; Chromium's sandbox refuses to run for root
         command = [browser, "--headless=new", "--no-sandbox", "--disable-gpu"]
         command += ["--disable-dev-shm-usage", f"--user-data-dir={profile}"]
