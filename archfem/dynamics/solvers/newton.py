@@ -12,7 +12,6 @@ solve for Δq, with f̄ the mean force of the joints over the step (`joints.larg
     (2 M/Δt² + C/Δt + (½ + β/Δt) K) Δq - 2 M v/Δt + K q + f̄(q, q + Δq) = p - M r a_g.
 """
 
-from copy import deepcopy
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -29,7 +28,13 @@ from archfem.dynamics.solvers.band_lu import (
     narrow_order,
     solve_band,
 )
-from archfem.dynamics.solvers.base import evaluate_step, is_system, solve_step, start_run
+from archfem.dynamics.solvers.base import (
+    StepSolver,
+    evaluate_step,
+    is_system,
+    solve_step,
+    start_run,
+)
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.joint_law import (
     add_derivatives,
@@ -41,6 +46,7 @@ from archfem.dynamics.solvers.joint_law import (
 from archfem.dynamics.solvers.linear_step import (
     LinearStepWorkspace,
     LinearSystem,
+    constant_parts,
     effective_matrix,
     evaluate_released,
     find_tangent_blocks,
@@ -150,13 +156,13 @@ def newton_driver(evaluate_residual: Any, find_correction: Any, search_line: Any
     return newton_solve
 
 
-class NewtonSolver:
+class NewtonSolver(StepSolver):
     """Steps by Newton's method on all coordinates."""
 
     name: ClassVar[str] = "newton"
 
     def __init__(self, equation: Equation, max_half_width: int = 40) -> None:
-        self._equation = equation
+        self._equation, self.assembled = equation, {}
         pattern = tangent_pattern(equation)
         self.order, self.half_width = narrow_order(pattern)
         # a band is factorised faster than the joint law is evaluated, a sparse tangent is not
@@ -171,14 +177,19 @@ class NewtonSolver:
         large = equation.model.large_displacements and equation.conserving
         return cls(equation) if large or equation.joints is not None else None
 
-    def system(self, dt: float) -> "SmallSystem | LargeSystem":
+    def assemble(self, dt: float) -> "SmallSystem | LargeSystem":
         """Return the data of steps of one length [s]."""
         large = self._equation.model.large_displacements
         return self._large_system(dt) if large else self._small_system(dt)
 
-    def copy_system(self, system: Any) -> Any:
-        """Return a copy for another run."""
-        return deepcopy(system)
+    def constants(self, system: "SmallSystem | LargeSystem") -> tuple[Any, ...]:
+        """Return the parts of the data that no step changes."""
+        tangent, changing = system.tangent, ("entries", "image", "pivots")
+        parts = [getattr(tangent, name) for name in tangent._fields if name not in changing]
+        if isinstance(system, SmallSystem):
+            return (*parts, *constant_parts(system.linear), system.begin, system.places)
+        matrices = system.mass, system.blocks, system.viscous, system.effective
+        return (*parts, *matrices, system.joints, system.places, system.weight, system.body)
 
     def _store_tangent(self, matrix: sparse.csr_matrix, rows: Any, columns: Any) -> tuple[Any, Any]:
         """Store a matrix for factorisation; returns also where its entries (row, column) are."""

@@ -99,7 +99,7 @@ class LargeDisplacementModel(Model):
 
     def with_memory(self, memory: Array) -> Self:
         """Return the model with another joint memory."""
-        return self.copy_with(_slip=np.ascontiguousarray(memory, float))
+        return self.copy_with(_slip=np.ascontiguousarray(memory, float), _derived=self.derived)
 
     def updated_memory(self, q: Array) -> Array:
         """Return the irreversible slip of each joint point once the model is at q (p,) [m]."""
