@@ -152,7 +152,7 @@ class LargeDisplacementModel(Model):
     ) -> sparse.csr_matrix:
         """Return block stiffness and joint tangent, each times a factor (n, n)."""
         sides = self.joints.kinematics
-        assemble_rates(sides, forces, np.empty((2, 2, 4, sides.shapes.shape[3])))
+        assemble_rates(sides, forces, np.empty((2, 3, 5, sides.shapes.shape[3])))
         of_joints = np.bincount(self._entries, forces.rate, len(self._pattern.indices))
         of_blocks = block_factor * self.block_stiffness.data
         return self._pattern.with_data(of_blocks + joint_factor * of_joints)
