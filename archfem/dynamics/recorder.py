@@ -178,7 +178,7 @@ class Recorder:
             coordinates["frame_time"] = "frame", times, {"units": "s"}
             variables["q"] = ("frame", "coordinate"), fields
             corners = corner_displacements(self.model, fields)
-            coordinates |= dict(corners.coords.variables)
+            coordinates |= {str(name): each for name, each in corners.coords.variables.items()}
             variables["displacement"] = corners["displacement"].variable
         for name in ("q", "velocity", "acceleration"):
             variables[f"last_{name}"] = "coordinate", getattr(self.state, name)
