@@ -331,9 +331,14 @@ class MeetingMonitor:
     @cached_property
     def _gaps(self) -> Array:
         """Gaps at the start of blocks and the ground; infinite with fill (b + 1, b + 1) [m]."""
-        gaps = measure_gaps(self._bodies, self._world, self._fit_motions(self._corners[None])[0])
-        fill = list(find_yielding_blocks(self.model.structure))
-        gaps[fill] = gaps[:, fill] = np.inf
+        derived, start = self.model.derived, self.start.q.tobytes()
+        if derived.get("gaps", (b"",))[0] != start:
+            motions = self._fit_motions(self._corners[None])[0]
+            gaps = measure_gaps(self._bodies, self._world, motions)
+            fill = list(find_yielding_blocks(self.model.structure))
+            gaps[fill] = gaps[:, fill] = np.inf
+            derived["gaps"] = start, gaps
+        gaps = derived["gaps"][1]
         return gaps
 
     @cached_property

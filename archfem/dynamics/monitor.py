@@ -192,10 +192,11 @@ class RunMonitor:
                 met = self._meeting.find_first(replace(batch, readings=readings))
                 # time of the first meeting of stones outside their joints
                 self._met = None if met is None else (float(batch.times[met[0]]), met[1])
-        # facets cost a sparse product, hence not at every step
-        for k in range(-self._steps % facet_check_interval, len(batch.times), facet_check_interval):
-            slip = self.model.face_mismatch(batch.state(k).q)
-            self._mismatch = max(self._mismatch, slip)
+        else:  # small displacements keep facets paired; these cost a product, hence not every step
+            first = -self._steps % facet_check_interval
+            for k in range(first, len(batch.times), facet_check_interval):
+                slip = self.model.face_mismatch(batch.state(k).q)
+                self._mismatch = max(self._mismatch, slip)
         self._steps += len(batch.times)
         self._before, self._last = self._last, batch.state(len(batch.times) - 1)
         return drift

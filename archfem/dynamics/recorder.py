@@ -125,10 +125,12 @@ class Recorder:
             effort_attributes.items(), self._effort(len(resultants)), strict=True
         ):
             variables[name] = "time", values, attrs
-        dataset = dataset.assign_coords(
-            block=[block.name for block in structure.blocks], axis=["x", "y"]
-        ).assign(variables)
-        dataset = self._with_coordinates(dataset)
+        coordinates: dict[str, Any] = {
+            "block": [block.name for block in structure.blocks],
+            "axis": ["x", "y"],
+        }
+        self._add_coordinates(variables, coordinates)
+        dataset = dataset.assign_coords(coordinates).assign(variables)
         dataset.attrs |= self._attributes(motion, ending, outcome)
         history = History(dataset, structure)
         return history.with_doubts((*self.monitor.doubts, *self._doubt_mass_damping(dataset)))
@@ -150,8 +152,7 @@ class Recorder:
     def _doubt_mass_damping(self, dataset: xr.Dataset) -> list[Doubt]:
         """Return a doubt where joints opened and damping drags loose blocks."""
         share = self.monitor.mass_damping_share
-        opens = bool((dataset["open"] | (dataset["hinge"] != 0)).any())
-        if not share or not opens:
+        if not share or not (dataset["open"].values.any() or dataset["hinge"].values.any()):
             return []
         cause = (
             "damping has a part proportional to mass, which also drags loose blocks, and joints "
@@ -201,21 +202,20 @@ class Recorder:
             self._recorded("drift")[ends],
         )
 
-    def _with_coordinates(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Return the dataset with the recorded coordinates and the state at the end."""
+    def _add_coordinates(self, variables: dict[str, Any], coordinates: dict[str, Any]) -> None:
+        """Add the recorded coordinates of the model and the state at the end to variables."""
         if "fields" in self._rows:
             fields = self._recorded("fields")
             times = self._recorded("frames")[: len(fields)]
-            dataset.coords["frame_time"] = "frame", times, {"units": "s"}
-            dataset["q"] = ("frame", "coordinate"), fields
-            dataset.update(corner_displacements(self.model, fields))
-        last: dict[str, Any] = {
-            f"last_{name}": ("coordinate", getattr(self.state, name))
-            for name in ("q", "velocity", "acceleration")
-        }
+            coordinates["frame_time"] = "frame", times, {"units": "s"}
+            variables["q"] = ("frame", "coordinate"), fields
+            corners = corner_displacements(self.model, fields)
+            coordinates |= {str(name): each for name, each in corners.coords.variables.items()}
+            variables["displacement"] = corners["displacement"].variable
+        for name in ("q", "velocity", "acceleration"):
+            variables[f"last_{name}"] = "coordinate", getattr(self.state, name)
         if self.state.memory is not None:
-            last["last_memory"] = "point", self.state.memory
-        return dataset.assign(last)
+            variables["last_memory"] = "point", self.state.memory
 
 
 @cache

@@ -22,7 +22,7 @@ class PartialStructure(LinearBlockModel):
     """
 
     def __init__(self, whole: LinearBlockModel) -> None:
-        vars(self).update(vars(whole))
+        vars(self).update(whole.__getstate__())
         self.whole = whole  # model of all blocks, built at once
         # which blocks stand, fixed ones among them, and which are held by centring (n_blocks,)
         self.standing: Flags = np.array([block.fixed for block in whole.structure.blocks])

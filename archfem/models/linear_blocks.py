@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Self
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +83,8 @@ class LinearBlockModel(Model):
 
     def with_memory(self, memory: Array) -> Self:
         """Return the model with another joint memory."""
-        return self.copy_with(operator=self.operator.with_memory(memory))
+        operator = self.operator.with_memory(memory)
+        return self.copy_with(operator=operator, _derived=self.derived)
 
     def updated_memory(self, q: Array) -> Array:
         """Return the joint memory once the model is at q, as `memory`."""
@@ -221,9 +221,6 @@ def _rigid_cells(structure: Structure) -> Cells:
     )
 
 
-_observers: WeakKeyDictionary[Model, "LinearObserver"] = WeakKeyDictionary()
-
-
 @dataclass(frozen=True, eq=False)
 class LinearObserver(Observer):
     """Observer of a model of small displacements."""
@@ -278,9 +275,10 @@ class LinearObserver(Observer):
 
 def linear_observer(model: Model, operator: JointOperator) -> LinearObserver:
     """Return the observer of a model of small displacements, built once for each model."""
-    if model not in _observers:
-        _observers[model] = _build_observer(model, operator)
-    return _observers[model]
+    if "observer" not in model.derived:
+        model.derived["observer"] = _build_observer(model, operator)
+    observer: LinearObserver = model.derived["observer"]
+    return observer
 
 
 def _build_observer(model: Model, operator: JointOperator) -> LinearObserver:

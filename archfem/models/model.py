@@ -394,6 +394,19 @@ class Model(Protocol):
         """
         return self.copy_with(prediction=prediction)
 
+    @property
+    def derived(self) -> dict[str, Any]:
+        """Results by name that depend on the model but for the memory of its joints.
+
+        Copies with another memory share them, and no others do.
+        """
+        results: dict[str, Any] = vars(self).setdefault("_derived", {})
+        return results
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the attributes of a copy, to which what was derived may not apply."""
+        return {name: value for name, value in vars(self).items() if name != "_derived"}
+
     def copy_with(self, **attributes: Any) -> Self:
         """Return a copy with other attributes; arrays and matrices are shared."""
         other = copy(self)

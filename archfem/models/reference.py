@@ -196,7 +196,7 @@ class MonolithicModel(Model):
 
     def with_memory(self, memory: Array) -> Self:
         """Return the model with another joint memory."""
-        return self.copy_with(_memory=memory)
+        return self.copy_with(_memory=memory, _derived=self.derived)
 
     def updated_memory(self, q: Array) -> Array:
         """Return the irreversible slip of each joint point once the model is at q (p,) [m]."""

@@ -78,8 +78,9 @@ class Equilibrium(ResultDisplay):
                 f"the state is of another structure, '{self.model.structure.name}', whose blocks "
                 f"are elsewhere than those of '{model.structure.name}': give the same model's"
             )
-        if self.model.initial_gaps is not None:
-            model = model.with_initial_gaps(self.model.initial_gaps)
+        gaps = self.model.initial_gaps
+        if gaps is not None and gaps is not model.initial_gaps:
+            model = model.with_initial_gaps(gaps)
         return model.with_memory(self.model.memory)
 
     @cached_property

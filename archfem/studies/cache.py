@@ -1,4 +1,4 @@
-"""Cache of one process between points of a study: models, damping, modes, steppers, motions.
+"""Cache of one process between points of a study: models, damping, modes, motions.
 
 The points of a study often differ in few keys. Everything that a later point shares with an earlier
 one, by the contents of its case and files, is taken from here, and has the same bits as if it were
@@ -17,17 +17,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from archfem._numba import source_digest
-from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_sections
 from archfem.cases.run import DeadLoadResult, damping_of, dead_load_of_case
-from archfem.dynamics.schemes import Conserving
-from archfem.dynamics.solvers.base import StepSolver
-from archfem.dynamics.solvers.equation import Equation
-from archfem.dynamics.solvers.integrator import Stepper
-from archfem.dynamics.solvers.selection import select_solver
-from archfem.dynamics.state import State
 from archfem.dynamics.warm_up import compile_variant
 from archfem.errors import InvalidInput
 from archfem.motion.motion import Motion
@@ -40,37 +33,6 @@ from archfem.studies.shared_results import compute_once
 Value = TypeVar("Value")
 
 _cache: dict[str, OrderedDict[str, Any]] = {}
-
-
-class SharedStepper(Stepper):
-    """Stepper with copies of the matrices that are assembled once for all runs of a model.
-
-    A run changes its matrices, for instance by the compliance rows that it computes. Copies of the
-    matrices as they were assembled make each run independent of earlier runs.
-    """
-
-    def __init__(
-        self, equation: Equation, solver: StepSolver | None, shared_systems: dict[float, Any]
-    ) -> None:
-        super().__init__(equation, solver)
-        self._shared_systems = shared_systems  # by time step
-
-    def under(self, motion: Motion) -> "SharedStepper":
-        """Return a new stepper for a run under another motion."""
-        equation = replace(self.equation, motion=motion)
-        return SharedStepper(equation, self.solver, self._shared_systems)
-
-    def allocate_batch(self, state: State, dt: float, times: Array) -> tuple[Any, ...]:
-        """Return the arguments of `base.advance`, with copies of the shared matrices."""
-        shared = self._shared_systems
-        if dt not in self._systems:
-            assert self.solver is not None
-            if dt not in shared:
-                shared[dt] = self.solver.system(dt)
-                while len(shared) > 8:  # as many time steps as an adaptive run uses
-                    del shared[next(iter(shared))]
-            self._systems[dt] = self.solver.copy_system(shared[dt])
-        return super().allocate_batch(state, dt, times)
 
 
 @cache
@@ -167,18 +129,6 @@ def _match_once(case: Case, key: str) -> Suite:
     # numbers in JSON have all digits: the motions have the same bits as those that were matched
     pairs = [Motion(**pair) for pair in compute_once("motions", key, match)]
     return Suite(case.suite.get("name", "suite"), tuple(pairs))
-
-
-def stepper_of(result: DeadLoadResult, motion: Motion) -> Stepper:
-    """Return a new stepper for a run from the dead load."""
-    dead, damping, scheme = result.dead, result.damping[0], result.case.scheme or Conserving()
-
-    def make() -> SharedStepper:
-        equation = Equation(dead.transfer_memory(dead.model), motion, damping, scheme)
-        return SharedStepper(equation, select_solver(equation), {})
-
-    key = f"{_model_key(result.case)} {damping!r} {scheme!r}"
-    return _look_up("steppers", key, make).under(motion)
 
 
 def _model_key(case: Case) -> str:

@@ -4,7 +4,6 @@ import hashlib
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ from archfem.joints.criteria import assessed_joints, part_roles
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import suggest_name
 from archfem.motion.motion import Motion
-from archfem.studies.cache import dead_load_of, first_mode, ground_motion, ground_suite, stepper_of
+from archfem.studies.cache import dead_load_of, first_mode, ground_motion, ground_suite
 from archfem.studies.parameter_space import Point
 
 # A flat table: numbers, texts and rows of numbers by name
@@ -66,8 +65,7 @@ def run_motion(result: DeadLoadResult, motion: Motion) -> History:
         DidNotConverge: a step failed.
         KeyboardInterrupt: on Ctrl-C.
     """
-    stepper = stepper_of(result, motion)
-    run = run_time_history(result.case, motion, result.dead, result.damping[0], method=stepper)
+    run = run_time_history(result.case, motion, result.dead, result.damping[0])
     if run.ending is Ending.INTERRUPTED:
         raise KeyboardInterrupt
     return run
@@ -132,7 +130,6 @@ def scales_of(result: DeadLoadResult, motion: Motion, **options: Any) -> Finding
             damping=result.damping[0],
             dt=result.case.analysis.get("dt"),
             criteria=result.case.criteria,
-            method=partial(stepper_of, result),
             **options,
         )
     if scales.interrupted:

@@ -21,7 +21,7 @@ from setting import plain_options, print_left_out, quick_motion
 from timing import table
 
 import archfem as af
-from archfem import build
+from archfem.models.builder import build
 from archfem.motion import GROUND_MOTION_MODELS, peak_ground_acceleration
 from archfem.units import STANDARD_GRAVITY, mm
 

@@ -26,12 +26,12 @@ from setting import plain_options, quick_motion
 from timing import table
 
 import archfem as af
-from archfem import build
 from archfem.dynamics import History
 from archfem.joints import assessed_joints
 from archfem.joints.criteria import find_failed_joints
 from archfem.limit import Mechanism, episode
 from archfem.limit.mechanism_count import duration_text
+from archfem.models.builder import build
 from archfem.units import mm
 
 DT = 0.005

@@ -19,7 +19,6 @@ from setting import plain_options
 from timing import table
 
 import archfem as af
-from archfem import build as build_model
 from archfem.dynamics.accuracy import time_run
 from archfem.dynamics.error_estimation import (
     default_damping,
@@ -28,6 +27,7 @@ from archfem.dynamics.error_estimation import (
 )
 from archfem.dynamics.model_selection import TRIED_SETTINGS, exact_discretisation
 from archfem.masonry.stiffness_ratio import find_soft_blocks
+from archfem.models.builder import build as build_model
 from archfem.models.fem.mesh import _recent_meshes
 
 FINEST_STEP = 0.000625

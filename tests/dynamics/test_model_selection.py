@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem import build as plain
 from archfem.dynamics import model_selection
 from archfem.dynamics.error_estimation import RunPeaks
 from archfem.dynamics.model_selection import discretisation_label, exact_discretisation
+from archfem.models.builder import build as plain
 
 BLOCK = af.column(breadth=1.0, heights=[1.0])
 MOTION = af.Motion(np.append(np.ones(401), np.zeros(1600)), 0.01)

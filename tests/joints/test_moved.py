@@ -131,7 +131,7 @@ def gathered(joints, before, after, late, slid):
         for side in range(2):
             own = index[joint, side, : sizes[joint, side]]
             force[own] += found.force[joint, side, : len(own)]
-    assemble_rates(joints.kinematics, found, np.empty((2, 2, 4, joints.kinematics.shapes.shape[3])))
+    assemble_rates(joints.kinematics, found, np.empty((2, 3, 5, joints.kinematics.shapes.shape[3])))
     np.add.at(rate, tuple(find_rate_pairs(joints.kinematics)), found.rate)
     return force, rate, found
 
@@ -230,6 +230,6 @@ def test_what_has_turned_round_is_to_hold_as_if_nothing_slid(shapes, fill, facet
     assert sliding.force + sliding.missing_force == pytest.approx(holding.force, abs=1e-12 * scale)
     for each in (sliding, holding):
         assemble_rates(
-            joints.kinematics, each, np.empty((2, 2, 4, joints.kinematics.shapes.shape[3]))
+            joints.kinematics, each, np.empty((2, 3, 5, joints.kinematics.shapes.shape[3]))
         )
     assert sliding.rate == pytest.approx(holding.rate, abs=1e-12 * abs(holding.rate).max())

@@ -1,8 +1,7 @@
 """What a worker keeps between points answers nothing else, and saves what it may."""
 
-from copy import deepcopy
+from copy import copy, deepcopy
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +10,10 @@ import pytest
 import archfem as af
 from archfem.cases.provenance import hash_inputs
 from archfem.cases.structure_keys import cached_structure
-from archfem.dynamics import Equation, StiffnessDamping, mechanism_scales
+from archfem.dynamics import StiffnessDamping
 from archfem.dynamics.solvers import base
-from archfem.dynamics.solvers.selection import select_solver
 from archfem.models import Discretisation
 from archfem.studies import cache
-from archfem.studies.cache import SharedStepper
 from archfem.studies.parameter_space import Point
 
 DT = 0.005
@@ -51,34 +48,34 @@ def same(first, second):
     )
 
 
-def test_a_stepper_of_shared_matrices_gives_the_run_of_one_of_its_own_whatever_ran_before(rest):
-    dead, damping = rest.dead, StiffnessDamping(0.05, 9.0)
-    weak, strong = (af.Motion.synthetic(duration=1.5, pga=pga, seed=2) for pga in (2.0, 7.0))
-    equation = Equation(dead.transfer_memory(dead.model), weak, damping)
+@pytest.mark.parametrize("method", ["newton", "compliance"])
+@pytest.mark.parametrize("displacements", ["small", "large"])
+def test_runs_of_one_model_are_those_of_new_models_whatever_ran_before(displacements, method):
+    """Runs share the matrices of their solver, and each has its own state: bit for bit."""
+    if (displacements, method) == ("large", "compliance"):
+        pytest.skip("for small displacements")
+    damping = StiffnessDamping(0.05, 9.0)
+    motions = [af.Motion.synthetic(duration=1.0, pga=pga, seed=2) for pga in (2.0, 7.0)]
+    structure = case().structure
 
-    def run(motion, method):
-        return af.time_history(
-            dead.model, motion, dt=DT, start=dead, damping=damping, method=method
-        )
+    def run(model, number, damping=damping):
+        return af.time_history(model, motions[number], dt=DT, damping=damping, method=method)
 
-    alone = [run(motion, "auto") for motion in (weak, strong)]
-    compiled = len(base.advance.signatures)
-    ready = SharedStepper(equation, select_solver(equation), {})
-    for order in ((0, 1), (1, 0), (1, 1)):
-        for number in order:
-            found = run((weak, strong)[number], ready.under((weak, strong)[number]))
-            assert same(found, alone[number])
+    def build():
+        return af.build(structure, fidelity="rigid", displacements=displacements)
+
+    alone = [run(build(), number) for number in (0, 1)]
+    compiled, model = len(base.advance.signatures), build()
+    for number in (0, 1, 0, 1, 1):
+        assert same(run(model, number), alone[number])
     assert not same(*alone)
     assert len(base.advance.signatures) == compiled  # copies are of the types of what was made
-
-
-def test_a_search_by_shared_matrices_finds_what_one_by_fresh_ones_does(rest):
-    motion = af.Motion.synthetic(duration=1.5, pga=3.0, seed=2)
-    given = {"start": rest.dead, "damping": rest.damping[0], "dt": DT, "precision": 0.3}
-    given["between"] = (0.5, 2.0)
-    alone = mechanism_scales(rest.dead.model, motion, **given)
-    shared = partial(cache.stepper_of, rest)
-    assert mechanism_scales(rest.dead.model, motion, method=shared, **given).runs == alone.runs
+    # another damping, and a copy that was changed, have matrices of their own
+    assert not same(run(model, 0, StiffnessDamping(0.1, 9.0)), alone[0])
+    heavier = copy(model)
+    heavier.mass = 2.0 * model.mass
+    assert not same(run(heavier, 0), alone[0])
+    assert same(run(model, 0), alone[0])
 
 
 def test_motions_are_read_once_at_any_scale_and_scaled_as_by_the_case(monkeypatch):

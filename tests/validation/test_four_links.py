@@ -13,8 +13,8 @@ import pytest
 from scipy.optimize import newton
 
 import archfem as af
-from archfem import build
 from archfem.models import Discretisation
+from archfem.models.builder import build
 
 
 def arch(normal):

@@ -7,10 +7,10 @@ import pytest
 from glued import glued
 
 import archfem as af
-from archfem import build as plain
 from archfem.dynamics.accuracy import Setting
 from archfem.dynamics.error_estimation import default_damping, largest_difference, run_peaks
 from archfem.dynamics.model_selection import TRIED_SETTINGS, exact_discretisation, select_model
+from archfem.models.builder import build as plain
 from archfem.models.linear_blocks import build_rigid_model
 
 STIFF = af.Contact(1.48e10, 0.3e10)

@@ -6,8 +6,9 @@ itself has no matrices and no joints, so that only the code of the solver at han
 makes no arrays: a system contains its workspace.
 """
 
+from copy import deepcopy
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Protocol, Self
+from typing import Any, ClassVar, Protocol, Self
 
 from numpy.typing import NDArray
 
@@ -16,6 +17,9 @@ from archfem.dynamics.solvers.equation import Equation
 
 # Iterations over the joints in a step before it is given up
 MAX_ITERATIONS = 40
+
+# Lengths of step whose matrices a solver stores: as many as an adaptive run uses
+MAX_STORED_STEPS = 8
 
 
 class StepSolver(Protocol):
@@ -28,16 +32,32 @@ class StepSolver(Protocol):
 
     name: ClassVar[str]  # value of `method=` that selects it
     order: NDArray[Any]  # coordinates of the model in the order of the solver's vectors (n,)
+    assembled: dict[float, Any]  # systems of which no step has been taken, by length of step [s]
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
         """Return the solver for an equation of motion, or None where it does not apply."""
 
-    def system(self, dt: float) -> NamedTuple:
+    def assemble(self, dt: float) -> Any:
         """Return the data of steps of one length [s] for the compiled loop."""
 
-    def copy_system(self, system: Any) -> Any:
-        """Return a copy of the data for another run, of which no step has been taken."""
+    def constants(self, system: Any) -> tuple[Any, ...]:
+        """Return the parts of the data that no step changes."""
+
+    def empty_parts(self, system: Any) -> dict[int, Any]:
+        """Return new parts for a copy, by identity of those that are too large to be copied."""
+        return {}
+
+    def system(self, dt: float) -> Any:
+        """Return the data for one run, whose steps change neither later runs nor their bits."""
+        stored = self.assembled
+        if dt not in stored:
+            stored[dt] = self.assemble(dt)
+            if len(stored) > MAX_STORED_STEPS:
+                del stored[next(iter(stored))]
+        system = stored[dt]
+        shared = {id(part): part for part in self.constants(system)}
+        return deepcopy(system, shared | self.empty_parts(system))
 
 
 def start_run(system: Any, state: Any, memory: Any) -> None:

@@ -9,7 +9,6 @@ compliance F = G (K + μ M + ν R)⁻¹ Gᵀ. Rows of F are computed once they b
 checked against the gaps of the whole structure.
 """
 
-from copy import deepcopy
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -23,12 +22,13 @@ from archfem.dynamics.solvers.active_rows import (
     solve_active_rows,
     subtract_released,
 )
-from archfem.dynamics.solvers.base import MAX_ITERATIONS, is_system
+from archfem.dynamics.solvers.base import MAX_ITERATIONS, StepSolver, is_system
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.joint_law import largest_force
 from archfem.dynamics.solvers.linear_step import (
     LinearStepWorkspace,
     LinearSystem,
+    constant_parts,
     effective_matrix,
     linear_system,
     linear_workspace,
@@ -62,7 +62,7 @@ class ComplianceSystem(NamedTuple):
     active: ActiveRows  # F, filled for rows that have been active
 
 
-class ComplianceSolver:
+class ComplianceSolver(StepSolver):
     """Steps with one sparse factor of the effective matrix."""
 
     name: ClassVar[str] = "compliance"
@@ -71,14 +71,14 @@ class ComplianceSolver:
         model = equation.model
         parts = (model.mass, equation.rest, model.closed_tangent())
         self._elimination = Elimination.of(sum(abs(without_round_off(part)) for part in parts))
-        self._equation, self.order = equation, self._elimination.order
+        self._equation, self.order, self.assembled = equation, self._elimination.order, {}
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
         """Return the solver, or None where anything but plain joints is nonlinear."""
         return cls(equation) if equation.joints is not None else None
 
-    def system(self, dt: float) -> ComplianceSystem:
+    def assemble(self, dt: float) -> ComplianceSystem:
         """Return the data of steps of one length [s]."""
         linear, pairs = linear_system(self._equation, self.order, dt)
         matrix = effective_matrix(self._equation, self.order, dt)
@@ -95,11 +95,15 @@ class ComplianceSolver:
             ActiveRows.of(rows, len(linear.law.segments), len(pairs)),
         )
 
-    def copy_system(self, system: ComplianceSystem) -> ComplianceSystem:
-        """Return a copy for another run, with an empty F: untouched pages cost nothing."""
+    def constants(self, system: ComplianceSystem) -> tuple[Any, ...]:
+        """Return the parts of the data that no step changes."""
+        factor = system.factor
+        return (*constant_parts(system.linear), *factor[:-1], system.group)
+
+    def empty_parts(self, system: ComplianceSystem) -> dict[int, Any]:
+        """Return an empty F: untouched pages cost nothing."""
         old, segments = system.active, len(system.linear.law.segments)
-        empty = ActiveRows.of(len(old.full), segments, len(old.derivatives[1]))
-        return deepcopy(system, {id(system.active): empty})
+        return {id(old): ActiveRows.of(len(old.full), segments, len(old.derivatives[1]))}
 
 
 @overload(solve_contact, jit_options=KERNEL_OPTIONS)

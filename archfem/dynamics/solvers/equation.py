@@ -154,9 +154,10 @@ class Equation:
         starts = np.append(times[0] - dt, times)
         if self.conserving:
             return np.stack(2 * [mean_accelerations(self.motion, starts)])
-        ends = self.motion.at(starts)
-        written = self.motion.at(times + self.scheme.alpha * dt)
-        return np.stack([written, 0.5 * (ends[:-1] + ends[1:])])
+        written = times + self.scheme.alpha * dt
+        values = self.motion.at(np.concatenate([starts, written]))
+        ends = values[: len(starts)]
+        return np.stack([values[len(starts) :], 0.5 * (ends[:-1] + ends[1:])])
 
     def at_rest(self, q: Array, time: float = 0.0, memory: Array | None = None) -> State:
         """Return the state of a structure at rest, with the acceleration due to its forces.
@@ -179,7 +180,10 @@ class Equation:
             - self.viscous @ state.velocity
             - self.with_memory(state).force(self.contact(state))
         )
-        return replace(state, acceleration=splu(self.model.mass.tocsc()).solve(forces))
+        derived = self.model.derived
+        if "mass factor" not in derived:
+            derived["mass factor"] = splu(self.model.mass.tocsc())
+        return replace(state, acceleration=derived["mass factor"].solve(forces))
 
     def with_memory(self, state: State) -> Model:
         """Return the model with the joints' memory of a state.

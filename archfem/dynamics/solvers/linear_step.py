@@ -161,6 +161,11 @@ def effective_matrix(equation: Equation, order: NDArray[Any], dt: float) -> spar
     return (closed + numbers.inertia * mass + numbers.rate * rest)[order][:, order].tocsr()
 
 
+def constant_parts(linear: LinearSystem) -> tuple[Any, ...]:
+    """Return the parts that no step changes: all but the state of the joints."""
+    return tuple(part for part in linear if part is not linear.law)
+
+
 def linear_workspace(linear: LinearSystem) -> LinearStepWorkspace:
     """Allocate the workspace of runs."""
     size, rows = len(linear.weight), len(linear.law.offset)

@@ -12,7 +12,6 @@ solve for Δq, with f̄ the mean force of the joints over the step (`joints.larg
     (2 M/Δt² + C/Δt + (½ + β/Δt) K) Δq - 2 M v/Δt + K q + f̄(q, q + Δq) = p - M r a_g.
 """
 
-from copy import deepcopy
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -29,7 +28,13 @@ from archfem.dynamics.solvers.band_lu import (
     narrow_order,
     solve_band,
 )
-from archfem.dynamics.solvers.base import evaluate_step, is_system, solve_step, start_run
+from archfem.dynamics.solvers.base import (
+    StepSolver,
+    evaluate_step,
+    is_system,
+    solve_step,
+    start_run,
+)
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.joint_law import (
     add_derivatives,
@@ -41,6 +46,7 @@ from archfem.dynamics.solvers.joint_law import (
 from archfem.dynamics.solvers.linear_step import (
     LinearStepWorkspace,
     LinearSystem,
+    constant_parts,
     effective_matrix,
     evaluate_released,
     find_tangent_blocks,
@@ -118,12 +124,12 @@ def newton_driver(evaluate_residual: Any, find_correction: Any, search_line: Any
 
         Semismooth Newton: a point that the first correction takes from sliding one way to sliding
         the other is held in the second, as no derivative sees the range in which it sticks.
-        `limits` are the number of iterations, and that of the first ones with whole corrections;
-        later ones use a line search.
+        `limits` are the number of iterations, that of the first ones with whole corrections, after
+        which a line search is used, and whether the first may use an earlier step's factor.
         """
-        max_iterations, full_steps = limits
+        max_iterations, full_steps, reusable = limits
         error, norm, reverses = evaluate_residual(system, work, 0)
-        previous, change, evaluations, reusable = np.inf, np.inf, 0, False
+        previous, change, evaluations = np.inf, np.inf, 0
         for iteration in range(max_iterations):
             stalled = error >= previous and error <= tolerances.stalled
             rounded = change <= tolerances.round_off and error <= tolerances.rounded
@@ -150,13 +156,13 @@ def newton_driver(evaluate_residual: Any, find_correction: Any, search_line: Any
     return newton_solve
 
 
-class NewtonSolver:
+class NewtonSolver(StepSolver):
     """Steps by Newton's method on all coordinates."""
 
     name: ClassVar[str] = "newton"
 
     def __init__(self, equation: Equation, max_half_width: int = 40) -> None:
-        self._equation = equation
+        self._equation, self.assembled = equation, {}
         pattern = tangent_pattern(equation)
         self.order, self.half_width = narrow_order(pattern)
         # a band is factorised faster than the joint law is evaluated, a sparse tangent is not
@@ -171,22 +177,27 @@ class NewtonSolver:
         large = equation.model.large_displacements and equation.conserving
         return cls(equation) if large or equation.joints is not None else None
 
-    def system(self, dt: float) -> "SmallSystem | LargeSystem":
+    def assemble(self, dt: float) -> "SmallSystem | LargeSystem":
         """Return the data of steps of one length [s]."""
         large = self._equation.model.large_displacements
         return self._large_system(dt) if large else self._small_system(dt)
 
-    def copy_system(self, system: Any) -> Any:
-        """Return a copy for another run."""
-        return deepcopy(system)
+    def constants(self, system: "SmallSystem | LargeSystem") -> tuple[Any, ...]:
+        """Return the parts of the data that no step changes."""
+        tangent, changing = system.tangent, ("entries", "image", "pivots")
+        parts = [getattr(tangent, name) for name in tangent._fields if name not in changing]
+        if isinstance(system, SmallSystem):
+            return (*parts, *constant_parts(system.linear), system.begin, system.places)
+        matrices = system.mass, system.blocks, system.viscous, system.effective
+        return (*parts, *matrices, system.joints, system.places, system.weight, system.body)
 
     def _store_tangent(self, matrix: sparse.csr_matrix, rows: Any, columns: Any) -> tuple[Any, Any]:
         """Store a matrix for factorisation; returns also where its entries (row, column) are."""
         if self._elimination is None:
             band = band_of(matrix, self.half_width)
-            return band, band_places(band, rows, columns).astype(np.uint64)
+            return band, band_places(band, rows, columns).astype(np.uint32)
         panels = panels_of(matrix, self._elimination, rows, columns)
-        return panels, panel_places(panels, rows, columns).astype(np.uint64)
+        return panels, panel_places(panels, rows, columns).astype(np.uint32)
 
     def _small_system(self, dt: float) -> "SmallSystem":
         """Return the data of steps with small displacements."""
@@ -244,8 +255,9 @@ class NewtonSolver:
             sparse_rows(without_round_off(viscous)),
             sparse_rows(effective),
             tangent,
+            np.zeros(1, bool),
             places,
-            np.zeros((2, 2, 4, sides.shapes.shape[3])),
+            np.zeros((2, 3, 5, sides.shapes.shape[3])),
             equation.weight[order],
             np.ascontiguousarray(model.mass_influence[order].T),
             (dt, lag),
@@ -398,7 +410,7 @@ def _solve_small_step(system):  # type: ignore
     tolerances = Tolerances(error, 10.0 * error, 0.0, 0.0, system.reduction)
     for full_steps in (4, 1):
         predict_gaps(law, work.gap, work.gap_before)
-        iterations = _solve_small(system, work, tolerances, (60, full_steps))
+        iterations = _solve_small(system, work, tolerances, (60, full_steps, False))
         total += abs(iterations)
         if iterations > 0:
             for row in range(len(law.guess)):
@@ -428,8 +440,9 @@ class LargeSystem(NamedTuple):
     viscous: SparseRows  # C
     effective: SparseRows  # 2 M/Δt² + C/Δt + (½ + β/Δt) K
     tangent: Any  # the same, to which joints add
+    factored: Any  # whether it has a factor of this run (1,)
     places: Any  # entry of the tangent that each rate of the joints adds to (e,)
-    faces: Array  # workspace of `assemble_rates` (2, 2, 4, s)
+    faces: Array  # workspace of `assemble_rates` (2, 3, 5, s)
     weight: Array  # forces of gravity (n,)
     body: Array  # forces per unit ground acceleration (2, n)
     step: tuple[float, float]  # Δt, and β/Δt
@@ -464,7 +477,8 @@ def _evaluate_step(system, step, states, ground, results, memory):  # type: igno
 
 
 def _start_large_run(system, state, memory):  # type: ignore
-    """Copy the memory of the joints."""
+    """Copy the memory of the joints, and discard the factor of an earlier run."""
+    system.factored[0] = False
     for point in range(len(memory)):
         system.slip[point] = memory[point]
 
@@ -525,7 +539,8 @@ def _large_correction(system, work, iteration, reuse, hold):  # type: ignore
             entries[k] = base[k]
         for k in range(len(forces.rate)):
             entries[system.places[k]] += forces.rate[k]
-        if not factorise(system.tangent):
+        system.factored[0] = factorise(system.tangent)
+        if not system.factored[0]:
             return False
     solve(system.tangent, correction)
     return True
@@ -595,7 +610,9 @@ def _solve_large_step(system, step, states, ground):  # type: ignore
     # an impact between stiff joints leads far into the other block, or away from it
     (old, new), total, dt, work = states, 0, system.step[0], system.work
     _sum_loads(system, work, old, ground)
-    for share, limits in ((1.0, (12, 3)), (0.0, (60, 0))):
+    # the factor of the step before leads as close to the joints' new states as a new one would
+    earlier = system.factored[0] and system.tolerances.reduction > 0.0
+    for share, limits in ((1.0, (12, 3, earlier)), (0.0, (60, 0, False))):
         for k in range(len(work.move)):
             work.move[k] = share * dt * old[1, k]
         iterations = _solve_large(system, work, system.tolerances, limits)

@@ -23,24 +23,32 @@ def stepper_for(
     """Return the stepper of a run."""
     if isinstance(method, Stepper):
         return method
-    solvers: dict[str, type[StepSolver]] = {"newton": NewtonSolver, "compliance": ComplianceSolver}
-    methods = ("auto", *solvers, "snes")
+    methods = ("auto", "newton", "compliance", "snes")
     if not isinstance(method, str) or method not in methods:
         raise InvalidInput(f"method {short_repr(method)} does not exist: use one of {methods}")
-    solver = None
+    stored, key = equation.model.derived, (method, equation.damping, equation.scheme)
+    # the solver of the last run serves again, whatever the ground motion
+    if stored.get("solver", (None,))[0] != key:
+        stored["solver"] = key, _make_solver(method, equation)
+    return Stepper(equation, stored["solver"][1], exact=SnesSolver(equation, newton))
+
+
+def _make_solver(method: str, equation: Equation) -> StepSolver | None:
+    """Return the solver of a method, or None for SNES."""
+    if method == "snes":
+        return None
     if method == "auto":
-        solver = select_solver(equation)
-    elif method != "snes":
-        solver = solvers[method].of(equation)
-        if solver is None:
-            raise InvalidInput(
-                f"method '{method}' does not apply to this model of fidelity "
-                f"'{equation.model.fidelity}': compliance needs small displacements; both need "
-                "joints that neither dilate, nor resist tension, nor have a law of their own, and, "
-                "with Newmark's method or HHT, whose supports have not moved; neither applies to "
-                "monolithic models; use method='auto' or 'snes'"
-            )
-    return Stepper(equation, solver, exact=SnesSolver(equation, newton))
+        return select_solver(equation)
+    solvers: dict[str, type[StepSolver]] = {"newton": NewtonSolver, "compliance": ComplianceSolver}
+    if (solver := solvers[method].of(equation)) is None:
+        raise InvalidInput(
+            f"method '{method}' does not apply to this model of fidelity "
+            f"'{equation.model.fidelity}': compliance needs small displacements; both need "
+            "joints that neither dilate, nor resist tension, nor have a law of their own, and, "
+            "with Newmark's method or HHT, whose supports have not moved; neither applies to "
+            "monolithic models; use method='auto' or 'snes'"
+        )
+    return solver
 
 
 def select_solver(equation: Equation) -> StepSolver | None:

@@ -206,7 +206,7 @@ def _layout(matrix: sparse.csr_matrix, elimination: Elimination, smallest: float
     below, places, updates = (
         np.concatenate([[0], np.cumsum(each)]) for each in (counts, sizes, counts**2)
     )
-    none, entries = np.zeros(0, np.uint64), np.zeros(places[-1])
+    none, entries = np.zeros(0, np.uint32), np.zeros(places[-1])
     groups, image = np.arange(len(width)), np.zeros(2 * size)
     panels = Panels(
         *(first, below, rows, elimination.parent, places, updates, none, groups),
@@ -216,7 +216,7 @@ def _layout(matrix: sparse.csr_matrix, elimination: Elimination, smallest: float
     ends = (np.concatenate([each[k].ravel() for each in targets]) for k in range(2))
     of_matrix = matrix.tocoo()
     np.add.at(entries, panel_places(panels, of_matrix.row, of_matrix.col), of_matrix.data)
-    return panels._replace(targets=panel_places(panels, *ends).astype(np.uint64))
+    return panels._replace(targets=panel_places(panels, *ends).astype(np.uint32))
 
 
 def panel_places(panels: Panels, rows: Any, columns: Any) -> Indices:

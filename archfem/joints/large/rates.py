@@ -67,14 +67,15 @@ def _assemble_joint(sides, joint, forces, workspace):  # type: ignore
     # Uᵀ L V of each pair of faces
     if _has_entries(law):
         for side in range(2):
-            _face_derivatives(sides, joint, side, forces.motion[joint, side], workspace[side])
+            count, own = sides.size[joint, side], workspace[side]
+            _face_derivatives(sides, joint, side, forces.motion[joint, side], own)
+            _multiply_law(law, 2 + side, own[1][:, :count], own[2])
         for side in range(2):
             for other in range(2):
                 counts = sides.size[joint, side], sides.size[joint, other]
                 start = sides.block_start[joint, side, other]
                 block = rate[start : start + counts[0] * counts[1]]
-                ends = workspace[side, 0], workspace[other, 1]
-                _add_product(law, (side, other), counts, ends, block)
+                _add_product(counts, workspace[side, 0], workspace[other, 2], 2 + side, block)
     # rotation stiffness of each face with a frame
     for side in range(2):
         if sides.has_frame[joint, side]:
@@ -118,24 +119,26 @@ def _face_derivatives(sides, joint, side, motion, derivatives):  # type: ignore
 
 
 @summing_kernel
-def _add_product(law, which, counts, ends, block):  # type: ignore
-    """Add the derivative Uᵀ L V of one face's forces by another's coordinates to their block."""
-    (side, other), (rows, columns), (mean, last) = which, counts, ends
-    # rows of L: x, y, angle of the lower face, angle of the higher face, elongation
-    angle, by_angle = 2 + side, 2 + other
+def _multiply_law(law, angle, last, images):  # type: ignore
+    """Store L V, the forces by the coordinates of a face; `angle` is the number of its angle."""
     p, q, r, s = last[0], last[1], last[2], last[3]
+    # rows of L: x, y, angle of the lower face, angle of the higher face, elongation
+    for number in range(5):
+        row = law[number]
+        a, b, c, d, image = row[0], row[1], row[angle], row[4], images[number]
+        for m in range(len(p)):
+            image[m] = a * p[m] + b * q[m] + c * r[m] + d * s[m]
+
+
+@summing_kernel
+def _add_product(counts, mean, images, angle, block):  # type: ignore
+    """Add the derivative Uᵀ L V of one face's forces by another's coordinates to their block."""
+    (rows, columns), p, q, r, s = counts, images[0], images[1], images[angle], images[4]
     for k in range(rows):
-        # a row of Uᵀ L, by the four numbers of the other face
         x, y, turn, longer = mean[0, k], mean[1, k], mean[2, k], mean[3, k]
-        a = x * law[0, 0] + y * law[1, 0] + turn * law[angle, 0] + longer * law[4, 0]
-        b = x * law[0, 1] + y * law[1, 1] + turn * law[angle, 1] + longer * law[4, 1]
-        c = x * law[0, by_angle] + y * law[1, by_angle]
-        c += turn * law[angle, by_angle] + longer * law[4, by_angle]
-        d = x * law[0, 4] + y * law[1, 4] + turn * law[angle, 4] + longer * law[4, 4]
-        # times V
         row = block[k * columns : (k + 1) * columns]
         for m in range(columns):
-            row[m] += a * p[m] + b * q[m] + c * r[m] + d * s[m]
+            row[m] += x * p[m] + y * q[m] + turn * r[m] + longer * s[m]
 
 
 @kernel

@@ -99,7 +99,7 @@ class LargeDisplacementModel(Model):
 
     def with_memory(self, memory: Array) -> Self:
         """Return the model with another joint memory."""
-        return self.copy_with(_slip=np.ascontiguousarray(memory, float))
+        return self.copy_with(_slip=np.ascontiguousarray(memory, float), _derived=self.derived)
 
     def updated_memory(self, q: Array) -> Array:
         """Return the irreversible slip of each joint point once the model is at q (p,) [m]."""
@@ -152,7 +152,7 @@ class LargeDisplacementModel(Model):
     ) -> sparse.csr_matrix:
         """Return block stiffness and joint tangent, each times a factor (n, n)."""
         sides = self.joints.kinematics
-        assemble_rates(sides, forces, np.empty((2, 2, 4, sides.shapes.shape[3])))
+        assemble_rates(sides, forces, np.empty((2, 3, 5, sides.shapes.shape[3])))
         of_joints = np.bincount(self._entries, forces.rate, len(self._pattern.indices))
         of_blocks = block_factor * self.block_stiffness.data
         return self._pattern.with_data(of_blocks + joint_factor * of_joints)
