@@ -185,7 +185,7 @@ def test_facets_that_slid_past_each_other_are_doubted(stack, monkeypatch, slip, 
 
 def test_every_step_of_a_batch_counts_for_displacements(stack):
     """The facets are checked at every 32nd step alone: the first, and the 33rd."""
-    model = af.build(stack, fidelity="rigid")
+    model = af.build(stack, fidelity="rigid", displacements="large")
     observer, far = model.observer(), np.array([0.0, 0.3, 0.0, 0.0, 0.4, 0.0])
     guard = looked(model)
     asked = []

@@ -313,12 +313,8 @@ def _small_residual(system, work, iteration):  # type: ignore
 def _small_correction(system, work, iteration, reuse, hold):  # type: ignore
     """Find the corrections of w, and of z and λ as the derivatives predict them."""
     gaps, law, begin = system.linear.gaps, system.linear.law, iteration == 0
-    released, along, move, origin = (
-        system.released,
-        system.along,
-        system.move,
-        system.balanced_origin,
-    )
+    released, along, move = system.released, system.along, system.move
+    origin = system.balanced_origin
     contact, change, right = system.contact, system.contact[2], work.right_side
     if not (reuse or _renew_factor(system, hold)):
         return False
