@@ -51,6 +51,9 @@ DISLOCATION = 0.1
 # Kinds of collapse with lost blocks
 FALLEN_STATES = COLLAPSE_STATES[2:]
 
+# Coefficient of friction of loose stones where their joints never slide: that of rough stone
+ASSUMED_FRICTION = 0.6
+
 
 @dataclass(frozen=True, eq=False)
 class ReleasedBlocks:
@@ -523,6 +526,24 @@ def doubt_rocking_ratio(structure: Structure, ratio: float | None) -> list[Doubt
     return [doubt]
 
 
+def doubt_loose_friction(structure: Structure) -> list[Doubt]:
+    """Return a doubt where loose stones slide by other properties than their joints."""
+    joints = [structure.joints[k] for k in np.flatnonzero(_between_stones(structure))]
+    held = [joint.name for joint in joints if not joint.contact.slides]
+    cohesive = [j.name for j in joints if j.contact.slides and j.contact.cohesion > 0.0]
+    doubts = []
+    if held:
+        cause = (
+            f"loose stones have a coefficient of friction of {ASSUMED_FRICTION:g} where their "
+            f"joints never slide: {join_names(held)}"
+        )
+        doubts.append(Doubt(cause, "give these joints a coefficient of friction"))
+    if cohesive:
+        cause = f"loose stones have no cohesion, in intact joints too: {join_names(cohesive)}"
+        doubts.append(Doubt(cause, "compare with joints without cohesion throughout"))
+    return doubts
+
+
 def standing_state(model: Model, start: State, state: State, shaken: bool) -> CollapseState:
     """Return the state of collapse without separated blocks; `shaken`: the ground still moves."""
     loose = release_blocks(model, state).start
@@ -558,11 +579,11 @@ def _rests(loose: LooseBlocks, rest_speed: float = 5e-4) -> bool:
     return bool(np.abs(loose.velocities[:, :2]).max() <= rest_speed)
 
 
-def _with_sliding_joints(structure: Structure, friction: float = 0.6) -> Structure:
+def _with_sliding_joints(structure: Structure) -> Structure:
     """Return the structure without cohesion, and with friction in joints that never slide."""
     joints = []
     for joint in structure.joints:
-        coefficient = joint.contact.coefficient if joint.contact.slides else friction
+        coefficient = joint.contact.coefficient if joint.contact.slides else ASSUMED_FRICTION
         contact = replace(joint.contact, friction=coefficient, cohesion=0.0)
         joints.append(replace(joint, contact=contact))
     return replace(structure, joints=tuple(joints))

@@ -25,6 +25,7 @@ from archfem.dynamics.fall import (
     MeetingMonitor,
     SeparationMonitor,
     doubt_collapse,
+    doubt_loose_friction,
     doubt_rocking_ratio,
     is_overturning,
     simulate_fall,
@@ -198,7 +199,11 @@ def _follow_fall(
             raise
         dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
         history = History(dataset, history.structure)
-        doubts = [*_doubt_impulses(history), *doubt_rocking_ratio(model.structure, rocking_ratio)]
+        doubts = [
+            *_doubt_impulses(history),
+            *doubt_rocking_ratio(model.structure, rocking_ratio),
+            *doubt_loose_friction(model.structure),
+        ]
     else:
         shaken = history.ending is not Ending.FINISHED
         fall = standing_state(model, start, state, shaken)

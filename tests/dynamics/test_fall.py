@@ -200,6 +200,26 @@ def test_loose_stones_rub_as_their_joints_did_or_by_six_tenths():
         assert [joint.contact.cohesion for joint in loose.joints] == [0.0]
 
 
+@pytest.mark.parametrize(
+    ("contact", "words"),
+    [
+        (af.Contact(1e9, 4e8, 0.45), []),
+        (af.Contact(1e9, 4e8, None), ["friction of 0.6 where their joints never slide: joint 0"]),
+        (af.Contact(1e9, 4e8, 0.45, cohesion=1e4), ["no cohesion, in intact joints too: joint 0"]),
+    ],
+)
+def test_friction_that_loose_stones_are_given_is_doubted(contact, words):
+    """A column on a cohesive joint topples under 0.4 g for 1 s whatever its friction."""
+    column = af.column(breadth=0.6, heights=[2.4], contact=contact)
+    run = af.time_history(
+        af.build(column, fidelity="rigid", displacements="large"), pulse(0.4, 1.0), dt=2e-3
+    )
+    assert run.fall.kind == "fallen"
+    causes = " ".join(doubt.cause for doubt in run.verdict.doubts)
+    assert all(word in causes for word in words)
+    assert ("loose stones have" in causes) == bool(words)
+
+
 @pytest.fixture(scope="module")
 def model(ring):
     return af.build(ring, fidelity="rigid", displacements="large")
