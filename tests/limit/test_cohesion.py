@@ -120,6 +120,7 @@ def test_joints_that_never_slide_are_left_out_without_dilatancy():
         assert found.factor == pytest.approx(0.25, rel=EXACT)
 
 
+@pytest.mark.slow
 def test_a_support_moves_as_far_with_enough_cohesion_as_without_sliding():
     def spread(cohesion, friction="coulomb"):
         contact = glued(cohesion, 0.45)

@@ -124,7 +124,12 @@ def hinges_of(stage):
 
 @pytest.mark.parametrize(
     ("thickness", "voussoirs", "settlement", "jumps"),
-    [(0.15, 8, SPREAD, 0), (0.12, 60, SPREAD, 1), (0.2, 8, SINK, 0), (0.15, 30, SINK, 1)],
+    [
+        (0.15, 8, SPREAD, 0),
+        pytest.param(0.12, 60, SPREAD, 1, marks=pytest.mark.slow),
+        pytest.param(0.2, 8, SINK, 0, marks=pytest.mark.slow),
+        (0.15, 30, SINK, 1),
+    ],
 )
 def test_every_state_is_one_of_three_hinges_and_the_last_one_is_the_last(
     thickness, voussoirs, settlement, jumps

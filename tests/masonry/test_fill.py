@@ -145,7 +145,9 @@ def test_passive_force_is_that_of_the_best_wedge(angle, rows, verified):
 
 
 @pytest.mark.parametrize("passive", [False, True], ids=["active", "passive"])
-@pytest.mark.parametrize("angle", [20.0, 30.0, 40.0])
+@pytest.mark.parametrize(
+    "angle", [30.0, *(pytest.param(each, marks=pytest.mark.slow) for each in (20.0, 40.0))]
+)
 def test_limit_analysis_of_the_pieces_finds_the_same_wedges(angle, passive):
     """As rigid blocks: the wall that gives way bears the least thrust, pushed in the greatest."""
     way = af.Settlement("wall", (-1.0 if passive else 1.0, 0.0, 0.0))

@@ -110,7 +110,9 @@ known = cache(lambda answers: answers(1.0, 1.0, 1.0))
 
 
 @pytest.mark.parametrize("answers", [at_rest, at_the_limit, shaken])
-@pytest.mark.parametrize("scale", SCALES, ids=["light", "small"])
+@pytest.mark.parametrize(
+    "scale", [pytest.param(SCALES[0], marks=pytest.mark.slow), SCALES[1]], ids=["light", "small"]
+)
 def test_ratios_do_not_depend_on_scale(answers, scale):
     for name, value in answers(*scale).items():
         expected = np.asarray(known(answers)[name], float)

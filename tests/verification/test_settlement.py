@@ -42,7 +42,14 @@ def at_rest(rung, rule):
     return af.dead_load(af.build(RING, fidelity=rung, cells=(2, 2), quadrature=rule))
 
 
-@pytest.mark.parametrize("motion", [(-0.05, 0.0, 0.0), (0.0, 0.0, 1e-3), (0.01, -0.01, 1e-3)])
+@pytest.mark.parametrize(
+    "motion",
+    [
+        pytest.param((-0.05, 0.0, 0.0), marks=pytest.mark.slow),
+        pytest.param((0.0, 0.0, 1e-3), marks=pytest.mark.slow),
+        (0.01, -0.01, 1e-3),  # both at once
+    ],
+)
 @pytest.mark.parametrize(
     ("rung", "rule"),
     [(rung, "exact") for rung in ("rigid", "faces", "condensed", "full")]

@@ -71,7 +71,7 @@ def test_a_block_topples(verified):
     assert turns[2e-3] - exact == pytest.approx(4.0 * (turns[1e-3] - exact), rel=0.1)
 
 
-@pytest.mark.parametrize("restitution", [0.0, 0.3])
+@pytest.mark.parametrize("restitution", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_a_rocking_block_loses_what_housner_says(restitution, verified):
     structure = rocking_block()
     start = tilted(structure, 0.5 * TILT)
