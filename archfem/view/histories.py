@@ -98,6 +98,13 @@ def draw_envelope(
     return _finish_panels(panels)
 
 
+def draw_envelopes(runs: Mapping[str, History], dead: xr.Dataset | None) -> list[Figure]:
+    """Draw the envelopes of any number of runs, in as many figures as line styles require."""
+    pairs, count = list(runs.items()), len(LINE_COLOURS)
+    groups = [dict(pairs[first : first + count]) for first in range(0, len(pairs), count)]
+    return [draw_envelope(group, dead=dead) for group in groups]
+
+
 @validate_arguments
 def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[str] = ()) -> Figure:
     """Draw the eccentricity of each joint at one instant of each of several structures.

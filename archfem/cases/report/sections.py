@@ -19,11 +19,10 @@ from archfem.motion.suite import Suite
 from archfem.statics.stress import utilisation_text
 from archfem.units import MPa, kN
 from archfem.view.collapse import draw_fall
-from archfem.view.histories import draw_envelope
+from archfem.view.histories import draw_envelopes
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
 from archfem.view.structure import draw_names, draw_structure
-from archfem.view.style import LINE_COLOURS
 
 
 def build_case_sections(data: ReportData) -> list[Section]:
@@ -324,16 +323,16 @@ def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
         blocks.append(TextBlock(f"The run is not complete: {run.outcome}.", "doubt"))
     blocks.append(build_player(case, run, title, players))
     if case.suite is None:
-        blocks.append(_build_envelope({name: run}, data))
+        blocks += _build_envelopes(data)
     blocks.append(_shorten_joint_table(result_text.tabulate_joints(run.joints, data.dead)))
     blocks.append(TextBlock(_sentence(utilisation_text(case.structure, run.joints))))
     return blocks
 
 
-def _build_envelope(runs: Mapping[str, History], data: ReportData) -> FigureBlock:
-    """Draw the envelopes of runs."""
+def _build_envelopes(data: ReportData) -> list[FigureBlock]:
+    """Draw the envelopes of all runs."""
     caption = "Least and largest eccentricity of each joint; dotted under dead load."
-    return FigureBlock.of(draw_envelope(runs, dead=data.dead), caption)
+    return [FigureBlock.of(figure, caption) for figure in draw_envelopes(data.runs, data.dead)]
 
 
 def _shorten_joint_table(table: result_text.ResultTable) -> Grid:
@@ -373,14 +372,11 @@ def _build_suite_response(data: ReportData) -> list[Any]:
         named = (f"{title}: {cell}" for title, cell in cells if cell != "-")
         mechanisms.append((row[0], "; ".join(named)))
     caption = "Outcome, PGA, and the critical joint of each run"
-    blocks: list[Any] = [
+    return [
         Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption),
         Grid([], mechanisms, "Mechanism and end of each run"),
+        *_build_envelopes(data),
     ]
-    pairs, per_figure = list(data.runs.items()), len(LINE_COLOURS)  # as many runs as line styles
-    for first in range(0, len(pairs), per_figure):
-        blocks.append(_build_envelope(dict(pairs[first : first + per_figure]), data))
-    return blocks
 
 
 def list_facts(data: ReportData) -> list[tuple[str, str]]:
