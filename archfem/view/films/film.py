@@ -39,7 +39,6 @@ from archfem.view.joint_marks import (
 )
 from archfem.view.positions import FallingBlocks, fields_at, recorded_fields
 from archfem.view.statics import ModePanel, mode_panels
-from archfem.view.stress import Triangles
 
 
 @validate_arguments
@@ -111,14 +110,14 @@ def film(  # noqa: PLR0913  (a film has many settings)
     if page:
         from archfem.view.films.viewer import write_scenes
 
-        frames = _frames(setup, run, _thin(timing.times, model), falls)
+        frames = _frames(setup, run, _thin(timing.times, setup), falls)
         return write_scenes(target, setup, run, frames)
     return write_film(target, _draw_frames(setup, run, timing, falls, size, painter), timing.fps)
 
 
-def _thin(times: Array, model: Model) -> Array:
+def _thin(times: Array, setup: Setup) -> Array:
     """Return at most 60 of the times: a page holds the blocks of each, and has some 10 MB."""
-    most = int(np.clip(100_000 / len(Triangles(model.cells).cell), 5, 60))
+    most = int(np.clip(100_000 / len(setup.triangles.cell), 5, 60))
     chosen = np.linspace(0, len(times) - 1, min(len(times), most))
     thinned: Array = times[chosen.round().astype(int)]
     return thinned

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -14,6 +15,7 @@ from archfem.models.model import Cells, Model, check_coordinate_count
 from archfem.units import MPa, mm
 from archfem.view.joint_marks import round_magnification, support_outlines
 from archfem.view.positions import FallingBlocks
+from archfem.view.stress import Triangles
 from archfem.view.style import CLIPPED_PERCENT, COLOUR_MAP
 
 
@@ -105,6 +107,16 @@ class Setup:
     outlines: tuple[Array, ...] = ()  # of blocks displaced by a mechanism, each (k, 2) [m]
     since: float = 0.0  # time from which they are shown [s]
     level: float | None = None  # of the ground below loose blocks [m]; None without loose blocks
+
+    @cached_property
+    def triangles(self) -> Triangles:
+        """Triangulation of the blocks."""
+        return Triangles(self.model.cells)
+
+    @cached_property
+    def supports(self) -> list[Array]:
+        """Outlines of the fixed blocks, displaced, each (k, 2) [m]."""
+        return support_outlines(self.model, self.magnification)
 
     @property
     def ground(self) -> Array | None:
