@@ -1,7 +1,6 @@
 """Report sections on the checks of each run, and on versions, hashes and inputs."""
 
 from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -135,21 +134,10 @@ def build_source_section(data: ReportData) -> Section:
     rows.append(("SHA-256 of the case", sha256(data.case.text().encode()).hexdigest()))
     blocks: list[Any] = [Grid((), rows)]
     if data.folder is not None:
-        files = sorted(path for path in data.files.values() if _is_source(path))
         table = []
-        for path in files:
-            name, size = str(path.relative_to(data.folder)), f"{path.stat().st_size / 1e3:.1f}"
-            table.append([name, size, hash_file(path)[:16]])
-        caption = "Files that the report was written from"
+        for name, path in sorted(data.files.items()):
+            table.append([name, f"{path.stat().st_size / 1e3:.1f}", hash_file(path)[:16]])
+        caption = "Files of the folder that have the inputs of the run"
         blocks.append(Grid(["file", "kB", "SHA-256"], table, caption))
     blocks.append(TextBlock(data.case.text(), "lines"))
     return Section("Versions, hashes and the case as a file", blocks)
-
-
-def _is_source(path: Path) -> bool:
-    """Return whether a report is written from a file."""
-    figures = {"dead", "dead_stress", "free_body", "modes", "collapse", "rating"}
-    figures |= {"accuracy", "verdict_range"}
-    text = path.suffix in (".nc", ".toml", ".txt")
-    drawn = path.stem in figures or path.stem.startswith("assessment_")
-    return text or (path.suffix == ".png" and drawn)

@@ -23,7 +23,7 @@ from archfem.joints.criteria import assessed_joints, sliding_limits
 from archfem.masonry.block import Block
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.models.model import Model, check_coordinate_count, check_model
-from archfem.view.joint_marks import DRAWN_DISPLACEMENT, joint_pairs
+from archfem.view.joint_marks import DRAWN_DISPLACEMENT, joint_pairs, round_magnification
 from archfem.view.positions import (
     FallingBlocks,
     block_kinds,
@@ -206,17 +206,12 @@ class Scene:
         if self.model is not None and self.model.large_displacements:
             return 1.0
         if self.moved is not None:
-            largest = float(np.abs(self.moved[1]).max())
-            aim = DRAWN_DISPLACEMENT * self.structure.size
-        elif "opening" in self.run.joints:
+            return round_magnification(float(np.abs(self.moved[1]).max()) / self.structure.size)
+        if "opening" in self.run.joints:  # seen as a gap of a third of the depth
             joints = assessed_joints(self.run.joints)
-            largest = float(joints["opening"].max())
-            aim = 0.3 * float(joints["depth"].mean())
-        else:
-            return 1.0
-        steps = np.outer(10.0 ** np.arange(9), [1.0, 2.0, 5.0]).ravel()
-        fits = steps[steps * largest <= aim]
-        return float(fits[-1]) if largest > 0.0 and len(fits) else 1.0
+            share = float(joints["opening"].max()) / float(joints["depth"].mean())
+            return round_magnification(3.0 * DRAWN_DISPLACEMENT * share)
+        return 1.0
 
     @cached_property
     def initial_time(self) -> float:
