@@ -46,11 +46,9 @@ KERNEL_OPTIONS: Any = {"error_model": "numpy", "_nrt": False}
 
 
 class CheckedCacheFile(IndexDataCacheFile):
-    """Index and data files of a function, each followed by the SHA-256 of its content.
+    """Index and data files of a function, each followed by the SHA-256 of its content."""
 
-    Unpickling ignores the checksum. Without it, a flipped bit in compiled code would not be noticed
-    before that code runs.
-    """
+    # Unpickling ignores the checksum: a flipped bit would not be noticed before the code runs.
 
     def _load_index(self) -> Any:
         """Return the data files by signature; none if the index is damaged or unreadable."""

@@ -105,10 +105,8 @@ def hash_sections(
 
 
 def remove_presentation(settings: Table) -> dict[str, Any]:
-    """Return the settings without those that change no number: the title, and pictures and films.
-
-    The largest values of a run are those of its records, so that `output.save_every` stays.
-    """
+    """Return the settings without those that change no number: title, pictures and films."""
+    # the largest values of a run are those of its records, so that `output.save_every` stays
     output = _as_table(settings.get("output"))
     kept = {key: value for key, value in output.items() if key == "save_every"}
     others = {key: value for key, value in settings.items() if key not in ("title", "output")}

@@ -209,10 +209,7 @@ def run_files(run: Run, at_rest: DeadLoadResult, text: str) -> Files:
 
 
 def adopt_files(run: Run) -> bool:
-    """Add the files of a pair that an earlier call has finished to the draft of its history.
-
-    Returns False, and adds none, if they are not those of this history.
-    """
+    """Add the files of a pair that an earlier call has finished to the draft of its history."""
     assert run.path is not None
     pair, draft, folder = run.path.parents[0].name, run.path.parents[1], run.path.parents[2]
     listed = _files.intact_file_list(folder).get("run")

@@ -460,21 +460,11 @@ def doubt_fidelity(
     at_rest: DeadLoadResult,
     motion: Motion,
     history: History,
-    duration: float = 0.5,
+    duration: float = 0.5,  # from the start of the motion [s]
+    # of the largest |e| [-]; rigid stones of ordinary stiffness differ by 0.02 where joints slide
     tolerance: float = 0.03,
 ) -> list[Doubt]:
-    """Return a doubt where the next finer fidelity disagrees in |e| at the start of a run.
-
-    A fidelity that was selected by its predicted error is not compared.
-
-    Args:
-        at_rest: dead load of the case.
-        motion: ground motion.
-        history: history of the run.
-        duration: duration of the comparison from the start of the motion [s].
-        tolerance: admissible difference of the largest |e| of any joint [-]; rigid stones of
-            ordinary stiffness differ by 0.02 where joints slide.
-    """
+    """Return a doubt where the next finer fidelity disagrees in |e| at the start of a run."""
     if (finer := at_rest.finer) is None:
         return []
     other, dead = finer
@@ -516,11 +506,9 @@ def load_finished_run(path: Path, case: Case, motion: Motion) -> History | None:
 
 @contextmanager
 def replace_run(case: Case, folder: Path) -> Iterator[Path]:
-    """Yield a draft folder whose files replace those of an earlier run when the block ends.
-
-    The draft has the case, and of a suite the histories of earlier calls. If the block fails, the
-    folder keeps the results of an earlier run; without any it gets what was computed.
-    """
+    """Yield a draft folder whose files replace those of an earlier run when the block ends."""
+    # If the block fails, the folder keeps the results of an earlier run; without any it gets what
+    # was computed. The draft of a suite has the histories of earlier calls.
     inputs = hash_inputs(case.settings, case.folder)
     with _files.lock_folder(folder):
         draft = _start_draft(case, folder, inputs)

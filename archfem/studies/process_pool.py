@@ -133,10 +133,7 @@ def evaluate_on_processes(
     meanwhile: Callable[[], object] | None = None,
     shared: Path | None = None,
 ) -> Iterator[tuple[int, Row]]:
-    """Evaluate points on processes of this machine; `meanwhile` runs while they start.
-
-    Results that workers share are in the folder `shared`, and their output goes to the file `log`.
-    """
+    """Evaluate points on processes of this machine; `meanwhile` runs while they start."""
     pool = WorkerPool(TaskQueue(points, evaluator), workers, str(log or os.devnull), shared)
     try:
         if meanwhile is not None:
@@ -173,10 +170,8 @@ class TaskQueue:
     def pop(
         self, model: str | None, other_models: Collection[str], other_pairs: Collection[Any] = ()
     ) -> Task:
-        """Remove and return the next task: of this model, else of one that no other worker has.
-
-        Pairs that other workers compute are left for later, when their matched motions are shared.
-        """
+        """Remove and return the next task: of this model, else of one that no other worker has."""
+        # pairs that others compute are left for later, when their matched motions are shared
         if model not in self._tasks:
             unused = (key for key in self._tasks if key not in other_models)
             model = next(unused, next(iter(self._tasks)))

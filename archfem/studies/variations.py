@@ -163,19 +163,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
 
 
 def verdict_range_of_case(case: Case, **options: Any) -> VerdictRange:
-    """Run a case over its uncertain properties, with rigid blocks.
-
-    Args:
-        case: case with one motion; its structure, motion, damping and time step are as given.
-        options: as for `verdict_range`.
-
-    Returns:
-        As `verdict_range`.
-
-    Raises:
-        InvalidInput: the case has no motion or a suite of several; or as `verdict_range`.
-        DidNotConverge: the structure as given does not stand under dead load.
-    """
+    """Run a case over its uncertain properties, with rigid blocks."""
     motion, damping = ground_motion(case), expected_damping(case)
     if callable(damping):
         damping = damping(build(case.structure, fidelity="rigid"))

@@ -385,12 +385,9 @@ def _mirror_images(structure: Structure | None, numbers: Array, first: int) -> N
 
 
 def most_stressed_joints(run: History) -> list[int]:
-    """Return two joints closest to failure: one by its eccentricity, one by its friction.
-
-    The first has the largest |e|, or opens; the second slides for the longest time, or else is
-    closest to sliding. A mirror image of the first, which behaves similarly, is left out if the run
-    contains its structure.
-    """
+    """Return two joints closest to failure: one by its eccentricity, one by its friction."""
+    # the second slides for the longest time, or is closest to sliding; a mirror image of the first
+    # behaves as that does, and is left out
     own = assessed_joints(run.joints)
     numbers = own["joint"].values
     e = abs(own["eccentricity"]).max("time").fillna(0.5).values

@@ -306,12 +306,7 @@ def draw_during(model: Model, run: History, joints: xr.Dataset) -> Figure:
 def draw_loads(
     axes: Axes, structure: Structure, live: Sequence[Action], *, factor: str = "λ ×"
 ) -> None:
-    """Draw live loads as arrows of one length, labelled with load factor and size.
-
-    A load in proportion to the weights is one arrow above the structure; a force ends at the
-    extrados; a movement of a support begins at its centroid. Equal labels that would overlap are
-    one; others are raised.
-    """
+    """Draw live loads as arrows of one length, labelled with load factor and size."""
     length, inch = 0.11 * structure.size, 1.0 / drawing_scale(structure)  # [m]
     labels: list[tuple[str, Array]] = []
     for number, action in enumerate(live):

@@ -74,11 +74,8 @@ class Outlines:
         return np.array(frames).reshape(len(fields), -1, 2) + supports
 
     def _interpolation(self, model: Model) -> sparse.csr_matrix:
-        """Return the matrix from displacements of the cells' points to those of the corners.
-
-        A corner rotates with the nearest edge; this is exact for rigid blocks, even for large
-        rotations.
-        """
+        """Return the matrix from displacements of the cells' points to those of the corners."""
+        # a corner rotates with the nearest edge, which is exact for rigid blocks at any rotation
         cells, rows = model.cells, []
         zero, one = sparse.csr_matrix((2, 2 * len(cells.places))), np.eye(2)
         for point, number in zip(self.points, self.block.tolist(), strict=True):
@@ -112,11 +109,10 @@ def _count_chords(block: Block, tolerance: float) -> int:
 
 @dataclass
 class PackedArrays:
-    """Arrays over time as text: integers of a quantum, differences, deflate, base64.
+    """Arrays over time as text: integers of a quantum, differences, deflate, base64."""
 
-    Consecutive values are similar, so that their differences are small integers. Bytes of equal
-    significance stand together, because deflate compresses them better.
-    """
+    # Consecutive values are similar: their differences are small. Bytes of equal significance stand
+    # together, which deflate compresses better.
 
     # name, shape (series, samples) and quantum of each array, in the order of the bytes
     head: list[dict[str, Any]] = field(default_factory=list)
