@@ -19,7 +19,7 @@ import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -31,6 +31,9 @@ from archfem.errors import InvalidInput
 
 # Environment variable with the permitted modules; "*" permits those of all cases
 OWN_CODE_VARIABLE = "ARCHFEM_OWN_CODE"
+
+# Group of the entry points by which installed packages add to archfem
+EXTENSION_GROUP = "archfem.extensions"
 
 # SHA-256 of each loaded module, by its name
 _loaded: dict[str, str] = {}
@@ -179,29 +182,21 @@ def load_extension(path: str | Path) -> ModuleType:
     return module
 
 
-def _find_packages(name: str | None = None) -> list[EntryPoint]:
-    """Return the installed extensions of a name, or all."""
-    found = entry_points(group="archfem.extensions")
-    # a distribution that is on the path twice is listed twice
-    distinct = {(entry.name, entry.value): entry for entry in found}
-    return [entry for entry in distinct.values() if name in (None, entry.name)]
-
-
 def _package_versions(settings: Table) -> list[tuple[str, str]]:
     """Return names and versions of the installed packages that a case names in `extensions`."""
     names = [str(name) for name in settings.get("extensions", ())]
     return [
         (name, entry.dist.version if entry.dist else "unknown")
         for name in names
-        for entry in _find_packages(name)
+        for entry in entry_points(group=EXTENSION_GROUP, name=name)
     ]
 
 
 def _load_package(name: str) -> ModuleType:
     """Import the module of an installed extension, which adds to archfem."""
-    found = _find_packages(name)
+    found = list(entry_points(group=EXTENSION_GROUP, name=name))
     if len(found) != 1:
-        known = sorted({entry.name for entry in _find_packages()})
+        known = sorted(entry_points(group=EXTENSION_GROUP).names)
         raise InvalidInput(
             f"extension '{name}' is that of {len(found)} installed packages: name one of {known}, "
             "or a file *.py"

@@ -37,38 +37,43 @@ class FailedPairs(DidNotConverge):
 def run(options: argparse.Namespace) -> int:
     """Carry out a case: limit analysis, dead load and time histories, tables and pictures."""
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
-    headline, failure = "", None
-    output = io.StringIO()
-    try:
-        # All else is printed after the verdict, which is known last.
-        with replace_run(case, folder) as draft, redirect_stdout(output):
-            if options.workers > 1 and case.suite is not None:
-                from archfem.studies.study import compute_pairs
+    failure = None
+    # All else is printed after the verdict, which is known last.
+    with _print_at_end(folder, "run", case.title) as verdict, replace_run(case, folder) as draft:
+        if options.workers > 1 and case.suite is not None:
+            from archfem.studies.study import compute_pairs
 
-                # Workers save the histories, which are reused below.
-                compute_pairs(case, draft, workers=options.workers)
-            try:
-                headline, doubtful = print_results(case, carry_out(case, draft), draft)
-            except FailedPairs as error:
-                failure = error
-    finally:
-        print(f"{case.title}: {headline}" if headline else case.title)
-        print(_name_published_files(output.getvalue(), folder, "run"), end="")
+            # Workers save the histories, which are reused below.
+            compute_pairs(case, draft, workers=options.workers)
+        try:
+            headline, doubtful = print_results(case, carry_out(case, draft), draft)
+            verdict.append(headline)
+        except FailedPairs as error:
+            failure = error
     if failure is not None:
         raise failure
     return ExitCode.DOUBTFUL if doubtful else 0
 
 
 @contextmanager
+def _print_at_end(folder: Path, command: str, title: str = "") -> Iterator[list[str]]:
+    """Print the output of a block when its results are in place, below a title and a verdict."""
+    output, verdict = io.StringIO(), list[str]()
+    try:
+        with redirect_stdout(output):
+            yield verdict
+    finally:
+        if title:
+            print(": ".join([title, *filter(None, verdict)]))
+        print(_name_published_files(output.getvalue(), folder, command), end="")
+
+
+@contextmanager
 def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
     """Yield the draft folder of a command; its output is printed when the results are in place."""
-    output = io.StringIO()
-    try:
-        inputs = hash_inputs(case.settings, case.folder)
-        with replace_results(folder, command, inputs) as draft, redirect_stdout(output):
-            yield draft
-    finally:
-        print(_name_published_files(output.getvalue(), folder, command), end="")
+    inputs = hash_inputs(case.settings, case.folder)
+    with _print_at_end(folder, command), replace_results(folder, command, inputs) as draft:
+        yield draft
 
 
 def _write_results(command: str, case: Case, out: str | None, draw: Callable[[], Files]) -> None:

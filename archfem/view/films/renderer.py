@@ -5,8 +5,7 @@ matplotlib's Agg renderer, many shapes per call, or by a painter of another libr
 divided into triangles so fine that colours may vary linearly between their corners.
 """
 
-from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -99,16 +98,6 @@ class Canvas:
         return style
 
 
-class Painter(Protocol):
-    """Draws the frames of a film on a canvas."""
-
-    def draw_background(self) -> None:
-        """Draw the layers below the blocks, which do not change."""
-
-    def draw(self, frame: Frame) -> None:
-        """Draw blocks and marks of a frame."""
-
-
 class FramePainter:
     """Draws blocks, supports and marks on a canvas, from the lowest layer to the uppermost."""
 
@@ -149,7 +138,7 @@ class FrameLayout:
         size: tuple[int, int],
         joints: xr.Dataset,
         run: History | None = None,
-        painter: Callable[[Setup, Canvas], Painter] = FramePainter,
+        painter: type[FramePainter] = FramePainter,
     ) -> None:
         # an image is 12.8 inches wide, or narrower: a small one has at least 60 dots per inch
         dpi = max(60.0, size[0] / 12.8)

@@ -19,7 +19,7 @@ from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.history import History
 from archfem.models.model import Model
 from archfem.view.films.frames import Frame, corner_values, frame_layers, frames_of_run
-from archfem.view.films.renderer import Canvas
+from archfem.view.films.renderer import Canvas, FramePainter
 from archfem.view.films.settings import Setup, check_film
 from archfem.view.pages.document import render
 from archfem.view.positions import decisive_instant, fields_at, recorded_fields
@@ -152,11 +152,12 @@ class Scene:
         return np.column_stack([points, np.full(len(points), layer * height)])
 
 
-class ScenePainter:
+class ScenePainter(FramePainter):
     """Draws the frames of a film by pyvista."""
 
     def __init__(self, setup: Setup, canvas: Canvas) -> None:
-        self._scene, self._canvas = Scene(setup, canvas.size), canvas
+        super().__init__(setup, canvas)
+        self._scene = Scene(setup, canvas.size)
 
     def draw_background(self) -> None:
         """Draw nothing: the image of a frame covers the window."""
