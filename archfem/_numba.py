@@ -36,9 +36,6 @@ SOURCE_FOLDERS = tuple(
     for room in ("joints/large", "dynamics/solvers", "dynamics/rigid_body")
 )
 
-# Environment variable of numba that names the folder of compiled code
-CACHE_VARIABLE = "NUMBA_CACHE_DIR"
-
 # Compiled code on disk of each function that was declared
 _declared: list["HealingCache"] = []
 
@@ -111,8 +108,8 @@ def _warn_unsaved(folder: str, reason: str) -> None:
     """Warn that compiled code cannot be stored, once a folder."""
     logger.warning(
         "compiled code cannot be stored in %s (%s): this run needs no file, but the next one "
-        "compiles again; make room there, or set %s to another folder",
-        *(folder, reason, CACHE_VARIABLE),
+        "compiles again; make room there, or set NUMBA_CACHE_DIR to another folder",
+        *(folder, reason),
     )
 
 

@@ -19,7 +19,7 @@ import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -31,9 +31,6 @@ from archfem.errors import InvalidInput
 
 # Environment variable with the permitted modules; "*" permits those of all cases
 OWN_CODE_VARIABLE = "ARCHFEM_OWN_CODE"
-
-# Group of the entry points by which installed packages add to archfem
-EXTENSION_GROUP = "archfem.extensions"
 
 # SHA-256 of each loaded module, by its name
 _loaded: dict[str, str] = {}
@@ -182,21 +179,26 @@ def load_extension(path: str | Path) -> ModuleType:
     return module
 
 
+def _installed_extensions() -> EntryPoints:
+    """Return the entry points by which installed packages add to archfem."""
+    return entry_points(group="archfem.extensions")
+
+
 def _package_versions(settings: Table) -> list[tuple[str, str]]:
     """Return names and versions of the installed packages that a case names in `extensions`."""
     names = [str(name) for name in settings.get("extensions", ())]
     return [
         (name, entry.dist.version if entry.dist else "unknown")
         for name in names
-        for entry in entry_points(group=EXTENSION_GROUP, name=name)
+        for entry in _installed_extensions().select(name=name)
     ]
 
 
 def _load_package(name: str) -> ModuleType:
     """Import the module of an installed extension, which adds to archfem."""
-    found = list(entry_points(group=EXTENSION_GROUP, name=name))
+    found = list(_installed_extensions().select(name=name))
     if len(found) != 1:
-        known = sorted(entry_points(group=EXTENSION_GROUP).names)
+        known = sorted(_installed_extensions().names)
         raise InvalidInput(
             f"extension '{name}' is that of {len(found)} installed packages: name one of {known}, "
             "or a file *.py"

@@ -35,8 +35,6 @@ from archfem.view.stress import draw_stress
 from archfem.view.structure import draw_during, draw_names
 from archfem.view.style import Files
 
-SUMMARY_FILE = "summary.txt"
-
 
 @validate_methods
 @dataclass(frozen=True, eq=False)
@@ -205,7 +203,7 @@ def run_files(run: Run, at_rest: DeadLoadResult, text: str) -> Files:
         from archfem.view.films.film import film  # pyvista and the encoder are slow to import
 
         files["hinges.mp4"] = partial(film, dead.model, history)
-    return {**files, SUMMARY_FILE: text}
+    return {**files, "summary.txt": text}
 
 
 def adopt_files(run: Run) -> bool:
@@ -215,7 +213,7 @@ def adopt_files(run: Run) -> bool:
     listed = _files.intact_file_list(folder).get("run")
     names = [] if listed is None else [n for n in listed.files if n.startswith(f"{pair}/")]
     same_history = is_linked(run.path, folder / pair / HISTORY_FILE)
-    if f"{pair}/{SUMMARY_FILE}" not in names or not same_history:
+    if f"{pair}/summary.txt" not in names or not same_history:
         return False
     try:
         for name in names:

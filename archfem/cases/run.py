@@ -51,9 +51,6 @@ logger = logging.getLogger("archfem")
 CASE_FILE = "case.toml"
 HISTORY_FILE = "history.nc"
 
-# Warning of a run that was broken off
-EARLIER_KEPT = "%s keeps the results of an earlier run; what was computed now is in %s"
-
 # Integrates a motion of a case from its dead load, with damping, as `run_time_history` does.
 RunMotion = Callable[[Case, Motion, Equilibrium, Viscous | None], History]
 
@@ -562,7 +559,7 @@ def _publish_run(run: Run, folder: Path, draft: Path, inputs: str) -> Run:
         broken_off = run.error is not None and run.case.suite is None
         replaces = same or listed.inputs != inputs
         if replaces and (broken_off or run.history.ending is Ending.INTERRUPTED):
-            logger.warning(EARLIER_KEPT, folder, draft)
+            _warn_of_draft(folder, draft)
             return run
     _files.publish_draft(folder, "run", inputs)
     return replace(run, path=place)
@@ -576,9 +573,15 @@ def _keep_partial_results(folder: Path, draft: Path, inputs: str) -> None:
         _files.publish_draft(folder, "run", inputs)
         logger.warning("what was computed is kept in %s", folder)
     elif any(path.name == HISTORY_FILE for path in new):
-        logger.warning(EARLIER_KEPT, folder, draft)
+        _warn_of_draft(folder, draft)
     else:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+def _warn_of_draft(folder: Path, draft: Path) -> None:
+    """Say where the results are of a run that was broken off."""
+    text = "%s keeps the results of an earlier run; what was computed now is in %s"
+    logger.warning(text, folder, draft)
 
 
 def link_file(source: Path, target: Path) -> None:

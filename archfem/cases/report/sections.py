@@ -1,7 +1,7 @@
 """Report sections: case and geometry, dead load, modes, limit analysis, ground motion, response."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -26,14 +26,9 @@ from archfem.view.structure import draw_names, draw_structure
 
 
 def build_case_sections(data: ReportData) -> list[Section]:
-    """Build the sections on settings, assumptions, units, signs and geometry."""
+    """Build the sections on assumptions, units, signs and geometry."""
     case = data.case
-    described = ("title", "structure", "materials", "contacts")  # the geometry shows these
-    tables = [table for table in case.settings.items() if table[0] not in described]
-    settings = [row for key, table in tables for row in _flatten(key, table)]
-    blocks: list[Any] = [Grid((), _list_assumptions(data), "Assumptions of the analysis")]
-    if settings:
-        blocks.append(Grid((), settings, "Settings of the case beside its structure"))
+    assumptions = Grid((), _list_assumptions(data), "Assumptions of the analysis")
     signs = [
         ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
         ("signs", SIGN_CONVENTION),
@@ -41,23 +36,10 @@ def build_case_sections(data: ReportData) -> list[Section]:
         ("V / N", "mobilised friction |V| / N: at its limit μ, with c A / N added, it slides"),
     ]
     return [
-        Section("Case and assumptions", blocks),
+        Section("Case and assumptions", [assumptions]),
         Section("Units and signs", [Grid((), signs)]),
         Section("Geometry and materials", _build_geometry(case.structure)),
     ]
-
-
-def _flatten(name: str, value: Any) -> Iterator[tuple[str, str]]:
-    """Yield keys of nested tables, joined by dots, with their values as text."""
-    if isinstance(value, Mapping):
-        for key, inner in value.items():
-            yield from _flatten(f"{name}.{key}", inner)
-    elif isinstance(value, list | tuple):
-        yield name, ", ".join(map(str, value))
-    elif isinstance(value, bool):
-        yield name, "yes" if value else "no"
-    else:
-        yield name, str(value)
 
 
 def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:

@@ -9,7 +9,7 @@ import zlib
 from base64 import b64encode
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -34,9 +34,6 @@ from archfem.view.positions import (
 
 # Default size of the packed part of a player [bytes]
 MAX_PACKED_BYTES = 3_000_000
-
-# Largest V / N in a player [-]; a joint with more is about to open
-MAX_FRICTION_RATIO = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +150,9 @@ class Scene:
     max_bytes: int = MAX_PACKED_BYTES  # size limit of the packed part
     missing_reason: str = ""  # why there are no displacements, if there are none
 
+    # largest V / N that is shown [-]; a joint with more is about to open
+    max_friction_ratio: ClassVar[float] = 5.0
+
     def __post_init__(self) -> None:
         """Refuse a run of another structure or model."""
         if self.run.joints.sizes["joint"] != len(self.structure.joints):
@@ -246,7 +246,7 @@ class Scene:
         pack.add_times("time", joints["time"].values)
         e, ratio, normal = (joints[key].values.T for key in ("eccentricity", "friction", "N"))
         pack.add("e", e, 1e-3)
-        pack.add("ratio", np.minimum(ratio, MAX_FRICTION_RATIO), 1e-3)
+        pack.add("ratio", np.minimum(ratio, self.max_friction_ratio), 1e-3)
         pack.add("normal", normal)
         if "opening" in joints:
             pack.add("opening", joints["opening"].values.T)
@@ -303,7 +303,7 @@ class Scene:
             "still": self.initial_time,
             "chosen": self.initial_joint,
             "every": every,
-            "most": MAX_FRICTION_RATIO,
+            "most": self.max_friction_ratio,
             "end": float(run.time[-1] if falls is None else falls.times[-1]),
             "loose": None if falls is None else float(falls.times[0]),
             "level": None if falls is None else falls.level,
