@@ -30,6 +30,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from archfem._files import temporary_folder
+from archfem._validation import check_integer
 from archfem.cases.provenance import describe_version
 from archfem.errors import ArchfemError, InvalidInput, StudyStopped
 from archfem.studies.evaluators import Evaluator
@@ -73,6 +74,23 @@ def evaluate_batch(
     # the cache between points is not thread-safe
     with _evaluation_lock, threadpool_limits(limits=1), share_results(shared):
         return own_version, list(evaluate_serially(points, evaluator))
+
+
+def evaluate_points(
+    points: Sequence[tuple[int, StudyPoint]],
+    evaluator: Evaluator,
+    workers: int | None = None,
+    log: Path | None = None,
+    meanwhile: Callable[[], object] | None = None,
+    shared: Path | None = None,
+) -> Iterator[tuple[int, Row]]:
+    """Evaluate points on a number of processes, by default one a core; on this one if it is 1."""
+    workers = len(os.sched_getaffinity(0)) if workers is None else workers
+    if check_integer(workers, "workers") > 1 and len(points) > 1:
+        yield from evaluate_on_processes(points, evaluator, workers, log, meanwhile, shared)
+        return
+    with threadpool_limits(limits=1), share_results(shared):
+        yield from evaluate_serially(points, evaluator)
 
 
 def evaluate_serially(

@@ -34,7 +34,7 @@ from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import dead_load
 from archfem.studies.cache import ground_motion
 from archfem.studies.evaluators import Evaluator
-from archfem.studies.process_pool import evaluate_on_processes, evaluate_serially
+from archfem.studies.process_pool import evaluate_points
 
 # What is varied by default: values, of which numbers are the ends of a range
 DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
@@ -147,11 +147,8 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     points = [(k, Variation(base, _resolve_labels(ranges, each))) for k, each in enumerate(changes)]
     evaluator = Evaluator(evaluate_variation)
     rows: dict[int, dict[str, Any]] = {}
-    evaluated = evaluate_serially(points, evaluator)
-    if workers != 1:
-        evaluated = evaluate_on_processes(points, evaluator, workers)
     with tqdm(total=len(points), unit="run", disable=None, leave=False) as bar:
-        for number, row in evaluated:
+        for number, row in evaluate_points(points, evaluator, workers):
             rows[number] = row
             bar.update()
     dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], damping)

@@ -93,7 +93,7 @@ def test_it_goes_on_where_it_ended(small_ida, monkeypatch):
     def never(*_):
         raise AssertionError("searched again")
 
-    monkeypatch.setattr("archfem.studies.study.evaluate_serially", never)
+    monkeypatch.setattr("archfem.studies.process_pool.evaluate_serially", never)
     again = af.ida(case, made(2), precision=0.2, between=(0.3, 2.5), folder=folder, workers=1)
     assert again.table.identical(found.table)
 
