@@ -95,18 +95,16 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
         raise InvalidInput(_missing_case_message(place))
     case = _read_case(place, None if inputs is None else Path(inputs))
     listed = _check_files(place).files
-    if case.suite is not None:
-        files = {name: place / name / HISTORY_FILE for name in case.suite["pairs"]}
-    else:
-        files = {_motion_name(case): place / HISTORY_FILE}
+    pairs = (case.suite or {}).get("pairs", ())
+    files = {name: place / name / HISTORY_FILE for name in pairs} or {"": place / HISTORY_FILE}
     runs = {
         name: History.read(path, case.structure)
         for name, path in files.items()
         if path.is_file() and path.relative_to(place).as_posix() in listed
     }
-    # A single motion without a history is no missing pair: the case may have dead load only.
-    missing = () if case.suite is None else tuple(name for name in files if name not in runs)
-    return ResultFolder(place, case, runs, missing)
+    if single := runs.pop("", None):  # named by its motion
+        runs[str(single.dataset.attrs["motion"]) or "motion"] = single
+    return ResultFolder(place, case, runs, tuple(name for name in pairs if name not in runs))
 
 
 def _check_files(place: Path) -> FileGroup:
@@ -124,14 +122,6 @@ def _check_files(place: Path) -> FileGroup:
         if path.is_file() and path.name != HISTORY_FILE:
             _files.check_listed(path, _files.read_bytes(path, "result", max_bytes=2**40))
     return run
-
-
-def _motion_name(case: Case) -> str:
-    """Return the name of the only motion of a case."""
-    settings = case.motion or {}
-    if "synthetic" in settings:
-        return f"synthetic {settings['synthetic'].get('seed', 0)}"
-    return Path(str(settings.get("file", "motion"))).stem
 
 
 def _missing_case_message(place: Path) -> str:
