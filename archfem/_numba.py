@@ -13,6 +13,7 @@ It is used again only if no module with kernels has changed: kernels contain tho
 import hashlib
 import io
 import logging
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -99,8 +100,16 @@ class HealingCache(FunctionCache):
         """Store the code for a signature; a run does not need the file."""
         try:
             super().save_overload(sig, data)
+            self._delete_moved()
         except OSError as error:
             _warn_unsaved(self._cache_path, error.strerror or str(error))
+
+    def _delete_moved(self) -> None:
+        """Delete files of this function from when it began at another line of its module."""
+        base = self._impl.filename_base
+        for path in Path(self._cache_path).glob(re.sub(r"-\d+\.", "-*.", base) + ".*nb[ic]"):
+            if not path.name.startswith(f"{base}."):
+                path.unlink(missing_ok=True)
 
 
 @cache

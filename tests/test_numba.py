@@ -111,6 +111,21 @@ def test_code_is_compiled_anew_if_any_kernel_has_changed(stored, monkeypatch):
     compiled(hits=1)
 
 
+def test_code_of_a_function_at_another_line_is_deleted(stored, monkeypatch):
+    """Of another function, or of another Python, it stays."""
+    folder, name = stored["index"].parent, stored["index"].name
+    line = re.search(r"-(\d+)\.", name)[1]
+    moved = folder / name.replace(f"-{line}.", "-7.")
+    names = moved.name.replace("add_half", "add"), re.sub(r"\.py\d+", ".py27", moved.name)
+    others = [folder / each for each in names]
+    for path in (moved, *others):
+        path.touch()
+    monkeypatch.setattr(_numba, "source_digest", lambda: "changed")
+    compiled(hits=0)
+    assert not moved.exists()
+    assert all(path.exists() for path in others)
+
+
 def test_the_digest_is_that_of_all_kernels(monkeypatch, tmp_path):
     monkeypatch.setattr(_numba, "SOURCE_FOLDERS", (tmp_path,))
     digests = set()
