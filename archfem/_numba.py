@@ -5,19 +5,16 @@ slices one, by atomic operations that take longer than the arithmetic of small f
 `_nrt` removes the counting; a function that allocates nevertheless does not compile. Divisions do
 not check for zero.
 
-Numba stores compiled code beside the sources. Where these are read-only, as in an installation for
-all users, it goes to the user's cache, and where that is read-only too, to a temporary folder. Each
-file ends with a checksum: a function whose file is damaged is compiled anew.
+Numba stores compiled code beside the sources, or where these are read-only, in the user's cache.
+It is used again only if no module with kernels has changed: kernels contain those that they call.
+ Each file ends with a checksum: a function whose file is damaged is compiled anew.
 """
 
-import atexit
 import hashlib
 import io
 import logging
-import os
-import shutil
+import re
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -40,18 +37,16 @@ SOURCE_FOLDERS = tuple(
     for room in ("joints/large", "dynamics/solvers", "dynamics/rigid_body")
 )
 
-# Environment variable of numba that names the folder of compiled code
-CACHE_VARIABLE = "NUMBA_CACHE_DIR"
+# Compiled code on disk of each function that was declared
+_declared: list["HealingCache"] = []
 
 KERNEL_OPTIONS: Any = {"error_model": "numpy", "_nrt": False}
 
 
 class CheckedCacheFile(IndexDataCacheFile):
-    """Index and data files of a function, each followed by the SHA-256 of its content.
+    """Index and data files of a function, each followed by the SHA-256 of its content."""
 
-    Unpickling ignores the checksum. Without it, a flipped bit in compiled code would not be noticed
-    before that code runs.
-    """
+    # Unpickling ignores the checksum: a flipped bit would not be noticed before the code runs.
 
     def _load_index(self) -> Any:
         """Return the data files by signature; none if the index is damaged or unreadable."""
@@ -81,10 +76,15 @@ class HealingCache(FunctionCache):
 
     def __init__(self, function: Any) -> None:
         super().__init__(function)
-        file = self._cache_file
-        self._cache_file = CheckedCacheFile(
-            self._cache_path, self._impl.filename_base, file._source_stamp
-        )
+        # numba itself would miss a change of a kernel that this one calls, in another module
+        base, stamp = self._impl.filename_base, source_digest()
+        self._cache_file = CheckedCacheFile(self._cache_path, base, stamp)
+        _declared.append(self)
+
+    @property
+    def is_stored(self) -> bool:
+        """Whether code for any signature is on disk, as new as the sources."""
+        return bool(self._cache_file._load_index())
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the code for a signature, or None, upon which numba compiles it."""
@@ -100,8 +100,16 @@ class HealingCache(FunctionCache):
         """Store the code for a signature; a run does not need the file."""
         try:
             super().save_overload(sig, data)
+            self._delete_moved()
         except OSError as error:
             _warn_unsaved(self._cache_path, error.strerror or str(error))
+
+    def _delete_moved(self) -> None:
+        """Delete files of this function from when it began at another line of its module."""
+        base = self._impl.filename_base
+        for path in Path(self._cache_path).glob(re.sub(r"-\d+\.", "-*.", base) + ".*nb[ic]"):
+            if not path.name.startswith(f"{base}."):
+                path.unlink(missing_ok=True)
 
 
 @cache
@@ -109,8 +117,8 @@ def _warn_unsaved(folder: str, reason: str) -> None:
     """Warn that compiled code cannot be stored, once a folder."""
     logger.warning(
         "compiled code cannot be stored in %s (%s): this run needs no file, but the next one "
-        "compiles again; make room there, or set %s to another folder",
-        *(folder, reason, CACHE_VARIABLE),
+        "compiles again; make room there, or set NUMBA_CACHE_DIR to another folder",
+        *(folder, reason),
     )
 
 
@@ -125,8 +133,10 @@ def store_compiled(compile_function: Callable[..., Any]) -> Callable[..., Any]:
 
     def decorate(function: Any) -> Any:
         dispatcher = compile_function(function)
-        with suppress(RuntimeError):  # there is no folder that numba may write to
+        try:
             dispatcher._cache = HealingCache(function)
+        except RuntimeError:  # there is no folder that numba may write to
+            _warn_unsaved("any folder that numba tries", "none may be written to")
         return dispatcher
 
     return decorate
@@ -168,6 +178,9 @@ class CompilationNotice(event.Listener):
     def on_end(self, event: Any) -> None:
         pass
 
+
+if parent_process() is None:  # workers of a study compile what others have announced
+    event.register("numba:compile", CompilationNotice())
 
 _announced: set[str] = set()
 
@@ -222,32 +235,14 @@ def _eliminate(a: Any, b: Any) -> None:
         b[k] /= a[k, k]
 
 
-@cache
-def prepare_cache() -> None:
-    """Choose the folder of compiled code; to be called before the first function is declared."""
-    folder = _cache_folder()
-    if folder is not None:  # child processes inherit it through the environment
-        os.environ[CACHE_VARIABLE] = str(folder)
-        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
-    if parent_process() is None:
-        event.register("numba:compile", CompilationNotice())
-
-
 def cache_folders() -> list[Path]:
-    """Return the folders of compiled code, whether they exist or not."""
-    folder = os.environ.get(CACHE_VARIABLE)
-    if not folder:  # empty counts as unset, for numba too
-        return [source / "__pycache__" for source in SOURCE_FOLDERS]
-    return [place for source in SOURCE_FOLDERS for place in Path(folder).glob(f"{source.name}_*")]
+    """Return the folders of the code of all functions that were declared."""
+    return sorted({Path(each.cache_path) for each in _declared})
 
 
 def count_cached_functions() -> int:
-    """Count the compiled functions that are as new as their sources."""
-    newest = 0.0
-    if not os.environ.get(CACHE_VARIABLE):  # else the folder's name is a digest of the sources
-        newest = max(path.stat().st_mtime for path in _source_files())
-    cached = [path for folder in cache_folders() for path in folder.glob("*.nbi")]
-    return sum(path.stat().st_mtime >= newest for path in cached)
+    """Count the functions that were declared and whose code on disk is that of their sources."""
+    return sum(each.is_stored for each in _declared)
 
 
 def find_damaged_files() -> list[Path]:
@@ -271,68 +266,10 @@ def delete_damaged_files() -> None:
             path.unlink()
 
 
-def delete_stale_cache(folder: Path, *others: Path) -> None:
-    """Delete compiled code of a folder if it is older than any source in this or the other folders.
-
-    Numba checks the source of each function, but not of the functions it calls: a compiled function
-    would go on using their old versions.
-    """
-    sources = [path for each in (folder, *others) for path in each.glob("*.py")]
-    newest = max(path.stat().st_mtime for path in sources)
-    for path in (folder / "__pycache__").glob("*.nb[ic]"):
-        with suppress(OSError):  # another process was first, or the file is read-only
-            if path.stat().st_mtime < newest:
-                path.unlink()
-
-
-def _cache_folder() -> Path | None:
-    """Return the first writable folder for compiled code; None for the default of numba."""
-    chosen = os.environ.get(CACHE_VARIABLE)
-    if not chosen and all(_is_writable(source / "__pycache__") for source in SOURCE_FOLDERS):
-        return None
-    # one folder for each state of the sources, for the reason given in `delete_stale_cache`
-    name = f"archfem-{source_digest()}"
-    places = [Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / name]
-    if chosen:
-        base = Path(chosen)  # or the choice of the parent process, which has such a name already
-        places.insert(0, (base.parent if base.name.startswith("archfem-") else base) / name)
-    for place in places:
-        if _is_writable(place):
-            return place
-    try:
-        temporary = Path(tempfile.mkdtemp(prefix="archfem-"))
-    except OSError as error:  # a full disk: the run compiles, and stores nothing
-        _warn_unsaved(tempfile.gettempdir(), error.strerror or str(error))
-        return None
-    atexit.register(shutil.rmtree, temporary, ignore_errors=True)
-    logger.warning(
-        "compiled code cannot be stored: neither beside %s nor in %s may be written, so that every "
-        "run compiles for a minute or more; set %s to a folder that you may write to",
-        SOURCE_FOLDERS[0],
-        " or ".join(map(str, places)),
-        CACHE_VARIABLE,
-    )
-    return temporary
-
-
-def _is_writable(folder: Path) -> bool:
-    """Return whether files can be created in a folder, which is created if missing."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
-    except OSError:
-        return False
-    return True
-
-
-def _source_files() -> list[Path]:
-    """List the modules with compiled functions."""
-    return sorted(path for source in SOURCE_FOLDERS for path in source.glob("*.py"))
-
-
+@cache
 def source_digest() -> str:
     """Compute a digest of the names and contents of all modules with compiled functions."""
     digest = hashlib.sha256()
-    for path in _source_files():
+    for path in sorted(path for folder in SOURCE_FOLDERS for path in folder.glob("*.py")):
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()[:16]

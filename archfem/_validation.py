@@ -42,10 +42,8 @@ def report_user_errors(what: str) -> Iterator[None]:
 
 
 def read_field_kinds(what: str, cls: type) -> dict[str, Any]:
-    """Return the kinds of the keys of a case that are fields of a dataclass of the user.
-
-    Numbers are without unit, or have that of `field(metadata={"unit": …})`.
-    """
+    """Return the kinds of the keys of a case that are fields of a dataclass of the user."""
+    # numbers are without unit, or have that of `field(metadata={"unit": …})`
     if not is_dataclass(cls):
         raise InvalidInput(f"{what}: {cls!r} is no dataclass: write @dataclass(frozen=True)")
     with report_user_errors(what):

@@ -1,7 +1,6 @@
 """Where compiled code is kept, and what becomes of damaged files."""
 
 import errno
-import logging
 import os
 import re
 import subprocess
@@ -12,64 +11,6 @@ import numba
 import pytest
 
 from archfem import _numba
-
-
-@pytest.fixture
-def closed(monkeypatch, tmp_path):
-    """Folders in which nothing can be written: those of the sources, and any that are added."""
-    folders = {source / "__pycache__" for source in _numba.SOURCE_FOLDERS}
-    monkeypatch.setattr(
-        _numba, "_is_writable", lambda folder: not {folder, *folder.parents} & folders
-    )
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv(_numba.CACHE_VARIABLE, raising=False)
-    return folders
-
-
-@pytest.mark.parametrize("chosen", [None, ""])  # numba takes an empty variable for an unset one
-def test_beside_the_sources_where_that_can_be(monkeypatch, chosen):
-    monkeypatch.delenv(_numba.CACHE_VARIABLE, raising=False)
-    if chosen is not None:
-        monkeypatch.setenv(_numba.CACHE_VARIABLE, chosen)
-    monkeypatch.setattr(_numba, "_is_writable", lambda folder: True)
-    assert _numba._cache_folder() is None
-    assert [path.parent for path in _numba.cache_folders()] == list(_numba.SOURCE_FOLDERS)
-
-
-def test_else_in_the_cache_of_the_user(closed, tmp_path):
-    assert _numba._cache_folder().parent == tmp_path / "cache"
-
-
-def test_where_it_is_asked_for_apart_for_each_state_of_the_sources(closed, monkeypatch, tmp_path):
-    monkeypatch.setenv(_numba.CACHE_VARIABLE, str(tmp_path / "mine"))
-    chosen = _numba._cache_folder()
-    assert chosen.parent == tmp_path / "mine"
-    monkeypatch.setenv(
-        _numba.CACHE_VARIABLE, str(chosen)
-    )  # as a process has it that was started here
-    assert _numba._cache_folder() == chosen
-    monkeypatch.setattr(_numba, "source_digest", lambda: "changed")
-    assert _numba._cache_folder() == chosen.with_name("archfem-changed")
-
-
-def test_nowhere_else_until_the_process_ends(closed, monkeypatch, tmp_path, caplog):
-    closed.add(tmp_path / "cache")
-    kept = []
-    monkeypatch.setattr(_numba.atexit, "register", lambda *given, **_: kept.append(given[1]))
-    with caplog.at_level(logging.WARNING):
-        chosen = _numba._cache_folder()
-    assert kept == [chosen]
-    assert chosen.stat().st_mode & 0o077 == 0  # what lies there is run: nobody else may write it
-    assert "run compiles for a minute" in caplog.text
-    os.rmdir(chosen)
-
-
-def test_what_is_kept_is_counted(monkeypatch, tmp_path):
-    monkeypatch.setenv(_numba.CACHE_VARIABLE, str(tmp_path))
-    assert _numba.count_cached_functions() == 0
-    Path(tmp_path / "solvers_0123").mkdir()
-    (tmp_path / "solvers_0123" / "a.nbi").touch()
-    assert _numba.count_cached_functions() == 1
 
 
 def test_that_it_compiles_is_said_once_for_each_part(capsys, monkeypatch):
@@ -87,7 +28,7 @@ def test_that_it_compiles_is_said_once_for_each_part(capsys, monkeypatch):
 def test_the_stated_time_is_that_of_the_compilation(tmp_path):
     script = tmp_path / "measure.py"
     script.write_text(MEASUREMENT)
-    environment = {**os.environ, _numba.CACHE_VARIABLE: str(tmp_path), "PYTHONPATH": os.getcwd()}
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": os.getcwd()}
     words = [sys.executable, script]
     ran = subprocess.run(words, env=environment, text=True, capture_output=True, check=True)
     stated = float(re.search(r"takes about (\d+) s", ran.stderr)[1])
@@ -124,10 +65,9 @@ def compiled(hits):
 def stored(monkeypatch, tmp_path):
     """Index and code of a small function, in a folder of their own."""
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-    monkeypatch.setenv(_numba.CACHE_VARIABLE, str(tmp_path))
+    monkeypatch.setattr(_numba, "_declared", [])
     compiled(hits=0)
     (index,), (code,) = tmp_path.rglob("*.nbi"), tmp_path.rglob("*.nbc")
-    monkeypatch.setattr(_numba, "cache_folders", lambda: [index.parent])
     return {"index": index, "code": code}
 
 
@@ -158,6 +98,43 @@ def test_damaged_code_is_found_and_compiled_anew(which, damage, stored):
         compiled(hits=1)
 
 
+def test_what_is_stored_is_counted(stored):
+    assert _numba.cache_folders() == [stored["index"].parent]
+    assert _numba.count_cached_functions() == 1
+    stored["index"].unlink()
+    assert _numba.count_cached_functions() == 0
+
+
+def test_code_is_compiled_anew_if_any_kernel_has_changed(stored, monkeypatch):
+    monkeypatch.setattr(_numba, "source_digest", lambda: "changed")
+    compiled(hits=0)
+    compiled(hits=1)
+
+
+def test_code_of_a_function_at_another_line_is_deleted(stored, monkeypatch):
+    """Of another function, or of another Python, it stays."""
+    folder, name = stored["index"].parent, stored["index"].name
+    line = re.search(r"-(\d+)\.", name)[1]
+    moved = folder / name.replace(f"-{line}.", "-7.")
+    names = moved.name.replace("add_half", "add"), re.sub(r"\.py\d+", ".py27", moved.name)
+    others = [folder / each for each in names]
+    for path in (moved, *others):
+        path.touch()
+    monkeypatch.setattr(_numba, "source_digest", lambda: "changed")
+    compiled(hits=0)
+    assert not moved.exists()
+    assert all(path.exists() for path in others)
+
+
+def test_the_digest_is_that_of_all_kernels(monkeypatch, tmp_path):
+    monkeypatch.setattr(_numba, "SOURCE_FOLDERS", (tmp_path,))
+    digests = set()
+    for name, content in (("a.py", "1"), ("b.py", "1"), ("b.py", "2")):
+        (tmp_path / name).write_text(content)
+        digests.add(_numba.source_digest.__wrapped__())
+    assert len(digests) == 3
+
+
 def test_code_that_is_intact_but_cannot_be_loaded_is_compiled_anew(stored, monkeypatch):
     def refuse(*_):
         raise RuntimeError("made by another LLVM")
@@ -179,14 +156,13 @@ def test_a_full_disk_stops_no_run(monkeypatch, tmp_path, caplog):
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
-def test_a_full_disk_leaves_no_folder_for_code(closed, monkeypatch, tmp_path, caplog):
-    def full(**_):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    closed.add(tmp_path / "cache")
-    monkeypatch.setattr(_numba.tempfile, "mkdtemp", full)
-    assert _numba._cache_folder() is None
+def test_without_any_folder_it_compiles_and_says_so(monkeypatch, caplog):
+    for locator in numba.core.caching.CacheImpl._locator_classes:
+        monkeypatch.setattr(locator, "from_function", lambda *_: None)
+    _numba._warn_unsaved.cache_clear()
+    assert _numba.entry(add_half)(2.0) == 2.5
     assert "compiled code cannot be stored" in caplog.text
+    assert "NUMBA_CACHE_DIR" in caplog.text
 
 
 def test_damaged_files_are_deleted_before_all_is_compiled(stored):

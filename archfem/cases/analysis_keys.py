@@ -222,20 +222,7 @@ def parse_rating(table: Any) -> Table:
 def rate_case(
     structure: Structure, rating: Table, limit: LimitAnalysis | None, given: Table
 ) -> Rating:
-    """Rate the bridge of a case, by the joints and the fill of its [limit].
-
-    Args:
-        structure: structure of the case.
-        rating: arguments of `rate` that the case gives.
-        limit: limit analysis of the case, or None.
-        given: arguments that replace those of the case.
-
-    Returns:
-        Result of `archfem.rate`.
-
-    Raises:
-        InvalidInput: no vehicle is given, or as for `archfem.rate`.
-    """
+    """Rate the bridge of a case, by the joints and the fill of its [limit]."""
     options = {**rating, **given}
     if "vehicle" not in options:
         raise InvalidInput(
@@ -248,34 +235,16 @@ def rate_case(
 
 @dataclass(frozen=True)
 class AssessmentSettings:
-    """Kinematic assessment of a case.
+    """Kinematic assessment of a case."""
 
-    Attributes:
-        spectrum: spectrum of the demand, or None for that of the case's suite or motion.
-        directions: senses of the horizontal forces, 1 to the right and -1 to the left.
-        options: other arguments of `kinematic_assessment`.
-    """
-
-    spectrum: DesignSpectrum | None
-    directions: tuple[float, ...]
-    options: dict[str, Any]
+    spectrum: DesignSpectrum | None  # of the demand; None for that of the case's suite or motion
+    directions: tuple[float, ...]  # of the horizontal forces, 1 to the right and -1 to the left
+    options: dict[str, Any]  # other arguments of `kinematic_assessment`
 
     def solve(
         self, structure: Structure, demand: DesignSpectrum | Motion | None, parts: bool = False
     ) -> dict[str, KinematicAssessment]:
-        """Assess the structure, or each part by itself, in each direction.
-
-        Args:
-            structure: structure of the case.
-            demand: spectrum of the suite, or motion, where the section has no spectrum.
-            parts: whether every part is assessed by itself.
-
-        Returns:
-            Assessments by direction, and part if `parts`.
-
-        Raises:
-            InvalidInput: there is no spectrum, or as for `kinematic_assessment`.
-        """
+        """Assess the structure, or each part by itself, in each direction."""
         spectrum = self.spectrum if self.spectrum is not None else demand
         if spectrum is None:
             raise InvalidInput(

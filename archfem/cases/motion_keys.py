@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from archfem._typing import Array
 from archfem.cases.toml_file import Table, check_choice, check_table
@@ -156,8 +157,8 @@ def build_suite(settings: Table, folder: Path = Path()) -> Suite:
     return suite.reversed() if settings.get("reversed", False) else suite
 
 
-def tabulate_selection(selection: RecordSelection, folder: Path, target: Table) -> dict[str, Any]:
-    """Return the [suite] of selected records of a folder, with a target spectrum."""
+def write_selected_suite(selection: RecordSelection, folder: Path, target: Table) -> str:
+    """Write the [suite] of selected records of a folder, with a target spectrum, as TOML."""
     pairs: dict[str, Any] = {}
     for record in selection.records:
         name = re.sub(r"[^\w +-]", "_", record.motion.name)
@@ -168,7 +169,8 @@ def tabulate_selection(selection: RecordSelection, folder: Path, target: Table) 
             if component != "transverse"  # which plane structures do not feel
         }
         pairs[name] = pair.pop("horizontal") | pair | {"scale": record.scale}
-    return {"name": selection.rule.name, "folder": str(folder), "target": target, "pairs": pairs}
+    suite = {"name": selection.rule.name, "folder": str(folder), "target": target, "pairs": pairs}
+    return tomli_w.dumps({"suite": suite})
 
 
 def _locate_component(path: Path, samples: Array, folder: Path) -> dict[str, Any]:

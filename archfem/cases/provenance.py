@@ -19,7 +19,7 @@ import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -105,10 +105,8 @@ def hash_sections(
 
 
 def remove_presentation(settings: Table) -> dict[str, Any]:
-    """Return the settings without those that change no number: the title, and pictures and films.
-
-    The largest values of a run are those of its records, so that `output.save_every` stays.
-    """
+    """Return the settings without those that change no number: title, pictures and films."""
+    # the largest values of a run are those of its records, so that `output.save_every` stays
     output = _as_table(settings.get("output"))
     kept = {key: value for key, value in output.items() if key == "save_every"}
     others = {key: value for key, value in settings.items() if key not in ("title", "output")}
@@ -181,12 +179,9 @@ def load_extension(path: str | Path) -> ModuleType:
     return module
 
 
-def _find_packages(name: str | None = None) -> list[EntryPoint]:
-    """Return the installed extensions of a name, or all."""
-    found = entry_points(group="archfem.extensions")
-    # a distribution that is on the path twice is listed twice
-    distinct = {(entry.name, entry.value): entry for entry in found}
-    return [entry for entry in distinct.values() if name in (None, entry.name)]
+def _installed_extensions() -> EntryPoints:
+    """Return the entry points by which installed packages add to archfem."""
+    return entry_points(group="archfem.extensions")
 
 
 def _package_versions(settings: Table) -> list[tuple[str, str]]:
@@ -195,15 +190,15 @@ def _package_versions(settings: Table) -> list[tuple[str, str]]:
     return [
         (name, entry.dist.version if entry.dist else "unknown")
         for name in names
-        for entry in _find_packages(name)
+        for entry in _installed_extensions().select(name=name)
     ]
 
 
 def _load_package(name: str) -> ModuleType:
     """Import the module of an installed extension, which adds to archfem."""
-    found = _find_packages(name)
+    found = list(_installed_extensions().select(name=name))
     if len(found) != 1:
-        known = sorted({entry.name for entry in _find_packages()})
+        known = sorted(_installed_extensions().names)
         raise InvalidInput(
             f"extension '{name}' is that of {len(found)} installed packages: name one of {known}, "
             "or a file *.py"

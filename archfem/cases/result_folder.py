@@ -3,11 +3,10 @@
 The files of a run appear in its folder together, when all of them exist (`archfem._files`).
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-
-import tomli_w
 
 from archfem import _files
 from archfem._files import FileGroup
@@ -23,31 +22,18 @@ from archfem.cases.run import (
     is_linked,
     link_file,
 )
-from archfem.cases.toml_file import Table, read_tables
-from archfem.dynamics.accuracy import Accuracy
+from archfem.cases.toml_file import read_tables
 from archfem.dynamics.history import History
-from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.limit.collapse import Collapse
-from archfem.limit.vehicles import Rating
-from archfem.motion.design_spectra import DesignSpectrum
-from archfem.motion.motion import Motion
-from archfem.motion.record_selection import RecordSelection
-from archfem.motion.suite import Suite
-from archfem.statics.mechanism_assessment import KinematicAssessment
-from archfem.statics.modes import Modes
 from archfem.statics.stress import strength_use_table
-from archfem.view.collapse import draw_collapse, draw_fall, draw_kinematic_assessment, draw_rating
-from archfem.view.histories import draw_envelope, draw_joints, most_stressed_joints
-from archfem.view.motions import draw_motion, draw_selection, draw_spectra, draw_suite
+from archfem.view.collapse import draw_fall
+from archfem.view.histories import draw_envelope, draw_envelopes
 from archfem.view.positions import decisive_instant
-from archfem.view.statics import draw_dead_load, draw_free_body, draw_modes
+from archfem.view.statics import draw_free_body
 from archfem.view.stress import draw_stress
 from archfem.view.structure import draw_during, draw_names
-from archfem.view.studies import draw_accuracy, draw_verdict_range
-from archfem.view.style import LINE_COLOURS, save
-
-SUMMARY_FILE = "summary.txt"
+from archfem.view.style import Files
 
 
 @validate_methods
@@ -109,18 +95,16 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
         raise InvalidInput(_missing_case_message(place))
     case = _read_case(place, None if inputs is None else Path(inputs))
     listed = _check_files(place).files
-    if case.suite is not None:
-        files = {name: place / name / HISTORY_FILE for name in case.suite["pairs"]}
-    else:
-        files = {_motion_name(case): place / HISTORY_FILE}
+    pairs = (case.suite or {}).get("pairs", ())
+    files = {name: place / name / HISTORY_FILE for name in pairs} or {"": place / HISTORY_FILE}
     runs = {
         name: History.read(path, case.structure)
         for name, path in files.items()
         if path.is_file() and path.relative_to(place).as_posix() in listed
     }
-    # A single motion without a history is no missing pair: the case may have dead load only.
-    missing = () if case.suite is None else tuple(name for name in files if name not in runs)
-    return ResultFolder(place, case, runs, missing)
+    if single := runs.pop("", None):  # named by its motion
+        runs[str(single.dataset.attrs["motion"]) or "motion"] = single
+    return ResultFolder(place, case, runs, tuple(name for name in pairs if name not in runs))
 
 
 def _check_files(place: Path) -> FileGroup:
@@ -138,14 +122,6 @@ def _check_files(place: Path) -> FileGroup:
         if path.is_file() and path.name != HISTORY_FILE:
             _files.check_listed(path, _files.read_bytes(path, "result", max_bytes=2**40))
     return run
-
-
-def _motion_name(case: Case) -> str:
-    """Return the name of the only motion of a case."""
-    settings = case.motion or {}
-    if "synthetic" in settings:
-        return f"synthetic {settings['synthetic'].get('seed', 0)}"
-    return Path(str(settings.get("file", "motion"))).stem
 
 
 def _missing_case_message(place: Path) -> str:
@@ -175,89 +151,59 @@ def _read_case(place: Path, inputs: Path | None) -> Case:
         raise type(error)(f"{path}: {error}") from error
 
 
-def write_limit(case: Case, collapse: Collapse, text: str, folder: Path) -> list[Path]:
-    """Write limit analysis and the joints at collapse, and draw the mechanism."""
+def limit_files(collapse: Collapse, text: str) -> Files:
+    """Return text, joints at collapse and mechanism of a limit analysis."""
     columns = ["name", "N", "V", "M", "eccentricity"]
-    joints = collapse.joints.to_dataframe()[columns]
-    return [
-        _write_text(text, folder / "limit.txt"),
-        _write_text(joints.to_csv(index=False).rstrip(), folder / "limit.csv"),
-        save(draw_collapse(case.structure, collapse), folder / "collapse.png"),
-    ]
+    joints = collapse.joints.to_dataframe()[columns].to_csv(index=False).rstrip()
+    return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot()}
 
 
-def write_assessments(
-    found: Mapping[str, KinematicAssessment], text: str, folder: Path
-) -> list[Path]:
-    """Write the results of kinematic assessments, and draw each."""
-    figures = [
-        save(draw_kinematic_assessment(result), folder / f"assessment_{place}.png")
-        for place, result in enumerate(found.values())
-        if result.path is not None
-    ]
-    return [_write_text(text, folder / "assessment.txt"), *figures]
-
-
-def write_rating(found: Rating, folder: Path) -> list[Path]:
-    """Write the rating of a bridge, the factors at all places, and the picture of both."""
-    return [
-        _write_text(str(found), folder / "rating.txt"),
-        _write_text(found.table(), folder / "rating.csv"),
-        save(draw_rating(found), folder / "rating.png"),
-    ]
-
-
-def write_dead_load(result: DeadLoadResult, folder: Path) -> list[Path]:
-    """Draw thrust line, joint names, and, where available, stress and a free body."""
+def dead_load_files(result: DeadLoadResult) -> Files:
+    """Return thrust line, joint names, and, where available, stress and a free body."""
     case, dead, model = result.case, result.dead, result.dead.model
-    files = [
-        save(draw_dead_load(dead, criteria=case.criteria), folder / "dead.png"),
-        save(draw_names(case.structure), folder / "names.png"),
-    ]
+    files: Files = {
+        "dead.png": dead.plot(criteria=case.criteria),
+        "names.png": draw_names(case.structure),
+    }
     if result.strength_use is not None:
-        files.append(save(draw_stress(model, dead), folder / "dead_stress.png"))
-        table = strength_use_table(result.strength_use)
-        files.append(_write_text(table, folder / "dead_stress.txt"))
+        files["dead_stress.png"] = draw_stress(model, dead)
+        files["dead_stress.txt"] = strength_use_table(result.strength_use)
     if "free_body" in case.output:
         block = case.output["free_body"]
-        figure = draw_free_body(case.structure, dead.joints, block, cells=model.cells)
-        files.append(save(figure, folder / "free_body.png"))
+        files["free_body.png"] = draw_free_body(
+            case.structure, dead.joints, block, cells=model.cells
+        )
     return files
 
 
-def write_run(run: Run, at_rest: DeadLoadResult, text: str, folder: Path) -> list[Path]:
-    """Draw critical instant, envelope, joints over time and fall of a run; film it if requested."""
+def run_files(run: Run, at_rest: DeadLoadResult, text: str) -> Files:
+    """Return critical instant, envelope, joints over time, fall, film and summary of a run."""
     case, history, dead = run.case, run.history, at_rest.dead
+    files: Files = {} if case.suite is None else {"motion.png": run.motion.plot()}
     critical = history.joints.sel(time=decisive_instant(history), method="nearest")
-    figures = {
+    files |= {
         "critical_instant.png": draw_during(dead.model, history, critical),
         "envelope.png": draw_envelope({case.title: history}, dead=dead.joints),
         # The joints of the case, or else those of the largest |e| and of the longest sliding.
-        "joints.png": draw_joints(history, case.joints or most_stressed_joints(history)),
+        "joints.png": history.plot(joints=case.joints or None),
     }
     if "fall_pose" in history.dataset:
-        figures["fall.png"] = draw_fall(history)
-    if case.suite is not None:
-        figures = {"motion.png": draw_motion(run.motion)} | figures
-    files = [save(figure, folder / name) for name, figure in figures.items()]
+        files["fall.png"] = draw_fall(history)
     if case.output.get("animation", False):
         from archfem.view.films.film import film  # pyvista and the encoder are slow to import
 
-        files.append(film(dead.model, history, folder / "hinges.mp4"))
-    return [*files, _write_text(text, folder / SUMMARY_FILE)]
+        files["hinges.mp4"] = partial(film, dead.model, history)
+    return {**files, "summary.txt": text}
 
 
 def adopt_files(run: Run) -> bool:
-    """Add the files of a pair that an earlier call has finished to the draft of its history.
-
-    Returns False, and adds none, if they are not those of this history.
-    """
+    """Add the files of a pair that an earlier call has finished to the draft of its history."""
     assert run.path is not None
     pair, draft, folder = run.path.parents[0].name, run.path.parents[1], run.path.parents[2]
     listed = _files.intact_file_list(folder).get("run")
     names = [] if listed is None else [n for n in listed.files if n.startswith(f"{pair}/")]
     same_history = is_linked(run.path, folder / pair / HISTORY_FILE)
-    if f"{pair}/{SUMMARY_FILE}" not in names or not same_history:
+    if f"{pair}/summary.txt" not in names or not same_history:
         return False
     try:
         for name in names:
@@ -270,71 +216,9 @@ def adopt_files(run: Run) -> bool:
     return True
 
 
-def write_suite(suite: Suite, target: DesignSpectrum | None, folder: Path) -> list[Path]:
-    """Draw the spectra of a suite beside its target."""
-    return [save(draw_suite(suite, target), folder / "spectra.png")]
-
-
-def write_pairs(
-    runs: Mapping[str, History], at_rest: DeadLoadResult, text: str, folder: Path
-) -> list[Path]:
-    """Write the table of a suite, and draw the envelopes of its runs."""
-    pairs, per_figure = list(runs.items()), len(LINE_COLOURS)  # as many runs as line styles
-    files = [_write_text(text, folder / "suite.txt")]
-    for number, first in enumerate(range(0, len(pairs), per_figure), start=1):
-        figure = draw_envelope(dict(pairs[first : first + per_figure]), dead=at_rest.dead.joints)
-        name = "envelope.png" if number == 1 else f"envelope_{number}.png"
-        files.append(save(figure, folder / name))
-    return files
-
-
-def write_modes(modes: Modes, text: str, folder: Path) -> list[Path]:
-    """Write the table of modes, and draw their shapes."""
-    return [_write_text(text, folder / "modes.txt"), save(draw_modes(modes), folder / "modes.png")]
-
-
-def write_accuracy(accuracy: Accuracy, text: str, folder: Path) -> list[Path]:
-    """Write and draw computing time against error."""
-    figure = save(draw_accuracy(accuracy), folder / "accuracy.png")
-    return [_write_text(text, folder / "accuracy.txt"), figure]
-
-
-def write_verdict_range(verdicts: VerdictRange, folder: Path) -> list[Path]:
-    """Write and draw the verdicts over a range of properties."""
-    return [
-        verdicts.save(folder / "verdict_range.nc"),
-        _write_text(str(verdicts), folder / "verdict_range.txt"),
-        save(draw_verdict_range(verdicts), folder / "verdict_range.png"),
-    ]
-
-
-def write_motions(motions: Sequence[Motion], folder: Path) -> list[Path]:
-    """Draw each motion with its integrals, and the spectra of all."""
-    files = [save(draw_motion(motion), folder / f"{motion.name}.png") for motion in motions]
-    return [*files, save(draw_spectra(motions), folder / "spectra.png")]
-
-
-def write_selection(found: RecordSelection, suite: Table, folder: Path) -> list[Path]:
-    """Write selected records as text, table, picture, and as the [suite] of a case."""
-    return [
-        _write_text(str(found), folder / "selection.txt"),
-        _write_text(found.table(), folder / "selection.csv"),
-        _write_text(tomli_w.dumps({"suite": suite}), folder / "selection.toml"),
-        save(draw_selection(found), folder / "selection.png"),
-    ]
-
-
-def with_unique_names(motions: Sequence[Motion], names: Sequence[str]) -> list[Motion]:
-    """Return motions named as their files, with a number behind a name that is used before."""
-    named: list[Motion] = []
-    for index, (motion, name) in enumerate(zip(motions, names, strict=True)):
-        before = list(names[:index]).count(name)
-        named.append(replace(motion, name=f"{name} ({before + 1})" if before else name))
-    return named
-
-
-def _write_text(text: str, path: Path) -> Path:
-    """Write a text atomically."""
-    with _files.atomic_write(path) as draft:
-        draft.write_text(text + "\n", encoding="utf-8")
-    return path
+def pair_files(runs: Mapping[str, History], at_rest: DeadLoadResult, text: str) -> Files:
+    """Return the table of a suite, and the envelopes of its runs."""
+    figures = draw_envelopes(runs, at_rest.dead.joints)
+    numbers = ["", *(f"_{number}" for number in range(2, len(figures) + 1))]
+    envelopes = {f"envelope{k}.png": each for k, each in zip(numbers, figures, strict=True)}
+    return {"suite.txt": text, **envelopes}

@@ -72,10 +72,7 @@ RUN_COLUMNS = (
 
 
 def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
-    """Tabulate the runs of a suite: verdict, ground motion, critical joint, and mechanisms.
-
-    A mechanism has its class, time, duration and opening; the last row counts the runs with one.
-    """
+    """Tabulate the runs of a suite: verdict, ground motion, critical joint, and mechanisms."""
     definitions = (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
     endings = {Ending.FINISHED: "reached", Ending.EVENT: "ended"}
     rows = []

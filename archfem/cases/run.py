@@ -51,9 +51,6 @@ logger = logging.getLogger("archfem")
 CASE_FILE = "case.toml"
 HISTORY_FILE = "history.nc"
 
-# Warning of a run that was broken off
-EARLIER_KEPT = "%s keeps the results of an earlier run; what was computed now is in %s"
-
 # Integrates a motion of a case from its dead load, with damping, as `run_time_history` does.
 RunMotion = Callable[[Case, Motion, Equilibrium, Viscous | None], History]
 
@@ -460,21 +457,11 @@ def doubt_fidelity(
     at_rest: DeadLoadResult,
     motion: Motion,
     history: History,
-    duration: float = 0.5,
+    duration: float = 0.5,  # from the start of the motion [s]
+    # of the largest |e| [-]; rigid stones of ordinary stiffness differ by 0.02 where joints slide
     tolerance: float = 0.03,
 ) -> list[Doubt]:
-    """Return a doubt where the next finer fidelity disagrees in |e| at the start of a run.
-
-    A fidelity that was selected by its predicted error is not compared.
-
-    Args:
-        at_rest: dead load of the case.
-        motion: ground motion.
-        history: history of the run.
-        duration: duration of the comparison from the start of the motion [s].
-        tolerance: admissible difference of the largest |e| of any joint [-]; rigid stones of
-            ordinary stiffness differ by 0.02 where joints slide.
-    """
+    """Return a doubt where the next finer fidelity disagrees in |e| at the start of a run."""
     if (finer := at_rest.finer) is None:
         return []
     other, dead = finer
@@ -516,11 +503,9 @@ def load_finished_run(path: Path, case: Case, motion: Motion) -> History | None:
 
 @contextmanager
 def replace_run(case: Case, folder: Path) -> Iterator[Path]:
-    """Yield a draft folder whose files replace those of an earlier run when the block ends.
-
-    The draft has the case, and of a suite the histories of earlier calls. If the block fails, the
-    folder keeps the results of an earlier run; without any it gets what was computed.
-    """
+    """Yield a draft folder whose files replace those of an earlier run when the block ends."""
+    # If the block fails, the folder keeps the results of an earlier run; without any it gets what
+    # was computed. The draft of a suite has the histories of earlier calls.
     inputs = hash_inputs(case.settings, case.folder)
     with _files.lock_folder(folder):
         draft = _start_draft(case, folder, inputs)
@@ -574,7 +559,7 @@ def _publish_run(run: Run, folder: Path, draft: Path, inputs: str) -> Run:
         broken_off = run.error is not None and run.case.suite is None
         replaces = same or listed.inputs != inputs
         if replaces and (broken_off or run.history.ending is Ending.INTERRUPTED):
-            logger.warning(EARLIER_KEPT, folder, draft)
+            _warn_of_draft(folder, draft)
             return run
     _files.publish_draft(folder, "run", inputs)
     return replace(run, path=place)
@@ -588,9 +573,15 @@ def _keep_partial_results(folder: Path, draft: Path, inputs: str) -> None:
         _files.publish_draft(folder, "run", inputs)
         logger.warning("what was computed is kept in %s", folder)
     elif any(path.name == HISTORY_FILE for path in new):
-        logger.warning(EARLIER_KEPT, folder, draft)
+        _warn_of_draft(folder, draft)
     else:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+def _warn_of_draft(folder: Path, draft: Path) -> None:
+    """Say where the results are of a run that was broken off."""
+    text = "%s keeps the results of an earlier run; what was computed now is in %s"
+    logger.warning(text, folder, draft)
 
 
 def link_file(source: Path, target: Path) -> None:

@@ -35,10 +35,8 @@ _recent_structures: OrderedDict[str, Structure] = OrderedDict()
 
 
 def cached_structure(settings: Table, folder: Path = Path(), max_cached: int = 8) -> Structure:
-    """Return the structure of a case under the case's title; recent ones are cached.
-
-    Structures are immutable, so that cases with the same tables and drawing share one.
-    """
+    """Return the structure of a case under the case's title; recent ones are cached."""
+    # structures are immutable: cases with the same tables and drawing share one
     # Only these sections describe the structure; the title is its name.
     sections = ("title", "structure", "materials", "contacts")
     tables = {name: settings[name] for name in sections if name in settings}

@@ -5,7 +5,7 @@ import io
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
-from functools import partial
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,8 @@ from archfem.limit.collapse import Collapse
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.modes import Modes
+from archfem.view.motions import draw_spectra, draw_suite
+from archfem.view.style import Files, write_files
 
 # Modules that import pyvista or studies, which are slow, are imported where they are needed.
 
@@ -35,47 +37,50 @@ class FailedPairs(DidNotConverge):
 def run(options: argparse.Namespace) -> int:
     """Carry out a case: limit analysis, dead load and time histories, tables and pictures."""
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
-    headline, failure = "", None
-    output = io.StringIO()
-    try:
-        # All else is printed after the verdict, which is known last.
-        with replace_run(case, folder) as draft, redirect_stdout(output):
-            if options.workers > 1 and case.suite is not None:
-                from archfem.studies.study import compute_pairs
+    failure = None
+    # All else is printed after the verdict, which is known last.
+    with _print_at_end(folder, "run", case.title) as verdict, replace_run(case, folder) as draft:
+        if options.workers > 1 and case.suite is not None:
+            from archfem.studies.study import compute_pairs
 
-                # Workers save the histories, which are reused below.
-                compute_pairs(case, draft, workers=options.workers)
-            try:
-                headline, doubtful = print_results(case, carry_out(case, draft), draft)
-            except FailedPairs as error:
-                failure = error
-    finally:
-        print(f"{case.title}: {headline}" if headline else case.title)
-        print(_name_published_files(output.getvalue(), folder, "run"), end="")
+            # Workers save the histories, which are reused below.
+            compute_pairs(case, draft, workers=options.workers)
+        try:
+            headline, doubtful = print_results(case, carry_out(case, draft), draft)
+            verdict.append(headline)
+        except FailedPairs as error:
+            failure = error
     if failure is not None:
         raise failure
     return ExitCode.DOUBTFUL if doubtful else 0
 
 
 @contextmanager
-def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
-    """Yield the draft folder of a command; its output is printed when the results are in place."""
-    output = io.StringIO()
+def _print_at_end(folder: Path, command: str, title: str = "") -> Iterator[list[str]]:
+    """Print the output of a block when its results are in place, below a title and a verdict."""
+    output, verdict = io.StringIO(), list[str]()
     try:
-        inputs = hash_inputs(case.settings, case.folder)
-        with replace_results(folder, command, inputs) as draft, redirect_stdout(output):
-            yield draft
+        with redirect_stdout(output):
+            yield verdict
     finally:
+        if title:
+            print(": ".join([title, *filter(None, verdict)]))
         print(_name_published_files(output.getvalue(), folder, command), end="")
 
 
-def _write_results(
-    command: str, case: Case, out: str | None, write: Callable[[Path], Iterable[Path]]
-) -> None:
+@contextmanager
+def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
+    """Yield the draft folder of a command; its output is printed when the results are in place."""
+    inputs = hash_inputs(case.settings, case.folder)
+    with _print_at_end(folder, command), replace_results(folder, command, inputs) as draft:
+        yield draft
+
+
+def _write_results(command: str, case: Case, out: str | None, draw: Callable[[], Files]) -> None:
     """Write the results of a command to its folder, if one is given."""
     if out is not None:
         with _replace_results(command, case, create_result_folder(out)) as draft:
-            print_written(write(draft))
+            write(draw(), draft)
 
 
 def _name_published_files(text: str, folder: Path, command: str) -> str:
@@ -99,7 +104,7 @@ def modes(options: argparse.Namespace) -> None:
         print(result_text.describe_dead_load(at_rest))
         computed = print_modes(at_rest, options.count, draft)
         first = range(1, min(len(computed.frequencies), 2) + 1)
-        print_written([film_modes(computed, draft / "modes.gif", first)])
+        write({"modes.gif": lambda path: film_modes(computed, path, first)}, draft)
 
 
 def limit(options: argparse.Namespace) -> None:
@@ -110,8 +115,7 @@ def limit(options: argparse.Namespace) -> None:
     found = case.limit.solve(case.structure)
     text = result_text.describe_collapse(case.structure, found)
     print(f"{case.title}\n{text}")
-    write = partial(results.write_limit, case, found, text)
-    _write_results("limit", case, options.out, write)
+    _write_results("limit", case, options.out, lambda: results.limit_files(found, text))
 
 
 def assess(options: argparse.Namespace) -> None:
@@ -122,7 +126,13 @@ def assess(options: argparse.Namespace) -> None:
     found = case.assessment.solve(case.structure, demand, options.parts)
     text = "\n\n".join(f"{name}: {result}" for name, result in found.items())
     print(f"{case.title}\n{text}")
-    _write_results("assess", case, options.out, partial(results.write_assessments, found, text))
+
+    def draw() -> Files:
+        mechanisms = [k for k, result in enumerate(found.values()) if result.path is not None]
+        figures = {f"assessment_{k}.png": list(found.values())[k].plot() for k in mechanisms}
+        return {"assessment.txt": text, **figures}
+
+    _write_results("assess", case, options.out, draw)
 
 
 def rate(options: argparse.Namespace) -> None:
@@ -132,7 +142,8 @@ def rate(options: argparse.Namespace) -> None:
     given = {key: value for key in keys if (value := getattr(options, key)) is not None}
     found = rate_case(case.structure, case.rating, case.limit, given)
     print(f"{case.title}\n{found}")
-    _write_results("rate", case, options.out, partial(results.write_rating, found))
+    texts = {"rating.txt": str(found), "rating.csv": found.table()}
+    _write_results("rate", case, options.out, lambda: {**texts, "rating.png": found.plot()})
 
 
 def mesh(options: argparse.Namespace) -> None:
@@ -147,13 +158,14 @@ def mesh(options: argparse.Namespace) -> None:
 def accuracy(options: argparse.Namespace) -> None:
     """Run a case over fidelities, meshes, quadratures and steps: table and picture."""
     from archfem.studies.convergence import case_accuracy
+    from archfem.view.studies import draw_accuracy
 
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     compared = case_accuracy(case, folder / "settings", workers=options.workers)
     with _replace_results("accuracy", case, folder) as draft:
         text = result_text.describe_accuracy(compared)
         print(text)
-        print_written(results.write_accuracy(compared, text, draft))
+        write({"accuracy.txt": text, "accuracy.png": draw_accuracy(compared)}, draft)
 
 
 def verdict(options: argparse.Namespace) -> None:
@@ -166,7 +178,12 @@ def verdict(options: argparse.Namespace) -> None:
     print(case.title)
     computed = verdict_range_of_case(case, workers=options.workers, samples=options.samples)
     print(computed)
-    _write_results("verdict", case, options.out, partial(results.write_verdict_range, computed))
+
+    def draw() -> Files:
+        files: Files = {"verdict_range.nc": computed.save}
+        return files | {"verdict_range.txt": str(computed), "verdict_range.png": computed.plot()}
+
+    _write_results("verdict", case, options.out, draw)
 
 
 def report(options: argparse.Namespace) -> None:
@@ -184,9 +201,10 @@ def motion(options: argparse.Namespace) -> None:
     folder = create_result_folder(options.out)
     given = {key: getattr(options, key) for key in ("column", "units", "dt", "response")}
     read, refused = _read_records(options.files, given)
-    motions = results.with_unique_names(list(read.values()), [Path(path).name for path in read])
+    motions = _name_by_file(read)
     print(result_text.tabulate_motions(motions).text)
-    print_written(results.write_motions(motions, folder))
+    figures = {f"{motion.name}.png": motion.plot() for motion in motions}
+    write({**figures, "spectra.png": draw_spectra(motions)}, folder)
     if refused:
         raise InvalidInput(
             f"{len(refused)} of {len(options.files)} files were refused, as said above"
@@ -195,7 +213,7 @@ def motion(options: argparse.Namespace) -> None:
 
 def select(options: argparse.Namespace) -> None:
     """Select records of a folder by a code's rule: text, table, picture, and [suite] of a case."""
-    from archfem.cases.motion_keys import build_spectrum, tabulate_selection
+    from archfem.cases.motion_keys import build_spectrum, write_selected_suite
     from archfem.cases.toml_file import parse_tables
     from archfem.motion.record_selection import select_records
 
@@ -213,10 +231,22 @@ def select(options: argparse.Namespace) -> None:
         failure, found = error, error.last
     print(found)
     if options.out is not None:
-        suite = tabulate_selection(found, Path(options.folder).absolute(), target)
-        print_written(results.write_selection(found, suite, create_result_folder(options.out)))
+        suite = write_selected_suite(found, Path(options.folder).absolute(), target)
+        texts = {"selection.txt": str(found), "selection.csv": found.table()}
+        texts["selection.toml"] = suite.rstrip()
+        write({**texts, "selection.png": found.plot()}, create_result_folder(options.out))
     if failure is not None:
         raise DidNotConverge("no set was found that meets the rule: above is the nearest")
+
+
+def _name_by_file(read: Mapping[str, Motion]) -> list[Motion]:
+    """Return motions named as their files, with a number behind a name that is used before."""
+    named: list[Motion] = []
+    names = [Path(path).name for path in read]
+    for index, (motion, name) in enumerate(zip(read.values(), names, strict=True)):
+        before = names[:index].count(name)
+        named.append(replace(motion, name=f"{name} ({before + 1})" if before else name))
+    return named
 
 
 def _read_records(
@@ -255,17 +285,17 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
         if isinstance(result, Collapse):
             text = result_text.describe_collapse(case.structure, result)
             print(text)
-            print_written(results.write_limit(case, result, text, folder))
+            write(results.limit_files(result, text), folder)
         elif isinstance(result, DeadLoadResult):
             at_rest = result
             print(result_text.describe_dead_load(at_rest))
-            print_written(results.write_dead_load(at_rest, folder))
+            write(results.dead_load_files(at_rest), folder)
             if case.has_motion:
                 _print_first_modes(at_rest, folder)
         elif isinstance(result, Suite):
             suite = result
             print_motions(suite)
-            print_written(results.write_suite(suite, case.target, folder))
+            write({"spectra.png": draw_suite(suite, case.target)}, folder)
         else:
             print(f"{result.motion.name}: {result.history.outcome}", file=sys.stderr)
             _print_run(result, at_rest)
@@ -292,7 +322,7 @@ def print_modes(at_rest: DeadLoadResult, count: int, folder: Path) -> Modes:
     computed = compute_modes(at_rest.dead.model, count, about=at_rest.dead)
     text = f"{computed.table()}\n\n{at_rest.damping[1]}"
     print(text)
-    print_written(results.write_modes(computed, text, folder))
+    write({"modes.txt": text, "modes.png": computed.plot()}, folder)
     return computed
 
 
@@ -314,10 +344,10 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
             f"time history: {motion.name}, PGA {motion.pga:.2f} m/s², "
             f"{float(history.time[-1]):.2f} s in {run.seconds:.1f} s; {history.outcome}"
         )
-        print_written([run.path])
+        print(f"wrote {run.path}")
     text = result_text.describe_run(run.case.structure, history, at_rest.dead.joints)
     print(text)
-    print_written(results.write_run(run, at_rest, text, run.path.parent))
+    write(results.run_files(run, at_rest, text), run.path.parent)
     if history.ending is Ending.INTERRUPTED and run.case.suite is None:
         raise KeyboardInterrupt
 
@@ -330,7 +360,7 @@ def _print_pairs(
     if doubtful := [name for name, run in runs.items() if run.doubts]:
         text += f"\n\nin doubt, as their summaries say: {', '.join(doubtful)}"
     print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{text}")
-    print_written(results.write_pairs(runs, at_rest, text, folder))
+    write(results.pair_files(runs, at_rest, text), folder)
     if any(run.ending is Ending.INTERRUPTED for run in runs.values()):
         print("run the same command again to compute the pairs that are left", file=sys.stderr)
         raise KeyboardInterrupt
@@ -342,7 +372,7 @@ def _print_pairs(
         )
 
 
-def print_written(files: Iterable[Path]) -> None:
-    """Print the names of written files."""
-    for path in files:
+def write(files: Files, folder: Path) -> None:
+    """Write files to a folder, and print their names."""
+    for path in write_files(files, folder):
         print(f"wrote {path}")

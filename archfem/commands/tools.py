@@ -239,7 +239,7 @@ def _diagnose_ffmpeg() -> Diagnosis:
 
 def _diagnose_compiled_code() -> Diagnosis:
     """Diagnose the cache of compiled kernels."""
-    _numba.prepare_cache()
+    import_module("archfem.dynamics.warm_up")  # declares all kernels
     count, folders = _numba.count_cached_functions(), _numba.cache_folders()
     if not count:
         return Diagnosis("compiled code", "none yet: the first run, or 'archfem compile', makes it")

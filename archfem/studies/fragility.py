@@ -313,10 +313,8 @@ def _distance(ends: Array, mean: Array, deviation: Array) -> Array:
 
 
 def _probit(x: Array, failed: Array, count: Array) -> tuple[Array, Array]:
-    """Medians and dispersions (samples,) for failures (samples, n) at levels, by Fisher scoring.
-
-    The probability of failure is Φ(intercept + slope · s), with s the standardised logarithm of x.
-    """
+    """Medians and dispersions (samples,) for failures (samples, n) at levels, by Fisher scoring."""
+    # the probability of failure is Φ(intercept + slope · s), s the standardised logarithm of x
     t = np.log(x)
     centre, width = float(np.mean(t)), max(float(np.std(t)), 1e-6)
     s = (t - centre) / width

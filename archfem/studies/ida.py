@@ -34,9 +34,8 @@ from archfem.dynamics.motion_scaling import (
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints, with_failure_flags
 from archfem.limit.mechanism_count import Mechanism
-from archfem.motion import signal_processing
 from archfem.motion.motion import Motion
-from archfem.motion.response_spectra import response_spectrum
+from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.studies.cache import dead_load_of, first_mode, ground_motion
 from archfem.studies.evaluators import Evaluator, Findings, of_history, run_motion
 from archfem.studies.fragility import Fragility, fragility
@@ -52,17 +51,6 @@ LIMIT_STATES = ("first hinge", "four failures", "verified", COLLAPSE_DEFINITION)
 DEMAND_NAMES = (
     "eccentricity", "rotation", "slip", "largest_displacement", "residual_displacement",
 )  # fmt: skip
-
-
-def measure_intensities(motion: Motion, period: float) -> dict[str, float]:
-    """Return the intensity measures of the horizontal component of a motion."""
-    samples = motion.component("horizontal")
-    return {
-        "pga": float(np.abs(samples).max()),
-        "pgv": float(np.abs(motion.velocity("horizontal")).max()),
-        "sa": float(response_spectrum(motion, np.array([period]))[0]),
-        "arias": float(signal_processing.integrate_arias(samples, motion.dt)[-1]),
-    }
 
 
 def search_limit_states(
@@ -98,7 +86,10 @@ def search_limit_states(
         if high > 1.2 * low:
             brackets = brackets.with_run(run_scaled(sqrt(low * high)))
     period = 1.0 / float(first_mode(result).frequencies[0])
-    findings: Findings = {"period": period, **measure_intensities(motion, period)}
+    measured = measure_intensity(motion)
+    findings: Findings = {"period": period, "pga": measured.pga, "pgv": measured.pgv}
+    findings["sa"] = float(response_spectrum(motion, np.array([period]))[0])
+    findings["arias"] = measured.arias
     for limit in limits:
         bracket = brackets[limit]
         findings |= {limit: bracket.upper, f"{limit}, survives": bracket.lower}

@@ -30,6 +30,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from archfem._files import temporary_folder
+from archfem._validation import check_integer
 from archfem.cases.provenance import describe_version
 from archfem.errors import ArchfemError, InvalidInput, StudyStopped
 from archfem.studies.evaluators import Evaluator
@@ -75,38 +76,68 @@ def evaluate_batch(
         return own_version, list(evaluate_serially(points, evaluator))
 
 
+def evaluate_points(
+    points: Sequence[tuple[int, StudyPoint]],
+    evaluator: Evaluator,
+    workers: int | None = None,
+    log: Path | None = None,
+    meanwhile: Callable[[], object] | None = None,
+    shared: Path | None = None,
+) -> Iterator[tuple[int, Row]]:
+    """Evaluate points on a number of processes, by default one a core; on this one if it is 1."""
+    workers = len(os.sched_getaffinity(0)) if workers is None else workers
+    if check_integer(workers, "workers") > 1 and len(points) > 1:
+        yield from evaluate_on_processes(points, evaluator, workers, log, meanwhile, shared)
+        return
+    with threadpool_limits(limits=1), share_results(shared):
+        yield from evaluate_serially(points, evaluator)
+
+
 def evaluate_serially(
     points: Sequence[tuple[int, StudyPoint]], evaluator: Evaluator
 ) -> Iterator[tuple[int, Row]]:
     """Evaluate points in this process, one after another; a repeated warning is logged once."""
-    warnings = RunWarnings()
-
-    def is_new(record: logging.LogRecord) -> bool:
-        return record.levelno != logging.WARNING or warnings.is_new(record.getMessage())
-
+    repeated = RepeatedWarnings()
     for number, point in points:
-        logger.addFilter(is_new)
-        try:
+        with keep_warnings() as warnings:
             row = evaluate_point(point, evaluator)
-        finally:
-            logger.removeFilter(is_new)
+        repeated.log(warnings)
         yield number, row
-    warnings.log_repeated()
+    repeated.log_count()
 
 
-class RunWarnings:
+@contextmanager
+def keep_warnings() -> Iterator[list[str]]:
+    """Yield a list of the warnings of a block, which are not logged."""
+    warnings: list[str] = []
+
+    def keep(record: logging.LogRecord) -> bool:
+        if is_warning := record.levelno == logging.WARNING:
+            warnings.append(record.getMessage())
+        return not is_warning
+
+    logger.addFilter(keep)
+    try:
+        yield warnings
+    finally:
+        logger.removeFilter(keep)
+
+
+class RepeatedWarnings:
     """Warnings of many runs, of which each kind is logged once."""
 
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
 
-    def is_new(self, message: str) -> bool:
-        """Count a warning; return whether it is the first of its kind."""
-        kind = re.sub(r"[\d.]+(e[-+]\d+)?", "#", message)  # numbers differ by the run
-        self._counts[kind] += 1
-        return self._counts[kind] == 1
+    def log(self, messages: Sequence[str]) -> None:
+        """Log the warnings that are the first of their kind."""
+        for message in messages:
+            kind = re.sub(r"[\d.]+(e[-+]\d+)?", "#", message)  # numbers differ by the run
+            self._counts[kind] += 1
+            if self._counts[kind] == 1:
+                logger.warning("%s", message)
 
-    def log_repeated(self) -> None:
+    def log_count(self) -> None:
         """Log how many warnings were not repeated."""
         if repeated := self._counts.total() - len(self._counts):
             logger.warning("%d more warnings as above, of other runs, are not repeated", repeated)
@@ -120,10 +151,7 @@ def evaluate_on_processes(
     meanwhile: Callable[[], object] | None = None,
     shared: Path | None = None,
 ) -> Iterator[tuple[int, Row]]:
-    """Evaluate points on processes of this machine; `meanwhile` runs while they start.
-
-    Results that workers share are in the folder `shared`, and their output goes to the file `log`.
-    """
+    """Evaluate points on processes of this machine; `meanwhile` runs while they start."""
     pool = WorkerPool(TaskQueue(points, evaluator), workers, str(log or os.devnull), shared)
     try:
         if meanwhile is not None:
@@ -160,10 +188,8 @@ class TaskQueue:
     def pop(
         self, model: str | None, other_models: Collection[str], other_pairs: Collection[Any] = ()
     ) -> Task:
-        """Remove and return the next task: of this model, else of one that no other worker has.
-
-        Pairs that other workers compute are left for later, when their matched motions are shared.
-        """
+        """Remove and return the next task: of this model, else of one that no other worker has."""
+        # pairs that others compute are left for later, when their matched motions are shared
         if model not in self._tasks:
             unused = (key for key in self._tasks if key not in other_models)
             model = next(unused, next(iter(self._tasks)))
@@ -242,7 +268,7 @@ class WorkerPool:
         self._tasks, self._max_workers, self._log, self._shared = tasks, max_workers, log, shared
         self._workers: list[Worker] = []
         self._deaths: Counter[int] = Counter()
-        self._warnings = RunWarnings()
+        self._warnings = RepeatedWarnings()
         # A second Ctrl-C may end `close` early, and Python waits at its end for all processes that
         # are left, until their points are computed
         atexit.register(self._kill)
@@ -256,7 +282,7 @@ class WorkerPool:
                 self._assign()  # before the caller stores this row: no worker waits for that
                 if finished is not None:
                     yield finished
-        self._warnings.log_repeated()
+        self._warnings.log_count()
 
     def close(self) -> None:
         """End all workers."""
@@ -288,8 +314,7 @@ class WorkerPool:
         task = worker.task
         assert task is not None
         row = worker.receive()
-        for message in filter(self._warnings.is_new, worker.warnings):
-            logger.warning("%s", message)
+        self._warnings.log(worker.warnings)
         worker.warnings = []
         if row is not None:
             return task.number, row
@@ -354,27 +379,17 @@ def _serve(pipe: Connection, log: str, shared: Path | None) -> None:
         for stream in (1, 2):
             os.dup2(file.fileno(), stream)
     np.random.seed()  # noqa: NPY002  (for users' functions: all workers would draw the same)
-    # the driver logs the warnings, each kind once
-    warnings: list[str] = []
-    logger.addFilter(lambda record: _keep_warning(record, warnings))
     with suppress(EOFError, OSError), threadpool_limits(1), share_results(shared):
         while True:
             message = pipe.recv_bytes()
-            try:
-                point, evaluator = pickle.loads(message)
-            except Exception as error:  # a function of a module that the worker cannot import
-                row = make_row({}, f"{type(error).__name__}: {error}", ours=False)
-            else:
-                row = evaluate_point(point, evaluator)
-            pipe.send((row, warnings))
-            warnings.clear()
-
-
-def _keep_warning(record: logging.LogRecord, warnings: list[str]) -> bool:
-    """Keep the text of a warning instead of logging it; return whether to log the record."""
-    if record.levelno == logging.WARNING:
-        warnings.append(record.getMessage())
-    return record.levelno != logging.WARNING
+            with keep_warnings() as warnings:
+                try:
+                    point, evaluator = pickle.loads(message)
+                except Exception as error:  # a function of a module that the worker cannot import
+                    row = make_row({}, f"{type(error).__name__}: {error}", ours=False)
+                else:
+                    row = evaluate_point(point, evaluator)
+            pipe.send((row, warnings))  # the driver logs the warnings, each kind once
 
 
 def _end_with_driver() -> None:

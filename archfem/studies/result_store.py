@@ -275,10 +275,7 @@ def status(folder: str | Path) -> Status:
 def build_table(
     axes: Sequence[Axis], rows: Sequence[Row], attributes: Mapping[str, Any]
 ) -> xr.Dataset:
-    """Return the rows of a study as a dataset over its axes.
-
-    Findings that are rows of numbers have a dimension `entry`; shorter rows end in NaN.
-    """
+    """Return the rows of a study as a dataset over its axes."""
     table = xr.Dataset(attrs=dict(attributes))
     for axis in axes:
         for k, key in enumerate(axis.keys):
@@ -314,10 +311,7 @@ def load_table_libraries() -> None:
 
 
 def write_table(table: xr.Dataset, folder: Path, inputs: str) -> None:
-    """Write a table as NetCDF and CSV, and as Parquet and Excel if their packages are installed.
-
-    The folder is locked; `inputs` is the digest of the points.
-    """
+    """Write a table as NetCDF and CSV, and as Parquet and Excel if their packages are installed."""
     frame = _flatten(table)
     quoted = frame.map(_quote_formula).rename(columns=_quote_formula)
     with explain_full_disk(folder), _files.stage_results(folder, "study", inputs) as draft:

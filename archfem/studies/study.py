@@ -5,7 +5,6 @@ computed of each. `Comparison` is the study of cases under the pairs of their su
 """
 
 import logging
-import os
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
@@ -13,10 +12,9 @@ from pathlib import Path
 from typing import Any, Self
 
 import xarray as xr
-from threadpoolctl import threadpool_limits
 
 from archfem._files import hash_json, temporary_folder
-from archfem._validation import check_integer, validate_arguments, validate_methods
+from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import describe_version
 from archfem.cases.run import Run, carry_out, replace_run
@@ -44,7 +42,7 @@ from archfem.studies.parameter_space import (
     group_by_model,
     parameter_axes,
 )
-from archfem.studies.process_pool import Row, evaluate_on_processes, evaluate_serially
+from archfem.studies.process_pool import Row, evaluate_points
 from archfem.studies.result_store import (
     Progress,
     Store,
@@ -53,7 +51,6 @@ from archfem.studies.result_store import (
     status,
     write_table,
 )
-from archfem.studies.shared_results import share_results
 
 logger = logging.getLogger("archfem")
 
@@ -247,13 +244,8 @@ class Study:
                 ) from error
             yield from evaluate_on_cluster(points, self.asked, client, shared)
             return
-        workers = len(os.sched_getaffinity(0)) if workers is None else workers
-        if check_integer(workers, "workers") > 1 and len(points) > 1:
-            load = load_table_libraries
-            yield from evaluate_on_processes(points, self.asked, workers, log, load, shared)
-            return
-        with threadpool_limits(limits=1), share_results(shared):
-            yield from evaluate_serially(points, self.asked)
+        load = load_table_libraries
+        yield from evaluate_points(points, self.asked, workers, log, load, shared)
 
     def _check(self) -> None:
         """Make the cases at the ends of each axis, so that errors are raised before the study."""

@@ -34,7 +34,7 @@ from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import dead_load
 from archfem.studies.cache import ground_motion
 from archfem.studies.evaluators import Evaluator
-from archfem.studies.process_pool import evaluate_on_processes, evaluate_serially
+from archfem.studies.process_pool import evaluate_points
 
 # What is varied by default: values, of which numbers are the ends of a range
 DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
@@ -147,11 +147,8 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     points = [(k, Variation(base, _resolve_labels(ranges, each))) for k, each in enumerate(changes)]
     evaluator = Evaluator(evaluate_variation)
     rows: dict[int, dict[str, Any]] = {}
-    evaluated = evaluate_serially(points, evaluator)
-    if workers != 1:
-        evaluated = evaluate_on_processes(points, evaluator, workers)
     with tqdm(total=len(points), unit="run", disable=None, leave=False) as bar:
-        for number, row in evaluated:
+        for number, row in evaluate_points(points, evaluator, workers):
             rows[number] = row
             bar.update()
     dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], damping)
@@ -163,19 +160,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
 
 
 def verdict_range_of_case(case: Case, **options: Any) -> VerdictRange:
-    """Run a case over its uncertain properties, with rigid blocks.
-
-    Args:
-        case: case with one motion; its structure, motion, damping and time step are as given.
-        options: as for `verdict_range`.
-
-    Returns:
-        As `verdict_range`.
-
-    Raises:
-        InvalidInput: the case has no motion or a suite of several; or as `verdict_range`.
-        DidNotConverge: the structure as given does not stand under dead load.
-    """
+    """Run a case over its uncertain properties, with rigid blocks."""
     motion, damping = ground_motion(case), expected_damping(case)
     if callable(damping):
         damping = damping(build(case.structure, fidelity="rigid"))

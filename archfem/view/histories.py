@@ -98,6 +98,13 @@ def draw_envelope(
     return _finish_panels(panels)
 
 
+def draw_envelopes(runs: Mapping[str, History], dead: xr.Dataset | None) -> list[Figure]:
+    """Draw the envelopes of any number of runs, in as many figures as line styles require."""
+    pairs, count = list(runs.items()), len(LINE_COLOURS)
+    groups = [dict(pairs[first : first + count]) for first in range(0, len(pairs), count)]
+    return [draw_envelope(group, dead=dead) for group in groups]
+
+
 @validate_arguments
 def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[str] = ()) -> Figure:
     """Draw the eccentricity of each joint at one instant of each of several structures.
@@ -378,12 +385,9 @@ def _mirror_images(structure: Structure | None, numbers: Array, first: int) -> N
 
 
 def most_stressed_joints(run: History) -> list[int]:
-    """Return two joints closest to failure: one by its eccentricity, one by its friction.
-
-    The first has the largest |e|, or opens; the second slides for the longest time, or else is
-    closest to sliding. A mirror image of the first, which behaves similarly, is left out if the run
-    contains its structure.
-    """
+    """Return two joints closest to failure: one by its eccentricity, one by its friction."""
+    # the second slides for the longest time, or is closest to sliding; a mirror image of the first
+    # behaves as that does, and is left out
     own = assessed_joints(run.joints)
     numbers = own["joint"].values
     e = abs(own["eccentricity"]).max("time").fillna(0.5).values

@@ -346,31 +346,16 @@ def draw_pushover(
         hinges = _mark_first_hinges(axes, push, reach)
     style = {"color": Colour.HINGE, "ms": 6.0, "mec": "white"}
     axes.plot([], [], "o", label="first hinge of a joint", **style)
-    # the labels stand where no curve runs
+    # the list stands where no curve runs
     falls = any(push.factor < float(push.curve["factor"][0]) for push in pushes.values())
     axes.set_xlim(0.0, reach / mm)
     if len(pushes) == 1 and hinges:
         _list_hinges(axes, hinges, at_top=falls)
-    for value in (limits or {}).values():
-        axes.axhline(value, color=Colour.TEXT, ls="--", lw=1.0, zorder=1)
-    side, offset, alignment = (0.0, 4, "left") if falls else (1.0, -4, "right")
-    for names, value in _merge_close_limits(limits or {}, float(np.ptp(axes.get_ylim()))).items():
-        frame = ("axes fraction", "data")
-        annotate(axes, names, (side, value), (offset, 3), xycoords=frame, ha=alignment)
+    for number, (name, value) in enumerate((limits or {}).items()):
+        style = {"ls": ("--", ":", "-.")[number % 3], "color": Colour.TEXT, "lw": 1.0, "zorder": 1}
+        axes.axhline(value, label=f"{name}: {value:.4g}", **style)
     add_legend(axes)
     return cast(Figure, axes.figure)
-
-
-def _merge_close_limits(limits: Mapping[str, float], height: float) -> dict[str, float]:
-    """Return labels of limits and their places; limits too close for two labels share one."""
-    labels: dict[str, float] = {}
-    for name, value in sorted(limits.items(), key=lambda item: item[1]):
-        label = f"{name}: {value:.4g}"
-        # a label takes about a twentieth of the axis
-        if labels and value - next(reversed(labels.values())) < 0.05 * height:
-            label = f"{labels.popitem()[0]}, {label}"
-        labels[label] = value
-    return labels
 
 
 def _displacement_shown(push: Pushover) -> float:

@@ -41,7 +41,6 @@ from archfem.view.style import (
     set_title,
     structure_axes,
     structure_figure,
-    text_width,
     white_halo,
 )
 
@@ -306,65 +305,19 @@ def draw_during(model: Model, run: History, joints: xr.Dataset) -> Figure:
 def draw_loads(
     axes: Axes, structure: Structure, live: Sequence[Action], *, factor: str = "λ ×"
 ) -> None:
-    """Draw live loads as arrows of one length, labelled with load factor and size.
-
-    A load in proportion to the weights is one arrow above the structure; a force ends at the
-    extrados; a movement of a support begins at its centroid. Equal labels that would overlap are
-    one; others are raised.
-    """
-    length, inch = 0.11 * structure.size, 1.0 / drawing_scale(structure)  # [m]
-    labels: list[tuple[str, Array]] = []
-    for number, action in enumerate(live):
+    """Draw live loads as arrows of one length; the legend has load factor and sizes."""
+    length, sizes = 0.11 * structure.size, []
+    for action in live:
         start, direction, size = _load_arrow(structure, action, length)
         tip = start + length * direction
         arrow = {"arrowstyle": "-|>", "color": Colour.LOAD, "lw": 2.2, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", tuple(tip), tuple(start), zorder=9, arrowprops=arrow)
-        above = (start[0], start[1] + 0.04 * structure.size)  # room for the text
-        axes.update_datalim([start, tip, above])
-        if not number:
-            axes.plot([], [], color=Colour.LOAD, lw=2.2, marker=">", ms=5, label="live load")
-        # the text stands above a steep arrow's tail, beside an upward arrow, else above its middle
-        offset = (0, 5) if direction[1] < 0.5 or abs(direction[0]) > 0.5 else (6, 0)
-        where = start if direction[1] < -0.5 else 0.5 * (start + tip)
-        text = f"{factor} {size}".strip()
-        place = where + np.array(offset) * inch / 72.0
-        if isinstance(action, Settlement):
-            place = _beside_block(structure, action.place(structure), text, inch)
-        labels.append((text, place))
-    style = {"ha": "center", "va": "bottom", "color": Colour.LOAD, "zorder": 9}
-    for text, place in _separate_labels(labels, inch):
-        annotate(axes, text, place, **style)
+        axes.update_datalim([start, tip])
+        sizes.append(size)
+    if sizes:
+        label = " ".join(["live load:", *filter(None, [factor]), ", ".join(dict.fromkeys(sizes))])
+        axes.plot([], [], color=Colour.LOAD, lw=2.2, marker=">", ms=5, label=label)
     axes.autoscale_view()
-
-
-def _beside_block(structure: Structure, block: int, text: str, inch: float) -> Array:
-    """Return the place of a label beside a support (2,) [m], towards the middle."""
-    outline = structure.blocks[block].drawn()
-    low, high = outline.min(axis=0), outline.max(axis=0)
-    half = (0.5 * text_width(len(text)) + 0.3) * inch
-    leftward = low[0] + high[0] > np.sum(outline_bounds(structure), axis=0)[0]
-    return np.array([low[0] - half if leftward else high[0] + half, low[1]])
-
-
-def _separate_labels(labels: Sequence[tuple[str, Array]], inch: float) -> list[tuple[str, Array]]:
-    """Return texts and places (2,) [m] of labels that do not overlap; an inch is so many metres."""
-    line = 1.3 * LABEL_SIZE / 72.0 * inch  # height of a line of text [m]
-    groups: list[tuple[str, list[Array]]] = []
-    for text, wanted in labels:
-        place = wanted
-        for other, places in groups:
-            width = 0.5 * text_width(len(text) + len(other)) * inch
-            if (np.abs(place - places[-1]) < [width, line]).all():
-                if text == other:
-                    places.append(place)
-                    break
-                place = np.array([place[0], places[-1][1] + line])
-        else:
-            groups.append((text, [place]))
-    return [
-        (f"{text} each" if len(places) > 1 else text, np.mean(places, axis=0))
-        for text, places in groups
-    ]
 
 
 def _load_arrow(structure: Structure, action: Action, length: float) -> tuple[Array, Array, str]:

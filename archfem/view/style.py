@@ -1,6 +1,6 @@
 """Common style of all figures: colours, type sizes, axes, titles, legends and annotations."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -236,3 +236,20 @@ def save(figure: Figure, path: str | Path) -> Path:
     with atomic_write(target) as draft, matplotlib.rc_context(fonts):
         figure.savefig(draft, format=kind, dpi=300)
     return target
+
+
+# Contents of result files by name: a text, a figure, or a function that writes the file
+Files = dict[str, str | Figure | Callable[[Path], object]]
+
+
+def write_files(files: Files, folder: Path) -> list[Path]:
+    """Write files to a folder, each atomically, and return their paths."""
+    for name, content in files.items():
+        if isinstance(content, Figure):
+            save(content, folder / name)
+        elif isinstance(content, str):
+            with atomic_write(folder / name) as draft:
+                draft.write_text(content + "\n", encoding="utf-8")
+        else:
+            content(folder / name)
+    return [folder / name for name in files]

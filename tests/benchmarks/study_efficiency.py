@@ -80,7 +80,7 @@ def alone(points: Sequence[tuple[int, Point]], asked: Evaluator) -> Iterator[tup
 
 def timed(study: af.Study, workers: int) -> tuple[float, float, int]:
     """Wall and processor time of a study [s], and how many points failed."""
-    serially = "archfem.studies.study.evaluate_serially"
+    serially = "archfem.studies.process_pool.evaluate_serially"
     with tempfile.TemporaryDirectory() as folder, patch(serially, alone):
         begun, spent = time.monotonic(), processor()
         failed = int((study.run(folder, workers=workers)["error"] != "").sum())

@@ -144,7 +144,7 @@ def test_a_case_without_motion_has_a_report_too(small, undrawn, tmp_path):
     assert "it stands" in words
 
 
-def test_supports_bear_the_weight_or_the_report_doubts_it(ring, caplog):
+def test_supports_bear_the_weight(ring, caplog):
     caplog.set_level(logging.ERROR)
     rest = af.dead_load(af.build(ring, fidelity="rigid"))
     assert supported_weight_ratio(ring, rest.joints) == pytest.approx(1.0, abs=1e-9)

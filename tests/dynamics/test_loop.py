@@ -1,6 +1,5 @@
 """The loop over steps, apart from the solvers that archfem has."""
 
-import os
 from typing import NamedTuple
 
 import numba
@@ -9,7 +8,6 @@ import pytest
 from numba.extending import overload
 
 import archfem as af
-from archfem._numba import delete_stale_cache
 from archfem.dynamics.solvers.base import advance, evaluate_step, solve_step, start_run
 
 GRAVITY = 9.81
@@ -118,14 +116,3 @@ def test_a_solver_with_memory_and_friction_is_stepped_by_the_same_loop():
     state = last.state(len(last.times) - 1)
     assert state.time == pytest.approx(1.0)
     assert state.memory == pytest.approx(slid, rel=1e-3)  # through all batches, at each point
-
-
-def test_compiled_code_older_than_any_source_is_forgotten(tmp_path):
-    cache = tmp_path / "__pycache__"
-    cache.mkdir()
-    old, young, other = cache / "loop.nbi", cache / "band.1.nbc", cache / "loop.pyc"
-    for path, when in ((old, 1.0), (tmp_path / "newton.py", 2.0), (young, 3.0), (other, 1.0)):
-        path.touch()
-        os.utime(path, (when, when))
-    delete_stale_cache(tmp_path)
-    assert sorted(cache.iterdir()) == [young, other]

@@ -138,9 +138,6 @@ def _noticed(place: Path, path: Path, number: int, change: Change, tests: Reache
     """Name of a test that fails with a change and passes without; None where there is none."""
     source = (ROOT / path).read_text(encoding="utf-8")
     (place / path).write_text(changed(source, number), encoding="utf-8")
-    if _compiled(path):  # numba looks at the source of each function alone
-        for kept in place.rglob("*.nb?"):
-            kept.unlink()
     try:
         for chosen in _chosen(path, change, tests):
             limit = SLOWER * sum(tests[test][0] for test in chosen)

@@ -142,7 +142,7 @@ def test_a_study_goes_on_where_it_was_ended(study, tmp_path, monkeypatch):
     table = (folder / "study.txt").read_text()
     assert (folder / "study.png").is_file()
 
-    monkeypatch.setattr("archfem.studies.study.evaluate_serially", never)
+    monkeypatch.setattr("archfem.studies.process_pool.evaluate_serially", never)
     asked = af.studies.Comparison.read(study, QUICK)
     found = compared(asked, folder)
     assert af.studies.study_table(found) in table

@@ -18,11 +18,9 @@ from scipy import stats
 
 import archfem as af
 from archfem.cases import provenance
-from archfem.studies import parameter_axes, result_store
-from archfem.studies import study as study_module
+from archfem.studies import parameter_axes, process_pool, result_store
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import group_by_model
-from archfem.studies.process_pool import TaskQueue
 from archfem.studies.result_store import Store
 from archfem.studies.shared_results import compute_once, share_results
 
@@ -93,7 +91,7 @@ def test_what_is_finished_is_not_computed_again(study_file, tmp_path, monkeypatc
         asked.extend(number for number, _ in points)
         return iter([(number, {"found": {}, "error": "", "ours": True}) for number, _ in points])
 
-    monkeypatch.setattr("archfem.studies.study.evaluate_serially", counted)
+    monkeypatch.setattr("archfem.studies.process_pool.evaluate_serially", counted)
     # what failed for no reason of the case's own is tried again: numbers 4 and 5
     study.run(folder, workers=1)
     assert asked == [4, 5]
@@ -271,13 +269,13 @@ def test_a_changed_title_or_picture_recomputes_nothing(ring_file, tmp_path, monk
 
     first = table()
     evaluated = []
-    original = study_module.evaluate_serially
+    original = process_pool.evaluate_serially
 
     def counted(points, evaluator):
         evaluated.append(len(points))
         return original(points, evaluator)
 
-    monkeypatch.setattr(study_module, "evaluate_serially", counted)
+    monkeypatch.setattr(process_pool, "evaluate_serially", counted)
     assert table("title=other", "output.animation=true", "output.joints=[1]").identical(first)
     assert not evaluated
     table("output.save_every=2")  # the largest value of a run is that of its records
@@ -351,7 +349,7 @@ def test_cases_and_what_is_computed_are_in_one_file(ring_file, tmp_path, capsys)
 def test_pairs_that_another_worker_matches_are_left_for_later(small):
     over = {"analysis.dt": [0.005], "suite.pair": ["first", "second"]}
     points = list(enumerate(af.Study.of(af.Case.read(small), over, "dead load").points))
-    tasks = TaskQueue(points, Evaluator.of("dead load"))
+    tasks = process_pool.TaskQueue(points, Evaluator.of("dead load"))
     assert tasks.pop(None, (), {"first"}).pair == "second"
     assert tasks.pop(None, (), {"first"}).pair == "first"  # better than to wait
 
@@ -598,7 +596,7 @@ def test_points_of_one_model_are_taken_together(small_ring):
 def test_who_is_free_goes_on_with_the_model_that_it_knows(small_ring):
     over = {"motion.scale": [0.1, 0.2, 0.3], "structure.thickness": [0.5, 0.6, 0.7]}
     points = list(enumerate(af.Study.of(small_ring, over, "dead load").points))
-    tasks = TaskQueue(points, Evaluator.of("dead load"))
+    tasks = process_pool.TaskQueue(points, Evaluator.of("dead load"))
     first = tasks.pop(None, set())
     other = tasks.pop(None, {first.model})
     assert other.model != first.model

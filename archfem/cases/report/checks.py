@@ -1,7 +1,6 @@
 """Report sections on the checks of each run, and on versions, hashes and inputs."""
 
 from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ def build_check_section(data: ReportData) -> Section:
         caption = (
             "Checks of each run; energy relative to the largest exchanged, supports under dead load"
         )
-        blocks += [Grid(head, rows, caption), *_list_warnings(data)]
+        blocks.append(Grid(head, rows, caption))
     else:
         blocks.append(missing_note("a run to check", "A case with [motion] or [suite] has one."))
     blocks.append(Grid((), _describe_model(data), "Model and mesh"))
@@ -74,31 +73,6 @@ def supported_weight_ratio(structure: Structure, joints: xr.Dataset) -> float:
     return float(reaction / structure.weight)
 
 
-def _list_warnings(
-    data: ReportData, max_energy_drift: float = 0.01, max_imbalance: float = 0.01
-) -> list[TextBlock]:
-    """List runs with an energy drift or an imbalance of the supports, or that did not finish."""
-    # The imbalance of equilibrium is not 0: arcs meshed as chords are 0.3 % lighter.
-    warnings = []
-    for name, run in data.runs.items():
-        drift = abs(float(run.dataset.attrs.get("energy_drift", 0.0)))
-        start = run.joints.isel(time=0, drop=True)
-        ratio = supported_weight_ratio(data.case.structure, start)
-        if not drift <= max_energy_drift:  # also NaN
-            warnings.append(
-                f"{name}: {drift:.1%} of the energy exchanged came from nowhere, or went nowhere: "
-                "try shorter steps."
-            )
-        if not abs(ratio - 1.0) <= max_imbalance:
-            warnings.append(
-                f"{name}: at its start the supports bear {ratio:.4f} of the weight: it did not "
-                "start at rest under dead load, or its mesh leaves too much out."
-            )
-        if not run.ending.is_complete:
-            warnings.append(f"{name}: {run.outcome}.")
-    return [TextBlock(warning, "doubt") for warning in warnings]
-
-
 def _describe_model(data: ReportData) -> list[tuple[str, str]]:
     """Describe fidelity, mesh and quadrature."""
     discretisation, rows = data.case.discretisation, []
@@ -135,21 +109,10 @@ def build_source_section(data: ReportData) -> Section:
     rows.append(("SHA-256 of the case", sha256(data.case.text().encode()).hexdigest()))
     blocks: list[Any] = [Grid((), rows)]
     if data.folder is not None:
-        files = sorted(path for path in data.files.values() if _is_source(path))
         table = []
-        for path in files:
-            name, size = str(path.relative_to(data.folder)), f"{path.stat().st_size / 1e3:.1f}"
-            table.append([name, size, hash_file(path)[:16]])
-        caption = "Files that the report was written from"
+        for name, path in sorted(data.files.items()):
+            table.append([name, f"{path.stat().st_size / 1e3:.1f}", hash_file(path)[:16]])
+        caption = "Files of the folder that have the inputs of the run"
         blocks.append(Grid(["file", "kB", "SHA-256"], table, caption))
     blocks.append(TextBlock(data.case.text(), "lines"))
     return Section("Versions, hashes and the case as a file", blocks)
-
-
-def _is_source(path: Path) -> bool:
-    """Return whether a report is written from a file."""
-    figures = {"dead", "dead_stress", "free_body", "modes", "collapse", "rating"}
-    figures |= {"accuracy", "verdict_range"}
-    text = path.suffix in (".nc", ".toml", ".txt")
-    drawn = path.stem in figures or path.stem.startswith("assessment_")
-    return text or (path.suffix == ".png" and drawn)

@@ -1,7 +1,7 @@
 """Report sections: case and geometry, dead load, modes, limit analysis, ground motion, response."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,22 +19,16 @@ from archfem.motion.suite import Suite
 from archfem.statics.stress import utilisation_text
 from archfem.units import MPa, kN
 from archfem.view.collapse import draw_fall
-from archfem.view.histories import draw_envelope
+from archfem.view.histories import draw_envelopes
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
 from archfem.view.structure import draw_names, draw_structure
-from archfem.view.style import LINE_COLOURS
 
 
 def build_case_sections(data: ReportData) -> list[Section]:
-    """Build the sections on settings, assumptions, units, signs and geometry."""
+    """Build the sections on assumptions, units, signs and geometry."""
     case = data.case
-    described = ("title", "structure", "materials", "contacts")  # the geometry shows these
-    tables = [table for table in case.settings.items() if table[0] not in described]
-    settings = [row for key, table in tables for row in _flatten(key, table)]
-    blocks: list[Any] = [Grid((), _list_assumptions(data), "Assumptions of the analysis")]
-    if settings:
-        blocks.append(Grid((), settings, "Settings of the case beside its structure"))
+    assumptions = Grid((), _list_assumptions(data), "Assumptions of the analysis")
     signs = [
         ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
         ("signs", SIGN_CONVENTION),
@@ -42,23 +36,10 @@ def build_case_sections(data: ReportData) -> list[Section]:
         ("V / N", "mobilised friction |V| / N: at its limit μ, with c A / N added, it slides"),
     ]
     return [
-        Section("Case and assumptions", blocks),
+        Section("Case and assumptions", [assumptions]),
         Section("Units and signs", [Grid((), signs)]),
         Section("Geometry and materials", _build_geometry(case.structure)),
     ]
-
-
-def _flatten(name: str, value: Any) -> Iterator[tuple[str, str]]:
-    """Yield keys of nested tables, joined by dots, with their values as text."""
-    if isinstance(value, Mapping):
-        for key, inner in value.items():
-            yield from _flatten(f"{name}.{key}", inner)
-    elif isinstance(value, list | tuple):
-        yield name, ", ".join(map(str, value))
-    elif isinstance(value, bool):
-        yield name, "yes" if value else "no"
-    else:
-        yield name, str(value)
 
 
 def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
@@ -324,16 +305,16 @@ def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
         blocks.append(TextBlock(f"The run is not complete: {run.outcome}.", "doubt"))
     blocks.append(build_player(case, run, title, players))
     if case.suite is None:
-        blocks.append(_build_envelope({name: run}, data))
+        blocks += _build_envelopes(data)
     blocks.append(_shorten_joint_table(result_text.tabulate_joints(run.joints, data.dead)))
     blocks.append(TextBlock(_sentence(utilisation_text(case.structure, run.joints))))
     return blocks
 
 
-def _build_envelope(runs: Mapping[str, History], data: ReportData) -> FigureBlock:
-    """Draw the envelopes of runs."""
+def _build_envelopes(data: ReportData) -> list[FigureBlock]:
+    """Draw the envelopes of all runs."""
     caption = "Least and largest eccentricity of each joint; dotted under dead load."
-    return FigureBlock.of(draw_envelope(runs, dead=data.dead), caption)
+    return [FigureBlock.of(figure, caption) for figure in draw_envelopes(data.runs, data.dead)]
 
 
 def _shorten_joint_table(table: result_text.ResultTable) -> Grid:
@@ -373,14 +354,11 @@ def _build_suite_response(data: ReportData) -> list[Any]:
         named = (f"{title}: {cell}" for title, cell in cells if cell != "-")
         mechanisms.append((row[0], "; ".join(named)))
     caption = "Outcome, PGA, and the critical joint of each run"
-    blocks: list[Any] = [
+    return [
         Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption),
         Grid([], mechanisms, "Mechanism and end of each run"),
+        *_build_envelopes(data),
     ]
-    pairs, per_figure = list(data.runs.items()), len(LINE_COLOURS)  # as many runs as line styles
-    for first in range(0, len(pairs), per_figure):
-        blocks.append(_build_envelope(dict(pairs[first : first + per_figure]), data))
-    return blocks
 
 
 def list_facts(data: ReportData) -> list[tuple[str, str]]:

@@ -6,7 +6,3 @@
 
 Start reading at `time_stepping`.
 """
-
-from archfem import _numba
-
-_numba.prepare_cache()

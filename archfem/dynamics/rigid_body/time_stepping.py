@@ -16,12 +16,11 @@ stated speed. Rebounds are reduced where they would add energy. Overlaps are cor
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from archfem._numba import allocating_entry, delete_stale_cache
+from archfem._numba import allocating_entry
 from archfem._typing import Array
 from archfem._validation import check_number, check_type, validate_methods
 from archfem.dynamics.rigid_body.bodies import (
@@ -70,8 +69,6 @@ MAX_ENERGY_GAIN = 1e-4
 
 # The same for a run without exchange: lift of its weight, relative to the structure's size [-]
 ENERGY_GAIN_NOISE = 1e-6
-
-delete_stale_cache(Path(__file__).parent)
 
 
 class StepParameters(NamedTuple):

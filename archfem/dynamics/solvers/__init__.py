@@ -32,7 +32,3 @@ Symbols, which all of them share:
     column      active row that has a number in the dense problem of a step
     image       product of the state with one of the matrices M, K and R
 """
-
-from archfem import _numba
-
-_numba.prepare_cache()

@@ -7,12 +7,11 @@ makes no arrays: a system contains its workspace.
 """
 
 from copy import deepcopy
-from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self
 
 from numpy.typing import NDArray
 
-from archfem._numba import delete_stale_cache, entry
+from archfem._numba import entry
 from archfem.dynamics.solvers.equation import Equation
 
 # Iterations over the joints in a step before it is given up
@@ -75,9 +74,6 @@ def evaluate_step(
 ) -> Any:
     """Evaluate resultants, energies and memory of a step that has converged; overloaded."""
     raise NotImplementedError
-
-
-delete_stale_cache(Path(__file__).parent, Path(__file__).parents[2] / "joints" / "large")
 
 
 @entry

@@ -7,7 +7,3 @@
 
 Start reading at `forces`.
 """
-
-from archfem import _numba
-
-_numba.prepare_cache()

@@ -20,17 +20,14 @@ which it sticks, and Newton's method would alternate. The derivative for such a 
 sticking, and the difference of its force from sticking is returned separately.
 """
 
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from archfem._numba import delete_stale_cache, inlined_kernel
+from archfem._numba import inlined_kernel
 from archfem._typing import Array
 from archfem.joints.contact_law import GAUSS_POINTS, GAUSS_WEIGHTS
 from archfem.joints.operator import SLIP_LIMIT_TOLERANCE
-
-delete_stale_cache(Path(__file__).parent)
 
 # Slip, relative to the depth of the joint, below which |s| in the overlap is rounded [-]
 ROUNDED_SLIP = 1e-5

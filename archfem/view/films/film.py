@@ -1,7 +1,6 @@
 """Films and pictures of a moving structure, and films of mode shapes."""
 
 from collections.abc import Iterator, Sequence
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +28,7 @@ from archfem.view.films.frames import (
     frames_of_fall,
     frames_of_run,
 )
-from archfem.view.films.renderer import FrameLayout, FramePainter, Painter
+from archfem.view.films.renderer import FrameLayout, FramePainter
 from archfem.view.films.settings import Setup, check_film, check_options
 from archfem.view.joint_marks import (
     joints_of_state,
@@ -39,7 +38,6 @@ from archfem.view.joint_marks import (
 )
 from archfem.view.positions import FallingBlocks, fields_at, recorded_fields
 from archfem.view.statics import ModePanel, mode_panels
-from archfem.view.stress import Triangles
 
 
 @validate_arguments
@@ -111,14 +109,14 @@ def film(  # noqa: PLR0913  (a film has many settings)
     if page:
         from archfem.view.films.viewer import write_scenes
 
-        frames = _frames(setup, run, _thin(timing.times, model), falls)
+        frames = _frames(setup, run, _thin(timing.times, setup))
         return write_scenes(target, setup, run, frames)
-    return write_film(target, _draw_frames(setup, run, timing, falls, size, painter), timing.fps)
+    return write_film(target, _draw_frames(setup, run, timing, size, painter), timing.fps)
 
 
-def _thin(times: Array, model: Model) -> Array:
+def _thin(times: Array, setup: Setup) -> Array:
     """Return at most 60 of the times: a page holds the blocks of each, and has some 10 MB."""
-    most = int(np.clip(100_000 / len(Triangles(model.cells).cell), 5, 60))
+    most = int(np.clip(100_000 / len(setup.triangles.cell), 5, 60))
     chosen = np.linspace(0, len(times) - 1, min(len(times), most))
     thinned: Array = times[chosen.round().astype(int)]
     return thinned
@@ -129,15 +127,12 @@ def _times_before_fall(times: Array, falls: FallingBlocks | None) -> Array:
     return times if falls is None else times[times < falls.times[0]]
 
 
-def _frames(
-    setup: Setup, run: History, times: Array, falls: FallingBlocks | None
-) -> Iterator[Frame]:
+def _frames(setup: Setup, run: History, times: Array) -> Iterator[Frame]:
     """Yield the frames of a run, and of the fall that may follow."""
-    held = _times_before_fall(times, falls)
-    frames = frames_of_run(setup, run, held, fields_at(run, held))
-    return (
-        frames if falls is None else chain(frames, frames_of_fall(setup, falls, times[len(held) :]))
-    )
+    held = _times_before_fall(times, setup.falls)
+    yield from frames_of_run(setup, run, held, fields_at(run, held))
+    if setup.falls is not None:
+        yield from frames_of_fall(setup, setup.falls, times[len(held) :])
 
 
 @validate_arguments
@@ -178,7 +173,7 @@ def picture(
     )
 
 
-def _choose_painter(renderer: str) -> type[Painter]:
+def _choose_painter(renderer: str) -> type[FramePainter]:
     """Return the painter of a renderer; pyvista is imported only where it is used."""
     if renderer == "matplotlib":
         return FramePainter
@@ -193,13 +188,12 @@ def _draw_frames(
     setup: Setup,
     run: History,
     timing: FrameTiming,
-    falls: FallingBlocks | None,
     size: tuple[int, int],
-    painter: type[Painter],
+    painter: type[FramePainter],
 ) -> Iterator[Image]:
     """Yield the images of a film, with a progress bar."""
     layout = FrameLayout(setup, size, run.joints, run, painter)
-    frames = _frames(setup, run, timing.times, falls)
+    frames = _frames(setup, run, timing.times)
     bar = tqdm(frames, total=len(timing.times), unit="frame", disable=None, leave=False)
     for frame, speed in zip(bar, timing.speeds, strict=True):
         yield layout.compose(frame, float(speed))

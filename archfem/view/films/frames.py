@@ -6,6 +6,7 @@ evenly spaced in time, or in slow motion around the decisive instant.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -14,9 +15,10 @@ from archfem._typing import Array
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.units import mm
-from archfem.view.films.settings import Setup, colour_values
+from archfem.view.films.settings import Setup, colour_values, polygon_sides
 from archfem.view.joint_marks import MARKED_QUANTITIES, Marker, Marks, joint_marks
 from archfem.view.positions import FallingBlocks, decisive_instant
+from archfem.view.style import Colour
 
 # Slow motion of a film: "auto", its start and end [s], or none
 Window = str | tuple[float, float] | None
@@ -34,6 +36,41 @@ class Frame:
     # places where hinges were before, displaced (n, 2) [m]
     past: Array = field(default_factory=lambda: np.zeros((0, 2)))
     outlines: Sequence[Array] = ()  # of blocks displaced by a mechanism, each (k, 2) [m]
+
+
+class Layer(NamedTuple):
+    """Lines or areas of a frame in one colour."""
+
+    shapes: Array  # segments (n, 2, 2), or outlines of areas (n, k, 2) [m]
+    colour: str
+    width: float = 0.0  # of lines, in a picture 1100 pixels wide [points]; 0 for areas
+    opacity: float = 1.0
+
+
+def frame_layers(setup: Setup, frame: Frame) -> list[Layer]:
+    """Return edges and marks of a frame, from the lowest layer to the uppermost."""
+    marks, disc = frame.marks, setup.hinge_disc
+    edges = frame.places[setup.model.cells.outline_edges]
+    thrust = marks.thrust[np.isfinite(marks.thrust[:, 0])]
+    return [
+        Layer(np.concatenate([edges, polygon_sides(setup.supports)]), Colour.EDGE, 1.2),
+        Layer(polygon_sides(frame.outlines), Colour.MECHANISM, 3.0),
+        Layer(frame.past[:, None] + disc, Colour.HINGE, opacity=0.3),
+        Layer(marks.links, "white", 6.0),
+        Layer(marks.links, Colour.THRUST, 3.0),
+        Layer(thrust[:, None] + 0.35 * disc, Colour.THRUST),
+        Layer(marks.slips, Colour.SLIDING),
+        Layer(marks.hinges[:, None] + 1.25 * disc, "white"),
+        Layer(marks.hinges[:, None] + disc, Colour.HINGE),
+    ]
+
+
+def corner_values(setup: Setup, frame: Frame) -> Array:
+    """Return values of the colour scale at the corners of the triangles of the blocks (t, 3)."""
+    triangles = setup.triangles
+    if setup.scale.colour == "stress":  # a value for each cell
+        return np.repeat(frame.shades[triangles.cell][:, None], 3, axis=1)
+    return triangles.corners(frame.shades)
 
 
 def frame_of_state(setup: Setup, q: Array, joints: xr.Dataset) -> Frame:

@@ -5,8 +5,7 @@ matplotlib's Agg renderer, many shapes per call, or by a painter of another libr
 divided into triangles so fine that colours may vary linearly between their corners.
 """
 
-from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -24,12 +23,10 @@ from matplotlib.transforms import Bbox, IdentityTransform
 from archfem._typing import Array
 from archfem.dynamics.history import History
 from archfem.view.films.encoder import Image
-from archfem.view.films.frames import Frame
-from archfem.view.films.settings import Scale, Setup, polygon_sides
+from archfem.view.films.frames import Frame, corner_values, frame_layers
+from archfem.view.films.settings import Scale, Setup
 from archfem.view.histories import draw_ground
-from archfem.view.joint_marks import support_outlines
 from archfem.view.positions import ground_acceleration
-from archfem.view.stress import Triangles
 from archfem.view.style import Colour, annotate, style_colour_bar, text_width
 
 
@@ -101,58 +98,31 @@ class Canvas:
         return style
 
 
-class Painter(Protocol):
-    """Draws the frames of a film on a canvas."""
-
-    def draw_background(self) -> None:
-        """Draw the layers below the blocks, which do not change."""
-
-    def draw(self, frame: Frame) -> None:
-        """Draw blocks and marks of a frame."""
-
-
 class FramePainter:
     """Draws blocks, supports and marks on a canvas, from the lowest layer to the uppermost."""
 
     def __init__(self, setup: Setup, canvas: Canvas) -> None:
         self._setup, self._canvas = setup, canvas
-        cells = setup.model.cells
-        self._triangles, self._rims = Triangles(cells), cells.outline_edges
-        self._supports = support_outlines(setup.model, setup.magnification)
-        self._disc = setup.hinge_disc
 
     def draw_background(self) -> None:
         """Draw the layers below the blocks, which do not change: ground, supports, outlines."""
         if self._setup.ground is not None:
             self._canvas.lines(self._setup.ground[None], Colour.EDGE, 2.0)
-        self._canvas.lines(self._setup.model.cells.places[self._rims], Colour.UNDEFORMED, 1.0)
-        for outline in self._supports:
+        cells = self._setup.model.cells
+        self._canvas.lines(cells.places[cells.outline_edges], Colour.UNDEFORMED, 1.0)
+        for outline in self._setup.supports:
             self._canvas.fill(outline[None], Colour.SUPPORT)
 
     def draw(self, frame: Frame) -> None:
         """Draw blocks and marks of a frame."""
-        canvas, marks, triangles = self._canvas, frame.marks, self._triangles
-        scale = self._setup.scale
-        if scale.colour == "stress":  # a value for each cell
-            values = np.repeat(frame.shades[triangles.cell][:, None], 3, axis=1)
-        else:
-            values = triangles.corners(frame.shades)
-        colours = scale.shades(scale.norm(values))
-        canvas.shade(triangles.corners(frame.places), colours)
-        rims = np.concatenate([frame.places[self._rims], polygon_sides(self._supports)])
-        canvas.lines(rims, Colour.EDGE, 1.2)
-        canvas.lines(polygon_sides(frame.outlines), Colour.MECHANISM, 3.0)
-        self._draw_discs(frame.past, Colour.HINGE, 1.0, 0.3)
-        canvas.lines(marks.links, "white", 6.0)
-        canvas.lines(marks.links, Colour.THRUST, 3.0)
-        self._draw_discs(marks.thrust[np.isfinite(marks.thrust[:, 0])], Colour.THRUST, 0.35)
-        canvas.fill(marks.slips, Colour.SLIDING)
-        self._draw_discs(marks.hinges, "white", 1.25)
-        self._draw_discs(marks.hinges, Colour.HINGE, 1.0)
-
-    def _draw_discs(self, centres: Array, colour: str, size: float, opacity: float = 1.0) -> None:
-        """Draw discs at points (n, 2), of a size relative to a hinge's."""
-        self._canvas.fill(centres[:, None] + size * self._disc, colour, opacity)
+        canvas, scale = self._canvas, self._setup.scale
+        colours = scale.shades(scale.norm(corner_values(self._setup, frame)))
+        canvas.shade(self._setup.triangles.corners(frame.places), colours)
+        for layer in frame_layers(self._setup, frame):
+            if layer.width:
+                canvas.lines(layer.shapes, layer.colour, layer.width)
+            else:
+                canvas.fill(layer.shapes, layer.colour, layer.opacity)
 
 
 class FrameLayout:
@@ -168,7 +138,7 @@ class FrameLayout:
         size: tuple[int, int],
         joints: xr.Dataset,
         run: History | None = None,
-        painter: Callable[[Setup, Canvas], Painter] = FramePainter,
+        painter: type[FramePainter] = FramePainter,
     ) -> None:
         # an image is 12.8 inches wide, or narrower: a small one has at least 60 dots per inch
         dpi = max(60.0, size[0] / 12.8)

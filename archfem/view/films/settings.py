@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -14,6 +15,7 @@ from archfem.models.model import Cells, Model, check_coordinate_count
 from archfem.units import MPa, mm
 from archfem.view.joint_marks import round_magnification, support_outlines
 from archfem.view.positions import FallingBlocks
+from archfem.view.stress import Triangles
 from archfem.view.style import CLIPPED_PERCENT, COLOUR_MAP
 
 
@@ -26,18 +28,6 @@ class Scale:
     shades: Colormap  # from low to high
     norm: Normalize  # from values to [0, 1]
     extend: str  # end at which values beyond the scale occur, as in matplotlib's colour bars
-
-
-def check_colour(cells: Cells, colour: str) -> None:
-    """Refuse a quantity by which the blocks cannot be coloured."""
-    known = ("displacement", "stress")
-    if colour not in known:
-        raise InvalidInput(f"colour '{colour}' is not known: use one of {known}")
-    if colour == "stress" and cells.stress is None:
-        raise InvalidInput(
-            "rigid blocks have no stress: use colour='displacement', or build and run the model "
-            "with fidelity='full'"
-        )
 
 
 def check_film(
@@ -62,7 +52,14 @@ def check_options(
     model: Model, colour: str, magnification: float | None, size: tuple[int, int]
 ) -> None:
     """Refuse invalid options of a frame."""
-    check_colour(model.cells, colour)
+    known = ("displacement", "stress")
+    if colour not in known:
+        raise InvalidInput(f"colour '{colour}' is not known: use one of {known}")
+    if colour == "stress" and model.cells.stress is None:
+        raise InvalidInput(
+            "rigid blocks have no stress: use colour='displacement', or build and run the model "
+            "with fidelity='full'"
+        )
     if magnification is not None and not 0.0 < magnification < 1e12:
         raise InvalidInput(f"magnification {magnification:.4g} is not above 0")
     smallest = (480, 320)  # the texts do not fit into a smaller frame
@@ -77,7 +74,7 @@ def colour_values(cells: Cells, q: Array, colour: str) -> Array:
     if colour == "displacement":
         lengths: Array = np.linalg.norm(cells.displacement(q), axis=1)
         return lengths / mm
-    assert cells.stress is not None, "checked by check_colour"
+    assert cells.stress is not None, "checked by check_options"
     xx, yy, xy = (cells.stress @ q).reshape(-1, 3).T / MPa
     return 0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy)
 
@@ -104,7 +101,18 @@ class Setup:
     high: Array  # upper right corner of the visible region (2,) [m]
     outlines: tuple[Array, ...] = ()  # of blocks displaced by a mechanism, each (k, 2) [m]
     since: float = 0.0  # time from which they are shown [s]
+    falls: FallingBlocks | None = None  # positions of loose blocks; None if no block came loose
     level: float | None = None  # of the ground below loose blocks [m]; None without loose blocks
+
+    @cached_property
+    def triangles(self) -> Triangles:
+        """Triangulation of the blocks."""
+        return Triangles(self.model.cells)
+
+    @cached_property
+    def supports(self) -> list[Array]:
+        """Outlines of the fixed blocks, displaced, each (k, 2) [m]."""
+        return support_outlines(self.model, self.magnification)
 
     @property
     def ground(self) -> Array | None:
@@ -163,7 +171,7 @@ class Setup:
             # a fall is some ten times the motion before it; square roots show both
             extend = "max" if lengths.max() > largest else "neither"
             scale = replace(scale, norm=PowerNorm(0.5, 0.0, largest), extend=extend)
-        return replace(self, low=low, high=high, scale=scale, level=falls.level)
+        return replace(self, low=low, high=high, scale=scale, falls=falls, level=falls.level)
 
 
 def polygon_sides(outlines: Sequence[Array]) -> Array:

@@ -18,13 +18,11 @@ from archfem._typing import Array
 from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.history import History
 from archfem.models.model import Model
-from archfem.view.films.frames import Frame, frames_of_run
-from archfem.view.films.renderer import Canvas
-from archfem.view.films.settings import Setup, check_film, polygon_sides
-from archfem.view.joint_marks import support_outlines
+from archfem.view.films.frames import Frame, corner_values, frame_layers, frames_of_run
+from archfem.view.films.renderer import Canvas, FramePainter
+from archfem.view.films.settings import Setup, check_film
 from archfem.view.pages.document import render
 from archfem.view.positions import decisive_instant, fields_at, recorded_fields
-from archfem.view.stress import Triangles
 from archfem.view.style import Colour
 
 
@@ -36,39 +34,31 @@ class Scene:
         # without a display, VTK renders off screen by EGL
         if sys.platform == "linux" and not os.environ.get("DISPLAY"):
             os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        self._setup, self._supports = setup, support_outlines(setup.model, setup.magnification)
-        self._triangles = Triangles(setup.model.cells)
+        self._setup = setup
         hidden = size is not None or not os.environ.get("DISPLAY")
         self.plotter = pv.Plotter(off_screen=hidden, window_size=size)
         self.plotter.set_background("white")
         self.blocks = pv.PolyData()
         self._add_blocks()
         self._set_camera()
-        self._add_marks()
+        self._marks: list[pv.Actor] = []  # a layer each, added with the first frame
 
     def show(self, frame: Frame) -> None:
         """Move blocks and marks to where a frame has them."""
-        triangles, marks = self._triangles, frame.marks
-        self.blocks.points = self._in_layer(triangles.corners(frame.places).reshape(-1, 2), 0)
-        if self._setup.scale.colour == "stress":  # a value for each cell
-            self.blocks["shade"] = np.repeat(frame.shades[triangles.cell], 3)
-        else:
-            self.blocks["shade"] = triangles.corners(frame.shades).ravel()
-        edges = frame.places[self._setup.model.cells.outline_edges]
-        thrust = marks.thrust[np.isfinite(marks.thrust[:, 0])]
-        shown = {
-            "edges": self._segments(edges, 1),
-            "mechanism": self._segments(polygon_sides(frame.outlines), 2),
-            "past": self._discs(frame.past, 3),
-            "halo": self._segments(marks.links, 4),
-            "thrust": self._segments(marks.links, 5),
-            "joints": self._discs(thrust, 5, 0.35),
-            "slips": self._polygons(marks.slips, 6),
-            "rims": self._discs(marks.hinges, 7, 1.25),
-            "hinges": self._discs(marks.hinges, 8),
-        }
-        for kind, mesh in shown.items():
-            self._mappers[kind].dataset = mesh
+        setup, layers = self._setup, frame_layers(self._setup, frame)
+        corners = setup.triangles.corners(frame.places).reshape(-1, 2)
+        self.blocks.points = self._in_layer(corners, 0)
+        self.blocks["shade"] = corner_values(setup, frame).ravel()
+        if not self._marks:
+            # lines are wider than in an image of matplotlib, whose edges are smooth
+            line = 4.0 / 3.0 * max(0.6, self.plotter.window_size[0] / 1100.0)
+            for each in layers:
+                width, opacity = line * each.width, each.opacity
+                self._marks.append(self._add(pv.PolyData(), each.colour, width, opacity))
+            self._moving += self._marks
+        for height, (actor, layer) in enumerate(zip(self._marks, layers, strict=True), start=1):
+            draw = self._segments if layer.width else self._polygons
+            actor.mapper.dataset = draw(layer.shapes, height)
         self.plotter.render()
 
     def keep(self, frame: Frame) -> tuple[float, int]:
@@ -103,7 +93,7 @@ class Scene:
     def _add_blocks(self) -> None:
         """Add the blocks, undeformed and displaced, the supports and the ground."""
         setup, cells = self._setup, self._setup.model.cells
-        corners = self._triangles.corners(cells.places).reshape(-1, 2)
+        corners = setup.triangles.corners(cells.places).reshape(-1, 2)
         faces = np.arange(len(corners)).reshape(-1, 3)
         self.blocks.copy_from(pv.PolyData.from_regular_faces(self._in_layer(corners, 0), faces))
         self.blocks["shade"] = np.zeros(len(corners))
@@ -114,25 +104,11 @@ class Scene:
         table = pv.LookupTable(values=(255.0 * shades).astype(np.uint8), scalar_range=ends)
         style = {"lighting": False, "show_scalar_bar": False}
         self._moving = [self.plotter.add_mesh(self.blocks, scalars="shade", cmap=table, **style)]
-        for outline in self._supports:
+        for outline in setup.supports:
             self._add(self._polygons(outline[None], 0), Colour.SUPPORT)
-        self._add(self._segments(polygon_sides(self._supports), 1), Colour.EDGE, 1.5)
         self._add(self._segments(cells.places[cells.outline_edges], -1), Colour.UNDEFORMED)
         if setup.ground is not None:
             self._add(self._segments(setup.ground[None], 0), Colour.EDGE, 2.0)
-
-    def _add_marks(self) -> None:
-        """Add an empty mesh for each kind of mark."""
-        line = max(0.6, self.plotter.window_size[0] / 1100.0)
-        styles = {
-            **{"edges": (Colour.EDGE, 1.5 * line), "mechanism": (Colour.MECHANISM, 4.0 * line)},
-            **{"past": (Colour.HINGE, 1.0, 0.3), "halo": ("white", 8.0 * line)},
-            **{"thrust": (Colour.THRUST, 4.0 * line), "joints": (Colour.THRUST,)},
-            **{"slips": (Colour.SLIDING,), "rims": ("white",), "hinges": (Colour.HINGE,)},
-        }
-        marks = {kind: self._add(pv.PolyData(), *each) for kind, each in styles.items()}
-        self._moving += marks.values()
-        self._mappers = {kind: actor.mapper for kind, actor in marks.items()}
 
     def _set_camera(self) -> None:
         """Look straight at the visible region, which fills the window."""
@@ -166,10 +142,6 @@ class Scene:
         # VTK renders only convex polygons correctly
         return pv.PolyData.from_regular_faces(points, corners).triangulate()
 
-    def _discs(self, centres: Array, layer: int, size: float = 1.0) -> pv.PolyData:
-        """Return discs at points (n, 2) as a mesh, of a size relative to a hinge's."""
-        return self._polygons(centres[:, None] + size * self._setup.hinge_disc, layer)
-
     def _segments(self, segments: Array, layer: int) -> pv.PolyData:
         """Return line segments (n, 2, 2) as a mesh."""
         return pv.line_segments_from_points(self._in_layer(segments.reshape(-1, 2), layer))
@@ -180,11 +152,12 @@ class Scene:
         return np.column_stack([points, np.full(len(points), layer * height)])
 
 
-class ScenePainter:
+class ScenePainter(FramePainter):
     """Draws the frames of a film by pyvista."""
 
     def __init__(self, setup: Setup, canvas: Canvas) -> None:
-        self._scene, self._canvas = Scene(setup, canvas.size), canvas
+        super().__init__(setup, canvas)
+        self._scene = Scene(setup, canvas.size)
 
     def draw_background(self) -> None:
         """Draw nothing: the image of a frame covers the window."""

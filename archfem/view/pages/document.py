@@ -99,19 +99,7 @@ class Document:
 
 
 def print_page(page: Path, target: Path) -> Path:
-    """Print a page to a PDF file by an installed Chromium or Chrome.
-
-    Args:
-        page: HTML file.
-        target: PDF file to write.
-
-    Returns:
-        The path of the PDF file.
-
-    Raises:
-        InvalidInput: the suffix is not that of a PDF file.
-        NotInstalled: no browser is found, or the browser writes no file.
-    """
+    """Print a page to a PDF file by an installed Chromium or Chrome."""
     if target.suffix.lower() != ".pdf":
         raise InvalidInput(f"{target} has suffix '{target.suffix}': a printed report is .pdf")
     browser = next(

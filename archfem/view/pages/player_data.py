@@ -9,7 +9,7 @@ import zlib
 from base64 import b64encode
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -23,7 +23,7 @@ from archfem.joints.criteria import assessed_joints, sliding_limits
 from archfem.masonry.block import Block
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.models.model import Model, check_coordinate_count, check_model
-from archfem.view.joint_marks import DRAWN_DISPLACEMENT, joint_pairs
+from archfem.view.joint_marks import DRAWN_DISPLACEMENT, joint_pairs, round_magnification
 from archfem.view.positions import (
     FallingBlocks,
     block_kinds,
@@ -34,9 +34,6 @@ from archfem.view.positions import (
 
 # Default size of the packed part of a player [bytes]
 MAX_PACKED_BYTES = 3_000_000
-
-# Largest V / N in a player [-]; a joint with more is about to open
-MAX_FRICTION_RATIO = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +71,8 @@ class Outlines:
         return np.array(frames).reshape(len(fields), -1, 2) + supports
 
     def _interpolation(self, model: Model) -> sparse.csr_matrix:
-        """Return the matrix from displacements of the cells' points to those of the corners.
-
-        A corner rotates with the nearest edge; this is exact for rigid blocks, even for large
-        rotations.
-        """
+        """Return the matrix from displacements of the cells' points to those of the corners."""
+        # a corner rotates with the nearest edge, which is exact for rigid blocks at any rotation
         cells, rows = model.cells, []
         zero, one = sparse.csr_matrix((2, 2 * len(cells.places))), np.eye(2)
         for point, number in zip(self.points, self.block.tolist(), strict=True):
@@ -112,11 +106,10 @@ def _count_chords(block: Block, tolerance: float) -> int:
 
 @dataclass
 class PackedArrays:
-    """Arrays over time as text: integers of a quantum, differences, deflate, base64.
+    """Arrays over time as text: integers of a quantum, differences, deflate, base64."""
 
-    Consecutive values are similar, so that their differences are small integers. Bytes of equal
-    significance stand together, because deflate compresses them better.
-    """
+    # Consecutive values are similar: their differences are small. Bytes of equal significance stand
+    # together, which deflate compresses better.
 
     # name, shape (series, samples) and quantum of each array, in the order of the bytes
     head: list[dict[str, Any]] = field(default_factory=list)
@@ -156,6 +149,9 @@ class Scene:
     title: str = ""  # above the structure
     max_bytes: int = MAX_PACKED_BYTES  # size limit of the packed part
     missing_reason: str = ""  # why there are no displacements, if there are none
+
+    # largest V / N that is shown [-]; a joint with more is about to open
+    max_friction_ratio: ClassVar[float] = 5.0
 
     def __post_init__(self) -> None:
         """Refuse a run of another structure or model."""
@@ -206,17 +202,12 @@ class Scene:
         if self.model is not None and self.model.large_displacements:
             return 1.0
         if self.moved is not None:
-            largest = float(np.abs(self.moved[1]).max())
-            aim = DRAWN_DISPLACEMENT * self.structure.size
-        elif "opening" in self.run.joints:
+            return round_magnification(float(np.abs(self.moved[1]).max()) / self.structure.size)
+        if "opening" in self.run.joints:  # seen as a gap of a third of the depth
             joints = assessed_joints(self.run.joints)
-            largest = float(joints["opening"].max())
-            aim = 0.3 * float(joints["depth"].mean())
-        else:
-            return 1.0
-        steps = np.outer(10.0 ** np.arange(9), [1.0, 2.0, 5.0]).ravel()
-        fits = steps[steps * largest <= aim]
-        return float(fits[-1]) if largest > 0.0 and len(fits) else 1.0
+            share = float(joints["opening"].max()) / float(joints["depth"].mean())
+            return round_magnification(3.0 * DRAWN_DISPLACEMENT * share)
+        return 1.0
 
     @cached_property
     def initial_time(self) -> float:
@@ -255,7 +246,7 @@ class Scene:
         pack.add_times("time", joints["time"].values)
         e, ratio, normal = (joints[key].values.T for key in ("eccentricity", "friction", "N"))
         pack.add("e", e, 1e-3)
-        pack.add("ratio", np.minimum(ratio, MAX_FRICTION_RATIO), 1e-3)
+        pack.add("ratio", np.minimum(ratio, self.max_friction_ratio), 1e-3)
         pack.add("normal", normal)
         if "opening" in joints:
             pack.add("opening", joints["opening"].values.T)
@@ -312,7 +303,7 @@ class Scene:
             "still": self.initial_time,
             "chosen": self.initial_joint,
             "every": every,
-            "most": MAX_FRICTION_RATIO,
+            "most": self.max_friction_ratio,
             "end": float(run.time[-1] if falls is None else falls.times[-1]),
             "loose": None if falls is None else float(falls.times[0]),
             "level": None if falls is None else falls.level,
