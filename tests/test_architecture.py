@@ -48,7 +48,7 @@ ALLOWED_IN = {
     "shapely": "masonry",
     "ezdxf": "masonry",
     "netCDF4": "_netcdf",
-    "tomllib": ("cases", "studies"),
+    "tomllib": ("cases", "limit.vehicles", "studies"),
     "tomli_w": "cases",
     "argparse": "commands",
     "obspy": "motion.records.waveforms",
