@@ -21,10 +21,11 @@ from scipy.sparse import csgraph, csr_matrix
 
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
+from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.masonry.block import Block
 from archfem.masonry.loads import AttachedLoad
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, largest_displacement, rigid_motion_matrix
 
 # Distance of points that touch, relative to the size of the structure [-]
 TOUCHING = 1e-6
@@ -91,10 +92,10 @@ class PlacedBlocks:
         """Return the blocks at other displacements from rest."""
         return replace(self, displacement=displacement)
 
-    @cached_property
+    @property
     def rest(self) -> Array:
         """Centroids at rest (n_blocks, 2) [m]."""
-        return np.array([block.centroid for block in self.structure.blocks])
+        return self.structure.centroids
 
     @cached_property
     def centroids(self) -> Array:
@@ -322,29 +323,17 @@ class Bodies:
         points = np.array([contact.point for contact in contacts]).reshape(-1, 2)
         normal = np.array([contact.normal for contact in contacts]).reshape(-1, 2)
         along = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
-        pairs = np.array([(c.corner, c.face) for c in contacts], dtype=np.intp).reshape(-1, 2)
+        pairs = np.array([(c.face, c.corner) for c in contacts], dtype=np.intp).reshape(-1, 2)
         body = self.body[pairs]
-        # first the corners' blocks, then the faces'
-        number, side = np.nonzero((body >= 0) & (body[:, :1] != body[:, 1:]))
-        own, sign = body[number, side], np.where(side == 0, 1.0, -1.0)
-        x, y = (points[number] - self.references[own]).T
-        place = np.repeat(number, 3), (3 * own[:, None] + np.arange(3)).ravel()
-        rates = []
-        for axis in (normal[number], along[number]):
-            turn = x * axis[:, 1] - y * axis[:, 0]
-            values = (sign * np.stack([axis[:, 0], axis[:, 1], turn])).T.ravel()
-            # the bodies of a contact differ, or the contact has no rate: no entry is met twice
-            rates.append(csr_matrix((values, place), (len(contacts), 3 * self.count)))
-        return rates[0], rates[1]
+        # within a body nothing opens or slips
+        body[body[:, 0] == body[:, 1]] = -1
+        rates = (jump_rates(axis, points, body, self.references) for axis in (normal, along))
+        return next(rates), next(rates)
 
 
 def largest_speed(blocks: PlacedBlocks, motion: Array) -> float:
     """Return the largest speed of a corner of any block [m/s]."""
-    speeds = []
-    for number, (u, v, turn) in enumerate(motion):
-        x, y = (blocks.outlines[number] - blocks.centroids[number]).T
-        speeds.append(np.hypot(u - turn * y, v + turn * x).max())
-    return float(max(speeds))
+    return largest_displacement(blocks.outlines, blocks.centroids, motion)
 
 
 def find_mechanism(
@@ -483,13 +472,12 @@ def _moves_as_one(blocks: PlacedBlocks, joint: int, motion: Array) -> bool:
     """Return whether both blocks of a joint have the same rigid motion."""
     lower, higher = blocks.structure.pairs[joint]
     middle = blocks.faces[:, joint].mean(axis=(0, 1))
-    jump = np.zeros(2)
-    for block, sign in ((higher, 1.0), (lower, -1.0)):
-        x, y = middle - blocks.centroids[block]
-        u, v, turn = motion[block]
-        jump += sign * np.array([u - turn * y, v + turn * x])
+    one, other = (
+        rigid_motion_matrix(middle[None], blocks.centroids[block])[0] @ motion[block]
+        for block in (lower, higher)
+    )
     turn = (motion[higher, 2] - motion[lower, 2]) * blocks.structure.depths[joint]
-    return bool(max(np.abs(jump).max(), abs(turn)) <= STILL)
+    return bool(max(np.abs(other - one).max(), abs(turn)) <= STILL)
 
 
 def _sliding_contact(blocks: PlacedBlocks, contact: Contact, slip: int) -> Contact:

@@ -27,10 +27,9 @@ from scipy.sparse.linalg import splu
 
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
-from archfem.joints.quadrature import Quadrature
-from archfem.joints.rigid_kinematics import rigid_joint_operator
+from archfem.joints.rigid_kinematics import jump_rates
 from archfem.masonry.loads import BodyForce, PointLoad
-from archfem.masonry.structure import Structure, first_coordinates, rigid_motion_matrix
+from archfem.masonry.structure import Structure, largest_displacement, rigid_motion_matrix
 
 
 class NoEquilibrium(DidNotConverge):
@@ -39,18 +38,18 @@ class NoEquilibrium(DidNotConverge):
 
 def rigid_load(structure: Structure, actions: Sequence[BodyForce | PointLoad]) -> Array:
     """Return the generalised forces of actions on the free blocks (3 n_free,) [N, N, N m]."""
-    start = first_coordinates(structure)
-    load = np.zeros(3 * len(start))
+    load = np.zeros(3 * len(structure.free))
     for action in actions:
         if isinstance(action, BodyForce):
-            for number, first in start.items():
-                block = structure.blocks[number]
-                weight = block.area * block.material.unit_weight * structure.width
-                load[first : first + 2] += weight * np.array([action.horizontal, action.vertical])
+            free = [structure.blocks[number] for number in structure.free]
+            weight = np.array([b.area * b.material.unit_weight * structure.width for b in free])
+            load[0::3] += weight * action.horizontal
+            load[1::3] += weight * action.vertical
         else:
             number, point = action.place(structure)
-            motion = rigid_motion_matrix(point[None, :], structure.blocks[number].centroid)[0]
-            load[start[number] : start[number] + 3] += np.array(action.force) @ motion
+            motion = rigid_motion_matrix(point[None, :], structure.centroids[number])[0]
+            first = structure.first_coordinates[number]
+            load[first : first + 3] += np.array(action.force) @ motion
     return load
 
 
@@ -81,25 +80,25 @@ class RigidBlocks:
         return self.structure.cohesion / self.force_unit
 
     @cached_property
-    def kinematics(self) -> sparse.csr_matrix:
-        """Openings of intrados ends, of extrados ends, and slips (3 n_joints, 3 n_free) [-, m]."""
-        ends = rigid_joint_operator(self.structure, 1, Quadrature("nodal"))
-        rows = [ends.opening[0::2], ends.opening[1::2], ends.slip[0::2]]
+    def rates(self) -> sparse.csr_matrix:
+        """Openings of intrados and extrados ends, and slips (3 n_joints, 3 n_blocks) [-, m]."""
+        structure, (intrados, extrados) = self.structure, np.moveaxis(self.structure.ends, 1, 0)
+        frames = (
+            (structure.normals, intrados),
+            (structure.normals, extrados),
+            (structure.tangents, intrados),
+        )
+        rows = [jump_rates(*frame, structure.pairs, structure.centroids) for frame in frames]
         return sparse.vstack(rows, format="csr")
+
+    @cached_property
+    def kinematics(self) -> sparse.csr_matrix:
+        """The same with motions of the free blocks alone (3 n_joints, 3 n_free) [-, m]."""
+        return self.rates[:, np.repeat([not b.fixed for b in self.structure.blocks], 3)]
 
     def gaps(self, motion: Array) -> Array:
         """Return intrados openings, extrados openings and slips of a motion (3, n_joints) [m]."""
-        structure, jump = self.structure, np.zeros((len(self.structure.joints), 2, 2))
-        centroids = np.array([block.centroid for block in structure.blocks])
-        # displacement jump at both ends: higher block minus lower block
-        for side, sign in enumerate((-1.0, 1.0)):
-            block = structure.pairs[:, side]
-            x, y = np.moveaxis(structure.ends - centroids[block, None], -1, 0)
-            u, v, turn = motion[block].T[:, :, None]
-            jump += sign * np.stack([u - turn * y, v + turn * x], axis=-1)
-        intrados, extrados = np.einsum("kei,ki->ek", jump, structure.normals)
-        slip = np.einsum("ki,ki->k", jump[:, 0], structure.tangents)
-        return np.stack([intrados, extrados, slip])
+        return (self.rates @ motion.ravel()).reshape(3, -1)
 
     @cached_property
     def balance(self) -> sparse.csr_matrix:
@@ -119,11 +118,8 @@ class RigidBlocks:
 
     def largest_displacement(self, motion: Array) -> float:
         """Return the largest displacement of a corner of any block [m]."""
-        largest = []
-        for block, u in zip(self.structure.blocks, motion, strict=True):
-            moved = rigid_motion_matrix(block.drawn(), block.centroid) @ u
-            largest.append(float(np.linalg.norm(moved, axis=1).max()))
-        return max(largest)
+        outlines = [block.drawn() for block in self.structure.blocks]
+        return largest_displacement(outlines, self.structure.centroids, motion)
 
     def resultants(self, forces: Array) -> Array:
         """Return N, V, M of every joint (n_joints, 3) [N, N, N m]."""

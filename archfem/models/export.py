@@ -55,7 +55,7 @@ class Solids:
     def displacement(self, q: Array) -> Array:
         """Return the displacements of all points (m, 2) [m]."""
         check_coordinate_count(self.model, len(q))
-        centroids = [block.centroid for block in self.model.structure.blocks]
+        centroids = self.model.structure.centroids
         fixed = [
             rigid_motion_matrix(points, centroids[number]) @ self.model.support_motion[number]
             for number, points in self._supports
