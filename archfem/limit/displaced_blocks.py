@@ -16,13 +16,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.optimize import linprog
 from scipy.sparse import csgraph, csr_matrix
 
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
 from archfem.joints.rigid_kinematics import jump_rates
-from archfem.limit.linear_programme import NoEquilibrium
+from archfem.limit.linear_programme import NoEquilibrium, solve_linear
 from archfem.masonry.block import Block
 from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.structure import Structure, largest_displacement, rigid_motion_matrix
@@ -419,25 +418,12 @@ def _solve_static(
         slope = 0.0 * slope
     none = csr_matrix((slope.shape[0], 1))
     limits = sparse.bmat([[-slope, one, none], [-slope, -one, none]], format="csr")
-    for presolve in (False, True):  # where round-off stops the solver presolve changes its path
-        result = linprog(
-            np.append(np.zeros(2 * count), -1.0),
-            A_ub=limits,
-            b_ub=strength,
-            A_eq=balance,
-            b_eq=-lengths * dead / unit,
-            bounds=[(0.0, None)] * count + [(None, None)] * (count + 1),
-            method="highs-ds",
-            options={"presolve": presolve},
-        )
-        if result.status in (0, 2, 3):  # optimal, infeasible, unbounded
-            break
-    if result.status == 3:
+    cost = np.append(np.zeros(2 * count), -1.0)
+    low = np.concatenate([np.zeros(count), np.full(count + 1, -np.inf)])
+    bounds = np.stack([low, np.full(len(low), np.inf)], axis=1)
+    equations = balance, -lengths * dead / unit
+    if (result := solve_linear(cost, bounds, equations, (limits, strength))) is None:
         return None
-    if result.status == 2:
-        raise NoEquilibrium("the blocks cannot rest here under any horizontal force")
-    if result.status != 0:
-        raise DidNotConverge(f"the linear programme found no mechanism: {result.message}")
     velocity = -lengths * np.array(result.eqlin.marginals)
     return float(result.x[-1]), velocity, result.x[:count]
 

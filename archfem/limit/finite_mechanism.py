@@ -15,13 +15,13 @@ not. Where a joint slides and others hinge, α at rest can therefore be below th
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
@@ -37,7 +37,7 @@ from archfem.limit.displaced_blocks import (
     rotation,
     tangent,
 )
-from archfem.limit.linear_programme import NoEquilibrium
+from archfem.limit.linear_programme import NoEquilibrium, solve_linear
 from archfem.masonry.block import largest_overlap
 from archfem.masonry.structure import join_joint_names
 
@@ -226,16 +226,16 @@ class LinkageState:
     def _least_factor(self, columns: Array, loads: Array, fallback: Array) -> Array:
         """Return the forces of least factor where friction makes it indeterminate."""
         unit = np.abs(loads).max()
-        free = [(None, None)] * (columns.shape[1] - len(self.contacts))
-        objective = np.append(np.zeros(columns.shape[1] - 1), 1.0)
+        cost = np.append(np.zeros(columns.shape[1] - 1), 1.0)
         scaled = columns.copy()
         scaled[:, -1] /= unit
-        bounds = [(0.0, None)] * len(self.contacts) + free
-        equations = {"A_eq": scaled, "b_eq": loads / unit}
-        result = linprog(objective, **equations, bounds=bounds, method="highs")
-        if result.status != 0:
-            return fallback
-        return np.append(result.x[:-1] * unit, result.x[-1])
+        low = np.where(np.arange(len(cost)) < len(self.contacts), 0.0, -np.inf)
+        bounds = np.stack([low, np.full(len(cost), np.inf)], axis=1)
+        with suppress(DidNotConverge):
+            result = solve_linear(cost, bounds, (scaled, loads / unit))
+            if result is not None:
+                return np.append(result.x[:-1] * unit, result.x[-1])
+        return fallback
 
 
 @dataclass(frozen=True)

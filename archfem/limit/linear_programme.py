@@ -36,6 +36,27 @@ class NoEquilibrium(DidNotConverge):
     """The programme is infeasible: no forces within the limits balance the loads."""
 
 
+def solve_linear(
+    cost: Array,
+    bounds: Array,
+    equations: tuple[sparse.csr_matrix | Array, Array],
+    limits: tuple[sparse.csr_matrix | None, Array | None] = (None, None),
+    method: str = "highs-ds",
+) -> OptimizeResult | None:
+    """Minimise a cost under equations and limits A x <= b; None where it is unbounded."""
+    # Residuals are of order one. Where round-off stops the solver, presolve changes its path, and
+    # then a coarser tolerance lets it end.
+    for presolve, tolerance in ((False, 1e-9), (True, 1e-9), (True, 1e-8)):
+        feasibility = (f"{side}_feasibility_tolerance" for side in ("primal", "dual"))
+        options = {**dict.fromkeys(feasibility, tolerance), "presolve": presolve}
+        result = linprog(cost, *limits, *equations, bounds, method, options=options)
+        if result.status == 2:
+            raise NoEquilibrium("no state of equilibrium fulfils the limits")
+        if result.status in (0, 3):
+            return result if result.status == 0 else None
+    raise DidNotConverge(f"the linear programme found no state: {result.message}")
+
+
 def rigid_load(structure: Structure, actions: Sequence[BodyForce | PointLoad]) -> Array:
     """Return the generalised forces of actions on the free blocks (3 n_free,) [N, N, N m]."""
     load = np.zeros(3 * len(structure.free))
@@ -248,12 +269,8 @@ class Programme:
         """Solve with linear limits only."""
         reduced = ReducedProgramme(self, limits)
         result = reduced.solve()
-        if result.status == 3:
+        if result is None:
             return None
-        if result.status == 2:
-            raise NoEquilibrium("no state of equilibrium fulfils the limits")
-        if result.status != 0:
-            raise DidNotConverge(f"the linear programme found no state: {result.message}")
         forces, multipliers = reduced.map @ result.x + reduced.constant, reduced.multipliers(result)
         unknowns = result.x[len(result.x) - len(self.unknown_cost) :]
         value = float(reduced.force_cost @ forces + self.unknown_cost @ unknowns)
@@ -316,30 +333,16 @@ class ReducedProgramme:
         self.map = self.map + sparse.csr_matrix((solved[row, column], place), self.map.shape)
         self.constant[self._pivot] = self._factors.solve(load)
 
-    def solve(self, large: int = 600) -> OptimizeResult:
+    def solve(self, large: int = 600) -> OptimizeResult | None:
         """Return SciPy's result: by the interior point from `large` equations on, else the simplex.
 
         In walls the simplex method takes 40 iterations a block. Without an objective any state
         will do, which it finds faster.
         """
         method = "highs-ipm" if len(self._load) > large and self._cost.any() else "highs-ds"
-        # Residuals of balance and limits in mean block weights. Where round-off stops the solver,
-        # presolve changes its path, and then a coarser tolerance lets it end.
-        for presolve, tolerance in ((False, 1e-9), (True, 1e-9), (True, 1e-8)):
-            feasibility = (f"{side}_feasibility_tolerance" for side in ("primal", "dual"))
-            result = linprog(
-                self._cost,
-                A_ub=self._limits.rows @ self.map,
-                b_ub=self._limits.bounds - self._limits.rows @ self.constant,
-                A_eq=self._equations,
-                b_eq=self._load,
-                bounds=self._bounds,
-                method=method,
-                options={**dict.fromkeys(feasibility, tolerance), "presolve": presolve},
-            )
-            if result.status in (0, 2, 3):  # optimal, infeasible, unbounded
-                break
-        return result
+        rows = self._limits.rows
+        limits = rows @ self.map, self._limits.bounds - rows @ self.constant
+        return solve_linear(self._cost, self._bounds, (self._equations, self._load), limits, method)
 
     def multipliers(self, result: OptimizeResult) -> Array:
         """Return the multipliers of the balance of all blocks (3 n_free,)."""
