@@ -22,6 +22,7 @@ from archfem._files import atomic_write, check_file, read_text
 from archfem._typing import Array
 from archfem._validation import short_repr
 from archfem.errors import InvalidInput
+from archfem.masonry.block import measure_polygon
 from archfem.masonry.structure import suggest_name
 from archfem.units import in_unit
 
@@ -394,13 +395,11 @@ def _check_plane(
     return points[:, :2]
 
 
-def _trace_outline(cells: list[NDArray[np.intp]], points: Array, name: str) -> list[int]:
-    """Trace the points around cells in order, without points on straight edges."""
-    ends: Counter[tuple[int, int]] = Counter()
-    for cell in cells:
-        x, y = points[cell].T
-        around = cell if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0.0 else cell[::-1]
-        ends.update((int(a), int(b)) for a, b in zip(around, np.roll(around, -1), strict=True))
+def trace_boundary(cells: Sequence[NDArray[np.intp]]) -> list[int]:
+    """Return the points around anticlockwise cells in order; none where the boundary is no loop."""
+    ends = Counter(
+        (int(a), int(b)) for cell in cells for a, b in zip(cell, np.roll(cell, -1), strict=True)
+    )
     # an edge between two cells occurs in both directions, one on the boundary in one
     rim = [(a, b) for a, b in ends if (b, a) not in ends]
     after = dict(rim)
@@ -408,7 +407,15 @@ def _trace_outline(cells: list[NDArray[np.intp]], points: Array, name: str) -> l
     while rim and (following := after.get(loop[-1], loop[0])) != loop[0] and len(loop) <= len(rim):
         loop.append(following)
     # an edge in one direction twice is of cells that overlap
-    if not rim or len(loop) != len(rim) or len(after) != len(rim) or max(ends.values()) > 1:
+    is_loop = len(loop) == len(rim) == len(after) and max(ends.values()) == 1
+    return loop if is_loop else []
+
+
+def _trace_outline(cells: list[NDArray[np.intp]], points: Array, name: str) -> list[int]:
+    """Trace the points around cells in order, without points on straight edges."""
+    areas = (measure_polygon(points[cell])[0] for cell in cells)
+    loop = trace_boundary([c if a > 0.0 else c[::-1] for c, a in zip(cells, areas, strict=True)])
+    if not loop:
         raise InvalidInput(
             f"physical surface '{name}' is in pieces or has a hole, or its cells overlap: tag "
             "each block by itself"
