@@ -20,7 +20,7 @@ import xarray as xr
 
 from archfem._display import ResultDisplay
 from archfem._typing import Array
-from archfem._validation import check_type, validate_arguments
+from archfem._validation import validate_arguments
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
 from archfem.limit.linear_programme import Optimum, Programme
@@ -255,8 +255,6 @@ def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
         >>> [round(found.factor, 4) for found in each]
         [0.5172, 0.5172, 0.6]
     """
-    check_type(structure, Structure, "structure", "give that whose joints these are")
-    check_type(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
     check_instant(structure, joints)
     fractions = contact_fractions(structure, joints["N"].values, joints["M"].values)
     joints_closed = []

@@ -240,36 +240,21 @@ class LinkageState:
 
 @dataclass(frozen=True)
 class PathEvent:
-    """A change of the mechanism along its path, or its end.
+    """A change of the mechanism along its path, or its end."""
 
-    Attributes:
-        place: number of the place where it happens.
-        text: what happens.
-    """
-
-    place: int
+    place: int  # number of the place where it happens
     text: str
 
 
 @dataclass(frozen=True, eq=False)
 class MechanismPath:
-    """Path of a mechanism: factor and displacements from rest to the fall.
+    """Path of a mechanism: factor and displacements from rest to the fall."""
 
-    Attributes:
-        blocks: blocks at rest, with their loads.
-        factors: factor α of the horizontal forces at each place (n,) [-].
-        displacements: of all blocks' centroids, and rotations (n, n_blocks, 3) [m, m, rad].
-        velocity: velocities at rest (n_blocks, 3), the fastest corner at 1 m/s.
-        mechanisms: mechanisms that are followed one after the other.
-        events: events that change or end the mechanism.
-        end: reason for which the path ends; `end.sentence` gives its meaning.
-    """
-
-    blocks: PlacedBlocks
-    factors: Array
-    displacements: Array
-    velocity: Array
-    mechanisms: tuple[Mechanism, ...]
+    blocks: PlacedBlocks  # at rest, with their loads
+    factors: Array  # α of the horizontal forces at each place (n,) [-]
+    displacements: Array  # of centroids, and rotations (n, n_blocks, 3) [m, m, rad]
+    velocity: Array  # at rest, the fastest corner at 1 m/s (n_blocks, 3)
+    mechanisms: tuple[Mechanism, ...]  # one after the other
     events: tuple[PathEvent, ...]
     end: PathEnd
 
