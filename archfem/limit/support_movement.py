@@ -18,12 +18,12 @@ that the forces of hinges act where the hinges are.
 """
 
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
+from archfem._display import ExplainedWord
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
@@ -48,25 +48,17 @@ MAX_MOVEMENT_STEP = 0.01
 GEOMETRY_TOLERANCE = 1e-8
 
 
-class End(StrEnum):
+class End(ExplainedWord):
     """Reason for which a movement ends."""
 
-    FALLS = "falls"
-    LEAPS = "leaps"
-    SLIDES = "slides"
-    LOCKS = "locks"
-    HOLDS = "holds"
-
-    @property
-    def sentence(self) -> str:
-        """Meaning of the reason, as a sentence."""
-        return {
-            End.FALLS: "beyond, no thrust line fits into the shape that it has taken, and it falls",
-            End.SLIDES: "beyond, a joint needs more than its friction and slides",
-            End.LEAPS: "beyond, no equilibrium lies near: it leaps to another, or falls",
-            End.LOCKS: "without sliding in its joints it cannot follow any further",
-            End.HOLDS: "it stands at the whole movement",
-        }[self]
+    FALLS = (
+        "falls",
+        "beyond, no thrust line fits into the shape that it has taken, and it falls",
+    )
+    LEAPS = "leaps", "beyond, no equilibrium lies near: it leaps to another, or falls"
+    SLIDES = "slides", "beyond, a joint needs more than its friction and slides"
+    LOCKS = "locks", "without sliding in its joints it cannot follow any further"
+    HOLDS = "holds", "it stands at the whole movement"
 
 
 @dataclass(frozen=True)
