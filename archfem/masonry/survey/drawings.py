@@ -307,12 +307,8 @@ def _read_msh(path: Path, unit: str | None, ignored: Collection[str]) -> Iterato
 
 def read_physical_surfaces(path: Path, factor: float = 1.0) -> list[tuple[str, Array]]:
     """Read names and outlines (n, 2) [m] of the physical surfaces, ordered by tag."""
-    mesh = _load_msh(path)
-    names, points = mesh.group_names(2), _check_plane(mesh.points, "the mesh", factor)
-    found: dict[int, list[NDArray[np.intp]]] = {}
     corners = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
-    for tag, cell in mesh.tagged_cells(corners):
-        found.setdefault(tag, []).append(cell)
+    points, names, found = _load_msh(path, factor, 2, corners)
     if not found:
         raise InvalidInput("it has no physical surface: tag each block with one, in gmsh")
     surfaces = []
@@ -324,13 +320,9 @@ def read_physical_surfaces(path: Path, factor: float = 1.0) -> list[tuple[str, A
 
 def read_physical_curves(path: Path, factor: float = 1.0) -> list[tuple[str, Array]]:
     """Read name and edge mid-points (n, 2) [m] of each named physical curve."""
-    mesh = _load_msh(path)
-    names, points = mesh.group_names(1), _check_plane(mesh.points, "the mesh", factor)
-    found: dict[str, list[Array]] = {}
-    for tag, edge in mesh.tagged_cells({"line": 2, "line3": 2}):
-        if tag in names:
-            found.setdefault(names[tag], []).append(points[edge].mean(axis=0))
-    return [(name, np.array(middles)) for name, middles in found.items()]
+    points, names, found = _load_msh(path, factor, 1, {"line": 2, "line3": 2})
+    named = [(names[tag], edges) for tag, edges in found.items() if tag in names]
+    return [(name, points[np.array(edges)].mean(axis=1)) for name, edges in named]
 
 
 def infer_part(name: str) -> str:
@@ -339,28 +331,10 @@ def infer_part(name: str) -> str:
     return head.strip() if comma else re.sub(r"\s*\d+$", "", name)
 
 
-@dataclass(frozen=True, eq=False)
-class TaggedMesh:
-    """Points, cells and physical groups of a gmsh file."""
-
-    points: Array  # (n, 2 or 3), in drawing units
-    cells: list[tuple[str, NDArray[np.intp], NDArray[np.intp]]]  # kind, points and tag of each
-    groups: dict[str, tuple[int, int]]  # tag and dimension by name
-
-    def group_names(self, dimension: int) -> dict[int, str]:
-        """Return the names of the physical groups of one dimension by tag."""
-        return {tag: name for name, (tag, size) in self.groups.items() if size == dimension}
-
-    def tagged_cells(self, corners: Mapping[str, int]) -> Iterator[tuple[int, NDArray[np.intp]]]:
-        """Yield tag and corners of each cell of some kinds, whose numbers of corners are given."""
-        for kind, cells, tags in self.cells:
-            for cell, tag in zip(cells[:, : corners.get(kind, 0)], tags, strict=True):
-                if len(cell):
-                    yield int(tag), cell
-
-
-def _load_msh(path: Path) -> TaggedMesh:
-    """Load a gmsh file with meshio."""
+def _load_msh(
+    path: Path, factor: float, dimension: int, corners: Mapping[str, int]
+) -> tuple[Array, dict[int, str], dict[int, list[NDArray[np.intp]]]]:
+    """Load points [m], and names and corners of cells of physical groups by tag, with meshio."""
     try:
         import meshio
     except ImportError as error:
@@ -370,19 +344,24 @@ def _load_msh(path: Path) -> TaggedMesh:
     with _foreign_reader("meshio", "mesh of gmsh"):
         read = meshio.gmsh.read(path)
         tags = read.cell_data.get("gmsh:physical", [np.empty(0)] * len(read.cells))
-        cells = [
+        blocks = [
             (each.type, np.array(each.data, dtype=np.intp), np.array(tag, dtype=np.intp))
             for each, tag in zip(read.cells, tags, strict=True)
         ]
-        groups = {name: (int(tag), int(size)) for name, (tag, size) in read.field_data.items()}
-        mesh = TaggedMesh(np.array(read.points, dtype=float), cells, groups)
-    for kind, numbers, _ in cells:
+        groups = [(name, int(tag), int(size)) for name, (tag, size) in read.field_data.items()]
+        points = np.array(read.points, dtype=float)
+    cells: dict[int, list[NDArray[np.intp]]] = {}
+    for kind, numbers, of_group in blocks:
         # a negative number would silently count from the end
-        if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(mesh.points):
+        if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(points):
             raise InvalidInput(
                 f"cells ({kind}) have nodes that are not in the file: save the whole mesh"
             )
-    return mesh
+        if kind in corners:
+            for cell, tag in zip(numbers[:, : corners[kind]], of_group.tolist(), strict=True):
+                cells.setdefault(tag, []).append(cell)
+    names = {tag: name for name, tag, size in groups if size == dimension}
+    return _check_plane(points, "the mesh", factor), names, cells
 
 
 def _check_plane(
