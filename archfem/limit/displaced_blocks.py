@@ -16,15 +16,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.optimize import linprog
 from scipy.sparse import csgraph, csr_matrix
 
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
-from archfem.joints.rigid_kinematics import jump_rates
-from archfem.limit.linear_programme import NoEquilibrium, solve_linear
+from archfem.limit.linear_programme import NoEquilibrium
 from archfem.masonry.block import Block
 from archfem.masonry.loads import AttachedLoad
-from archfem.masonry.structure import Structure, largest_displacement, rigid_motion_matrix
+from archfem.masonry.structure import Structure
 
 # Distance of points that touch, relative to the size of the structure [-]
 TOUCHING = 1e-6
@@ -314,17 +314,29 @@ class Bodies:
         points = np.array([contact.point for contact in contacts]).reshape(-1, 2)
         normal = np.array([contact.normal for contact in contacts]).reshape(-1, 2)
         along = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
-        pairs = np.array([(c.face, c.corner) for c in contacts], dtype=np.intp).reshape(-1, 2)
+        pairs = np.array([(c.corner, c.face) for c in contacts], dtype=np.intp).reshape(-1, 2)
         body = self.body[pairs]
-        # within a body nothing opens or slips
-        body[body[:, 0] == body[:, 1]] = -1
-        rates = (jump_rates(axis, points, body, self.references) for axis in (normal, along))
-        return next(rates), next(rates)
+        # first the corners' blocks, then the faces'
+        number, side = np.nonzero((body >= 0) & (body[:, :1] != body[:, 1:]))
+        own, sign = body[number, side], np.where(side == 0, 1.0, -1.0)
+        x, y = (points[number] - self.references[own]).T
+        place = np.repeat(number, 3), (3 * own[:, None] + np.arange(3)).ravel()
+        rates = []
+        for axis in (normal[number], along[number]):
+            turn = x * axis[:, 1] - y * axis[:, 0]
+            values = (sign * np.stack([axis[:, 0], axis[:, 1], turn])).T.ravel()
+            # the bodies of a contact differ, or the contact has no rate: no entry is met twice
+            rates.append(csr_matrix((values, place), (len(contacts), 3 * self.count)))
+        return rates[0], rates[1]
 
 
 def largest_speed(blocks: PlacedBlocks, motion: Array) -> float:
     """Return the largest speed of a corner of any block [m/s]."""
-    return largest_displacement(blocks.outlines, blocks.centroids, motion)
+    speeds = []
+    for number, (u, v, turn) in enumerate(motion):
+        x, y = (blocks.outlines[number] - blocks.centroids[number]).T
+        speeds.append(np.hypot(u - turn * y, v + turn * x).max())
+    return float(max(speeds))
 
 
 def find_mechanism(
@@ -378,8 +390,10 @@ def _solve_flat(
 def _solve_static(
     bodies: Bodies, contacts: Sequence[Contact], coefficient: Array, held: Array | None = None
 ) -> tuple[float, Array, Array] | None:
-    """Return the largest factor, velocities by duality and normal forces [mean body weights]."""
-    # with `held` normal forces, friction is limited by these
+    """Return the largest factor, velocities by duality and normal forces [mean body weights].
+
+    With `held` normal forces, friction is limited by these.
+    """
     normal, along = bodies.sparse_rates(contacts)
     dead, live = (bodies.generalised(load) for load in (bodies.blocks.dead, bodies.blocks.live))
     # forces in mean body weights and lengths in metres over the size keep coefficients near one
@@ -395,12 +409,25 @@ def _solve_static(
         slope = 0.0 * slope
     none = csr_matrix((slope.shape[0], 1))
     limits = sparse.bmat([[-slope, one, none], [-slope, -one, none]], format="csr")
-    cost = np.append(np.zeros(2 * count), -1.0)
-    low = np.concatenate([np.zeros(count), np.full(count + 1, -np.inf)])
-    bounds = np.stack([low, np.full(len(low), np.inf)], axis=1)
-    equations = balance, -lengths * dead / unit
-    if (result := solve_linear(cost, bounds, equations, (limits, strength))) is None:
+    for presolve in (False, True):  # where round-off stops the solver presolve changes its path
+        result = linprog(
+            np.append(np.zeros(2 * count), -1.0),
+            A_ub=limits,
+            b_ub=strength,
+            A_eq=balance,
+            b_eq=-lengths * dead / unit,
+            bounds=[(0.0, None)] * count + [(None, None)] * (count + 1),
+            method="highs-ds",
+            options={"presolve": presolve},
+        )
+        if result.status in (0, 2, 3):  # optimal, infeasible, unbounded
+            break
+    if result.status == 3:
         return None
+    if result.status == 2:
+        raise NoEquilibrium("the blocks cannot rest here under any horizontal force")
+    if result.status != 0:
+        raise DidNotConverge(f"the linear programme found no mechanism: {result.message}")
     velocity = -lengths * np.array(result.eqlin.marginals)
     return float(result.x[-1]), velocity, result.x[:count]
 
@@ -435,12 +462,13 @@ def _moves_as_one(blocks: PlacedBlocks, joint: int, motion: Array) -> bool:
     """Return whether both blocks of a joint have the same rigid motion."""
     lower, higher = blocks.structure.pairs[joint]
     middle = blocks.faces[:, joint].mean(axis=(0, 1))
-    one, other = (
-        rigid_motion_matrix(middle[None], blocks.centroids[block])[0] @ motion[block]
-        for block in (lower, higher)
-    )
+    jump = np.zeros(2)
+    for block, sign in ((higher, 1.0), (lower, -1.0)):
+        x, y = middle - blocks.centroids[block]
+        u, v, turn = motion[block]
+        jump += sign * np.array([u - turn * y, v + turn * x])
     turn = (motion[higher, 2] - motion[lower, 2]) * blocks.structure.depths[joint]
-    return bool(max(np.abs(other - one).max(), abs(turn)) <= STILL)
+    return bool(max(np.abs(jump).max(), abs(turn)) <= STILL)
 
 
 def _sliding_contact(blocks: PlacedBlocks, contact: Contact, slip: int) -> Contact:

@@ -15,12 +15,12 @@ not. Where a joint slides and others hinge, α at rest can therefore be below th
 """
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linprog
 
 from archfem._display import ExplainedWord
 from archfem._typing import Array
@@ -37,7 +37,7 @@ from archfem.limit.displaced_blocks import (
     rotation,
     tangent,
 )
-from archfem.limit.linear_programme import NoEquilibrium, solve_linear
+from archfem.limit.linear_programme import NoEquilibrium
 from archfem.masonry.block import largest_overlap
 from archfem.masonry.structure import join_joint_names
 
@@ -215,16 +215,16 @@ class LinkageState:
     def _least_factor(self, columns: Array, loads: Array, fallback: Array) -> Array:
         """Return the forces of least factor where friction makes it indeterminate."""
         unit = np.abs(loads).max()
-        cost = np.append(np.zeros(columns.shape[1] - 1), 1.0)
+        free = [(None, None)] * (columns.shape[1] - len(self.contacts))
+        objective = np.append(np.zeros(columns.shape[1] - 1), 1.0)
         scaled = columns.copy()
         scaled[:, -1] /= unit
-        low = np.where(np.arange(len(cost)) < len(self.contacts), 0.0, -np.inf)
-        bounds = np.stack([low, np.full(len(cost), np.inf)], axis=1)
-        with suppress(DidNotConverge):
-            result = solve_linear(cost, bounds, (scaled, loads / unit))
-            if result is not None:
-                return np.append(result.x[:-1] * unit, result.x[-1])
-        return fallback
+        bounds = [(0.0, None)] * len(self.contacts) + free
+        equations = {"A_eq": scaled, "b_eq": loads / unit}
+        result = linprog(objective, **equations, bounds=bounds, method="highs")
+        if result.status != 0:
+            return fallback
+        return np.append(result.x[:-1] * unit, result.x[-1])
 
 
 @dataclass(frozen=True)
