@@ -5,9 +5,10 @@ and `report` are therefore bound when they are called, through one table that a 
 """
 
 from collections.abc import Mapping
+from enum import StrEnum
 from html import escape
 from importlib import import_module
-from typing import Any
+from typing import Any, Self
 
 # "Class.method": "module:function" below archfem; the function takes the instance first.
 LATE_BOUND_METHODS: Mapping[str, str] = {
@@ -36,6 +37,18 @@ def call_late_bound(method: str, *args: Any, **options: Any) -> Any:
     """Call the function which `LATE_BOUND_METHODS` names for a method."""
     module, _, function = LATE_BOUND_METHODS[method].partition(":")
     return getattr(import_module(f"archfem.{module}"), function)(*args, **options)
+
+
+class ExplainedWord(StrEnum):
+    """A word for an outcome, with its meaning as a sentence."""
+
+    sentence: str
+
+    def __new__(cls, word: str, sentence: str) -> Self:
+        """Create a word and its sentence."""
+        member = str.__new__(cls, word)
+        member._value_, member.sentence = word, sentence
+        return member
 
 
 class ResultDisplay:

@@ -23,7 +23,7 @@ class Requirement(NamedTuple):
 FENICSX_REMEDY = (
     "on Debian and Ubuntu 'apt-get install python3-dolfinx' and a virtual environment made by "
     "'/usr/bin/python3 -m venv --system-site-packages DIR', elsewhere 'conda install -c "
-    "conda-forge fenics-dolfinx slepc4py'"
+    "conda-forge fenics-dolfinx'"
 )
 
 OPTIONAL_PACKAGES = {
@@ -32,7 +32,6 @@ OPTIONAL_PACKAGES = {
         FENICSX_REMEDY,
     ),
     "PETSc": Requirement("its solvers", "it comes with FEniCSx, " + FENICSX_REMEDY),
-    "SLEPc": Requirement("modes of large models", "it comes with FEniCSx, " + FENICSX_REMEDY),
     "ObsPy": Requirement("records in miniSEED and SAC", "pip install 'archfem[seismology]'"),
     "pygmm": Requirement("ground-motion models", "pip install 'archfem[hazard]'"),
     "Chromium": Requirement(

@@ -1,9 +1,8 @@
-"""PETSc and SLEPc without PETSc's signal handlers, which turn Ctrl-C into an MPI abort."""
+"""PETSc without its signal handlers, which turn Ctrl-C into an MPI abort."""
 
 import ctypes
 import sys
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
 
 import petsc4py
 
@@ -12,25 +11,9 @@ if "petsc4py.PETSc" not in sys.modules:
 
 from petsc4py import PETSc as PETSc
 
-if TYPE_CHECKING:
-    from slepc4py import SLEPc as SLEPc
-
 # MPI, which PETSc loads, makes the allocator of glibc keep all memory that was ever used. Large
 # arrays go back to the system again: a third of the memory that a long run takes.
 with suppress(OSError, AttributeError):  # another C library
     _mallopt = ctypes.CDLL(None).mallopt
     _mallopt(-4, 65536)  # M_MMAP_MAX, its default
     _mallopt(-3, 2**23)  # M_MMAP_THRESHOLD [bytes]
-
-
-def __getattr__(name: str) -> Any:
-    """Load SLEPc at first use: only modes of vibration require it."""
-    if name != "SLEPc":
-        raise AttributeError(f"module '{__name__}' has no attribute {name!r}")
-    import slepc4py
-
-    if "slepc4py.SLEPc" not in sys.modules:
-        slepc4py.init(["archfem", "-no_signal_handler"])
-    from slepc4py import SLEPc
-
-    return SLEPc

@@ -48,7 +48,7 @@ napoleon_use_ivar = True
 toc_object_entries = False
 autodoc_mock_imports = [
     name
-    for name in ("dolfinx", "petsc4py", "slepc4py", "mpi4py", "ufl", "basix", "gmsh")
+    for name in ("dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "gmsh")
     if find_spec(name) is None
 ]
 

@@ -208,9 +208,9 @@ def _diagnose_package(name: str, min_version: str) -> Diagnosis:
 def _diagnose_fenicsx() -> Iterator[Diagnosis]:
     """Diagnose FEniCSx, and the C compiler for its forms."""
     try:
-        # These modules import dolfinx, petsc4py and slepc4py with a message of their own.
+        # These modules import dolfinx and petsc4py with a message of their own.
         import_module("archfem.models.fem")
-        import_module("archfem.statics.slepc_eigensolver")
+        import_module("archfem.statics.snes")
     except ImportError as error:
         remedy = _optional.OPTIONAL_PACKAGES["FEniCSx"].remedy
         if find_spec("dolfinx") is None:  # pip cannot install it, and most works without it
@@ -222,7 +222,7 @@ def _diagnose_fenicsx() -> Iterator[Diagnosis]:
         else:
             yield Diagnosis("FEniCSx", f"does not load: {error.__cause__}", remedy)
         return
-    for name in ("dolfinx", "petsc4py", "slepc4py", "mpi4py"):
+    for name in ("dolfinx", "petsc4py", "mpi4py"):
         yield Diagnosis(name, str(import_module(name).__version__))
     compiler = shutil.which(os.environ.get("CC", "cc")) or shutil.which("gcc")
     remedy = "'apt-get install gcc libc6-dev', elsewhere 'conda install -c conda-forge c-compiler'"

@@ -444,13 +444,8 @@ class OwnLawStep:
         return total[:2], total[2:].reshape(2, 2, -1)
 
     def _evaluate(self, change: Array, rows: Numbers, places: Array) -> Array:
-        """Return tractions, and derivatives by the gaps at the end, at places on the way (5, 6, k).
-
-        Args:
-            change: of opening and slip over the step (2, p) [m].
-            rows: points (k,).
-            places: from 0 at the start to 1 at the end (5, k).
-        """
+        """Return tractions, and derivatives by the gaps at the end, on the way (5, 6, k)."""
+        # places of the points `rows` (k,) from 0 at the start to 1 at the end (5, k)
         ahead = places + self.damping_lag
         gaps = self._before[:, rows, None] + change[:, rows, None] * ahead.T
         all_rows = np.repeat(rows, len(places))

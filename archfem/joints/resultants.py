@@ -20,7 +20,7 @@ from scipy import sparse
 
 from archfem._files import atomic_write
 from archfem._typing import Array
-from archfem._validation import check_type, validate_arguments
+from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     TENSION_COORDINATE,
@@ -250,8 +250,6 @@ def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
         >>> af.joints.thrust_line(block, pushed).values.round(6).tolist()
         [[0.3, 0.0]]
     """
-    check_type(structure, Structure, "structure", "give that whose joints these are")
-    check_type(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
     middle, along = (
         xr.DataArray(vectors, {"axis": ["x", "y"]}, ("joint", "axis"))
         for vectors in (structure.middles, structure.tangents * structure.depths[:, None])

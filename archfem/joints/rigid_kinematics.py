@@ -19,55 +19,41 @@ def rigid_joint_operator(structure: Structure, cells: int, rule: Quadrature) -> 
     """Return the joint operator in terms of rigid motions of the free blocks."""
     rules = [rule.on_joint(facet_ends(depth, cells)) for depth in structure.depths]
     points = JointPoints.on(structure, rules)
-    places, normals, tangents = _point_frames(structure, points)
-    jump = _jump_entries(structure, points, places)
-    size = 3 * len(structure.free)
-    opening, slip = (_component(directions, jump, size) for directions in (normals, tangents))
+    opening, slip = _point_rates(structure, points, free_only=True)
     return make_operator(structure, rule, points, opening, slip)
 
 
 def block_motion_gaps(structure: Structure, points: JointPoints, motion: Array) -> Array:
     """Return opening and slip at the joint points due to rigid motions of all blocks (2, p) [m]."""
-    places, normals, tangents = _point_frames(structure, points)
-    jump = np.zeros_like(places)
-    centroids = np.array([block.centroid for block in structure.blocks])
-    for side, sign in enumerate((-1.0, 1.0)):
-        block = structure.pairs[points.joint, side]
-        jump += sign * np.einsum(
-            "pij,pj->pi", rigid_motion_matrix(places, centroids[block]), motion[block]
-        )
-    return np.stack([np.sum(normals * jump, axis=1), np.sum(tangents * jump, axis=1)])
+    rates = _point_rates(structure, points, free_only=False)
+    return np.stack([rate @ motion.ravel() for rate in rates])
 
 
-def _point_frames(structure: Structure, points: JointPoints) -> tuple[Array, Array, Array]:
-    """Return places of the joint points, and normals and tangents there, each (p, 2)."""
+def _point_rates(
+    structure: Structure, points: JointPoints, *, free_only: bool
+) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    """Return the rates of openings and slips at the joint points with motions of blocks."""
     tangents = structure.tangents[points.joint]
     places = structure.middles[points.joint] + points.offset[:, None] * tangents
-    return places, structure.normals[points.joint], tangents
+    pairs, centroids = structure.pairs[points.joint], structure.centroids
+    if free_only:
+        pairs, centroids = structure.first_coordinates[pairs] // 3, centroids[list(structure.free)]
+    opening = jump_rates(structure.normals[points.joint], places, pairs, centroids)
+    return opening, jump_rates(tangents, places, pairs, centroids)
 
 
-Jump = tuple[Numbers, Numbers, Array]
+def jump_rates(
+    directions: Array, places: Array, pairs: Numbers, centres: Array
+) -> sparse.csr_matrix:
+    """Return the matrix from motions of bodies to the jumps at places along directions (p, 3 m).
 
-
-def _jump_entries(structure: Structure, points: JointPoints, places: Array) -> Jump:
-    """Return the nonzero blocks of the jump's matrix: their rows, first columns and values."""
-    first_coordinate = np.full(len(structure.blocks), -1)
-    first_coordinate[list(structure.free)] = 3 * np.arange(len(structure.free))
-    centroids = np.array([block.centroid for block in structure.blocks])
-    # lower blocks of all points, then higher ones
-    block = structure.pairs[points.joint].T.ravel()
-    rows = np.flatnonzero(first_coordinate[block] >= 0)
-    free, count = block[rows], len(places)
-    motion = rigid_motion_matrix(places[rows % count], centroids[free])
-    sign = np.where(rows < count, -1.0, 1.0)
-    return rows % count, first_coordinate[free], sign[:, None, None] * motion
-
-
-def _component(directions: Array, jump: Jump, size: int) -> sparse.csr_matrix:
-    """Return the component of the jump at each point along a direction (p, n)."""
-    rows, start, motion = jump
-    values = directions[rows, 0, None] * motion[:, 0] + directions[rows, 1, None] * motion[:, 1]
-    entries = np.repeat(rows, 3), (start[:, None] + np.arange(3)).ravel()
-    component = sparse.csr_matrix((values.ravel(), entries), (len(directions), size))
-    component.eliminate_zeros()
-    return component
+    A jump is the motion of the second body of a pair less that of the first; -1 does not move.
+    """
+    row, side = np.nonzero(pairs >= 0)
+    body, sign = pairs[row, side], np.where(side == 0, -1.0, 1.0)
+    motion = sign[:, None, None] * rigid_motion_matrix(places[row], centres[body])
+    values = directions[row, 0, None] * motion[:, 0] + directions[row, 1, None] * motion[:, 1]
+    entries = np.repeat(row, 3), (3 * body[:, None] + np.arange(3)).ravel()
+    rates = sparse.csr_matrix((values.ravel(), entries), (len(pairs), 3 * len(centres)))
+    rates.eliminate_zeros()
+    return rates

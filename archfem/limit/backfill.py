@@ -21,16 +21,12 @@ from scipy import sparse
 from archfem._typing import Array
 from archfem._validation import check_number, check_type, is_one_of, short_repr
 from archfem.errors import InvalidInput
+from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks, rigid_load
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
 from archfem.masonry.loads import BodyForce, PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import (
-    CONTACT_TOLERANCE,
-    Structure,
-    first_coordinates,
-    rigid_motion_matrix,
-)
+from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 from archfem.units import in_degrees
 
 logger = logging.getLogger("archfem")
@@ -492,15 +488,10 @@ class BlocksWithFill:
     ) -> sparse.csr_matrix:
         """Return the generalised forces of forces at points of the stones (n, 3 n_free)."""
         structure = self.rigid_regions.structure
-        start = np.full(len(structure.blocks), -1)
-        for number, first in first_coordinates(structure).items():
-            start[number] = first
-        centroids = np.array([stone.centroid for stone in structure.blocks])
-        entries = np.einsum("pi,pij->pj", forces, rigid_motion_matrix(points, centroids[block]))
-        rows = np.flatnonzero(start[block] >= 0)  # supports have no coordinates
-        columns = start[block[rows], None] + np.arange(3)
-        shape = (len(block), 3 * len(structure.free))
-        return sparse.csr_matrix((entries[rows].ravel(), (rows.repeat(3), columns.ravel())), shape)
+        # supports have no coordinates
+        free = structure.first_coordinates[block] // 3
+        pairs = np.stack([np.full_like(free, -1), free], axis=1)
+        return jump_rates(forces, points, pairs, structure.centroids[list(structure.free)])
 
     def _sum_forces(self, block: NDArray[np.intp], points: Array, forces: Array) -> Array:
         """Return the sum of the generalised forces of forces at points (3 n_free,)."""

@@ -13,14 +13,13 @@ it remains depends on where the thrust of the state is.
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 import xarray as xr
 
-from archfem._display import ResultDisplay
+from archfem._display import ExplainedWord, ResultDisplay
 from archfem._typing import Array
-from archfem._validation import check_type, validate_arguments
+from archfem._validation import validate_arguments
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
 from archfem.limit.linear_programme import Optimum, Programme
@@ -31,28 +30,18 @@ from archfem.masonry.structure import Structure, join_joint_names, join_names
 logger = logging.getLogger("archfem")
 
 
-class Outcome(StrEnum):
+class Outcome(ExplainedWord):
     """Outcome of a limit analysis."""
 
-    COLLAPSES = "collapses"
-    UNBOUNDED = "unbounded"
-    INFEASIBLE = "infeasible"
-    SETTLES = "settles"
-    LOCKS = "locks"
-    BRACKETED = "bracketed"
-
-    @property
-    def sentence(self) -> str:
-        """Meaning of the outcome, as a sentence."""
-        return {
-            Outcome.COLLAPSES: "the load turns it into a mechanism",
-            Outcome.UNBOUNDED: "this load never overturns it",
-            Outcome.INFEASIBLE: "it does not stand under its own weight",
-            Outcome.SETTLES: "it follows its support and stands",
-            Outcome.LOCKS: "it cannot follow this movement of its support",
-            Outcome.BRACKETED: "no state without dilatancy was found, and none lies beyond this "
-            "bound",
-        }[self]
+    COLLAPSES = "collapses", "the load turns it into a mechanism"
+    UNBOUNDED = "unbounded", "this load never overturns it"
+    INFEASIBLE = "infeasible", "it does not stand under its own weight"
+    SETTLES = "settles", "it follows its support and stands"
+    LOCKS = "locks", "it cannot follow this movement of its support"
+    BRACKETED = (
+        "bracketed",
+        "no state without dilatancy was found, and none lies beyond this bound",
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -255,8 +244,6 @@ def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
         >>> [round(found.factor, 4) for found in each]
         [0.5172, 0.5172, 0.6]
     """
-    check_type(structure, Structure, "structure", "give that whose joints these are")
-    check_type(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
     check_instant(structure, joints)
     fractions = contact_fractions(structure, joints["N"].values, joints["M"].values)
     joints_closed = []

@@ -46,22 +46,14 @@ class Contact(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """A mechanism at a place: rigid bodies and the contacts between them that persist.
+    """A mechanism at a place: rigid bodies and the contacts between them that persist."""
 
-    Attributes:
-        factor: factor α of the horizontal forces that sets it in motion [-].
-        motion: velocities of all blocks' centroids and rotations (n_blocks, 3), scaled so that the
-            fastest corner has 1 m/s.
-        body: number of the body of each block; -1 for blocks at rest (n_blocks,).
-        contacts: contacts that persist.
-        is_flat: whether contacts were found to slide without dilatancy.
-    """
-
-    factor: float
+    factor: float  # α of the horizontal forces that sets it in motion [-]
+    # velocities of centroids and rotations, the fastest corner at 1 m/s (n_blocks, 3)
     motion: Array
-    body: NDArray[np.intp]
-    contacts: tuple[Contact, ...]
-    is_flat: bool = False
+    body: NDArray[np.intp]  # number of the body of each block; -1 at rest (n_blocks,)
+    contacts: tuple[Contact, ...]  # those that persist
+    is_flat: bool = False  # whether contacts were found to slide without dilatancy
 
     @property
     def sliding_joints(self) -> frozenset[int]:
@@ -91,10 +83,10 @@ class PlacedBlocks:
         """Return the blocks at other displacements from rest."""
         return replace(self, displacement=displacement)
 
-    @cached_property
+    @property
     def rest(self) -> Array:
         """Centroids at rest (n_blocks, 2) [m]."""
-        return np.array([block.centroid for block in self.structure.blocks])
+        return self.structure.centroids
 
     @cached_property
     def centroids(self) -> Array:
@@ -350,24 +342,11 @@ def largest_speed(blocks: PlacedBlocks, motion: Array) -> float:
 def find_mechanism(
     blocks: PlacedBlocks, joints: Sequence[int], friction: Array, *, flat: bool = False
 ) -> Mechanism | None:
-    """Find the mechanism of least factor by limit analysis of the blocks at their present places.
-
-    Forces N >= 0 and |T| <= μ N act at the contacts of the joints that may move; the largest factor
-    at which they balance the loads is sought, and its dual is the motion.
-
-    Args:
-        blocks: at their present places.
-        joints: numbers of the joints that may open or slip; the others are welded.
-        friction: coefficients μ of all joints, infinite where nothing slides (n_joints,).
-        flat: whether contacts slide without dilatancy: |T| <= μ N₀ with N₀ of the solution before,
-            until it repeats (Gilbert, Casapulla and Ahmed, Comput. Struct. 84 (2006) 873-887).
-
-    Returns:
-        The mechanism; None where no factor sets the blocks in motion.
-
-    Raises:
-        NoEquilibrium: the blocks cannot be at rest here under any factor.
-    """
+    """Find the mechanism of least factor at the present places; None where no factor moves them."""
+    # Forces N >= 0 and |T| <= μ N act at the contacts of the joints that may move. The largest
+    # factor at which they balance the loads is sought; its dual is the motion. Without dilatancy,
+    # if `flat`, |T| <= μ N₀ with N₀ of the solution before, until it repeats (Gilbert, Casapulla
+    # and Ahmed, Comput. Struct. 84 (2006) 873-887).
     among = set(joints)
     welded = [k for k in range(len(blocks.structure.joints)) if k not in among]
     bodies = Bodies(blocks, merge_blocks(blocks.structure, welded))

@@ -16,13 +16,13 @@ not. Where a joint slides and others hinge, α at rest can therefore be below th
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from archfem._display import ExplainedWord
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
 from archfem.limit.displaced_blocks import (
@@ -42,25 +42,14 @@ from archfem.masonry.block import largest_overlap
 from archfem.masonry.structure import join_joint_names
 
 
-class PathEnd(StrEnum):
+class PathEnd(ExplainedWord):
     """Reason for which the path of a mechanism ends."""
 
-    FALLS = "falls"
-    LOCKS = "locks"
-    COLLIDES = "collides"
-    ENDURES = "endures"
-    UNRESOLVED = "unresolved"
-
-    @property
-    def sentence(self) -> str:
-        """Meaning of the reason, as a sentence."""
-        return {
-            PathEnd.FALLS: "at the end it falls without any horizontal force",
-            PathEnd.LOCKS: "at the end its contacts permit no further motion",
-            PathEnd.COLLIDES: "at the end it runs into blocks that it has no joint with",
-            PathEnd.UNRESOLVED: "at the end no mechanism was found whose faces slide flat",
-            PathEnd.ENDURES: "it still needs a horizontal force where the path is cut off",
-        }[self]
+    FALLS = "falls", "at the end it falls without any horizontal force"
+    LOCKS = "locks", "at the end its contacts permit no further motion"
+    COLLIDES = "collides", "at the end it runs into blocks that it has no joint with"
+    ENDURES = "endures", "it still needs a horizontal force where the path is cut off"
+    UNRESOLVED = "unresolved", "at the end no mechanism was found whose faces slide flat"
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,36 +229,21 @@ class LinkageState:
 
 @dataclass(frozen=True)
 class PathEvent:
-    """A change of the mechanism along its path, or its end.
+    """A change of the mechanism along its path, or its end."""
 
-    Attributes:
-        place: number of the place where it happens.
-        text: what happens.
-    """
-
-    place: int
+    place: int  # number of the place where it happens
     text: str
 
 
 @dataclass(frozen=True, eq=False)
 class MechanismPath:
-    """Path of a mechanism: factor and displacements from rest to the fall.
+    """Path of a mechanism: factor and displacements from rest to the fall."""
 
-    Attributes:
-        blocks: blocks at rest, with their loads.
-        factors: factor α of the horizontal forces at each place (n,) [-].
-        displacements: of all blocks' centroids, and rotations (n, n_blocks, 3) [m, m, rad].
-        velocity: velocities at rest (n_blocks, 3), the fastest corner at 1 m/s.
-        mechanisms: mechanisms that are followed one after the other.
-        events: events that change or end the mechanism.
-        end: reason for which the path ends; `end.sentence` gives its meaning.
-    """
-
-    blocks: PlacedBlocks
-    factors: Array
-    displacements: Array
-    velocity: Array
-    mechanisms: tuple[Mechanism, ...]
+    blocks: PlacedBlocks  # at rest, with their loads
+    factors: Array  # α of the horizontal forces at each place (n,) [-]
+    displacements: Array  # of centroids, and rotations (n, n_blocks, 3) [m, m, rad]
+    velocity: Array  # at rest, the fastest corner at 1 m/s (n_blocks, 3)
+    mechanisms: tuple[Mechanism, ...]  # one after the other
     events: tuple[PathEvent, ...]
     end: PathEnd
 
@@ -444,8 +418,8 @@ class PathFollower:
         blocks = trial[0].blocks
         self._record(blocks, max(trial[0].balance(trial[1], self.friction)[0], 0.0))
         self.events.append(PathEvent(len(self.factors) - 1, event))
-        if event in (PathEnd.FALLS, PathEnd.COLLIDES):
-            raise _Stop(PathEnd(event))
+        if isinstance(event, PathEnd):
+            raise _Stop(event)
         return blocks
 
     def _event(self, state: LinkageState, velocity: Array, step: float) -> str:

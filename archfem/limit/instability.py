@@ -33,18 +33,7 @@ class DeepenedBlocks(RigidBlocks):
 
 
 def explain_instability(structure: Structure) -> str | None:
-    """Return why rigid blocks cannot rest under their weight, and the remedy; None if they can.
-
-    Args:
-        structure: structure whose blocks are all rigid bodies.
-
-    Returns:
-        A sentence that names sliding joints with the coefficient of friction from which they hold,
-        hinges with the depth of joints from which it stands, or a block that nothing holds.
-
-    Raises:
-        InvalidInput: joints have tensile strength, or bodies are too soft to be rigid.
-    """
+    """Return why rigid blocks cannot rest under their weight, and the remedy; None if they can."""
     stones, dead = self_weight_programme(structure, "coulomb", None, None)
     fall = dead.minimise_residual()
     if is_balanced(fall, dead):

@@ -27,30 +27,50 @@ from scipy.sparse.linalg import splu
 
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
-from archfem.joints.quadrature import Quadrature
-from archfem.joints.rigid_kinematics import rigid_joint_operator
+from archfem.joints.rigid_kinematics import jump_rates
 from archfem.masonry.loads import BodyForce, PointLoad
-from archfem.masonry.structure import Structure, first_coordinates, rigid_motion_matrix
+from archfem.masonry.structure import Structure, largest_displacement, rigid_motion_matrix
 
 
 class NoEquilibrium(DidNotConverge):
     """The programme is infeasible: no forces within the limits balance the loads."""
 
 
+def solve_linear(
+    cost: Array,
+    bounds: Array,
+    equations: tuple[sparse.csr_matrix | Array, Array],
+    limits: tuple[sparse.csr_matrix | None, Array | None] = (None, None),
+    method: str = "highs-ds",
+) -> OptimizeResult | None:
+    """Minimise a cost under equations and limits A x <= b; None where it is unbounded."""
+    # Residuals are of order one. Where round-off stops the solver, presolve changes its path, and
+    # then a coarser tolerance lets it end.
+    for presolve, tolerance in ((False, 1e-9), (True, 1e-9), (True, 1e-8)):
+        feasibility = (f"{side}_feasibility_tolerance" for side in ("primal", "dual"))
+        options = {**dict.fromkeys(feasibility, tolerance), "presolve": presolve}
+        result = linprog(cost, *limits, *equations, bounds, method, options=options)
+        if result.status == 2:
+            raise NoEquilibrium("no state of equilibrium fulfils the limits")
+        if result.status in (0, 3):
+            return result if result.status == 0 else None
+    raise DidNotConverge(f"the linear programme found no state: {result.message}")
+
+
 def rigid_load(structure: Structure, actions: Sequence[BodyForce | PointLoad]) -> Array:
     """Return the generalised forces of actions on the free blocks (3 n_free,) [N, N, N m]."""
-    start = first_coordinates(structure)
-    load = np.zeros(3 * len(start))
+    load = np.zeros(3 * len(structure.free))
     for action in actions:
         if isinstance(action, BodyForce):
-            for number, first in start.items():
-                block = structure.blocks[number]
-                weight = block.area * block.material.unit_weight * structure.width
-                load[first : first + 2] += weight * np.array([action.horizontal, action.vertical])
+            free = [structure.blocks[number] for number in structure.free]
+            weight = np.array([b.area * b.material.unit_weight * structure.width for b in free])
+            load[0::3] += weight * action.horizontal
+            load[1::3] += weight * action.vertical
         else:
             number, point = action.place(structure)
-            motion = rigid_motion_matrix(point[None, :], structure.blocks[number].centroid)[0]
-            load[start[number] : start[number] + 3] += np.array(action.force) @ motion
+            motion = rigid_motion_matrix(point[None, :], structure.centroids[number])[0]
+            first = structure.first_coordinates[number]
+            load[first : first + 3] += np.array(action.force) @ motion
     return load
 
 
@@ -81,25 +101,25 @@ class RigidBlocks:
         return self.structure.cohesion / self.force_unit
 
     @cached_property
-    def kinematics(self) -> sparse.csr_matrix:
-        """Openings of intrados ends, of extrados ends, and slips (3 n_joints, 3 n_free) [-, m]."""
-        ends = rigid_joint_operator(self.structure, 1, Quadrature("nodal"))
-        rows = [ends.opening[0::2], ends.opening[1::2], ends.slip[0::2]]
+    def rates(self) -> sparse.csr_matrix:
+        """Openings of intrados and extrados ends, and slips (3 n_joints, 3 n_blocks) [-, m]."""
+        structure, (intrados, extrados) = self.structure, np.moveaxis(self.structure.ends, 1, 0)
+        frames = (
+            (structure.normals, intrados),
+            (structure.normals, extrados),
+            (structure.tangents, intrados),
+        )
+        rows = [jump_rates(*frame, structure.pairs, structure.centroids) for frame in frames]
         return sparse.vstack(rows, format="csr")
+
+    @cached_property
+    def kinematics(self) -> sparse.csr_matrix:
+        """The same with motions of the free blocks alone (3 n_joints, 3 n_free) [-, m]."""
+        return self.rates[:, np.repeat([not b.fixed for b in self.structure.blocks], 3)]
 
     def gaps(self, motion: Array) -> Array:
         """Return intrados openings, extrados openings and slips of a motion (3, n_joints) [m]."""
-        structure, jump = self.structure, np.zeros((len(self.structure.joints), 2, 2))
-        centroids = np.array([block.centroid for block in structure.blocks])
-        # displacement jump at both ends: higher block minus lower block
-        for side, sign in enumerate((-1.0, 1.0)):
-            block = structure.pairs[:, side]
-            x, y = np.moveaxis(structure.ends - centroids[block, None], -1, 0)
-            u, v, turn = motion[block].T[:, :, None]
-            jump += sign * np.stack([u - turn * y, v + turn * x], axis=-1)
-        intrados, extrados = np.einsum("kei,ki->ek", jump, structure.normals)
-        slip = np.einsum("ki,ki->k", jump[:, 0], structure.tangents)
-        return np.stack([intrados, extrados, slip])
+        return (self.rates @ motion.ravel()).reshape(3, -1)
 
     @cached_property
     def balance(self) -> sparse.csr_matrix:
@@ -119,11 +139,8 @@ class RigidBlocks:
 
     def largest_displacement(self, motion: Array) -> float:
         """Return the largest displacement of a corner of any block [m]."""
-        largest = []
-        for block, u in zip(self.structure.blocks, motion, strict=True):
-            moved = rigid_motion_matrix(block.drawn(), block.centroid) @ u
-            largest.append(float(np.linalg.norm(moved, axis=1).max()))
-        return max(largest)
+        outlines = [block.drawn() for block in self.structure.blocks]
+        return largest_displacement(outlines, self.structure.centroids, motion)
 
     def resultants(self, forces: Array) -> Array:
         """Return N, V, M of every joint (n_joints, 3) [N, N, N m]."""
@@ -252,12 +269,8 @@ class Programme:
         """Solve with linear limits only."""
         reduced = ReducedProgramme(self, limits)
         result = reduced.solve()
-        if result.status == 3:
+        if result is None:
             return None
-        if result.status == 2:
-            raise NoEquilibrium("no state of equilibrium fulfils the limits")
-        if result.status != 0:
-            raise DidNotConverge(f"the linear programme found no state: {result.message}")
         forces, multipliers = reduced.map @ result.x + reduced.constant, reduced.multipliers(result)
         unknowns = result.x[len(result.x) - len(self.unknown_cost) :]
         value = float(reduced.force_cost @ forces + self.unknown_cost @ unknowns)
@@ -320,30 +333,16 @@ class ReducedProgramme:
         self.map = self.map + sparse.csr_matrix((solved[row, column], place), self.map.shape)
         self.constant[self._pivot] = self._factors.solve(load)
 
-    def solve(self, large: int = 600) -> OptimizeResult:
+    def solve(self, large: int = 600) -> OptimizeResult | None:
         """Return SciPy's result: by the interior point from `large` equations on, else the simplex.
 
         In walls the simplex method takes 40 iterations a block. Without an objective any state
         will do, which it finds faster.
         """
         method = "highs-ipm" if len(self._load) > large and self._cost.any() else "highs-ds"
-        # Residuals of balance and limits in mean block weights. Where round-off stops the solver,
-        # presolve changes its path, and then a coarser tolerance lets it end.
-        for presolve, tolerance in ((False, 1e-9), (True, 1e-9), (True, 1e-8)):
-            feasibility = (f"{side}_feasibility_tolerance" for side in ("primal", "dual"))
-            result = linprog(
-                self._cost,
-                A_ub=self._limits.rows @ self.map,
-                b_ub=self._limits.bounds - self._limits.rows @ self.constant,
-                A_eq=self._equations,
-                b_eq=self._load,
-                bounds=self._bounds,
-                method=method,
-                options={**dict.fromkeys(feasibility, tolerance), "presolve": presolve},
-            )
-            if result.status in (0, 2, 3):  # optimal, infeasible, unbounded
-                break
-        return result
+        rows = self._limits.rows
+        limits = rows @ self.map, self._limits.bounds - rows @ self.constant
+        return solve_linear(self._cost, self._bounds, (self._equations, self._load), limits, method)
 
     def multipliers(self, result: OptimizeResult) -> Array:
         """Return the multipliers of the balance of all blocks (3 n_free,)."""

@@ -19,15 +19,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.optimize import linprog, nnls
+from scipy.optimize import nnls
 from scipy.sparse.csgraph import dijkstra
 
 from archfem._typing import Array
 from archfem._validation import check_type, validate_arguments
-from archfem.errors import DidNotConverge
 from archfem.joints.criteria import Criteria, find_lasting, merge_criteria, with_failure_flags
 from archfem.joints.resultants import check_instant
-from archfem.limit.linear_programme import RigidBlocks
+from archfem.limit.linear_programme import RigidBlocks, solve_linear
 from archfem.limit.mechanism_count import Mechanism, counted_mechanism, mechanism_kind
 from archfem.masonry.parts import select_assessed_parts
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
@@ -329,12 +328,11 @@ def _largest_motion(blocks: RigidBlocks, freedoms: Array) -> Array:
     gaps = blocks.kinematics @ sparse.diags(blocks.coordinate_units)
     free = sparse.diags(sense) @ gaps
     fixed = gaps[freedoms == 0.0]
-    one_way = {"A_ub": -free[sense != 0.0], "b_ub": np.zeros(int(np.count_nonzero(sense)))}
-    closed = {"A_eq": fixed, "b_eq": np.zeros(fixed.shape[0])}
+    one_way = -free[sense != 0.0], np.zeros(int(np.count_nonzero(sense)))
     cost = -np.asarray(free.sum(axis=0)).ravel()
-    result = linprog(cost, **one_way, **closed, bounds=(-1.0, 1.0), method="highs-ds")
-    if result.status != 0:
-        raise DidNotConverge(f"the linear programme found no motion: {result.message}")
+    box = np.tile([-1.0, 1.0], (len(cost), 1))
+    result = solve_linear(cost, box, (fixed, np.zeros(fixed.shape[0])), one_way)
+    assert result is not None  # the box bounds it
     return result.x
 
 

@@ -18,18 +18,19 @@ that the forces of hinges act where the hinges are.
 """
 
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
+from archfem._display import ExplainedWord
 from archfem._typing import Array
-from archfem._validation import check_number, check_type, validate_arguments
+from archfem._validation import validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.backfill import SELF_WEIGHT
 from archfem.limit.collapse import stands
-from archfem.limit.displaced_blocks import rotation
+from archfem.limit.displaced_blocks import PlacedBlocks, rotation
 from archfem.limit.linear_programme import (
     NoEquilibrium,
     Optimum,
@@ -38,7 +39,7 @@ from archfem.limit.linear_programme import (
     rigid_load,
 )
 from archfem.masonry.loads import Settlement
-from archfem.masonry.structure import Structure, join_names, rigid_motion_matrix
+from archfem.masonry.structure import Structure, join_names
 
 # First and longest step, as a share of the full movement [-]
 MAX_MOVEMENT_STEP = 0.01
@@ -47,25 +48,17 @@ MAX_MOVEMENT_STEP = 0.01
 GEOMETRY_TOLERANCE = 1e-8
 
 
-class End(StrEnum):
+class End(ExplainedWord):
     """Reason for which a movement ends."""
 
-    FALLS = "falls"
-    LEAPS = "leaps"
-    SLIDES = "slides"
-    LOCKS = "locks"
-    HOLDS = "holds"
-
-    @property
-    def sentence(self) -> str:
-        """Meaning of the reason, as a sentence."""
-        return {
-            End.FALLS: "beyond, no thrust line fits into the shape that it has taken, and it falls",
-            End.SLIDES: "beyond, a joint needs more than its friction and slides",
-            End.LEAPS: "beyond, no equilibrium lies near: it leaps to another, or falls",
-            End.LOCKS: "without sliding in its joints it cannot follow any further",
-            End.HOLDS: "it stands at the whole movement",
-        }[self]
+    FALLS = (
+        "falls",
+        "beyond, no thrust line fits into the shape that it has taken, and it falls",
+    )
+    LEAPS = "leaps", "beyond, no equilibrium lies near: it leaps to another, or falls"
+    SLIDES = "slides", "beyond, a joint needs more than its friction and slides"
+    LOCKS = "locks", "without sliding in its joints it cannot follow any further"
+    HOLDS = "holds", "it stands at the whole movement"
 
 
 @dataclass(frozen=True)
@@ -182,9 +175,7 @@ def largest_movement(
         >>> round(af.limit.largest_movement(ring, spread, friction=None).largest, 4)
         0.2269
     """
-    check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
-    check_type(settlement, Settlement, "settlement", "give Settlement('left abutment', (-1, 0, 0))")
-    if not 1e-8 <= check_number(tolerance, "tolerance [-]") <= MAX_MOVEMENT_STEP:
+    if not 1e-8 <= tolerance <= MAX_MOVEMENT_STEP:
         raise InvalidInput(f"tolerance {tolerance:.3g} is not between 1e-8 and {MAX_MOVEMENT_STEP}")
     if friction not in ("coulomb", None):
         raise InvalidInput(f"friction {friction!r} is not known here: use 'coulomb' or None")
@@ -207,25 +198,18 @@ class DisplacedBlocks(RigidBlocks):
         """Return the blocks after a further motion."""
         return DisplacedBlocks(self.structure, self.displacement + motion)
 
-    def current_points(self, points: Array, block: int) -> Array:
-        """Return the present places of points that move with a block (p, 2) [m]."""
-        centroid, (x, y, turn) = self.structure.blocks[block].centroid, self.displacement[block]
-        return centroid + (points - centroid) @ rotation(turn).T + [x, y]
-
     @cached_property
     def faces(self) -> Array:
         """Ends of the joints on the lower and on the higher blocks (2, n_joints, 2, 2) [m]."""
-        lower = [self.current_points(joint.ends, joint.lower) for joint in self.structure.joints]
-        higher = [self.current_points(joint.ends, joint.higher) for joint in self.structure.joints]
-        return np.array([lower, higher])
+        both = np.stack([self.structure.ends, self.structure.ends])
+        return PlacedBlocks(self.structure, self.displacement, both).faces
 
     @cached_property
     def axes(self) -> Array:
         """Normals and tangents of the lower blocks' faces (2, n_joints, 2)."""
-        turns = self.displacement[[joint.lower for joint in self.structure.joints], 2]
-        rotations = np.array([rotation(turn) for turn in turns])
+        rotations = np.array([rotation(turn) for turn in self.displacement[:, 2]])
         initial = np.stack([self.structure.normals, self.structure.tangents])
-        return np.einsum("jab,kjb->kja", rotations, initial)
+        return np.einsum("jab,kjb->kja", rotations[self.structure.pairs[:, 0]], initial)
 
     @cached_property
     def current_gaps(self) -> Array:
@@ -236,30 +220,15 @@ class DisplacedBlocks(RigidBlocks):
         return np.vstack([openings, slips[nearer, np.arange(len(nearer))]])
 
     @cached_property
-    def _rates(self) -> sparse.csr_matrix:
+    def rates(self) -> sparse.csr_matrix:
         """Rates of `current_gaps` with motions of all blocks (3 n_joints, 3 n_blocks)."""
-        joints, nearer = self.structure.joints, np.argmin(self.current_gaps[:2], axis=0)
-        rates = np.zeros((3, len(joints), len(self.structure.blocks), 3))
-        for number, joint in enumerate(joints):
-            normal, tangent = self.axes[:, number]
-            # Both blocks move the corners of the higher one: the lower block's axes turn with it.
-            corners = self.faces[1, number]
-            for block, sign in ((joint.higher, 1.0), (joint.lower, -1.0)):
-                centre = self.structure.blocks[block].centroid + self.displacement[block, :2]
-                points = sign * rigid_motion_matrix(corners, centre)
-                rates[:2, number, block] = np.einsum("a,eac->ec", normal, points)
-                rates[2, number, block] = tangent @ points[nearer[number]]
-        return sparse.csr_matrix(rates.reshape(3 * len(joints), -1))
-
-    @cached_property
-    def kinematics(self) -> sparse.csr_matrix:
-        """Rates of openings and slips with motions of the free blocks (3 n_joints, 3 n_free)."""
-        free = np.array(self.structure.free)
-        return self._rates[:, (3 * free[:, None] + np.arange(3)).ravel()]
-
-    def gaps(self, motion: Array) -> Array:
-        """Return the rates of openings and slip at the present places, as `RigidBlocks.gaps`."""
-        return (self._rates @ motion.ravel()).reshape(3, -1)
+        # Both blocks move the corners of the higher one: the lower block's axes turn with it.
+        corners, (normals, tangents) = np.moveaxis(self.faces[1], 1, 0), self.axes
+        nearer = corners[np.argmin(self.current_gaps[:2], axis=0), np.arange(len(normals))]
+        centroids = self.structure.centroids + self.displacement[:, :2]
+        frames = (normals, corners[0]), (normals, corners[1]), (tangents, nearer)
+        rows = [jump_rates(*frame, self.structure.pairs, centroids) for frame in frames]
+        return sparse.vstack(rows, format="csr")
 
 
 class _PathEnd(Exception):

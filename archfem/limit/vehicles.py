@@ -1,8 +1,10 @@
 """Vehicles over a bridge: collapse factor at every position of a row of axles, and its rating."""
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -61,61 +63,15 @@ class Vehicle:
         _check_factor(self.impact, f"dynamic factor of {self.name}")
 
 
-def _code_vehicles() -> dict[str, Vehicle]:
-    """Return vehicles of codes: axles in kN (CS 454: tonnes, by 9.81 m/s²), spacings in m."""
-    tonne = 9.81
-    en_1990 = "EN 1990:2002, Table A2.4(B), from memory"
-    dmrb = "BD 21/01, from memory"
-    aashto = "AASHTO LRFD, Strength I, from memory"
-    lane = "EN 1991-2:2003, 4.3.2: tandem of lane 1, dynamic; its 9 kN/m² is left out"
-    single = "EN 1991-2:2003, 4.3.3: single axle, dynamic"
-    train = "EN 1991-2:2003, 6.3.2, as UIC 71"
-    table = "CS 454, Table 7.3.1a, normal traffic, no axle lift-off"
-    rows: list[tuple[str, list[float], list[float], float, str, str, str]] = [
-        ("LM1", [300.0] * 2, [1.2], 1.35, lane, "read", en_1990),
-        ("LM2", [400.0], [], 1.35, single, "read", en_1990),
-        ("LM71", [250.0] * 4, [1.6] * 3, 1.45, f"{train}: axles alone", "from memory", en_1990),
-        # 80 kN/m from 0.8 m behind the last axle, over 20 m, as a force on each metre
-        (
-            *("LM71-train", [250.0] * 4 + [80.0] * 20, [1.6] * 3 + [1.3] + [1.0] * 19, 1.45),
-            *(f"{train}: axles, and 80 kN/m over 20 m behind them", "from memory", en_1990),
-        ),
-        ("CS454-single", [11.5 * tonne], [], 1.9, table, "read", dmrb),
-        ("CS454-double-1.0", [8.0 * tonne] * 2, [1.0], 1.9, table, "read", dmrb),
-        ("CS454-double-1.3", [9.5 * tonne] * 2, [1.3], 1.9, table, "read", dmrb),
-        ("CS454-double-1.8", [10.0 * tonne] * 2, [1.8], 1.9, table, "read", dmrb),
-        (
-            *("CS454-triple-2.6", [8.0 * tonne] * 3, [1.3] * 2, 1.9),
-            *(f"{table}; 2.6 m from first to last axle, from memory", "read", dmrb),
-        ),
-        ("HL93-tandem", [110.0] * 2, [1.2], 1.75, "AASHTO LRFD, 3.6.1.2.3", "read", aashto),
-        (
-            *("HL93-truck", [35.0, 145.0, 145.0], [4.3, 4.3], 1.75),
-            *("AASHTO LRFD, 3.6.1.2.2, least rear spacing", "read", aashto),
-        ),
-    ]
-    vehicles, impacts = {}, _dynamic_factors()
-    for name, axles, gaps, live, source, grade, live_source in rows:
-        impact = impacts[name.split("-")[0]]
-        weights = tuple(1e3 * weight for weight in axles)
-        texts = source, grade, live_source
-        vehicles[name] = Vehicle(name, weights, tuple(gaps), live, *texts, *impact)
+def _read_vehicles() -> dict[str, Vehicle]:
+    """Return the vehicles of codes, with what those of a code share."""
+    text = Path(__file__).with_name("vehicles.toml").read_text(encoding="utf-8")
+    vehicles = {}
+    for shared in tomllib.loads(text).values():
+        for name, own in shared.pop("vehicles").items():
+            axles, spacings = tuple(own.pop("axles")), tuple(own.pop("spacings", ()))
+            vehicles[name] = Vehicle(name, axles, spacings, **shared | own)
     return vehicles
-
-
-def _dynamic_factors() -> dict[str, tuple[float, str]]:
-    """Return dynamic factors of codes and their sources, by the first part of a vehicle's name."""
-    span = (
-        "none, to be given: EN 1991-2:2003, 6.4.5.2, 1.44 / (√L - 0.2) + 0.82 from 1 to 1.67, "
-        "with L in m, half the span of an arch; from memory"
-    )
-    return {
-        "LM1": (1.0, "EN 1991-2:2003, 4.2.1: in the weights; from memory"),
-        "LM2": (1.0, "EN 1991-2:2003, 4.2.1: in the weights; from memory"),
-        "LM71": (1.0, span),
-        "CS454": (1.8, "BD 21/01, here on all axles; from memory"),
-        "HL93": (1.33, "AASHTO LRFD, 3.6.2, not reduced by depth of fill; from memory"),
-    }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -558,4 +514,4 @@ def _label_factors(places: Array, factors: Array, count: NDArray[np.intp]) -> xr
     return xr.Dataset(variables, {"direction": list(DRIVING_DIRECTIONS), "position": position})
 
 
-VEHICLES: Mapping[str, Vehicle] = _code_vehicles()
+VEHICLES: Mapping[str, Vehicle] = _read_vehicles()

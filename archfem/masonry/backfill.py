@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import check_number, check_type, validate_arguments
+from archfem._validation import check_number, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.assembly import assembled
 from archfem.masonry.block import Block
@@ -69,7 +69,6 @@ def jointed_fill(
     Raises:
         InvalidInput: no block is soft, or a value is not valid.
     """
-    check_type(structure, Structure, "structure", "give one with a fill, e.g. bridge(…)")
     law = _fill_contact(
         in_degrees(angle, "angle of friction"), check_number(cohesion, "cohesion [Pa]", minimum=0.0)
     )

@@ -53,7 +53,6 @@ def usual_stages(structure: Structure, layers: int = 4) -> tuple[Stage, ...]:
     Raises:
         InvalidInput: the number of layers is not positive.
     """
-    check_type(structure, Structure, "structure", "give one, e.g. bridge(…)")
     check_integer(layers, "layers of the fill")
     soil = set(find_yielding_blocks(structure))
     rings = {n for n in structure.free if structure.blocks[n].role == "ring"} - soil

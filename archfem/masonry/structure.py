@@ -293,6 +293,18 @@ class Structure(ResultDisplay):
         return tuple(number for number, block in enumerate(self.blocks) if not block.fixed)
 
     @cached_property
+    def first_coordinates(self) -> NDArray[np.intp]:
+        """First of the three coordinates of each free block, -1 of a fixed one (n_blocks,)."""
+        first = np.full(len(self.blocks), -1)
+        first[list(self.free)] = 3 * np.arange(len(self.free))
+        return first
+
+    @cached_property
+    def centroids(self) -> Array:
+        """Centroids of the blocks (n_blocks, 2) [m]."""
+        return np.array([block.centroid for block in self.blocks])
+
+    @cached_property
     def judged(self) -> NDArray[np.bool_]:
         """Whether each joint belongs to an assessed part, a ring or pier (n_joints,)."""
         parts = select_assessed_parts({joint.part: joint.role for joint in self.joints})
@@ -371,6 +383,10 @@ def rigid_motion_matrix(points: Array, centroid: Array) -> Array:
     return motion
 
 
-def first_coordinates(structure: Structure) -> dict[int, int]:
-    """Return the first of the three coordinates of each free block."""
-    return {block: 3 * k for k, block in enumerate(structure.free)}
+def largest_displacement(outlines: Sequence[Array], centroids: Array, motion: Array) -> float:
+    """Return the largest displacement of a corner by small motions of blocks (n_blocks, 3) [m]."""
+    moved = [
+        rigid_motion_matrix(points, centroid) @ of_block
+        for points, centroid, of_block in zip(outlines, centroids, motion, strict=True)
+    ]
+    return max(float(np.linalg.norm(each, axis=1).max()) for each in moved)

@@ -22,7 +22,7 @@ from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import rigid_motion_matrix
-from archfem.masonry.survey.drawings import write_dxf
+from archfem.masonry.survey.drawings import trace_boundary, write_dxf
 from archfem.models.model import Cells, Model, check_coordinate_count
 
 
@@ -55,7 +55,7 @@ class Solids:
     def displacement(self, q: Array) -> Array:
         """Return the displacements of all points (m, 2) [m]."""
         check_coordinate_count(self.model, len(q))
-        centroids = [block.centroid for block in self.model.structure.blocks]
+        centroids = self.model.structure.centroids
         fixed = [
             rigid_motion_matrix(points, centroids[number]) @ self.model.support_motion[number]
             for number, points in self._supports
@@ -223,7 +223,7 @@ def _write_drawing(solids: Solids, displacement: Array, path: Path, magnificatio
     places = solids.cells.places + magnification * displacement
     outlines: dict[str, list[tuple[str, Array]]] = {}
     for number, block in enumerate(structure.blocks):
-        loop = _trace_outline(
+        loop = trace_boundary(
             [cell for cell in solids.cells.polygons if solids.cells.block[cell[0]] == number]
         )
         outlines.setdefault(block.part or "blocks", []).append((block.name, places[loop]))
@@ -231,19 +231,6 @@ def _write_drawing(solids: Solids, displacement: Array, path: Path, magnificatio
     built = [(name, np.vstack([points, points[:1]])) for name, points in drawn]
     joints = [(joint.name, joint.ends) for joint in structure.joints]
     return write_dxf(path, outlines, {"as built": built, "joints": joints})
-
-
-def _trace_outline(cells: list[NDArray[np.intp]]) -> list[int]:
-    """Return the points around a block, in order."""
-    edges = {
-        (int(a), int(b)) for cell in cells for a, b in zip(cell, np.roll(cell, -1), strict=True)
-    }
-    # inner edges occur in both directions
-    following = {a: b for a, b in edges if (b, a) not in edges}
-    loop = [min(following)]
-    while (point := following[loop[-1]]) != loop[0]:
-        loop.append(point)
-    return loop
 
 
 def _write_with_meshio(

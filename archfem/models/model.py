@@ -128,15 +128,10 @@ class Cells:
 
 @dataclass(frozen=True)
 class Doubt:
-    """Reason why a result may be wrong.
+    """Reason why a result may be wrong."""
 
-    Attributes:
-        cause: what was found, with values.
-        remedy: what to do about it.
-    """
-
-    cause: str
-    remedy: str
+    cause: str  # what was found, with values
+    remedy: str  # what to do about it
 
     def __str__(self) -> str:
         """Cause and remedy as one sentence."""

@@ -42,8 +42,89 @@ class DesignSpectrum(Protocol):
         """
 
 
+def _validate_periods(periods: float | Array, longest: float) -> Array:
+    """Return periods as an array, refused where a spectrum is not defined."""
+    natural = as_periods(periods)
+    check_oscillators(natural, 0.05)
+    if np.any(natural > longest):
+        raise InvalidInput(
+            f"period {natural.max():g} s: this spectrum is defined up to {longest:g} s"
+        )
+    return natural
+
+
+def damping_correction(damping: float) -> float:
+    """Return the damping correction factor η of European codes [-]."""
+    return max(float(np.sqrt(10.0 / (5.0 + 100.0 * damping))), 0.55)
+
+
 @dataclass(frozen=True)
-class Tbec2018:
+class SpectrumBranches:
+    """A spectrum of straight rise, plateau, and branches in 1/T and 1/T²."""
+
+    level: float  # of the plateau [g]
+    lowest: float  # value at period zero over that of the plateau [-]
+    corners: Sequence[float]  # periods at which plateau, 1/T and 1/T² begin [s]
+    longest: float = np.inf  # period up to which it is defined [s]
+    start: float = 0.0  # period at which it begins to rise [s]
+
+    def evaluate(self, periods: float | Array) -> Array:
+        """Return spectral accelerations in the shape of the periods [g]."""
+        natural = _validate_periods(periods, self.longest)
+        rise, falls, far = self.corners
+        safe = np.maximum(natural, rise)
+        falling = np.minimum(1.0, falls / safe) * np.minimum(1.0, far / safe)
+        beyond, width = np.maximum(natural, self.start) - self.start, rise - self.start
+        rising = self.lowest + (1.0 - self.lowest) * beyond / width
+        return self.level * np.where(natural < rise, rising, falling)
+
+
+def _european_branches(
+    ground: float, amplification: float, corners: Sequence[float], damping: float
+) -> SpectrumBranches:
+    """Return the branches of European codes, from the acceleration of the ground [g]."""
+    top = amplification * damping_correction(damping)
+    return SpectrumBranches(ground * top, 1.0 / top, corners, longest=4.0)
+
+
+class CodeSpectrum:
+    """Elastic spectra of a code, which all have the same branches."""
+
+    def _branches(self) -> tuple[SpectrumBranches, SpectrumBranches | None]:
+        """Return the horizontal spectrum, and the vertical one unless points have to give it."""
+        raise NotImplementedError
+
+    def horizontal(self, periods: float | Array) -> Array:
+        """Return horizontal spectral accelerations in the shape of the periods [g].
+
+        Args:
+            periods: natural periods, of any shape [s].
+
+        Raises:
+            InvalidInput: a period is negative, not finite, or beyond those of the code.
+        """
+        return self._branches()[0].evaluate(periods)
+
+    def vertical(self, periods: float | Array) -> Array:
+        """Return vertical spectral accelerations in the shape of the periods [g].
+
+        Args:
+            periods: natural periods, of any shape [s].
+
+        Raises:
+            InvalidInput: as for `horizontal`, or the vertical spectrum has to be given by points.
+        """
+        upright = self._branches()[1]
+        if upright is None:
+            raise InvalidInput(
+                f"{type(self).__name__} is here without its vertical spectrum: give one by points, "
+                "as a TableSpectrum with vertical_values"
+            )
+        return upright.evaluate(periods)
+
+
+@dataclass(frozen=True)
+class Tbec2018(CodeSpectrum):
     """Elastic spectra of the Turkish Building Earthquake Code 2018, 5 % damping.
 
     Horizontal: (0.4 + 0.6 T/T_A) S_DS, S_DS from T_A, S_D1/T from T_B, S_D1 T_L/T² from T_L = 6 s,
@@ -111,33 +192,14 @@ class Tbec2018:
         }
         return self.s1 * float(np.interp(self.s1, levels, factors[self.site]))
 
-    def horizontal(self, periods: float | Array) -> Array:
-        """Return horizontal spectral accelerations in the shape of the periods [g].
-
-        Args:
-            periods: natural periods, of any shape [s].
-
-        Raises:
-            InvalidInput: a period is negative or not finite.
-        """
-        corners = 0.2 * self.sd1 / self.sds, self.sd1 / self.sds, 6.0
-        return self.sds * spectrum_shape(periods, np.inf, corners, lowest=0.4)
-
-    def vertical(self, periods: float | Array) -> Array:
-        """Return vertical spectral accelerations in the shape of the periods [g].
-
-        Args:
-            periods: natural periods, of any shape [s].
-
-        Raises:
-            InvalidInput: a period is negative, or beyond 3 s, where the code gives none.
-        """
-        corners = self.sd1 / self.sds / 15.0, self.sd1 / self.sds / 3.0, np.inf
-        return 0.8 * self.sds * spectrum_shape(periods, 3.0, corners, lowest=0.4)
+    def _branches(self) -> tuple[SpectrumBranches, SpectrumBranches | None]:
+        sds, end = self.sds, self.sd1 / self.sds
+        upright = SpectrumBranches(0.8 * sds, 0.4, (end / 15.0, end / 3.0, np.inf), longest=3.0)
+        return SpectrumBranches(sds, 0.4, (0.2 * end, end, 6.0)), upright
 
 
 @dataclass(frozen=True)
-class Eurocode8:
+class Eurocode8(CodeSpectrum):
     """Elastic spectra of Eurocode 8 (2004) with the recommended values.
 
     Horizontal: a_g S (1 + T/T_B (2.5 η - 1)), 2.5 η a_g S from T_B, times T_C/T from T_C and
@@ -199,32 +261,13 @@ class Eurocode8:
             )
         check_oscillators(np.zeros(1), self.damping)
 
-    def horizontal(self, periods: float | Array) -> Array:
-        """Return horizontal spectral accelerations in the shape of the periods [g].
-
-        Args:
-            periods: natural periods, of any shape [s].
-
-        Raises:
-            InvalidInput: a period is negative, or beyond 4 s, where these clauses give none.
-        """
+    def _branches(self) -> tuple[SpectrumBranches, SpectrumBranches | None]:
         soil, *corners = self._ground_types[self.type][self.ground]
-        top = 2.5 * damping_correction(self.damping)
-        return self.ag * soil * top * spectrum_shape(periods, 4.0, corners, lowest=1.0 / top)
-
-    def vertical(self, periods: float | Array) -> Array:
-        """Return vertical spectral accelerations in the shape of the periods [g].
-
-        Args:
-            periods: natural periods, of any shape [s].
-
-        Raises:
-            InvalidInput: a period is negative, or beyond 4 s, where these clauses give none.
-        """
         ratio = {1: 0.90, 2: 0.45}[self.type]  # a_vg / a_g [-]
-        top = 3.0 * damping_correction(self.damping)
-        shape = spectrum_shape(periods, 4.0, (0.05, 0.15, 1.0), lowest=1.0 / top)
-        return self.ag * ratio * top * shape
+        return (
+            _european_branches(self.ag * soil, 2.5, corners, self.damping),
+            _european_branches(self.ag * ratio, 3.0, (0.05, 0.15, 1.0), self.damping),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,35 +339,8 @@ class TableSpectrum:
         return np.interp(natural, self.periods, row)
 
 
-def _validate_periods(periods: float | Array, longest: float) -> Array:
-    """Return periods as an array, refused where a spectrum is not defined."""
-    natural = as_periods(periods)
-    check_oscillators(natural, 0.05)
-    if np.any(natural > longest):
-        raise InvalidInput(
-            f"period {natural.max():g} s: this spectrum is defined up to {longest:g} s"
-        )
-    return natural
-
-
-def damping_correction(damping: float) -> float:
-    """Return the damping correction factor η of European codes [-]."""
-    return max(float(np.sqrt(10.0 / (5.0 + 100.0 * damping))), 0.55)
-
-
-def spectrum_shape(
-    periods: float | Array, longest: float, corners: Sequence[float], *, lowest: float
-) -> Array:
-    """Return the shape of code spectra: rise from `lowest` to 1, plateau, 1/T, then 1/T²."""
-    natural = _validate_periods(periods, longest)
-    rise, level, fall = corners
-    safe = np.maximum(natural, rise)
-    falling = np.minimum(1.0, level / safe) * np.minimum(1.0, fall / safe)
-    return np.where(natural < rise, lowest + (1.0 - lowest) * natural / rise, falling)
-
-
 @dataclass(frozen=True)
-class Ntc2018:
+class Ntc2018(CodeSpectrum):
     """Elastic spectra of the Italian technical standards for constructions of 2018.
 
     Horizontal: a_g S η F_0 (T/T_B + (1 - T/T_B)/(η F_0)), a_g S η F_0 from T_B = T_C/3, times T_C/T
@@ -394,57 +410,18 @@ class Ntc2018:
         falls = factor * self.tc_star**power * self.tc_star
         return falls / 3.0, falls, 4.0 * self.ag + 1.6
 
-    def horizontal(self, periods: float | Array) -> Array:
-        """Return horizontal spectral accelerations in the shape of the periods [g].
-
-        Args:
-            periods: natural periods, of any shape [s].
-
-        Raises:
-            InvalidInput: a period is negative, or beyond 4 s, where the code gives none.
-        """
-        top = damping_correction(self.damping) * self.f0
-        shape = spectrum_shape(periods, 4.0, self.corners, lowest=1.0 / top)
-        return self.ag * self.soil * self.topography * top * shape
-
-    def vertical(self, periods: float | Array) -> Array:
-        """Return vertical spectral accelerations in the shape of the periods [g].
-
-        Args:
-            periods: natural periods, of any shape [s].
-
-        Raises:
-            InvalidInput: a period is negative, or beyond 4 s, where the code gives none.
-        """
-        top = damping_correction(self.damping) * self.f0
-        shape = spectrum_shape(periods, 4.0, (0.05, 0.15, 1.0), lowest=1.0 / top)
+    def _branches(self) -> tuple[SpectrumBranches, SpectrumBranches | None]:
+        level = self.ag * self.soil * self.topography
         # table 3.2.VI has the periods of Eurocode 8, and S_S = 1
-        factor = 1.35 * float(self.ag) ** 1.5 * self.topography
-        return factor * top * shape
-
-
-class _HorizontalSpectrum:
-    """Base class of codes whose vertical spectrum has to be given by points."""
-
-    code: ClassVar[str]
-
-    def vertical(self, periods: float | Array) -> Array:
-        """Refuse: the vertical spectrum has to be given by points.
-
-        Args:
-            periods: natural periods, of any shape [s].
-
-        Raises:
-            InvalidInput: always.
-        """
-        raise InvalidInput(
-            f"{self.code} is here without its vertical spectrum: give one by points, as a "
-            "TableSpectrum with vertical_values"
+        upright = 1.35 * float(self.ag) ** 1.5 * self.topography
+        return (
+            _european_branches(level, self.f0, self.corners, self.damping),
+            _european_branches(upright, self.f0, (0.05, 0.15, 1.0), self.damping),
         )
 
 
 @dataclass(frozen=True)
-class Asce2022(_HorizontalSpectrum):
+class Asce2022(CodeSpectrum):
     """Two-period design spectrum of ASCE/SEI 7-22, 5 % damping.
 
     (0.4 + 0.6 T/T_0) S_DS, S_DS from T_0 = 0.2 S_D1/S_DS, S_D1/T from T_S = S_D1/S_DS, S_D1 T_L/T²
@@ -465,8 +442,6 @@ class Asce2022(_HorizontalSpectrum):
         ASCE/SEI 7-22 (2022), sections 11.4.4 and 11.4.5.2.
     """
 
-    code = "ASCE 7-22"
-
     sds: float
     sd1: float
     tl: float
@@ -479,21 +454,13 @@ class Asce2022(_HorizontalSpectrum):
                 f"T_L {self.tl:g} s is not beyond T_S = S_D1/S_DS = {self.sd1 / self.sds:.3g} s"
             )
 
-    def horizontal(self, periods: float | Array) -> Array:
-        """Return horizontal spectral accelerations in the shape of the periods [g].
-
-        Args:
-            periods: natural periods, of any shape [s].
-
-        Raises:
-            InvalidInput: a period is negative or not finite.
-        """
+    def _branches(self) -> tuple[SpectrumBranches, SpectrumBranches | None]:
         end = self.sd1 / self.sds
-        return self.sds * spectrum_shape(periods, np.inf, (0.2 * end, end, self.tl), lowest=0.4)
+        return SpectrumBranches(self.sds, 0.4, (0.2 * end, end, self.tl)), None
 
 
 @dataclass(frozen=True)
-class Eurocode2024(_HorizontalSpectrum):
+class Eurocode2024(CodeSpectrum):
     """Horizontal elastic spectrum of EN 1998-1-1:2024 with the recommended values, 5 % damping.
 
     With S_α = F_T F_α S_α,RP and S_β = F_T F_β S_β,RP: S_α/F_A to T_A = 0.02 s, straight to S_α at
@@ -518,8 +485,6 @@ class Eurocode2024(_HorizontalSpectrum):
         EN 1998-1-1:2024, clause 5.2.2.2.
     """
 
-    code = "Eurocode 8 (2024)"
-
     s_alpha: float
     s_beta: float
     f_alpha: float
@@ -543,22 +508,9 @@ class Eurocode2024(_HorizontalSpectrum):
         rise = min(max(falls / 4.0, 0.05), 0.1)
         return rise, falls, max(2.0, 1.0 + self.s_beta * STANDARD_GRAVITY)
 
-    def horizontal(self, periods: float | Array) -> Array:
-        """Return horizontal spectral accelerations in the shape of the periods [g].
-
-        Args:
-            periods: natural periods, of any shape [s].
-
-        Raises:
-            InvalidInput: a period is negative, or beyond 4 s.
-        """
-        rise, falls, far = self.corners
-        cut = 0.02  # T_A [s]
-        natural = np.maximum(_validate_periods(periods, 4.0), cut) - cut
-        shape = spectrum_shape(natural, 4.0, (rise - cut, np.inf, np.inf), lowest=1.0 / 2.5)
-        beyond = np.maximum(natural + cut, falls)
+    def _branches(self) -> tuple[SpectrumBranches, SpectrumBranches | None]:
         level = self.topography * self.f_alpha * self.s_alpha
-        return level * shape * (falls / beyond) * np.minimum(1.0, far / beyond)
+        return SpectrumBranches(level, 1.0 / 2.5, self.corners, longest=4.0, start=0.02), None
 
 
 def _check_positive(value: float, name: str) -> float:

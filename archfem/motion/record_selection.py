@@ -531,21 +531,14 @@ def _compute_spectrum(motion: Motion, measure: Measure, periods: Array) -> Array
 
 
 class _Search:
-    """Search for the records whose scaled mean spectrum has a ratio near 1 to the design spectrum.
-
-    Args:
-        rule: of the code.
-        ratios: spectra over the design spectrum, period zero first (n, 1 + m) [-].
-        events: number of the event of each record (n,).
-        scales: least and largest scale [-].
-    """
+    """Search for the records whose scaled mean spectrum is nearest to the design spectrum."""
 
     def __init__(
         self,
         rule: SelectionRule,
-        ratios: Array,
-        events: NDArray[np.intp],
-        scales: tuple[float, float],
+        ratios: Array,  # spectra over the design spectrum, period zero first (n, 1 + m) [-]
+        events: NDArray[np.intp],  # number of the event of each record (n,)
+        scales: tuple[float, float],  # the least and the largest [-]
     ) -> None:
         self.rule, self.events, self.limits = rule, events, scales
         # scale of least squares: minimum of Σ (s r - 1)²
@@ -590,10 +583,8 @@ class _Search:
         return np.where(np.isin(self.events, self.events[chosen]), inf, cost)
 
     def common_factor(self, mean: Array, least: Array, most: Array) -> Array:
-        """Return the factor of each set that brings its mean spectrum (n, 1 + m) to the target.
-
-        The factor of least squares is brought within the rule, then within the allowed scales.
-        """
+        """Return the factor of each set that brings its mean spectrum (n, 1 + m) to the target."""
+        # the factor of least squares is brought within the rule, then within the allowed scales
         inside = mean[:, 1:]
         lowest, highest = self.rule.lower / inside.min(axis=1), self.rule.upper / inside.max(axis=1)
         if self.rule.zero_period:

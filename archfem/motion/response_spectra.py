@@ -26,16 +26,10 @@ from archfem.motion.motion import Motion
 def find_peak_responses(
     samples: Array, dt: float, periods: Array, damping: float
 ) -> tuple[Array, Array]:
-    """Find the largest pseudo-acceleration of oscillators at rest at first, and when it occurs.
-
-    u'' + 2 ζ ω u' + ω² u = -a is solved exactly from sample to sample (Nigam and Jennings). The
-    record is interpolated to 40 samples a period, and the peak is that of a parabola through the
-    largest sample and its neighbours. The response after the end of the record is ignored.
-
-    References:
-        Nigam, Jennings, Calculation of response spectra from strong-motion earthquake records,
-        BSSA 59 (1969).
-    """
+    """Find the largest pseudo-acceleration of oscillators at rest at first, and when it occurs."""
+    # u'' + 2 ζ ω u' + ω² u = -a is solved exactly from sample to sample. The record is interpolated
+    # to 40 samples a period, and the peak is that of a parabola through the largest sample and its
+    # neighbours. The response after the end of the record is ignored.
     check_oscillators(periods, damping)
     values, times = np.empty(len(periods)), np.empty(len(periods))
     finer: dict[int, Array] = {1: samples}
@@ -67,11 +61,9 @@ def oscillator_displacement(samples: Array, dt: float, period: float, damping: f
 
 @lru_cache(maxsize=4096)  # records of a folder share their steps
 def _oscillator_filter(dt: float, period: float, damping: float) -> tuple[Array, Array, Array]:
-    """Return numerator, denominator and initial state of the digital filter of an oscillator.
-
-    The step from (u, v) to the next is a matrix exponential; without v it is the recurrence
-    u₂ - tr A u₁ + det A u₀ = b₀ a₂ + b₁ a₁ + b₂ a₀.
-    """
+    """Return numerator, denominator and initial state of the digital filter of an oscillator."""
+    # The step from (u, v) to the next is a matrix exponential; without v it is the recurrence
+    # u₂ - tr A u₁ + det A u₀ = b₀ a₂ + b₁ a₁ + b₂ a₀.
     omega = 2.0 * np.pi / period
     # States u, v, and the input with its slope: a' = s, s' = 0.
     rates = np.zeros((4, 4))
@@ -189,7 +181,6 @@ def rotated_spectrum(
         horizontal components of motion, BSSA 100 (2010).
     """
     check_number(percentile, "percentile of directions", minimum=0.0, maximum=100.0)
-    check_unmasked(periods, "periods [s]")
     natural = as_periods(periods)
     check_oscillators(natural, damping)
     # an angle of zero fills the shorter component with zeros

@@ -1,7 +1,6 @@
 """Static analyses: dead load, pushover, modes, stress and free bodies.
 
     continuation          load and displacement control
-    dense_eigensolver     eigenvalues of small matrices by LAPACK
     equilibrium           equilibrium under dead load, plausibility checks
     free_body             free-body diagram of a block
     mechanism_assessment  kinematic assessment against design spectra
@@ -10,7 +9,6 @@
     newton_iteration      Newton iterations on SciPy's sparse factors
     pushover              Pushover, stopping rules
     relaxation            pseudo-time relaxation, Tresca iteration, irreversible joints
-    slepc_eigensolver     eigenvalues of sparse matrices by SLEPc
     snes                  Newton iterations by PETSc SNES
     stress                principal stresses and strength use
 

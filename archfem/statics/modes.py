@@ -1,27 +1,30 @@
-"""Modal analysis about a state, with joints as open or closed as they are there."""
+"""Modal analysis about a state, with joints as open or closed as they are there.
+
+K x = ω² M x is solved by shift-and-invert and the Lanczos method of ARPACK, for many of all modes
+by LAPACK. By Sylvester's law of inertia the number of negative pivots of K - σ M equals the number
+of ω² below σ: this detects negative stiffness, and modes that were missed.
+
+References: Lehoucq, Sorensen and Yang, ARPACK users' guide (1998).
+"""
 
 import hashlib
 from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
-from importlib.util import find_spec
 from numbers import Integral
-from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import splu
+from scipy.linalg import eigh
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, SuperLU, eigsh, splu
 
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
-from archfem._optional import require_package
 from archfem._threads import single_threaded
 from archfem._typing import Array
 from archfem._validation import check_type
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.model import Model, check_model
-from archfem.statics import dense_eigensolver
 from archfem.statics.equilibrium import Equilibrium
 
 _mode_cache: OrderedDict[str, tuple[Array, Array]] = OrderedDict()
@@ -103,7 +106,6 @@ def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
         InvalidInput: there are not so many modes, or the state is another model's.
         DidNotConverge: the structure is a mechanism there and does not vibrate, or the eigensolver
             failed; `last` is the state.
-        NotInstalled: SLEPc is missing, and the model too large for LAPACK.
 
     References:
         Clough and Penzien, Dynamics of structures (1993), chapters 11 and 26-3, for participation
@@ -137,22 +139,94 @@ def _find_cached_modes(
     stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int, cache_size: int = 6
 ) -> tuple[Array, Array]:
     """Return the lowest ω² and their shapes, from the cache where all bits of K and M agree."""
-    by_slepc = find_spec("slepc4py") is not None
-    digest = hashlib.sha256(str((count, stiffness.shape, by_slepc)).encode())
+    digest = hashlib.sha256(str((count, stiffness.shape)).encode())
     for matrix in (stiffness, mass):
         for part in (matrix.indptr, matrix.indices, matrix.data):
             digest.update(part.tobytes())
     key = digest.hexdigest()
     if key not in _mode_cache:
-        solver: Any = dense_eigensolver
-        if by_slepc:
-            with require_package("SLEPc"):
-                solver = import_module("archfem.statics.slepc_eigensolver")
-        _mode_cache[key] = solver.find_lowest_modes(stiffness, mass, count)
+        _mode_cache[key] = find_lowest_modes(stiffness, mass, count)
         if len(_mode_cache) > cache_size:
             _mode_cache.popitem(last=False)
     _mode_cache.move_to_end(key)
     return _mode_cache[key]
+
+
+def find_lowest_modes(
+    stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int, max_restarts: int = 200
+) -> tuple[Array, Array]:
+    """Find the lowest ω² and their shapes, with φᵀ M φ = 1."""
+    size = mass.shape[0]
+    zero = zero_threshold(stiffness, mass)
+    _check_lowest(0.0, -zero)
+    if 2 * count >= size:
+        dense = stiffness.toarray()
+        symmetric = 0.5 * (dense + dense.T)
+        squares, shapes = eigh(symmetric, mass.toarray(), subset_by_index=(0, count - 1))
+        _check_lowest(float(squares[0]), zero)
+        return squares, shapes
+    # a shift just below zero: K + zero M is regular for any structure that stands
+    factors = _factorise(stiffness, mass, -zero)
+    inverse = LinearOperator(mass.shape, factors.solve)
+    # a start of noise has a part of every mode, and the same seed gives the same bits
+    start = np.random.default_rng(0).standard_normal(size)
+    options = {"sigma": -zero, "OPinv": inverse, "v0": start, "maxiter": max_restarts}
+    try:
+        squares, shapes = eigsh(stiffness, count, mass, **options)
+    except ArpackNoConvergence as error:
+        raise DidNotConverge(
+            f"ARPACK found {len(error.eigenvalues)} of {count} modes in {max_restarts} restarts: "
+            "ask for fewer, or check units"
+        ) from error
+    _check_lowest(float(squares[0]), np.inf if _count_negative_pivots(factors) else zero)
+    # Count modes below the highest one; those within 1e-6 of it count as equal and are left out.
+    edge = float(squares[-1]) * (1.0 - 1e-6)
+    below, expected = int(np.sum(squares < edge)), count_modes_below(stiffness, mass, edge)
+    if expected != below:
+        raise DidNotConverge(
+            f"ARPACK found {below} modes below {np.sqrt(edge) / (2.0 * np.pi):.4g} Hz where there "
+            f"are {expected}: ask for a few more or fewer"
+        )
+    return squares, shapes
+
+
+def count_modes_below(stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, square: float) -> int:
+    """Return the number of ω² below a value, by Sylvester's law."""
+    return _count_negative_pivots(_factorise(stiffness, mass, square))
+
+
+def _factorise(stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, square: float) -> SuperLU:
+    """Return the factors of K - σ M, with the diagonal entries as pivots."""
+    shifted = stiffness - square * mass
+    # where joints can slide the pattern has slips coupled with openings, but not the reverse
+    symmetric = (0.5 * (shifted + shifted.T)).tocsc()
+    options = {"SymmetricMode": True}
+    try:
+        return splu(symmetric, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    except RuntimeError as error:  # SuperLU: a pivot is zero
+        raise DidNotConverge(f"the stiffness less {square:.3g} M is singular: {error}") from error
+
+
+def _count_negative_pivots(factors: SuperLU) -> int:
+    """Return the number of negative pivots of a symmetric matrix."""
+    if not np.array_equal(factors.perm_r, factors.perm_c):  # a zero on the diagonal was passed over
+        raise DidNotConverge("modes cannot be counted where a pivot vanishes: ask for one more")
+    return int(np.sum(factors.U.diagonal() < 0.0))
+
+
+def zero_threshold(stiffness: sparse.csr_matrix, mass: sparse.csr_matrix) -> float:
+    """Return the largest ω² that may be round-off of zero [1/s²]."""
+    # relative to the largest ω² of a single coordinate; round-off stays well below 1e-13 of it
+    return 1e-13 * float(np.max(stiffness.diagonal() / mass.diagonal()))
+
+
+def _check_lowest(square: float, zero: float) -> None:
+    """Refuse a structure with a motion of no stiffness, by its lowest ω² [1/s²]."""
+    if square <= zero:
+        raise DidNotConverge(
+            f"the stiffness is singular or negative, with ω² = {square:.1e} 1/s² where rounding "
+            f"makes up to {zero:.0e}: a mechanism; check supports and joints, or take another state"
+        )
 
 
 def _tangent_about(model: Model, about: Equilibrium | None) -> sparse.csr_matrix:

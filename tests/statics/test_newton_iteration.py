@@ -1,4 +1,4 @@
-"""Without PETSc and SLEPc: SciPy finds the same equilibria and modes."""
+"""Without PETSc: SciPy finds the same equilibria."""
 
 import sys
 
@@ -7,14 +7,7 @@ import pytest
 from scipy import sparse
 
 import archfem as af
-from archfem.statics import (
-    Newton,
-    dense_eigensolver,
-    modes,
-    newton,
-    newton_iteration,
-    slepc_eigensolver,
-)
+from archfem.statics import Newton, newton, newton_iteration
 from archfem.statics.newton import EquilibriumSolver
 
 
@@ -23,10 +16,9 @@ def alone(monkeypatch):
     """As if FEniCSx and what it stands on were not installed."""
 
     def found(name):
-        return None if name in ("dolfinx", "petsc4py", "slepc4py", "mpi4py") else name
+        return None if name in ("dolfinx", "petsc4py", "mpi4py") else name
 
-    for module in (newton, modes):
-        monkeypatch.setattr(module, "find_spec", found)
+    monkeypatch.setattr(newton, "find_spec", found)
 
 
 def kinked(q):
@@ -44,19 +36,14 @@ def test_a_kink_is_solved_exactly(alone, search):
     assert solved.q[0] == pytest.approx(-0.5, rel=1e-9)
 
 
-def test_dead_load_and_modes_are_those_of_petsc(ring, monkeypatch):
+def test_a_dead_load_is_that_of_petsc(ring, monkeypatch):
     """Both solve to 1e-10 of the load."""
     model = af.build(ring, fidelity="rigid")
     monkeypatch.setattr(newton, "MAX_SCIPY_UNKNOWNS", 0)
     usual = af.dead_load(model)
-    for module in (newton, modes):
-        monkeypatch.setattr(module, "find_spec", lambda name: None)
+    monkeypatch.setattr(newton, "find_spec", lambda name: None)
     other = af.dead_load(model)
     assert other.q == pytest.approx(usual.q, rel=1e-8, abs=1e-8 * np.abs(usual.q).max())
-    squares, shapes = slepc_eigensolver.find_lowest_modes(model.closed_tangent(), model.mass, 4)
-    found, also = dense_eigensolver.find_lowest_modes(model.closed_tangent(), model.mass, 4)
-    assert found == pytest.approx(squares, rel=1e-8)
-    assert np.abs(shapes.T @ (model.mass @ also)) == pytest.approx(np.eye(4), abs=1e-6)
 
 
 def test_full_steps_of_what_is_small_do_without_petsc(monkeypatch):
@@ -107,29 +94,10 @@ def test_a_search_down_the_residual_finds_what_full_steps_go_to_and_fro_over(alo
     assert abs(solved.q[0]) < 1e-10  # the tolerance of a solve, relative to a load of 1
 
 
-@pytest.mark.parametrize("least", [-1e6, 1e-9])
-def test_a_mechanism_has_no_modes(alone, least):
-    """Nor has what is held by no more than the rounding of the stiffest coordinate, 1e-7 here."""
-    stiff = sparse.diags([least, 2.0, 1e6]).tocsr()
-    with pytest.raises(af.DidNotConverge, match="singular or negative"):
-        dense_eigensolver.find_lowest_modes(stiff, sparse.identity(3, format="csr"), 2)
-
-
-def test_rounding_is_that_of_the_highest_square_of_one_coordinate():
-    """K / M of each by itself: 4, 3 and 2 per second squared."""
-    stiff, mass = (sparse.diags(each).tocsr() for each in ([4.0, 6.0, 6.0], [1.0, 2.0, 3.0]))
-    one = sparse.identity(3, format="csr")
-    least = dense_eigensolver.zero_threshold(one, one)
-    assert dense_eigensolver.zero_threshold(stiff, mass) == pytest.approx(4.0 * least, rel=1e-12)
-
-
-def test_what_only_petsc_and_slepc_can_do_says_how_they_are_had(monkeypatch):
+def test_what_only_petsc_can_do_says_how_it_is_had(monkeypatch):
     monkeypatch.setitem(sys.modules, "archfem.statics.snes", None)
     with pytest.raises(af.errors.NotInstalled, match="python3-dolfinx"):
         EquilibriumSolver(1, Newton(petsc={"pc_type": "svd"}))
-    many = sparse.identity(3001, format="csr")
-    with pytest.raises(af.errors.NotInstalled, match="conda-forge"):
-        dense_eigensolver.find_lowest_modes(many, many, 1)
 
 
 @pytest.mark.parametrize("library", ["PETSc", "SciPy"])

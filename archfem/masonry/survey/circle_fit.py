@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from archfem._typing import Array
 from archfem.errors import InvalidInput
@@ -45,8 +46,7 @@ class FittedCircle:
 def fitted_circle(points: Sequence[Point] | Array) -> FittedCircle:
     """Fit the circle with the least sum of squared distances to surveyed points.
 
-    Distances are normal to the circle. The Gauss-Newton iteration starts from the circle of least
-    algebraic error.
+    Distances are normal to the circle. The iteration starts from that of least algebraic error.
 
     Args:
         points: points along an arc, from one springing to the other (n, 2) [m].
@@ -68,23 +68,21 @@ def fitted_circle(points: Sequence[Point] | Array) -> FittedCircle:
     # algebraic fit: x² + y² = 2 x_c x + 2 y_c y + (r² - x_c² - y_c²) is linear in its coefficients
     terms = np.column_stack([2.0 * centred, np.ones(len(centred))])
     x, y, constant = np.linalg.lstsq(terms, np.sum(centred**2, axis=1), rcond=None)[0]
-    circle = np.array([x, y, np.sqrt(constant + x * x + y * y)])
-    for _ in range(100):
-        offsets = centred - circle[:2]
-        radii = np.linalg.norm(offsets, axis=1)
-        jacobian = np.column_stack([-offsets / radii[:, None], -np.ones(len(radii))])
-        step = np.linalg.lstsq(jacobian, circle[2] - radii, rcond=None)[0]
-        circle = circle + step
-        if np.abs(step).max() <= 1e-12 * circle[2]:  # converged to round-off
-            break
-    else:
+    start = np.array([x, y, np.sqrt(constant + x * x + y * y)])
+
+    def distances(circle: Array) -> Array:
+        return np.asarray(np.linalg.norm(centred - circle[:2], axis=1) - circle[2])
+
+    fit = least_squares(distances, start, method="lm", xtol=1e-12, ftol=1e-15)
+    if not fit.success:
         raise InvalidInput("no circle comes nearest to these points: they hardly bend")
+    circle = fit.x
     offsets = centred - circle[:2]
     angles = np.unwrap(np.arctan2(offsets[:, 1], offsets[:, 0]))
     centre = mean + circle[:2]
     return FittedCircle(
         (float(centre[0]), float(centre[1])),
         float(circle[2]),
-        np.linalg.norm(offsets, axis=1) - circle[2],
+        distances(circle),
         float(np.degrees(abs(angles[-1] - angles[0]))),
     )

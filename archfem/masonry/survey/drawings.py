@@ -22,6 +22,7 @@ from archfem._files import atomic_write, check_file, read_text
 from archfem._typing import Array
 from archfem._validation import short_repr
 from archfem.errors import InvalidInput
+from archfem.masonry.block import measure_polygon
 from archfem.masonry.structure import suggest_name
 from archfem.units import in_unit
 
@@ -306,12 +307,8 @@ def _read_msh(path: Path, unit: str | None, ignored: Collection[str]) -> Iterato
 
 def read_physical_surfaces(path: Path, factor: float = 1.0) -> list[tuple[str, Array]]:
     """Read names and outlines (n, 2) [m] of the physical surfaces, ordered by tag."""
-    mesh = _load_msh(path)
-    names, points = mesh.group_names(2), _check_plane(mesh.points, "the mesh", factor)
-    found: dict[int, list[NDArray[np.intp]]] = {}
     corners = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
-    for tag, cell in mesh.tagged_cells(corners):
-        found.setdefault(tag, []).append(cell)
+    points, names, found = _load_msh(path, factor, 2, corners)
     if not found:
         raise InvalidInput("it has no physical surface: tag each block with one, in gmsh")
     surfaces = []
@@ -323,13 +320,9 @@ def read_physical_surfaces(path: Path, factor: float = 1.0) -> list[tuple[str, A
 
 def read_physical_curves(path: Path, factor: float = 1.0) -> list[tuple[str, Array]]:
     """Read name and edge mid-points (n, 2) [m] of each named physical curve."""
-    mesh = _load_msh(path)
-    names, points = mesh.group_names(1), _check_plane(mesh.points, "the mesh", factor)
-    found: dict[str, list[Array]] = {}
-    for tag, edge in mesh.tagged_cells({"line": 2, "line3": 2}):
-        if tag in names:
-            found.setdefault(names[tag], []).append(points[edge].mean(axis=0))
-    return [(name, np.array(middles)) for name, middles in found.items()]
+    points, names, found = _load_msh(path, factor, 1, {"line": 2, "line3": 2})
+    named = [(names[tag], edges) for tag, edges in found.items() if tag in names]
+    return [(name, points[np.array(edges)].mean(axis=1)) for name, edges in named]
 
 
 def infer_part(name: str) -> str:
@@ -338,28 +331,10 @@ def infer_part(name: str) -> str:
     return head.strip() if comma else re.sub(r"\s*\d+$", "", name)
 
 
-@dataclass(frozen=True, eq=False)
-class TaggedMesh:
-    """Points, cells and physical groups of a gmsh file."""
-
-    points: Array  # (n, 2 or 3), in drawing units
-    cells: list[tuple[str, NDArray[np.intp], NDArray[np.intp]]]  # kind, points and tag of each
-    groups: dict[str, tuple[int, int]]  # tag and dimension by name
-
-    def group_names(self, dimension: int) -> dict[int, str]:
-        """Return the names of the physical groups of one dimension by tag."""
-        return {tag: name for name, (tag, size) in self.groups.items() if size == dimension}
-
-    def tagged_cells(self, corners: Mapping[str, int]) -> Iterator[tuple[int, NDArray[np.intp]]]:
-        """Yield tag and corners of each cell of some kinds, whose numbers of corners are given."""
-        for kind, cells, tags in self.cells:
-            for cell, tag in zip(cells[:, : corners.get(kind, 0)], tags, strict=True):
-                if len(cell):
-                    yield int(tag), cell
-
-
-def _load_msh(path: Path) -> TaggedMesh:
-    """Load a gmsh file with meshio."""
+def _load_msh(
+    path: Path, factor: float, dimension: int, corners: Mapping[str, int]
+) -> tuple[Array, dict[int, str], dict[int, list[NDArray[np.intp]]]]:
+    """Load points [m], and names and corners of cells of physical groups by tag, with meshio."""
     try:
         import meshio
     except ImportError as error:
@@ -369,19 +344,24 @@ def _load_msh(path: Path) -> TaggedMesh:
     with _foreign_reader("meshio", "mesh of gmsh"):
         read = meshio.gmsh.read(path)
         tags = read.cell_data.get("gmsh:physical", [np.empty(0)] * len(read.cells))
-        cells = [
+        blocks = [
             (each.type, np.array(each.data, dtype=np.intp), np.array(tag, dtype=np.intp))
             for each, tag in zip(read.cells, tags, strict=True)
         ]
-        groups = {name: (int(tag), int(size)) for name, (tag, size) in read.field_data.items()}
-        mesh = TaggedMesh(np.array(read.points, dtype=float), cells, groups)
-    for kind, numbers, _ in cells:
+        groups = [(name, int(tag), int(size)) for name, (tag, size) in read.field_data.items()]
+        points = np.array(read.points, dtype=float)
+    cells: dict[int, list[NDArray[np.intp]]] = {}
+    for kind, numbers, of_group in blocks:
         # a negative number would silently count from the end
-        if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(mesh.points):
+        if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(points):
             raise InvalidInput(
                 f"cells ({kind}) have nodes that are not in the file: save the whole mesh"
             )
-    return mesh
+        if kind in corners:
+            for cell, tag in zip(numbers[:, : corners[kind]], of_group.tolist(), strict=True):
+                cells.setdefault(tag, []).append(cell)
+    names = {tag: name for name, tag, size in groups if size == dimension}
+    return _check_plane(points, "the mesh", factor), names, cells
 
 
 def _check_plane(
@@ -394,13 +374,11 @@ def _check_plane(
     return points[:, :2]
 
 
-def _trace_outline(cells: list[NDArray[np.intp]], points: Array, name: str) -> list[int]:
-    """Trace the points around cells in order, without points on straight edges."""
-    ends: Counter[tuple[int, int]] = Counter()
-    for cell in cells:
-        x, y = points[cell].T
-        around = cell if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0.0 else cell[::-1]
-        ends.update((int(a), int(b)) for a, b in zip(around, np.roll(around, -1), strict=True))
+def trace_boundary(cells: Sequence[NDArray[np.intp]]) -> list[int]:
+    """Return the points around anticlockwise cells in order; none where the boundary is no loop."""
+    ends = Counter(
+        (int(a), int(b)) for cell in cells for a, b in zip(cell, np.roll(cell, -1), strict=True)
+    )
     # an edge between two cells occurs in both directions, one on the boundary in one
     rim = [(a, b) for a, b in ends if (b, a) not in ends]
     after = dict(rim)
@@ -408,7 +386,15 @@ def _trace_outline(cells: list[NDArray[np.intp]], points: Array, name: str) -> l
     while rim and (following := after.get(loop[-1], loop[0])) != loop[0] and len(loop) <= len(rim):
         loop.append(following)
     # an edge in one direction twice is of cells that overlap
-    if not rim or len(loop) != len(rim) or len(after) != len(rim) or max(ends.values()) > 1:
+    is_loop = len(loop) == len(rim) == len(after) and max(ends.values()) == 1
+    return loop if is_loop else []
+
+
+def _trace_outline(cells: list[NDArray[np.intp]], points: Array, name: str) -> list[int]:
+    """Trace the points around cells in order, without points on straight edges."""
+    areas = (measure_polygon(points[cell])[0] for cell in cells)
+    loop = trace_boundary([c if a > 0.0 else c[::-1] for c, a in zip(cells, areas, strict=True)])
+    if not loop:
         raise InvalidInput(
             f"physical surface '{name}' is in pieces or has a hole, or its cells overlap: tag "
             "each block by itself"

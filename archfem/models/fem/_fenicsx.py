@@ -41,10 +41,10 @@ except ImportError:
 Numbers = NDArray[np.int32]
 
 
-def import_gmsh_mesh(model: Any) -> tuple[Any, Any, Any]:
-    """Return the current gmsh model as a plane mesh, its cell tags and its facet tags."""
-    grid, cells, facets = _gmsh_io.model_to_mesh(model, MPI.COMM_SELF, 0, gdim=2)[:3]
-    return grid, cells, facets
+def import_gmsh_mesh(model: Any) -> tuple[Any, Any]:
+    """Return the current gmsh model as a plane mesh, and its cell tags."""
+    grid, cells = _gmsh_io.model_to_mesh(model, MPI.COMM_SELF, 0, gdim=2)[:2]
+    return grid, cells
 
 
 def find_connectivity(grid: Any, start: int, end: int) -> Any:

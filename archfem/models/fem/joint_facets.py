@@ -57,38 +57,20 @@ class JointFacets:
         """Number k of points on a facet."""
         return self.rule.count(self.space.degree)
 
-    @cached_property
-    def _facet_order(self) -> tuple[Numbers, Numbers, Array]:
-        """Facets (f,), their joints (f,), and offsets of their ends from mid-depth (f, 2) [m]."""
-        facets, joint = self.space.mesh.joints
-        ends = np.array([self._end_offsets(*pair) for pair in zip(facets, joint, strict=True)])
-        order = np.lexsort((ends[:, 0], joint))
-        return facets[order], joint[order].astype(np.intp), ends[order]
-
-    def _end_offsets(self, facet: int, number: int) -> Array:
-        """Return the offsets of both ends of a facet from the joint's mid-depth (2,) [m]."""
-        grid, joint = self.space.mesh.grid, self.space.mesh.structure.joints[number]
-        cell = _fenicsx.find_connectivity(grid, 1, 2)(facet)[0]
-        position = int(np.flatnonzero(_fenicsx.find_connectivity(grid, 2, 1)(cell) == facet)[0])
-        nodes = self.space.cells[cell][_fenicsx.facet_nodes(self.space.functions)[position]]
-        offsets = (self.space.places[nodes] - joint.middle) @ joint.tangent
-        return np.array([offsets.min(), offsets.max()])
-
     @property
     def numbers(self) -> Numbers:
         """Numbers of the facets in the mesh (f,)."""
-        return self._facet_order[0]
+        return self.space.facets.numbers
 
     @property
     def joint(self) -> Numbers:
         """Number of each facet's joint (f,)."""
-        return self._facet_order[1]
+        return self.space.facets.joint
 
-    @cached_property
-    def _cells(self) -> Numbers:
-        """Cells at each facet (f, 2)."""
-        cells_at = _fenicsx.find_connectivity(self.space.mesh.grid, 1, 2)
-        return np.array([cells_at(facet) for facet in self.numbers])
+    @property
+    def _ends(self) -> Array:
+        """Offsets of both ends of each facet from the joint's mid-depth (f, 2) [m]."""
+        return self.space.facets.offsets[:, [0, -1]]
 
     @cached_property
     def colours(self) -> Numbers:
@@ -96,7 +78,7 @@ class JointFacets:
         # greedy colouring, facet by facet
         taken: dict[int, set[int]] = {}
         colours = []
-        for cells in self._cells:
+        for cells in self.space.facets.cells:
             used = set().union(*(taken.setdefault(cell, set()) for cell in cells))
             colours.append(next(c for c in range(len(used) + 1) if c not in used))
             for cell in cells:
@@ -111,13 +93,13 @@ class JointFacets:
     @cached_property
     def offsets(self) -> Array:
         """Offset of each facet's points from the joint's mid-depth (f, k) [m]."""
-        first, last = self._facet_order[2].T[..., None]
+        first, last = self._ends.T[..., None]
         return first + (last - first) * self.rule.on_facet(self.space.degree)[0]
 
     @cached_property
     def _lengths(self) -> Array:
         """Quadrature weights of each facet's points (f, k) [m]."""
-        return np.diff(self._facet_order[2], axis=1) * self.rule.on_facet(self.space.degree)[1]
+        return np.diff(self._ends, axis=1) * self.rule.on_facet(self.space.degree)[1]
 
     @cached_property
     def points(self) -> Numbers:
@@ -126,7 +108,7 @@ class JointFacets:
         numbers, count = np.empty(self.offsets.shape, dtype=np.intp), 0
         for joint in range(len(self.space.mesh.structure.joints)):
             facets = self.joint == joint
-            ends = self._facet_order[2][facets]
+            ends = self._ends[facets]
             along = self.rule.on_joint(np.append(ends[:, 0], ends[-1, 1]), self.space.degree)[0]
             distance = np.abs(self.offsets[facets][..., None] - along)
             numbers[facets] = count + distance.argmin(axis=-1)
@@ -169,7 +151,7 @@ class JointFacets:
     def _cellwise_space(self, size: int) -> tuple[Any, Numbers]:
         """Space of cellwise constants, `size` for each colour; entries of facets (f, 2, size)."""
         functions = _fenicsx.vector_space(self.space.mesh.grid, "DG", 0, size * self._colour_count)
-        nodes = _fenicsx.cell_dofs(functions)[self._cells, 0]
+        nodes = _fenicsx.cell_dofs(functions)[self.space.facets.cells, 0]
         number = nodes.astype(np.intp) * self._colour_count + self.colours[:, None]
         return functions, size * number[..., None] + np.arange(size)
 
@@ -178,7 +160,7 @@ class JointFacets:
         """Function with geometry and point values of each facet; entries of the point values."""
         functions, entries = self._cellwise_space(FACET_VALUE_COUNT + self.size)
         structure = self.space.mesh.structure
-        start, length = self._facet_order[2][:, :1], np.diff(self._facet_order[2], axis=1)
+        start, length = self._ends[:, :1], np.diff(self._ends, axis=1)
         along = structure.tangents[self.joint]
         begin = structure.middles[self.joint] + start * along
         place = np.hstack([begin, along / length, self._tangent_signs[:, None]])

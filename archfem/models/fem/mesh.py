@@ -44,7 +44,7 @@ def generate_mesh(structure: Structure, settings: Discretisation | None = None) 
     """Mesh a structure."""
     with _gmsh_model(structure.name):
         _generate(structure, settings or Discretisation())
-        return _import_tagged(structure)
+        return _import_mesh(structure)
 
 
 @validate_arguments
@@ -104,7 +104,7 @@ def read_mesh(structure: Structure, path: str | Path) -> Mesh:
         copy.write_bytes(content)
         try:
             gmsh.merge(str(copy))
-            return _import_named(structure)
+            return _import_mesh(structure)
         except MeshError:
             raise
         except Exception as error:  # gmsh and FEniCSx raise nothing more specific
@@ -201,19 +201,8 @@ def _mesh_blocks(division: Division) -> None:
             )
 
 
-def _import_tagged(structure: Structure) -> Mesh:
-    """Return the current gmsh model, generated here, as a checked mesh."""
-    grid, cells, facets = _fenicsx.import_gmsh_mesh(gmsh.model)
-    count = grid.topology.index_map(2).size_local
-    blocks = np.full(count, -1, dtype=np.int32)
-    blocks[cells.indices] = cells.values - 1
-    mesh = Mesh(structure, grid, blocks, (facets.indices, facets.values - 1))
-    _check_mesh(mesh)
-    return mesh
-
-
-def _import_named(structure: Structure) -> Mesh:
-    """Return the current gmsh model, with groups by name, as a checked mesh."""
+def _import_mesh(structure: Structure) -> Mesh:
+    """Return the current gmsh model, whose surfaces have the names of blocks, as a checked mesh."""
     numbers = {block.name: number for number, block in enumerate(structure.blocks)}
     groups = [int(tag) for _, tag in gmsh.model.getPhysicalGroups(2)]
     names = {tag: gmsh.model.getPhysicalName(2, tag) or f"block {tag}" for tag in groups}
@@ -223,26 +212,31 @@ def _import_named(structure: Structure) -> Mesh:
             f"the mesh has {len(names)} physical surfaces, of which {strange} are no blocks, and "
             f"the structure {len(numbers)} blocks: the mesh is of another structure"
         )
-    grid, cells, _ = _fenicsx.import_gmsh_mesh(gmsh.model)
+    grid, cells = _fenicsx.import_gmsh_mesh(gmsh.model)
     blocks = np.full(grid.topology.index_map(2).size_local, -1, dtype=np.int32)
     blocks[cells.indices] = [numbers[names[int(tag)]] for tag in cells.values]
-    mesh = Mesh(structure, grid, blocks, _find_joint_facets(structure, grid, blocks))
-    _check_mesh(mesh)
-    return mesh
+    if (found := set(blocks.tolist())) != set(numbers.values()):
+        raise MeshError(
+            f"the mesh has block numbers {sorted(found)}, the structure 0 to {len(numbers) - 1}: "
+            "the mesh is of another structure"
+        )
+    return Mesh(structure, grid, blocks, _find_joint_facets(structure, grid, blocks))
 
 
 def _find_joint_facets(
     structure: Structure, grid: Any, blocks: NDArray[np.int32]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return the facets between two blocks, and the joint that each lies on."""
-    cells_at, nodes_of = _fenicsx.find_connectivity(grid, 1, 2), _facet_points(grid)
+    """Return the facets between two blocks, which must cover the joints, and their joints."""
+    cells_at = _fenicsx.find_connectivity(grid, 1, 2)
+    vertices, point = _fenicsx.find_connectivity(grid, 1, 0), _fenicsx.find_vertex_points(grid)
     near, by_pair = CONTACT_TOLERANCE * structure.size, structure.pairs.tolist()
-    facets, joints = [], []
+    facets, joints, covered = [], [], np.zeros(len(structure.joints))
     for facet in range(grid.topology.index_map(1).size_local):
         sides = sorted({int(blocks[cell]) for cell in cells_at(facet)})
         if len(sides) < 2:
             continue
-        middle = grid.geometry.x[nodes_of(facet)][:, :2].mean(axis=0)
+        ends = grid.geometry.x[point[vertices(facet)]][:, :2]
+        middle = ends.mean(axis=0)
         # joints between these blocks, and the distance of the facet's middle from theirs
         between = [number for number, pair in enumerate(by_pair) if pair == sides]
         away = middle - structure.middles[between]
@@ -257,49 +251,15 @@ def _find_joint_facets(
             )
         facets.append(facet)
         joints.append(between[on[0]])
-    return np.array(facets, dtype=np.int32), np.array(joints, dtype=np.int32)
-
-
-def _check_mesh(mesh: Mesh) -> None:
-    """Refuse cells without block, facets between wrong blocks, and joints not covered."""
-    structure = mesh.structure
-    numbers = set(mesh.blocks.tolist())
-    if numbers != set(range(len(structure.blocks))):
-        raise MeshError(
-            f"the mesh has block numbers {sorted(numbers)}, the structure 0 to "
-            f"{len(structure.blocks) - 1}: the mesh is of another structure"
-        )
-    x = mesh.grid.geometry.x
-    cells_at, nodes_of = _fenicsx.find_connectivity(mesh.grid, 1, 2), _facet_points(mesh.grid)
-    covered = np.zeros(len(structure.joints))
-    for facet, number in zip(*mesh.joints, strict=True):
-        if not 0 <= number < len(structure.joints):
-            raise MeshError(f"the mesh has a joint number {number} that the structure has not")
-        joint = structure.joints[number]
-        sides = sorted(int(mesh.blocks[cell]) for cell in cells_at(facet))
-        if sides != [joint.lower, joint.higher]:
-            raise MeshError(
-                f"a facet of joint '{joint.name}' lies between blocks {sides}, not "
-                f"{[joint.lower, joint.higher]}: the mesh is of another structure"
-            )
-        ends = x[nodes_of(facet)][:, :2]
-        covered[number] += np.linalg.norm(ends[1] - ends[0])
-    wrong = np.flatnonzero(
-        np.abs(covered - structure.depths) > 4.0 * CONTACT_TOLERANCE * structure.size
-    )
+        covered[joints[-1]] += np.linalg.norm(ends[1] - ends[0])
+    wrong = np.flatnonzero(np.abs(covered - structure.depths) > 4.0 * near)
     if len(wrong):
         joint = structure.joints[wrong[0]]
         raise MeshError(
             f"joint '{joint.name}' is {joint.depth:.6g} m deep but its facets cover "
             f"{covered[wrong[0]]:.6g} m: the mesh is of another structure"
         )
-
-
-def _facet_points(grid: Any) -> Any:
-    """Return a function from a facet to its two mesh points."""
-    vertices = _fenicsx.find_connectivity(grid, 1, 0)
-    corner = _fenicsx.find_vertex_points(grid)
-    return lambda facet: corner[vertices(facet)]
+    return np.array(facets, dtype=np.int32), np.array(joints, dtype=np.int32)
 
 
 _recent_meshes: OrderedDict[Hashable, Mesh] = OrderedDict()

@@ -6,7 +6,8 @@ without interface elements or constraints.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,37 @@ class BrokenSpace:
         nodes = np.flatnonzero(moves[self.owner])
         return (2 * nodes[:, None] + np.arange(2)).ravel()
 
+    @cached_property
+    def facets(self) -> "OrderedFacets":
+        """Facets on all joints, in the order of their joints, along each of them."""
+        mesh = self.mesh
+        cells_at = _fenicsx.find_connectivity(mesh.grid, 1, 2)
+        facets_of = _fenicsx.find_connectivity(mesh.grid, 2, 1)
+        local = _fenicsx.facet_nodes(self.functions)
+        cells, nodes, offsets = [], [], []
+        for facet, number in zip(*mesh.joints, strict=True):
+            joint = mesh.structure.joints[number]
+            pair = sorted(cells_at(facet), key=lambda cell: mesh.blocks[cell])
+            positions = [int(np.flatnonzero(facets_of(cell) == facet)[0]) for cell in pair]
+            sides = [self.cells[c][local[k]] for c, k in zip(pair, positions, strict=True)]
+            along = [(self.places[side] - joint.middle) @ joint.tangent for side in sides]
+            cells.append(pair)
+            nodes.append([side[np.argsort(x)] for side, x in zip(sides, along, strict=True)])
+            offsets.append(np.sort(along[0]))
+        order = np.lexsort((np.array(offsets)[:, 0], mesh.joints[1]))
+        columns = *mesh.joints, cells, nodes, offsets
+        return OrderedFacets(*(np.array(column)[order] for column in columns))
+
+
+class OrderedFacets(NamedTuple):
+    """Facets on joints, joint after joint and along each of them."""
+
+    numbers: Nodes  # in the mesh (f,)
+    joint: Nodes  # number of the joint of each (f,)
+    cells: Nodes  # on both sides, that of the lower block first (f, 2)
+    nodes: Nodes  # on both sides, along the joint (f, 2, k)
+    offsets: Array  # of the nodes from the joint's mid-depth (f, k) [m]
+
 
 def build_broken_space(mesh: Mesh, degree: int = 1) -> BrokenSpace:
     """Return the space of displacements that are continuous in each block."""
@@ -65,13 +97,10 @@ def build_joint_operator(space: BrokenSpace, rule: Quadrature) -> JointOperator:
     elements, so entries are exact and only nodes on the joint appear.
     """
     structure = space.mesh.structure
-    sides = _joint_nodes(space)
-    rules, entries = [], []
-    for joint, nodes in zip(structure.joints, sides, strict=True):
-        # offsets of the nodes of each facet from mid-depth, facets in order along the joint
-        offsets = (space.places[nodes[:, 0]] - joint.middle) @ joint.tangent
-        order = np.argsort(offsets[:, 0])
-        offsets, nodes = offsets[order], nodes[order]
+    facets, rules, entries = space.facets, [], []
+    for number in range(len(structure.joints)):
+        of_joint = facets.joint == number
+        offsets, nodes = facets.offsets[of_joint], facets.nodes[of_joint]
         breaks = np.append(offsets[:, 0], offsets[-1, -1])
         rules.append(rule.on_joint(breaks, space.degree))
         entries.append(_interpolation(rules[-1][0], offsets, nodes))
@@ -82,24 +111,6 @@ def build_joint_operator(space: BrokenSpace, rule: Quadrature) -> JointOperator:
         for directions in (structure.normals[points.joint], structure.tangents[points.joint])
     )
     return make_operator(structure, rule, points, opening, slip)
-
-
-def _joint_nodes(space: BrokenSpace) -> list[Nodes]:
-    """Return nodes of each joint's facets, lower side first (facets, sides, nodes)."""
-    mesh = space.mesh
-    cells_at = _fenicsx.find_connectivity(mesh.grid, 1, 2)
-    facets_of = _fenicsx.find_connectivity(mesh.grid, 2, 1)
-    local = _fenicsx.facet_nodes(space.functions)
-    sides: list[list[list[Nodes]]] = [[] for _ in mesh.structure.joints]
-    for facet, number in zip(*mesh.joints, strict=True):
-        joint = mesh.structure.joints[number]
-        pair = []
-        for cell in sorted(cells_at(facet), key=lambda cell: mesh.blocks[cell]):
-            position = int(np.flatnonzero(facets_of(cell) == facet)[0])
-            nodes = space.cells[cell][local[position]]
-            pair.append(nodes[np.argsort((space.places[nodes] - joint.middle) @ joint.tangent)])
-        sides[number].append(pair)
-    return [np.array(pairs) for pairs in sides]
 
 
 def _interpolation(points: Array, offsets: Array, nodes: Nodes) -> tuple[Array, Nodes]:
