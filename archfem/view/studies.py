@@ -120,7 +120,8 @@ def _draw_over_key(
     colours: dict[Any, str] = {}
     for _, group in frame.groupby(sets, sort=False) if sets else [("", frame)]:
         words = None if coloured is None else group[coloured].iloc[0]
-        label = None if words is None or words in colours else f"{words}"
+        text = f"{words:.6g}" if isinstance(words, float) else f"{words}"
+        label = None if words is None or words in colours else text
         colour = colours.setdefault(words, LINE_COLOURS[len(colours)])
         known = group[np.isfinite(group["value"])].sort_values(key)
         style = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
