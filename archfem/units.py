@@ -193,11 +193,10 @@ def _convert(text: str, unit: str, key: str) -> float:
     except pint.DimensionalityError as error:
         if unit == "1":
             raise InvalidInput(f"{key} = {text!r} has a unit, and this is a pure number") from error
-        if quantity.unitless:
-            raise InvalidInput(
-                f'{key} = {text!r} has no unit: write a number, or "{text} {target}"'
-            ) from error
-        raise InvalidInput(f"{key} = {text!r} is not in a unit like {target}: {error}") from error
+        reason = f"is not in a unit like {target}: {error}"
+        plain = f'has no unit: write a number, or "{text} {target}"'
+        words = plain if quantity.unitless else reason
+        raise InvalidInput(f"{key} = {text!r} {words}") from error
     except (pint.UndefinedUnitError, pint.PintError, ValueError, TypeError) as error:
         raise InvalidInput(
             f"{key} = {text!r} is not a quantity ({error}): write a number and a unit, e.g. "

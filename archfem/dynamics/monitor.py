@@ -279,7 +279,8 @@ class RunMonitor:
         doubt = Doubt(
             f"by t = {time:.4g} s the faces of '{name}' had slid by {slip:.2g} of a facet, though "
             "they are paired as meshed",
-            f"take fewer cells{coarser}, hold the fill's ends by sidewalls, or cut it with jointed_fill",
+            f"take fewer cells{coarser}, hold the fill's ends by sidewalls, or cut it with "
+            "jointed_fill",
         )
         if slip > 1.0:
             raise DidNotConverge(str(doubt), last=self._before)

@@ -83,9 +83,7 @@ def test_outlines_that_are_no_structure(tmp_path, outlines, says):
 def test_a_tolerance_as_large_as_the_blocks_is_refused(tmp_path):
     """All vertices merge to one place, so that edges have no length."""
     path = geojson(tmp_path / "bad.geojson", LOWER | {"a": square(0, 0)})
-    with pytest.raises(
-        af.errors.InvalidStructure, match="is no larger than snap 1.6 m: lower snap"
-    ):
+    with pytest.raises(af.errors.InvalidStructure, match=r"is no larger than snap 1\.6 m: lower"):
         af.masonry.surveyed(path, snap=1.6)
 
 
