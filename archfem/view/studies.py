@@ -25,6 +25,7 @@ from archfem.view.style import (
     new_figure,
     set_title,
     style_axes,
+    white_halo,
 )
 
 
@@ -489,7 +490,8 @@ def draw_accuracy(found: Accuracy) -> Figure:
         place = (chosen.seconds, max(chosen.error, floor))
         style = {"mfc": "none", "mec": Colour.HINGE, "mew": 1.4, "zorder": 6}
         axes.plot(*place, "o", ms=15, label="chosen", **style)
-        annotate(axes, chosen.setting.label, place, (10, -14))
+        style = {"path_effects": white_halo(3.0), "zorder": 6}
+        annotate(axes, chosen.setting.label, place, (10, -14), **style)
     _draw_settings(axes, found, floor)
     axes.legend(fontsize=LABEL_SIZE, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure

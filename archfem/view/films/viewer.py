@@ -223,11 +223,12 @@ def write_scenes(path: Path, setup: Setup, run: History, frames: Iterable[Frame]
     title = f"{run.dataset.attrs['title']}: {run.verdict.outcome}"
     page = re.sub("<title>.*?</title>", lambda _: f"<title>{escape(title)}</title>", page, count=1)
     times = np.array([time for time, _ in shown])
+    wide, high = scene.plotter.window_size
     known = {
         **{"title": title, "static": static, "counts": [count for _, count in shown]},
         **{"times": times.round(4).tolist()},
         "first": int(np.argmin(np.abs(times - decisive_instant(run)))),
-        "aspect": float(np.divide(*scene.plotter.window_size)),
+        "aspect": wide / high,
         "distance": float(scene.plotter.camera.position[2]),
     }
     # a tag in the title must not end the script
