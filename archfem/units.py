@@ -132,6 +132,11 @@ def in_si_unit(values: Sequence[Any]) -> tuple[list[Any], str]:
     return list(values), ""
 
 
+def format_mm(length: float) -> str:
+    """Return a length in millimetres, of a metre and more without decimals or powers of ten."""
+    return f"{length / mm:.3g} mm" if abs(length) < 0.9995 else f"{length / mm:.0f} mm"
+
+
 def _check_text(text: str, unit: str, key: str) -> None:
     """Refuse commas, and long text and high powers, which pint would evaluate for hours."""
     power_pattern = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-+]?\s*(\d{1,2}(?![\deE]))?")
@@ -188,7 +193,10 @@ def _convert(text: str, unit: str, key: str) -> float:
     except pint.DimensionalityError as error:
         if unit == "1":
             raise InvalidInput(f"{key} = {text!r} has a unit, and this is a pure number") from error
-        raise InvalidInput(f"{key} = {text!r} is not in a unit like {target}: {error}") from error
+        reason = f"is not in a unit like {target}: {error}"
+        plain = f'has no unit: write a number, or "{text} {target}"'
+        words = plain if quantity.unitless else reason
+        raise InvalidInput(f"{key} = {text!r} {words}") from error
     except (pint.UndefinedUnitError, pint.PintError, ValueError, TypeError) as error:
         raise InvalidInput(
             f"{key} = {text!r} is not a quantity ({error}): write a number and a unit, e.g. "

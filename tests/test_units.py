@@ -33,6 +33,19 @@ def test_a_comma_in_a_number_is_refused(text):
         af.units.in_unit(text, "m", "length")
 
 
+def test_a_number_as_a_text_is_refused_with_its_remedy():
+    with pytest.raises(af.InvalidInput, match=r"x = '2\.25' has no unit: .* or \"2\.25 m\""):
+        af.units.in_unit("2.25", "m", "x")
+
+
+@pytest.mark.parametrize(
+    ("length", "words"),
+    [(1.5e-7, "0.00015 mm"), (0.0728, "72.8 mm"), (0.9999, "1000 mm"), (2.084, "2084 mm")],
+)
+def test_a_length_of_a_fall_has_no_power_of_ten(length, words):
+    assert af.units.format_mm(length) == words
+
+
 @pytest.mark.parametrize("mass", ["10 t", "10000 kg"])
 def test_a_mass_in_place_of_a_weight_is_refused_with_its_weight(mass):
     with pytest.raises(af.InvalidInput, match=r"is a mass: give its weight, '98\.1 kN'"):

@@ -26,7 +26,7 @@ from archfem.motion.matching import Match
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity
 from archfem.statics.stress import strength_use_text, utilisation_text
-from archfem.units import STANDARD_GRAVITY, kN, mm
+from archfem.units import STANDARD_GRAVITY, format_mm, kN
 
 
 class ResultTable(NamedTuple):
@@ -87,7 +87,7 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         row.append(str(joints["name"].values[int(largest.values.argmax())]))
         row.append(format_ratio(float(joints["friction"].max())))
         row.append(f"{int(apart.sum())} joints" if apart.any() else "-")
-        row += [f"{value / mm:.3g} mm" for value in (verdict.displacement, verdict.residual)]
+        row += [format_mm(value) for value in (verdict.displacement, verdict.residual)]
         row += [_mechanism_cell(verdict.mechanisms, definition) for definition in definitions]
         rows.append([*row, f"{endings.get(run.ending, run.ending)} {run.time[-1]:.2f} s"])
     verdicts = [run.verdict for run in runs.values()]
@@ -230,7 +230,7 @@ def _mechanism_cell(mechanisms: Mapping[str, DetectedMechanism | None], definiti
     found = mechanisms[definition]
     if found is None:
         return "none"
-    opening = "" if found.opening is None else f", {found.opening / mm:.3g} mm"
+    opening = "" if found.opening is None else f", {format_mm(found.opening)}"
     return f"{found.mechanism.kind} {found.time:.2f} s, {duration_text(found.duration)}{opening}"
 
 

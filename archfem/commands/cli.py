@@ -221,8 +221,11 @@ def _add_result_commands(commands: Any) -> None:
 
 def _add_installation_commands(commands: Any) -> None:
     """Add the commands on the installation and its example cases."""
-    about = "compile the time steps once: a minute or two"
-    add = _add_command(commands, "compile", about, "run", "compile_steps")
+    about = "compile the time steps once, for some minutes"
+    text = (
+        "Compile all that steps in time, once, for some minutes; a run compiles only what it needs."
+    )
+    add = _add_command(commands, "compile", about, "run", "compile_steps", description=text)
     add("--jobs", type=int, help="processes that compile (one a core)")
     _add_command(commands, "examples", "the cases that archfem brings, a line each", "tools")
     text = "Print a case, as in `archfem example ring > ring.toml`, or copy it."

@@ -168,9 +168,14 @@ def diagnose_installation() -> Iterator[Diagnosis]:
     yield Diagnosis("library of the viewer", "found" if found else "missing", remedy)
     yield _diagnose_ffmpeg()
     yield _diagnose_compiled_code()
-    if find_spec("distributed") is None:
-        remedy = f"{PIP_INSTALL} 'archfem[cluster]'"
-        yield Diagnosis("distributed", f"none; only clusters need it: {remedy}")
+    optional = {
+        "distributed": ("cluster", "only clusters need it"),
+        "openpyxl": ("tables", "only tables of studies for Excel need it"),
+        "trame": ("notebooks", "only pyvista's pages and its viewer in notebooks need it"),
+    }
+    for name, (extra, need) in optional.items():
+        if find_spec(name) is None:
+            yield Diagnosis(name, f"none; {need}: {PIP_INSTALL} 'archfem[{extra}]'")
 
 
 def _diagnose_requirements() -> Iterator[Diagnosis]:

@@ -38,7 +38,7 @@ from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Model, check_model
 from archfem.motion.motion import Motion
-from archfem.units import G, mm
+from archfem.units import G, format_mm
 
 logger = logging.getLogger("archfem")
 
@@ -199,7 +199,7 @@ def doubt_collapse(structure: Structure, fall: CollapseState) -> list[Doubt]:
     # more than 0.6, as did 14 of the others. A stack overturns at about 1.
     if fall.displacement > 0.6 * depth:
         cause = (
-            f"a corner was displaced by {fall.displacement / mm:.3g} mm, "
+            f"a corner was displaced by {format_mm(fall.displacement)}, "
             f"{fall.displacement / depth:.2g} of the depth of the shallowest joint: other joints "
             "or time steps may let it fall"
         )
@@ -208,7 +208,7 @@ def doubt_collapse(structure: Structure, fall: CollapseState) -> list[Doubt]:
     if limit / 1.5 < fall.residual < 1.5 * limit:
         cause = (
             f"it {'stands' if fall.kind == COLLAPSE_STATES[0] else 'is dislocated'} by little: "
-            f"residual displacement {fall.residual / mm:.3g} mm, limit {limit / mm:.3g} mm"
+            f"residual displacement {format_mm(fall.residual)}, limit {format_mm(limit)}"
         )
         doubts.append(Doubt(cause, "state the displacement rather than the kind"))
     return doubts

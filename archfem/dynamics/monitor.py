@@ -273,12 +273,14 @@ class RunMonitor:
         slip, name = self._mismatch
         if slip <= doubtful:
             return
-        rigid = self.model.fidelity == "rigid"
-        coarser = "" if rigid else ", fidelity 'faces' or 'rigid' for stones"
+        # of "backfill: full, rest: rigid" too
+        coarse = any(name in self.model.fidelity for name in ("rigid", "faces"))
+        coarser = "" if coarse else ", fidelity 'faces' or 'rigid' for stones"
         doubt = Doubt(
             f"by t = {time:.4g} s the faces of '{name}' had slid by {slip:.2g} of a facet, though "
             "they are paired as meshed",
-            f"take fewer cells{coarser}, or cut the fill with jointed_fill",
+            f"take fewer cells{coarser}, hold the fill's ends by sidewalls, or cut it with "
+            "jointed_fill",
         )
         if slip > 1.0:
             raise DidNotConverge(str(doubt), last=self._before)

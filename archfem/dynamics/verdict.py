@@ -28,7 +28,7 @@ from archfem.limit.mechanism_count import (
 from archfem.limit.mechanism_kinematics import first_verified_mechanism
 from archfem.masonry.structure import Structure, join_joint_names, join_names
 from archfem.models.model import Doubt
-from archfem.units import mm
+from archfem.units import format_mm, mm
 
 MECHANISM_DEFINITIONS = (
     "any joints at once",
@@ -138,15 +138,16 @@ class Verdict:
         lines = [self.headline, *(f"in doubt: {doubt}" for doubt in self.doubts)]
         if not np.isnan(self.displacement):
             lines.append(
-                f"largest displacement of a corner {self.displacement / mm:.3g} mm, residual "
-                f"{self.residual / mm:.3g} mm"
+                f"largest displacement of a corner {format_mm(self.displacement)}, residual "
+                f"{format_mm(self.residual)}"
             )
         # definitions with the same mechanism share a line
         groups: dict[str, list[str]] = {}
         for name, found in self.mechanisms.items():
             groups.setdefault("none" if found is None else str(found), []).append(name)
         lines += self.remarks
-        lines += [f"{join_names(names)}: {words}" for words, names in groups.items()]
+        for words, names in groups.items():
+            lines.append(f"{'mechanism by ' * (words == 'none')}{join_names(names)}: {words}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -191,7 +192,7 @@ def _follow(
     duration = mechanism.time - begin
     opening = float(own["opening"].max()) if "opening" in own else None
     words = f"they failed one after the other within {duration_text(duration)}"
-    words += "" if opening is None else f", and open by up to {opening / mm:.3g} mm"
+    words += "" if opening is None else f", and open by up to {format_mm(opening)}"
     return DetectedMechanism(mechanism, duration, opening, words)
 
 

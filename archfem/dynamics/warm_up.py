@@ -1,4 +1,4 @@
-"""Compilation of all kernels ahead of time: a minute or two, once, cached on disk from then on.
+"""Compilation of all kernels ahead of time: some minutes, once, cached on disk from then on.
 
 Kernels are compiled at their first use, for each solver and scheme. Here each combination steps a
 small arch in a process of its own, so that later runs find all kernels in the cache.

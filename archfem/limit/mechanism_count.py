@@ -25,7 +25,7 @@ from archfem.joints.criteria import (
     with_failure_flags,
 )
 from archfem.masonry.parts import select_assessed_parts
-from archfem.units import mm
+from archfem.units import format_mm
 
 # Classes of mechanisms, from narrow to wide
 MECHANISM_KINDS = ("local", "semi-global", "global")
@@ -81,7 +81,7 @@ class Episode:
 
     def __str__(self) -> str:
         """Describe duration, opening, and whether it closes again."""
-        wide = "" if self.opening is None else f", opens by up to {self.opening / mm:.3g} mm"
+        wide = "" if self.opening is None else f", opens by up to {format_mm(self.opening)}"
         end = "closes again" if self.closes else "has not closed when the record ends"
         return f"it lasts {duration_text(self.duration)}{wide} and {end}"
 

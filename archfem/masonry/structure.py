@@ -277,7 +277,8 @@ class Structure(ResultDisplay):
         held = find_supported_blocks(self, range(len(self.blocks)))
         if loose := [block.name for k, block in enumerate(self.blocks) if k not in held]:
             raise InvalidStructure(
-                f"blocks {loose} rest on nothing: join each, through others, to a fixed block"
+                f"blocks {loose} rest on nothing: join each, through others, to a fixed block, "
+                "which has fixed = true, in a drawing by its layer"
             )
 
     def _check_outlines(self) -> None:

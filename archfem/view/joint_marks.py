@@ -114,12 +114,13 @@ def joint_marks(structure: Structure, joints: xr.Dataset, *, shift: Array | None
 
 
 def joint_pairs(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return pairs of shown joints of blocks that have exactly two of them (n_links, 2)."""
+    """Return pairs of shown joints of free blocks that have exactly two of them (n_links, 2)."""
     touching: list[list[int]] = [[] for _ in structure.blocks]
     for number in np.flatnonzero(shown):
         for block in structure.joints[number].blocks:
             touching[block].append(int(number))
-    pairs = [numbers for numbers in touching if len(numbers) == 2]
+    # no thrust line runs along the ground from one pier to the next
+    pairs = [touching[number] for number in structure.free if len(touching[number]) == 2]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
 

@@ -84,7 +84,8 @@ def draw_stress(
         model: a model with a mesh, of any fidelity but "rigid".
         q: an equilibrium, or coordinates (n,) of a model that contains the initial gaps of its
             joints, for example those of a dead load in construction stages.
-        parts: parts whose blocks are shaded, for example ["backfill"]; by default all but soil.
+        parts: parts whose blocks are shaded, for example ["backfill"]; by default all but
+            soil, and soil too where no stone has stress, since all are rigid.
         axes: matplotlib axes; by default those of a new figure.
 
     Returns:
@@ -95,8 +96,10 @@ def draw_stress(
     """
     model, q = model_and_coordinates(model, q)
     structure, cells = model.structure, model.cells
-    blocks = _select_blocks(structure, parts)
     corners = (corner_stress_operator(cells) @ q).reshape(-1, 3)
+    largest = np.abs(corners).max(axis=1)
+    stressed = np.unique(cells.block[largest > 1e-9 * largest.max()])
+    blocks = _select_blocks(structure, parts, stressed)
     has_own_figure = axes is None
     axes = structure_axes(structure, axes)
     figure = cast(Figure, axes.figure)
@@ -114,11 +117,14 @@ def draw_stress(
     return figure
 
 
-def _select_blocks(structure: Structure, parts: Collection[str] | None) -> Numbers:
+def _select_blocks(
+    structure: Structure, parts: Collection[str] | None, stressed: Numbers
+) -> Numbers:
     """Return the numbers of the blocks to be shaded."""
     soil = find_yielding_blocks(structure)
     if parts is None:
-        return np.array([number for number in structure.free if number not in soil])
+        stones = np.array([number for number in structure.free if number not in soil])
+        return stones if np.isin(stones, stressed).any() else np.array(structure.free)
     known = {structure.blocks[number].part for number in structure.free}
     unknown = sorted(set(parts) - known)
     if unknown or not parts:

@@ -25,6 +25,7 @@ from archfem.view.style import (
     new_figure,
     set_title,
     style_axes,
+    white_halo,
 )
 
 
@@ -120,7 +121,8 @@ def _draw_over_key(
     colours: dict[Any, str] = {}
     for _, group in frame.groupby(sets, sort=False) if sets else [("", frame)]:
         words = None if coloured is None else group[coloured].iloc[0]
-        label = None if words is None or words in colours else f"{words}"
+        text = f"{words:.6g}" if isinstance(words, float) else f"{words}"
+        label = None if words is None or words in colours else text
         colour = colours.setdefault(words, LINE_COLOURS[len(colours)])
         known = group[np.isfinite(group["value"])].sort_values(key)
         style = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
@@ -488,7 +490,8 @@ def draw_accuracy(found: Accuracy) -> Figure:
         place = (chosen.seconds, max(chosen.error, floor))
         style = {"mfc": "none", "mec": Colour.HINGE, "mew": 1.4, "zorder": 6}
         axes.plot(*place, "o", ms=15, label="chosen", **style)
-        annotate(axes, chosen.setting.label, place, (10, -14))
+        style = {"path_effects": white_halo(3.0), "zorder": 6}
+        annotate(axes, chosen.setting.label, place, (10, -14), **style)
     _draw_settings(axes, found, floor)
     axes.legend(fontsize=LABEL_SIZE, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure

@@ -178,6 +178,16 @@ def test_facets_that_slid_past_each_other_are_doubted(stack, monkeypatch, slip, 
         any("had slid by" in doubt.cause and "'joint 1'" in doubt.cause for doubt in guard.doubts)
         is doubted
     )
+    # stones that are rigid already cannot be made coarser
+    assert not any("for stones" in doubt.remedy for doubt in guard.doubts)
+    monkeypatch.setattr(model, "fidelity", "backfill: full, rest: condensed")
+    fine = looked(model)
+    fine.check_run()
+    assert any("for stones" in doubt.remedy for doubt in fine.doubts) is doubted
+    monkeypatch.setattr(model, "fidelity", "backfill: full, rest: rigid")
+    fine = looked(model)
+    fine.check_run()
+    assert not any("for stones" in doubt.remedy for doubt in fine.doubts)
     monkeypatch.setattr(type(model), "face_mismatch", lambda self, q: (1.02, "joint 1"))
     with pytest.raises(af.DidNotConverge, match=r"'joint 1' had slid by 1 of a facet"):
         looked(model).check_run()

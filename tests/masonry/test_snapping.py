@@ -79,6 +79,14 @@ def test_outlines_that_are_no_structure(tmp_path, outlines, says):
         af.masonry.surveyed(path)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_tolerance_as_large_as_the_blocks_is_refused(tmp_path):
+    """All vertices merge to one place, so that edges have no length."""
+    path = geojson(tmp_path / "bad.geojson", LOWER | {"a": square(0, 0)})
+    with pytest.raises(af.errors.InvalidStructure, match=r"is no larger than snap 1\.6 m: lower"):
+        af.masonry.surveyed(path, snap=1.6)
+
+
 def test_gaps_that_are_meant_are_left(tmp_path):
     """A joint open at one end by 6 mm, an open joint of 10 mm: more than five times snap."""
     path = geojson(

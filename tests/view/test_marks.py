@@ -71,3 +71,25 @@ def test_joints_go_with_supports_that_have_moved(ring):
     dead = af.dead_load(moved)
     ends = moved.observer().joint_ends(dead.q)
     np.testing.assert_allclose(ends[..., 0], -0.05, atol=5e-4)  # the dead load moves by 0.3 mm
+
+
+def test_no_thrust_line_runs_along_the_ground():
+    """Two posts on one ground and a lintel: a link through each of the five stones."""
+
+    def box(left, low, right, high, name, **given):
+        corners = ((left, low), (right, low), (right, high), (left, high))
+        return af.Block(corners, af.STONE, name, **given)
+
+    posts = [
+        box(x, y, x + 0.5, y + 1.0, f"{side} {y:g}", part=f"{side} pier", role="pier")
+        for x, side in ((0.0, "left"), (2.5, "right"))
+        for y in (0.0, 1.0)
+    ]
+    ground = box(-1.0, -0.5, 4.0, 0.0, "ground", fixed=True, role="other")
+    lintel = box(-0.2, 2.0, 3.2, 2.5, "lintel", part="lintel", role="ring")
+    portal = af.masonry.assembled([ground, *posts, lintel], af.Contact(1e9, 4e8, friction=0.6))
+    assert [joint.role != "other" for joint in portal.joints] == 6 * [True]
+    rows = np.tile([WEIGHT, 0.0, 0.0], (6, 1))
+    links = joint_marks(portal, af.joints.joint_dataset(portal, rows)).links
+    assert len(links) == 5
+    assert (np.abs(np.diff(links[..., 1])) > 0.5).sum() == 4  # the lintel's alone is level

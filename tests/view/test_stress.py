@@ -45,3 +45,16 @@ def test_the_map_of_one_part_has_its_own_scale():
     assert labels == ["largest compression [MPa]", "largest compression [kPa]"]
     with pytest.raises(af.InvalidInput, match=r"parts \['deck'\] cannot be shaded: .*'backfill'"):
         draw_stress(model, q, parts=["deck"])
+
+
+def test_under_rigid_stones_the_soil_is_shaded():
+    """Rigid stones have no stress, and a map of none would have a scale without meaning."""
+    arch = af.shapes.Arch(span=6.0, rise=1.5, thickness=0.4, voussoirs=9)
+    bridge = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.3), width=3.0)
+    model = af.build(bridge, fidelity={"backfill": "full", "rest": "rigid"}, cells=(2, 2))
+    q = af.dead_load(model).q
+    shown, alone = (
+        drawn(draw_stress(model, q, parts=parts), "compression").get_array()
+        for parts in (None, ["backfill"])
+    )
+    assert shown.max() == alone.max() > 1.0  # [kPa]

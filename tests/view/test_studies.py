@@ -65,6 +65,10 @@ def test_points_that_differ_in_one_number_are_joined_and_coloured_by_the_case():
     assert [line.get_ydata().tolist() for line in over_width.lines] == [[0.4, 0.5], [0.6, 0.7, 0.8]]
     named = [text.get_text() for text in over_width.get_legend().get_texts()]
     assert named == ["thin", "thick"]
+    # 0.35 m from 35 cm has a digit of rounding
+    third = {"case": ["thin", "thick"], "width": [0.35000000000000003, 0.4, 0.5]}
+    legend = draw_findings(table.assign_coords(third)).axes[0].get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == ["0.35", "0.4", "0.5"]
     assert [text.get_text() for text in over_case.get_xticklabels()] == ["thin", "thick"]
     assert all(line.get_linestyle() == "None" for line in over_case.lines)
     with pytest.raises(af.InvalidInput, match="no finding is a number"):

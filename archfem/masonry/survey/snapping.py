@@ -42,19 +42,19 @@ def close_gaps(
     parts = np.split(number, np.cumsum([len(points) for points in oriented])[:-1])
     # merged vertices repeat, inside a boundary and across its end
     boundaries = [part[part != np.roll(part, 1)].tolist() or [int(part[0])] for part in parts]
-    ties = _find_ties(boundaries, places, snap)
-    ties |= _find_bends(boundaries, places, ties, snap)
-    places = _place_tied(places, ties)
-    moved = np.linalg.norm(places[number] - given, axis=1)
     owners = [name for name, points in zip(names, oriented, strict=True) for _ in points]
-    _check_moved(moved, given, owners, snap)
-    found = [places[boundary] for boundary in boundaries]
+    _check_moved(places[number] - given, given, owners, snap)
     for name, boundary in zip(names, boundaries, strict=True):
         if len(boundary) < 3:
             raise InvalidStructure(f"'{name}' is no larger than snap {snap:.3g} m: lower snap")
+    ties = _find_ties(boundaries, places, snap)
+    ties |= _find_bends(boundaries, places, ties, snap)
+    places = _place_tied(places, ties)
+    moved = _check_moved(places[number] - given, given, owners, snap)
+    found = [places[boundary] for boundary in boundaries]
     check_overlaps(found, names, AMBIGUOUS_GAP_RATIO * snap)
     _check_gaps(places, boundaries, names, snap)
-    return found, float(moved.max())
+    return found, moved
 
 
 def _edges(boundaries: Boundaries) -> Iterator[tuple[int, int, int]]:
@@ -160,8 +160,12 @@ def _place_tied(places: Array, ties: dict[int, Edge]) -> Array:
     return np.asarray(splu(hold.tocsc()).solve(free))
 
 
-def _check_moved(moved: Array, given: Array, owners: Sequence[str], snap: float) -> None:
-    """Refuse vertex displacements above twice the tolerance, which short steps may add up to."""
+def _check_moved(change: Array, given: Array, owners: Sequence[str], snap: float) -> float:
+    """Return the largest vertex displacement; refuse it above twice the tolerance.
+
+    Short steps may add up to it.
+    """
+    moved = np.linalg.norm(change, axis=1)
     worst = int(np.argmax(moved))
     if moved[worst] > 2.0 * snap:
         x, y = given[worst]
@@ -171,6 +175,7 @@ def _check_moved(moved: Array, given: Array, owners: Sequence[str], snap: float)
             "snap if the survey is rougher than that; lower it, or leave out vertices, if they "
             "follow one another so closely"
         )
+    return float(moved[worst])
 
 
 def _check_gaps(places: Array, boundaries: Boundaries, names: Sequence[str], snap: float) -> None:

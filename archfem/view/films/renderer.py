@@ -27,7 +27,7 @@ from archfem.view.films.frames import Frame, corner_values, frame_layers
 from archfem.view.films.settings import Scale, Setup
 from archfem.view.histories import draw_ground
 from archfem.view.positions import ground_acceleration
-from archfem.view.style import Colour, annotate, style_colour_bar, text_width
+from archfem.view.style import Colour, annotate, style_colour_bar
 
 
 class Canvas:
@@ -227,11 +227,12 @@ class FrameLayout:
         end = width + 0.2  # of the room for a text [inch]; later texts push earlier ones aside
         for time, text in instants:
             axes.axvline(time, color=Colour.GREY, lw=1.0, ls="--")
-            half = 0.5 * text_width(len(text), self.font_size)
+            label = annotate(axes, text, (0.0, 1.0), (0, 1), **style)
+            half = 0.5 * label.get_window_extent().width / self._figure.dpi
             share = (time - times[0]) / max(times[-1] - times[0], 1e-9)
             place = min(width * share, end - half)
             end = place - half - 0.1
-            annotate(axes, text, (place / width, 1.0), (0, 1), **style)
+            label.xy = (place / width, 1.0)
         return axes.axvline(run.time[0], color=Colour.HINGE, lw=1.8, animated=True)
 
     def _add_axes(self, *box: float) -> Axes:

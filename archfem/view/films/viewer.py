@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Iterable
 from html import escape
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -176,6 +177,7 @@ def _export_page(plotter: pv.Plotter) -> str:
     blocked = modules.setdefault(unused, None) is None
     try:
         with require_package("trame"):
+            import_module("trame")  # without it pyvista warns before it fails
             # older versions of pyvista have the exporter itself
             return str(getattr(plotter, "trame", plotter).export_html(None).getvalue())
     finally:
@@ -194,10 +196,13 @@ def write_scenes(path: Path, setup: Setup, run: History, frames: Iterable[Frame]
     title = f"{run.dataset.attrs['title']}: {run.verdict.outcome}"
     page = re.sub("<title>.*?</title>", lambda _: f"<title>{escape(title)}</title>", page, count=1)
     times = np.array([time for time, _ in shown])
+    wide, high = scene.plotter.window_size
     known = {
         **{"title": title, "static": static, "counts": [count for _, count in shown]},
         **{"times": times.round(4).tolist()},
         "first": int(np.argmin(np.abs(times - decisive_instant(run)))),
+        "aspect": wide / high,
+        "distance": float(scene.plotter.camera.position[2]),
     }
     # a tag in the title must not end the script
     controls = render("scenes.html", known=json.dumps(known).replace("<", "\\u003c"))

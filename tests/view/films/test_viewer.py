@@ -134,6 +134,15 @@ def test_the_slider_of_a_page_shows_one_instant(shaken, tmp_path, wide):
         width = "return [document.documentElement.scrollWidth, innerWidth]"
         scrolled, inner = driver.execute_script(width)
         assert scrolled <= inner
+        # the region fills the height or the width of the window
+        camera = (
+            "return [global.renderWindow.getRenderers().map(each => each.getActiveCamera()"
+            ".getPosition()[2] / known.distance), "
+            "Math.max(1, known.aspect * innerHeight / innerWidth)]"
+        )
+        farther, needed = driver.execute_script(camera)
+        assert min(abs(each - needed) for each in farther) < 1e-6 * needed
+        assert (needed > 1.0) is (wide == 390)
         said = [each["message"] for each in complaints(driver)]
     # of a machine without graphics
     assert not [text for text in said if "WebGL" not in text]

@@ -230,6 +230,8 @@
       if (scene.mechanism !== null) instants.push([scene.mechanism, "mechanism"]);
       if (scene.loose !== null) instants.push([scene.loose, "blocks loose"]);
       this.instants = instants.map(([time]) => [time, ""]);
+      // on a phone a wide chart would have tiny words
+      if (matchMedia("screen and (max-width: 44rem)").matches) this.find("ground").setAttribute("viewBox", this.find("e").getAttribute("viewBox"));
       this.charts = { ground: new Chart(this.find("ground"), scene.end, (time) => { this.pause(); this.show(time); }) };
       const curves = [{ times, values: level, name: "first" }];
       if (both) curves.unshift({ times, values: upright, name: "second" });
