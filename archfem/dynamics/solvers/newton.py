@@ -38,7 +38,6 @@ from archfem.dynamics.solvers.linear_step import (
     LinearStepWorkspace,
     LinearSystem,
     constant_parts,
-    effective_matrix,
     evaluate_released,
     find_tangent_blocks,
     linear_system,
@@ -153,8 +152,8 @@ class NewtonSolver(StepSolver):
 
     def _small_system(self, dt: float) -> "SmallSystem":
         """Return the data of steps with small displacements."""
-        linear, pairs = linear_system(self._equation, self.order, dt)
-        effective, law = effective_matrix(self._equation, self.order, dt), linear.law
+        linear, pairs, effective = linear_system(self._equation, self.order, dt)
+        law = linear.law
         begin, *ends = find_tangent_blocks(linear.gaps, pairs)
         tangent, places = self._storage.store(effective, *ends)
         widest = int(np.diff(linear.gaps[0]).max(initial=0))
