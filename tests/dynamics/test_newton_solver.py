@@ -10,14 +10,14 @@ from scipy import sparse
 
 import archfem as af
 from archfem.dynamics import Stepper
-from archfem.dynamics.solvers import band_lu
-from archfem.dynamics.solvers.band_lu import (
+from archfem.dynamics.solvers import tangent_lu
+from archfem.dynamics.solvers.newton import NewtonSolver
+from archfem.dynamics.solvers.selection import select_solver, stepper_for
+from archfem.dynamics.solvers.tangent_lu import (
     band_of,
     half_width,
     narrow_order,
 )
-from archfem.dynamics.solvers.newton import NewtonSolver
-from archfem.dynamics.solvers.selection import select_solver, stepper_for
 
 DT = 0.005
 
@@ -96,8 +96,8 @@ def test_supports_that_have_moved_are_refused_by_schemes_at_an_instant(ring):
         assert stepper_for(method, af.dynamics.Equation(moved, MOTION)).name == method
 
 
-factorise_band = from_python(band_lu.factorise_band)
-solve_band = from_python(band_lu.solve_band)
+factorise_band = from_python(tangent_lu.factorise_band)
+solve_band = from_python(tangent_lu.solve_band)
 
 
 def banded(rng, size, half):

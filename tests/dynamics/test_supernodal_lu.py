@@ -54,7 +54,7 @@ def factorise(panels, places, added):
 def test_it_solves_as_superlu_does_whatever_is_added(grid):
     matrix, elimination, places = grid
     panels = panels_of(matrix, elimination, *places)
-    assert 0 < len(panels.changing) < len(elimination.groups)
+    assert 0 < panels.changed.sum() < len(elimination.groups)
     rng = np.random.default_rng(1)
     for _ in range(2):
         added, right = rng.normal(size=places.shape[1]), rng.normal(size=SIDE**2)
@@ -88,7 +88,7 @@ def test_with_a_fill_it_gives_the_history_of_snes(caplog):
     given = {"dt": 0.005, "damping": af.StiffnessDamping(0.05, 8.0)}
     tight = af.statics.Newton(tolerance=1e-12)
     system = NewtonSolver(Equation(built, shake)).system(0.005)
-    assert len(system.tangent.changing) < len(system.tangent.first) - 1
+    assert not system.tangent.changed.all()
     runs = [
         af.time_history(built, shake, method=method, newton=tight, **given).joints
         for method in ("newton", "snes")

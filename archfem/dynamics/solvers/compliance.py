@@ -29,7 +29,6 @@ from archfem.dynamics.solvers.linear_step import (
     LinearStepWorkspace,
     LinearSystem,
     constant_parts,
-    effective_matrix,
     linear_system,
     linear_workspace,
     solve_contact,
@@ -80,9 +79,8 @@ class ComplianceSolver(StepSolver):
 
     def assemble(self, dt: float) -> ComplianceSystem:
         """Return the data of steps of one length [s]."""
-        linear, pairs = linear_system(self._equation, self.order, dt)
-        matrix = effective_matrix(self._equation, self.order, dt)
-        factor = symmetric_factor(matrix, self._elimination)
+        linear, pairs, effective = linear_system(self._equation, self.order, dt)
+        factor = symmetric_factor(effective, self._elimination)
         rows = len(linear.law.offset)
         return ComplianceSystem(
             linear,

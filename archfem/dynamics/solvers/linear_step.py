@@ -72,16 +72,6 @@ class LinearStepWorkspace(NamedTuple):
     released: Array  # by openings at an instant, and how much more with the lag (2, o)
 
 
-class JointRows(NamedTuple):
-    """Matrices and law of the joints for steps of one length."""
-
-    gaps: sparse.csr_matrix  # G (r, n)
-    shear: sparse.csr_matrix  # shear resultants of joints that cannot slide (n_joints, n)
-    weight: Array  # forces of gravity and of initial gaps (n,)
-    law: JointLaw
-    pairs: Any  # rows of λ and z of each derivative (q, 2)
-
-
 def find_tangent_blocks(
     gaps: SparseRows, pairs: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], Any, Any]:
@@ -114,51 +104,36 @@ def tangent_pattern(equation: Equation) -> sparse.csr_matrix:
     parts = (model.mass, model.closed_tangent(), equation.rest)
     pattern = sum(abs(without_round_off(part)) for part in parts)
     # joints couple what moves a released force with what moves the gaps it depends on
-    rows = joint_rows(equation, 1.0)
-    touched, pairs = abs(without_round_off(rows.gaps)), rows.pairs
+    _, gaps, pairs = joint_law(equation.joints, equation.numbers(1.0), 1.0, equation.conserving)
+    touched = abs(without_round_off(gaps))
     coupled = sparse.csr_matrix((np.ones(len(pairs)), pairs.T), 2 * (touched.shape[0],))
     return sparse.csr_matrix(pattern + touched.T @ (coupled + coupled.T) @ touched)
 
 
-def joint_rows(equation: Equation, dt: float) -> JointRows:
-    """Return gaps, loads and law of the joints for steps of one length."""
-    joints = equation.joints
-    assert joints is not None
-    law, rows, pairs = joint_law(joints, equation.numbers(dt), dt, equation.conserving)
-    shear, weight = joints.shear_resultants(), equation.weight
-    if joints.gap_offset is not None:
-        weight = weight - joints.generalised_force(*joints.elastic_forces(joints.gap_offset))
-    # shear of joints that can slide is summed up point by point instead
-    return JointRows(rows, shear[:0] if joints.slides else shear, weight, law, pairs)
-
-
 def linear_system(
     equation: Equation, order: NDArray[Any], dt: float
-) -> tuple[LinearSystem, NDArray[np.int64]]:
-    """Return the data of steps with reordered coordinates, and the pairs of gap rows (q, 2)."""
-    model, rows = equation.model, joint_rows(equation, dt)
+) -> tuple[LinearSystem, NDArray[np.int64], sparse.csr_matrix]:
+    """Return the data of steps with reordered coordinates.
+
+    Also the pairs of gap rows (q, 2), and K + μ M + ν R (n, n).
+    """
+    model, joints, numbers = equation.model, equation.joints, equation.numbers(dt)
+    assert joints is not None
+    law, gaps, pairs = joint_law(joints, numbers, dt, equation.conserving)
+    # shear of joints that can slide is summed up point by point instead
+    shear, weight = joints.shear_resultants()[: 0 if joints.slides else None], equation.weight
+    if joints.gap_offset is not None:
+        weight = weight - joints.generalised_force(*joints.elastic_forces(joints.gap_offset))
     mass, closed, rest = (
-        sparse_rows(without_round_off(matrix[order][:, order]))
-        for matrix in (model.mass, model.closed_tangent(), equation.rest)
+        without_round_off(each[order][:, order])
+        for each in (model.mass, model.closed_tangent(), equation.rest)
     )
-    gaps, shear = (
-        sparse_rows(without_round_off(each[:, order])) for each in (rows.gaps, rows.shear)
-    )
-    places = np.arange(len(rows.law.stiffness))
-    body, numbers = np.ascontiguousarray(model.mass_influence[order].T), equation.numbers(dt)
-    loads = rows.weight[order], body
-    system = LinearSystem(mass, closed, rest, gaps, shear, *loads, numbers, rows.law, places)
-    return system, rows.pairs
-
-
-def effective_matrix(equation: Equation, order: NDArray[Any], dt: float) -> sparse.csr_matrix:
-    """Return K + μ M + ν R, with all joints closed and stuck (n, n)."""
-    model, numbers = equation.model, equation.numbers(dt)
-    parts = (
-        without_round_off(each) for each in (model.closed_tangent(), model.mass, equation.rest)
-    )
-    closed, mass, rest = parts
-    return (closed + numbers.inertia * mass + numbers.rate * rest)[order][:, order].tocsr()
+    rows = (without_round_off(each[:, order]) for each in (gaps, shear))
+    matrices: Any = [sparse_rows(each) for each in (mass, closed, rest, *rows)]
+    loads = weight[order], np.ascontiguousarray(model.mass_influence[order].T)
+    places = np.arange(len(law.offset))
+    system = LinearSystem(*matrices, *loads, numbers, law, places)  # type: ignore[call-arg]
+    return system, pairs, closed + numbers.inertia * mass + numbers.rate * rest
 
 
 def constant_parts(linear: LinearSystem) -> tuple[Any, ...]:

@@ -1,8 +1,8 @@
 """Solver "newton": Newton's method on the whole structure, for small and large displacements.
 
 One driver serves both: an initial guess, the assembled tangent, points that reverse their slip held
-once, and a line search. The tangent is a band where coordinates can be ordered so (`band_lu`), else
-it is sparse (`supernodal_lu`). Small displacements (`linear_step`) solve in every iteration
+once, and a line search. The tangent is a band where coordinates can be ordered so, else it is
+sparse (`tangent_lu`). Small displacements (`linear_step`) solve in every iteration
 
     (K + μ M + ν R - Gᵀ λ′ G) w = r + Gᵀ (λ - λ′ (z - z₀));
 
@@ -16,18 +16,9 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numba.extending import overload
-from scipy import sparse
 
 from archfem._numba import KERNEL_OPTIONS, kernel
 from archfem._typing import Array
-from archfem.dynamics.solvers.band_lu import (
-    Band,
-    band_of,
-    band_places,
-    factorise_band,
-    narrow_order,
-    solve_band,
-)
 from archfem.dynamics.solvers.base import (
     StepSolver,
     evaluate_step,
@@ -47,7 +38,6 @@ from archfem.dynamics.solvers.linear_step import (
     LinearStepWorkspace,
     LinearSystem,
     constant_parts,
-    effective_matrix,
     evaluate_released,
     find_tangent_blocks,
     linear_system,
@@ -59,18 +49,13 @@ from archfem.dynamics.solvers.linear_step import (
 from archfem.dynamics.solvers.sparse_products import (
     SparseRows,
     add_rows,
+    multiply,
     row_times,
     sparse_rows,
     without_round_off,
 )
-from archfem.dynamics.solvers.supernodal_lu import (
-    Elimination,
-    Indices,
-    eliminate,
-    panel_places,
-    panels_of,
-    solve_panels,
-)
+from archfem.dynamics.solvers.supernodal_lu import Indices
+from archfem.dynamics.solvers.tangent_lu import TangentStorage, factorise, solve
 from archfem.joints.large.forces import (
     JointStepForces,
     LargeDisplacementJoints,
@@ -78,7 +63,7 @@ from archfem.joints.large.forces import (
     compute_step_forces,
     joint_energy,
 )
-from archfem.joints.large.rates import assemble_rates, find_rate_pairs
+from archfem.joints.large.rates import JointRates, add_rates, copy_rates, find_rate_pairs
 
 
 class Tolerances(NamedTuple):
@@ -89,30 +74,6 @@ class Tolerances(NamedTuple):
     round_off: float  # correction that changes nothing [m]
     rounded: float  # largest residual after such a correction [N]
     reduction: float  # of the residual in an iteration, to which the last factor serves again [-]
-
-
-def factorise(tangent: Any) -> Any:
-    """Factorise a tangent in its entries; returns whether it is regular; overloaded."""
-    raise NotImplementedError
-
-
-def solve(tangent: Any, vector: Any) -> Any:
-    """Solve in place by the factor of a tangent; overloaded."""
-    raise NotImplementedError
-
-
-@overload(factorise, inline="always")
-def _factorise(tangent):  # type: ignore
-    if is_system(tangent, Band):
-        return lambda tangent: factorise_band(tangent)
-    return lambda tangent: eliminate(tangent)
-
-
-@overload(solve, inline="always")
-def _solve(tangent, vector):  # type: ignore
-    if is_system(tangent, Band):
-        return lambda tangent, vector: solve_band(tangent, vector)
-    return lambda tangent, vector: solve_panels(tangent, vector)
 
 
 def newton_driver(evaluate_residual: Any, find_correction: Any, search_line: Any) -> Any:
@@ -163,13 +124,10 @@ class NewtonSolver(StepSolver):
 
     def __init__(self, equation: Equation, max_half_width: int = 40) -> None:
         self._equation, self.assembled = equation, {}
-        pattern = tangent_pattern(equation)
-        self.order, self.half_width = narrow_order(pattern)
+        self._storage = TangentStorage.of(tangent_pattern(equation), max_half_width)
+        self.order, self.half_width = self._storage.order, self._storage.half_width
         # a band is factorised faster than the joint law is evaluated, a sparse tangent is not
-        self._elimination, self._reduction = None, 0.0
-        if self.half_width > max_half_width:
-            self._elimination, self._reduction = Elimination.of(pattern), 0.03
-            self.order = self._elimination.order
+        self._reduction = 0.0 if self._storage.elimination is None else 0.01
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
@@ -184,27 +142,20 @@ class NewtonSolver(StepSolver):
 
     def constants(self, system: "SmallSystem | LargeSystem") -> tuple[Any, ...]:
         """Return the parts of the data that no step changes."""
-        tangent, changing = system.tangent, ("entries", "image", "pivots")
+        tangent = system.tangent
+        changing = "entries", "factor", "products", "changed", "image", "pivots"
         parts = [getattr(tangent, name) for name in tangent._fields if name not in changing]
         if isinstance(system, SmallSystem):
             return (*parts, *constant_parts(system.linear), system.begin, system.places)
         matrices = system.mass, system.blocks, system.viscous, system.effective
         return (*parts, *matrices, system.joints, system.places, system.weight, system.body)
 
-    def _store_tangent(self, matrix: sparse.csr_matrix, rows: Any, columns: Any) -> tuple[Any, Any]:
-        """Store a matrix for factorisation; returns also where its entries (row, column) are."""
-        if self._elimination is None:
-            band = band_of(matrix, self.half_width)
-            return band, band_places(band, rows, columns).astype(np.uint32)
-        panels = panels_of(matrix, self._elimination, rows, columns)
-        return panels, panel_places(panels, rows, columns).astype(np.uint32)
-
     def _small_system(self, dt: float) -> "SmallSystem":
         """Return the data of steps with small displacements."""
-        linear, pairs = linear_system(self._equation, self.order, dt)
-        effective, law = effective_matrix(self._equation, self.order, dt), linear.law
+        linear, pairs, effective = linear_system(self._equation, self.order, dt)
+        law = linear.law
         begin, *ends = find_tangent_blocks(linear.gaps, pairs)
-        tangent, places = self._store_tangent(effective, *ends)
+        tangent, places = self._storage.store(effective, *ends)
         widest = int(np.diff(linear.gaps[0]).max(initial=0))
         blocks = np.zeros(widest), np.zeros(widest**2)
         entries = np.zeros((len(pairs), 3), np.int64), np.zeros(len(pairs))
@@ -233,21 +184,19 @@ class NewtonSolver(StepSolver):
             for each in (model.mass, model.block_stiffness, equation.viscous)
         )
         effective = ((2.0 / dt**2) * mass + viscous / dt + (0.5 + lag) * blocks).tocsr()
-        place, sides, forces = (
-            np.argsort(order),
-            model.joints.kinematics,
-            allocate_step_forces(model.joints),
-        )
+        place, sides = np.argsort(order), model.joints.kinematics
+        forces = allocate_step_forces(model.joints)
         sides = sides._replace(index=place[sides.index])
-        tangent, places = self._store_tangent(effective, *find_rate_pairs(sides))
+        tangent, places = self._storage.store(effective, *find_rate_pairs(sides))
+        rates = JointRates(*(np.zeros_like(each) for each in forces.rates))
         # energy then drifts by 1e-8 of what is exchanged; reused factors round ten times as much
-        balance = 1e-9 if self._elimination is None else 1e-8
+        balance = 1e-9 if self._reduction == 0.0 else 1e-8
         balance *= float(np.linalg.norm(equation.weight))
-        round_off, reduction = 1e-13 * model.structure.size, self._reduction
-        tolerances = Tolerances(balance, balance, round_off, 1e4 * balance, reduction)
+        round_off = 1e-13 * model.structure.size
+        tolerances = Tolerances(balance, balance, round_off, 1e4 * balance, self._reduction)
         return LargeSystem(
             model.joints._replace(kinematics=sides),
-            LargeStepWorkspace(*np.zeros((7, model.size))),
+            LargeStepWorkspace(*np.zeros((8, model.size))),
             forces,
             np.zeros_like(forces.irreversible_slip),
             sparse_rows(without_round_off(mass)),
@@ -256,6 +205,7 @@ class NewtonSolver(StepSolver):
             sparse_rows(effective),
             tangent,
             np.zeros(1, bool),
+            rates,
             places,
             np.zeros((2, 3, 5, sides.shapes.shape[3])),
             equation.weight[order],
@@ -437,8 +387,9 @@ class LargeSystem(NamedTuple):
     effective: SparseRows  # 2 M/Δt² + C/Δt + (½ + β/Δt) K
     tangent: Any  # the same, to which joints add
     factored: Any  # whether it has a factor of this run (1,)
-    places: Any  # entry of the tangent that each rate of the joints adds to (e,)
-    faces: Array  # workspace of `assemble_rates` (2, 3, 5, s)
+    rates: JointRates  # of the joints in that
+    places: Any  # entry of the tangent that each derivative of joint forces adds to (e,)
+    faces: Array  # workspace of `add_rates` (2, 3, 5, s)
     weight: Array  # forces of gravity (n,)
     body: Array  # forces per unit ground acceleration (2, n)
     step: tuple[float, float]  # Δt, and β/Δt
@@ -454,6 +405,7 @@ class LargeStepWorkspace(NamedTuple):
     correction: Array  # of Δq
     residual: Array  # forces out of balance
     pulled: Array  # K q at the start of the step
+    momentum: Array  # M v there
     constant: Array  # forces that do not depend on the end of the step
 
 
@@ -473,8 +425,10 @@ def _evaluate_step(system, step, states, ground, results, memory):  # type: igno
 
 
 def _start_large_run(system, state, memory):  # type: ignore
-    """Copy the memory of the joints, and discard the factor of an earlier run."""
+    """Copy memory and state, and discard the factor of an earlier run."""
     system.factored[0] = False
+    multiply(system.blocks, state[0], system.work.pulled)
+    multiply(system.mass, state[1], system.work.momentum)
     for point in range(len(memory)):
         system.slip[point] = memory[point]
 
@@ -482,15 +436,13 @@ def _start_large_run(system, state, memory):  # type: ignore
 @kernel
 def _sum_loads(system, work, old, ground):  # type: ignore
     """Sum up the forces that do not depend on the end of the step."""
-    constant, body, elastic = work.constant, system.body, len(system.blocks[2]) > 0
+    constant, body = work.constant, system.body
     for k in range(len(constant)):
         work.before[k] = old[0, k]
         # gravity, ground motion, 2 M v/Δt, and blocks at the start
-        inertia = 2.0 / system.step[0] * row_times(system.mass, k, old[1])
+        inertia = 2.0 / system.step[0] * work.momentum[k]
         constant[k] = system.weight[k] + inertia - ground[0] * body[0, k] - ground[1] * body[1, k]
-        if elastic:
-            work.pulled[k] = row_times(system.blocks, k, old[0])
-            constant[k] -= work.pulled[k]
+        constant[k] -= work.pulled[k]
 
 
 @kernel
@@ -508,10 +460,10 @@ def _large_residual(system, work, iteration):  # type: ignore
     for k in range(len(residual)):
         residual[k] = work.constant[k] - row_times(system.effective, k, move)
     for joint in range(len(forces.force)):
+        reverses = reverses or forces.reverses[joint]
         for side in range(2):
             for k in range(sides.size[joint, side]):
                 residual[sides.index[joint, side, k]] -= forces.force[joint, side, k]
-                reverses = reverses or forces.missing_force[joint, side, k] != 0.0
     for k in range(len(residual)):
         square += residual[k] ** 2
     return np.sqrt(square), np.sqrt(square), reverses
@@ -525,21 +477,52 @@ def _large_correction(system, work, iteration, reuse, hold):  # type: ignore
         correction[k] = work.residual[k]
     if hold:  # what the residual lacks if reversed points stick; rates are those of stuck points
         for joint in range(len(forces.missing_force)):
-            for side in range(2):
+            for side in range(2 if forces.reverses[joint] else 0):
                 for k in range(sides.size[joint, side]):
                     correction[sides.index[joint, side, k]] -= forces.missing_force[joint, side, k]
     if not reuse:
-        entries, base = system.tangent.entries, system.tangent.base
-        assemble_rates(sides, forces, system.faces)
-        for k in range(len(entries)):
-            entries[k] = base[k]
-        for k in range(len(forces.rate)):
-            entries[system.places[k]] += forces.rate[k]
-        system.factored[0] = factorise(system.tangent)
+        _renew_tangent(system)
         if not system.factored[0]:
             return False
     solve(system.tangent, correction)
     return True
+
+
+@kernel
+def _renew_tangent(system):  # type: ignore
+    """Assemble the joints whose derivatives have changed, and factorise the tangent."""
+    sides, own, new = system.joints.kinematics, system.rates, system.forces.rates
+    tangent, places = system.tangent, system.places
+    entries, base, changed = tangent.entries, tangent.base, tangent.changed
+    # a band is assembled anew, as its entries are those of its factor
+    whole = not system.factored[0] or system.tolerances.reduction == 0.0
+    for k in range(len(entries) if whole else 0):
+        entries[k] = base[k]
+    for group in range(len(changed)):
+        changed[group] = False
+    for joint in range(len(sides.size)):
+        if not whole:
+            if not _has_changed(own.law[joint], new.law[joint]):
+                continue
+            add_rates(sides, joint, own, -1.0, system.faces, places, entries)
+        add_rates(sides, joint, new, 1.0, system.faces, places, entries)
+        copy_rates(new, own, joint)
+        for side in range(2):
+            for k in range(sides.size[joint, side]):
+                changed[tangent.group_of[sides.index[joint, side, k]]] = True
+    system.factored[0] = factorise(system.tangent)
+
+
+@kernel
+def _has_changed(last, law):  # type: ignore
+    """Return whether the law of a joint differs so much that a correction by the last one errs."""
+    largest = change = 0.0
+    for row in range(5):
+        for column in range(5):
+            largest = max(largest, abs(last[row, column]), abs(law[row, column]))
+            change = max(change, abs(law[row, column] - last[row, column]))
+    # corrections then err by 1e-4, which the next one makes up for
+    return change > 1e-4 * largest
 
 
 @kernel
@@ -610,7 +593,7 @@ def _solve_large_step(system, step, states, ground):  # type: ignore
     earlier = system.factored[0] and system.tolerances.reduction > 0.0
     for share, limits in ((1.0, (12, 3, earlier)), (0.0, (60, 0, False))):
         for k in range(len(work.move)):
-            work.move[k] = share * dt * old[1, k]
+            work.move[k] = share * dt * (old[1, k] - 0.5 * dt * old[2, k])
         iterations = _solve_large(system, work, system.tolerances, limits)
         total += abs(iterations)
         if iterations > 0:
@@ -620,6 +603,7 @@ def _solve_large_step(system, step, states, ground):  # type: ignore
                 new[1, k] = (2.0 / dt) * work.move[k] - old[1, k]
                 new[2, k] = (new[1, k] - old[1, k]) / dt
             return total
+        system.factored[0] = False
     return -1
 
 
@@ -644,11 +628,13 @@ def _evaluate_energies(system, work, new, ground, energy):  # type: ignore
     for k in range(len(forces.dissipation)):
         energy[3] += forces.dissipation[k]
     for k in range(len(move)):
-        energy[0] += 0.5 * new[1, k] * row_times(system.mass, k, new[1])
+        work.momentum[k] = row_times(system.mass, k, new[1])
+        energy[0] += 0.5 * new[1, k] * work.momentum[k]
         energy[1] -= system.weight[k] * new[0, k]
         energy[2] -= move[k] * (ground[0] * system.body[0, k] + ground[1] * system.body[1, k])
         # blocks: their energy, and damping proportional to their stiffness
         more = row_times(system.blocks, k, move)
-        energy[1] += 0.5 * new[0, k] * (work.pulled[k] + more)
+        work.pulled[k] += more
+        energy[1] += 0.5 * new[0, k] * work.pulled[k]
         energy[3] += lag * move[k] * more + move[k] * row_times(system.viscous, k, move) / dt
     energy[1] += joint_energy(system.joints, new[0], system.slip)

@@ -4,9 +4,9 @@ The order is one of minimum degree (George and Liu, SIAM Review 31, 1989). Colum
 with the same fill form a group, and so does a branch of the elimination tree with few columns.
 
 The pattern is symmetric, the matrix need not be. Of each group the rows from the diagonal on are
-one dense block, and the columns below them another. Groups whose entries never change, as inside a
-fill, are eliminated once: the rest is the matrix condensed onto the coordinates that joints touch.
-Groups form a tree, and solves of a symmetric pattern may keep to branches of it.
+one dense block, and the columns below them another. Groups form a tree, and what a group subtracts
+from its ancestors is stored. So where few entries change, only their groups and ancestors are
+eliminated again; solves of a symmetric pattern may keep to branches of the tree, too.
 """
 
 from dataclasses import dataclass
@@ -130,11 +130,14 @@ class Panels(NamedTuple):
     rows: Any  # rows below the columns of each group
     parent: Indices  # group of the first row below, -1 where there is none (groups,)
     places: Indices  # begin of its entries: its rows, then columns below them (groups + 1,)
-    updates: Indices  # begin of its targets (groups + 1,)
-    targets: Any  # entries that its elimination changes further down, row by row
-    changing: Indices  # groups to eliminate once entries change
-    base: Array  # entries without changes, of all other groups eliminated
-    entries: Array  # of the matrix, then of its triangles, pivots inverted
+    updates: Indices  # begin of its products (groups + 1,)
+    targets: Any  # entries from which its products are subtracted, row by row
+    group_of: Indices  # group of each coordinate (n,)
+    changed: Any  # whether entries of a group have changed since it was factorised (groups,)
+    base: Array  # entries without changes
+    entries: Array  # of the matrix
+    factor: Array  # entries of its triangles, pivots inverted
+    products: Array  # of the blocks of each group, in an even number of rows
     image: Array  # intermediate results (n,)
     smallest_step: float  # pivot, relative to its row, below which rows would have to be exchanged
 
@@ -144,16 +147,12 @@ def panels_of(
 ) -> Panels:
     """Return a matrix in panels, of which entries in some rows and columns (k,) change."""
     panels = _layout(matrix, elimination, 1e-6)
-    # groups with entries that change, and their ancestors
-    changes = np.zeros(len(panels.parent), bool)
-    changes[elimination.group_of[np.minimum(rows, columns)]] = True
-    for group, parent in enumerate(panels.parent):
-        if changes[group] and parent >= 0:
-            changes[parent] = True
-    # all others are eliminated once
-    if not eliminate(panels._replace(changing=np.flatnonzero(~changes))):
+    panels.changed[panels.group_of[np.minimum(rows, columns)]] = True
+    add_ancestors(panels)
+    # all others, as inside a fill, are eliminated once
+    if not eliminate(panels._replace(changed=~panels.changed)):
         raise np.linalg.LinAlgError("a fill without joints is not held by its own inertia")
-    return panels._replace(changing=np.flatnonzero(changes), base=panels.entries.copy())
+    return panels
 
 
 class SymmetricFactor(NamedTuple):
@@ -178,9 +177,10 @@ def symmetric_factor(matrix: sparse.csr_matrix, elimination: Elimination) -> Sym
     Raises LinAlgError where it is not definite, and ValueError where the pattern lacks entries.
     """
     lu, parts = _layout(matrix, elimination, 0.0), []  # no exchanges, however small a pivot is
+    lu.changed[:] = True
     regular = eliminate(lu)
     for group, width in enumerate(np.diff(lu.first)):
-        entries = lu.entries[lu.places[group] : lu.places[group + 1]]
+        entries = lu.factor[lu.places[group] : lu.places[group + 1]]
         count = lu.below[group + 1] - lu.below[group]
         top = entries[: width * (width + count)].reshape(width, -1)[:, :width]
         left = entries[width * (width + count) :].reshape(width, count)
@@ -203,20 +203,25 @@ def _layout(matrix: sparse.csr_matrix, elimination: Elimination, smallest: float
     # compiled indices without a sign need no check of it
     width, rows = np.diff(first), np.concatenate(elimination.rows).astype(np.uint32)
     sizes = width * (width + 2 * counts)
+    # an odd number of rows below leaves room for one more, as two are multiplied at a time
+    padded = (counts + counts % 2) * counts
     below, places, updates = (
-        np.concatenate([[0], np.cumsum(each)]) for each in (counts, sizes, counts**2)
+        np.concatenate([[0], np.cumsum(each)]) for each in (counts, sizes, padded)
     )
-    none, entries = np.zeros(0, np.uint32), np.zeros(places[-1])
-    groups, image = np.arange(len(width)), np.zeros(2 * size)
     panels = Panels(
-        *(first, below, rows, elimination.parent, places, updates, none, groups),
-        *(entries, entries, image, smallest),
+        *(first, below, rows, elimination.parent, places, updates),
+        *(np.zeros(updates[-1], np.uint32), elimination.group_of, np.zeros(len(width), bool)),
+        *(np.zeros(places[-1]), np.zeros(places[-1]), np.zeros(places[-1])),
+        *(np.zeros(updates[-1]), np.zeros(size), smallest),
     )
-    targets = [np.broadcast_arrays(own[:, None], own) for own in elimination.rows]
-    ends = (np.concatenate([each[k].ravel() for each in targets]) for k in range(2))
+    pairs = [np.broadcast_arrays(own[:, None], own) for own in elimination.rows]
+    ends = (np.concatenate([each[k].ravel() for each in pairs]) for k in range(2))
+    filled = [begin + np.arange(count**2) for begin, count in zip(updates, counts, strict=False)]
+    panels.targets[np.concatenate(filled)] = panel_places(panels, *ends)
     of_matrix = matrix.tocoo()
-    np.add.at(entries, panel_places(panels, of_matrix.row, of_matrix.col), of_matrix.data)
-    return panels._replace(targets=panel_places(panels, *ends).astype(np.uint32))
+    np.add.at(panels.base, panel_places(panels, of_matrix.row, of_matrix.col), of_matrix.data)
+    panels.entries[:] = panels.base
+    return panels
 
 
 def panel_places(panels: Panels, rows: Any, columns: Any) -> Indices:
@@ -239,21 +244,46 @@ def panel_places(panels: Panels, rows: Any, columns: Any) -> Indices:
 
 
 @entry
+def add_ancestors(panels):  # type: ignore
+    """Mark the ancestors of groups that have changed as changed; returns the panels."""
+    changed = panels.changed
+    for group in range(len(changed)):
+        if changed[group] and panels.parent[group] >= 0:
+            changed[panels.parent[group]] = True
+    return panels
+
+
+@entry
 def eliminate(panels):  # type: ignore
-    """Factorise the matrix in `entries` in place; returns whether no pivot has become small."""
-    entries = panels.entries
-    for group in panels.changing:
+    """Factorise the groups that have changed; returns whether no pivot has become small."""
+    entries, rows, changed = panels.factor, panels.rows, panels.changed
+    for group in range(len(changed)):
+        if changed[group]:
+            for k in range(panels.places[group], panels.places[group + 1]):
+                entries[k] = panels.entries[k]
+    for group in range(len(changed)):
         start, end = panels.places[group], panels.places[group + 1]
         width = panels.first[group + 1] - panels.first[group]
         count = panels.below[group + 1] - panels.below[group]
         middle = start + width * (width + count)
         top = entries[start:middle].reshape((width, width + count))
         left = entries[middle:end].reshape((width, count))
+        products = panels.products[panels.updates[group] : panels.updates[group + 1]]
+        kept = 0  # rows below, of groups that do not change
+        if changed[group]:
+            if not _eliminate_rows(top, panels.smallest_step):
+                return False
+            _eliminate_columns(top, left)
+            _multiply_blocks(top, left, products)
+        else:
+            own = rows[panels.below[group] : panels.below[group + 1]]
+            while kept < count and not changed[panels.group_of[own[kept]]]:
+                kept += 1
         targets = panels.targets[panels.updates[group] : panels.updates[group + 1]]
-        if not _eliminate_rows(top, panels.smallest_step):
-            return False
-        _eliminate_columns(top, left)
-        _update_rest(top, left, targets, panels.image, entries)
+        # each entry of the product goes to its position in the panels of later groups
+        for i in range(kept, count):
+            for k in range(i * count + kept, (i + 1) * count):
+                entries[targets[k]] -= products[k]
     return True
 
 
@@ -313,12 +343,13 @@ def _eliminate_columns(top, left):  # type: ignore
 
 
 @summing_kernel
-def _update_rest(top, left, targets, image, entries):  # type: ignore
-    """Subtract the product of a group's blocks from the entries further down, two rows a time."""
+def _multiply_blocks(top, left, products):  # type: ignore
+    """Multiply the blocks of a group, two rows at a time."""
     width, count = left.shape
     for i in range(0, count, 2):
         m = min(i + 1, count - 1)  # the second row
-        one, two = image[:count], image[count : 2 * count]
+        one = products[i * count : (i + 1) * count]
+        two = products[(i + 1) * count : (i + 2) * count]
         for j in range(count):
             one[j] = two[j] = 0.0
         # both rows of the product, four columns of the group at a time
@@ -334,14 +365,6 @@ def _update_rest(top, left, targets, image, entries):  # type: ignore
             for j in range(count):
                 one[j] += a * row[j]
                 two[j] += e * row[j]
-        # each entry of the product goes to its position in the panels of later groups
-        own = targets[i * count : (i + 1) * count]
-        for j in range(count):
-            entries[own[j]] -= one[j]
-        if m > i:
-            own = targets[m * count : (m + 1) * count]
-            for j in range(count):
-                entries[own[j]] -= two[j]
 
 
 @view_kernel
@@ -364,7 +387,7 @@ def solve_panels(panels, vector):  # type: ignore
         start, width = panels.first[group], panels.first[group + 1] - panels.first[group]
         rows = panels.rows[panels.below[group] : panels.below[group + 1]]
         own, size = vector[start : start + width], width + len(rows)
-        block = panels.entries[panels.places[group] :]
+        block = panels.factor[panels.places[group] :]
         for k in range(width):
             row, value = block[k * size :], own[k]
             for j in range(k):
@@ -378,7 +401,7 @@ def solve_panels(panels, vector):  # type: ignore
         start, width = panels.first[group], panels.first[group + 1] - panels.first[group]
         rows = panels.rows[panels.below[group] : panels.below[group + 1]]
         own, later, size = vector[start : start + width], panels.image, width + len(rows)
-        block = panels.entries[panels.places[group] :]
+        block = panels.factor[panels.places[group] :]
         for i in range(len(rows)):
             later[i] = vector[rows[i]]
         for k in range(width - 1, -1, -1):

@@ -174,8 +174,8 @@ class FaceKinematics(NamedTuple):
     # E: elongation of the face per coordinate (j, 2, s), or (j, 2, 0) where no face stretches
     stretch: Array
     fixed_pose: Array  # pose of a face of a fixed block, else 0 (j, 2, 3) [m, m, rad]
-    # first entry of `JointStepForces.rate` of the forces on one face by the coordinates of another,
-    # from `rates.find_block_starts` (j, 2, 2)
+    # first place of the derivatives of the forces on one face by the coordinates of another, from
+    # `rates.find_block_starts` (j, 2, 2)
     block_start: Any
 
 

@@ -25,7 +25,7 @@ from archfem.joints.large.face_kinematics import (
     step_poses,
 )
 from archfem.joints.large.overlap_law import FaceLaw, closing_energy, overlap_length, segment_forces
-from archfem.joints.large.rates import count_entries
+from archfem.joints.large.rates import JointRates
 
 
 class LargeDisplacementJoints(NamedTuple):
@@ -47,29 +47,20 @@ class LargeDisplacementJoints(NamedTuple):
 
 
 class JointStepForces(NamedTuple):
-    """Joint forces over a step, filled by `compute_step_forces`; `rate` by `assemble_rates`."""
+    """Joint forces over a step, filled by `compute_step_forces`."""
 
     # mean generalised forces of each segment on the coordinates of both faces (j, 2, s)
     force: Array
-    # derivative by the coordinates at the end (e,), in blocks of the forces on one face by the
-    # coordinates of another, each row by row, from `FaceKinematics.block_start` on
-    rate: Array
-    # derivative of the forces on the jump (x, y), on both angles and on the elongation, by their
-    # values at the end (j, 5, 5)
-    law_rate: Array
-    # derivative of each face's pose by its coordinates: cosine, sine, factor of the shapes, and the
-    # middle by the angle, mean over the step; cosine, sine, middle by the angle, at the end
-    # (j, 2, 9)
-    motion: Array
-    bend: Array  # rotation stiffness of each face, by `rotation_stiffness` (j, 2, 5)
+    rates: JointRates
     resultants: Array  # mean N, V, M of the joints of the structure (n_joints, 3) [N, N, N m]
     irreversible_slip: Array  # of each point at the end (p,) [m]
     dissipation: Array  # energy lost to friction and damping (j,) [J]
     # slip direction of each point in the last evaluation, 1 or -1; 0 where it held, or before the
     # first evaluation (p,)
     slip_direction: Array
-    # Correction to `force` for points whose slip direction has reversed, computed as if they stick
-    # (j, 2, s). `law_rate` is the sticking tangent at these points.
+    reverses: Any  # whether the slip direction of points of a segment has reversed (j,)
+    # correction to `force` of such segments, computed as if these points stick, of which `rates`
+    # are the derivatives (j, 2, s)
     missing_force: Array
 
 
@@ -79,14 +70,12 @@ def allocate_step_forces(joints: LargeDisplacementJoints) -> JointStepForces:
     points = len(joints.face_law.place)
     return JointStepForces(
         np.zeros((count, 2, size)),
-        np.zeros(count_entries(joints.kinematics)),
-        np.zeros((count, 5, 5)),
-        np.zeros((count, 2, 9)),
-        np.zeros((count, 2, 5)),
+        JointRates(np.zeros((count, 5, 5)), np.zeros((count, 2, 9)), np.zeros((count, 2, 5))),
         np.zeros((joints.joint_count, 3)),
         np.zeros(points),
         np.zeros(count),
         np.zeros(points),
+        np.zeros(count, bool),
         np.zeros((count, 2, size)),
     )
 
@@ -182,7 +171,7 @@ def joint_energy(joints, q, slip):  # type: ignore
 
 @entry
 def compute_step_forces(joints, before, after, lag, slip, forces):  # type: ignore
-    """Compute the joint forces of a step, without their assembled rate."""
+    """Compute the joint forces of a step."""
     for joint in range(len(forces.resultants)):
         for k in range(3):
             forces.resultants[joint, k] = 0.0
@@ -218,23 +207,24 @@ def _compute_segment(joints, segment, states, lag, slip, forces):  # type: ignor
     means = lower_rates[0], higher_rates[0]
     push = face_forces(rates, force)
     _store_forces(sides, segment, means, push, force[3], forces.force)
-    push = face_forces(rates, (0.0, missing[0], 0.0))
-    _store_forces(sides, segment, means, push, missing[1], forces.missing_force)
+    forces.reverses[segment] = missing[0] != 0.0 or missing[1] != 0.0
+    if forces.reverses[segment]:
+        push = face_forces(rates, (0.0, missing[0], 0.0))
+        _store_forces(sides, segment, means, push, missing[1], forces.missing_force)
     # derivatives, of the forces with that correction
     force = force[0], force[1] + missing[0], force[2]
     x, y, low, high = face_forces(rates, force)
     derivative = force_derivative(step, rates, now, force, law_rate)
-    _store_derivative(forces.law_rate[segment], derivative)
-    _store_motion(forces.motion[segment, 0], lower_rates)
-    _store_motion(forces.motion[segment, 1], higher_rates)
-    if sides.has_frame[segment, 0]:
-        _store_five(forces.bend[segment, 0], rotation_stiffness(lower_rotation, (-x, -y, low)))
-    if sides.has_frame[segment, 1]:
-        _store_five(forces.bend[segment, 1], rotation_stiffness(higher_rotation, (x, y, high)))
+    of_law, motion, bend = forces.rates
+    _store_derivative(of_law[segment], derivative)
+    _store_motion(motion[segment, 0], lower_rates)
+    _store_motion(motion[segment, 1], higher_rates)
+    _store_bend(bend[segment, 0], lower_rotation, (-x, -y, low))
+    _store_bend(bend[segment, 1], higher_rotation, (x, y, high))
     if sides.stretch.shape[2] > 0:
         of_stretch = measure_rates(now, law_rate[3])
         by_stretch = face_forces(rates, (0.0, stretch_rate[0], 0.0))
-        _store_stretch(forces.law_rate[segment], of_stretch, by_stretch, stretch_rate[1])
+        _store_stretch(of_law[segment], of_stretch, by_stretch, stretch_rate[1])
 
 
 @kernel
@@ -273,9 +263,9 @@ def _store_motion(motion, rates):  # type: ignore
 
 
 @inlined_kernel
-def _store_five(row, values):  # type: ignore
-    """Store five numbers."""
-    row[0], row[1], row[2], row[3], row[4] = values
+def _store_bend(row, rotation, push):  # type: ignore
+    """Store the rotation stiffness of a face, which counts for blocks with a frame only."""
+    row[0], row[1], row[2], row[3], row[4] = rotation_stiffness(rotation, push)
 
 
 @inlined_kernel

@@ -3,19 +3,33 @@
 A joint segment sees its two faces by five numbers: the jump between them (x, y), both angles, and
 the relative elongation. The derivative of its forces is Uᵀ L V plus a rotation stiffness. L (5, 5)
 is the derivative of the law; U and V hold the derivatives of the five numbers by the coordinates,
-mean over the step and at its end. Segments between the same coordinates add to one shared block.
+mean over the step and at its end. Segments between the same coordinates share a block of places.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from archfem._numba import entry, kernel, summing_kernel
+from archfem._numba import entry, kernel
+from archfem._typing import Array
 from archfem.joints.large.face_kinematics import FaceKinematics, shape_rates
 
 
+class JointRates(NamedTuple):
+    """What the derivative of the forces of all joint segments is assembled from."""
+
+    # derivative of the forces on the jump (x, y), on both angles and on the elongation, by their
+    # values at the end (j, 5, 5)
+    law: Array
+    # derivative of each face's pose by its coordinates: cosine, sine, factor of the shapes, and the
+    # middle by the angle, mean over the step; cosine, sine, middle by the angle, at the end
+    # (j, 2, 9)
+    motion: Array
+    bend: Array  # rotation stiffness of each face, by `rotation_stiffness` (j, 2, 5)
+
+
 def find_block_starts(index: Any, size: Any) -> Any:
-    """Return the first entry of each block of `JointStepForces.rate` (j, 2, 2)."""
+    """Return the first place of each block of derivatives (j, 2, 2)."""
     # segments with the same coordinates on both faces share a block
     starts, count = np.zeros((len(index), 2, 2), np.int64), 0
     blocks: dict[Any, int] = {}
@@ -30,15 +44,11 @@ def find_block_starts(index: Any, size: Any) -> Any:
     return starts
 
 
-def count_entries(sides: FaceKinematics) -> int:
-    """Return the number of entries of `JointStepForces.rate`."""
-    sizes = sides.size[:, :, None] * sides.size[:, None, :]
-    return int((sides.block_start + sizes).max(initial=0))
-
-
 def find_rate_pairs(sides: FaceKinematics) -> Any:
-    """Return the coordinates of rows and columns of `JointStepForces.rate` (2, e)."""
-    pairs, done = np.zeros((2, count_entries(sides)), np.int64), set()
+    """Return the coordinates of rows and columns of all blocks of derivatives (2, e)."""
+    sizes = sides.size[:, :, None] * sides.size[:, None, :]
+    count = int((sides.block_start + sizes).max(initial=0))
+    pairs, done = np.zeros((2, count), np.int64), set()
     for joint, side, other in np.ndindex(sides.block_start.shape):
         start = int(sides.block_start[joint, side, other])
         rows = sides.index[joint, side, : sides.size[joint, side]]
@@ -52,37 +62,48 @@ def find_rate_pairs(sides: FaceKinematics) -> Any:
 
 
 @entry
-def assemble_rates(sides, forces, workspace):  # type: ignore
-    """Assemble the rate of all joints from the derivatives stored by `compute_step_forces`."""
-    for k in range(len(forces.rate)):
-        forces.rate[k] = 0.0
+def assemble_rates(sides, rates, workspace, places, entries):  # type: ignore
+    """Add the derivatives of all joints to the entries of a matrix at the places of all blocks."""
     for joint in range(len(sides.size)):
-        _assemble_joint(sides, joint, forces, workspace)
+        add_rates(sides, joint, rates, 1.0, workspace, places, entries)
 
 
 @kernel
-def _assemble_joint(sides, joint, forces, workspace):  # type: ignore
-    """Add the rate of a joint segment."""
-    law, rate = forces.law_rate[joint], forces.rate
+def add_rates(sides, joint, rates, factor, workspace, places, entries):  # type: ignore
+    """Add the derivatives of a joint segment, times a factor, to the entries of a matrix."""
+    law = rates.law[joint]
     # Uᵀ L V of each pair of faces
     if _has_entries(law):
         for side in range(2):
             count, own = sides.size[joint, side], workspace[side]
-            _face_derivatives(sides, joint, side, forces.motion[joint, side], own)
-            _multiply_law(law, 2 + side, own[1][:, :count], own[2])
+            _face_derivatives(sides, joint, side, rates.motion[joint, side], own)
+            _multiply_law(law, factor, 2 + side, own[1][:, :count], own[2])
         for side in range(2):
             for other in range(2):
                 counts = sides.size[joint, side], sides.size[joint, other]
-                start = sides.block_start[joint, side, other]
-                block = rate[start : start + counts[0] * counts[1]]
-                _add_product(counts, workspace[side, 0], workspace[other, 2], 2 + side, block)
+                own = places[sides.block_start[joint, side, other] :]
+                _add_product(
+                    counts, workspace[side, 0], workspace[other, 2], 2 + side, own, entries
+                )
     # rotation stiffness of each face with a frame
     for side in range(2):
         if sides.has_frame[joint, side]:
-            count, start = sides.size[joint, side], sides.block_start[joint, side, side]
-            block = rate[start : start + count * count]
-            bend = forces.bend[joint, side]
-            _add_rotation_stiffness(sides.shapes[joint, side], count, bend, block)
+            count, own = sides.size[joint, side], places[sides.block_start[joint, side, side] :]
+            bend = rates.bend[joint, side]
+            _add_rotation_stiffness(sides.shapes[joint, side], count, bend, factor, own, entries)
+
+
+@kernel
+def copy_rates(source, target, joint):  # type: ignore
+    """Copy what the derivatives of a joint segment are assembled from."""
+    for row in range(5):
+        for column in range(5):
+            target.law[joint, row, column] = source.law[joint, row, column]
+    for side in range(2):
+        for k in range(9):
+            target.motion[joint, side, k] = source.motion[joint, side, k]
+        for k in range(5):
+            target.bend[joint, side, k] = source.bend[joint, side, k]
 
 
 @kernel
@@ -118,36 +139,37 @@ def _face_derivatives(sides, joint, side, motion, derivatives):  # type: ignore
             rows[3, k] = sign * sides.stretch[joint, side, k] if sides.stretch.shape[2] else 0.0
 
 
-@summing_kernel
-def _multiply_law(law, angle, last, images):  # type: ignore
+@kernel
+def _multiply_law(law, factor, angle, last, images):  # type: ignore
     """Store L V, the forces by the coordinates of a face; `angle` is the number of its angle."""
     p, q, r, s = last[0], last[1], last[2], last[3]
     # rows of L: x, y, angle of the lower face, angle of the higher face, elongation
     for number in range(5):
         row = law[number]
-        a, b, c, d, image = row[0], row[1], row[angle], row[4], images[number]
+        a, b, c, d = factor * row[0], factor * row[1], factor * row[angle], factor * row[4]
+        image = images[number]
         for m in range(len(p)):
             image[m] = a * p[m] + b * q[m] + c * r[m] + d * s[m]
 
 
-@summing_kernel
-def _add_product(counts, mean, images, angle, block):  # type: ignore
-    """Add the derivative Uᵀ L V of one face's forces by another's coordinates to their block."""
+@kernel
+def _add_product(counts, mean, images, angle, places, entries):  # type: ignore
+    """Add the derivative Uᵀ L V of one face's forces by another's coordinates."""
     (rows, columns), p, q, r, s = counts, images[0], images[1], images[angle], images[4]
     for k in range(rows):
         x, y, turn, longer = mean[0, k], mean[1, k], mean[2, k], mean[3, k]
-        row = block[k * columns : (k + 1) * columns]
+        own = places[k * columns : (k + 1) * columns]
         for m in range(columns):
-            row[m] += x * p[m] + y * q[m] + turn * r[m] + longer * s[m]
+            entries[own[m]] += x * p[m] + y * q[m] + turn * r[m] + longer * s[m]
 
 
 @kernel
-def _add_rotation_stiffness(shapes, count, bend, block):  # type: ignore
+def _add_rotation_stiffness(shapes, count, bend, factor, places, entries):  # type: ignore
     """Add the derivative of generalised forces at a constant force on the face."""
     # moment by the angle, force on each shape by the angle, moment by each shape
     a, b, c, d, e = bend[0], bend[1], bend[2], bend[3], bend[4]
-    block[2 * count + 2] += a
+    entries[places[2 * count + 2]] += factor * a
     for k in range(3, count):
         u, v = shapes[0, k], shapes[1, k]
-        block[k * count + 2] += b * u + c * v
-        block[2 * count + k] += d * u + e * v
+        entries[places[k * count + 2]] += factor * (b * u + c * v)
+        entries[places[2 * count + k]] += factor * (d * u + e * v)

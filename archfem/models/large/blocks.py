@@ -121,7 +121,7 @@ class Slots:
     """Places of the joint forces and their rates among the model's coordinates."""
 
     rows: tuple[Any, Any]  # coordinates, and entries of `JointStepForces.force` for them
-    pairs: tuple[Any, Any]  # rows and columns of the entries of `JointStepForces.rate`
+    pairs: tuple[Any, Any]  # rows and columns of the blocks of their derivatives
 
 
 def find_slots(sides: FaceKinematics, size: int) -> tuple[Slots, sparse.csr_matrix]:

@@ -73,7 +73,7 @@ class LargeDisplacementModel(Model):
         self.mass = pattern.spread(self.small.mass)
         self.block_stiffness = pattern.spread(self.small.block_stiffness)
         self._pattern = pattern
-        self._entries = pattern.find_entries(*self._slots.pairs)
+        self._entries = pattern.find_entries(*self._slots.pairs).astype(np.uint32)
         self.mass_influence = self.small.mass_influence
         self.cells: RotatingCells = RotatingCells.of(self.small.cells, blocks.blocks)
         self.support_motion = self.small.support_motion
@@ -152,8 +152,9 @@ class LargeDisplacementModel(Model):
     ) -> sparse.csr_matrix:
         """Return block stiffness and joint tangent, each times a factor (n, n)."""
         sides = self.joints.kinematics
-        assemble_rates(sides, forces, np.empty((2, 3, 5, sides.shapes.shape[3])))
-        of_joints = np.bincount(self._entries, forces.rate, len(self._pattern.indices))
+        workspace = np.empty((2, 3, 5, sides.shapes.shape[3]))
+        of_joints = np.zeros(len(self._pattern.indices))
+        assemble_rates(sides, forces.rates, workspace, self._entries, of_joints)
         of_blocks = block_factor * self.block_stiffness.data
         return self._pattern.with_data(of_blocks + joint_factor * of_joints)
 

@@ -1,21 +1,31 @@
-"""A tangent in a band: assembled from the rates of the joints, factorised with row exchanges.
+"""The tangent of Newton's method and its factor: in a narrow band, else in panels.
 
-Row i of a band of half-width b holds columns i - b … i + 2 b of a matrix, as row exchanges fill b
-more to the right. Rows overlap in memory by their shift, so that column j of row i lies at
-b + i (w - 1) + j, w entries a row: loops then run over columns of the matrix itself.
+Panels are those of `supernodal_lu`. A band is factorised with row exchanges: row i of a band of
+half-width b holds columns i - b … i + 2 b of a matrix, as row exchanges fill b more to the right.
+Rows overlap in memory by their shift, so that column j of row i lies at b + i (w - 1) + j, w
+entries a row: loops then run over columns of the matrix itself.
 """
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numba.extending import overload
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from archfem._numba import kernel, summing_kernel, view_kernel
 from archfem._typing import Array
-
-Indices = NDArray[np.int64]
+from archfem.dynamics.solvers.base import is_system
+from archfem.dynamics.solvers.supernodal_lu import (
+    Elimination,
+    Indices,
+    add_ancestors,
+    eliminate,
+    panel_places,
+    panels_of,
+    solve_panels,
+)
 
 
 class Band(NamedTuple):
@@ -25,13 +35,16 @@ class Band(NamedTuple):
     base: Array  # entries without changes (n w,)
     entries: Array  # of the matrix, then of its triangles, pivots inverted (n w,)
     pivots: Indices  # row with which each was exchanged, and entries right of it (2, n)
+    group_of: Indices  # as of panels: one group of all coordinates (n,)
+    changed: Any  # whether it has changed (1,)
 
 
 def band_of(matrix: sparse.csr_matrix, half: int) -> Band:
     """Return a matrix as a band of at least its own half-width."""
     entries, size = matrix.tocoo(), matrix.shape[0]
     base = np.zeros(size * (3 * half + 1))
-    band = Band(half, base, np.zeros_like(base), np.zeros((2, size), np.int64))
+    pivots, group_of = np.zeros((2, size), np.int64), np.zeros(size, np.int64)
+    band = Band(half, base, np.zeros_like(base), pivots, group_of, np.ones(1, bool))
     base[band_places(band, entries.row, entries.col)] = entries.data
     band.entries[:] = base
     return band
@@ -55,6 +68,56 @@ def narrow_order(pattern: sparse.csr_matrix) -> tuple[Any, int]:
     widths = [half_width(pattern[order][:, order]) for order in orders]
     best = int(np.argmin(widths))
     return orders[best], widths[best]
+
+
+@dataclass(frozen=True, eq=False)
+class TangentStorage:
+    """Order of the coordinates in which tangents of one pattern are stored, as bands or panels."""
+
+    order: Any  # coordinates (n,)
+    half_width: int  # of a band in its narrowest order
+    elimination: Elimination | None  # of panels; None for a band
+
+    @classmethod
+    def of(cls, pattern: sparse.csr_matrix, max_half_width: int) -> "TangentStorage":
+        """Return the storage for a pattern: in panels where its band is wider than a maximum."""
+        order, width = narrow_order(pattern)
+        if width <= max_half_width:
+            return cls(order, width, None)
+        elimination = Elimination.of(pattern)
+        return cls(elimination.order, width, elimination)
+
+    def store(self, matrix: sparse.csr_matrix, rows: Any, columns: Any) -> tuple[Any, Any]:
+        """Store a matrix; returns also the places of its entries that change (row, column)."""
+        if self.elimination is None:
+            band = band_of(matrix, self.half_width)
+            return band, band_places(band, rows, columns).astype(np.uint32)
+        panels = panels_of(matrix, self.elimination, rows, columns)
+        return panels, panel_places(panels, rows, columns).astype(np.uint32)
+
+
+def factorise(tangent: Any) -> Any:
+    """Factorise a tangent, in panels only what has changed; returns its regularity; overloaded."""
+    raise NotImplementedError
+
+
+def solve(tangent: Any, vector: Any) -> Any:
+    """Solve in place by the factor of a tangent; overloaded."""
+    raise NotImplementedError
+
+
+@overload(factorise, inline="always")
+def _factorise(tangent):  # type: ignore
+    if is_system(tangent, Band):
+        return lambda tangent: factorise_band(tangent)
+    return lambda tangent: eliminate(add_ancestors(tangent))
+
+
+@overload(solve, inline="always")
+def _solve(tangent, vector):  # type: ignore
+    if is_system(tangent, Band):
+        return lambda tangent, vector: solve_band(tangent, vector)
+    return lambda tangent, vector: solve_panels(tangent, vector)
 
 
 @view_kernel
