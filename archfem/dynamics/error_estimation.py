@@ -114,7 +114,7 @@ def run_peaks(
         for start, end in parts:
             first = start_batch(stepper, start, dt)
             monitor = RunMonitor(model, first)
-            for batch in chain([first], stepper.batches(start, dt, end)):
+            for batch in chain([first], stepper.batches(start, dt, min(end, motion.duration))):
                 monitor.add(batch, batch.read(model.observer()))
                 monitor.check_run()
                 resultants = batch.resultants[:, structure.judged]
