@@ -2,7 +2,8 @@
 
 The selection runs settings over the strongest part of the motion, each with half the time step of
 the one before, until the predicted error is within the tolerance (`dynamics.error_estimation`). The
-first two share one model, so that a selection takes about as long as the run for which it selects.
+first two share one model, and the second runs about the peaks of the first alone, so that a
+selection takes about as long as the run for which it selects.
 """
 
 import logging
@@ -111,6 +112,7 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
     Raises:
         InvalidInput: an option is not one of those above.
         MeshError: the blocks cannot be meshed with these cells.
+        DidNotConverge: for "auto", the structure does not stand under its own weight.
     """
     check_type(structure, Structure, "structure", "give a Structure, e.g. circular_arch(…)")
     if not 0.0 < check_number(tolerance, "tolerance on |e| [-]") < 1.0:

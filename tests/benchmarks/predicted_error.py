@@ -1,4 +1,4 @@
-"""Cost of `fidelity="auto"`, and its predicted error beside the actual one: 23 scenes, and 12 of a blind test.
+"""Cost of `fidelity="auto"`, and its predicted error beside the actual one: 23 scenes, 12 blind.
 
     python tests/benchmarks/predicted_error.py [--blind] [--tolerance 0.005] [SCENE …]
 
