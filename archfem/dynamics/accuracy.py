@@ -10,7 +10,8 @@ from tqdm import tqdm
 from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import validate_arguments
-from archfem.dynamics.error_estimation import largest_difference, run_peaks
+from archfem.dynamics.error_estimation import largest_difference
+from archfem.dynamics.history import Ending, History
 from archfem.dynamics.model_selection import (
     DampingChoice,
     discretisation_label,
@@ -21,6 +22,7 @@ from archfem.dynamics.model_selection import (
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
+from archfem.joints.criteria import assessed_joints
 from archfem.masonry.structure import Structure
 from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
@@ -191,8 +193,18 @@ def time_run(
     # two steps beforehand, so that compilation is not measured
     time_history(model, motion.cut(0.0, 2.0 * dt), damping=damping, dt=dt, start=start)
     begin = process_time()
-    peaks = run_peaks(model, motion, damping, dt, start).peaks
-    return TimedRun(model.size, process_time() - begin, peaks)
+    try:
+        run = time_history(model, motion, damping=damping, dt=dt, start=start)
+    except DidNotConverge:
+        return TimedRun(model.size, process_time() - begin, None)
+    if run.ending is Ending.INTERRUPTED:
+        raise KeyboardInterrupt
+    return TimedRun(model.size, process_time() - begin, peak_eccentricities(run))
+
+
+def peak_eccentricities(run: History) -> Array:
+    """Return the largest |e| of each assessed joint of a run (n,) [-]; 0.5 where it came apart."""
+    return abs(assessed_joints(run.joints)["eccentricity"]).fillna(0.5).max("time").values
 
 
 def compare_runs(

@@ -13,17 +13,24 @@ for the joint with the largest difference. The first is Richardson's extrapolati
 the largest rotation of a joint.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 from scipy.sparse.linalg import eigsh
 
+from archfem._threads import single_threaded
 from archfem._typing import Array
-from archfem.dynamics.history import Ending, History
+from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.schemes import StiffnessDamping, Viscous
-from archfem.dynamics.time_history import time_history
+from archfem.dynamics.solvers.equation import Equation
+from archfem.dynamics.solvers.selection import stepper_for
+from archfem.dynamics.state import State
+from archfem.dynamics.time_history import start_batch
 from archfem.errors import DidNotConverge
 from archfem.joints.criteria import assessed_joints
+from archfem.joints.resultants import eccentricity_and_friction
 from archfem.masonry.loads import BodyForce
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
@@ -73,11 +80,6 @@ def default_damping(model: Model) -> StiffnessDamping:
     return StiffnessDamping(0.05, float(np.sqrt(square) / (2.0 * np.pi)))
 
 
-def peak_eccentricities(run: History) -> Array:
-    """Return the largest |e| of each assessed joint of a run (n,) [-]; 0.5 where it came apart."""
-    return abs(assessed_joints(run.joints)["eccentricity"]).fillna(0.5).max("time").values
-
-
 def largest_difference(first: Array, second: Array) -> float:
     """Return the largest difference, over the joints, of the peaks of two runs [-]."""
     return float(np.abs(first - second).max())
@@ -89,23 +91,55 @@ class RunPeaks:
 
     peaks: Array | None  # largest |e| of each assessed joint (n,) [-]; None for a failed run
     rotation: float = 0.0  # largest rotation of a joint [rad]
+    times: Array = field(default_factory=lambda: np.zeros(0))  # of the peaks (n,) [s]
+    states: tuple[State, ...] = ()  # at the start of the run, and at intervals of some steps
 
 
+# Parts of a run: the state at the start of each, and the time of its end [s]
+Parts = Sequence[tuple[State, float]]
+
+
+@single_threaded
 def run_peaks(
-    model: Model,
-    motion: Motion,
-    damping: Viscous | None,
-    dt: float,
-    start: Equilibrium | None = None,
+    model: Model, motion: Motion, damping: Viscous | None, dt: float, parts: Parts | None = None
 ) -> RunPeaks:
-    """Run a model and return the largest eccentricities and the largest rotation of its joints."""
+    """Run a model of small displacements, from dead load by default, and return its peaks."""
+    structure, equation = model.structure, Equation(model, motion, damping)
+    if parts is None:
+        rest = dead_load(model)
+        parts = [(equation.at_rest(rest.q, memory=rest.model.memory), motion.duration)]
+    stepper, depths = stepper_for("auto", equation), structure.depths[structure.judged]
+    peaks, times, rotation, states = np.zeros(len(depths)), np.zeros(len(depths)), 0.0, []
     try:
-        run = time_history(model, motion, damping=damping, dt=dt, start=start)
+        for start, end in parts:
+            first = start_batch(stepper, start, dt)
+            monitor = RunMonitor(model, first)
+            for batch in chain([first], stepper.batches(start, dt, min(end, motion.duration))):
+                monitor.add(batch, batch.read(model.observer()))
+                monitor.check_run()
+                resultants = batch.resultants[:, structure.judged]
+                values = np.abs(eccentricity_and_friction(resultants, depths)[0])
+                values[np.isnan(values)] = 0.5  # joints that came apart
+                steps = values.argmax(axis=0)
+                largest = values[steps, np.arange(len(steps))]
+                times = np.where(largest > peaks, batch.times[steps], times)
+                peaks = np.maximum(peaks, largest)
+                states += [batch.state(k) for k in range(0, len(batch.times), 32)]
+            rotation = max(rotation, monitor.largest_turn)
     except DidNotConverge:
         return RunPeaks(None)
-    if run.ending is Ending.INTERRUPTED:
-        raise KeyboardInterrupt
-    return RunPeaks(peak_eccentricities(run), float(np.abs(run.joints["rotation"]).max()))
+    return RunPeaks(peaks, rotation, times, tuple(states))
+
+
+def parts_about_peaks(run: RunPeaks, before: float = 1.0, after: float = 0.25) -> Parts:
+    """Return the parts of a run about the peaks of its joints [s]."""
+    parts: list[tuple[State, float]] = []
+    for time in np.sort(run.times):
+        start = [state for state in run.states if state.time <= max(0.0, time - before)][-1]
+        if parts and start.time <= parts[-1][1]:
+            start = parts.pop()[0]
+        parts.append((start, float(time) + after))
+    return parts
 
 
 def estimate_errors(runs: list[RunPeaks]) -> list[float]:

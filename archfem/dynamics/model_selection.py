@@ -2,7 +2,8 @@
 
 The selection runs settings over the strongest part of the motion, each with half the time step of
 the one before, until the predicted error is within the tolerance (`dynamics.error_estimation`). The
-first two share one model, so that a selection takes about as long as the run for which it selects.
+first two share one model, and the second runs about the peaks of the first alone, so that a
+selection takes about as long as the run for which it selects.
 """
 
 import logging
@@ -18,6 +19,7 @@ from archfem.dynamics.error_estimation import (
     RunPeaks,
     default_damping,
     estimate_errors,
+    parts_about_peaks,
     run_peaks,
     severe_motion,
     strongest_window,
@@ -110,6 +112,7 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
     Raises:
         InvalidInput: an option is not one of those above.
         MeshError: the blocks cannot be meshed with these cells.
+        DidNotConverge: for "auto", the structure does not stand under its own weight.
     """
     check_type(structure, Structure, "structure", "give a Structure, e.g. circular_arch(…)")
     if not 0.0 < check_number(tolerance, "tolerance on |e| [-]") < 1.0:
@@ -221,11 +224,14 @@ def _try_settings(
     for discretisation, dt in tqdm(
         settings, unit="run", disable=None, leave=False, desc="choosing a model"
     ):
-        same = trials and trials[-1].settings == discretisation
+        parts, same = None, trials and trials[-1].settings == discretisation
         model = trials[-1].model if same else builder(structure, discretisation)
         excitation = excitation or _resolve_excitation(model, motion, damping)
         window, viscous, share = excitation
-        run = run_peaks(model, window, viscous, dt)
+        if trials and trials[0].run.peaks is not None:
+            parts = parts_about_peaks(trials[0].run)
+            window = window.cut(0.0, min(parts[-1][1], window.duration))
+        run = run_peaks(model, window, viscous, dt, parts if same else None)
         trials.append(_Trial(discretisation, dt, model, run, share))
         history.append(estimate_errors([trial.run for trial in trials]))
         if history[-1][-1] <= tolerance or _stagnates(history):
@@ -256,12 +262,13 @@ def _resolve_excitation(
     model: Model, motion: Motion | None, damping: DampingChoice
 ) -> tuple[Motion, Viscous | None, float]:
     """Return the strongest part of a motion, the damping, and this part's share of the duration."""
-    structure = model.structure
-    soil = bool(find_soft_blocks(structure))
-    probe = model if soil else build_rigid_model(structure, rule=Quadrature("exact"))
-    motion = severe_motion(probe) if motion is None else motion
+    structure, viscous = model.structure, resolve_damping(model, damping)
+    if motion is None or viscous is None:
+        soil = bool(find_soft_blocks(structure))
+        probe = model if soil else build_rigid_model(structure, rule=Quadrature("exact"))
+        motion = severe_motion(probe) if motion is None else motion
+        viscous = viscous or default_damping(probe)
     window = strongest_window(motion)
-    viscous = resolve_damping(model, damping) or default_damping(probe)
     return window, viscous, window.duration / motion.duration
 
 

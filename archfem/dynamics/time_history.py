@@ -156,7 +156,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         start = equation.at_rest(rest.q, memory=rest.model.memory)
     start.check(model)
     stepper = stepper_for(method, equation, newton)
-    first = _start_batch(stepper, start, dt or 0.005)  # typical where steps vary in length
+    first = start_batch(stepper, start, dt or 0.005)  # typical where steps vary in length
     recorder = _make_recorder(stepper, first, dt, record or Record(), criteria)
     adaptive = None if dt else AdaptiveStepper(stepper, tolerance, first)
     try:
@@ -269,7 +269,7 @@ def _check_types(**arguments: Any) -> None:
             check_type(value, *kinds[name])
 
 
-def _start_batch(stepper: Stepper, start: State, dt: float) -> Batch:
+def start_batch(stepper: Stepper, start: State, dt: float) -> Batch:
     """Return the start of a run as a batch of one step."""
     equation = stepper.equation
     return Batch(

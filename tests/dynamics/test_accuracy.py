@@ -1,12 +1,13 @@
 """Speed against error: what is tried and compared, by runs that are known."""
 
 from time import process_time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import archfem as af
-from archfem.dynamics import accuracy, error_estimation
+from archfem.dynamics import accuracy
 from archfem.dynamics.accuracy import TimedRun, candidate_settings, compare_runs, reference_settings
 
 
@@ -61,12 +62,22 @@ def test_no_more_time_is_told_than_has_passed(stack, fails, monkeypatch):
     motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1)
     if fails:
 
-        def failing(*given, **more):
-            raise af.DidNotConverge("made to fail")
+        def failing(model, motion, **options):
+            if motion.duration > 0.01:  # not the two steps beforehand
+                raise af.DidNotConverge("made to fail")
+            return af.time_history(model, motion, **options)
 
-        monkeypatch.setattr(error_estimation, "time_history", failing)
+        monkeypatch.setattr(accuracy, "time_history", failing)
     begun = process_time()
     run = accuracy.time_run(model, motion, None, 0.005)
     assert 0.0 <= run.seconds <= process_time() - begun
     assert (run.peaks is None) is fails
     assert run.size == 6
+
+
+def test_an_interrupted_run_ends_the_comparison(monkeypatch, stack):
+    model = af.build(stack, fidelity="rigid")
+    run = SimpleNamespace(ending=af.dynamics.Ending.INTERRUPTED)
+    monkeypatch.setattr(accuracy, "time_history", lambda *_, **given: run)
+    with pytest.raises(KeyboardInterrupt):
+        accuracy.time_run(model, af.Motion.synthetic(duration=0.25), None, 0.005)

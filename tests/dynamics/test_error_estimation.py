@@ -13,6 +13,7 @@ from archfem.dynamics.error_estimation import (
     RunPeaks,
     default_damping,
     estimate_errors,
+    parts_about_peaks,
     run_peaks,
     severe_motion,
     strongest_window,
@@ -113,12 +114,36 @@ def test_a_failed_run_has_no_error_and_gives_none(peaks, known):
     assert list(np.isinf(estimate_errors(runs_of(*peaks)))) == list(known)
 
 
-def test_an_interrupted_run_ends_the_selection(monkeypatch, stack):
+def test_a_run_that_fails_has_no_peaks(monkeypatch, stack):
+    def fail(monitor):
+        raise af.DidNotConverge("made to fail")
+
+    monkeypatch.setattr(error_estimation.RunMonitor, "check_run", fail)
     model = af.build(stack, fidelity="rigid")
-    run = SimpleNamespace(ending=af.dynamics.Ending.INTERRUPTED)
-    monkeypatch.setattr(error_estimation, "time_history", lambda *_, **given: run)
-    with pytest.raises(KeyboardInterrupt):
-        run_peaks(model, af.Motion.synthetic(duration=0.25), None, 0.005)
+    assert run_peaks(model, af.Motion.synthetic(duration=0.25), None, 0.005).peaks is None
+
+
+def test_parts_about_peaks_give_the_peaks_of_the_whole_run():
+    """In the same steps, from states on the way: the parts are those that decide."""
+    model = af.build(COLUMN, fidelity="rigid")
+    motion = af.Motion.synthetic(duration=6.0, pga=1.5, seed=3)
+    damping = default_damping(model)
+    whole = run_peaks(model, motion, damping, 0.005)
+    joints = af.time_history(model, motion, damping=damping, dt=0.005).joints
+    series = abs(joints["eccentricity"])
+    assert whole.times == pytest.approx(joints["time"].values[series.argmax("time").values])
+    parts = parts_about_peaks(whole, before=0.3, after=0.02)
+    assert sum(end - start.time for start, end in parts) < 3.0
+    assert run_peaks(model, motion, damping, 0.005, parts).peaks == pytest.approx(
+        whole.peaks, rel=1e-9
+    )
+
+
+def test_parts_that_overlap_are_one():
+    states = tuple(SimpleNamespace(time=0.5 * k) for k in range(12))
+    run = RunPeaks(np.zeros(3), times=np.array([4.2, 1.2, 0.3]), states=states)
+    found = parts_about_peaks(run, before=1.0, after=0.25)
+    assert [(start.time, end) for start, end in found] == [(0.0, 1.45), (3.0, 4.45)]
 
 
 COLUMN = af.column(breadth=1.0, heights=[1.0, 1.0, 1.0])

@@ -20,22 +20,26 @@ class Chosen:
     """A selection by known peaks; what it runs, and the model it returns."""
 
     def __init__(self, monkeypatch):
-        self.steps, self.built, self.model = [], [], None
+        self.steps, self.built, self.ends, self.parts = [], [], [], []
+        self.model = None
         self._patch = monkeypatch
 
     def of(self, *peaks, turn=0.0, tolerance=0.01, dt=None, **given):
         """Select by runs of these largest |e|."""
-        self.steps, self.built = [], []
+        self.steps, self.built, self.ends, self.parts = [], [], [], []
         rigid = plain(BLOCK, af.models.Discretisation("rigid"))
 
         def build(structure, discretisation):
             self.built.append(discretisation)
             return rigid
 
-        def run(model, motion, damping, step):
+        def run(model, motion, damping, step, parts):
             number = len(self.steps)
             self.steps.append(step)
-            return RunPeaks(np.array([0.1, peaks[number]]), turn)
+            self.ends.append(motion.duration)
+            self.parts.append(parts)
+            largest, start = np.array([0.1, peaks[number]]), SimpleNamespace(time=0.0)
+            return RunPeaks(largest, turn, np.array([0.5, 1.5]), (start,))
 
         self._patch.setattr(model_selection, "run_peaks", run)
         self.model = model_selection.select_model(
@@ -67,6 +71,15 @@ def test_the_first_setting_within_the_tolerance_is_chosen(chosen):
     assert errors == pytest.approx([0.044 + 0.004 * REST, told.error, 0.004 * REST])
     assert told.is_met
     assert not chosen.model.doubts
+
+
+def test_only_the_first_runs_beyond_its_last_peak(chosen):
+    """The second of the same model starts from states of the first, the third at rest."""
+    chosen.of(0.32, 0.28, 0.276)
+    assert chosen.ends == pytest.approx([chosen.ends[0], 1.75, 1.75])
+    assert chosen.ends[0] > 3.0
+    assert [parts is None for parts in chosen.parts] == [True, False, True]
+    assert [(start.time, end) for start, end in chosen.parts[1]] == [(0.0, 1.75)]
 
 
 def test_a_cheap_setting_that_took_longer_to_find_than_to_run_is_not_chosen(chosen, monkeypatch):

@@ -62,7 +62,7 @@ def test_a_reference_that_fails_is_named(case, monkeypatch):
             raise af.DidNotConverge("no equilibrium")
         return af.time_history(model, motion, **options)
 
-    monkeypatch.setattr("archfem.dynamics.error_estimation.time_history", failing)
+    monkeypatch.setattr("archfem.dynamics.accuracy.time_history", failing)
     with pytest.raises(af.DidNotConverge, match="the reference, faces 2×2 exact 5 ms, did not"):
         case_accuracy(case)
 

@@ -222,7 +222,7 @@ def test_a_setting_that_fails_is_reported_as_such(ring, monkeypatch):
             raise af.DidNotConverge("no equilibrium")
         return af.time_history(model, motion, **options)
 
-    monkeypatch.setattr("archfem.dynamics.error_estimation.time_history", failing)
+    monkeypatch.setattr("archfem.dynamics.accuracy.time_history", failing)
     motion = af.Motion.synthetic(duration=0.3, pga=1.7, seed=1)
     given = {"rungs": ("rigid",), "cells": ((4, 4),), "rules": (("nodal", None),)}
     found = af.accuracy(ring, motion, **given, steps=(0.01, 0.005))
