@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from archfem._numba import allocating_entry, delete_stale_cache
+from archfem._numba import allocating_entry, delete_stale_cache, entry
 from archfem._typing import Array
 from archfem._validation import check_number, check_type, validate_methods
 from archfem.dynamics.rigid_body.bodies import (
@@ -389,7 +389,7 @@ def advance_steps(bodies, parameters, workspace, state):  # type: ignore
     return overlap, False
 
 
-@allocating_entry
+@entry
 def _exchange(bodies, parameters, moved, ground):  # type: ignore
     """Return the rise of potential energy by displacements, and the work of inertia forces [J]."""
     rise, work = 0.0, 0.0
@@ -400,7 +400,7 @@ def _exchange(bodies, parameters, moved, ground):  # type: ignore
     return rise, work
 
 
-@allocating_entry
+@entry
 def _kinetic_energy(bodies, v):  # type: ignore
     """Return the kinetic energy of all bodies [J]."""
     kinetic = 0.0
@@ -523,7 +523,7 @@ def _separate(bodies, parameters, workspace, touching):  # type: ignore
     return True
 
 
-@allocating_entry
+@entry
 def _add_rebounds(bodies, parameters, workspace, touching):  # type: ignore
     """Add the rebounds of impacts to the target velocities; return whether there are any.
 
@@ -557,7 +557,7 @@ def _add_rebounds(bodies, parameters, workspace, touching):  # type: ignore
     return any_rebound
 
 
-@allocating_entry
+@entry
 def _impulse_work(bodies, parameters, before, after, ground):  # type: ignore
     """Return the work of the impulses of a step, and the kinetic energy after it [J]."""
     work = kinetic = 0.0
@@ -600,7 +600,7 @@ def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # typ
     return max_sweeps, measure_residual(bodies, workspace, touching)
 
 
-@allocating_entry
+@entry
 def _add_momentum(workspace, touching, share):  # type: ignore
     """Continue the change between two sweeps by a share of it (Nesterov)."""
     speeds, impulse, last = workspace.speeds, workspace.contacts.impulse, workspace.last
@@ -617,7 +617,7 @@ def _add_momentum(workspace, touching, share):  # type: ignore
             last.impulse[k, axis] = new
 
 
-@allocating_entry
+@entry
 def _sweep_contacts(bodies, workspace, touching):  # type: ignore
     """Sweep once over the faces; return the largest violation of a contact found [m/s]."""
     # single elements are read, since views of rows cost more than the arithmetic
@@ -666,7 +666,7 @@ def _sweep_contacts(bodies, workspace, touching):  # type: ignore
     return worst
 
 
-@allocating_entry
+@entry
 def _sweep_friction(rows, impulse, points, speeds, inverse_mass):  # type: ignore
     """Solve for friction at the points of a face; return its change, both spins, and the slip."""
     (along, wa, wb, worst), (m, ia, ib) = speeds, inverse_mass
