@@ -19,7 +19,8 @@ from scenes import with_friction
 from setting import plain_options
 
 import archfem as af
-from archfem.dynamics.error_estimation import largest_difference, peak_eccentricities
+from archfem.dynamics.accuracy import peak_eccentricities
+from archfem.dynamics.error_estimation import largest_difference
 
 SCHEMES = {
     "conserving": af.dynamics.Conserving(),

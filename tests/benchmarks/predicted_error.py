@@ -20,10 +20,7 @@ from timing import table
 
 import archfem as af
 from archfem.dynamics.accuracy import time_run
-from archfem.dynamics.error_estimation import (
-    default_damping,
-    largest_difference,
-)
+from archfem.dynamics.error_estimation import default_damping, largest_difference
 from archfem.dynamics.model_selection import TRIED_SETTINGS, exact_discretisation
 from archfem.masonry.stiffness_ratio import find_soft_blocks
 from archfem.models.builder import build as build_model

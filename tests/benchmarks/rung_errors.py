@@ -17,7 +17,8 @@ from random_structures import structure
 from setting import plain_options
 
 import archfem as af
-from archfem.dynamics.error_estimation import largest_difference, peak_eccentricities
+from archfem.dynamics.accuracy import peak_eccentricities
+from archfem.dynamics.error_estimation import largest_difference
 from archfem.masonry.stiffness_ratio import estimate_block_stiffness
 
 PROMISED = {"rigid": 0.005, "faces": 0.002}

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem._numba import allocating_entry
+from archfem._numba import allocating_entry, entry
 from archfem._typing import Array
 from archfem.dynamics.rigid_body.bodies import Bodies
 
@@ -86,7 +86,7 @@ def allocate_stored_impulses(contacts: Contacts) -> StoredImpulses:
     )
 
 
-@allocating_entry
+@entry
 def place_pieces(bodies, q, world):  # type: ignore
     """Move the pieces to the poses of their bodies, and sort them along x."""
     points, normals, boxes, _ = world
@@ -109,7 +109,7 @@ def place_pieces(bodies, q, world):  # type: ignore
     _sort(world)
 
 
-@allocating_entry
+@entry
 def _sort(world):  # type: ignore
     """Sort the pieces by their smallest x."""
     order, boxes = world.order, world.boxes
@@ -124,7 +124,7 @@ def _sort(world):  # type: ignore
         order[place + 1] = piece
 
 
-@allocating_entry
+@entry
 def find_contacts(bodies, world, contacts):  # type: ignore
     """Find all contact points; return their number, or -1 where the workspace is too small."""
     count, capacity = 0, len(contacts.key) - 4  # a pair and the ground add up to four points
@@ -150,7 +150,7 @@ def find_contacts(bodies, world, contacts):  # type: ignore
     return count
 
 
-@allocating_entry
+@entry
 def _touch_ground(bodies, world, piece, contacts, count):  # type: ignore
     """Add the outermost vertices of a piece that touch the ground, one or two."""
     left, right = -1, -1
@@ -175,7 +175,7 @@ def _touch_ground(bodies, world, piece, contacts, count):  # type: ignore
     return count
 
 
-@allocating_entry
+@entry
 def _edge_distance(bodies, world, edge, piece):  # type: ignore
     """Return the distance of a piece's nearest vertex from the line of an edge, outward [m]."""
     nx, ny = world.normals[edge, 0], world.normals[edge, 1]
@@ -185,7 +185,7 @@ def _edge_distance(bodies, world, edge, piece):  # type: ignore
     return nearest - (nx * world.points[edge, 0] + ny * world.points[edge, 1])
 
 
-@allocating_entry
+@entry
 def _separation(bodies, world, one, two):  # type: ignore
     """Return the largest separation of two pieces along normals of the first, and its edge."""
     best, edge = -np.inf, -1
@@ -199,7 +199,7 @@ def _separation(bodies, world, one, two):  # type: ignore
     return best, edge
 
 
-@allocating_entry
+@entry
 def _touch(bodies, world, one, two, contacts, count):  # type: ignore
     """Add the contact points of two pieces."""
     here, edge = _separation(bodies, world, one, two)
@@ -214,18 +214,19 @@ def _touch(bodies, world, one, two, contacts, count):  # type: ignore
     return _clip(bodies, world, one, edge, two, 1.0, contacts, count)
 
 
-@allocating_entry
+@entry
 def _next_vertex(bodies, piece, k):  # type: ignore
     """Return the vertex after one of a piece."""
     return k + 1 if k + 1 < bodies.piece_starts[piece + 1] else bodies.piece_starts[piece]
 
 
-@allocating_entry
+@entry
 def _clip(bodies, world, one, edge, two, sign, contacts, count):  # type: ignore
     """Add the end points of the incident edge, clipped to the reference edge, that touch it."""
     n, start = world.normals[edge], world.points[edge]
-    along = world.points[_next_vertex(bodies, one, edge)] - start
-    length = np.sqrt(along[0] ** 2 + along[1] ** 2)
+    end = world.points[_next_vertex(bodies, one, edge)]
+    tx, ty = end[0] - start[0], end[1] - start[1]
+    length = np.sqrt(tx**2 + ty**2)
     # the incident edge has the normal most opposite to that of the reference edge
     incident, lowest = -1, np.inf
     for k in range(bodies.piece_starts[two], bodies.piece_starts[two + 1]):
@@ -234,7 +235,7 @@ def _clip(bodies, world, one, edge, two, sign, contacts, count):  # type: ignore
             incident, lowest = k, facing
     # its ends in coordinates along (x) and away from (y) the reference edge
     a, b = world.points[incident], world.points[_next_vertex(bodies, two, incident)]
-    tx, ty = along[0] / length, along[1] / length
+    tx, ty = tx / length, ty / length
     xa = (a[0] - start[0]) * tx + (a[1] - start[1]) * ty
     xb = (b[0] - start[0]) * tx + (b[1] - start[1]) * ty
     ya = (a[0] - start[0]) * n[0] + (a[1] - start[1]) * n[1]
@@ -262,7 +263,7 @@ def _clip(bodies, world, one, edge, two, sign, contacts, count):  # type: ignore
     return count
 
 
-@allocating_entry
+@entry
 def store_impulses(bodies, q, contacts, count, stored):  # type: ignore
     """Store the impulses of a step."""
     slots = stored.slots
@@ -270,7 +271,8 @@ def store_impulses(bodies, q, contacts, count, stored):  # type: ignore
     for k in range(count):
         stored.key[k] = contacts.key[k]
         stored.place[k] = _tangential_position(bodies, q, contacts, k)
-        stored.impulse[k] = contacts.impulse[k]
+        for axis in range(2):
+            stored.impulse[k, axis] = contacts.impulse[k, axis]
         # open addressing: the next free slot after the hash
         slot = _hash_slot(contacts.key[k], len(slots))
         while slots[slot] >= 0:
@@ -278,12 +280,12 @@ def store_impulses(bodies, q, contacts, count, stored):  # type: ignore
         slots[slot] = k
 
 
-@allocating_entry
+@entry
 def restore_impulses(bodies, q, contacts, count, stored):  # type: ignore
     """Set impulses to those of the nearest contacts of the same pieces, each used once."""
     slots = stored.slots
     for k in range(count):
-        contacts.impulse[k] = 0.0
+        contacts.impulse[k, 0] = contacts.impulse[k, 1] = 0.0
         place, best, nearest = _tangential_position(bodies, q, contacts, k), -1, np.inf
         slot = _hash_slot(contacts.key[k], len(slots))
         # up to two contacts of a pair share a chain of slots
@@ -294,18 +296,19 @@ def restore_impulses(bodies, q, contacts, count, stored):  # type: ignore
                 best, nearest = old, distance
             slot = (slot + 1) % len(slots)
         if best >= 0:
-            contacts.impulse[k] = stored.impulse[best]
+            for axis in range(2):
+                contacts.impulse[k, axis] = stored.impulse[best, axis]
             stored.key[best] = -1
 
 
-@allocating_entry
+@entry
 def _hash_slot(key, size):  # type: ignore
     """Return the first slot of a key, by multiplicative hashing."""
     # the multiplier is 2³² over the golden ratio
     return ((key * 0x9E3779B1) >> 16) & (size - 1)
 
 
-@allocating_entry
+@entry
 def _tangential_position(bodies, q, contacts, k):  # type: ignore
     """Return the position of a contact along its tangent, from the first body's centroid [m]."""
     body = contacts.bodies[k, 0]
@@ -314,7 +317,7 @@ def _tangential_position(bodies, q, contacts, k):  # type: ignore
     return ry * contacts.normal[k, 0] - rx * contacts.normal[k, 1]
 
 
-@allocating_entry
+@entry
 def prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
     """Compute the rows of H, their inverse effective masses, and the target velocities."""
     contacts, rows = workspace.contacts, workspace.rows
@@ -354,7 +357,7 @@ def prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
             rows[k, 13] = 1.0 / determinant
 
 
-@allocating_entry
+@entry
 def _arm(bodies, q, point, body):  # type: ignore
     """Return the vector from a body's centroid to a point; zero for the ground, which is fixed."""
     if body == len(q):
@@ -363,7 +366,7 @@ def _arm(bodies, q, point, body):  # type: ignore
     return x, point[1] - bodies.centre[body, 1] - q[body, 1]
 
 
-@allocating_entry
+@entry
 def relative_speed(speeds, pair, direction, arms):  # type: ignore
     """Return the velocity of the second body relative to the first along a direction."""
     one, two = speeds[pair[0]], speeds[pair[1]]
@@ -371,7 +374,7 @@ def relative_speed(speeds, pair, direction, arms):  # type: ignore
     return translation + arms[1] * two[2] - arms[0] * one[2]
 
 
-@allocating_entry
+@entry
 def _apply_impulse(bodies, speeds, pair, direction, arms, impulse):  # type: ignore
     """Apply an impulse along a direction to the second body, and its reaction to the first."""
     for side in range(2):
@@ -382,7 +385,7 @@ def _apply_impulse(bodies, speeds, pair, direction, arms, impulse):  # type: ign
         body[2] += inertia * arms[side] * signed
 
 
-@allocating_entry
+@entry
 def apply_initial_impulses(bodies, workspace, touching):  # type: ignore
     """Apply the impulses of the step before, as initial guess of the sweeps."""
     contacts, speeds = workspace.contacts, workspace.speeds
@@ -394,13 +397,13 @@ def apply_initial_impulses(bodies, workspace, touching):  # type: ignore
         _apply_impulse(bodies, speeds, (a, b), (-ny, nx), (ta, tb), contacts.impulse[k, 1])
 
 
-@allocating_entry
+@entry
 def has_partner(contacts, k, touching):  # type: ignore
     """Return whether a contact and the next one are the two points of one face."""
     return k + 1 < touching and contacts.key[k] == contacts.key[k + 1]
 
 
-@allocating_entry
+@entry
 def measure_residual(bodies, workspace, touching):  # type: ignore
     """Return the largest violation of a contact's condition, as a velocity [m/s]."""
     contacts, speeds = workspace.contacts, workspace.speeds
@@ -421,7 +424,7 @@ def measure_residual(bodies, workspace, touching):  # type: ignore
     return worst
 
 
-@allocating_entry
+@entry
 def solve_face(inverse, old, gap):  # type: ignore
     """Return the normal impulses of a face's two points that meet the conditions of both."""
     one, two, coupling, factor = inverse
@@ -438,7 +441,7 @@ def solve_face(inverse, old, gap):  # type: ignore
     return 0.0, max(-free2 / two, 0.0)
 
 
-@allocating_entry
+@entry
 def _widest_gap(bodies, world, one, two):  # type: ignore
     """Return a lower bound of the distance of two pieces; negative, their depth of overlap [m]."""
     widest = -np.inf
