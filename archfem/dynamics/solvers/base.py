@@ -17,9 +17,6 @@ from archfem.dynamics.solvers.equation import Equation
 # Iterations over the joints in a step before it is given up
 MAX_ITERATIONS = 40
 
-# Lengths of step whose matrices a solver stores: as many as an adaptive run uses
-MAX_STORED_STEPS = 8
-
 
 class StepSolver(Protocol):
     """A compiled solver of time steps, whose history equals that of `SnesSolver` to rounding.
@@ -52,7 +49,7 @@ class StepSolver(Protocol):
         stored = self.assembled
         if dt not in stored:
             stored[dt] = self.assemble(dt)
-            if len(stored) > MAX_STORED_STEPS:
+            if len(stored) > 8:  # an adaptive run uses as many lengths of step
                 del stored[next(iter(stored))]
         system = stored[dt]
         shared = {id(part): part for part in self.constants(system)}
