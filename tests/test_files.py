@@ -9,23 +9,11 @@ import pytest
 
 import archfem as af
 from archfem import _files
-from archfem._files import (
-    atomic_write,
-    check_listed,
-    complete_publication,
-    is_locked,
-    lock_folder,
-    read_file_list,
-    read_sealed_json,
-    replace_results,
-    temporary_folder,
-    write_sealed_json,
-)
 
 
 def test_a_file_appears_when_it_is_whole(tmp_path):
     path = tmp_path / "new" / "run.txt"
-    with atomic_write(path) as draft:
+    with _files.atomic_write(path) as draft:
         draft.write_text("half")
         assert draft.suffix == ".txt"
         assert not path.exists()
@@ -38,7 +26,7 @@ def test_what_breaks_off_leaves_the_old_file(tmp_path):
     path.write_text("old")
 
     def broken_off():
-        with atomic_write(path) as draft:
+        with _files.atomic_write(path) as draft:
             draft.write_text("half")
             raise KeyboardInterrupt
 
@@ -65,7 +53,7 @@ def test_drafts_of_killed_processes_are_removed_by_the_next_writer(tmp_path, dea
     others = (f".run.elsewhere.{dead_process}.part.txt", f".run2.{machine}.{dead_process}.part.txt")
     for name in (*names.values(), *others):
         (tmp_path / name).touch()
-    with atomic_write(tmp_path / "run.txt") as draft:
+    with _files.atomic_write(tmp_path / "run.txt") as draft:
         draft.write_text("whole")
     left = {path.name for path in tmp_path.iterdir()}
     assert left == {"run.txt", names[os.getppid()], *others}
@@ -78,9 +66,9 @@ def test_temporary_folders_of_killed_processes_are_removed_by_the_next(tmp_path,
     subprocess.run(killed, env=os.environ | {"TMPDIR": str(tmp_path)}, check=False)
     (left,) = tmp_path.iterdir()
     assert {path.name for path in left.iterdir()} == {".lock", "a"}
-    with temporary_folder() as folder:
+    with _files.temporary_folder() as folder:
         assert list(tmp_path.iterdir()) == [folder]
-        with temporary_folder() as other:
+        with _files.temporary_folder() as other:
             assert set(tmp_path.iterdir()) == {folder, other}
     assert list(tmp_path.iterdir()) == []
 
@@ -96,7 +84,7 @@ def contents(folder):
 
 def write(folder, command, inputs, **texts):
     """Replace the results of a command by texts; underscores stand for dots."""
-    with replace_results(folder, command, inputs) as draft:
+    with _files.replace_results(folder, command, inputs) as draft:
         for name, text in texts.items():
             path = draft / name.replace("_", ".").replace("pair.", "pair/")
             path.parent.mkdir(exist_ok=True)
@@ -114,10 +102,10 @@ def test_results_of_a_command_are_replaced_together(tmp_path):
     # what the other run had alone is gone, and its report; the other command's file is its own
     assert {*contents(tmp_path)} == {"a.txt", "modes.txt", "archfem.json"}
     assert not (tmp_path / "pair").exists()
-    groups = read_file_list(tmp_path)
+    groups = _files.read_file_list(tmp_path)
     assert {name: group.inputs for name, group in groups.items()} == {"run": "two", "modes": "one"}
     write(tmp_path, "run", "two", modes_txt="of two")
-    assert read_file_list(tmp_path)["modes"].files == {}
+    assert _files.read_file_list(tmp_path)["modes"].files == {}
 
 
 def test_what_was_written_from_other_results_vanishes_with_these(tmp_path):
@@ -137,7 +125,7 @@ def test_a_command_that_fails_leaves_the_folder_as_it_was(tmp_path):
     before = contents(tmp_path)
 
     def broken_off():
-        with replace_results(tmp_path, "run", "two") as draft:
+        with _files.replace_results(tmp_path, "run", "two") as draft:
             (draft / "a.txt").write_text("2")
             raise KeyboardInterrupt
 
@@ -168,25 +156,25 @@ def test_a_kill_while_files_are_moved_loses_none(moves, tmp_path, monkeypatch):
         patch.setattr(_files.shutil, "rmtree", lambda *_, **__: None)  # nor is the draft removed
         with pytest.raises(SystemExit):
             write(tmp_path, "modes", "two", a_txt="2", b_txt="2", d_txt="2")
-    complete_publication(tmp_path)
+    _files.complete_publication(tmp_path)
     found = {name: text for name, text in contents(tmp_path).items() if "/" not in name}
     digit = b"1" if moves < 2 else b"2"  # the list of the draft, then its name
     names = {"a.txt", "b.txt", "c.txt" if moves < 2 else "d.txt"}
     assert found.pop("archfem.json")
     assert found == dict.fromkeys(names, digit)
     for name in names:
-        check_listed(tmp_path / name, digit)
+        _files.check_listed(tmp_path / name, digit)
     write(tmp_path, "modes", "three", a_txt="3")
     assert {*contents(tmp_path)} == {"a.txt", "archfem.json"}
 
 
 def test_a_changed_file_is_refused_and_another_is_not(tmp_path):
     write(tmp_path, "run", "one", a_txt="1", pair_c_txt="1")
-    check_listed(tmp_path / "a.txt", b"1")
-    check_listed(tmp_path / "unlisted.txt", b"5")
+    _files.check_listed(tmp_path / "a.txt", b"1")
+    _files.check_listed(tmp_path / "unlisted.txt", b"5")
     for name in ("a.txt", "pair/c.txt"):
         with pytest.raises(af.InvalidInput, match="is not the file that archfem wrote there"):
-            check_listed(tmp_path / name, b"2")
+            _files.check_listed(tmp_path / name, b"2")
 
 
 def test_a_list_names_no_files_outside_its_folder(tmp_path):
@@ -194,7 +182,7 @@ def test_a_list_names_no_files_outside_its_folder(tmp_path):
     write(out, "run", "one", a_txt="1")
     (tmp_path / "mine.txt").write_text("mine")
     files = {"../mine.txt": "", "a.txt": ""}
-    write_sealed_json(out / "archfem.json", {"run": {"inputs": "one", "files": files}})
+    _files.write_sealed_json(out / "archfem.json", {"run": {"inputs": "one", "files": files}})
     write(out, "run", "two", b_txt="2")
     assert {*contents(tmp_path)} == {"mine.txt", "out/b.txt", "out/archfem.json"}
 
@@ -204,30 +192,30 @@ def test_a_damaged_list_is_refused_and_written_anew(text, tmp_path):
     write(tmp_path, "run", "one", a_txt="1")
     (tmp_path / "archfem.json").write_text(text)
     with pytest.raises(af.InvalidInput, match=r"archfem\.json is damaged"):
-        check_listed(tmp_path / "a.txt", b"1")
+        _files.check_listed(tmp_path / "a.txt", b"1")
     write(tmp_path, "run", "two", a_txt="2")
-    check_listed(tmp_path / "a.txt", b"2")
+    _files.check_listed(tmp_path / "a.txt", b"2")
 
 
 def test_sealed_numbers_come_back_and_changed_ones_do_not(tmp_path):
     path, content = tmp_path / "row.json", {"b": [0.1, 1e300, float("inf")], "a": "text"}
-    write_sealed_json(path, content)
-    assert read_sealed_json(path, "row") == content
+    _files.write_sealed_json(path, content)
+    assert _files.read_sealed_json(path, "row") == content
     path.write_text(path.read_text().replace("0.1", "0.2"))
     with pytest.raises(af.InvalidInput, match="damaged"):
-        read_sealed_json(path, "row")
+        _files.read_sealed_json(path, "row")
     assert json.loads(path.read_text())["content"]["b"][0] == 0.2
 
 
 def test_a_folder_has_one_writer(tmp_path):
-    assert not is_locked(tmp_path)
-    with lock_folder(tmp_path):
-        assert is_locked(tmp_path)
+    assert not _files.is_locked(tmp_path)
+    with _files.lock_folder(tmp_path):
+        assert _files.is_locked(tmp_path)
         refused = rf"another driver runs in .*process {os.getpid()}"
-        with pytest.raises(af.InvalidInput, match=refused), lock_folder(tmp_path):
+        with pytest.raises(af.InvalidInput, match=refused), _files.lock_folder(tmp_path):
             pass
-        assert is_locked(tmp_path)
-    assert not is_locked(tmp_path)
+        assert _files.is_locked(tmp_path)
+    assert not _files.is_locked(tmp_path)
     assert not list(tmp_path.iterdir())
 
 
@@ -242,12 +230,12 @@ def test_a_lock_whose_file_its_owner_deletes_is_taken_anew(tmp_path, monkeypatch
             (tmp_path / ".lock").unlink()
 
     monkeypatch.setattr(_files.fcntl, "flock", delete_first)
-    with lock_folder(tmp_path):
+    with _files.lock_folder(tmp_path):
         assert len(files) == 2
         assert (tmp_path / ".lock").read_bytes().startswith(b"process")
 
 
 def test_a_folder_that_cannot_be_written_to_is_named(tmp_path):
     (tmp_path / ".lock").mkdir()
-    with pytest.raises(af.InvalidInput, match="cannot be written to"), lock_folder(tmp_path):
+    with pytest.raises(af.InvalidInput, match="cannot be written to"), _files.lock_folder(tmp_path):
         pass

@@ -17,7 +17,6 @@ from archfem.dynamics import (
     fall,
     release_blocks,
 )
-from archfem.dynamics.fall import SeparationMonitor, is_overturning, standing_state
 from archfem.dynamics.time_history import _doubt_impulses
 from archfem.masonry.stiffness_ratio import estimate_block_stiffness
 
@@ -47,8 +46,8 @@ def leant(turn):
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_a_joint_lets_go_where_it_has_turned_by_three_tenths(tower, side):
-    assert SeparationMonitor(tower).find_first(batch(leant(0.0), leant(side * 0.295))) is None
-    k, why = SeparationMonitor(tower).find_first(
+    assert fall.SeparationMonitor(tower).find_first(batch(leant(0.0), leant(side * 0.295))) is None
+    k, why = fall.SeparationMonitor(tower).find_first(
         batch(leant(0.0), leant(side * 0.305), leant(side * 0.4))
     )
     assert k == 1
@@ -60,8 +59,8 @@ def test_a_joint_lets_go_where_it_has_slid_off_its_face(tower, side):
     near, off = (
         [side * share * BREADTH, 0, 0, side * share * BREADTH, 0, 0] for share in (0.99, 1)
     )
-    assert SeparationMonitor(tower).find_first(batch(near, near)) is None
-    assert SeparationMonitor(tower).find_first(batch(near, off)) == (
+    assert fall.SeparationMonitor(tower).find_first(batch(near, near)) is None
+    assert fall.SeparationMonitor(tower).find_first(batch(near, off)) == (
         1,
         "'joint 0' had slid by 0.5 m, off its face",
     )
@@ -74,7 +73,7 @@ def test_blocks_that_lean_and_move_are_followed(tower, turn, speed, falls):
     velocity = np.zeros(tower.size)
     velocity[3] = speed
     state = af.dynamics.State(1.0, np.array(leant(turn)), velocity, np.zeros(tower.size))
-    assert is_overturning(tower, state) is falls
+    assert fall.is_overturning(tower, state) is falls
 
 
 @pytest.mark.parametrize(
@@ -95,7 +94,7 @@ def test_blocks_rest_that_can_only_vibrate(tower, turn, speed, shaken, rests):
     velocity[4] = speed
     start = State(0.0, *np.zeros((3, tower.size)))
     state = State(1.0, np.array(leant(turn)), velocity, np.zeros(tower.size))
-    assert standing_state(tower, start, state, shaken).resting is rests
+    assert fall.standing_state(tower, start, state, shaken).resting is rests
 
 
 def test_vibration_that_counts_as_rest_cannot_overturn_a_slender_column():
