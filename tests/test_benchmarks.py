@@ -21,14 +21,20 @@ FIRST = ("opensees_ring", "run")
 
 LONG = (
     "assessment_map",
+    "bridge",
+    "bridge_falls",
     "bridge_fragility",
+    "bridge_history",
+    "bridge_range",
+    "drift_and_equality",
     "opensees_ring",
+    "random_structures",
     "run",
     "study_efficiency",
     "study_kills",
 )
-"""Scripts that take seconds: one runs five others of these, two start studies of processes,
-two match motions, and one needs OpenSees."""
+"""Scripts that take a second or more: one runs five others of these, two start studies of
+processes, two match motions, and one needs OpenSees."""
 
 
 MARKED = [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in NAMES]
@@ -54,6 +60,12 @@ def logging_levels():
     yield
     logger.setLevel(level)
     logging.disable(disabled)
+
+
+@pytest.mark.usefixtures("scripts", "logging_levels")
+@pytest.mark.parametrize("name", [name for name in LONG if name not in FIRST])
+def test_names_that_a_long_benchmark_imports_exist(name):
+    assert callable(importlib.import_module(name).main)
 
 
 @pytest.mark.usefixtures("scripts", "logging_levels")

@@ -20,10 +20,11 @@ POINT = {"x": "1.4 m", "force": ["0 kN", "-1 kN"]}
         ({"horizontal": 1.0}, [af.BodyForce(1.0)], "coulomb"),
         ({"horizontal": 1.0, "vertical": 0.3}, [af.BodyForce(1.0, 0.3)], "coulomb"),
         ({"point": POINT, "friction": "none"}, [af.PointLoad(1.4, (0.0, -1000.0))], None),
-        (
+        pytest.param(
             {"point": POINT, "horizontal": -0.1, "friction": "nonassociated"},
             [af.BodyForce(-0.1), af.PointLoad(1.4, (0.0, -1000.0))],
             "nonassociated",
+            marks=pytest.mark.slow,
         ),
     ],
 )

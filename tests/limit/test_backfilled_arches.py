@@ -338,6 +338,7 @@ def test_a_spreading_support_finds_the_least_thrust():
     assert 0.0 < thrusts[-1.0] < thrusts[1.0]
 
 
+@pytest.mark.slow
 def test_crushing_and_sliding_go_with_a_fill():
     structure = arch_bridge()
     strong, weak, weaker = (

@@ -182,6 +182,7 @@ def test_weights_lose_what_the_thrust_does():
     assert done == pytest.approx(fallen[1:-1].sum(), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_either_abutment_may_move():
     ring = semicircle(0.2, 12)
     left = largest_movement(ring, SPREAD, friction=None)
@@ -192,6 +193,7 @@ def test_either_abutment_may_move():
     )
 
 
+@pytest.mark.slow
 def test_a_column_on_ground_that_tilts():
     """It falls where its centre passes the corner, and slides before where that is beyond μ."""
     stocky = af.column(breadth=1.0, heights=[0.5, 1.0], contact=rough(0.6))
@@ -205,6 +207,7 @@ def test_a_column_on_ground_that_tilts():
     assert slid.settlement.motion == pytest.approx((0.0, 0.0, slid.largest))
 
 
+@pytest.mark.slow
 def test_a_small_movement_is_held_and_a_strut_locks():
     held = largest_movement(semicircle(0.2, 12), af.Settlement(0, (-0.01, 0.0, 0.0)))
     assert (held.end, held.largest) == (End.HOLDS, pytest.approx(1.0))

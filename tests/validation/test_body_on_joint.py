@@ -78,7 +78,11 @@ def test_moment_approaches_its_limit_only_as_rotation_grows():
     assert float(found.joints["M"][0]) == pytest.approx(moment, rel=2e-4)
 
 
-@pytest.mark.parametrize("contact", [JOINT, replace(JOINT, friction=None)], ids=["μ", "glued"])
+@pytest.mark.parametrize(
+    "contact",
+    [JOINT, pytest.param(replace(JOINT, friction=None), marks=pytest.mark.slow)],
+    ids=["μ", "glued"],
+)
 @pytest.mark.parametrize(
     ("fidelity", "rule"),
     [

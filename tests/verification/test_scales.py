@@ -109,7 +109,9 @@ def shaken(weight, width, length):
 known = cache(lambda answers: answers(1.0, 1.0, 1.0))
 
 
-@pytest.mark.parametrize("answers", [at_rest, at_the_limit, shaken])
+@pytest.mark.parametrize(
+    "answers", [at_rest, pytest.param(at_the_limit, marks=pytest.mark.slow), shaken]
+)
 @pytest.mark.parametrize(
     "scale", [pytest.param(SCALES[0], marks=pytest.mark.slow), SCALES[1]], ids=["light", "small"]
 )
