@@ -147,7 +147,8 @@ class Verdict:
             groups.setdefault("none" if found is None else str(found), []).append(name)
         lines += self.remarks
         for words, names in groups.items():
-            lines.append(f"{'mechanism by ' * (words == 'none')}{join_names(names)}: {words}")
+            subject = "mechanism by " if words == "none" else ""
+            lines.append(f"{subject}{join_names(names)}: {words}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
