@@ -13,6 +13,7 @@ rigid blocks that no thrust line within friction can hold must not be at rest: t
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import sqrt
 
 import numpy as np
 import xarray as xr
@@ -208,9 +209,7 @@ def _describe_failure(model: Model, error: DidNotConverge, newton: Newton | None
     return f"{text}: it stands if they are {factor:g} times as stiff, k_n from {least:.2g} Pa/m on"
 
 
-def _find_carried_part(
-    model: Model, newton: Newton | None, precise: float = 0.25, rounds: int = 6
-) -> float | None:
+def _find_carried_part(model: Model, newton: Newton | None, rounds: int = 20) -> float | None:
     """Return a part of the weight that the structure carries, near the largest; None without one.
 
     Where nothing but weight and stiffness has the dimension of a force, only their ratio matters: a
@@ -218,21 +217,26 @@ def _find_carried_part(
     """
     if any(joint.contact.cohesion > 0.0 for joint in model.structure.joints):
         return None
-    weight, tried = self_weight(model), 1.0
+    weight, tried, largest, growth = self_weight(model), 1.0, 0.0, 2.0
     for _ in range(rounds):
+        part = tried
         try:
             equilibrium_under(model, tried * weight, newton)
-            return tried
         except DidNotConverge as error:
             if error.last is None:
-                return None
+                break
             carried = error.last.model.force(error.last.q)
-        part = float(carried @ weight) / float(weight @ weight)
-        # steps of the load, a sixty-fourth of it, are too coarse to find a small part
-        if part >= precise * tried:
-            return part
-        tried = max(part, 0.0) + tried / 64.0
-    return None
+            part = float(carried @ weight) / float(weight @ weight)
+        # a search may end too early, by steps that are too long or by rounding: more is tried in
+        # smaller steps, until not even 5 % more is found
+        if part <= 1.02 * largest and largest > 0.0:
+            growth = sqrt(growth)
+        largest = max(largest, part)
+        if growth < 1.05 or largest >= 1.0:
+            break
+        # steps of the load are a sixty-fourth of it
+        tried = min(growth * largest, 1.0) if largest > 0.0 else tried / 64.0
+    return largest or None
 
 
 @validate_arguments
