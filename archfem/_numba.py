@@ -7,24 +7,25 @@ not check for zero.
 
 Numba stores compiled code beside the sources, or where these are read-only, in the user's cache.
 It is used again only if no module with kernels has changed: kernels contain those that they call.
- Each file ends with a checksum: a function whose file is damaged is compiled anew.
+Each file ends with a checksum: a function whose file is damaged is compiled anew. Of several
+processes that need the same code, one compiles it, and the others wait and load it.
 """
 
+import fcntl
 import hashlib
 import io
 import logging
 import re
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from multiprocessing import parent_process
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
-from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 # mypy: disable-error-code="no-untyped-call"
@@ -71,6 +72,24 @@ class CheckedCacheFile(IndexDataCacheFile):
             file.write(content.getvalue() + hashlib.sha256(content.getvalue()).digest())
 
 
+class NotStored(Exception):
+    """Compiled code is not on disk, and is not to be compiled now."""
+
+
+_loads_only: list[bool] = [False]  # the last one holds
+
+
+@contextmanager
+def load_only() -> Iterator[None]:
+    """Load compiled code in a block, which ends at the first function that is not stored."""
+    _loads_only.append(True)
+    try:
+        with suppress(NotStored):
+            yield
+    finally:
+        _loads_only.pop()
+
+
 class HealingCache(FunctionCache):
     """Compiled code of a function on disk; what cannot be loaded is discarded."""
 
@@ -79,6 +98,7 @@ class HealingCache(FunctionCache):
         # numba itself would miss a change of a kernel that this one calls, in another module
         base, stamp = self._impl.filename_base, source_digest()
         self._cache_file = CheckedCacheFile(self._cache_path, base, stamp)
+        self.lock = ExitStack()  # of the code that this process compiles, until it is stored
         _declared.append(self)
 
     @property
@@ -88,6 +108,25 @@ class HealingCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the code for a signature, or None, upon which numba compiles it."""
+        code = self._load(sig, target_context)
+        if code is not None:
+            return code
+        if _loads_only[-1]:
+            raise NotStored
+        _announce_compilation(f"{self._py_func.__module__} {sig}")
+        with suppress(OSError):  # without a lock each process compiles
+            self._wait_for_others(hashlib.sha256(str(sig).encode()).hexdigest()[:16])
+        return self._load(sig, target_context)
+
+    def _wait_for_others(self, digest: str) -> None:
+        """Wait until no other process compiles for a signature, and let others wait for this."""
+        path = Path(self._cache_path) / f"{self._impl.filename_base}-{digest}.lock"
+        file = self.lock.enter_context(path.open("ab"))
+        self.lock.callback(path.unlink, missing_ok=True)
+        fcntl.flock(file, fcntl.LOCK_EX)  # the kernel releases that of a killed process
+
+    def _load(self, sig: Any, target_context: Any) -> Any:
+        """Return the code for a signature, or None; what cannot be loaded is discarded."""
         try:
             return super().load_overload(sig, target_context)
         except Exception as error:  # an intact file of another LLVM or processor, for instance
@@ -134,9 +173,17 @@ def store_compiled(compile_function: Callable[..., Any]) -> Callable[..., Any]:
     def decorate(function: Any) -> Any:
         dispatcher = compile_function(function)
         try:
-            dispatcher._cache = HealingCache(function)
+            dispatcher._cache = cache = HealingCache(function)
         except RuntimeError:  # there is no folder that numba may write to
             _warn_unsaved("any folder that numba tries", "none may be written to")
+            return dispatcher
+        compile_signature = dispatcher.compile
+
+        def compile_once(signature: Any) -> Any:
+            with cache.lock:  # released also if it does not compile
+                return compile_signature(signature)
+
+        dispatcher.compile = compile_once
         return dispatcher
 
     return decorate
@@ -166,48 +213,48 @@ summing_kernel: Any = numba.njit(**INNER_OPTIONS, fastmath={"contract", "reassoc
 view_kernel: Any = numba.njit(**INNER_OPTIONS, inline="always")
 
 
-class CompilationNotice(event.Listener):
-    """Event listener that announces compilations of this package, and how long they take."""
+class CompilationNotice(NamedTuple):
+    """Which part of a run is compiled, and how long this takes."""
 
-    def on_start(self, event: Any) -> None:
-        function = getattr(event.data["dispatcher"], "py_func", None)
-        module = getattr(function, "__module__", "")
-        if module.startswith("archfem.") and module != __name__:
-            _announce_compilation(module)
+    part: str
+    seconds: float
 
-    def on_end(self, event: Any) -> None:
-        pass
+    def write(self) -> None:
+        """Write the notice, except in a child process: its parent says what it is for."""
+        if parent_process() is not None:
+            return
+        seconds = self.seconds
+        duration = f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.1f} minutes"
+        sys.stderr.write(
+            f"archfem: compiling the {self.part}, which takes about {duration}; later runs reuse "
+            "the result ('archfem compile' compiles everything, 'archfem doctor' shows the "
+            "folder)\n"
+        )
+        sys.stderr.flush()
 
 
-if parent_process() is None:  # workers of a study compile what others have announced
-    event.register("numba:compile", CompilationNotice())
+# What a process does with its notices; a worker of a study sends them to its driver.
+send_notice: Callable[[CompilationNotice], None] = CompilationNotice.write
 
 _announced: set[str] = set()
 
 
-def _announce_compilation(module: str) -> None:
-    """Write which part of a run is compiled, and for how long, once for each part."""
-    # what is compiled at once, by the module of its first kernel, and its time as a multiple of
-    # that of the reference function
+def _announce_compilation(name: str) -> None:
+    """Announce the part of a run that is compiled, once, by a module and the types it is for."""
+    # what is compiled at once, by a word of its first kernel, and its time as a multiple of that
+    # of the reference function
     parts = {
         "rigid_body.time_stepping": ("fall of loose blocks", 270.0),
         "solvers.supernodal_lu": ("steps of elastic blocks", 290.0),
-        "joints.large": ("time steps", 225.0),
-        "": ("time steps", 150.0),  # of rigid blocks with small displacements
+        "joints.large": ("time steps of large displacements", 225.0),
+        "SmallSystem": ("time steps", 150.0),  # of rigid blocks with small displacements
     }
-    key = next(part for part in parts if part in module)
-    part, multiple = parts[key]
-    if part in _announced:
+    part, multiple = next((parts[word] for word in parts if word in name), ("", 0.0))
+    if not part or part in _announced:
         return
     # kernels of large displacements include those of elastic blocks
-    _announced.update({part, "steps of elastic blocks"} if key == "joints.large" else {part})
-    seconds = multiple * _time_compilation()
-    duration = f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.1f} minutes"
-    sys.stderr.write(
-        f"archfem: compiling the {part}, which takes about {duration}; later runs reuse the result "
-        "('archfem compile' compiles everything, 'archfem doctor' shows the folder)\n"
-    )
-    sys.stderr.flush()
+    _announced.update({part, "steps of elastic blocks"} if "joints.large" in name else {part})
+    send_notice(CompilationNotice(part, multiple * _time_compilation()))
 
 
 def _time_compilation(repeats: int = 3) -> float:

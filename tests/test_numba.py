@@ -17,11 +17,13 @@ def test_that_it_compiles_is_said_once_for_each_part(capsys, monkeypatch):
     monkeypatch.setattr(_numba, "_announced", set())
     monkeypatch.setattr(_numba, "_time_compilation", lambda: 0.2)
     modules = ("joints.large.forces", "dynamics.solvers.base", "dynamics.solvers.supernodal_lu")
-    for module in (*modules, "dynamics.rigid_body.time_stepping"):
+    steps = "dynamics.solvers.base (SmallSystem(float64))"
+    for module in (*modules, "dynamics.rigid_body.time_stepping", steps, steps):
         _numba._announce_compilation(f"archfem.{module}")
-    first, second = capsys.readouterr().err.splitlines()
-    assert "compiling the time steps, which takes about 45 s" in first
+    first, second, third = capsys.readouterr().err.splitlines()
+    assert "compiling the time steps of large displacements, which takes about 45 s" in first
     assert "compiling the fall of loose blocks, which takes about 54 s" in second
+    assert "compiling the time steps, which takes about 30 s" in third
 
 
 @pytest.mark.slow
@@ -96,6 +98,61 @@ def test_damaged_code_is_found_and_compiled_anew(which, damage, stored):
     if damage != "unreadable":  # no file replaces a folder
         assert not _numba.find_damaged_files()
         compiled(hits=1)
+
+
+def test_of_several_processes_one_compiles(tmp_path):
+    """They begin at once, and the others load what the first one has stored."""
+    (tmp_path / "functions.py").write_text(FUNCTION)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    environment["PYTHONPATH"] = os.pathsep.join([os.getcwd(), str(tmp_path)])
+    options = {"env": environment, "stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    words = [sys.executable, "-c", "import functions"]
+    processes = [subprocess.Popen(words, text=True, **options) for _ in range(3)]
+    for process in processes:  # until all have been imported
+        assert process.stdout.readline() == "ready\n"
+    for process in processes:
+        process.stdin.close()
+    hits = [process.stdout.read().strip() for process in processes]
+    assert sorted(hits) == ["0", "1", "1"]
+    for process in processes:
+        process.stdout.close()
+        assert process.wait() == 0
+    assert not list(tmp_path.rglob("*.lock"))
+
+
+FUNCTION = """
+import sys
+from archfem import _numba
+
+@_numba.entry
+def add_half(value):
+    return value + 0.5
+
+print("ready", flush=True)
+sys.stdin.read()
+assert add_half(2.0) == 2.5
+print(sum(add_half.stats.cache_hits.values()))
+"""
+
+
+def test_a_function_that_does_not_compile_is_locked_no_longer(monkeypatch, tmp_path):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(_numba, "_declared", [])
+    function = _numba.entry(add_half)
+    for _ in range(2):  # the second would wait for ever
+        with pytest.raises(numba.TypingError):
+            function("two")
+    assert not list(tmp_path.rglob("*.lock"))
+
+
+def test_code_is_loaded_without_being_compiled(stored):
+    function, other = _numba.entry(add_half), _numba.entry(add_half)
+    with _numba.load_only():
+        assert function(2.0) == 2.5
+        other(2)  # of another type, which is not stored
+        pytest.fail("it was compiled")
+    assert not other.signatures
+    assert other(2) == 2.5
 
 
 def test_what_is_stored_is_counted(stored):

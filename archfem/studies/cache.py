@@ -5,23 +5,15 @@ one, by the contents of its case and files, is taken from here, and has the same
 computed anew.
 """
 
-import fcntl
-import os
-import tempfile
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Mapping
-from contextlib import suppress
 from dataclasses import replace
-from functools import cache
-from pathlib import Path
 from typing import Any, TypeVar
 
-from archfem._numba import source_digest
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_sections
 from archfem.cases.run import DeadLoadResult, damping_of, dead_load_of_case
-from archfem.dynamics.warm_up import compile_variant
 from archfem.errors import InvalidInput
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
@@ -35,20 +27,6 @@ Value = TypeVar("Value")
 _cache: dict[str, OrderedDict[str, Any]] = {}
 
 
-@cache
-def preload() -> None:
-    """Load the compiled code of a usual run; on each machine one process compiles it first."""
-    path = Path(tempfile.gettempdir()) / f"archfem-{os.getuid()}-{source_digest()}.warm"
-    # a full disk stops no study: the points compile what they need
-    with suppress(OSError), path.open("ab", buffering=0) as file:
-        compiled = file.tell() > 0
-        if not compiled:  # many workers of a cluster would compile the same for minutes
-            fcntl.flock(file, fcntl.LOCK_EX)
-        compile_variant("compliance, Conserving")
-        if not compiled:
-            file.write(b"compiled\n")
-
-
 @validate_arguments
 def dead_load_of(case: Case) -> DeadLoadResult:
     """Return the dead-load result of a case, with its damping; the model is reused if cached.
@@ -59,7 +37,6 @@ def dead_load_of(case: Case) -> DeadLoadResult:
     Raises:
         DidNotConverge: the structure does not stand.
     """
-    preload()
     key = _model_key(case)
     dead: Equilibrium = _look_up("equilibria", key, lambda: dead_load_of_case(case))
     result = DeadLoadResult(case, dead)

@@ -21,10 +21,12 @@ gc.disable()
 from tqdm import tqdm  # noqa: E402
 
 import archfem.studies.process_pool  # noqa: E402, F401  (with it all modules that workers use)
-from archfem.studies.cache import preload  # noqa: E402
+from archfem._numba import load_only  # noqa: E402
+from archfem.dynamics.warm_up import compile_variant  # noqa: E402
 
 tqdm.monitor_interval = 0  # no thread that refreshes progress bars
 tqdm.set_lock(threading.RLock())  # a lock of each worker: a killed one would keep a shared lock
-preload()
+with load_only():  # on a first day workers compile what their points need
+    compile_variant("compliance, Conserving")
 gc.freeze()  # the collector would write to the loaded objects, whose pages workers share
 gc.enable()

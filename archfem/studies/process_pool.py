@@ -29,6 +29,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from archfem import _numba
 from archfem._files import temporary_folder
 from archfem._validation import check_integer
 from archfem.cases.provenance import describe_version
@@ -226,13 +227,15 @@ class Worker:
         with suppress(OSError):
             self.pipe.send_bytes(task.message)
 
-    def receive(self) -> Row | None:
-        """Receive the row of the task; None if the worker has died."""
+    def receive(self) -> Row | _numba.CompilationNotice | None:
+        """Receive the row of the task, or what it compiles first; None if the worker has died."""
         try:
-            row: Row
-            row, self.warnings = self.pipe.recv()
+            received: tuple[Row, list[str]] | _numba.CompilationNotice = self.pipe.recv()
         except (EOFError, OSError, pickle.UnpicklingError):
             return None
+        if isinstance(received, _numba.CompilationNotice):
+            return received
+        row, self.warnings = received
         self.task = None
         return row
 
@@ -269,6 +272,7 @@ class WorkerPool:
         self._workers: list[Worker] = []
         self._deaths: Counter[int] = Counter()
         self._warnings = RepeatedWarnings()
+        self._compiled: set[str] = set()  # parts of which workers have said that they compile them
         # A second Ctrl-C may end `close` early, and Python waits at its end for all processes that
         # are left, until their points are computed
         atexit.register(self._kill)
@@ -310,10 +314,15 @@ class WorkerPool:
             worker.send(self._tasks.pop(worker.model, models, pairs))
 
     def _receive(self, worker: Worker) -> tuple[int, Row] | None:
-        """Return number and row of a point; None if its worker died and the task was put back."""
+        """Return number and row of a point; None if it is not finished."""
         task = worker.task
         assert task is not None
         row = worker.receive()
+        if isinstance(row, _numba.CompilationNotice):
+            if row.part not in self._compiled:  # one worker compiles, and the others wait
+                row.write()
+            self._compiled.add(row.part)
+            return None
         self._warnings.log(worker.warnings)
         worker.warnings = []
         if row is not None:
@@ -378,6 +387,7 @@ def _serve(pipe: Connection, log: str, shared: Path | None) -> None:
     with open(log, "a") as file:
         for stream in (1, 2):
             os.dup2(file.fileno(), stream)
+    _numba.send_notice = pipe.send  # the driver says it once for all workers
     np.random.seed()  # noqa: NPY002  (for users' functions: all workers would draw the same)
     with suppress(EOFError, OSError), threadpool_limits(1), share_results(shared):
         while True:

@@ -184,8 +184,8 @@ class Command:
         differing = sorted({name for name, _ in self.allowed[-1].items() ^ visible(out).items()})
         left = [path.name for path in out.rglob(".*")]
         temporary = [path.name for path in self.temporary.iterdir()]
-        # marks of compiled code stay on purpose, and Open MPI leaves its own folders
-        left += [name for name in temporary if not name.endswith(".warm") and name[:5] != "ompi."]
+        # Open MPI leaves its own folders
+        left += [name for name in temporary if name[:5] != "ompi."]
         if differing or left:
             self.fail(f"differing: {differing}; left: {left}")
         deadline = time.monotonic() + 30.0  # they end when they notice that the driver has

@@ -19,6 +19,8 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_info
 
+from archfem import _numba
+
 
 def lengths(case):
     """Findings that take no time."""
@@ -31,6 +33,12 @@ def lengths(case):
 def slowly(case, seconds=0.2):
     """Findings that take time."""
     time.sleep(seconds)
+    return lengths(case)
+
+
+def compiling(case):
+    """Announces what every worker would compile."""
+    _numba._announce_compilation("SmallSystem")
     return lengths(case)
 
 

@@ -1,6 +1,7 @@
 """Workers of a study: how they end, what they inherit, and who outlives whom."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -40,6 +41,32 @@ def study_of(case, find, thicknesses, folder):
     over = {"structure.thickness": thicknesses}
     find = {"name": f"finders_of_tests:{find}", "folder": str(folder)}
     return af.Study.of(case, over, find)
+
+
+def test_the_driver_says_once_what_workers_compile(small_ring, tmp_path, finders, capsys):
+    over = {"structure.thickness": [0.5, 0.6, 0.7, 0.8]}
+    study = af.Study.of(small_ring, over, "finders_of_tests:compiling")
+    study.run(tmp_path, workers=2)
+    assert capsys.readouterr().err.count("compiling the time steps, which takes about") == 1
+    assert "compiling" not in (tmp_path / "workers.log").read_text()
+
+
+@pytest.mark.slow
+def test_workers_compile_every_function_once(small_ring, tmp_path):
+    (tmp_path / "case.toml").write_text(small_ring.text())
+    vary = "motion.scale = [0.1, 0.2, 0.3, 0.4]"
+    study = f'case = "case.toml"\ncompute = "history"\n[vary]\n{vary}\n'
+    (tmp_path / "study.toml").write_text(study)
+    command = [sys.executable, "-m", "archfem", "study", str(tmp_path / "study.toml")]
+    command += ["--out", str(tmp_path / "out"), "--workers", "2"]
+    shown = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DEBUG_CACHE": "1"}
+    ran = subprocess.run(command, env=os.environ | shown, text=True, capture_output=True)
+    assert "4 of 4" in ran.stdout, ran.stderr
+    assert ran.stderr.count("compiling the time steps, which takes about") == 1
+    log = (tmp_path / "out" / "workers.log").read_text()
+    saved = re.findall(r"data saved to '(.*)'", log)
+    assert any("advance" in path for path in saved)
+    assert len(saved) == len(set(saved))
 
 
 def test_deaths_of_workers_are_reported_and_nothing_is_inherited(
