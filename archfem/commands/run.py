@@ -2,6 +2,7 @@
 
 import argparse
 import io
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
@@ -226,7 +227,8 @@ def select(options: argparse.Namespace) -> None:
     settings["events"] = dict(event.partition("=")[::2] for event in options.events)
     failure = None
     try:
-        found = select_records(options.folder, spectrum, options.period, **settings)
+        with name_options(events="--event"):
+            found = select_records(options.folder, spectrum, options.period, **settings)
     except DidNotConverge as error:  # the nearest selection is shown, and the command fails
         failure, found = error, error.last
     print(found)
@@ -254,9 +256,11 @@ def _read_records(
 ) -> tuple[dict[str, Motion], list[InvalidInput]]:
     """Read records: motions by file, and the errors of refused files, which are printed."""
     read, refused = {}, []
+    names = {name: f"--{name}" for name in given}
     for path in files:
         try:
-            read[path] = Motion.read(path, **given)
+            with name_options(**names):
+                read[path] = Motion.read(path, **given)
         except InvalidInput as error:
             refused.append(error)
             if len(files) > 1:
@@ -265,6 +269,21 @@ def _read_records(
     if not read:
         raise refused[0]
     return read, refused
+
+
+@contextmanager
+def name_options(**options: str) -> Iterator[None]:
+    """Name options of the command, by keyword, where errors of a block name keywords of Python."""
+
+    def replace_keyword(match: re.Match[str]) -> str:
+        # the value of `units='g'` is separated from the option, other words are already
+        return f"{options[match[1]]} " if match[2] else options[match[1]]
+
+    try:
+        yield
+    except InvalidInput as error:
+        pattern = rf"\b({'|'.join(options)})=(?=(['\d])?)"
+        raise InvalidInput(re.sub(pattern, replace_keyword, str(error))) from error
 
 
 def compile_steps(options: argparse.Namespace) -> None:

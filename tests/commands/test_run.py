@@ -220,6 +220,30 @@ def test_motion_command_reads_plain_columns(tmp_path, capsys):
     assert "plain.txt" in capsys.readouterr().err
 
 
+RECORDS = {
+    "no unit": ("0\n1\n0\n", ["--dt", "0.02"], "no unit: give --units as g, m/s2"),
+    "no step": ("0\n1\n0\n", ["--units", "g"], "give --dt in seconds"),
+    "contradiction": ("# in g\n0\n1\n0\n", ["--units", "cm/s2"], "--units 'cm/s2' contradicts"),
+    "columns": ("0 0 0\n.1 1 1\n.2 0 0\n", ["--units", "g"], "choose with --column, from 1"),
+}
+
+
+@pytest.mark.parametrize("kind", RECORDS)
+def test_errors_of_records_name_options_of_the_command(tmp_path, capsys, kind):
+    content, words, remedy = RECORDS[kind]
+    (tmp_path / "plain.txt").write_text(content)
+    command = ["motion", str(tmp_path / "plain.txt"), *words, "--out", str(tmp_path)]
+    assert af.commands.main(command) == 1
+    assert remedy in capsys.readouterr().err
+
+
+def test_too_few_records_name_the_option_of_the_command(tmp_path, capsys):
+    spectrum = "{ code = 'TBEC-2018', ss = 1.0, s1 = 0.3, site = 'ZD' }"
+    words = ["--spectrum", spectrum, "--period", "0.2", "--count", "3"]
+    assert af.commands.main(["select", str(tmp_path), *words]) == 1
+    assert "name events that were taken for one by --event" in capsys.readouterr().err
+
+
 LIMIT = """
 title = "a ring pushed over"
 [structure]

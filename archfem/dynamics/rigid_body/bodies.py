@@ -176,7 +176,8 @@ def check_cohesionless(structure: Structure) -> None:
     for number in find_soft_blocks(structure):
         if not structure.blocks[number].fixed:
             logger.warning(
-                "block '%s' is soft, and falls here as one rigid body: cut it with jointed_fill",
+                "block '%s' is soft, and falls here as one rigid body: cut it with jointed_fill "
+                '(law = "jointed" in a case)',
                 structure.blocks[number].name,
             )
 
