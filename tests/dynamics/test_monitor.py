@@ -178,6 +178,7 @@ def test_facets_that_slid_past_each_other_are_doubted(stack, monkeypatch, slip, 
         any("had slid by" in doubt.cause and "'joint 1'" in doubt.cause for doubt in guard.doubts)
         is doubted
     )
+    assert all("cells=(1, 1) of cell='triangle'" in doubt.remedy for doubt in guard.doubts)
     # stones that are rigid already cannot be made coarser
     assert not any("for stones" in doubt.remedy for doubt in guard.doubts)
     monkeypatch.setattr(model, "fidelity", "backfill: full, rest: condensed")

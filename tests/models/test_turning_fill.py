@@ -142,3 +142,18 @@ def test_how_far_faces_have_slid_is_told_in_facets():
         assert model.face_mismatch(q) == (pytest.approx(0.2), "joint 1")
     plane = af.build(tower, fidelity="rigid", displacements="large")
     assert plane.face_mismatch(np.full(plane.size, 0.1)) == (0.0, "")
+
+
+def test_one_triangle_on_each_stone_leaves_no_facets_to_slide():
+    """Quadrilaterals have two facets or more on each stone, however few cells are asked for."""
+    arch = af.shapes.Arch(span=6.0, rise=1.5, thickness=0.4, voussoirs=11)
+    bridge = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.3), width=3.0)
+    fidelity = {"backfill": "full", "rest": "rigid"}
+    meshes = {"quadrilateral": {(4, 4): 4, (2, 2): 2, (1, 1): 2}, "triangle": {(1, 1): 0}}
+    for cell, facets in meshes.items():
+        for cells, count in facets.items():
+            model = af.build(
+                bridge, fidelity=fidelity, displacements="large", cells=cells, cell=cell
+            )
+            assert model.joints.face_law.paired.sum() == 11 * count
+    assert model.face_mismatch(np.full(model.size, 0.1)) == (0.0, "")
