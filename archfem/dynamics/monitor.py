@@ -281,7 +281,8 @@ class RunMonitor:
             f"by t = {time:.4g} s the faces of '{name}' had slid by {slip:.2g} of a facet, though "
             "they are paired as meshed",
             "take fewer cells, down to cells=(1, 1) of cell='triangle', one facet on each stone "
-            f"that is not slender{coarser}; hold the fill's ends by sidewalls; or cut it with jointed_fill",
+            f"that is not slender{coarser}; hold the fill's ends by sidewalls; or cut it with "
+            "jointed_fill",
         )
         if slip > 1.0:
             raise DidNotConverge(str(doubt), last=self._before)

@@ -3,8 +3,10 @@
 import pytest
 
 import archfem as af
+from archfem.cases.report.sections import _build_mechanism, _verdict_facts
 from archfem.cases.result_text import tabulate_runs
 from archfem.commands.run import run as run_command
+from archfem.dynamics.history import with_fall
 
 CASE = """
 title = "a column that falls"
@@ -79,8 +81,27 @@ def test_a_run_writes_all_its_files_and_begins_with_the_verdict(path, tmp_path, 
     assert tabulate_runs({"pair": history}).rows[0][1] == "fallen"
 
 
-def test_a_run_that_holds_says_so(path):
-    case = af.Case.read(path, ["motion.scale=0.01", "motion.end=0.5"])
-    *_, done = af.cases.run_case(case)
-    assert done.history.verdict.headline.startswith("stands")
-    assert "largest displacement of a corner " in str(done.history.verdict)
+@pytest.fixture
+def held(path):
+    """The history of a run that holds."""
+    *_, done = af.cases.run_case(af.Case.read(path, ["motion.scale=0.01", "motion.end=0.5"]))
+    return done.history
+
+
+def test_a_run_that_holds_says_so(held):
+    assert held.verdict.headline.startswith("stands")
+    assert "largest displacement of a corner " in str(held.verdict)
+    assert _verdict_facts([held])[0] == ("verdict", held.verdict.headline)
+
+
+def test_a_report_begins_with_the_number_of_lost_stones_and_lists_all_below(held):
+    names = [f"stone {number}" for number in range(1, 13)]
+    fall = af.dynamics.CollapseState("fallen", 1.25, tuple(names), 2.0, 2.0, True)
+    run = with_fall(held, fall)
+    outcome, lost, *_ = _verdict_facts([run])
+    assert outcome == ("verdict", "fallen; no doubts")
+    short = "stone 1, stone 2, stone 3, …"
+    assert lost == ("lost", f"12 blocks, the first at 1.25 s: {short}")
+    first, second, *_ = [block.text for block in _build_mechanism(run)]
+    assert first == "Fallen; no doubts."
+    assert second == f"Lost: 12 blocks, the first at 1.25 s: {', '.join(names)}."

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,10 @@ import xarray as xr
 from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.report.report_data import ReportData, build_player, missing_note
+from archfem.dynamics.fall import CollapseState
 from archfem.dynamics.history import SIGN_CONVENTION, History
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh
+from archfem.dynamics.verdict import Verdict
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
@@ -334,7 +337,10 @@ def _shorten_joint_table(table: result_text.ResultTable) -> Grid:
 
 def _build_mechanism(run: History) -> list[Any]:
     """Build the verdict, and the fall of a run with large displacements."""
-    blocks: list[Any] = [TextBlock(_sentence(line)) for line in str(run.verdict).splitlines()]
+    lines = str(_without_lost(run.verdict)).splitlines()
+    if run.fall is not None and run.fall.blocks:
+        lines.insert(1, f"lost: {_describe_lost(run.fall, len(run.fall.blocks))}")
+    blocks: list[Any] = [TextBlock(_sentence(line)) for line in lines]
     if run.fall is None:
         what = "what happens after blocks come loose, for displacements were taken as small"
         blocks.append(missing_note(what, 'model.displacements = "large" follows them.'))
@@ -381,9 +387,12 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
 def _verdict_facts(runs: Sequence[History]) -> list[tuple[str, str]]:
     """Return outcome and doubts of a run, or how many of several runs have each."""
     verdicts = [run.verdict for run in runs]
-    facts = [("verdict", result_text.describe_verdicts(runs))]
     if len(verdicts) == 1:
-        return [*facts, *(("in doubt", str(doubt)) for doubt in verdicts[0].doubts)]
+        verdict, fall = verdicts[0], verdicts[0].fall
+        facts = [("verdict", _without_lost(verdict).headline)]
+        facts += [("lost", _describe_lost(fall))] if fall is not None and fall.blocks else []
+        return [*facts, *(("in doubt", str(doubt)) for doubt in verdict.doubts)]
+    facts = [("verdict", result_text.describe_verdicts(runs))]
     reasons = Counter(str(doubt) for verdict in verdicts for doubt in verdict.doubts)
     facts += [
         ("in doubt", f"{count} of {len(verdicts)} runs: {text}") for text, count in reasons.items()
@@ -392,6 +401,18 @@ def _verdict_facts(runs: Sequence[History]) -> list[tuple[str, str]]:
         met = sum(verdict.mechanisms.get(name) is not None for verdict in verdicts)
         facts.append((f"mechanism by {name}", f"{met} of {len(verdicts)} runs"))
     return facts
+
+
+def _without_lost(verdict: Verdict) -> Verdict:
+    """Return a verdict that does not list the lost blocks."""
+    fall = verdict.fall
+    return verdict if fall is None else replace(verdict, fall=replace(fall, time=None))
+
+
+def _describe_lost(fall: CollapseState, max_names: int = 3) -> str:
+    """Return the number of lost blocks, the time of the first, and the first names."""
+    names = ", ".join([*fall.blocks[:max_names], *(["…"] if fall.blocks[max_names:] else [])])
+    return f"{len(fall.blocks)} blocks, the first at {fall.time:.2f} s: {names}"
 
 
 def _sentence(text: str) -> str:

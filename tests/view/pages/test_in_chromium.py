@@ -7,7 +7,7 @@ import pytest
 from chromium import BROWSER, browser, complaints, opened, printed
 
 import archfem as af
-from archfem.view.pages.document import print_page
+from archfem.view.pages.document import Document, Section, TextBlock, print_page
 from archfem.view.pages.player_data import Outlines
 
 pytestmark = pytest.mark.slow
@@ -129,6 +129,26 @@ def test_a_report_fits_its_screen_and_follows_the_colour_scheme(small, tmp_path,
         paper = driver.execute_script("return getComputedStyle(document.body).backgroundColor")
         assert (sum(map(int, re.findall(r"\d+", paper))) < 200) == (scheme == "dark")
         assert complaints(driver) == []
+
+
+def test_a_text_table_scrolls_and_sentences_wrap(tmp_path):
+    """On a phone, a line of a table is a line, and what follows it is read without scrolling."""
+    table = "\n".join("mode  " + "  ".join(f"frequency {k}" for k in range(9)) for _ in range(4))
+    text = f"{table}\n\n{'damping in a sentence ' * 9}"
+    page = Document("modes", "", (), [Section("Modes", [TextBlock(text, "lines")])]).page
+    (tmp_path / "page.html").write_text(page, encoding="utf-8")
+    with browser() as driver:
+        screen = {"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
+        opened(driver, tmp_path / "page.html")
+        (tall, wide, whole), (more, own, all_own) = driver.execute_script(
+            "return [...document.querySelectorAll('pre span')]"
+            ".map(e => [e.clientHeight, e.clientWidth, e.scrollWidth])"
+        )
+        assert whole > 2 * wide
+        assert all_own == own == wide
+        # lines of 18.2 pixels, and 8 for the scroll bar
+        assert 4 * 18 < tall < 5 * 18 < more
 
 
 NAMES = """
