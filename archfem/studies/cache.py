@@ -122,7 +122,7 @@ def _without(table: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
 def _look_up(kind: str, key: str, make: Callable[[], Value]) -> Value:
     """Return a cached object of a kind, or make it; the least recently used one is dropped."""
     # few objects that are as large as a model
-    limit = 4 if kind in ("equilibria", "modes", "steppers") else 64
+    limit = 4 if kind in ("equilibria", "modes") else 64
     objects = _cache.setdefault(kind, OrderedDict())
     if key not in objects:
         objects[key] = make()
