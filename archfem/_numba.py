@@ -233,7 +233,7 @@ class CompilationNotice(NamedTuple):
         sys.stderr.flush()
 
 
-# What a process does with its notices; a worker of a study sends them to its driver.
+# Function that notices are passed to: a worker of a study sends them to its driver.
 send_notice: Callable[[CompilationNotice], None] = CompilationNotice.write
 
 _announced: set[str] = set()
