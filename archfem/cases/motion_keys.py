@@ -180,7 +180,7 @@ def _locate_component(path: Path, samples: Array, folder: Path) -> dict[str, Any
         try:
             if np.array_equal(Motion.read(path, column=column).horizontal, samples):
                 number = {} if column is None else {"column": column}
-                return {"file": path.relative_to(folder).as_posix(), **number}
+                return {"file": path.absolute().relative_to(folder).as_posix(), **number}
         except InvalidInput:
             continue
     raise InvalidInput(f"{path} was changed while it was read: select again")

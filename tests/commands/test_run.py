@@ -259,7 +259,7 @@ horizontal = 1.0
 """
 
 
-def test_selected_records_become_a_suite(tmp_path, at2, undrawn, capsys):
+def test_selected_records_become_a_suite(tmp_path, at2, undrawn, capsys, monkeypatch):
     records, out = tmp_path / "records", tmp_path / "out"
     records.mkdir()
     for day in range(1, 5):
@@ -269,7 +269,8 @@ def test_selected_records_become_a_suite(tmp_path, at2, undrawn, capsys):
     rows = "\n".join(f"{0.1 * a:.5f} {a:.5f}" for a in motion.horizontal)
     (records / "19900109.txt").write_text(f"# N-S E-W m/s2, dt = 0.01\n{rows}\n")
     spectrum = '{ code = "EC8", ag = 0.25, ground = "B" }'
-    given = ["select", str(records), "--spectrum", spectrum, "--period", "0.2", "--out", str(out)]
+    monkeypatch.chdir(tmp_path)  # a folder as it is usually typed
+    given = ["select", "records", "--spectrum", spectrum, "--period", "0.2", "--out", str(out)]
     assert af.commands.main([*given, "--count", "5", "--scales", "0.1", "9"]) == 0
     said = capsys.readouterr().out
     code = af.Eurocode8(0.25, "B")
