@@ -31,7 +31,6 @@ from archfem.joints.rigid_kinematics import jump_rates
 from archfem.masonry.loads import BodyForce, PointLoad
 from archfem.masonry.structure import Structure, largest_displacement, rigid_motion_matrix
 
-
 # Reduced balances that blocks keep for further programmes: a search without dilatancy uses four
 MAX_KEPT_REDUCTIONS = 8
 
