@@ -27,14 +27,15 @@ LONG = (
     "bridge_history",
     "bridge_range",
     "drift_and_equality",
+    "floor",
     "opensees_ring",
     "random_structures",
     "run",
     "study_efficiency",
     "study_kills",
 )
-"""Scripts that take a second or more: one runs five others of these, two start studies of
-processes, two match motions, and one needs OpenSees."""
+"""Scripts that take a second or more: one runs five others of these, one compiles a loop of its
+own, two start studies of processes, two match motions, and one needs OpenSees."""
 
 
 MARKED = [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in NAMES]

@@ -31,6 +31,9 @@ from archfem.joints.rigid_kinematics import jump_rates
 from archfem.masonry.loads import BodyForce, PointLoad
 from archfem.masonry.structure import Structure, largest_displacement, rigid_motion_matrix
 
+# Reduced balances that blocks keep for further programmes: a search without dilatancy uses four
+MAX_KEPT_REDUCTIONS = 8
+
 
 class NoEquilibrium(DidNotConverge):
     """The programme is infeasible: no forces within the limits balance the loads."""
@@ -126,6 +129,34 @@ class RigidBlocks:
         """Equilibrium matrix of free blocks in the programme's units (3 n_free, 3 n_joints)."""
         sign = np.repeat([-1.0, -1.0, 1.0], len(self.structure.depths))
         return sparse.diags(self.coordinate_units) @ self.kinematics.T @ sparse.diags(sign)
+
+    @cached_property
+    def _chains(self) -> dict[bytes, "Chains"]:
+        """Chains that were found, by the blocks left out of them."""
+        return {}
+
+    @cached_property
+    def _reductions(self) -> dict[tuple[bytes, ...], "ReducedBalance"]:
+        """Last balances that were reduced, by what they depend on."""
+        return {}
+
+    def reduce(
+        self, columns: sparse.csr_matrix, friction: Array, coheres: NDArray[np.bool_]
+    ) -> "ReducedBalance":
+        """Return the balance in few unknowns, kept for programmes of other loads and costs."""
+        parts = columns.indptr, columns.indices, columns.data, friction, coheres
+        key = tuple(part.tobytes() for part in parts)
+        if key not in self._reductions:
+            single = _find_single_blocks(columns)
+            if (blocks := single.tobytes()) not in self._chains:
+                links, pivots = _find_chains(self.structure, single)
+                self._chains[blocks] = Chains(self.balance, links, pivots)
+            # a search without dilatancy alternates between a few
+            if len(self._reductions) == MAX_KEPT_REDUCTIONS:
+                self._reductions.pop(next(iter(self._reductions)))
+            chains = self._chains[blocks]
+            self._reductions[key] = ReducedBalance(chains, columns, friction, coheres)
+        return self._reductions[key]
 
     def dimensionless(self, load: Array) -> Array:
         """Return generalised forces in the programme's units (3 n_free,)."""
@@ -267,107 +298,150 @@ class Programme:
 
     def _solve_linear(self, limits: Limits) -> Optimum | None:
         """Solve with linear limits only."""
-        reduced = ReducedProgramme(self, limits)
-        result = reduced.solve()
-        if result is None:
-            return None
-        forces, multipliers = reduced.map @ result.x + reduced.constant, reduced.multipliers(result)
-        unknowns = result.x[len(result.x) - len(self.unknown_cost) :]
-        value = float(reduced.force_cost @ forces + self.unknown_cost @ unknowns)
-        return Optimum(value, forces, multipliers, unknowns)
+        columns = self.columns
+        if columns is None:
+            columns = sparse.csr_matrix((len(self.load), 0))
+        reduced = self.blocks.reduce(columns, self.friction, self.cohesion > 0.0)
+        return reduced.solve(self, limits)
 
 
-class ReducedProgramme:
-    """Linear programme in few unknowns v, of which joint forces are x = T v + t.
+class Chains:
+    """Blocks with two joints, the links, which pass the forces of one on to the other.
 
-    Blocks with two joints, as in a ring, pass the forces of one joint on to the other. Their
-    balance is solved for the forces of one joint each, the pivots, so that a chain of any length
-    has the unknowns of a single joint; limits of the pivots become rows. In other joints forces
-    are sums >= 0 of generators of the friction cone, a compression at either end with a shear of
-    ±μ times it, which need no rows. The last of v are z.
+    Their balance is solved for the forces of one joint each, the pivots, so that a chain of any
+    length, as a ring, has the unknowns of a single joint.
     """
 
-    def __init__(self, programme: Programme, limits: Limits) -> None:
-        """Eliminate chains, and express the other forces by generators."""
-        joint_count, load = len(programme.friction), programme.load
-        balance, columns = programme.blocks.balance, programme.columns
-        if columns is None:
-            columns = sparse.csr_matrix((len(load), 0))
-        links, pivots = _find_chains(programme.blocks.structure, columns)
-        self._kept = ~np.isin(np.arange(len(load)) // 3, links)
-        self._pivot = np.isin(np.arange(3 * joint_count) % joint_count, pivots)
-        extra = columns.shape[1]
-        self.map, largest = _cone_generators(programme, ~self._pivot[:joint_count], extra)
-        count = self.map.shape[1] - extra
-        free = np.concatenate([np.zeros(count - len(largest)), largest])
-        lower = np.concatenate([-free, np.zeros(extra)])
-        upper = np.concatenate([np.where(free > 0.0, free, np.inf), programme.upper_bounds])
-        self._bounds = np.stack([lower, upper], axis=1)
-        loads = sparse.csr_matrix(
-            (columns.data, columns.indices + count, columns.indptr), (len(load), count + extra)
-        )
-        self.constant = np.zeros(3 * joint_count)
+    def __init__(
+        self, balance: sparse.csr_matrix, links: NDArray[np.intp], pivots: NDArray[np.intp]
+    ) -> None:
+        """Factorise the balance of the links for the forces of their pivots."""
+        self.pivots = pivots
+        self.is_pivot = np.zeros(balance.shape[1], dtype=bool)
+        self.is_pivot.reshape(3, -1)[:, pivots] = True
+        self.kept = np.ones(balance.shape[0], dtype=bool)
+        self.kept.reshape(-1, 3)[links] = False
+        self.passed, self.balance = balance[~self.kept], balance[self.kept]
         if len(links):
-            self._eliminate(balance[~self._kept], loads[~self._kept], load[~self._kept])
-        self.force_cost = np.zeros(3 * joint_count)
-        if programme.force_cost is not None:
-            self.force_cost += programme.force_cost
-        self._cost = self.map.T @ self.force_cost
-        self._cost[count:] += programme.unknown_cost
-        self._balance = balance[self._kept]
-        self._equations = self._balance @ self.map + loads[self._kept]
-        self._load = load[self._kept] - self._balance @ self.constant
-        self._limits = _pivot_limits(programme, pivots)
-        if len(limits.bounds):
-            self._limits = self._limits.joined(limits)
+            self.factors = splu(self.passed[:, self.is_pivot].tocsc())
 
-    def _eliminate(self, own: sparse.csr_matrix, loads: sparse.csr_matrix, load: Array) -> None:
+
+class ReducedBalance:
+    """Equilibrium in few unknowns v, of which joint forces are x = T v + t, with t of the load.
+
+    Limits of the pivots become rows. In other joints forces are sums >= 0 of generators of the
+    friction cone, a compression at either end with a shear of ±μ times it, which need no rows. The
+    last of v are z. Programmes of the same friction and columns share it.
+    """
+
+    def __init__(
+        self,
+        chains: Chains,
+        columns: sparse.csr_matrix,
+        friction: Array,
+        coheres: NDArray[np.bool_],
+    ) -> None:
+        """Eliminate chains, and express the other forces by generators."""
+        self._chains, used = chains, ~chains.is_pivot[: len(friction)]
+        # these carry shear without compression
+        self._alone = np.flatnonzero(used & (coheres | ~np.isfinite(friction)))
+        self._map = _cone_generators(friction, used, self._alone, columns.shape[1])
+        self._count = self._map.shape[1] - columns.shape[1]
+        loads = sparse.csr_matrix(
+            (columns.data, columns.indices + self._count, columns.indptr),
+            (columns.shape[0], self._map.shape[1]),
+        )
+        if len(chains.pivots):
+            self._eliminate(loads[~chains.kept])
+        self._equations = chains.balance @ self._map + loads[chains.kept]
+        self._slides = chains.pivots[np.isfinite(friction[chains.pivots])]
+        self._rows = _pivot_limits(friction, chains.pivots, self._slides)
+        self._limits = self._rows @ self._map
+
+    def _eliminate(self, loads: sparse.csr_matrix) -> None:
         """Solve the balance of the links of chains for the forces of their pivots."""
-        self._factors = splu(own[:, self._pivot].tocsc())
-        passed_on = (own @ self.map + loads).tocsc()
+        passed_on = (self._chains.passed @ self._map + loads).tocsc()
         # only forces at the end of a chain and loads act on its links
         acting = np.flatnonzero(np.diff(passed_on.indptr))
-        solved = self._factors.solve(-passed_on[:, acting].toarray())
+        solved = self._chains.factors.solve(-passed_on[:, acting].toarray())
         row, column = np.nonzero(solved)
-        place = np.flatnonzero(self._pivot)[row], acting[column]
-        self.map = self.map + sparse.csr_matrix((solved[row, column], place), self.map.shape)
-        self.constant[self._pivot] = self._factors.solve(load)
+        place = np.flatnonzero(self._chains.is_pivot)[row], acting[column]
+        self._map = self._map + sparse.csr_matrix((solved[row, column], place), self._map.shape)
 
-    def solve(self, large: int = 600) -> OptimizeResult | None:
-        """Return SciPy's result: by the interior point from `large` equations on, else the simplex.
+    def solve(self, programme: Programme, further: Limits, large: int = 600) -> Optimum | None:
+        """Solve a programme: by the interior point from `large` equations on, else the simplex.
 
         In walls the simplex method takes 40 iterations a block. Without an objective any state
         will do, which it finds faster.
         """
-        method = "highs-ipm" if len(self._load) > large and self._cost.any() else "highs-ds"
-        rows = self._limits.rows
-        limits = rows @ self.map, self._limits.bounds - rows @ self.constant
-        return solve_linear(self._cost, self._bounds, (self._equations, self._load), limits, method)
+        chains, constant = self._chains, np.zeros(self._map.shape[0])
+        if len(chains.pivots):
+            constant[chains.is_pivot] = chains.factors.solve(programme.load[~chains.kept])
+        force_cost = np.zeros_like(constant)
+        if programme.force_cost is not None:
+            force_cost += programme.force_cost
+        cost = self._map.T @ force_cost
+        cost[self._count :] += programme.unknown_cost
+        strength = np.tile(programme.cohesion[self._slides], 2)
+        limits = Limits(self._rows, np.concatenate([np.zeros(2 * len(chains.pivots)), strength]))
+        reduced = self._limits
+        if len(further.bounds):
+            limits = limits.joined(further)
+            reduced = sparse.vstack([reduced, further.rows @ self._map], format="csr")
+        load = programme.load[chains.kept] - chains.balance @ constant
+        method = "highs-ipm" if len(load) > large and cost.any() else "highs-ds"
+        rows = reduced, limits.bounds - limits.rows @ constant
+        equations = self._equations, load
+        result = solve_linear(cost, self._bounds(programme), equations, rows, method)
+        if result is None:
+            return None
+        forces, unknowns = self._map @ result.x + constant, result.x[self._count :]
+        multipliers = self._multipliers(result, force_cost, limits.rows)
+        value = float(force_cost @ forces + programme.unknown_cost @ unknowns)
+        return Optimum(value, forces, multipliers, unknowns)
 
-    def multipliers(self, result: OptimizeResult) -> Array:
+    def _bounds(self, programme: Programme) -> Array:
+        """Return the bounds of the unknowns of a programme (m, 2)."""
+        largest = np.where(np.isfinite(programme.friction), programme.cohesion, np.inf)
+        bounds = np.zeros((self._map.shape[1], 2))
+        bounds[:, 1] = np.inf
+        alone = slice(self._count - len(self._alone), self._count)
+        bounds[alone] = largest[self._alone, None] * [-1.0, 1.0]
+        bounds[self._count :, 1] = programme.upper_bounds
+        return bounds
+
+    def _multipliers(
+        self, result: OptimizeResult, force_cost: Array, rows: sparse.csr_matrix
+    ) -> Array:
         """Return the multipliers of the balance of all blocks (3 n_free,)."""
-        every = np.empty(len(self._kept))
-        every[self._kept] = result.eqlin.marginals
-        if not self._kept.all():
+        chains = self._chains
+        every = np.empty(len(chains.kept))
+        every[chains.kept] = result.eqlin.marginals
+        if len(chains.pivots):
             # the forces of pivots are unknowns without bounds: their reduced costs vanish
-            cost = self.force_cost - self._balance.T @ result.eqlin.marginals
-            cost -= self._limits.rows.T @ result.ineqlin.marginals
-            every[~self._kept] = self._factors.solve(cost[self._pivot], trans="T")
+            cost = force_cost - chains.balance.T @ result.eqlin.marginals
+            cost -= rows.T @ result.ineqlin.marginals
+            every[~chains.kept] = chains.factors.solve(cost[chains.is_pivot], trans="T")
         return every
 
 
+def _find_single_blocks(columns: sparse.csr_matrix) -> NDArray[np.intp]:
+    """Return the free blocks on which an unknown acts alone (n,)."""
+    # It would enter the rows of its whole chain.
+    single = np.bincount(columns.indices, minlength=columns.shape[1]) <= 3
+    row = np.repeat(np.arange(columns.shape[0]), np.diff(columns.indptr))
+    return np.unique(row[single[columns.indices]] // 3)
+
+
 def _find_chains(
-    structure: Structure, columns: sparse.csr_matrix
+    structure: Structure, excluded: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the free blocks that link two joints, and a joint of each for a pivot (n,)."""
     place = np.full(len(structure.blocks), -1)
     place[list(structure.free)] = np.arange(len(structure.free))
     block, joint = place[structure.pairs.ravel()], np.repeat(np.arange(len(structure.pairs)), 2)
-    # An unknown that acts on one block alone would enter the rows of its whole chain.
-    single = np.bincount(columns.indices, minlength=columns.shape[1]) <= 3
-    row = np.repeat(np.arange(columns.shape[0]), np.diff(columns.indptr))
     is_link = np.bincount(block[block >= 0], minlength=len(structure.free)) == 2
-    is_link[row[single[columns.indices]] // 3] = False
+    is_link[excluded] = False
     links, number = np.flatnonzero(is_link), np.cumsum(is_link) - 1
     ends = (block >= 0) & is_link[block]
     entries = np.ones(2 * len(links)), (number[block[ends]], joint[ends])
@@ -378,17 +452,12 @@ def _find_chains(
 
 
 def _cone_generators(
-    programme: Programme, used: NDArray[np.bool_], extra: int
-) -> tuple[sparse.csr_matrix, Array]:
-    """Return generators of the forces of some joints, and bounds of the last ones.
-
-    Columns (3 n_joints, m + extra) are followed by `extra` zero ones.
-    """
-    friction, count = programme.friction, len(used)
+    friction: Array, used: NDArray[np.bool_], alone: NDArray[np.intp], extra: int
+) -> sparse.csr_matrix:
+    """Return generators of the forces of some joints, followed by zeros (3 n_joints, m + extra)."""
+    count = len(used)
     cone = np.isfinite(friction) & (friction > 0.0)
     slides, plain = np.flatnonzero(used & cone), np.flatnonzero(used & ~cone)
-    largest = np.where(np.isfinite(friction), programme.cohesion, np.inf)
-    alone = np.flatnonzero(used & (largest > 0.0))  # these carry shear without compression
     # both ends with a shear of μ, both with -μ, both without shear, shear alone
     both, ends = np.tile(slides, 2), np.concatenate([slides, slides + count])
     rows = np.concatenate([ends, ends, plain, plain + count, alone + 2 * count])
@@ -397,13 +466,14 @@ def _cone_generators(
     entries = np.concatenate([np.ones(len(rows)), slope * np.tile(friction[both], 2)])
     across = np.concatenate([columns[: len(rows)], columns[: len(shear)]])
     place = np.concatenate([rows, shear]), across
-    return sparse.csr_matrix((entries, place), (3 * count, len(columns))), largest[alone]
+    return sparse.csr_matrix((entries, place), (3 * count, len(columns)))
 
 
-def _pivot_limits(programme: Programme, pivots: NDArray[np.intp]) -> Limits:
-    """Return the limits F_i, F_e >= 0 and |V| <= r + μ N of the pivots."""
-    friction, count = programme.friction, len(programme.friction)
-    slides = pivots[np.isfinite(friction[pivots])]
+def _pivot_limits(
+    friction: Array, pivots: NDArray[np.intp], slides: NDArray[np.intp]
+) -> sparse.csr_matrix:
+    """Return the rows of F_i, F_e >= 0 for pivots, and of ±V - μ N <= r for those that slide."""
+    count = len(friction)
     first = 2 * len(pivots) + np.arange(2 * len(slides)).reshape(2, -1)  # of V, of -V
     row = [np.arange(2 * len(pivots)), *(first.ravel() for _ in range(3))]
     column = [np.concatenate([pivots, pivots + count])]
@@ -412,6 +482,4 @@ def _pivot_limits(programme: Programme, pivots: NDArray[np.intp]) -> Limits:
     entries = [-np.ones(2 * len(pivots)), slope, slope, np.repeat([1.0, -1.0], len(slides))]
     shape = (2 * len(pivots) + 2 * len(slides), 3 * count)
     place = np.concatenate(row), np.concatenate(column)
-    rows = sparse.csr_matrix((np.concatenate(entries), place), shape)
-    strength = np.tile(programme.cohesion[slides], 2)
-    return Limits(rows, np.concatenate([np.zeros(2 * len(pivots)), strength]))
+    return sparse.csr_matrix((np.concatenate(entries), place), shape)

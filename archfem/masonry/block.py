@@ -54,12 +54,15 @@ def triangulate_polygon(points: Array) -> NDArray[np.intp]:
 
 def intersect_edges(points: Array, x: float, arcs: Sequence[int] = ()) -> list[float]:
     """Return the heights where a vertical line intersects straight edges of an outline."""
-    start, step = points, np.roll(points, -1, axis=0) - points
-    low, high = np.sort(np.stack([start[:, 0], start[:, 0] + step[:, 0]]), axis=0)
-    met = (low <= x) & (x <= high) & (high > low)
-    met[list(arcs)] = False
-    share = (x - start[met, 0]) / step[met, 0]
-    return (start[met, 1] + share * step[met, 1]).tolist()
+    heights, corners = [], points.tolist()  # floats: outlines have a few corners
+    for number, ((x_start, y_start), (x_end, y_end)) in enumerate(
+        zip(corners, corners[1:] + corners[:1], strict=True)
+    ):
+        step = x_end - x_start
+        low, high = sorted((x_start, x_start + step))
+        if number not in arcs and low <= x <= high and high > low:
+            heights.append(y_start + (x - x_start) / step * (y_end - y_start))
+    return heights
 
 
 def intersect_arc(ends: Array, centre: Array, x: float) -> list[float]:

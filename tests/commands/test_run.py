@@ -176,7 +176,7 @@ def test_a_pair_that_fails_does_not_end_the_suite(small, undrawn, capsys):
     assert af.History.read(path).ending is af.dynamics.Ending.FAILED
 
 
-def test_a_motion_that_fails_is_kept_and_ends_the_command(small, capsys):
+def test_a_motion_that_fails_is_kept_and_ends_the_command(small, undrawn, capsys):
     small.write_text(small.read_text().split("[suite]")[0] + "[motion]\nsynthetic = { seed = 1 }")
 
     def failing(case, motion, *given):
@@ -197,7 +197,7 @@ def test_check_tells_how_strong_the_pairs_are(small, capsys):
     assert "ready" in said
 
 
-def test_motion_command_measures_and_draws(tmp_path, capsys, at2):
+def test_motion_command_measures_and_draws(tmp_path, undrawn, capsys, at2):
     for folder, peak in (("a", 0.2), ("b", 0.4)):
         (tmp_path / folder).mkdir()
         at2(tmp_path / folder / "x.AT2", [0.0, peak, -0.1, *np.zeros(50)], 0.01)
@@ -210,7 +210,7 @@ def test_motion_command_measures_and_draws(tmp_path, capsys, at2):
     assert made == {"x.AT2.png", "x.AT2 (2).png", "spectra.png"}
 
 
-def test_motion_command_reads_plain_columns(tmp_path, capsys):
+def test_motion_command_reads_plain_columns(tmp_path, undrawn, capsys):
     path = tmp_path / "plain.txt"
     path.write_text("0 0\n1 98.0665\n0 0\n0 0\n")
     keywords = ["--column", "2", "--units", "cm/s2", "--dt", "0.02"]
@@ -293,7 +293,7 @@ def test_selected_records_become_a_suite(tmp_path, at2, undrawn, capsys, monkeyp
     assert "no set was found that meets the rule: above is the nearest" in said.err
 
 
-def test_limit_analysis_of_a_case(tmp_path, ring, capsys):
+def test_limit_analysis_of_a_case(tmp_path, ring, undrawn, capsys):
     path, out = tmp_path / "ring.toml", tmp_path / "out"
     path.write_text(LIMIT)
     assert af.commands.main(["run", str(path), "--out", str(out)]) == 0

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from orders import observed_order
+from repeats import each_once
 
 import archfem as af
 from archfem.dynamics.solvers.selection import stepper_for
@@ -224,16 +225,11 @@ def shaken(fidelity, rule, method):
     return steps(mixed(fidelity, rule), motion, 0.005, damping, method)
 
 
-@pytest.mark.parametrize("method", ["newton", "compliance"])
-@pytest.mark.parametrize("rule", ["lobatto", "exact"])
 @pytest.mark.parametrize(
-    "fidelity",
-    [
-        "rigid",
-        pytest.param("faces", marks=pytest.mark.slow),
-        pytest.param("condensed", marks=pytest.mark.slow),
-        "full",
-    ],
+    ("fidelity", "rule", "method"),
+    each_once(
+        ("rigid", "full", "condensed", "faces"), ("lobatto", "exact"), ("newton", "compliance")
+    ),
 )
 def test_solvers_step_as_snes_does(fidelity, rule, method):
     """To 1e-8 over 60 steps in which joints open and slide; some are glued."""

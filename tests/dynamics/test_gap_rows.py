@@ -58,6 +58,8 @@ def test_rows_are_as_few_as_the_faces_allow(fidelity, rule, each):
     assert gap_rows(joints).openings == each * joints.points.joint_count
 
 
+# kernels are compiled anew where tests call them from Python; `test_ladder` compares histories
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", ["exact", "lobatto"])
 @pytest.mark.parametrize("fidelity", ["rigid", "condensed"])
 def test_forces_at_an_instant_are_those_of_the_operator(fidelity, rule):

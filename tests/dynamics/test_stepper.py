@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from glued import glued
+from repeats import each_once
 
 import archfem as af
 from archfem.dynamics import Stepper
@@ -14,9 +15,14 @@ DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 MOTION = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3)
 
 
-@pytest.mark.parametrize("rule", [pytest.param("lobatto", marks=pytest.mark.slow), "exact"])
-@pytest.mark.parametrize("scheme", [af.dynamics.Conserving(), af.dynamics.Newmark()])
-@pytest.mark.parametrize("solver", [NewtonSolver, ComplianceSolver])
+@pytest.mark.parametrize(
+    ("rule", "scheme", "solver"),
+    each_once(
+        ("exact", "lobatto"),
+        (af.dynamics.Conserving(), af.dynamics.Newmark()),
+        (NewtonSolver, ComplianceSolver),
+    ),
+)
 def test_a_stepper_falls_back(ring, rule, scheme, solver):
     """With one pass allowed, every step that opens or closes a point is left to SNES."""
     slides = scheme == af.dynamics.Conserving()

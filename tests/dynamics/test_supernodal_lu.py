@@ -51,6 +51,8 @@ def factorise(panels, places, added):
     return eliminate(panels)
 
 
+# the kernel is compiled anew where a test calls it from Python; the history below is by it too
+@pytest.mark.slow
 def test_it_solves_as_superlu_does_whatever_is_added(grid):
     matrix, elimination, places = grid
     panels = panels_of(matrix, elimination, *places)

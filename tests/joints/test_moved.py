@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from kernels import from_python
+from repeats import each_once
 
 from archfem.joints.large import face_kinematics
 from archfem.joints.large.face_kinematics import FaceKinematics
@@ -170,11 +171,10 @@ def test_work_is_the_change_of_energy_and_a_loss_that_is_never_negative(
 
 
 @pytest.mark.parametrize("facets", [True, False])
-@pytest.mark.parametrize("friction", [0.5, np.inf])
-@pytest.mark.parametrize(("shapes", "fill"), KINDS)
-def test_the_derivative_is_that_of_the_force(shapes, fill, friction, facets):
+@pytest.mark.parametrize(("kind", "friction"), each_once(KINDS, (0.5, np.inf)))
+def test_the_derivative_is_that_of_the_force(kind, friction, facets):
     """By central differences, but where the law bends between them: in three of four states."""
-    rng, errors = np.random.default_rng(3), []
+    (shapes, fill), rng, errors = kind, np.random.default_rng(3), []
     for trial in range(40):
         joints = two_joints(shapes, friction, facets, rng, fill)
         size = 2 * (3 + shapes)

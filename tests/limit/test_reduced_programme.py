@@ -1,5 +1,6 @@
 """Chains and friction cones of the linear programme, against the same programme written in full."""
 
+from dataclasses import replace
 from itertools import pairwise
 from time import process_time
 
@@ -10,6 +11,7 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 import archfem as af
+from archfem.limit.backfill import self_weight_programme
 from archfem.limit.linear_programme import RigidBlocks, rigid_load
 
 SIDEWAYS = af.BodyForce(1.0)
@@ -137,3 +139,34 @@ def test_large_walls_and_rings_take_seconds():
         found = af.collapse_factor(structure, live=SIDEWAYS)
         assert found.outcome == "collapses"
         assert process_time() - start < limit
+
+
+@pytest.mark.parametrize(
+    ("structure", "different"), [(ring(), 6), (bonded_wall(3, 3), 7)], ids=["ring", "wall"]
+)
+def test_what_is_kept_of_a_programme_serves_those_of_other_loads_and_costs(structure, different):
+    """Each optimum is that of blocks on which nothing was solved before, to the last digit.
+
+    The ring hinges: more cohesion does not change its factor.
+    """
+    _, dead = self_weight_programme(structure, "coulomb", None, None)
+    programme = dead.with_load_factor(rigid_load(structure, [SIDEWAYS]))
+    weights = np.random.default_rng(1).random(3 * len(structure.joints))
+    changes = (
+        {},
+        {"load": 2.0 * programme.load},
+        {"force_cost": weights},
+        {"cohesion": programme.cohesion + 0.1},
+        {"friction": 0.5 * programme.friction},
+        {"upper_bounds": np.array([0.05])},
+        {"columns": 3.0 * programme.columns},
+    )
+    values = []
+    for change in (*changes, *changes):
+        kept = replace(programme, **change).solve()
+        fresh = replace(programme, blocks=RigidBlocks(structure), **change).solve()
+        np.testing.assert_array_equal(kept.forces, fresh.forces)
+        np.testing.assert_array_equal(kept.multipliers, fresh.multipliers)
+        np.testing.assert_array_equal(kept.unknowns, fresh.unknowns)
+        values.append(kept.value)
+    assert len({round(value, 9) for value in values}) == different

@@ -6,6 +6,7 @@ from itertools import pairwise
 import meshio
 import numpy as np
 import pytest
+from repeats import each_once
 
 import archfem as af
 from archfem.models import read_mesh, write_mesh
@@ -230,8 +231,9 @@ def outer_edges(cells, places):
     return edges[times == 1]
 
 
-@pytest.mark.parametrize("make", [viaduct, one_arch])
-@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+@pytest.mark.parametrize(
+    ("make", "cell"), each_once((viaduct, one_arch), ("quadrilateral", "triangle"))
+)
 def test_cells_of_touching_blocks_meet(make, cell):
     """Patch test, all of stone and stuck together: a uniform strain needs forces at the rim alone.
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from repeats import each_once
 from scipy.integrate import solve_ivp
 
 import archfem as af
@@ -25,8 +26,7 @@ def harmonic_peak(period, damping, forcing, duration):
     return np.abs(steady + np.exp(-damping * omega * time) * free).max()
 
 
-@pytest.mark.parametrize("damping", [0.0, 0.02, 0.05, 0.2])
-@pytest.mark.parametrize("dt", [0.005, 0.02])
+@pytest.mark.parametrize(("damping", "dt"), each_once((0.0, 0.02, 0.05, 0.2), (0.005, 0.02)))
 def test_spectrum_of_a_sine_is_the_closed_form(damping, dt, verified):
     duration, forcing = 8.0, 0.8
     motion = af.Motion(np.sin(2.0 * np.pi / forcing * np.arange(0.0, duration + dt / 2, dt)), dt)

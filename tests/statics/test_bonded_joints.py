@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from repeats import each_once
 
 import archfem as af
 from archfem.statics import Equilibrium
@@ -53,8 +54,7 @@ def test_a_bond_carries_pure_tension_up_to_its_strength(fidelity, rule):
         under(model, 0.0, 1.001 * most)
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
-@pytest.mark.parametrize("rule", ["exact", "lobatto"])
+@pytest.mark.parametrize(("fidelity", "rule"), each_once(("rigid", "faces"), ("lobatto", "exact")))
 def test_a_bonded_bed_breaks_where_its_edge_reaches_the_strength(fidelity, rule):
     """Weight and a push at mid-height: -W / A + 6 M / (w b²) = f_t, with M = H h / 2.
 
@@ -170,8 +170,7 @@ def let_go(path):
     return Equilibrium(model, solved.q, 0, 0)
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
-@pytest.mark.parametrize("rule", ["exact", "lobatto"])
+@pytest.mark.parametrize(("fidelity", "rule"), each_once(("rigid", "faces"), ("lobatto", "exact")))
 def test_a_shear_box_rises_and_falls_on_its_teeth(fidelity, rule):
     """Under constant N: tan ψ × slip up, either way, and back to nothing at the start.
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from kinematics import displacement, gaps
+from repeats import each_once
 from scipy.optimize import minimize_scalar
 
 import archfem as af
@@ -37,8 +38,7 @@ def incline(angle, friction, breadth=1.0, height=0.5):
     )
 
 
-@pytest.mark.parametrize("rule", ["lobatto", "exact"])
-@pytest.mark.parametrize("friction", [0.2, 0.5, 0.8])
+@pytest.mark.parametrize(("friction", "rule"), each_once((0.2, 0.5, 0.8), ("lobatto", "exact")))
 def test_a_block_stays_on_an_incline_up_to_the_angle_of_friction(friction, rule):
     """tan φ = μ - 1e-6 holds, with V / N = tan φ; tan φ = μ + 1e-6 does not."""
     steep = friction - 1e-6

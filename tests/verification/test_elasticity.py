@@ -5,6 +5,7 @@ import pytest
 import ufl
 from dolfinx import fem
 from orders import observed_order
+from repeats import each_once
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
@@ -95,8 +96,7 @@ def test_broken_space_tied_together_is_the_conforming_one(stack, degree):
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: f"{rule.rule}{rule.points or ''}")
-@pytest.mark.parametrize("degree", [1, 2])
-@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+@pytest.mark.parametrize(("degree", "cell"), each_once((1, 2), ("quadrilateral", "triangle")))
 def test_operator_equals_forms(ring, rule, degree, cell, verified):
     """Force and tangent of the sparse products and of the compiled UFL forms."""
     from archfem.models.reference import build_full_model
