@@ -15,8 +15,8 @@ import hashlib
 import archfem as af
 quake = af.Motion.synthetic(duration=2.0, pga=6.0, seed=3)
 ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
-for rung, method in (("full", "newton"), ("faces", "newton"), ("full", "compliance")):
-    model = af.build(ring, fidelity=rung, cells=(4, 4))
+for fidelity, method in (("full", "newton"), ("faces", "newton"), ("full", "compliance")):
+    model = af.build(ring, fidelity=fidelity, cells=(4, 4))
     given = {"dt": 0.005, "damping": af.Rayleigh(0.05, (8.0, 16.0)), "method": method}
     run = af.time_history(model, quake, **given)
     bits = b"".join(run.joints[name].values.tobytes() for name in ("N", "V", "M"))
@@ -55,12 +55,12 @@ def test_a_run_takes_one_thread():
 @pytest.mark.slow
 def test_another_process_another_cache_and_two_threads_give_the_same_bits(tmp_path):
     found = set()
-    for threads_asked, cache in (("1", None), ("2", None), ("2", tmp_path)):
-        asked = {"OPENBLAS_NUM_THREADS": threads_asked, "OMP_NUM_THREADS": threads_asked}
-        asked |= {} if cache is None else {"NUMBA_CACHE_DIR": str(cache)}
+    for threads, cache in (("1", None), ("2", None), ("2", tmp_path)):
+        variables = {"OPENBLAS_NUM_THREADS": threads, "OMP_NUM_THREADS": threads}
+        variables |= {} if cache is None else {"NUMBA_CACHE_DIR": str(cache)}
         done = subprocess.run(
             [sys.executable, "-c", WORK],
-            env={**os.environ, **asked},
+            env={**os.environ, **variables},
             capture_output=True,
             text=True,
             check=True,

@@ -106,8 +106,8 @@ def tried(seed: int, displacements: str, duration: float = 4.0) -> Came:
             duration=duration, pga=rng.uniform(0.5, 20.0), seed=int(rng.integers(1000))
         )
         damping = None if rng.random() < 0.3 else af.StiffnessDamping(0.05, 8.0)
-        rung = ("rigid", "faces")[int(rng.random() < 0.15)]
-        model = af.build(built, fidelity=rung, cells=(2, 2), displacements=displacements)
+        fidelity = ("rigid", "faces")[int(rng.random() < 0.15)]
+        model = af.build(built, fidelity=fidelity, cells=(2, 2), displacements=displacements)
         begun = time.process_time()
         run = af.time_history(model, motion, dt=DT, damping=damping)
         spent = 1e3 * (time.process_time() - begun)
@@ -115,10 +115,10 @@ def tried(seed: int, displacements: str, duration: float = 4.0) -> Came:
         return Came(type(error).__name__, str(error)[:WIDTH])
     except Exception as error:  # what no user should ever see
         return Came("FOREIGN", f"{type(error).__name__}: {error}"[:WIDTH])
-    told, finite = run.dataset.attrs, bool(np.isfinite(run.joints["N"]).all())
-    steps, drift = told["steps"], float(told["energy_drift"])
-    counts = steps, told["halved_steps"], told["fallback_steps"], drift
-    words = f"{built.name}, {rung}: {run.fall.text if run.fall else run.outcome}"[:WIDTH]
+    summary, finite = run.dataset.attrs, bool(np.isfinite(run.joints["N"]).all())
+    steps, drift = summary["steps"], float(summary["energy_drift"])
+    counts = steps, summary["halved_steps"], summary["fallback_steps"], drift
+    words = f"{built.name}, {fidelity}: {run.fall.text if run.fall else run.outcome}"[:WIDTH]
     kind = run.fall.kind if run.fall else "answer"
     wrong = not finite or abs(drift) > RISE
     return Came("WRONG" if wrong else kind, words, *counts, spent / steps)
@@ -128,10 +128,10 @@ Lines = list[tuple[tuple[int, int], tuple[float, float], tuple[float, float]]]
 """Blocks and ends of joints."""
 
 
-def rectangle(name: str, left: float, low: float, right: float, high: float, **told) -> af.Block:
+def rectangle(name: str, left: float, low: float, right: float, high: float, **options) -> af.Block:
     """Build a rectangular stone."""
     return af.Block(
-        ((left, low), (right, low), (right, high), (left, high)), af.STONE, name, **told
+        ((left, low), (right, low), (right, high), (left, high)), af.STONE, name, **options
     )
 
 

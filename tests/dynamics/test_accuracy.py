@@ -22,7 +22,7 @@ def test_the_reference_is_the_finest_and_its_doubt_half_of_it(ring):
 
 
 def test_each_scene_is_tried_once(ring):
-    """Three rungs, meshes and steps by four rules; rigid joints with exact facets have no mesh."""
+    """Three fidelities, meshes and steps by four rules; rigid stones and exact facets: no mesh."""
     labels = [each.label for each in candidate_settings(ring)]
     assert len(labels) == len(set(labels)) == 3 * (3 * 3 * 4) - 2 * 3
     assert labels[0] == "rigid 2×2 nodal 10 ms"
@@ -57,7 +57,7 @@ def test_errors_are_the_largest_difference_to_the_reference(settings):
 
 
 @pytest.mark.parametrize("fails", [False, True])
-def test_no_more_time_is_told_than_has_passed(stack, fails, monkeypatch):
+def test_no_more_time_is_reported_than_has_passed(stack, fails, monkeypatch):
     model = af.build(stack, fidelity="rigid")
     motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1)
     if fails:

@@ -113,8 +113,13 @@ BY_PART = {"backfill": "full", "rest": "faces"}
 
 
 @case("filled span, condensed", "compliance against SNES", fidelity="condensed")
-@case("filled span, rungs by part", "faces of stones, nodes of soil", fidelity=BY_PART, quick=True)
-def rungs(fidelity):
+@case(
+    "filled span, fidelities by part",
+    "faces of stones, nodes of soil",
+    fidelity=BY_PART,
+    quick=True,
+)
+def fidelities(fidelity):
     return compared(bridge(arches=[span()], backfill=fill()), build={"fidelity": fidelity})
 
 

@@ -102,11 +102,11 @@ def _slip(hold, push, last, step, square):
     return slip + speed**2 / (2.0 * hold)
 
 
-def _compared(rung, rule, pga, method):
+def _compared(fidelity, rule, pga, method):
     """By a solver and by SNES; "newton" with Newmark's method, and joints that never slide."""
     newmark = method == "newton"
     contact = joints(friction=None) if newmark else joints()
-    model = af.build(ring(contact=contact), fidelity=rung, quadrature=rule, cells=(2, 2))
+    model = af.build(ring(contact=contact), fidelity=fidelity, quadrature=rule, cells=(2, 2))
     newton = Newton(tolerance=1e-13)
     given = {"newton": newton, "start": af.dead_load(model, newton)}
     given["scheme"] = af.dynamics.Newmark() if newmark else None
@@ -114,23 +114,23 @@ def _compared(rung, rule, pga, method):
     return [shaken(model, motion, method=m, **given) for m in (method, "snes")]
 
 
-def steppers(rung, rule, method):
+def steppers(fidelity, rule, method):
     """The same history by both steppers, joints opening and closing."""
-    run, exact = _compared(rung, rule, 2.0, method)
+    run, exact = _compared(fidelity, rule, 2.0, method)
     return answer(run, off(run, exact), 1e-8)
 
 
 for _rule in ("lobatto", "nodal", "gauss", "exact"):
-    for _method, _rungs in (
+    for _method, _fidelities in (
         ("compliance", ("rigid", "faces", "condensed", "full")),
         ("newton", ("rigid", "faces", "condensed", "full")),
     ):
-        for _rung in _rungs:
+        for _fidelity in _fidelities:
             case(
-                f"{_method} stepper, {_rung}, {_rule}",
+                f"{_method} stepper, {_fidelity}, {_rule}",
                 "active set against SNES",
-                quick=_rung == "faces" and _rule == "exact",
-                rung=_rung,
+                quick=_fidelity == "faces" and _rule == "exact",
+                fidelity=_fidelity,
                 rule=_rule,
                 method=_method,
             )(steppers)

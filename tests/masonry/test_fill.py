@@ -224,7 +224,7 @@ def test_pieces_fill_the_body_and_are_soil_still():
     soil = find_yielding_blocks(fill)
     assert sum(fill.blocks[n].area for n in soil) == pytest.approx(whole.blocks[-1].area)
     assert {fill.blocks[n].part for n in soil} == {"backfill"}
-    assert find_soft_blocks(fill) == ()  # no rung is too low for them
+    assert find_soft_blocks(fill) == ()  # no fidelity is too low for them
     assert [j.name for j in fill.joints if j.role == "ring"] == [
         j.name for j in whole.joints if j.role == "ring"
     ]

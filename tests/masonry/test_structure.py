@@ -79,7 +79,7 @@ def test_blocks_and_joints_by_name_or_number(stack):
 
 
 def test_blocks_that_overlap_or_cross_themselves_are_refused():
-    """On any rung: a rigid one has no mesh that would tell."""
+    """At any fidelity: rigid blocks have no mesh that would fail."""
     column = af.column(breadth=1.0, heights=[1.0, 1.0])
     reaching = [(-0.5, 2.0), (-0.5, 0.6), (0.0, 0.6), (0.0, 1.0), (0.5, 1.0), (0.5, 2.0)]
     crossing = [(-0.5, 2.0), (-0.5, 1.0), (0.5, 1.0), (0.3, 2.2), (0.9, 2.2), (-0.1, 1.6)]
@@ -131,13 +131,13 @@ def test_a_fingerprint_tells_geometry_to_a_billionth_of_its_size():
         ]
         return af.masonry.assembled(blocks, af.masonry.STONE_TO_STONE, **more)
 
-    told, size = pair(1.0).fingerprint, 5.0
+    fingerprint, size = pair(1.0).fingerprint, 5.0
     assert pair(1.0).size == size
-    assert pair(1.0 + 3e-10 * size).fingerprint == told
-    assert pair(1.0 + 1e-9 * size).fingerprint != told
-    assert pair(1.0, name="another", gravity=5.0).fingerprint == told
-    assert pair(1.0, zero=-0.0).fingerprint == told
-    assert pair(1.0, width=1.0 + 2e-9).fingerprint == told
-    assert pair(1.0, width=1.0 + 2e-8).fingerprint != told
+    assert pair(1.0 + 3e-10 * size).fingerprint == fingerprint
+    assert pair(1.0 + 1e-9 * size).fingerprint != fingerprint
+    assert pair(1.0, name="another", gravity=5.0).fingerprint == fingerprint
+    assert pair(1.0, zero=-0.0).fingerprint == fingerprint
+    assert pair(1.0, width=1.0 + 2e-9).fingerprint == fingerprint
+    assert pair(1.0, width=1.0 + 2e-8).fingerprint != fingerprint
     # files that are written already are still of their structures
     assert af.column(breadth=1.0, heights=[1.0, 1.0]).fingerprint == "f33242d1fb0986b7"

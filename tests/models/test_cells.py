@@ -20,11 +20,11 @@ def test_rims_run_once_around_each_block(ring_model):
         assert abs(twice[own].sum()) / 2.0 == pytest.approx(block_.area, rel=5e-4)
 
 
-@pytest.mark.parametrize("rung", ["rigid", "faces", "full"])
-def test_an_inclined_load_has_the_arm_of_the_arc(rung):
+@pytest.mark.parametrize("fidelity", ["rigid", "faces", "full"])
+def test_an_inclined_load_has_the_arm_of_the_arc(fidelity):
     """Its work on a turn of the whole plane, although meshes have chords for the arc."""
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=9)
-    model = af.build(ring, fidelity=rung, cells=(2, 2))
+    model = af.build(ring, fidelity=fidelity, cells=(2, 2))
     push = af.PointLoad(-0.7, (2e3, -1.5e3))
     turned = rigid_motion_matrix(model.cells.places, np.zeros(2)) @ [0.0, 0.0, 1.0]
     of_free = np.isin(model.cells.block, ring.free)

@@ -63,16 +63,16 @@ def wall():
 
 
 @cache
-def rungs(rule="lobatto", degree=1, cell="quadrilateral"):
+def models(rule="lobatto", degree=1, cell="quadrilateral"):
     """The wall with all nodes, by matrices and by weak forms."""
     given = {"cells": (1, 1), "quadrature": rule, "degree": degree, "cell": cell}
-    return [af.build(wall(), fidelity=rung, **given) for rung in ("full", "monolithic")]
+    return [af.build(wall(), fidelity=fidelity, **given) for fidelity in ("full", "monolithic")]
 
 
 @pytest.fixture(params=SETTINGS, ids=lambda setting: setting[0])
 def both(request):
     """Two models that remember the same random slips, a state, and a direction."""
-    full, slow = rungs(*request.param)
+    full, slow = models(*request.param)
     random = np.random.default_rng(3)
     memory = 1e-4 * random.standard_normal(len(full.memory))
     start, q = 1e-4 * random.standard_normal((2, full.size))
@@ -108,7 +108,7 @@ def test_a_step_is_that_of_the_joint_operator(both, late):
 
 
 def test_joints_that_just_touch_are_closed_and_hold():
-    full, slow = rungs()
+    full, slow = models()
     rest = np.zeros(full.size)
     assert (
         abs(slow.tangent(rest) - full.closed_tangent()).max()
@@ -123,7 +123,7 @@ def test_a_support_that_has_moved_moves_the_joints():
         each.settled(af.Settlement("base", (1e-4, -2e-4, 1e-5))).with_memory(
             1e-5 * np.arange(len(each.memory))
         )
-        for each in rungs()
+        for each in models()
     )
     start, q = 1e-4 * np.random.default_rng(4).standard_normal((2, full.size))
     assert differ(slow.resultants(q), full.resultants(q)) < SAME
@@ -132,7 +132,7 @@ def test_a_support_that_has_moved_moves_the_joints():
 
 
 def test_memory_of_a_copy_is_its_own():
-    _, slow = rungs()
+    _, slow = models()
     q = 1e-4 * np.random.default_rng(5).standard_normal(slow.size)
     force = slow.force(q)
     passage = slow.begin_step(np.zeros(slow.size), 0.0)
@@ -160,8 +160,8 @@ def test_no_cell_has_two_facets_of_one_colour():
 
 @cache
 def dead():
-    """The wall under its own weight, on both rungs."""
-    return [af.dead_load(model, TIGHT) for model in rungs()]
+    """The wall under its own weight, at both fidelities."""
+    return [af.dead_load(model, TIGHT) for model in models()]
 
 
 def test_dead_load_under_which_joints_slide():
@@ -188,5 +188,5 @@ def test_history_in_which_joints_open_and_slide():
         assert differ(slow.dataset[key], full.dataset[key]) < SOLVED
     of_beds = full.joints["friction"].isel(joint=slice(2)).max("time")
     assert of_beds.values == pytest.approx(BED.friction, rel=1e-9)  # all of their points slide
-    open_ = ~is_closed(rungs()[0].operator.effective_gaps(full.dataset["last_q"].values))
+    open_ = ~is_closed(models()[0].operator.effective_gaps(full.dataset["last_q"].values))
     assert 0.0 < open_.mean() < 1.0

@@ -14,7 +14,7 @@ from archfem.statics.newton import Solution
 
 
 def semicircle(share, fidelity):
-    """Of 17 chorded stones, so many times as thick as limit analysis of the same polygon asks."""
+    """A ring of 17 chorded stones, `share` times as thick as its polygon must be to stand."""
     given = {"radius": 1.0, "embrace": 180.0, "voussoirs": 17, "chords": 1}
     return af.build(af.circular_arch(thickness=share * 0.10546, **given), fidelity=fidelity)
 
@@ -36,7 +36,7 @@ def test_a_ring_does_not_stand_just_below_its_least_thickness(fidelity):
 
 
 def test_point_load_is_carried_whole(ring):
-    """Thrusts at both springings balance weight and load, on either rung."""
+    """Thrusts at both springings balance weight and load, at either fidelity."""
     load = af.PointLoad(x=1.0, force=(0.0, -5e3))
     for fidelity in ("rigid", "full"):
         model = af.build(ring, fidelity=fidelity)
@@ -74,12 +74,12 @@ class Growing:
 
 def grown(most, ways=("whole", "half", "least")):
     """Parts of a load at which an equilibrium was sought up to a largest one, and how it was."""
-    asked, begin = [], Equilibrium(Growing(), np.zeros(1), 5, 2)
+    calls, begin = [], Equilibrium(Growing(), np.zeros(1), 5, 2)
 
     def way(name):
         def find(solver, model, load, start):
-            asked.append((float(load), name, float(start[0])))
-            if load > most(len(asked)):
+            calls.append((float(load), name, float(start[0])))
+            if load > most(len(calls)):
                 raise af.DidNotConverge("made to fail")
             return model, Solution(np.array([load]), 3, 0.0)
 
@@ -89,24 +89,24 @@ def grown(most, ways=("whole", "half", "least")):
     try:
         found = _increment_load(None, begin, lambda part: (begin.model, part), "load", ways)
     except af.DidNotConverge as error:
-        return asked, error
-    return asked, found
+        return calls, error
+    return calls, found
 
 
 def test_steps_of_a_load_are_halved_where_there_is_no_equilibrium():
     """To a half, and from then on as long as that; each begins where the last one ended."""
-    asked, found = grown(lambda count: 0.6 if count == 1 else 1.0)
-    assert asked == [(1.0, "whole", 0.0), (0.5, "half", 0.0), (1.0, "half", 0.5)]
+    calls, found = grown(lambda count: 0.6 if count == 1 else 1.0)
+    assert calls == [(1.0, "whole", 0.0), (0.5, "half", 0.0), (1.0, "half", 0.5)]
     assert (found.iterations, found.steps, found.q[0]) == (5 + 6, 2 + 2, 1.0)
 
 
 def test_a_load_is_given_up_at_a_sixty_fourth_of_it():
-    """Another way is tried for the smallest step; what was found last is told, and how far."""
-    asked, error = grown(lambda count: 0.3)
-    parts = [part for part, *_ in asked]
+    """Another way is tried for the smallest step; the error has the last state and its load."""
+    calls, error = grown(lambda count: 0.3)
+    parts = [part for part, *_ in calls]
     known = [1.0, 0.5, 0.25, 0.5, 0.375, 0.3125, 0.28125, 0.3125, 0.296875, 0.3125]
     assert parts == pytest.approx(known)
-    assert [name for _, name, _ in asked][-3:] == ["half", "least", "least"]
+    assert [name for _, name, _ in calls][-3:] == ["half", "least", "least"]
     assert "no equilibrium beyond 0.297 of the load" in str(error)
     assert error.last.q[0] == pytest.approx(0.296875)
 
@@ -120,9 +120,9 @@ def test_an_equilibrium_in_a_line(stack):
 
 def resting(**given):
     """A ring with joints of some friction, under its weight."""
-    told = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 9} | given
-    contact = af.Contact(1.48e9, 0.30e9, told.pop("friction", 0.6))
-    ring = af.circular_arch(**told, contact=contact)
+    dimensions = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 9} | given
+    contact = af.Contact(1.48e9, 0.30e9, dimensions.pop("friction", 0.6))
+    ring = af.circular_arch(**dimensions, contact=contact)
     return af.dead_load(af.build(ring, fidelity="rigid"))
 
 
@@ -171,7 +171,7 @@ def test_joints_of_stone_are_not_smooth():
     assert doubt.remedy == "joints of stone have 0.6 to 0.75: check it"
 
 
-def test_one_smooth_joint_among_rough_ones_is_told(stack):
+def test_one_smooth_joint_among_rough_ones_is_named(stack):
     rough, other = stack.joints
     slippery = replace(other, contact=replace(other.contact, friction=0.02))
     mixed = replace(stack, joints=(rough, slippery))
@@ -221,7 +221,7 @@ def test_check_says_so(embrace, code, tmp_path, capsys):
 
 
 def thin_ring(stiffness, unit_weight=20e3):
-    """1.03 times as thick as limit analysis asks, 0.19568 m, in large displacements."""
+    """1.03 times as thick as limit analysis needs, 0.19568 m, in large displacements."""
     ring = af.circular_arch(
         radius=2.95,
         thickness=1.03 * 0.19568,
@@ -233,7 +233,7 @@ def thin_ring(stiffness, unit_weight=20e3):
     return af.build(ring, fidelity="rigid", displacements="large")
 
 
-def test_what_is_too_soft_in_large_displacements_is_told_how_stiff_it_must_be(verified):
+def test_an_error_of_large_displacements_states_the_stiffness_that_is_needed(verified):
     """By a path along which the weight grows past its peak, whose steps resolve it to 0.05 %."""
     light = 0.02  # of the weight that is there at the start of the path
     path = af.pushover(thin_ring(1e11, light * 20e3), af.BodyForce(0.0, -1.0), control="path")
@@ -242,17 +242,17 @@ def test_what_is_too_soft_in_large_displacements_is_told_how_stiff_it_must_be(ve
     assert factors[-1] < 0.999 * factors.max()
     with pytest.raises(af.DidNotConverge, match="joints are too soft for its depth") as caught:
         dead_load(thin_ring(1e11))
-    told = float(re.search(r"k_n from (\S+) Pa/m on", str(caught.value))[1])
-    verified("stiffness at which a thin ring stands [Pa/m]", least, "path past its peak", told)
-    # a step of the load is a sixty-fourth, and what is told is rounded up to two digits
-    assert least < told < 1.12 * least
-    assert dead_load(thin_ring(told)).steps >= 1
+    reported = float(re.search(r"k_n from (\S+) Pa/m on", str(caught.value))[1])
+    verified("stiffness at which a thin ring stands [Pa/m]", least, "path past its peak", reported)
+    # a step of the load is a sixty-fourth, and the reported stiffness is rounded up to two digits
+    assert least < reported < 1.12 * least
+    assert dead_load(thin_ring(reported)).steps >= 1
     assert dead_load(thin_ring(1.01 * least)).steps >= 1
     with pytest.raises(af.DidNotConverge):
         dead_load(thin_ring(0.97 * least))
 
 
-def test_a_ring_that_carries_a_thousandth_of_its_weight_is_told_so_too():
+def test_the_error_also_states_that_a_ring_carries_a_thousandth_of_its_weight():
     """The first step of the load is longer than what it carries."""
     with pytest.raises(af.DidNotConverge, match=r"(39|4[01])0 times as stiff, k_n from [56]\.\de"):
         dead_load(thin_ring(1.48e9))

@@ -33,10 +33,10 @@ def check_balance(model, joints):
     return max(left)
 
 
-@pytest.mark.parametrize("rung", ["rigid", "faces", "full"])
+@pytest.mark.parametrize("fidelity", ["rigid", "faces", "full"])
 @pytest.mark.parametrize("name", ["ring", "stack", "portal"])
-def test_forces_on_every_block_balance(request, name, rung):
-    model = af.build(request.getfixturevalue(name), fidelity=rung)
+def test_forces_on_every_block_balance(request, name, fidelity):
+    model = af.build(request.getfixturevalue(name), fidelity=fidelity)
     check_balance(model, af.dead_load(model).joints)
 
 

@@ -105,7 +105,7 @@ def test_effective_masses_add_up_to_all_that_moves(fidelity, verified):
     assert found.effective_masses.sum(axis=0) == pytest.approx(of_blocks(shape), rel=1e-10)
     assert found.masses == pytest.approx(of_blocks(shape), rel=1e-10)
     total = found.effective_masses.sum(axis=0)
-    case = "effective masses of all modes, each rung [kg]"
+    case = "effective masses of all modes, each fidelity [kg]"
     verified(case, of_blocks(shape), "mass that can move", total[0])
 
 
@@ -119,7 +119,7 @@ def test_as_dense_lapack_about_dead_load(ring, fidelity, verified):
     squares, shapes = eigh(stiffness, mass, subset_by_index=[0, 11])
     assert found.frequencies == pytest.approx(hertz(squares), rel=SAME)
     off = np.abs(found.frequencies / hertz(squares) - 1.0).max()
-    case = "twelve modes of the ring about the dead load, each rung"
+    case = "twelve modes of the ring about the dead load, each fidelity"
     verified(case, "equal", "dense LAPACK", "equal", difference=off)
     assert found.shapes.T @ mass @ found.shapes == pytest.approx(np.eye(12), abs=1e-8)
     assert np.abs(np.diag(shapes.T @ mass @ found.shapes)) == pytest.approx(1.0, abs=1e-7)
@@ -139,8 +139,8 @@ def test_open_joints_lower_the_first_frequency(ring):
 
 def test_monolithic_as_full(ring):
     both = [
-        af.build(ring, fidelity=rung, cells=(2, 2), quadrature="lobatto")
-        for rung in ("full", "monolithic")
+        af.build(ring, fidelity=fidelity, cells=(2, 2), quadrature="lobatto")
+        for fidelity in ("full", "monolithic")
     ]
     full, slow = (modes(model, 6, about=af.dead_load(model)) for model in both)
     assert slow.frequencies == pytest.approx(full.frequencies, rel=SAME)
@@ -167,7 +167,7 @@ def test_a_mechanism_does_not_vibrate():
     assert caught.value.last is lifted
 
 
-def test_what_cannot_be_asked_for():
+def test_invalid_requests_are_refused():
     model, other = block(), af.build(af.column(breadth=1.0, heights=[1.0, 1.0]), fidelity="rigid")
     for count in (0, 4):
         with pytest.raises(af.InvalidInput, match=f"{count} modes of a model with 3 coordinates"):

@@ -25,7 +25,7 @@ KEYSTONE = abs(RING.joints[8].extrados[0]) * (1.0 - 1e-9)
 
 
 def rigid(structure, **given):
-    """Rigid blocks; by Lobatto's rule, unless told otherwise, joints reach |e| = 0.5."""
+    """Rigid blocks; by Lobatto's rule, the default here, joints reach |e| = 0.5."""
     return af.build(structure, fidelity="rigid", **{"quadrature": "lobatto", **given})
 
 
@@ -58,7 +58,7 @@ def spread(motion):
 
 
 REACHED = 5e-3
-"""Relative: how near a pushover must come to the limit of the polygon it models."""
+"""Relative tolerance of a pushover against the limit of the polygon that it models."""
 
 
 QUICK = [("force", "sideways"), ("displacement", "eccentric"), ("arc length", "two at the crown")]
@@ -82,7 +82,7 @@ def test_rigid_blocks_on_elastic_joints_reach_the_limit(control, load):
 
 
 @pytest.mark.parametrize(
-    ("rung", "load"),
+    ("fidelity", "load"),
     [
         ("faces", "two at the crown"),
         ("condensed", "sideways"),
@@ -92,27 +92,29 @@ def test_rigid_blocks_on_elastic_joints_reach_the_limit(control, load):
         pytest.param("full", "sideways", marks=pytest.mark.slow),
     ],
 )
-def test_every_rung_reaches_the_limit_of_its_polygon(rung, load, verified):
+def test_every_fidelity_reaches_the_limit_of_its_polygon(fidelity, load, verified):
     limit = limit_of(LOADS[load])
-    found = pushover(af.build(RING, fidelity=rung, cells=(4, 2), quadrature="lobatto"), LOADS[load])
+    found = pushover(
+        af.build(RING, fidelity=fidelity, cells=(4, 2), quadrature="lobatto"), LOADS[load]
+    )
     assert found.factor == pytest.approx(limit, rel=REACHED)
     assert found.factor <= limit * (1.0 + 1e-5)
-    case = f"pushover of rung {rung}, {load}: limit"
+    case = f"pushover of fidelity {fidelity}, {load}: limit"
     verified(case, limit, "limit analysis of its polygon", found.factor)
 
 
-@pytest.mark.parametrize("rung", ["rigid", "faces"])
-def test_exact_facets_only_approach_it_and_their_extrapolation_reaches_it(rung):
+@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+def test_exact_facets_only_approach_it_and_their_extrapolation_reaches_it(fidelity):
     """The compressed strip never vanishes: 2 % are missing after 10 % of the span and rise."""
     limit = af.collapse_factor(RING, live=LOADS["eccentric"], friction=None).factor
-    found = pushover(af.build(RING, fidelity=rung, quadrature="exact"), LOADS["eccentric"])
+    found = pushover(af.build(RING, fidelity=fidelity, quadrature="exact"), LOADS["eccentric"])
     assert found.factor < 0.99 * limit
     assert found.limit == pytest.approx(limit, rel=REACHED)
     assert found.uncertainty == pytest.approx(0.02 * limit, rel=0.2)
 
 
 def test_a_rule_without_points_at_the_faces_cannot_reach_it():
-    """Gauss's outermost point is the lever arm: the curve is flat below the limit, and knows it."""
+    """Gauss's outermost point is the lever arm: the curve is flat below the limit, and says so."""
     limit = af.collapse_factor(RING, live=LOADS["sideways"], friction=None).factor
     found = pushover(rigid(RING, quadrature="gauss"), LOADS["sideways"])
     assert "slope fell" in found.outcome
@@ -260,12 +262,12 @@ def test_a_support_that_moves_finds_the_limit_state_that_resists_it_least(motion
     assert factor.attrs["units"] == "N m"
 
 
-@pytest.mark.parametrize("rung", ["faces", "full"])
-def test_spreading_supports_bring_meshed_rungs_to_the_least_thrust(rung):
+@pytest.mark.parametrize("fidelity", ["faces", "full"])
+def test_spreading_supports_bring_meshed_fidelities_to_the_least_thrust(fidelity):
     settlement = af.Settlement("left abutment", (-1.0, 0.0, 0.0))
     limit = af.collapse_factor(RING, live=settlement, friction=None).factor
     found = pushover(
-        af.build(RING, fidelity=rung, cells=(4, 2), quadrature="lobatto"),
+        af.build(RING, fidelity=fidelity, cells=(4, 2), quadrature="lobatto"),
         settlement,
         stop=Stop(slope=1e-4),
     )
@@ -345,12 +347,12 @@ def test_a_limit_is_extrapolated_from_the_last_doubling():
 
 
 class Steps:
-    """A path that fails where it is told to, and otherwise rises evenly."""
+    """A path that fails at given steps, and otherwise rises evenly."""
 
     moving, units = "load", "1"
 
     def __init__(self, fails=(), iterations=9):
-        self.fails, self.asked, self.each = list(fails), [], iterations
+        self.fails, self.distances, self.each = list(fails), [], iterations
         self.borders = []
         self.unit, self.states, self.iterations = (1.0, 1.0), [0], [0]
         self.displacements, self.factors = np.zeros(1), [0.0]
@@ -358,7 +360,7 @@ class Steps:
         self.joint_forces = []
 
     def advance(self, border, distance):
-        self.asked.append(distance)
+        self.distances.append(distance)
         self.borders.append(border.tolist())
         if self.fails and self.fails.pop(0):
             return False
@@ -374,7 +376,7 @@ def test_steps_grow_by_a_tenth_and_are_halved_where_they_fail():
     said = follow(path, "force", Stop(steps=4), af.Criteria())
     assert said == "4 steps were taken"
     known = [1.0, 1.1, 1.21, 0.605, 0.3025, 0.33275]
-    assert path.asked == pytest.approx(known)
+    assert path.distances == pytest.approx(known)
 
 
 def test_steps_are_given_up_below_a_thousandth_of_the_first():
@@ -382,7 +384,7 @@ def test_steps_are_given_up_below_a_thousandth_of_the_first():
     path = Steps([True] * 99)
     with pytest.raises(af.DidNotConverge, match="no equilibrium just after the dead load"):
         follow(path, "force", Stop(), af.Criteria())
-    assert path.asked == pytest.approx(0.5 ** np.arange(10))
+    assert path.distances == pytest.approx(0.5 ** np.arange(10))
 
 
 def test_rules_end_a_path_where_they_are_met():
@@ -408,7 +410,7 @@ def test_rules_end_a_path_where_they_are_met():
     assert stop_reason(path, Stop(displacement=1.0), criteria, even) is None
 
 
-def test_arc_length_goes_on_in_the_direction_of_the_last_step():
+def test_arc_length_continues_in_the_direction_of_the_last_step():
     """Of length one, half of each at first; the units of both are those of the first step."""
     path = Steps()
     path.unit = (0.5, 2.0)

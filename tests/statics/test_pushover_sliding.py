@@ -19,7 +19,7 @@ EXACT = 1e-7
 """Relative: programmes are solved to 1e-9 block weights, and the curve is flat at its end."""
 
 TENDS = 1e-3
-"""Relative: how near the extrapolation of a curve comes to its limit."""
+"""Relative tolerance of the extrapolation of a curve against its limit."""
 
 REACHED = 5e-3
 """Relative: what is missing where a path ends far along, and its last steps are coarse."""
@@ -75,7 +75,7 @@ def test_dry_fill_reaches_the_limit_of_joints_that_slide_flat(verified):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("control", ["displacement", "force"])
-def test_dry_fill_goes_on_by_creep_where_steps_would_crawl(control):
+def test_dry_fill_continues_by_creep_where_steps_would_be_tiny(control):
     """By steps alone it was at 0.88 of the limit after 400 of them."""
     fill = boxed(3.0, 0.7)
     push = af.pushover(af.build(fill, fidelity="rigid", cells=(1, 1)), SIDEWAYS, control=control)
@@ -148,14 +148,14 @@ def test_what_hardly_moves_in_many_steps_crawls(
 @pytest.mark.parametrize(("control", "each", "growth"), [("path", 4, 1.4), ("path", 5, 1.1),
                                                          ("force", 4, 1.1)])  # fmt: skip
 def test_steps_along_the_path_grow_faster_where_they_are_easy(control, each, growth):
-    asked = []
+    distances = []
     path = SimpleNamespace(displacements=np.zeros(1), factors=[0.0], iterations=[0], states=[0])
     structure = SimpleNamespace(size=1e9)
     path.model = SimpleNamespace(structure=structure, large_displacements=False)
     path.unit, path.units, path.moving = (1.0, 1.0), "1", "load"
 
     def advance(border, distance):
-        asked.append(distance)
+        distances.append(distance)
         path.displacements = np.append(path.displacements, path.displacements[-1] + distance)
         for values, new in ((path.factors, path.displacements[-1]), (path.iterations, each)):
             values.append(new)
@@ -164,20 +164,20 @@ def test_steps_along_the_path_grow_faster_where_they_are_easy(control, each, gro
 
     path.advance = advance
     follow(path, control, Stop(steps=4), af.Criteria())
-    assert asked == pytest.approx(growth ** np.arange(4.0))
+    assert distances == pytest.approx(growth ** np.arange(4.0))
 
 
 class Slow(LoadPath):
-    """A path that creeps on where it is told to."""
+    """A path that creeps at given steps."""
 
     displacements = np.array([0.0, 2.0])
 
     def __init__(self, creeps=()):
-        self.creeps, self.asked, self.states = list(creeps), [], [0, 0]
+        self.creeps, self.creep_calls, self.states = list(creeps), [], [0, 0]
         self.factors, self.unit = [0.0, 0.4], (1.0, 0.1)
 
     def advance_by_relaxation(self, grown, farthest):
-        self.asked.append((grown, farthest))
+        self.creep_calls.append((grown, farthest))
         return self.creeps.pop(0)
 
 
@@ -188,9 +188,9 @@ def test_creep_takes_the_place_of_failed_steps_and_the_seldomer_the_oftener_in_v
     creeping = pushover._StepRelaxation(path, af.Criteria(), 9.0)
     tried = []
     for k in range(17):
-        before = len(path.asked)
+        before = len(path.creep_calls)
         creeping.advance(np.array([0.0, 1.0]), 1.0)
-        if len(path.asked) > before:
+        if len(path.creep_calls) > before:
             tried.append(k)
     assert tried == [0, 2, 6, 14, 15]
 
@@ -209,7 +209,7 @@ def test_creep_brings_as_much_load_as_the_step_would_have_brought(monkeypatch):
         assert pushover._StepRelaxation(path, af.Criteria(), 9.0).advance(
             np.array(border), distance
         )
-        assert path.asked == [(pytest.approx(grown), 9.0)]
+        assert path.creep_calls == [(pytest.approx(grown), 9.0)]
     falling, fresh, settled = Slow(), Slow(), SimpleNamespace(states=[0, 0])
     falling.factors, fresh.states = [0.4, 0.4], [0]
     for path in (falling, fresh, settled):
@@ -234,18 +234,18 @@ STOP = af.statics.Stop(displacement=0.25)
 
 
 class RelaxedPath(LoadPath):
-    """A path whose joints slide, and that creeps on where it is told to."""
+    """A path whose joints slide, and that creeps at given steps."""
 
     displacements = np.array([0.0, 2.0])
 
     def __init__(self, creeps, states=2, factor=0.4, grain=False):
-        self.creeps, self.asked = list(creeps), []
+        self.creeps, self.creep_calls = list(creeps), []
         self.states, self.factors, self.unit = [0] * states, [0.0, factor], (1.0, 0.1)
         blocks = (SimpleNamespace(grain=grain),)
         self.model = SimpleNamespace(structure=SimpleNamespace(size=8.0, blocks=blocks))
 
     def advance_by_relaxation(self, grown, farthest):
-        self.asked.append((grown, farthest))
+        self.creep_calls.append((grown, farthest))
         if not self.creeps.pop(0):
             return False
         self.factors.append(self.factors[-1] + grown)
@@ -271,13 +271,13 @@ def test_loads_grow_by_a_twentieth_and_less_while_the_structure_creeps(slides, m
     monkeypatch.setattr(pushover, "stop_reason", finished)
     path = RelaxedPath([True, False, True, *[False] * 9])
     assert pushover.continue_by_relaxation(path, STOP, af.Criteria()) is None
-    grown = [each for each, _ in path.asked]
+    grown = [each for each, _ in path.creep_calls]
     first, second = 0.05 * 0.4, 0.05 * 0.42
     rest = 0.42 + 0.5 * second
     assert grown == pytest.approx(
         [first, second, 0.5 * second, *(0.025 * rest / 2.0**k for k in range(4))]
     )
-    assert {farthest for _, farthest in path.asked} == {2.0}
+    assert {farthest for _, farthest in path.creep_calls} == {2.0}
     assert moved[0] == pytest.approx([0.5, first / 0.1])
     assert len(moved) == 2
 
@@ -317,7 +317,7 @@ def test_only_what_slides_after_a_first_step_creeps(slides):
         ("path", True, "no equilibrium was found past a factor of 0.4"),
     ],
 )
-def test_what_slides_is_told_where_nothing_more_is_found(slides, control, grain, words):
+def test_sliding_joints_are_named_where_nothing_more_is_found(slides, control, grain, words):
     said = pushover.failure_message(RelaxedPath([], grain=grain), control, af.Criteria())
     assert said.startswith(words)
     assert "such as 'bed 3'" in said

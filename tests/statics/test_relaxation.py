@@ -119,7 +119,7 @@ def test_a_support_spreads_under_fill_in_pieces(bridge):
     assert found.factor < 0.9 * float(found.curve["factor"][0])
 
 
-def test_a_load_on_fill_in_pieces_goes_on_by_creep(bridge):
+def test_a_load_on_fill_in_pieces_continues_by_creep(bridge):
     """Each state is in balance and none beyond Coulomb; what cannot be borne adds none."""
     fill = af.masonry.jointed_fill(bridge, 0.8, angle=35.0, cohesion=10e3)
     dead = af.dead_load(af.build(fill, fidelity="rigid", cells=(2, 1)))
@@ -146,7 +146,7 @@ def counting(monkeypatch):
     return made
 
 
-def test_iterations_that_are_told_are_those_made(stack, ring, monkeypatch):
+def test_reported_iterations_are_those_made(stack, ring, monkeypatch):
     """By creep, under dead load at once and in stages, on a support that moves, and by a push."""
     model, made = af.build(stack, fidelity="rigid"), counting(monkeypatch)
     _, solved = relax(
@@ -164,14 +164,14 @@ def test_iterations_that_are_told_are_those_made(stack, ring, monkeypatch):
 
 
 def test_where_newton_fails_a_step_of_creep_is_made_with_given_limits(stack, monkeypatch):
-    """Six times, each from limits of the one before; what they all took is told."""
-    asked = []
+    """Six times, each from limits of the one before; the iterations of all are reported."""
+    calls = []
 
     def dragged(solver, model, load, starts, drag, searches):
-        asked.append((starts, searches, getattr(model, "operator", model)))
-        if len(asked) == 1:
+        calls.append((starts, searches, getattr(model, "operator", model)))
+        if len(calls) == 1:
             raise af.DidNotConverge("made to fail")
-        return Solution(starts[1] + 1.0, len(asked), 0.5)
+        return Solution(starts[1] + 1.0, len(calls), 0.5)
 
     monkeypatch.setattr("archfem.statics.relaxation._solve_with_drag", dragged)
     model = af.build(stack, fidelity="rigid")
@@ -180,9 +180,9 @@ def test_where_newton_fails_a_step_of_creep_is_made_with_given_limits(stack, mon
         EquilibriumSolver(model.size), model, load, start, model.closed_tangent()
     )
     assert solved.iterations == sum(range(2, 8))
-    assert [float(guess[0]) for (_, guess), _, _ in asked] == [0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
-    assert all(not first.any() for (first, _), _, _ in asked)
-    assert [searches for _, searches, _ in asked] == [("basic",)] + [("basic", "cp")] * 6
+    assert [float(guess[0]) for (_, guess), _, _ in calls] == [0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    assert all(not first.any() for (first, _), _, _ in calls)
+    assert [searches for _, searches, _ in calls] == [("basic",)] + [("basic", "cp")] * 6
     assert (solved.q == 6.0).all()
 
 
@@ -213,17 +213,17 @@ class Creeping:
 @pytest.fixture
 def drags(monkeypatch):
     """The drag of each step; a step takes what `iterations` says, or fails where that is None."""
-    asked, iterations = [], []
+    drag_history, iterations = [], []
 
     def crept(solver, model, load, start, drag):
-        asked.append(float(drag[0, 0]))
+        drag_history.append(float(drag[0, 0]))
         taken = iterations.pop(0) if len(iterations) > 1 else iterations[0]
         if taken is None:
             raise af.DidNotConverge("made to fail")
         return Solution(start, taken, 0.0)
 
     monkeypatch.setattr("archfem.statics.relaxation._solve_creep_step", crept)
-    return asked, iterations
+    return drag_history, iterations
 
 
 def creep(part):
@@ -232,26 +232,26 @@ def creep(part):
 
 def test_drag_falls_after_easy_steps_and_grows_after_failed_ones(drags):
     """By four; eight iterations are easy, nine are not. It is given up beyond 256."""
-    asked, iterations = drags
+    drag_history, iterations = drags
     iterations += [8, 9, 9, None, 8]
     _, solved = creep(0.9999)
-    assert asked == [1.0, 0.25, 0.25]
+    assert drag_history == [1.0, 0.25, 0.25]
     assert solved.iterations == 8 + 9 + 9
-    asked.clear()
+    drag_history.clear()
     iterations[:] = [None]
     with pytest.raises(af.DidNotConverge, match="in 0 steps of creep"):
         creep(0.5)
-    assert asked == [1.0, 4.0, 16.0, 64.0, 256.0]
+    assert drag_history == [1.0, 4.0, 16.0, 64.0, 256.0]
 
 
 @pytest.mark.parametrize(("part", "steps"), [(0.05, 12), (0.07, 100)])
-def test_creep_goes_on_while_what_is_left_halves_in_twelve_steps(drags, part, steps):
+def test_creep_continues_while_the_residual_halves_in_twelve_steps(drags, part, steps):
     """0.95¹¹ is 0.57, 0.93¹¹ is 0.45; a hundred steps are made at most."""
-    asked, iterations = drags
+    drag_history, iterations = drags
     iterations += [9]
     with pytest.raises(af.DidNotConverge, match=f"in {steps} steps of creep") as caught:
         creep(part)
-    assert len(asked) == steps
+    assert len(drag_history) == steps
     assert f"{(1.0 - part) ** steps:.2e} of 1.00e+00 stays" in str(caught.value)
 
 

@@ -112,8 +112,8 @@ def test_a_wedge_slides_out_of_its_groove(friction, control):
 def test_limit_analysis_may_pinch_a_wedge_that_has_never_been_pressed():
     """Narrower above than below, its faces at 10°, it falls, unless it had been driven in before.
 
-    Limit analysis asks whether forces *can* hold it, and they can at μ > tan 10°; the dead load
-    asks what comes about from rest.
+    Limit analysis finds whether forces *can* hold it, and they can at μ > tan 10°; the dead load
+    is the state that is reached from rest.
     """
     lean = np.tan(np.radians(10.0))
     wedge = ((-0.5 - lean, 0.0), (0.5 + lean, 0.0), (0.5, 1.0), (-0.5, 1.0))
@@ -215,7 +215,7 @@ def thrust_at_springing(thickness):
 def test_an_arch_slides_at_its_springings(thickness):
     """H is at most μ W at the foot, and at least what the line of thrust needs within the ring.
 
-    The rigid rung stands and falls on either side of that coefficient, as limit analysis has it,
+    The rigid model stands and falls on either side of that coefficient, as limit analysis has it,
     with springs at the edges: under exact integration a joint comes up to N h/2 as it turns.
     """
     needed = thrust_needed(1.0, thickness, 16)

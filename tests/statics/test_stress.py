@@ -99,10 +99,10 @@ def test_corners_tell_the_peak_where_centres_miss_it(ring, ring_model, dead):
     assert abs(centres / exact - 1.0) > 0.12
 
 
-@pytest.mark.parametrize("rung", ["faces", "condensed"])
-def test_reduced_models_recover_stress(ring, ring_model, dead, rung):
+@pytest.mark.parametrize("fidelity", ["faces", "condensed"])
+def test_reduced_models_recover_stress(ring, ring_model, dead, fidelity):
     """Their peak is within 4 % of that with all nodes; a block's peak within 13 %."""
-    model = af.build(ring, fidelity=rung, cells=(4, 4))
+    model = af.build(ring, fidelity=fidelity, cells=(4, 4))
     found = strength_use(model, af.dead_load(model).q)["compression"]
     whole = strength_use(ring_model, dead.q)["compression"]
     assert float(found.max()) == pytest.approx(float(whole.max()), rel=0.04)
@@ -156,7 +156,7 @@ def test_utilisation_follows_time_and_the_weaker_block(stack):
     assert found.values[:, 1] == pytest.approx([0.1, 0.2, 0.0])
 
 
-def test_the_gravest_joint_of_a_run_is_named_but_not_a_hinge(stack):
+def test_the_most_loaded_joint_of_a_run_is_named_but_not_a_hinge(stack):
     """Joint 1 peaks at 0.5 s; joint 0 presses harder at 1 s, but hinges then."""
     rows = np.zeros((3, 2, 3))
     rows[..., 0] = [[1e5, 1e5], [1e5, 5.6e5], [9e5, 1e5]]
@@ -206,7 +206,7 @@ def test_what_strength_is_unknown_is_not_used(stack):
     assert "-" in strength_use_table(use).splitlines()[1]
 
 
-def test_tension_and_compression_are_told_by_part(stack):
+def test_tension_and_compression_are_reported_by_part(stack):
     use = strength_use(
         one_cell(stack, [-2.8 * af.units.MPa, 0.014 * af.units.MPa, 0.0]), np.ones(1)
     )
@@ -238,10 +238,10 @@ def test_a_run_gives_the_largest_of_all_instants(ring_model, dead):
 
 def test_what_has_no_field_is_refused(ring, ring_model, dead):
     rigid = af.build(ring, fidelity="rigid")
-    for ask in (af.statics.principal_stresses, strength_use):
+    for evaluate in (af.statics.principal_stresses, strength_use):
         with pytest.raises(af.InvalidInput, match=r"rigid blocks .*fidelity='faces'.*joint_stress"):
-            ask(rigid, np.zeros(rigid.size))
+            evaluate(rigid, np.zeros(rigid.size))
         with pytest.raises(af.InvalidInput, match=r"shape \(3,\), the model 850 coordinates"):
-            ask(ring_model, np.zeros(3))
+            evaluate(ring_model, np.zeros(3))
     with pytest.raises(af.InvalidInput, match=r"no fields.*fields_every.*utilisation"):
         strength_use_over(ring_model, dead.joints)

@@ -38,7 +38,7 @@ def case(monkeypatch):
 
 
 def test_a_case_is_compared_as_its_structure_is(case, tmp_path):
-    """The case's own rung, rule and step do not matter; its damping does."""
+    """The case's own fidelity, rule and step do not matter; its damping does."""
     found = case_accuracy(case, tmp_path)
     given = {**GIVEN, "damping": case.damping, "steps": STEPS}
     known = af.accuracy(case.structure, case.ground_motion(), **given)
@@ -68,7 +68,7 @@ def test_a_reference_that_fails_is_named(case, monkeypatch):
 
 
 def test_soil_keeps_its_nodes():
-    """A stone's rung is not that of soft blocks, in the references and in all other settings."""
+    """A stone's fidelity is not that of soft blocks, in references and in all other settings."""
     bridge = af.Case.read(list_examples()["prusias"]).structure
     assert all(
         setting.discretisation.fidelity["backfill"] == "full"

@@ -15,7 +15,7 @@ LONG = (
     "fill of 0.5 MPa",
     "0.98 × least thickness, rigid",
     "filled span at 0.8 g, 0.4 s",
-    "filled span, rungs by part",
+    "filled span, fidelities by part",
     "filled span, damping 'none', conserving",
     "sidewalls retained",
     "piers of 20 m, 50 courses",

@@ -55,9 +55,9 @@ def test_compression_nears_that_of_the_paper_under_two_metres_of_fill(dead, veri
         largest.append(float(use["compression"][rings].max()))
     assert 0.15e6 < largest[0] < PAPER_STRESS / 2.0
     assert largest[1] == pytest.approx(PAPER_STRESS, rel=0.15)
-    told = "bridge under 2 m of fill, largest compression in stones [MPa]"
+    label = "bridge under 2 m of fill, largest compression in stones [MPa]"
     source = "Demirel and Aldemir (2021), who do not state their cover"
-    verified(told, PAPER_STRESS / 1e6, source, largest[1] / 1e6)
+    verified(label, PAPER_STRESS / 1e6, source, largest[1] / 1e6)
 
 
 def test_modes_of_a_trial(verified):
@@ -78,8 +78,8 @@ def test_modes_of_a_trial(verified):
     found = af.modes(state.model, 3, about=state)
     assert found.frequencies == pytest.approx([3.03, 3.57, 4.22], rel=0.02)
     assert found.mass_ratios[:, 0] == pytest.approx([0.29, 0.26, 0.21], abs=0.01)
-    told = "bridge, uneroded and held, first modes [Hz]"
-    verified(told, [3.03, 3.57, 4.22], "another mesh and program", found.frequencies)
+    label = "bridge, uneroded and held, first modes [Hz]"
+    verified(label, [3.03, 3.57, 4.22], "another mesh and program", found.frequencies)
 
 
 @pytest.mark.slow
@@ -104,8 +104,8 @@ def test_run_command_on_the_bridge(tmp_path, capsys):
     options = [word for text in changes for word in ("--set", text)]
     command = ["run", str(MESHES / "prusias.toml"), "--out", str(tmp_path), *options]
     assert af.commands.main(command) == 0
-    told = capsys.readouterr().out
-    assert "the first and the last effective along x" in told
+    printed = capsys.readouterr().out
+    assert "the first and the last effective along x" in printed
     for name in ("dead.png", "dead_stress.png", "free_body.png", "suite.txt", "envelope.png"):
         assert (tmp_path / name).is_file()
     for name in ("history.nc", "summary.txt", "critical_instant.png", "joints.png"):
@@ -154,8 +154,8 @@ def test_the_criterion_of_the_paper_is_met_for_an_instant_by_its_own_law_alone()
             for joint in own.structure.joints
         ]
         structure = replace(own.structure, joints=tuple(joints))
-        rungs = {"backfill": "full", "rest": "rigid"}
-        model = af.build(structure, fidelity=rungs, quadrature="nodal")
+        fidelities = {"backfill": "full", "rest": "rigid"}
+        model = af.build(structure, fidelity=fidelities, quadrature="nodal")
         start = af.dead_load(model)
         damping = af.cases.damping_of(own, start)[0]
         criteria = af.Criteria(friction=0.60)

@@ -215,8 +215,8 @@ def test_each_solve_of_a_random_structure_is_that_of_superlu(first, count):
     """In another order, by another factor: 1e-8, with 1e12 between stiff and soft at most."""
     for seed in range(first, first + count):
         rng = np.random.default_rng(seed)
-        rung = "rigid" if rng.random() < 0.85 else "faces"
-        model = af.build(shuffled_structure(rng), fidelity=rung, cells=(2, 2))
+        fidelity = "rigid" if rng.random() < 0.85 else "faces"
+        model = af.build(shuffled_structure(rng), fidelity=fidelity, cells=(2, 2))
         equation = af.dynamics.Equation(model, STRONG, af.StiffnessDamping(0.05, 8.0))
         solver = ComplianceSolver.of(equation)
         system = solver.system(0.005)

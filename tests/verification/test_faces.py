@@ -1,4 +1,4 @@
-"""The rung "faces" where faces of a stone share corners: rings with soil on their backs."""
+"""The fidelity "faces" where faces of a stone share corners: rings with soil on their backs."""
 
 import numpy as np
 import pytest
@@ -25,8 +25,8 @@ def models(arch):
     """The ring's stones by their faces and by their joint nodes, on one mesh."""
     given = {"cells": (4, 4), "quadrature": "exact"}
     return {
-        rung: af.build(arch, fidelity={**SOIL, "rest": rung}, **given)
-        for rung in ("faces", "condensed", "full")
+        fidelity: af.build(arch, fidelity={**SOIL, "rest": fidelity}, **given)
+        for fidelity in ("faces", "condensed", "full")
     }
 
 
@@ -58,12 +58,12 @@ def test_dead_load_and_shaking_against_all_joint_nodes(arch, models):
     """Bounds are twice the errors in e that were found, 0.0007 and 0.0011, where e reaches 0.47."""
     motion = af.Motion.synthetic(duration=4.0, pga=3.0, seed=5).cut(0.5, 2.0)
     dead, shaken = {}, {}
-    for rung in ("faces", "condensed"):
-        state = af.dead_load(models[rung], TIGHT)
-        dead[rung] = state.joints["eccentricity"].values
+    for fidelity in ("faces", "condensed"):
+        state = af.dead_load(models[fidelity], TIGHT)
+        dead[fidelity] = state.joints["eccentricity"].values
         damping = af.Rayleigh(0.05, (3.0, 12.0))
-        run = af.time_history(models[rung], motion, dt=0.005, damping=damping, start=state)
-        shaken[rung] = abs(run.joints["eccentricity"]).max("time").values
+        run = af.time_history(models[fidelity], motion, dt=0.005, damping=damping, start=state)
+        shaken[fidelity] = abs(run.joints["eccentricity"]).max("time").values
     assert np.abs(shaken["condensed"]).max() > 0.4
     assert 1e-6 < np.abs(dead["faces"] - dead["condensed"]).max() < 0.0014
     assert 1e-6 < np.abs(shaken["faces"] - shaken["condensed"]).max() < 0.0022
@@ -80,7 +80,8 @@ def test_a_long_bed_bends(length, bends):
     courses = [box(-0.3, 0.0, "ground"), box(0.0, 0.4, "low"), box(0.4, 0.8, "high")]
     wall = af.masonry.assembled(courses, af.masonry.STONE_TO_STONE)
     sizes = {
-        rung: af.build(wall, fidelity=rung, cells=(8, 4)).size for rung in ("faces", "condensed")
+        fidelity: af.build(wall, fidelity=fidelity, cells=(8, 4)).size
+        for fidelity in ("faces", "condensed")
     }
     assert sizes["condensed"] > 50
     assert sizes["faces"] == (sizes["condensed"] if bends else 9)

@@ -1,4 +1,4 @@
-"""The ladder of models: each rung against the one above it, and against the assembled forms."""
+"""The ladder of models: each fidelity against the one above it, and against assembled forms."""
 
 from dataclasses import replace
 from itertools import product
@@ -30,7 +30,10 @@ def full(ring):
 
 
 def test_sizes(ring):
-    sizes = {rung: af.build(ring, fidelity=rung).size for rung in ("rigid", "faces", "condensed")}
+    sizes = {
+        fidelity: af.build(ring, fidelity=fidelity).size
+        for fidelity in ("rigid", "faces", "condensed")
+    }
     assert sizes == {"rigid": 51, "faces": 102, "condensed": 340}
 
 
@@ -62,8 +65,8 @@ def test_monolithic_is_full(ring, rule):
 def test_monolithic_history_is_that_of_full(ring):
     short, given = MOTION.cut(1.0, 1.2), {"newton": TIGHT, "method": "snes", "dt": 0.005}
     runs = []
-    for rung in ("full", "monolithic"):
-        model = af.build(ring, cells=(2, 2), fidelity=rung, quadrature="lobatto")
+    for fidelity in ("full", "monolithic"):
+        model = af.build(ring, cells=(2, 2), fidelity=fidelity, quadrature="lobatto")
         runs.append(af.time_history(model, short, **given).joints["M"])
     assert np.abs(runs[0] - runs[1]).max() < 1e-8 * np.abs(runs[0]).max()
 
@@ -73,14 +76,14 @@ def test_errors_fall_up_the_ladder(ring, law):
     """Against all nodes on the same mesh; bounds up to twice what was found on this motion.
 
     Found are 8e-6, 0.0019 and 0.0070 where joints hold, 9e-6, 0.0021 and 0.0065 where they slide:
-    four facets a joint, which all rungs have here, follow the edges that are pressed little and
-    slide first.
+    four facets a joint, which all fidelities have here, follow the edges that are pressed little
+    and slide first.
     """
     structure = law(ring)
     reference = envelope(af.build(structure, cells=(4, 4)))
     off = {
-        rung: np.abs(envelope(af.build(structure, fidelity=rung)) - reference).max()
-        for rung in ("rigid", "faces", "condensed")
+        fidelity: np.abs(envelope(af.build(structure, fidelity=fidelity)) - reference).max()
+        for fidelity in ("rigid", "faces", "condensed")
     }
     assert off["condensed"] < 1.5e-5 < off["faces"] < 0.0035 < off["rigid"] < 0.012
 
@@ -101,27 +104,27 @@ SCHEMES = [
 SLOW = pytest.mark.slow
 
 
-RUNGS, RULES = ("rigid", "faces", "condensed"), ("nodal", "lobatto", "gauss", "exact")
+FIDELITIES, RULES = ("rigid", "faces", "condensed"), ("nodal", "lobatto", "gauss", "exact")
 
 
-def quick(rung, rule, way):
-    """Each rung, rule and law of joints at least once, but not with each other."""
+def quick(fidelity, rule, way):
+    """Each fidelity, rule and law of joints at least once, but not with each other."""
     place = RULES.index(rule)
-    return rung == RUNGS[place % len(RUNGS)] and way == SCHEMES[place]
+    return fidelity == FIDELITIES[place % len(FIDELITIES)] and way == SCHEMES[place]
 
 
 @pytest.mark.parametrize(
-    ("rung", "rule", "joints", "scheme"),
+    ("fidelity", "rule", "joints", "scheme"),
     [
-        pytest.param(rung, rule, *way, marks=() if quick(rung, rule, way) else SLOW)
-        for rung, rule, way in product(RUNGS, RULES, SCHEMES)
+        pytest.param(fidelity, rule, *way, marks=() if quick(fidelity, rule, way) else SLOW)
+        for fidelity, rule, way in product(FIDELITIES, RULES, SCHEMES)
     ],
 )
-def test_compiled_steppers_give_the_history_of_snes(ring, rung, rule, joints, scheme):
+def test_compiled_steppers_give_the_history_of_snes(ring, fidelity, rule, joints, scheme):
     """To 1e-8 of the largest, joints opening and closing, and sliding where the scheme allows."""
     slides = scheme == CONSERVING
     structure = ring if slides else glued(ring)
-    model = af.build(structure, fidelity=rung, quadrature=rule, cells=(2, 2))
+    model = af.build(structure, fidelity=fidelity, quadrature=rule, cells=(2, 2))
     given = {
         "start": af.dead_load(model, TIGHT),
         "damping": af.Rayleigh(0.05, (8.0, 16.0), joints),
@@ -144,11 +147,11 @@ def test_compiled_steppers_give_the_history_of_snes(ring, rung, rule, joints, sc
 
 
 @pytest.mark.parametrize("stones", [2, 16, 34])
-@pytest.mark.parametrize("rung", ["faces", "condensed", "full"])
-def test_a_joint_at_the_crown(stones, rung):
+@pytest.mark.parametrize("fidelity", ["faces", "condensed", "full"])
+def test_a_joint_at_the_crown(stones, fidelity):
     """Its normal lies along x: openings there have exact zeros, which patterns must survive."""
     ring = af.circular_arch(radius=2.95, thickness=0.8, embrace=150.0, voussoirs=stones)
-    found = af.dead_load(af.build(ring, fidelity=rung, cells=(2, 2), quadrature="exact")).joints
+    found = af.dead_load(af.build(ring, fidelity=fidelity, cells=(2, 2), quadrature="exact")).joints
     e = found["eccentricity"].values
     assert e == pytest.approx(e[::-1], abs=1e-6)
 
@@ -176,9 +179,12 @@ def test_damping_on_the_blocks_alone(ring, scheme, method):
     assert np.abs(runs[0] - runs[1]).max() < 1e-8 * np.abs(runs[0]).max()
 
 
-def test_rungs_may_differ_from_block_to_block(ring):
-    rungs, structure = {"voussoir 5": "full", "voussoir 9": "rigid", "rest": "faces"}, glued(ring)
-    mixed = af.build(structure, fidelity=rungs)
+def test_fidelities_may_differ_from_block_to_block(ring):
+    fidelities, structure = (
+        {"voussoir 5": "full", "voussoir 9": "rigid", "rest": "faces"},
+        glued(ring),
+    )
+    mixed = af.build(structure, fidelity=fidelities)
     assert mixed.size == 15 * 6 + 50 + 3
     off = np.abs(envelope(mixed) - envelope(af.build(structure, cells=(4, 4)))).max()
     assert off < 0.003
@@ -205,8 +211,8 @@ def test_rigid_and_condensed_are_wrong_where_a_block_is_soft(caplog):
     stack = replace(stack, blocks=(stack.blocks[0], soft, stack.blocks[2]))
     reference = envelope(af.build(stack, fidelity="full"))
     off = {}
-    for rung in ("rigid", "condensed"):
-        off[rung] = np.abs(envelope(af.build(stack, fidelity=rung)) - reference).max()
+    for fidelity in ("rigid", "condensed"):
+        off[fidelity] = np.abs(envelope(af.build(stack, fidelity=fidelity)) - reference).max()
         assert "block 'block 1'" in caplog.text
         caplog.clear()
     assert off["rigid"] > 0.01

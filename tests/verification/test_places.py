@@ -43,7 +43,7 @@ def of_joints(joints, prefix):
 
 
 def at_rest(away):
-    """A ring on piers, on three rungs, under its weight and a load, and as blocks move far."""
+    """A ring on piers, at three fidelities, under its weight and a load, and as blocks move far."""
     portal = af.arch_on_piers(
         radius=2.0, thickness=0.5, voussoirs=5, pier_breadth=0.7, courses=[0.6]
     )

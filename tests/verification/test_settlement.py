@@ -1,4 +1,4 @@
-"""Supports that move: joints follow, on every rung alike, toward limit states of rigid blocks."""
+"""Supports that move: joints follow, at every fidelity, toward limit states of rigid blocks."""
 
 from functools import cache
 
@@ -13,7 +13,7 @@ from archfem.masonry.structure import rigid_motion_matrix
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
 COUPLE = af.circular_arch(radius=2.0, thickness=0.5, embrace=120.0, voussoirs=2, chords=1)
 TIGHT = af.statics.Newton(tolerance=1e-13)
-RUNGS = ("rigid", "faces", "condensed", "full", "monolithic")
+FIDELITIES = ("rigid", "faces", "condensed", "full", "monolithic")
 
 
 def about(structure, block, turn, shift):
@@ -37,9 +37,9 @@ def force_on_higher(joints):
 
 
 @cache
-def at_rest(rung, rule):
+def at_rest(fidelity, rule):
     """The ring on its supports as they were built."""
-    return af.dead_load(af.build(RING, fidelity=rung, cells=(2, 2), quadrature=rule))
+    return af.dead_load(af.build(RING, fidelity=fidelity, cells=(2, 2), quadrature=rule))
 
 
 @pytest.mark.parametrize(
@@ -51,15 +51,19 @@ def at_rest(rung, rule):
     ],
 )
 @pytest.mark.parametrize(
-    ("rung", "rule"),
-    [(rung, "exact") for rung in ("rigid", "faces", "condensed", "full")]
-    + [(rung, "lobatto") for rung in RUNGS]
-    + [(rung, rule) for rung in ("rigid", "faces", "condensed") for rule in ("nodal", "gauss")],
+    ("fidelity", "rule"),
+    [(fidelity, "exact") for fidelity in ("rigid", "faces", "condensed", "full")]
+    + [(fidelity, "lobatto") for fidelity in FIDELITIES]
+    + [
+        (fidelity, rule)
+        for fidelity in ("rigid", "faces", "condensed")
+        for rule in ("nodal", "gauss")
+    ],
 )
-def test_supports_that_move_together_change_nothing(rung, rule, motion):
+def test_supports_that_move_together_change_nothing(fidelity, rule, motion):
     """The ring goes with them, a rigid motion of everything, although its joints could slide."""
-    reference = at_rest(rung, rule)
-    moved = model = af.build(RING, fidelity=rung, cells=(2, 2), quadrature=rule)
+    reference = at_rest(fidelity, rule)
+    moved = model = af.build(RING, fidelity=fidelity, cells=(2, 2), quadrature=rule)
     for block in (0, len(RING.blocks) - 1):
         moved = moved.settled(af.Settlement(block, about(RING, block, motion[2], motion[:2])))
     found = af.dead_load(moved)
@@ -69,10 +73,10 @@ def test_supports_that_move_together_change_nothing(rung, rule, motion):
     np.testing.assert_allclose(gap, plane, atol=1e-8)
 
 
-@pytest.mark.parametrize("rung", RUNGS)
-def test_what_supports_pull_is_the_derivative_of_the_force(rung):
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_what_supports_pull_is_the_derivative_of_the_force(fidelity):
     """By differences, on joints that never slide, where some are open in part."""
-    model = af.build(glued(RING), fidelity=rung, cells=(2, 2), quadrature="lobatto")
+    model = af.build(glued(RING), fidelity=fidelity, cells=(2, 2), quadrature="lobatto")
     q, motion = af.dead_load(model).q, np.zeros_like(model.support_motion)
     motion[0] = [-1.0, 0.5, 0.3]
     ahead, back = (model.with_support_motion(sign * 1e-9 * motion).force(q) for sign in (1.0, -1.0))
@@ -82,7 +86,7 @@ def test_what_supports_pull_is_the_derivative_of_the_force(rung):
 
 @pytest.mark.parametrize("settlement", [(-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])
 def test_a_support_that_moves_far_at_once_leads_where_small_steps_lead(settlement):
-    """Joints slide to and fro on the way, by 0.1 to 0.3 mm; 5 cm at once come to the same."""
+    """Joints slide to and fro on the way, by 0.1 to 0.3 mm; 5 cm at once give the same."""
     model = af.build(RING, fidelity="rigid")
     stop = af.statics.Stop(displacement=0.05 / RING.size)
     path = af.pushover(model, af.Settlement(0, settlement), stop=stop)
@@ -100,19 +104,19 @@ def test_a_support_that_moves_far_at_once_leads_where_small_steps_lead(settlemen
 def test_condensation_and_modes_follow_as_all_nodes_do(rule):
     spread = af.Settlement("left abutment", (-2e-4, -1e-4, 1e-5))
     built = {
-        rung: af.build(RING, fidelity=rung, cells=(2, 2), quadrature=rule).settled(spread)
-        for rung in ("condensed", "full")
+        fidelity: af.build(RING, fidelity=fidelity, cells=(2, 2), quadrature=rule).settled(spread)
+        for fidelity in ("condensed", "full")
     }
-    found = {rung: af.dead_load(model, TIGHT).joints for rung, model in built.items()}
+    found = {fidelity: af.dead_load(model, TIGHT).joints for fidelity, model in built.items()}
     assert differ(found["condensed"], found["full"]) < 1e-7
 
 
 def test_nodes_of_the_support_may_move_instead_of_joints():
-    """The monolithic model moves the abutment's own nodes, and knows nothing of offsets."""
+    """The monolithic model moves the abutment's own nodes, and has no offsets."""
     spread = af.Settlement("left abutment", (-2e-4, -1e-4, 1e-5))
     built = (
-        af.build(RING, fidelity=rung, cells=(2, 2), quadrature="lobatto")
-        for rung in ("full", "monolithic")
+        af.build(RING, fidelity=fidelity, cells=(2, 2), quadrature="lobatto")
+        for fidelity in ("full", "monolithic")
     )
     full, slow = (af.dead_load(model.settled(spread), TIGHT).joints for model in built)
     assert differ(full, slow) < 1e-8
@@ -130,7 +134,7 @@ def test_two_blocks_on_a_support_that_sinks_a_little():
         - before
         for by in (-1e-6, 1e-6)
     )
-    assert float(sunk["V"][1]) < -1.0  # the higher block, on the right, hangs on its neighbour
+    assert float(sunk["V"][1]) < -1.0  # the higher block, on the right, is carried by its neighbour
     for key in ("N", "V", "M"):
         np.testing.assert_allclose(sunk[key], -risen[key], atol=1e-5)
     np.testing.assert_allclose(sunk["V"], sunk["V"][::-1], atol=1e-5)
@@ -140,7 +144,7 @@ def test_two_blocks_on_a_support_that_sinks_a_little():
 
 
 @pytest.mark.parametrize("rule", ["lobatto", "exact"])
-def test_two_blocks_on_a_support_that_sinks_far_hang_on_three_hinges(rule):
+def test_two_blocks_on_a_support_that_sinks_far_are_carried_by_three_hinges(rule):
     """Moments about the hinges alone give the thrust between the blocks, whatever the stiffness.
 
     Hinges are corners where springs end in a point; a facet is closed over a length of its own,
