@@ -289,7 +289,7 @@ def test_steps_too_short_to_be_meant_are_refused_before_memory_is_taken(model, d
         af.time_history(model, QUAKE, dt=dt)
 
 
-def test_widths_and_gravities_that_cannot_be_meant():
+def test_invalid_widths_and_gravities_are_refused():
     for key, value in (("width", 1e-300), ("gravity", 1e-200)):
         with pytest.raises(af.errors.InvalidStructure, match=f"{key} .* is not between"):
             replace(RING, **{key: value})

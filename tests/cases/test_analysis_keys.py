@@ -93,7 +93,7 @@ def test_a_case_is_rated_by_its_own_table(ring):
         (3, "limit = 3 is not a table"),
     ],
 )
-def test_limits_that_cannot_be_meant(given, says):
+def test_invalid_limits_are_refused(given, says):
     with pytest.raises(af.InvalidInput, match=says):
         parse_limit(given)
 
@@ -175,7 +175,7 @@ def test_damping_at_a_frequency(small):
         '{ ratio = 0.05, frequency = 8.0, kind = "rayleigh" }',
     ],
 )
-def test_damping_that_cannot_be_meant(small, damping):
+def test_invalid_damping_is_refused(small, damping):
     with pytest.raises(af.InvalidInput, match=r'write \{ ratio = 0\.05, modes = "effective" \}'):
         af.Case.read(small, [f"analysis.damping={damping}"])
 

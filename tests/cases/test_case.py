@@ -185,7 +185,7 @@ def test_a_case_says_only_what_differs_from_its_base(tmp_path):
         ('base = "ring.toml"\n[structure]\nradios = 3.0', "did you mean 'radius'"),
     ],
 )
-def test_bases_that_cannot_be_meant(text, says, tmp_path):
+def test_invalid_bases_are_refused(text, says, tmp_path):
     (tmp_path / "ring.toml").write_text(BASE)
     (tmp_path / "case.toml").write_text(text)
     with pytest.raises(af.InvalidInput, match=says):

@@ -163,6 +163,6 @@ def test_stages_of_a_cases_own():
         (FILL, {"steps": 2}, "unknown key 'dead_load.steps'"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(fill, dead_load, words):
+def test_invalid_input_is_refused(fill, dead_load, words):
     with pytest.raises(af.InvalidInput, match=words):
         case(fill, dead_load=dead_load)

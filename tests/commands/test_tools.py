@@ -103,7 +103,7 @@ def test_a_history_is_filmed_beside_its_case(kept, capsys):
         (["."], "there is no history file"),
     ],
 )
-def test_what_cannot_be_meant_is_told(kept, capsys, given, said):
+def test_invalid_input_is_reported(kept, capsys, given, said):
     assert af.commands.main(["animate", str(kept / given[0]), *given[1:]]) == 1
     assert said in capsys.readouterr().err
 

@@ -149,7 +149,7 @@ HORIZONTALS = [
 )
 @pytest.mark.parametrize("friction", [0.6, None])
 def test_energy_is_kept_through_records(name, seconds, dt, friction):
-    """An undamped ring at 0.4 g, which opens and slides: asked 1e-3 of what is exchanged."""
+    """An undamped ring at 0.4 g, which opens and slides: 1e-3 of the energy exchanged."""
     built, motion = model("ring", friction), recorded(name, seconds)
     start, energy, resultants, _ = steps(built, motion, dt)
     drift, exchanged = balance(start, energy)

@@ -54,7 +54,7 @@ def test_the_mesh_hardly_moves_the_last_effective_mode(ring, cells):
     )
 
 
-def test_search_goes_on_until_the_share_is_reached(ring):
+def test_search_continues_until_the_share_is_reached(ring):
     model = af.build(ring, fidelity="rigid")
     whole = effective_mode_range(model)
     assert effective_mode_range(model, initial_count=1).frequencies == pytest.approx(
@@ -87,7 +87,7 @@ def test_effective_damping_has_its_ratio_at_the_first_effective_mode(ring):
     assert abs(slowest) == pytest.approx(2.0 * np.pi * damping.frequency, rel=1e-6)
 
 
-def test_first_effective_mode_is_told(ring):
+def test_first_effective_mode_is_reported(ring):
     model = af.build(ring, fidelity="rigid")
     text = first_effective_mode(model, af.dead_load(model)).text
     assert text == "mode 1, the first effective along x, has 70.7 % of the mass"
@@ -141,7 +141,7 @@ def test_too_few_effective_modes():
         ((0.05, 8.0, "open"), "joints = 'open'"),
     ],
 )
-def test_stiffness_damping_that_cannot_be_meant(given, words):
+def test_invalid_stiffness_damping_is_refused(given, words):
     with pytest.raises(af.InvalidInput, match=words):
         af.StiffnessDamping(*given)
 
@@ -177,17 +177,17 @@ def test_twice_as_many_modes_are_computed_until_they_have_the_share(
     reached, counts, monkeypatch, caplog
 ):
     """Of a model with as many coordinates, whose modes have their share from some number on."""
-    asked = []
+    computed = []
 
     def modes(model, count, about):
-        asked.append(count)
+        computed.append(count)
         ratios = np.zeros((count, 2))
         ratios[min(reached, count) - 1, 0] = 0.91 if reached <= count else 0.5
         return SimpleNamespace(mass_ratios=ratios, frequencies=1.0 + np.arange(count))
 
     monkeypatch.setattr("archfem.dynamics.damping.modes", modes)
     found, total = _modes_with_share(SimpleNamespace(size=50), None, 0.9, 3, 10)
-    assert asked == counts
+    assert computed == counts
     assert len(total) == len(found.frequencies) == counts[-1]
     assert bool(caplog.text) is (reached == 99)
 

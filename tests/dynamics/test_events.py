@@ -40,42 +40,42 @@ ALTERNATING = {0: -0.5, 6: 0.5, 12: -0.5, 17: 0.5}
 SAME_SIDE = {0: -0.5, 6: -0.5, 12: -0.5, 17: -0.5}
 
 
-def told(event, structure, *states, criteria=None):
-    """What a fresh watch says of the last of some states, one after another."""
+def stop_reason(event, structure, *states, criteria=None):
+    """The reason by which a new monitor stops at the last of some states, or None."""
     watch = event.start_monitor(structure, criteria or af.Criteria())
     return [watch(resultants, STEP) for resultants in states][-1]
 
 
 def test_both_events_see_four_alternating_hinges():
     for event in (CountedMechanism(), MovingMechanism()):
-        reason = told(event, ring(), state(ring(), ALTERNATING))
+        reason = stop_reason(event, ring(), state(ring(), ALTERNATING))
         assert "motion and count agree: by motion local (arch)" in reason
         assert "by joints 0, 6, 12 and 17; " in reason
 
 
 def test_four_hinges_on_one_face_are_counted_and_do_not_move():
-    counted = told(CountedMechanism(), ring(), state(ring(), SAME_SIDE))
+    counted = stop_reason(CountedMechanism(), ring(), state(ring(), SAME_SIDE))
     assert "motion and count disagree: by motion none, by count local (arch)" in counted
     twice = [state(ring(), SAME_SIDE)] * 2
-    assert told(MovingMechanism(), ring(), state(ring()), *twice) is None
+    assert stop_reason(MovingMechanism(), ring(), state(ring()), *twice) is None
 
 
 def test_one_sliding_joint_moves_a_block_that_nobody_counts():
     stack = af.column(breadth=1.0, heights=[1.0, 1.0])
     sliding = state(stack, sliding={1: 0.6})
-    assert told(CountedMechanism(), stack, sliding) is None
-    assert "disagree: by motion local" in told(MovingMechanism(), stack, sliding)
+    assert stop_reason(CountedMechanism(), stack, sliding) is None
+    assert "disagree: by motion local" in stop_reason(MovingMechanism(), stack, sliding)
 
 
 def test_a_run_may_wait_for_a_wider_class():
     """Three hinges of the ring and one at the foot of the right pier: a ring and a pier move."""
     hinges = state(on_piers(), {3: -0.5, 8: 0.5, 13: -0.5, 19: 0.5})
-    assert "agree: by motion semi-global (arch + right pier)" in told(
+    assert "agree: by motion semi-global (arch + right pier)" in stop_reason(
         MovingMechanism(), on_piers(), hinges
     )
     for event in (CountedMechanism, MovingMechanism):
-        assert told(event(kinds=("semi-global",)), on_piers(), hinges)
-        assert told(event(kinds=("local", "global")), on_piers(), hinges) is None
+        assert stop_reason(event(kinds=("semi-global",)), on_piers(), hinges)
+        assert stop_reason(event(kinds=("local", "global")), on_piers(), hinges) is None
 
 
 def test_a_run_ends_when_its_blocks_can_move():
@@ -94,8 +94,8 @@ def test_a_run_ends_when_its_blocks_can_move():
 def test_an_event_serves_several_structures():
     """The same numbers of joints, in another structure, are another state."""
     event, lone = MovingMechanism(), af.column(breadth=1.0, heights=[1.0] * 18)
-    assert told(event, ring(), state(ring(), {0: 0.5})) is None
-    assert told(event, lone, state(lone, {0: 0.5})) is not None
+    assert stop_reason(event, ring(), state(ring(), {0: 0.5})) is None
+    assert stop_reason(event, lone, state(lone, {0: 0.5})) is not None
 
 
 def with_soil():
@@ -120,13 +120,13 @@ def test_soil_that_slides_is_no_event():
     structure = with_soil()
     resultants = state(structure, sliding=dict.fromkeys(range(2, 22), 0.7))
     for event in (CountedMechanism(), MovingMechanism()):
-        assert told(event, structure, resultants) is None
+        assert stop_reason(event, structure, resultants) is None
     resultants[1] = state(structure, {1: 0.5})[1]
-    assert told(CountedMechanism(), structure, resultants) is None
-    assert "motion local (column)" in told(MovingMechanism(), structure, resultants)
+    assert stop_reason(CountedMechanism(), structure, resultants) is None
+    assert "motion local (column)" in stop_reason(MovingMechanism(), structure, resultants)
 
 
-def test_every_mechanism_waits_for_the_last_and_remembers_the_others():
+def test_every_mechanism_waits_for_the_last_and_keeps_the_others():
     structure, event = on_piers(), EveryMechanism()
     watch = event.start_monitor(structure, af.Criteria())
     in_ring = state(structure, {3: -0.5, 6: -0.5, 9: -0.5, 12: -0.5})  # one face: cannot move
@@ -141,11 +141,11 @@ def test_every_mechanism_waits_for_the_last_and_remembers_the_others():
     for resultants in (state(structure), in_ring, in_ring, with_pier):
         assert watch(resultants, STEP) is None
     assert "by each definition" in watch(moving, STEP)
-    assert told(event, structure, moving) is None  # a fresh watch: never four in the ring
-    assert "by each definition" in told(EveryMechanism(), ring(), state(ring(), ALTERNATING))
+    assert stop_reason(event, structure, moving) is None  # a fresh watch: never four in the ring
+    assert "by each definition" in stop_reason(EveryMechanism(), ring(), state(ring(), ALTERNATING))
     alone = af.column(breadth=1.0, heights=[1.0])
     assert applicable_definitions(alone) == ()
-    assert "by each definition" in told(EveryMechanism(), alone, state(alone, {0: 0.5}))
+    assert "by each definition" in stop_reason(EveryMechanism(), alone, state(alone, {0: 0.5}))
 
 
 def test_events_wait_for_as_long_as_a_mechanism_lasts():

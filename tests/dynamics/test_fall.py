@@ -280,7 +280,7 @@ def test_supports_stay_where_they_have_moved(ring, model, state):
 
 
 def test_a_ring_thrown_up_falls_from_there(ring, model):
-    """The handover of a ring whose blocks fly apart at 2 m/s goes on without a jolt."""
+    """The handover of a ring whose blocks fly apart at 2 m/s is smooth."""
     q, velocity = np.zeros(model.size), np.zeros(model.size)
     velocity[1::3] = 2.0
     found = release_blocks(model, State(0.0, q, velocity, np.zeros_like(q)))

@@ -89,7 +89,7 @@ def test_what_is_kept_over_time_and_joint_is_packed(run, tmp_path):
         assert not plain["time"].encoding["zlib"]
 
 
-def test_a_history_knows_what_can_move(run, model, motion, tmp_path):
+def test_a_history_has_the_blocks_that_can_move(run, model, motion, tmp_path):
     """The blocks at the counted instant, and the first motion of all: looked for anew."""
     assert run.structure is model.structure
     instant = run.joints.sel(time=run.mechanism.time)

@@ -15,7 +15,7 @@ FRICTION = 0.5
 
 
 class SlidingSystem(NamedTuple):
-    """A block that slides on the ground, whose joint remembers how far it has slid."""
+    """A block that slides on the ground, whose joint has its slip as a state."""
 
     mass: float
     dt: float

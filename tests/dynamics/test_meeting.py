@@ -20,9 +20,9 @@ DEEPEST = 1e-3
 it, and steps of 0.5 ms of approach speeds below 1 m/s add less than the other half."""
 
 
-def stone(name, left, low, right, high, **told):
+def stone(name, left, low, right, high, **options):
     outline = ((left, low), (right, low), (right, high), (left, high))
-    return af.Block(outline, af.STONE, name, **told)
+    return af.Block(outline, af.STONE, name, **options)
 
 
 def on_floor(*stones, joints=()):
@@ -260,7 +260,7 @@ def test_stones_without_a_role_are_no_fill():
     assert monitor.find_first(moved) == (0, "'one' met 'two'")
 
 
-def test_a_face_that_goes_on_beyond_its_joint_is_met(pair):
+def test_a_face_that_extends_beyond_its_joint_is_met(pair):
     """Slid by s, a column that tilts enters the floor by s sin θ beyond the end of its joint."""
     monitor, slid, turns = MeetingMonitor(pair, at_rest(pair, np.zeros(6))), 0.02, (0.024, 0.026)
     states = []

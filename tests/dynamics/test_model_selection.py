@@ -57,19 +57,19 @@ REST = 1.0 / (2.0**2 - 1.0)
 
 
 def test_the_first_setting_within_the_tolerance_is_chosen(chosen):
-    told = chosen.of(0.32, 0.28, 0.276)
+    prediction = chosen.of(0.32, 0.28, 0.276)
     assert chosen.steps == [0.005, 0.0025, 0.00125]
-    assert told.error == pytest.approx(0.004 * (1.0 + REST))
-    assert told.dt == 0.0025
+    assert prediction.error == pytest.approx(0.004 * (1.0 + REST))
+    assert prediction.dt == 0.0025
     assert len(chosen.built) == 2
-    assert [name for name, _ in told.candidates] == [
+    assert [name for name, _ in prediction.candidates] == [
         "faces 8×8 exact 5 ms",
         "faces 8×8 exact 2.5 ms",
         "condensed 8×8 exact 1.25 ms",
     ]
-    errors = [error for _, error in told.candidates]
-    assert errors == pytest.approx([0.044 + 0.004 * REST, told.error, 0.004 * REST])
-    assert told.is_met
+    errors = [error for _, error in prediction.candidates]
+    assert errors == pytest.approx([0.044 + 0.004 * REST, prediction.error, 0.004 * REST])
+    assert prediction.is_met
     assert not chosen.model.doubts
 
 
@@ -85,9 +85,9 @@ def test_only_the_first_runs_beyond_its_last_peak(chosen):
 def test_a_cheap_setting_that_took_longer_to_find_than_to_run_is_not_chosen(chosen, monkeypatch):
     """Where the strongest part is most of the motion."""
     monkeypatch.setattr(model_selection, "strongest_window", lambda motion: motion)
-    told = chosen.of(0.300, 0.299)
-    assert told.dt == 0.0025
-    assert told.error == pytest.approx(0.001 * REST)
+    prediction = chosen.of(0.300, 0.299)
+    assert prediction.dt == 0.0025
+    assert prediction.error == pytest.approx(0.001 * REST)
 
 
 @pytest.mark.parametrize(
@@ -95,23 +95,23 @@ def test_a_cheap_setting_that_took_longer_to_find_than_to_run_is_not_chosen(chos
 )
 def test_the_longest_step_within_the_tolerance_is_taken(chosen, difference, step):
     """Of those of 0.5 ms; errors of steps are of order 2, and 0.003 is left of 0.012 at 2.5 ms."""
-    told = chosen.of(0.3 + difference, 0.3)
-    assert 1e3 * told.dt == pytest.approx(step)
-    assert told.error == pytest.approx(REST * difference * (step / 2.5) ** 2)
+    prediction = chosen.of(0.3 + difference, 0.3)
+    assert 1e3 * prediction.dt == pytest.approx(step)
+    assert prediction.error == pytest.approx(REST * difference * (step / 2.5) ** 2)
     assert len(chosen.built) == 1
 
 
 def test_where_none_is_good_enough_the_best_is_taken(chosen):
-    told = chosen.of(0.45, 0.33, 0.26, 0.22)
-    assert told.dt == 0.000625
-    assert not told.is_met
+    prediction = chosen.of(0.45, 0.33, 0.26, 0.22)
+    assert prediction.dt == 0.000625
+    assert not prediction.is_met
     assert "no finer setting is tried" in str(chosen.model.doubts[-1])
 
 
 def test_refinement_ends_where_it_changes_no_less_than_before(chosen):
-    told = chosen.of(0.40, 0.35, 0.29)
+    prediction = chosen.of(0.40, 0.35, 0.29)
     assert len(chosen.steps) == 3
-    assert told.error == pytest.approx(0.06 * REST)
+    assert prediction.error == pytest.approx(0.06 * REST)
     assert "impacts decide" in chosen.model.doubts[-1].remedy
 
 
@@ -121,18 +121,18 @@ def test_no_prediction_is_trusted_where_a_stack_rocks(chosen, largest, rocks):
     assert [f"up to {largest}" in doubt.cause for doubt in chosen.model.doubts] == [True] * rocks
 
 
-def test_a_step_that_is_asked_for_is_compared_with_one_twice_as_long(chosen):
-    told = chosen.of(0.40, 0.30, dt=0.01)
+def test_a_given_step_is_compared_with_one_twice_as_long(chosen):
+    prediction = chosen.of(0.40, 0.30, dt=0.01)
     assert chosen.steps == [0.02, 0.01]
-    assert told.dt == 0.01
+    assert prediction.dt == 0.01
     assert "leave dt out" in chosen.model.doubts[-1].remedy
     assert chosen.of(0.3, 0.3, dt=0.01).dt == 0.01
 
 
 def test_what_joints_turn_is_doubted_of_small_displacements(chosen):
-    told = chosen.of(0.3, 0.3, turn=0.004)
-    assert told.small_displacement_error == pytest.approx(0.012)
-    assert "by the assumption of small displacements" in told.text
+    prediction = chosen.of(0.3, 0.3, turn=0.004)
+    assert prediction.small_displacement_error == pytest.approx(0.012)
+    assert "by the assumption of small displacements" in prediction.text
     (doubt,) = chosen.model.doubts
     assert "small errs by about 0.012" in doubt.cause
     assert "displacements='large'" in doubt.remedy
@@ -146,7 +146,7 @@ def test_a_choice_may_be_of_large_displacements(chosen):
         chosen.of(0.3, 0.3, displacements="huge")
 
 
-def test_damping_is_found_of_a_model_where_it_is_asked_for():
+def test_damping_is_computed_of_a_model_where_it_is_a_function():
     damping = af.StiffnessDamping(0.03, 8.0)
     found = SimpleNamespace(size=3)
     assert model_selection.resolve_damping(found, lambda model: (model.size, damping)) == (

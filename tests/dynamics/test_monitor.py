@@ -31,12 +31,12 @@ def test_energy_from_nowhere_ends_a_run(whole):
     assert caught.value.last.time < history.time[-1] < 4.0
 
 
-def test_drift_is_told_once(whole, caplog):
+def test_drift_is_reported_once(whole, caplog):
     with caplog.at_level(logging.WARNING, "archfem"):
         run = af.time_history(whole, MOTION, dt=0.005, scheme=af.HHT(-0.1))
-    told = [record.message for record in caplog.records if "energy drifts" in record.message]
-    assert len(told) == 1
-    assert "lost to the scheme; compare with" in told[0]
+    messages = [record.message for record in caplog.records if "energy drifts" in record.message]
+    assert len(messages) == 1
+    assert "lost to the scheme; compare with" in messages[0]
     assert run.dataset.attrs["energy_drift"] < -0.05
     assert [doubt for doubt in run.doubts if "energy drifts" in doubt.cause]
     assert f"in doubt: {run.doubts[0]}" in str(run.verdict)
@@ -108,7 +108,7 @@ def test_displacements_that_are_not_small(stack, caplog):
 @pytest.mark.parametrize("method", ["snes", "newton", "compliance"])
 @pytest.mark.parametrize("scheme", [af.dynamics.Conserving(), af.dynamics.Newmark()])
 def test_numbers_that_overflow_end_in_an_error(method, scheme):
-    """A state that cannot be meant, in a joint as stiff as can be."""
+    """An impossible state, in the stiffest joint."""
     slides = scheme == af.dynamics.Conserving()
     stiff = af.Contact(1e16, 1e16, friction=0.6 if slides else None)
     model = af.build(af.column(breadth=1.0, heights=[1.0], contact=stiff), fidelity="rigid")
@@ -200,10 +200,10 @@ def test_every_step_of_a_batch_counts_for_displacements(stack):
     model = af.build(stack, fidelity="rigid", displacements="large")
     observer, far = model.observer(), np.array([0.0, 0.3, 0.0, 0.0, 0.4, 0.0])
     guard = looked(model)
-    asked = []
+    evaluated = []
 
     def state(k):
-        asked.append(k)
+        evaluated.append(k)
         return af.dynamics.State(0.0, np.zeros(model.size), *np.zeros((2, model.size)))
 
     count = 40
@@ -216,7 +216,7 @@ def test_every_step_of_a_batch_counts_for_displacements(stack):
     assert displacements.largest == pytest.approx([0.3, 0.4])
     assert displacements.residual == pytest.approx([0.0, 0.0])
     assert displacements.time == pytest.approx([21.0, 21.0])  # the first of two equal steps
-    assert asked[0] == 31  # the 33rd of all, since one had come before
+    assert evaluated[0] == 31  # the 33rd of all, since one had come before
 
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
@@ -292,7 +292,7 @@ def test_balance_is_exact_while_joints_stay_closed(stack, scheme, method):
     assert abs(run.dataset.attrs["energy_drift"]) < 1e-6
 
 
-def test_a_restart_goes_on_with_its_own_balance(ring):
+def test_a_restart_continues_with_its_own_balance(ring):
     """Of a scheme that has one to tell."""
     model = af.build(glued(ring), fidelity="rigid")
     given = {"damping": DAMPING, "scheme": NEWMARK, "dt": 0.005}

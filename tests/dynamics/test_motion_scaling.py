@@ -265,17 +265,17 @@ def test_no_bracket_rests_on_a_run_without_an_answer():
     [((0.1, 10.0), (0.1, 2.4516625)), ((0.1, 2.0), (0.1, 2.0)), ((3.0, 4.0), (3.0, 3.0))],
 )
 def test_collapse_is_not_sought_beyond_what_a_motion_may_be(between, limits, monkeypatch):
-    """Five g, of a motion of 20 m/s²; one scale where the least of those asked for is beyond."""
-    asked = []
+    """Five g, of a motion of 20 m/s²; one scale where the least of the given ones is beyond."""
+    ranges = []
     monkeypatch.setattr(
         "archfem.dynamics.motion_scaling.search_scales",
-        lambda shaken, what, precision, found: asked.append(found),
+        lambda shaken, what, precision, found: ranges.append(found),
     )
     block = af.column(breadth=1.0, heights=[1.0])
     model = af.build(block, fidelity="rigid", displacements="large")
     strong = af.Motion(np.array([0.0, 20.0, 0.0]), dt=0.01)
     af.collapse_scale(model, strong, between=between)
-    assert asked == [pytest.approx(limits)] * 2
+    assert ranges == [pytest.approx(limits)] * 2
 
 
 def test_motions_are_scaled_to_five_g_at_most_by_their_strongest_component():

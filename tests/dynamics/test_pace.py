@@ -72,14 +72,14 @@ def test_a_run_to_the_plain_call_keeps_its_energy(ring):
 
 
 @pytest.mark.parametrize(
-    ("asked", "words"),
+    ("options", "words"),
     [
         ({"dt": 0.005, "tolerance": 0.01}, "give one of both"),
         ({"tolerance": 0.0}, "between 0 and 1"),
         ({"tolerance": float("nan")}, "not a finite number"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(ring, asked, words):
+def test_invalid_input_is_refused(ring, options, words):
     model, dead = ring
     with pytest.raises(af.InvalidInput, match=words):
-        af.time_history(model, af.Motion(np.zeros(10), 0.01), start=dead, **asked)
+        af.time_history(model, af.Motion(np.zeros(10), 0.01), start=dead, **options)

@@ -102,7 +102,7 @@ def test_effort_between_records_is_kept(model):
 
 
 def test_ctrl_c_amid_a_batch_leaves_whole_records(model, motion):
-    """It comes when the coordinates of the third step are asked for."""
+    """It arrives when the coordinates of the third step are read."""
     start = af.dynamics.Equation(model, motion).at_rest(af.dead_load(model).q)
     given = {"method": "by hand", "dt": 0.005, "every": 1, "fields_every": 1}
 

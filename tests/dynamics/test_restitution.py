@@ -25,7 +25,7 @@ def contact(normal=1e9, friction=0.6):
 
 
 def of_bounce(ratio, normal=1e9):
-    """Damping with a ratio of the bounce on the whole base, told at that frequency."""
+    """Damping with a given ratio of the bounce on the whole base, at its frequency."""
     mass = WEIGHT / 9.81 * HEIGHT
     omega = np.sqrt(normal / mass)
     return af.StiffnessDamping(0.3 * ratio, 0.3 * omega / (2.0 * np.pi))
@@ -187,7 +187,7 @@ def test_the_usual_damping_lets_a_block_rock():
 
 
 @pytest.mark.parametrize("wanted", [0.5, 0.999, 1.2])
-def test_what_damping_cannot_do_is_told_with_what_it_can(wanted):
+def test_an_unreachable_restitution_is_refused_with_the_reachable_range(wanted):
     with pytest.raises(af.InvalidInput, match=r"out of reach.* from 0\.88\d to 0\.99\d: give"):
         restitution_damping(wanted, BREADTH, HEIGHT, contact=contact(), material=STONE)
 
@@ -203,7 +203,7 @@ def test_what_damping_cannot_do_is_told_with_what_it_can(wanted):
         ({"material": 2e4}, "material is a float"),
     ],
 )
-def test_blocks_that_cannot_be_meant(change, words):
+def test_invalid_blocks_are_refused(change, words):
     given = {"breadth": BREADTH, "height": HEIGHT, "contact": contact(), "material": STONE}
     with pytest.raises(af.InvalidInput, match=words):
         restitution_damping(0.95, **{**given, **change})
@@ -260,19 +260,19 @@ def test_turning_is_slowed_by_what_is_left_at_the_largest_tilts():
 @pytest.mark.parametrize("size", [0.1, 10.0])
 def test_a_block_is_followed_for_two_impacts_and_a_half(size, monkeypatch):
     """From tilt to level it takes √(2 θ I / M) under the moment M of its weight about the edge."""
-    asked = []
+    calls = []
 
     class Stepper:
         @staticmethod
         def batches(start, dt, end):
-            asked.append((dt, end))
+            calls.append((dt, end))
             return []
 
     monkeypatch.setattr("archfem.dynamics.damping.stepper_for", lambda *_: Stepper)
     block = _RockingBlock(size * BREADTH, size * HEIGHT, contact(), STONE)
-    assert block.measure_restitution(None) == 0.0  # it never comes to an impact here
+    assert block.measure_restitution(None) == 0.0  # no impact happens here
     mass = WEIGHT / 9.81 * size**2 * BREADTH * HEIGHT
     inertia = mass * size**2 * (BREADTH**2 + HEIGHT**2) / 3.0
     swing = np.sqrt(2.0 * block.tilt * inertia / (mass * 9.81 * size * BREADTH / 2.0))
     fine = 2.0 * np.pi / np.sqrt(1e9 / (WEIGHT / 9.81 * size * HEIGHT)) / 20.0
-    assert asked == [(pytest.approx(min(1e-3, fine)), pytest.approx(4.5 * swing))]
+    assert calls == [(pytest.approx(min(1e-3, fine)), pytest.approx(4.5 * swing))]

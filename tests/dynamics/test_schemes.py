@@ -23,7 +23,7 @@ def test_newmark_is_average_acceleration_and_the_midpoint_rule_its_own():
 
 
 @pytest.mark.parametrize("frequency", [2.0, 8.0, 31.0])
-def test_damping_has_its_ratio_where_it_is_told(frequency):
+def test_damping_has_its_ratio_at_the_given_frequency(frequency):
     """a / (4 π f) + b π f (Clough and Penzien, 1993)."""
     both = af.Rayleigh(0.03, (frequency, 3.0 * frequency))
     for f in both.frequencies:

@@ -51,5 +51,5 @@ def test_a_batch_is_cut_and_read():
     part = whole.cut(2)
     assert (part.times.tolist(), part.energy.tolist()) == ([1.0, 2.0], rows[:2].tolist())
     assert part.read(gauges).tolist() == [[2.0, 2.0], [4.0, 4.0]]
-    told = Batch(*given, readings=np.full((4, 3), 9.0)).cut(3)
-    assert told.read(gauges).tolist() == [[9.0] * 3] * 3
+    with_readings = Batch(*given, readings=np.full((4, 3), 9.0)).cut(3)
+    assert with_readings.read(gauges).tolist() == [[9.0] * 3] * 3

@@ -57,9 +57,9 @@ def test_a_step_that_does_not_settle_is_halved_by_the_solver(ring):
     run = af.time_history(model, short, dt=0.005, method=halving)
     plain = Stepper(equation, NewtonSolver.of(equation))
     fine = af.time_history(model, short, dt=0.0025, method=plain)
-    told = run.dataset.attrs
-    assert (told["halved_steps"], told["fallback_steps"]) == (told["steps"], 0)
-    assert told["shortest_step"] == 0.0025
+    attributes = run.dataset.attrs
+    assert (attributes["halved_steps"], attributes["fallback_steps"]) == (attributes["steps"], 0)
+    assert attributes["shortest_step"] == 0.0025
     for name in ("M", "V", "slip"):
         most = np.abs(fine.joints[name]).max()
         halves = [fine.joints[name].values[k::2] for k in (1, 2)]

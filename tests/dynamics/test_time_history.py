@@ -16,7 +16,7 @@ DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 GIVEN = {"damping": DAMPING, "dt": 0.005}
 
 
-def test_a_model_knows_what_was_predicted_of_it(model):
+def test_a_model_keeps_its_prediction(model):
     foreseen = af.models.Prediction(
         error=0.003,
         tolerance=0.005,
@@ -89,7 +89,7 @@ def test_an_event_begins_afresh_in_each_run(model, motion, event):
     assert first.time[-1] == second.time[-1]
 
 
-def test_a_run_goes_on_where_it_stopped(run, model, motion):
+def test_a_run_continues_where_it_stopped(run, model, motion):
     first = af.time_history(model, motion.cut(0.0, 1.5), **GIVEN)
     second = af.time_history(model, motion, **GIVEN, start=last_state(first))
     assert second.time[0] == pytest.approx(1.5)
@@ -144,7 +144,7 @@ def test_refusals(model, motion):
         Record(every=0)
 
 
-def test_steps_are_those_asked_for_or_foreseen_or_chosen_by_a_tolerance(model):
+def test_steps_are_given_or_predicted_or_chosen_by_a_tolerance(model):
     """Between a microsecond and a tenth of a second; 0.005 of |e| where nothing is said."""
     assert _resolve_steps(model, None, None) == (None, 0.005)
     assert _resolve_steps(model, None, 0.02) == (None, 0.02)

@@ -246,7 +246,7 @@ def paced(model, motion):
 
 
 @pytest.mark.slow
-def test_mechanisms_too_short_to_count_are_told(paced):
+def test_mechanisms_too_short_to_count_are_reported(paced):
     """By a loop over the record: what counts lasts long enough, and what came before is named."""
     step = np.diff(paced.time, prepend=0.0)
     failed = (paced.joints["hinge"].values != 0) | paced.joints["slide"] | paced.joints["open"]

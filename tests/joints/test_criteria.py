@@ -196,7 +196,7 @@ def test_a_hinge_lies_within_its_joint(hinge):
 @pytest.mark.parametrize(
     "given", [{"failures": 0}, {"failures": 4.0}, {"friction": -0.1}, {"friction": "none"}]
 )
-def test_criteria_that_cannot_be_meant(given):
+def test_invalid_criteria_are_refused(given):
     with pytest.raises(af.errors.InvalidInput, match=f"criteria {next(iter(given))}"):
         Criteria(**given)
 

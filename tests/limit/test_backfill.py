@@ -89,7 +89,7 @@ def test_a_uniform_fan_of_one_in_two():
         ({"spread": 0.0}, "degrees from the vertical"),
     ],
 )
-def test_a_fill_that_cannot_be_meant_is_refused(given, says):
+def test_an_invalid_fill_is_refused(given, says):
     with pytest.raises(af.InvalidInput, match=says):
         Fill(**{"friction_angle": 35.0, **given})
 

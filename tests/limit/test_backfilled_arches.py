@@ -392,7 +392,7 @@ def test_a_fill_that_slides_first_is_warned_of(caplog):
         ),
     ],
 )
-def test_what_cannot_be_meant_is_refused(call, says):
+def test_invalid_input_is_refused(call, says):
     with pytest.raises(af.InvalidInput, match=says):
         call()
 

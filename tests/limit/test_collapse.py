@@ -346,7 +346,7 @@ def test_piers_reach_to_the_ground_and_carry_the_ring():
         (lambda: piers(pier_breadth=0.5), "is not between"),
     ],
 )
-def test_input_that_cannot_be_meant_is_refused(call, message):
+def test_invalid_input_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
 

@@ -180,7 +180,7 @@ def test_impact_multiplies_the_vehicle():
         ({"fill": None}, "softer than the joints"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(given, says):
+def test_invalid_input_is_refused(given, says):
     options = {"structure": arch_bridge(voussoirs=7), "vehicle": "LM1", "fill": GRAVEL} | given
     with pytest.raises(af.InvalidInput, match=says):
         af.rate(**options)

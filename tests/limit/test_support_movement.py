@@ -265,6 +265,6 @@ def test_gaps_of_displaced_blocks_are_rates_of_what_is_open():
         (lambda: largest_movement(semicircle(0.2, 12), af.BodyForce(1.0)), "settlement"),
     ],
 )
-def test_input_that_cannot_be_meant_is_refused(call, message):
+def test_invalid_input_is_refused(call, message):
     with pytest.raises(af.InvalidInput, match=message):
         call()

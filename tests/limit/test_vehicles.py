@@ -215,7 +215,7 @@ def test_the_fill_over_the_abutments_carries_an_axle_to_the_ground():
         ({"structure": 3}, "structure is a int"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(given, says):
+def test_invalid_input_is_refused(given, says):
     options = {"structure": arch_bridge(), "axles": 1e5, "fill": GRAVEL} | given
     with pytest.raises(af.InvalidInput, match=says):
         af.moving_load(**options)

@@ -1,4 +1,4 @@
-"""Joints found from touching edges: which there are, what they are called, which way they point."""
+"""Joints found from touching edges: their number, their names and their directions."""
 
 from dataclasses import replace
 

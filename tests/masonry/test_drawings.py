@@ -200,7 +200,7 @@ def test_a_drawing_of_too_many_vertices_or_too_rough_a_tolerance_takes_no_time(t
         af.read_outlines(geojson(tmp_path / "b.geojson", many), snap=20.0)
 
 
-def test_a_failure_of_the_library_that_reads_dxf_is_told_with_its_cause(tmp_path, monkeypatch):
+def test_a_failure_of_the_library_that_reads_dxf_is_reported_with_its_cause(tmp_path, monkeypatch):
     def fail(path):
         raise struct.error("unpack_from requires a buffer")
 

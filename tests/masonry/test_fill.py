@@ -246,7 +246,7 @@ def test_pieces_fill_the_body_and_are_soil_still():
         (50.0, 30.0, "give a size with which"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(size, angle, words):
+def test_invalid_input_is_refused(size, angle, words):
     whole = box(3.0, SOIL_TO_STONE, SOIL_TO_STONE)
     with pytest.raises(af.InvalidInput, match=words):
         jointed_fill(whole, size, angle=angle)

@@ -69,8 +69,8 @@ BOUNDS = [
 
 
 @pytest.mark.parametrize(("make", "least", "most"), BOUNDS)
-def test_what_can_be_meant_ends_where_it_is_said_to(make, least, most):
-    """By a hundredth to either side of each bound, and of zero by as little as is told from it."""
+def test_values_are_accepted_up_to_their_documented_bounds(make, least, most):
+    """A hundredth to either side of each bound, and 1e-9 to either side of zero."""
     for bound, outward in ((least, -1.0), (most, 1.0)):
         if bound is not None:
             step = 0.01 * abs(bound) or 1e-9

@@ -25,7 +25,7 @@ def test_an_overlap_is_none_up_to_a_millionth_of_all_outlines(share, apart):
             check_overlaps(outlines, NAMES)
 
 
-def test_an_overlap_is_told_by_its_depth_and_its_place():
+def test_an_overlap_is_reported_with_its_depth_and_its_place():
     """A strip of 2 cm by 1 m, 2 A / P = 0.0196 m deep, a third of the way up the other block."""
     outlines = [box(0.0, 0.0), box(0.98, 0.0), box(5.0, 0.0)]
     for slight, remedy in ((0.0195, False), (0.0197, True)):

@@ -49,7 +49,7 @@ def test_impossible_rings_are_refused(change, says):
         af.circular_arch(**{**given, **change})
 
 
-def test_an_angle_that_looks_like_radians_is_asked_about():
+def test_an_angle_that_looks_like_radians_is_refused_with_both_readings():
     given = {"radius": 2.95, "thickness": 0.55, "voussoirs": 17}
     with pytest.raises(af.InvalidInput, match=r"looks like radians: give 159 for 2\.775 rad, or"):
         af.circular_arch(embrace=2.775, **given)

@@ -1,4 +1,4 @@
-"""Roles of parts: told by blocks and joints, else by names with a warning; they decide verdicts."""
+"""Roles of parts: given by blocks and joints, or by names with a warning; verdicts by role."""
 
 import json
 import logging
@@ -34,7 +34,7 @@ def viaduct(west, east, middle, fill=FILL):
     )
 
 
-def untold(structure):
+def without_roles(structure):
     """A structure of the same blocks and joints, whose roles nobody tells."""
     blocks, joints = (
         tuple(replace(each, role="") for each in members)
@@ -72,14 +72,14 @@ def verdicts(structure):
 
 
 @pytest.fixture
-def told(caplog):
-    """What was warned of so far."""
+def warnings(caplog):
+    """The warnings so far."""
     caplog.set_level(logging.WARNING, "archfem")
     return lambda: [record.getMessage() for record in caplog.records]
 
 
 @pytest.mark.parametrize("names", NAMES.values(), ids=NAMES)
-def test_the_verdict_does_not_hang_on_names(names, told):
+def test_the_verdict_does_not_depend_on_names(names, warnings):
     """Not on the names, whether the shapes find the joints, or `assembled` does."""
     expected = verdicts(viaduct(*NAMES["arches"]))
     kinds = {name: (each.time, each.kind) for name, each in expected.items()}
@@ -97,11 +97,11 @@ def test_the_verdict_does_not_hang_on_names(names, told):
     first = af.masonry.assembled(viaduct(*NAMES["arches"]).blocks, af.masonry.STONE_TO_STONE)
     assert [each.role for each in again.joints] == [each.role for each in first.joints]
     assert [each.ends.tolist() for each in again.joints] == [e.ends.tolist() for e in first.joints]
-    assert told() == []
+    assert warnings() == []
 
 
-def test_a_run_meets_the_same_mechanism_whatever_its_parts_are_called(told):
-    """And another one, with warnings, where nobody tells what the vaults are."""
+def test_a_run_meets_the_same_mechanism_whatever_its_parts_are_called(warnings):
+    """And another one, with warnings, where nothing states that the vaults are vaults."""
     motion = af.Motion(5.0 * np.sin(4.0 * np.pi * np.arange(0.0, 0.8, 0.005)), 0.005)
     met = []
     for names in NAMES.values():
@@ -115,11 +115,11 @@ def test_a_run_meets_the_same_mechanism_whatever_its_parts_are_called(told):
         met.append((replace(run.mechanism, part=""), replace(run.verified.moved, part="")))
     assert met[0] == met[1] == met[2]
     assert met[0][0].kind == "global"
-    assert not [words for words in told() if "displacements as small" not in words]
-    blank = af.build(untold(made), fidelity="rigid")
+    assert not [words for words in warnings() if "displacements as small" not in words]
+    blank = af.build(without_roles(made), fidelity="rigid")
     run = af.time_history(blank, motion, dt=0.005, damping=af.Rayleigh(0.05, (4.0, 15.0)))
     assert replace(run.mechanism, part="") != met[0][0]
-    assert len([words for words in told() if "displacements as small" not in words]) >= 3
+    assert len([words for words in warnings() if "displacements as small" not in words]) >= 3
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,7 @@ def test_events_go_by_roles(event):
 
 
 def test_all_else_goes_by_roles_too():
-    """What studies keep and pictures show."""
+    """Findings that studies keep, and panels of pictures."""
     seen = []
     for names in NAMES.values():
         made = viaduct(*names)
@@ -145,22 +145,22 @@ def test_all_else_goes_by_roles_too():
         panels = [axes.get_title() for axes in af.view.draw_envelope({"run": run}).axes]
         assert panels == list(names)
         found = findings_by_part(run)
-        told = {word: {} for word in ("eccentricity", "friction", "mechanism", "time")}
+        by_name = {word: {} for word in ("eccentricity", "friction", "mechanism", "time")}
         for key, value in found.items():
             word, colon, name = key.partition(": ")
             if colon:
-                told[word][name] = value
-        assert set(told["eccentricity"]) == set(names)
+                by_name[word][name] = value
+        assert set(by_name["eccentricity"]) == set(names)
         marks = joint_marks(made, joints.isel(time=5))
-        seen.append((told["mechanism"], told["time"], marks.hinges.tolist()))
+        seen.append((by_name["mechanism"], by_name["time"], marks.hinges.tolist()))
     assert seen[0] == seen[1] == seen[2]
 
 
-def test_an_unknown_name_is_warned_of_once_and_told_how_to_set_it(told):
-    made = untold(viaduct(*NAMES["English"]))
-    assert len(told()) == 3
+def test_an_unknown_name_is_warned_of_once_with_ways_to_set_its_role(warnings):
+    made = without_roles(viaduct(*NAMES["English"]))
+    assert len(warnings()) == 3
     for name in NAMES["English"]:
-        (said,) = (each for each in told() if f"'{name}'" in each)
+        (said,) = (each for each in warnings() if f"'{name}'" in each)
         assert f"part '{name}' is taken for neither ring nor pier" in said
         assert "its name has no word of a known role" in said
         assert 'Block(role="ring")' in said
@@ -168,15 +168,15 @@ def test_an_unknown_name_is_warned_of_once_and_told_how_to_set_it(told):
     assert set(af.joints.part_roles(af.joints.joint_dataset(made, quake(made)[0])).values()) == {
         "other"
     }
-    assert verdicts(untold(viaduct(*NAMES["arches"]))) == verdicts(viaduct(*NAMES["arches"]))
-    assert len(told()) == 3
+    assert verdicts(without_roles(viaduct(*NAMES["arches"]))) == verdicts(viaduct(*NAMES["arches"]))
+    assert len(warnings()) == 3
     replace(made, width=2.0)
-    assert len(told()) == 3  # its blocks know their roles now
+    assert len(warnings()) == 3  # its blocks have their roles now
 
 
-def test_what_one_block_tells_goes_for_all_of_its_part(told):
-    made = untold(viaduct("west vault", "east arch", "pier"))
-    assert len(told()) == 1
+def test_a_role_of_one_block_holds_for_all_of_its_part(warnings):
+    made = without_roles(viaduct("west vault", "east arch", "pier"))
+    assert len(warnings()) == 1
     number = next(k for k, each in enumerate(made.blocks) if each.part == "west vault")
     blank = [replace(each, role="") for each in made.blocks]
     blank[number] = replace(blank[number], role="ring")
@@ -185,7 +185,7 @@ def test_what_one_block_tells_goes_for_all_of_its_part(told):
     assert {each.role for each in again.blocks if each.part == "west vault"} == {"ring"}
     assert {each.role for each in again.joints if each.part == "west vault"} == {"ring"}
     assert verdicts(again) == verdicts(viaduct(*NAMES["arches"]))
-    assert len(told()) == 1
+    assert len(warnings()) == 1
 
 
 @pytest.mark.parametrize(
@@ -204,9 +204,9 @@ def test_what_one_block_tells_goes_for_all_of_its_part(told):
         ("spandrel-walls", "other"),
     ],
 )
-def test_names_that_tell_a_role(part, role, told):
+def test_names_that_imply_a_role(part, role, warnings):
     assert infer_role(part) == role
-    assert told() == []
+    assert warnings() == []
 
 
 @pytest.mark.parametrize(
@@ -219,9 +219,9 @@ def test_names_that_tell_a_role(part, role, told):
         ("pier foundation", "pier", "has words of pier and other"),
     ],
 )
-def test_names_that_leave_a_role_open(part, role, why, told):
+def test_names_that_leave_a_role_open(part, role, why, warnings):
     assert infer_role(part) == role
-    (said,) = told()
+    (said,) = warnings()
     assert f"part '{part}' is taken for" in said
     assert why in said
 
@@ -260,12 +260,12 @@ def test_roles_that_contradict_one_another_are_refused():
         viaduct("backfill", "east arch", "pier")
 
 
-def test_a_survey_tells_roles_by_properties_or_layers(tmp_path, told):
+def test_a_survey_gives_roles_by_properties_or_layers(tmp_path, warnings):
     made = viaduct(*NAMES["German"])
     path = tmp_path / "viaduct.geojson"
     af.masonry.write_outlines(made, path)
     joints = [(joint.name, joint.role) for joint in af.masonry.surveyed(path).joints]
-    assert told() == []
+    assert warnings() == []
     table = json.loads(path.read_text())
     for feature in table["features"]:
         del feature["properties"]["role"]
@@ -274,12 +274,12 @@ def test_a_survey_tells_roles_by_properties_or_layers(tmp_path, told):
     structure = {"shape": "outlines", "file": str(path), "layers": layers}
     found = af.Case.of({"structure": structure}).structure
     assert [(joint.name, joint.role) for joint in found.joints] == joints
-    assert told() == []
+    assert warnings() == []
     af.read_outlines(path)
-    assert {said.split("'")[1] for said in told()} == set(NAMES["German"])
+    assert {said.split("'")[1] for said in warnings()} == set(NAMES["German"])
 
 
-def test_roles_of_a_survey_that_cannot_be_meant(tmp_path):
+def test_invalid_roles_of_a_survey_are_refused(tmp_path):
     path = tmp_path / "stack.geojson"
     af.masonry.write_outlines(af.column(breadth=1.0, heights=[1.0]), path)
     table = json.loads(path.read_text())
@@ -303,17 +303,17 @@ def test_roles_of_a_survey_that_cannot_be_meant(tmp_path):
         af.masonry.surveyed(path)
 
 
-def test_what_a_feature_tells_comes_before_its_layer(tmp_path):
+def test_the_role_of_a_feature_precedes_that_of_its_layer(tmp_path):
     path = tmp_path / "stack.geojson"
     af.masonry.write_outlines(af.column(breadth=1.0, heights=[1.0]), path)
     blocks = af.read_outlines(path, layers={"column": af.masonry.Layer(role="other")}).blocks
     assert {block.role for block in blocks} == {"pier"}
 
 
-def test_a_bridge_of_a_case_may_call_its_parts_anything(told):
+def test_a_bridge_of_a_case_may_call_its_parts_anything(warnings):
     case = af.Case.of({"structure": {"shape": "bridge", "arches": {"Bogen": RING}}})
     assert {joint.role for joint in case.structure.joints} == {"ring"}
-    assert told() == []
+    assert warnings() == []
 
 
 def test_a_saved_history_keeps_roles(tmp_path):

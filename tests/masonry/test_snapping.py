@@ -1,4 +1,4 @@
-"""Outlines that nearly touch, made to touch; and those that cannot be meant."""
+"""Outlines that nearly touch, made to touch; and those that are refused."""
 
 import json
 
@@ -87,7 +87,7 @@ def test_a_tolerance_as_large_as_the_blocks_is_refused(tmp_path):
         af.masonry.surveyed(path, snap=1.6)
 
 
-def test_gaps_that_are_meant_are_left(tmp_path):
+def test_intended_gaps_are_left(tmp_path):
     """A joint open at one end by 6 mm, an open joint of 10 mm: more than five times snap."""
     path = geojson(
         tmp_path / "open.geojson",
@@ -102,9 +102,9 @@ def test_gaps_that_are_meant_are_left(tmp_path):
     assert names == ["rock to a", "rock to b", "rock to c"]
 
 
-@pytest.mark.parametrize(("gap", "meant"), [(4.9e-3, False), (5.1e-3, True)])
-def test_a_gap_is_meant_from_five_times_the_tolerance_on(tmp_path, gap, meant):
-    """Two stones side by side on a rock, and along how much of an edge they may touch it."""
+@pytest.mark.parametrize(("gap", "intended"), [(4.9e-3, False), (5.1e-3, True)])
+def test_a_gap_counts_as_intended_from_five_times_the_tolerance(tmp_path, gap, intended):
+    """Two stones side by side on a rock, and a short contact with its edge."""
     rock = [[0, -1], [4, -1], [4, 0], [0, 0]]
     apart = geojson(
         tmp_path / "gap.geojson", {"rock": rock, "a": square(0, 0), "b": square(1 + gap, 0)}
@@ -113,7 +113,7 @@ def test_a_gap_is_meant_from_five_times_the_tolerance_on(tmp_path, gap, meant):
         tmp_path / "short.geojson",
         {"rock": rock, "a": [[4 - gap, 0], [5, 0], [5, 1], [4 - gap, 1]]},
     )
-    if meant:
+    if intended:
         assert len(af.masonry.surveyed(apart).joints) == 2
         assert af.masonry.surveyed(short).joints[0].depth == pytest.approx(gap)
     else:

@@ -1,4 +1,4 @@
-"""How soft blocks are: closed forms of one block, and soil told from stone."""
+"""How soft blocks are: closed forms of one block, and soil distinguished from stone."""
 
 from dataclasses import replace
 

@@ -85,16 +85,16 @@ def test_material_and_layer_of_a_feature(tmp_path):
     assert af.read_outlines(own, layers=layers).blocks[1].material == af.STONE
 
 
-def test_layers_must_be_told_rightly(tmp_path, stack):
+def test_layers_must_be_those_of_the_file(tmp_path, stack):
     path = dxf(tmp_path / "stack.dxf", stack)
     with pytest.raises(af.errors.InvalidInput, match="of layer 'column-fixed' nothing is said"):
         af.read_outlines(path, layers={"column": af.masonry.Layer()})
-    told = {"column": af.masonry.Layer(), "column-fixed": af.masonry.Layer(ignore=True)}
-    assert len(af.read_outlines(path, layers=told).blocks) == 2
+    layers = {"column": af.masonry.Layer(), "column-fixed": af.masonry.Layer(ignore=True)}
+    assert len(af.read_outlines(path, layers=layers).blocks) == 2
     with pytest.raises(
         af.errors.InvalidInput, match=r"no outlines on layer 'colum': its layers are \['col"
     ):
-        af.read_outlines(path, layers=told | {"colum": af.masonry.Layer()})
+        af.read_outlines(path, layers=layers | {"colum": af.masonry.Layer()})
     with pytest.raises(af.errors.InvalidStructure, match=r"snap 0\.0 m is not above 0"):
         af.read_outlines(path, snap=0.0)
 

@@ -224,7 +224,7 @@ def test_a_ring_that_does_not_stand_is_not_pushed():
         (lambda: pushover(rigid(RING), af.Settlement(5, (0.1, 0.0, 0.0))), "cannot settle"),
     ],
 )
-def test_input_that_cannot_be_meant_is_refused(call, message):
+def test_invalid_input_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
 

@@ -85,7 +85,7 @@ def test_a_study_finds_what_its_cases_do_alone(study, tmp_path):
         (f"{CASE}\n{CASE.replace('a b', 'a/b')}", "'a/b' names a file of results too"),
     ],
 )
-def test_studies_that_cannot_be_meant(text, says, tmp_path):
+def test_invalid_studies_are_refused(text, says, tmp_path):
     (tmp_path / "study.toml").write_text(text)
     with pytest.raises(af.InvalidInput, match=says):
         af.studies.Comparison.read(tmp_path / "study.toml")

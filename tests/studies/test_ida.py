@@ -183,7 +183,7 @@ def test_a_motion_is_what_its_table_says(small_ida):
     assert ida(case, [unnamed], **few).table["motion"].values.tolist() == ["motion 1"]
 
 
-def test_analyses_that_cannot_be_meant(small_ring):
+def test_invalid_analyses_are_refused(small_ring):
     with pytest.raises(af.InvalidInput, match="no motions were given"):
         ida(small_ring)
     with pytest.raises(af.InvalidInput, match="3 motions under 1 names"):

@@ -58,7 +58,7 @@ def test_the_report_tells_what_hangs_on_stiffness(small_ring):
         ((-1.0, 0.5), "young = -1.0"),
     ],
 )
-def test_joints_that_cannot_be_meant(given, says):
+def test_invalid_joints_are_refused(given, says):
     with pytest.raises(af.InvalidInput, match=says):
         af.joint_stiffness(*given)
     with pytest.raises(af.InvalidInput, match="not between 0 and the strength"):

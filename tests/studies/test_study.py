@@ -532,7 +532,7 @@ RANDOM = "vary.structure.thickness = { distribution = 'norm', loc = 0.5, scale =
         ),
     ],
 )
-def test_studies_that_cannot_be_meant(text, says, ring_file):
+def test_invalid_studies_are_refused(text, says, ring_file):
     path = ring_file.with_name("study.toml")
     path.write_text(text)
     with pytest.raises(af.InvalidInput, match=says):

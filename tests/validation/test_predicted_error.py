@@ -131,7 +131,7 @@ def test_damping_found_of_the_first_model_is_that_of_the_choice(ring):
         (float("nan"), "is not a finite number"),
     ],
 )
-def test_a_tolerance_that_cannot_be_meant(tolerance, says):
+def test_an_invalid_tolerance_is_refused(tolerance, says):
     with pytest.raises(af.InvalidInput, match=f"tolerance .* {says}"):
         af.build(SCENES["ring"][0], fidelity="auto", tolerance=tolerance)
 

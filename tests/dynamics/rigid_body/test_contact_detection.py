@@ -15,9 +15,9 @@ from archfem.dynamics.rigid_body.contact_detection import (
 )
 
 
-def touching(structure, poses, **told):
+def touching(structure, poses, **options):
     """Bodies, points, normals and gaps of all contacts."""
-    bodies = make_bodies(structure, **told)
+    bodies = make_bodies(structure, **options)
     world, found = allocate_pieces(bodies), allocate_contacts(len(bodies.owner))
     place_pieces(bodies, np.asarray(poses, dtype=float), world)
     count = find_contacts(bodies, world, found)

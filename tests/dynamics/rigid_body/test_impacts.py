@@ -149,7 +149,7 @@ def test_rebounds_that_would_add_energy_are_reduced():
     assert end.energy.gained < 1e-4 * end.energy.lost
 
 
-def test_ratios_that_cannot_be_meant_are_refused():
+def test_invalid_ratios_are_refused():
     structure = floor((0.0, 0.0, 0.5, 2.0))
     for ratio in (0.0, 1.1, {"joint 1": -0.5}, {"joint 7": 0.9}):
         with pytest.raises(af.errors.InvalidInput, match="rocking_ratio"):

@@ -173,11 +173,11 @@ def test_frames_come_at_equal_times_and_at_the_end():
     assert times == pytest.approx([2.0, 2.02, 2.04, 2.05], abs=1e-9)
 
 
-def test_numbers_that_cannot_be_meant_are_refused():
+def test_invalid_numbers_are_refused():
     structure = floor((0.0, 0.0, 0.5, 0.5))
-    for told in ({"dt": 0.1}, {"restitution": 1.5}, {"friction": -1.0}, {"level": 5.0}):
+    for settings in ({"dt": 0.1}, {"restitution": 1.5}, {"friction": -1.0}, {"level": 5.0}):
         with pytest.raises(af.errors.InvalidInput):
-            RigidBlockSimulation(structure, **told)
+            RigidBlockSimulation(structure, **settings)
     with pytest.raises(af.errors.InvalidInput, match="structure is a str"):
         RigidBlockSimulation("ring")
     falling, start = RigidBlockSimulation(structure), LooseBlocks.as_built(structure)
@@ -225,7 +225,7 @@ def test_energy_from_nowhere_is_refused(monkeypatch, chords):
         )
 
 
-def test_rest_is_told_only_once_the_ground_rests(chords):
+def test_rest_is_reported_only_once_the_ground_rests(chords):
     ground = af.Motion(1e-9 * np.ones(101), 0.01)
     end = RigidBlockSimulation(chords, dt=1e-3).final_frame(
         LooseBlocks.as_built(chords), 5.0, ground

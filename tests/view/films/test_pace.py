@@ -59,6 +59,6 @@ def test_what_matters_is_the_mechanism_or_the_fall(run, column, toppled):
         ({"window": "auto", "seconds": 5.0}, r"give one of the two"),
     ],
 )
-def test_windows_that_cannot_be_meant_are_refused(run, options, said):
+def test_invalid_windows_are_refused(run, options, said):
     with pytest.raises(af.InvalidInput, match=said):
         frame_timing(run, KEPT, 20.0, **{"seconds": None, "window": None, **options})
