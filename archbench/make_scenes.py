@@ -430,7 +430,7 @@ SEVENTH = ("s", "time from release to the seventh impact")
 
 def rocking() -> Iterator[Scene]:
     """S11, S12, S13: blocks released from half of the angle at which they overturn."""
-    # breadth and height [m], what it is, ratio of angular velocities that is given
+    # breadth and height [m], description, ratio of angular velocities that is given
     blocks: dict[str, tuple[float, float, str, float | None]] = {
         "S11": (0.6, 2.4, "block 0.6 by 2.4 m, rigid impacts", None),
         "S12_1": (0.25, 1.0, "granite block 0.25 by 1.0 m", None),

@@ -43,7 +43,7 @@ class Program:
 
     @property
     def answers(self) -> set[str]:
-        """Actions that the program knows."""
+        """Actions that the program supports."""
         return set(self.settings)
 
     @property

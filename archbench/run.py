@@ -35,7 +35,7 @@ Answer = dict[str, Any]
 class Process:
     """A process of a program that answers a scene, by one settings after another.
 
-    It starts when it is first asked, and anew after it died or was ended.
+    It starts at its first request, and anew after it died or was ended.
     """
 
     def __init__(self, program: Program, scene: dict[str, Any], limit: float = TIME_LIMIT) -> None:

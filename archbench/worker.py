@@ -39,16 +39,16 @@ def main(adapter: str, scene: str, short: float = 5.0) -> None:
     module = load(Path(adapter))
     given = json.loads(Path(scene).read_text(encoding="utf-8"))
     for number, line in enumerate(sys.stdin):
-        asked = json.loads(line)
-        found, cost = timed(module, given, asked["settings"])
+        request = json.loads(line)
+        found, cost = timed(module, given, request["settings"])
         if number == 0 and cost < short:
             # modules and compiled kernels are loaded on first use, which is no cost of the answer
-            found, cost = timed(module, given, asked["settings"])
+            found, cost = timed(module, given, request["settings"])
         found |= {"cpu_s": cost, "version": module.version()}
         # complete once it is there under its name
-        unfinished = Path(f"{asked['answer']}.part")
+        unfinished = Path(f"{request['answer']}.part")
         unfinished.write_text(json.dumps(found), encoding="utf-8")
-        os.replace(unfinished, asked["answer"])
+        os.replace(unfinished, request["answer"])
 
 
 if __name__ == "__main__":

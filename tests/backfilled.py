@@ -46,7 +46,7 @@ def retaining_wall(breadth=1.0, height=2.0, friction=0.6, material=SOIL, width=1
 
 
 def row_of_stones(cover=1.0, stones=12, paving=0.0):
-    """Stones of 0.5 m side by side on rock, under a level fill and, if asked for, a pavement."""
+    """Stones of 0.5 m side by side on rock, under a level fill and, on request, a pavement."""
     side = 0.5
     blocks = [rectangle(0.0, -1.0, side * stones, 0.0, "rock", fixed=True)]
     blocks += [

@@ -40,12 +40,12 @@ def opened(driver, path):
 
 
 def complaints(driver):
-    """What the page has complained of in the console."""
+    """Warnings and errors of the page in the console."""
     return [entry for entry in driver.get_log("browser") if entry["level"] != "INFO"]
 
 
 def printed(driver):
-    """The page as PDF, as it asks to be printed."""
+    """The page as PDF, in the page size that it sets."""
     pypdf = pytest.importorskip("pypdf")
     found = driver.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})
     return pypdf.PdfReader(BytesIO(base64.b64decode(found["data"])))

@@ -29,10 +29,10 @@ def floor(*boxes, friction=0.6, floor=(-20.0, 60.0)):
     return af.Structure(tuple(blocks), tuple(joints), gravity=G)
 
 
-def _block(box, name, **told):
+def _block(box, name, **options):
     left, low, right, high = box
     outline = ((left, low), (right, low), (right, high), (left, high))
-    return af.Block(outline, af.STONE, name, **told)
+    return af.Block(outline, af.STONE, name, **options)
 
 
 def rocking_block():

@@ -1,4 +1,4 @@
-"""Pages read by the standard library's reader: whether elements close, and what they ask for."""
+"""Pages read by the standard library's reader: whether elements close, and what they load."""
 
 import json
 import re
@@ -13,18 +13,18 @@ VOID = {"br", "hr", "img", "input", "link", "meta", "path", "circle", "rect", "c
 
 
 class Reader(HTMLParser):
-    """Keeps which elements are open, what is asked for, and what is said."""
+    """Keeps the open elements, the addresses that they load, and the text."""
 
     def __init__(self, page):
         super().__init__()
-        self.open, self.asked, self.words, self.scenes, self.ids = [], [], [], [], []
+        self.open, self.addresses, self.words, self.scenes, self.ids = [], [], [], [], []
         self.feed(page)
         self.close()
         assert self.open == []
 
     def handle_starttag(self, tag, attrs):
         given = dict(attrs)
-        self.asked += [given[key] for key in ("src", "href", "data") if key in given]
+        self.addresses += [given[key] for key in ("src", "href", "data") if key in given]
         self.ids += [given["id"]] if "id" in given else []
         self.scripted = given.get("type") == "application/json"
         if tag not in VOID:
@@ -45,10 +45,10 @@ class Reader(HTMLParser):
 
 
 def read_page(page):
-    """Read a page that must be well-formed and ask nobody for anything."""
+    """Read a page that must be well-formed and load nothing from elsewhere."""
     found = Reader(page)
-    for asked in found.asked:
-        assert asked.startswith(("data:image/", "#"))
+    for address in found.addresses:
+        assert address.startswith(("data:image/", "#"))
     style = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
     assert not any(word in each for each in style for word in ("url(", "@import"))
     assert len(found.ids) == len(set(found.ids))

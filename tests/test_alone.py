@@ -1,4 +1,4 @@
-"""Installed by pip into an environment of its own, without FEniCSx and what a checkout has."""
+"""Installed by pip into an environment of its own, without FEniCSx and files of a checkout."""
 
 import os
 import subprocess

@@ -22,7 +22,7 @@ SUPPORT_MODULES |= {"_petsc", "_threads", "_typing", "_validation"}
 ROOMS = ["motion", "masonry", "joints", "limit", "models", "statics", "dynamics", "view", "cases"]
 ROOMS += ["studies", "commands"]
 ENTRANCES = {"__init__", "__main__"}
-# `motion` knows no structures, and rooms about structures at rest need no motion.
+# `motion` imports no structures, and rooms about structures at rest need no motion.
 INDEPENDENT_ROOMS = {
     "motion": {"masonry"},
     "masonry": {"motion"},

@@ -70,7 +70,7 @@ def test_each_draws_itself(things):
         assert isinstance(each._repr_html_(), str)
 
 
-def test_each_is_told_in_a_line_or_two(things):
+def test_each_is_shown_in_a_line_or_two(things):
     for each in things:
         words = repr(each)
         assert words.startswith(type(each).__name__)
@@ -81,7 +81,7 @@ def test_each_is_told_in_a_line_or_two(things):
     assert "factor 0.25" in repr(things[4])  # b / h of the whole column, 0.4 / 1.6
 
 
-def test_pictures_are_loaded_when_asked_for():
+def test_pictures_are_loaded_on_first_use():
     script = """
 import sys, archfem as af
 import archfem.commands.tools  # of `archfem check`

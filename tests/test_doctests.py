@@ -1,4 +1,4 @@
-"""Examples in docstrings of public names run, and print what they say."""
+"""Examples in docstrings of public names run, and print the output that they show."""
 
 import doctest
 from importlib import import_module
@@ -22,10 +22,10 @@ def examples():
     return [test for test in found.values() if test.examples]
 
 
-def test_examples_print_what_they_say():
-    told, ran = [], examples()
+def test_examples_print_the_output_that_they_show():
+    printed, ran = [], examples()
     runner = doctest.DocTestRunner()
     for example in ran:
-        runner.run(example, out=told.append)
-    assert not runner.failures, "".join(told)
+        runner.run(example, out=printed.append)
+    assert not runner.failures, "".join(printed)
     assert len(ran) >= 15

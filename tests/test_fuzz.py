@@ -16,4 +16,4 @@ def test_odd_input_ends_in_an_answer_or_a_named_error(tmp_path, monkeypatch, cam
     module.ready()
     for number in range(COUNTS[campaign]):
         came = module.trial(0, number, tmp_path)
-        assert came.kind not in BAD, f"{campaign} {number}: {came.kind}: {came.words}\n{came.told}"
+        assert came.kind not in BAD, f"{campaign} {number}: {came.kind}: {came.words}\n{came.input}"

@@ -31,9 +31,9 @@ def run_blocks(page, capsys):
     space = {"__name__": "__main__"}
     for code, printed in RUN.findall(PAGES[page]):
         exec(compile(code, page, "exec"), space)
-        told = capsys.readouterr().out
+        output = capsys.readouterr().out
         if printed:
-            assert told.strip() == printed.strip()
+            assert output.strip() == printed.strip()
 
 
 def with_python():

@@ -284,7 +284,7 @@ def test_a_start_of_another_structure_is_refused(model, tmp_path):
 
 
 @pytest.mark.parametrize("dt", [1e-12, 1.9e-14])
-def test_steps_too_short_to_be_meant_are_refused_before_memory_is_taken(model, dt):
+def test_steps_that_are_too_short_are_refused_before_memory_is_taken(model, dt):
     with pytest.raises(af.InvalidInput, match=r"is not between 1e-06 and 0\.1 s"):
         af.time_history(model, QUAKE, dt=dt)
 

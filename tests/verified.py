@@ -1,8 +1,8 @@
 """What tests verify, as rows of a table: `pytest --verified=docs/verification.json`.
 
-A test that asks for the fixture `verified` tells it what was computed beside what is known apart
-from this package. With the option only those tests run, and what they told is written to the file,
-from which the documentation makes its table. Numbers are rounded to what they are told with, and
+A test with the fixture `verified` passes it computed values beside references that are independent
+of this package. With the option only those tests run, and the values are written to the file,
+from which the documentation makes its table. Numbers are rounded to the digits of the table, and
 differences that are round-off to a power of ten above, so that every machine writes the same.
 Cases of one name are one row, with the largest of their differences.
 """
@@ -19,7 +19,7 @@ DIGITS = 5
 """Of numbers in the table."""
 
 ROUND_OFF = 1e-6
-"""Relative difference below which only its order is told: what is left differs by machine."""
+"""Relative difference below which only its order is written: digits below differ by machine."""
 
 
 def rounded(number):
@@ -40,7 +40,7 @@ def relative(computed, reference):
     return float(np.max(off / np.where(np.equal(reference, 0.0), 1.0, np.abs(reference))))
 
 
-def told(value):
+def json_value(value):
     """A value as JSON has it: words, or numbers that are rounded."""
     if isinstance(value, str):
         return value
@@ -61,22 +61,22 @@ def merged(rows):
 
 @pytest.fixture
 def verified(request):
-    """A function that tells what was computed beside what is known; it asserts nothing."""
+    """A function that records a computed value beside its reference; it asserts nothing."""
 
-    def tell(case, reference, source, computed, *, difference=None):
+    def record(case, reference, source, computed, *, difference=None):
         if difference is None:
             words = isinstance(computed, str)
             difference = None if words else relative(computed, reference)
         row = {
             "case": case,
-            "reference": told(reference),
+            "reference": json_value(reference),
             "source": source,
-            "computed": told(computed),
+            "computed": json_value(computed),
             "difference": difference if difference is None else order(difference),
         }
         request.node.user_properties.append(("verified", row))
 
-    return tell
+    return record
 
 
 class Table:

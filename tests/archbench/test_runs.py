@@ -17,7 +17,7 @@ def version():
     return "toy 1"
 
 def run(scene, settings):
-    return {"values": {"factor": 0.5}, "said": "as told"}
+    return {"values": {"factor": 0.5}, "said": "as stated"}
 """
 
 MANIFEST = 'needs = []\npython = "bench"\nsettings = {"sideways": [{"n": 1}, {"n": 2}]}\n'
@@ -90,9 +90,9 @@ def version():
     monkeypatch.setattr(run, "programs", lambda: both)
     found = run.run_scene(both, "S04")
     # the first answer of a process is a repetition, after modules are loaded
-    asked = ["archfem 1"] * 2 + ["archfem 2"] + ["other 1"] * 2
-    asked += ["other 1", "archfem 1"] * 3 + ["other 2"]
-    assert log.read_text(encoding="utf-8").split("\n")[:-1] == asked
+    calls = ["archfem 1"] * 2 + ["archfem 2"] + ["other 1"] * 2
+    calls += ["other 1", "archfem 1"] * 3 + ["other 2"]
+    assert log.read_text(encoding="utf-8").split("\n")[:-1] == calls
     cost = found["other"]["cost"]
     assert len(cost["own"]) == len(cost["archfem"]) == 3
     assert "cost" not in found["archfem"]
@@ -100,7 +100,7 @@ def version():
 
 
 def test_a_long_run_is_timed_once():
-    class Told:
+    class TimedAnswer:
         def __init__(self, cost):
             self.cost, self.count = cost, 0
 
@@ -108,7 +108,7 @@ def test_a_long_run_is_timed_once():
             self.count += 1
             return {"cpu_s": self.cost}
 
-    program, archfem = Told(4.0), Told(0.1)
+    program, archfem = TimedAnswer(4.0), TimedAnswer(0.1)
     cost = run.times_in_turn((program, {}, {"cpu_s": 4.0}), (archfem, {}), long=3.0)
     assert cost == {"own": [4.0], "archfem": [0.1]}
     assert (program.count, archfem.count) == (0, 1)
@@ -209,9 +209,12 @@ def test_no_length_from_memory_is_shown_without_its_mark():
 
 def test_a_row_counts_what_lies_inside_the_uncertainty():
     (row,) = (row for row in table.rows() if row.scene == "S03")
-    told = {"settings": {}, "values": {"factor": 0.37}, "cpu_s": 1.0}
+    row_of_run = {"settings": {}, "values": {"factor": 0.37}, "cpu_s": 1.0}
     for value, inside in ((row.reference[0], True), (1.1 * row.reference[0], False)):
-        runs = [{**told, "values": {"factor": value}}, {**told, "values": {"factor": 0.5}}]
+        runs = [
+            {**row_of_run, "values": {"factor": value}},
+            {**row_of_run, "values": {"factor": 0.5}},
+        ]
         cost = {"own": [3.0, 2.0, 9.0], "archfem": [1.0, 2.0, 0.5]}
         answered = replace(row, answers={"toy": {"runs": runs, "cost": cost}})
         assert answered.is_inside("toy") is inside

@@ -139,7 +139,7 @@ def run_setting(
         yield motion.name, run, time.perf_counter() - begun
 
 
-def told(joints: xr.Dataset, found: Mechanism | None) -> str:
+def mechanism_text(joints: xr.Dataset, found: Mechanism | None) -> str:
     """Write a mechanism: class, time, duration and largest opening."""
     if found is None:
         return "none"
@@ -173,7 +173,7 @@ def row(name: str, pair: str, run: History, seconds: float) -> list[object]:
         f"{float(abs(joints['slip']).max()) / mm:.2f}",
         f"{float(dataset['residual_displacement'].where(stones, 0.0).max()) / mm:.2f}",
         *(
-            told(run.joints, first[definition])
+            mechanism_text(run.joints, first[definition])
             for definition in ("any joints at once", "Demirel and Aldemir", "verified")
         ),
         f"{seconds:.0f}",
@@ -181,7 +181,7 @@ def row(name: str, pair: str, run: History, seconds: float) -> list[object]:
 
 
 def scene(chosen: argparse.Namespace) -> tuple[Path, list[str]]:
-    """Find the case that was asked for, and its changes."""
+    """Find the requested case, and its changes."""
     if chosen.records is None:
         return MESHES / f"prusias{'_restored' if chosen.restored else ''}.toml", []
     return MESHES / "prusias_records.toml", [f"suite.folder={chosen.records.resolve()}"]

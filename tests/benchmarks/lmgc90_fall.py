@@ -45,21 +45,21 @@ def main(given: str, out: str) -> None:
             impulses where it is not the usual one.
         out: path of the result.
     """
-    told = json.loads(Path(given).read_text())
-    if "tolerance" in told:
-        set_tolerance(told["tolerance"])
-    solver = Solver(dt=told["dt"], theta=0.5, density=told["density"])
-    solver.geometry_from_v_f(told["prisms"])
-    solver.supports = told["fixed"]
-    for number, fixed in enumerate(told["fixed"]):
+    settings = json.loads(Path(given).read_text())
+    if "tolerance" in settings:
+        set_tolerance(settings["tolerance"])
+    solver = Solver(dt=settings["dt"], theta=0.5, density=settings["density"])
+    solver.geometry_from_v_f(settings["prisms"])
+    solver.supports = settings["fixed"]
+    for number, fixed in enumerate(settings["fixed"]):
         if fixed:
             solver.v_drvdof[number] = {freedom: np.zeros(6) for freedom in range(1, 7)}
-            if "ground" in told:
-                solver.apply_velocity(number, "Vx", np.array(told["ground"]))
-    solver.contact_law("IQS_CLB", told["friction"])
+            if "ground" in settings:
+                solver.apply_velocity(number, "Vx", np.array(settings["ground"]))
+    solver.contact_law("IQS_CLB", settings["friction"])
     solver.preprocess()
     took, places = [], []
-    for _ in range(told["steps"]):
+    for _ in range(settings["steps"]):
         start = time.process_time()
         result = solver.lmgc90.compute_one_step()
         took.append(time.process_time() - start)

@@ -144,7 +144,7 @@ def _damp(model, damping, committed: bool) -> None:
     """Damp by mass and initial stiffness.
 
     The committed stiffness of the stones is their initial one, and never changes; an element that
-    works out its initial stiffness anew at each iteration is spared that by asking for it.
+    works out its initial stiffness anew at each iteration is spared that if it is given.
     """
     if not committed:
         ops.rayleigh(damping.mass, 0.0, damping.stiffness, 0.0)

@@ -230,26 +230,26 @@ def compare(name: str, tolerance: float | None, duration: float | None) -> list[
 
     choose(motion.cut(0.0, 0.5))  # compiles, and loads, what the timed choice needs
     begin = process_time()
-    told = choose(motion).prediction
+    prediction = choose(motion).prediction
     choosing = process_time() - begin
-    chosen = next(setting[:2] for setting in TRIED_SETTINGS[1:] if setting[2] <= told.dt)
+    chosen = next(setting[:2] for setting in TRIED_SETTINGS[1:] if setting[2] <= prediction.dt)
     _recent_meshes.clear()
     begin = process_time()
     model = build_model(structure, exact_discretisation(structure, *chosen))
     choosing -= process_time() - begin
-    run = time_run(model, motion, damping, told.dt)
+    run = time_run(model, motion, damping, prediction.dt)
     step = FINEST_STEP * (2 if find_soft_blocks(structure) else 1)
     reference = time_run(finest, motion, damping, step).peaks
     actual = largest_difference(run.peaks, reference)
     return [
         name,
         f"{run.peaks.max():.2f}",
-        f"{chosen[0]} {chosen[1][0]}, {1e3 * told.dt:g} ms",
+        f"{chosen[0]} {chosen[1][0]}, {1e3 * prediction.dt:g} ms",
         f"{choosing:.2f}",
         f"{choosing / run.seconds:.2f}",
-        f"{told.error:.4f}",
+        f"{prediction.error:.4f}",
         f"{actual:.4f}",
-        f"{told.error / actual:.2f}" + ("" if told.is_met else ", not met"),
+        f"{prediction.error / actual:.2f}" + ("" if prediction.is_met else ", not met"),
     ]
 
 

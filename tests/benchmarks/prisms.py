@@ -53,7 +53,7 @@ def by_lmgc90(
         How far each block has moved after each step (steps, n, 2) [m], and the processor time of a
         step [ms].
     """
-    told = {
+    settings = {
         "prisms": [prism(block) for block in arch.blocks],
         "fixed": [block.fixed for block in arch.blocks],
         "friction": friction,
@@ -62,12 +62,12 @@ def by_lmgc90(
         "steps": steps,
     }
     if ground is not None:
-        told["ground"] = [each.tolist() for each in ground]
+        settings["ground"] = [each.tolist() for each in ground]
     if tolerance is not None:
-        told["tolerance"] = tolerance
+        settings["tolerance"] = tolerance
     with tempfile.TemporaryDirectory() as folder:
         given, out = Path(folder) / "blocks.json", Path(folder) / "moved.npy"
-        given.write_text(json.dumps(told))
+        given.write_text(json.dumps(settings))
         script = Path(__file__).with_name("lmgc90_fall.py")
         ran = subprocess.run(
             [python, str(script), str(given), str(out)],

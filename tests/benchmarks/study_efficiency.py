@@ -51,15 +51,15 @@ def processor() -> float:
 
 def bridge() -> af.Study:
     """Return the first cases of the bridge's sensitivity study, as histories of one pair."""
-    told = tomllib.loads(BRIDGE.read_text())
-    del told["scales"]
-    told["cases"] = {
+    table = tomllib.loads(BRIDGE.read_text())
+    del table["scales"]
+    table["cases"] = {
         name: each | {"case": str(MESHES / each["case"])}
-        for name, each in islice(told["cases"].items(), CASES)
+        for name, each in islice(table["cases"].items(), CASES)
     }
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "study.toml"
-        path.write_text(tomli_w.dumps(told | {"pairs": ["pair-1"]}))
+        path.write_text(tomli_w.dumps(table | {"pairs": ["pair-1"]}))
         return af.Study.read(path)
 
 
@@ -73,9 +73,9 @@ def suite() -> af.Study:
         return af.Study.read(path)
 
 
-def alone(points: Sequence[tuple[int, Point]], asked: Evaluator) -> Iterator[tuple[int, Row]]:
-    """Answer points on one process that is not this one."""
-    return process_pool.evaluate_on_processes(points, asked, 1, meanwhile=load_table_libraries)
+def alone(points: Sequence[tuple[int, Point]], evaluator: Evaluator) -> Iterator[tuple[int, Row]]:
+    """Evaluate points on one process that is not this one."""
+    return process_pool.evaluate_on_processes(points, evaluator, 1, meanwhile=load_table_libraries)
 
 
 def timed(study: af.Study, workers: int) -> tuple[float, float, int]:

@@ -145,7 +145,7 @@ class Command:
                 process.wait()
                 break
             kind, number = kills[0]
-            # a command that goes on where it was would end before a late kill
+            # a command that continues where it was would end before a late kill
             time.sleep(chance.uniform(0.0, (0.9 if self.what == "run" else 0.6) * self.spent))
             begun = {"server": servers(process.pid), "worker": workers(process.pid)}
             met.update(each for some in begun.values() for each in some)

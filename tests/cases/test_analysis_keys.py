@@ -67,7 +67,7 @@ def test_a_case_is_rated_by_its_own_table(ring):
     expected = af.rate(ring, own, live=1.2, impact=1.1, width=0.5, friction=None)
     found = rate_case(ring, rating, parse_limit({"friction": "none"}), {})
     assert found.factor == expected.factor
-    # what the command gives counts before the table
+    # keys of the command count before those of the table
     heavier = rate_case(ring, rating, None, {"live": 2.4})
     assert heavier.live == 2.4
     with pytest.raises(af.InvalidInput, match="a rating needs a vehicle"):

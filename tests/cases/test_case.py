@@ -13,7 +13,7 @@ RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
 
 
 GLUED = "contacts.stone to stone.friction=none"
-"""Joints that never slide, which Newmark and HHT ask for."""
+"""Joints that never slide, as Newmark and HHT require."""
 
 
 def test_shipped_case():

@@ -123,7 +123,7 @@ def permitted(monkeypatch, tmp_path):
         ("import archfem as af\naf.motion.register_spectrum('s', int)", "no dataclass"),
     ],
 )
-def test_errors_of_a_module_are_told_as_its_own(permitted, code, said, request):
+def test_errors_of_a_module_name_its_file_and_line(permitted, code, said, request):
     number = abs(hash(code))
     path = permitted / f"wrong_{number}.py"
     path.write_text(code)
@@ -180,7 +180,7 @@ shear_stiffness = "1e9 Pa/m"
 """
 
 
-def test_a_field_without_its_unit_is_told(installed, permitted):
+def test_a_field_without_its_unit_is_refused(installed, permitted):
     @dataclass(frozen=True)
     class Plain(af.joints.DryJoint):
         softening: float = 0.0

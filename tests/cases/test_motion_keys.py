@@ -107,12 +107,12 @@ def test_files_of_a_pair_have_their_own_units_and_steps(tmp_path, at2):
         build_suite(parse_suite({"pairs": {"one": given}}), tmp_path)
 
 
-def test_a_vertical_that_is_made_has_the_peak_that_is_asked_for():
+def test_a_synthetic_vertical_has_the_given_peak():
     """It used to be the vertical of a motion whose horizontal had that peak: two thirds of it."""
     level = {"seed": 1, "pga": 1.0, "duration": 2.0}
     upright = {"synthetic": {"seed": 2, "pga": 2.0, "duration": 2.0}}
-    asked = parse_motion({"synthetic": level, "vertical": upright})
-    made = build_motion(asked)
+    settings = parse_motion({"synthetic": level, "vertical": upright})
+    made = build_motion(settings)
     assert abs(made.vertical).max() == pytest.approx(2.0, rel=1e-12)
     assert made.pga == pytest.approx(1.0, rel=1e-12)
     with pytest.raises(af.InvalidInput, match="vertical_ratio: a vertical has none"):

@@ -119,7 +119,7 @@ def test_a_run_in_memory_has_a_report_and_a_player(small, undrawn, tmp_path):
 def test_a_history_has_them_too(kept, tmp_path):
     """By the case that it keeps; one of a model made in Python has a player alone."""
     run = af.History.read(kept / "first" / "history.nc")
-    run.dataset.attrs["title"] = "of another name: second"  # what it ran is told by `motion` alone
+    run.dataset.attrs["title"] = "of another name: second"  # `motion` alone names what it ran
     words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
     assert "a column <b>& more</b> under two pairs" in words
     assert run.dataset.attrs["motion"] == "first"

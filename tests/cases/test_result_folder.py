@@ -276,7 +276,7 @@ def test_disks_without_links_get_copies(two_runs, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_case_may_ask_for_a_free_body():
+def test_a_case_may_request_a_free_body():
     ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
     tables = {"structure": {**ring, "voussoirs": 9}, "output": {"free_body": "voussoir 3"}}
     for cells, more in (({"fidelity": "rigid"}, []), ({"cells": [2, 2]}, ["png", "txt"])):

@@ -59,7 +59,7 @@ def test_a_table_of_parts_says_what_holds_for_all_of_them():
 
 
 @pytest.mark.parametrize(
-    ("told", "blocks"),
+    ("keys", "blocks"),
     [
         ('shape="pointed_arch", span=4.0, rise="3 m", thickness=0.5, voussoirs=11', 13),
         ('shape="elliptical_arch", span=4.0, rise=1.2, thickness=0.6, voussoirs=11', 13),
@@ -77,8 +77,8 @@ def test_a_table_of_parts_says_what_holds_for_all_of_them():
         ),
     ],
 )
-def test_shapes_by_name(told, blocks):
-    assert len(build_structure(tomllib.loads(f"structure = {{ {told} }}")).blocks) == blocks
+def test_shapes_by_name(keys, blocks):
+    assert len(build_structure(tomllib.loads(f"structure = {{ {keys} }}")).blocks) == blocks
 
 
 BRIDGE = {

@@ -50,7 +50,7 @@ def test_a_folder_that_cannot_be_made_is_refused_at_once(command, out, says, tmp
     assert said.out == ""
 
 
-def test_a_file_system_that_is_read_only_is_told_before_the_run(tmp_path, capsys, monkeypatch):
+def test_a_file_system_that_is_read_only_is_refused_before_the_run(tmp_path, capsys, monkeypatch):
     def refuse(**_):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
@@ -132,7 +132,7 @@ def test_a_quoted_name_may_be_changed(capsys):
     assert "joints slide" in capsys.readouterr().err
 
 
-def test_a_missing_record_is_told_before_anything_is_computed(tmp_path, capsys):
+def test_a_missing_record_is_reported_before_anything_is_computed(tmp_path, capsys):
     (tmp_path / "case.toml").write_text(
         f'base = "{RING}"\nremove = ["motion"]\n[motion]\nfile = "missing.at2"\n'
     )

@@ -127,14 +127,14 @@ def test_one_line_runs_all_and_the_same_line_keeps_what_is_finished(small, undra
     assert re.search(r"^first .* 1\.00 m/s² +0\.67 m/s² ", table, re.MULTILINE)
 
 
-def told(small, shake):
-    """Carry out a case with something else than `shaken`, as `archfem run` does."""
+def run_with(small, shake):
+    """Carry out a case as `archfem run` does, with another function that runs a motion."""
     case, out = af.Case.read(small), small.parent / "out"
     print_results(case, carry_out(case, out, run_motion=shake), out)
 
 
 @pytest.mark.slow
-def test_an_interrupted_suite_goes_on_with_what_is_left(small, undrawn, capsys):
+def test_an_interrupted_suite_continues_with_the_motions_left(small, undrawn, capsys):
     def broken_off(case, motion, *given):
         history = af.cases.run_time_history(case, motion, *given)
         history.dataset.attrs["doubts"] = "energy drifts"
@@ -143,7 +143,7 @@ def test_an_interrupted_suite_goes_on_with_what_is_left(small, undrawn, capsys):
         return history
 
     with pytest.raises(KeyboardInterrupt):
-        told(small, broken_off)
+        run_with(small, broken_off)
     assert "run the same command again" in capsys.readouterr().err
     assert run(small) == 3  # what is kept keeps its doubts
     summary = (small.parent / "out" / "first" / "summary.txt").read_text()
@@ -166,7 +166,7 @@ def test_a_pair_that_fails_does_not_end_the_suite(small, undrawn, capsys):
     with pytest.raises(
         af.DidNotConverge, match="1 of 2 pairs have no equilibrium at some step: first"
     ):
-        told(small, failing)
+        run_with(small, failing)
     path = small.parent / "out" / "first" / "history.nc"
     said = capsys.readouterr().err
     assert "archfem: first: no equilibrium" in said
@@ -184,7 +184,7 @@ def test_a_motion_that_fails_is_kept_and_ends_the_command(small, undrawn, capsys
         raise af.DidNotConverge("no equilibrium at 0.5 s", history=history)
 
     with pytest.raises(af.DidNotConverge, match=r"no equilibrium at 0.5 s"):
-        told(small, failing)
+        run_with(small, failing)
     path = small.parent / "out" / "history.nc"
     assert af.History.read(path).time[-1] == pytest.approx(0.5)
     assert not path.with_name("summary.txt").exists()
@@ -306,7 +306,7 @@ def test_limit_analysis_of_a_case(tmp_path, ring, undrawn, capsys):
     assert (out / "dead.png").is_file()
     assert af.commands.main(["check", str(path)]) == 0
     assert f"at a factor of {found.factor:.4g}" in capsys.readouterr().out
-    # the case alone, in the same folder: what it has written replaces what the run did
+    # the case alone, in the same folder: its files replace those of the run
     assert af.commands.main(["limit", str(path), "--out", str(out)]) == 0
     assert (out / "limit.txt").read_text() in capsys.readouterr().out
     joints = pd.read_csv(out / "limit.csv")

@@ -25,21 +25,21 @@ def test_all_is_well_ends_with_zero(monkeypatch, capsys):
     assert capsys.readouterr().out.split() == ["archfem", "1.0", "all", "is", "well"]
 
 
-def test_what_is_missing_is_told_with_its_remedy(monkeypatch, capsys):
+def test_missing_libraries_are_reported_with_their_remedy(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "archfem.models.fem", None)
     monkeypatch.setattr(_optional, "OFFSCREEN_LIBRARIES", ("libNone.so",))
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr(metadata, "requires", lambda name: ["numpy>=99.1", "nonesuch>=1", "a; b"])
     assert af.commands.main(["doctor"]) == 1
-    told = capsys.readouterr()
+    captured = capsys.readouterr()
     for remedy in ("apt-get install python3-dolfinx", "apt-get install libegl1", "numpy>=99.1"):
-        assert remedy in told.out
-    assert "nonesuch" in told.err
+        assert remedy in captured.out
+    assert "nonesuch" in captured.err
     # one that is there and does not load is a fault
-    assert "FEniCSx" in told.err
+    assert "FEniCSx" in captured.err
 
 
-def test_an_installation_without_fenicsx_is_well_and_told_what_works(monkeypatch, capsys):
+def test_an_installation_without_fenicsx_is_sound_and_names_what_works(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "archfem.models.fem", None)
     found = tools.find_spec
     monkeypatch.setattr(tools, "find_spec", lambda name: None if name == "dolfinx" else found(name))
@@ -53,9 +53,9 @@ def test_examples_are_listed_and_printed(tmp_path, capsys):
     assert af.commands.main(["examples"]) == 0
     assert "ring_falls" in capsys.readouterr().out
     assert af.commands.main(["example", "ring_falls"]) == 0
-    told = capsys.readouterr()
-    assert 'ring.toml"\ntitle = "A ring that falls' in told.out
-    assert "it refers to ring.toml" in told.err
+    captured = capsys.readouterr()
+    assert 'ring.toml"\ntitle = "A ring that falls' in captured.out
+    assert "it refers to ring.toml" in captured.err
     assert af.commands.main(["example", "ring", "--out", str(tmp_path)]) == 0
     assert (tmp_path / "ring.toml").is_file()
 
@@ -128,7 +128,7 @@ def test_a_case_gives_its_title_to_its_structure(kept):
     assert af.Case.read(kept / "untitled.toml").structure.name == "column"
 
 
-def test_damaged_code_is_told(monkeypatch, tmp_path):
+def test_damaged_code_is_reported(monkeypatch, tmp_path):
     monkeypatch.setattr(tools._numba, "count_cached_functions", lambda: 1)
     monkeypatch.setattr(tools._numba, "cache_folders", lambda: [tmp_path])
     (tmp_path / "a.nbi").write_bytes(b"cut off")

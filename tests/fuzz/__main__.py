@@ -16,7 +16,7 @@ from fuzz.staff import carried_out
 from fuzz.trial import BAD, KINDS, Came
 
 COUNTS = {"case_files": 10_000, "records": 10_000, "drawings": 30_000, "calls": 2000, "shakes": 500}
-"""Campaigns, and how many trials they have unless told otherwise."""
+"""Campaigns, and their default number of trials."""
 
 
 def main() -> int:
@@ -37,7 +37,7 @@ def main() -> int:
             tally[came.kind] += 1
             if came.kind in BAD or single:
                 print(f"{name} {number}: {came.kind}: {came.words}", flush=True)
-                print(came.told if single else "", end="\n" if single else "", flush=True)
+                print(came.input if single else "", end="\n" if single else "", flush=True)
             if came.kind in BAD:
                 _kept(given.out, f"{name}-{given.seed}-{number}", came)
         bad += sum(tally[kind] for kind in BAD)
@@ -56,7 +56,7 @@ def _spent() -> float:
 def _kept(folder: Path, name: str, came: Came) -> None:
     """Keep what ended badly."""
     folder.mkdir(parents=True, exist_ok=True)
-    text = f"{came.kind}: {came.words}\n\n{came.told}"
+    text = f"{came.kind}: {came.words}\n\n{came.input}"
     (folder / f"{name}.txt").write_text(text, encoding="utf-8", errors="backslashreplace")
 
 

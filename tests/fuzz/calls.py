@@ -214,12 +214,12 @@ def trial(seed: int, number: int, folder: Path) -> Came:
     for _ in range(rng.choice([1, 1, 2])):
         key = list(given)[int(rng.integers(len(given)))]
         given[key] = odds[int(rng.integers(len(odds)))]
-    told = f"{name}({', '.join(f'{key}={_said(value)}' for key, value in given.items())})"
+    call_text = f"{name}({', '.join(f'{key}={_said(value)}' for key, value in given.items())})"
 
     def call() -> str | None:
         return _nonsense(function(**given))
 
-    return judged(call, told)
+    return judged(call, call_text)
 
 
 def _said(value: Any) -> str:

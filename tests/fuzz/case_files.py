@@ -149,10 +149,10 @@ GROUND = '"part": "ground", "fixed": true'
 WALL = '"part": "wall", "role": "pier", "material": "stone"'
 
 
-def _square(x: float, y: float, told: str) -> str:
+def _square(x: float, y: float, properties: str) -> str:
     corners = [[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1], [x, y]]
     return (
-        f'{{"type": "Feature", "properties": {{{told}}}, "geometry": '
+        f'{{"type": "Feature", "properties": {{{properties}}}, "geometry": '
         f'{{"type": "Polygon", "coordinates": [{corners}]}}}}'
     )
 

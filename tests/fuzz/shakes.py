@@ -21,10 +21,10 @@ def trial(seed: int, number: int, folder: Path) -> Came:
     """Shake one."""
     del folder
     displacements = ("small", "large")[number % 2]
-    told = f"{SCRIPT.name}: tried({1000 * seed + number}, {displacements!r})"
+    call_text = f"{SCRIPT.name}: tried({1000 * seed + number}, {displacements!r})"
     came = tried(1000 * seed + number, displacements)
     if came.kind == "FOREIGN":
-        return Came(FOREIGN, came.words, told)
+        return Came(FOREIGN, came.words, call_text)
     if came.steps and not abs(came.drift) <= 0.5:  # the monitor ends a run above
-        return Came(NONSENSE, f"drift {came.drift:.0%}; {came.words}", told)
-    return Came(ANSWERED if came.steps else REFUSED, came.words, told)
+        return Came(NONSENSE, f"drift {came.drift:.0%}; {came.words}", call_text)
+    return Came(ANSWERED if came.steps else REFUSED, came.words, call_text)

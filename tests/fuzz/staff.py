@@ -19,7 +19,7 @@ WAIT = 4.5
 """Time after which a trial counts as hung even if it does nothing at all, of that CPU time [-]."""
 
 MEMORY = 3 * 2**30
-"""What trials may take beyond what a process has after its imports [bytes]."""
+"""Memory of trials, beyond that of a process after its imports [bytes]."""
 
 
 def carried_out(campaign: str, seed: int, numbers: Iterable[int]) -> Iterator[tuple[int, Came]]:
@@ -31,13 +31,13 @@ def carried_out(campaign: str, seed: int, numbers: Iterable[int]) -> Iterator[tu
         numbers: of the trials.
 
     Yields:
-        Number of a trial and what came of it.
+        Number of a trial and its result.
     """
     worker: _Worker | None = None
     try:
         for number in numbers:
             worker = worker or _Worker(campaign, seed)
-            came = worker.asked(number)
+            came = worker.carry_out(number)
             yield number, came
             if worker.ended:
                 worker = None
@@ -58,7 +58,7 @@ class _Worker:
         self.ended = False
         self.pipe.recv()  # once it has imported what it needs
 
-    def asked(self, number: int) -> Came:
+    def carry_out(self, number: int) -> Came:
         """Carry out one trial."""
         self.pipe.send(number)
         spent, begun = self._cpu(), time.monotonic()
@@ -90,7 +90,7 @@ class _Worker:
 
 
 def _serve(pipe: Connection, campaign: str, seed: int) -> None:
-    """Carry out trials as they are asked for, in a folder of their own, without words."""
+    """Carry out trials as their numbers arrive, in a folder of their own, without output."""
     module = importlib.import_module(f"fuzz.{campaign}")
     module.ready()
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)

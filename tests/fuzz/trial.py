@@ -18,38 +18,38 @@ WORDS = 200
 
 @dataclass(frozen=True)
 class Came:
-    """What came of a trial.
+    """The result of a trial.
 
     Attributes:
-        kind: one of `MECHANISM_KINDS`.
+        kind: one of `KINDS`.
         words: the error, or what is wrong with the answer.
-        told: what was tried, as text that a person can repeat it from.
+        input: the call or file that was tried, as text from which it can be repeated.
     """
 
     kind: str
     words: str = ""
-    told: str = ""
+    input: str = ""
 
 
-def judged(trial: Callable[[], str | None], told: str) -> Came:
+def judged(trial: Callable[[], str | None], input_text: str) -> Came:
     """Carry out a trial.
 
     Args:
-        trial: does it, and says what is wrong with the answer, if anything is.
-        told: what is tried.
+        trial: carries it out, and returns the fault of its answer, if there is one.
+        input_text: the call or file that is tried.
     """
     try:
         wrong = trial()
     except af.ArchfemError as error:
         said = str(error)
         if len(said) > 20_000:
-            return Came(FOREIGN, f"an error of {len(said)} letters", told)
-        return Came(REFUSED, said[:WORDS], told)
+            return Came(FOREIGN, f"an error of {len(said)} letters", input_text)
+        return Came(REFUSED, said[:WORDS], input_text)
     except (KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:  # what no user should ever see
         last = traceback.extract_tb(sys.exc_info()[2])[-1]
         where = f"{last.filename.rpartition('/')[2]}:{last.lineno}"
         words = f"{type(error).__name__} in {where}: {str(error)[:WORDS]}"
-        return Came(FOREIGN, words, f"{told}\n{traceback.format_exc(limit=-12)[:8000]}")
-    return Came(NONSENSE, wrong, told) if wrong else Came(ANSWERED, "", told)
+        return Came(FOREIGN, words, f"{input_text}\n{traceback.format_exc(limit=-12)[:8000]}")
+    return Came(NONSENSE, wrong, input_text) if wrong else Came(ANSWERED, "", input_text)

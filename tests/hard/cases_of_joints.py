@@ -85,7 +85,7 @@ def _slip(hold, push, last, step, square):
 
     Shear grows with ω² per unit mass up to μ g, at y = μ g / ω². The push reaches that while the
     block lags behind, which is then faster by v than a rigid bed would have it: to first order the
-    slip is (a - μ g) a T² / (2 μ g) + v a T / (μ g), and v may be a tenth of what the push gives.
+    slip is (a - μ g) a T² / (2 μ g) + v a T / (μ g), and v may be a tenth of the push's speed.
     """
     way, yields = np.sqrt(square), hold / square
     along = push * (1.0 / square - np.sin(way * step) / (way**3 * step))  # at the end of the ramp

@@ -103,8 +103,10 @@ def chatter(alpha, dt):
     try:
         run = shaken(model, still(2.0), **given)
     except af.DidNotConverge as error:
-        told = "of the energy had" in str(error)
-        return Found(f"DidNotConverge: {str(error).split(', so')[0]}", told, run=error.history)
+        names_energy = "of the energy had" in str(error)
+        return Found(
+            f"DidNotConverge: {str(error).split(', so')[0]}", names_energy, run=error.history
+        )
     force = run.joints["N"].values[:, 0] / abs(float(held.weight[1]))
     late = np.abs(force[len(force) // 2 :] - 1.0).max()
     words = "at rest after 1 s" if late < 1e-3 else f"hops, N to {late:.0f} × the weight after 1 s"

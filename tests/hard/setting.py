@@ -56,33 +56,33 @@ class Case:
     quick: bool
 
     def row(self) -> tuple[list[str], bool]:
-        """Cells of the table, and whether all is as it should be."""
+        """Cells of the table, and whether the case passes."""
         start = perf_counter()
-        told = _Told()
+        warnings = _Warnings()
         try:
-            with told:
+            with warnings:
                 found = self.study()
         except af.ArchfemError as error:
             found = Found(f"{type(error).__name__}: {error}", False, run=_history(error))
         except (ArithmeticError, ValueError, AssertionError, np.linalg.LinAlgError) as error:
             found = Found(f"crashed with {type(error).__name__}: {error}", False)
         taken = perf_counter() - start
-        silent = found.run is not None and "energy" not in told.words and _drifts(found.run)
+        silent = found.run is not None and "energy" not in warnings.words and _drifts(found.run)
         right = found.right and not silent
         outcome = found.outcome + ("; drift of energy not warned of" if silent else "")
         cells = [self.name, self.hard, outcome if right else f"**{outcome}**"]
-        rest = [", ".join(sorted(told.words)), _number(found.error), f"{taken:.1f}"]
+        rest = [", ".join(sorted(warnings.words)), _number(found.error), f"{taken:.1f}"]
         return [*cells, *effort(found.run), *rest], right
 
 
-class _Told(logging.Handler):
-    """Collects of what archfem warns: "energy", "displacements"."""
+class _Warnings(logging.Handler):
+    """Collects the subjects of archfem's warnings: "energy", "displacements"."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
         self.words: set[str] = set()
 
-    def __enter__(self) -> "_Told":
+    def __enter__(self) -> "_Warnings":
         logger.addHandler(self)
         logger.propagate = False
         return self
@@ -97,7 +97,7 @@ class _Told(logging.Handler):
 
 
 def _drifts(run: af.History) -> bool:
-    """Whether the drift is such that archfem must speak of it, in a run that came to its end."""
+    """Whether a run reached its end with a drift of which archfem must warn."""
     return (
         abs(run.dataset.attrs["energy_drift"]) > 0.05  # the monitor warns above
         and run.ending is not Ending.FAILED
@@ -138,13 +138,13 @@ def effort(run: af.History | None) -> list[str]:
     """Most iterations in a step, smallest step, steps halved, left to SNES, drift of energy."""
     if run is None:
         return ["", "", "", "", ""]
-    told = run.dataset.attrs
+    attributes = run.dataset.attrs
     return [
         str(int(run.dataset["iterations"].max())),
         f"{float(run.dataset['smallest_step'].min()):.3g}",
-        str(told["halved_steps"]),
-        str(told["fallback_steps"]),
-        f"{100.0 * told['energy_drift']:+.2g} %",
+        str(attributes["halved_steps"]),
+        str(attributes["fallback_steps"]),
+        f"{100.0 * attributes['energy_drift']:+.2g} %",
     ]
 
 
@@ -222,8 +222,8 @@ def refused(study: Callable[[], object], kind: type[af.ArchfemError], says: str)
     try:
         study()
     except kind as error:
-        told = str(error).split(": ")[0]
-        return Found(f"{kind.__name__}: {told}", says in str(error), run=_history(error))
+        message = str(error).split(": ")[0]
+        return Found(f"{kind.__name__}: {message}", says in str(error), run=_history(error))
     return Found("numbers, where there is no answer", False)
 
 

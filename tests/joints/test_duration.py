@@ -38,8 +38,8 @@ def test_the_first_of_what_lasts_is_found(up, least, expected):
 
 def test_it_adds_up_from_nothing():
     unbroken = DurationCounter(0.25)
-    told = [(True, 0.2), (True, 0.05), (False, 0.3), (True, 0.2), (True, 0.1)]
-    assert [unbroken.add_step(*each) for each in told] == [False, True, False, False, True]
+    steps = [(True, 0.2), (True, 0.05), (False, 0.3), (True, 0.2), (True, 0.1)]
+    assert [unbroken.add_step(*each) for each in steps] == [False, True, False, False, True]
 
 
 def test_a_single_record_is_a_state_that_stays():

@@ -72,7 +72,7 @@ def test_openings_that_are_not_plane_give_the_nearest_plane():
 
 
 @pytest.mark.parametrize("fidelity", ["rigid", "monolithic"])
-def test_supports_that_have_moved_are_told_of(fidelity):
+def test_gauges_follow_supports_that_have_moved(fidelity):
     """The left abutment sinks away from a ring that stays: its joint opens and slips by that."""
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5)
     model = af.build(ring, fidelity=fidelity)

@@ -118,7 +118,7 @@ def test_no_point_bears_more_shear_than_friction_holds(rule):
         assert np.abs(shear[apart]).max(initial=0.0) <= 1e-12 * np.abs(shear).max()
 
 
-def test_what_is_remembered_holds_without_sliding_further():
+def test_an_updated_memory_holds_without_sliding_further():
     """Once its memory is taken in, the same place gives the same forces, and slides no more."""
     for rule in RULES:
         model, q, _ = places(mixed(rule=rule), 3)

@@ -160,7 +160,7 @@ def test_a_block_that_cohesion_holds_counts_as_sliding_only_when_it_is_used_up(f
     assert bool(joints["slide"][0]) == used
     assert (af.verified_mechanism(structure, joints).kind == "local") == used
     alone = af.verified_mechanism(structure, joints, af.Criteria(friction=friction))
-    assert alone.kind == "local"  # who asks for |V| / N alone gets it
+    assert alone.kind == "local"  # a criterion of |V| / N alone ignores cohesion
     again = af.joints.joint_dataset(structure, joints[["N", "V", "M"]].to_array().values.T)
     assert again["slide"].values.tolist() == joints["slide"].values.tolist()
 
@@ -232,7 +232,7 @@ def test_a_block_slides_on_what_is_closed_of_its_bed(friction, verified, caplog)
 
 
 @pytest.mark.parametrize(("held", "friction"), [(0.1, 0.1), (0.0, 0.3), (5.0, 0.3)])
-def test_nothing_is_told_where_no_cohesion_is_lost(held, friction, caplog):
+def test_nothing_is_warned_of_where_no_cohesion_is_lost(held, friction, caplog):
     """The bed stays closed; it has no cohesion; it turns on its edge, which does not slide."""
     af.collapse_factor(block(held, friction), live=SIDEWAYS, friction="nonassociated")
     lost = held == 5.0  # at the edge nothing is closed, and friction alone is too little

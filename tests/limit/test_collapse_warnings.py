@@ -19,14 +19,14 @@ def warned(caplog):
 @pytest.mark.parametrize(
     ("each", "said"), [((0.0, 0.0), ""), ((0.02, 0.0, 0.05), "up to 0.05,"), ((0.01,), "0.01,")]
 )
-def test_the_steepest_dilatancy_that_is_left_out_is_told(each, said, warned):
+def test_the_steepest_dilatancy_that_is_left_out_is_stated(each, said, warned):
     joints = [SimpleNamespace(contact=SimpleNamespace(dilatancy=value)) for value in each]
     collapse.warn_dilatancy(SimpleNamespace(joints=joints))
     assert said in warned()
     assert bool(warned()) == bool(said)
 
 
-def test_joints_that_slide_are_told_with_their_factor(warned):
+def test_joints_that_slide_are_named_with_their_factor(warned):
     collapse.warn_sliding([], 0.3)
     assert not warned()
     collapse.warn_sliding(["a", "b"], 0.31416)
@@ -45,7 +45,7 @@ def test_joints_that_slide_are_told_with_their_factor(warned):
         (24.001, np.inf, {0, 1}, 0),  # and never slide
     ],
 )
-def test_joints_that_more_cohesion_holds_than_is_closed_are_told(
+def test_joints_that_hold_by_more_cohesion_than_is_closed_are_named(
     shear, friction, failing, count, warned, monkeypatch
 ):
     """Of 10 N of cohesion, 40 % is closed."""

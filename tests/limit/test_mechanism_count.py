@@ -30,7 +30,7 @@ def history(structure, instants):
     )
 
 
-def test_count_takes_the_class_of_all_that_failed_or_the_class_asked_for():
+def test_count_takes_the_class_of_all_failed_joints_or_the_given_class():
     structure = piers(2)
     ring_and_pier = {3: 0.5, 6: -0.5, 9: 0.5, 0: 0.5}
     four_in_ring = {3: 0.5, 6: -0.5, 9: 0.5, 12: -0.5}
@@ -215,7 +215,7 @@ def test_further_failures_do_not_end_it():
     assert episode(joints, af.limit.counted_mechanism(joints)).duration == pytest.approx(0.015)
 
 
-def test_what_goes_on_at_the_end_has_not_closed():
+def test_a_mechanism_open_at_the_end_has_not_closed():
     joints = shaken([{}, ALTERNATING, ALTERNATING], [0.0, 1e-3, 3e-3])
     found = af.limit.counted_mechanism(joints)
     assert str(episode(joints, found)) == (
@@ -227,7 +227,7 @@ def test_what_goes_on_at_the_end_has_not_closed():
     )
 
 
-def test_openings_that_nobody_kept_are_not_told():
+def test_openings_that_were_not_kept_are_not_stated():
     joints = shaken([ALTERNATING, {}])
     met = episode(joints, af.limit.counted_mechanism(joints))
     assert met == Episode(STEP, None, True)
@@ -241,7 +241,7 @@ def test_a_mechanism_of_another_record_is_refused():
         episode(joints.isel(time=[0]), found)
 
 
-def test_durations_are_told_in_fitting_units():
+def test_durations_are_written_in_fitting_units():
     assert [duration_text(each) for each in (0.025, 0.9994, 1.0, 12.34)] == [
         "25 ms",
         "999 ms",

@@ -284,15 +284,17 @@ def test_from_the_strongest_solution_the_search_goes_down_to_the_weakest():
     """A wall that slides at two factors, of which the mixed-integer programme finds the least."""
     structure = random_structure(10)
     _, dead = self_weight_programme(structure, "nonassociated", None, None)
-    asked = dead.with_load_factor(rigid_load(structure, [SIDEWAYS]))
-    starts = starting_forces(asked, asked.solve(), 40, 0)
-    found = [turn for forces in starts if (turn := find_solution(asked, forces))]
+    programme = dead.with_load_factor(rigid_load(structure, [SIDEWAYS]))
+    starts = starting_forces(programme, programme.solve(), 40, 0)
+    found = [turn for forces in starts if (turn := find_solution(programme, forces))]
     strongest = min(found, key=lambda turn: turn.state.value)
     assert -strongest.state.value == pytest.approx(0.67229, rel=1e-4)
-    values = [-turn.state.value for turn in descend(asked, strongest, strongest.state.forces, 30)]
+    values = [
+        -turn.state.value for turn in descend(programme, strongest, strongest.state.forces, 30)
+    ]
     assert values == sorted(values, reverse=True)
     assert values[-1] == pytest.approx(least_by_integers(structure, SIDEWAYS), rel=1e-5)
-    from_none = [-turn.state.value for turn in descend(asked, None, starts[0], 30)]
+    from_none = [-turn.state.value for turn in descend(programme, None, starts[0], 30)]
     assert min(from_none) == pytest.approx(values[-1], rel=EXACT)
 
 

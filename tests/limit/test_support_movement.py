@@ -12,7 +12,7 @@ from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.support_movement import DisplacedBlocks
 
 TOLERANCE = 1e-4
-"""Width of the last step, as a share of the movement asked for: the default."""
+"""Width of the last step, as a share of the given movement: the default."""
 
 SPREAD = af.Settlement("left abutment", (-1.0, 0.0, 0.0))
 SINK = af.Settlement("left abutment", (0.0, -1.0, 0.0))
@@ -216,7 +216,7 @@ def test_a_small_movement_is_held_and_a_strut_locks():
     assert (stuck.end, stuck.largest) == (End.LOCKS, 0.0)
 
 
-def test_the_last_step_ends_where_it_is_asked_to(monkeypatch):
+def test_the_last_step_ends_at_the_given_movement(monkeypatch):
     """Steps of three tenths, and one of a tenth."""
     monkeypatch.setattr(support_movement, "MAX_MOVEMENT_STEP", 0.3)
     ring = af.circular_arch(radius=2.0, thickness=0.4, embrace=120.0, voussoirs=7, chords=1)

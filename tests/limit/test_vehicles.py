@@ -221,12 +221,12 @@ def test_invalid_input_is_refused(given, says):
         af.moving_load(**options)
 
 
-def test_of_what_is_found_at_a_place_the_weakest_is_kept(monkeypatch):
+def test_the_weakest_solution_at_a_place_is_kept(monkeypatch):
     """There and back again: each search begins with what was found beside it just before."""
-    values, asked = iter([0.1, 0.3, None, None, 0.2, 0.4]), []
+    values, calls = iter([0.1, 0.3, None, None, 0.2, 0.4]), []
 
     def weakest_from(programme, starts):
-        asked.append((programme, list(starts)))
+        calls.append((programme, list(starts)))
         value = next(values)
         return None if value is None else SimpleNamespace(value=value, forces=f"{value}")
 
@@ -240,7 +240,7 @@ def test_of_what_is_found_at_a_place_the_weakest_is_kept(monkeypatch):
     assert {row: state and state.value for row, state in found.items()} == {
         **{"a": 0.4, "b": 0.3, "c": None}
     }
-    assert asked == [
+    assert calls == [
         (1, ["at a 2 0"]),
         (2, ["0.1", "at b 2 1"]),
         (3, ["0.3", "at c 2 2"]),

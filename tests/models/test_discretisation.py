@@ -1,4 +1,4 @@
-"""What a structure is modelled by: said once, checked when said."""
+"""Discretisations of a structure: stated once, checked when stated."""
 
 from pathlib import Path
 
@@ -56,32 +56,32 @@ def test_refusals(ring, given, says):
         af.build(ring, **given)
 
 
-def test_what_is_asked_is_kept():
-    asked = Discretisation("faces", [2, np.int64(3)], quadrature="gauss", points=2)
-    assert asked.cells == (asked.through, asked.along) == (2, 3)
-    assert asked.rule == af.joints.Quadrature("gauss", 2)
-    assert asked == Discretisation("faces", (2, 3), quadrature="gauss", points=2)
+def test_given_settings_are_kept():
+    discretisation = Discretisation("faces", [2, np.int64(3)], quadrature="gauss", points=2)
+    assert discretisation.cells == (discretisation.through, discretisation.along) == (2, 3)
+    assert discretisation.rule == af.joints.Quadrature("gauss", 2)
+    assert discretisation == Discretisation("faces", (2, 3), quadrature="gauss", points=2)
     for fidelity in ("rigid", "faces", "condensed", "full", "monolithic"):
         assert Discretisation(fidelity).name == fidelity
     mixed = Discretisation({"backfill": "full", "rest": "faces"})
     assert mixed.name == "backfill: full, rest: faces"
 
 
-def test_a_case_says_it():
+def test_a_case_has_its_discretisation():
     changes = [
         "model={ fidelity = 'faces', cells = [2, 3], max_cell_size = '50 cm', tolerance = 0.01 }"
     ]
-    asked = af.Case.read(BRIDGE, changes).discretisation
-    assert asked == Discretisation("faces", (2, 3), coarse=0.5)
+    discretisation = af.Case.read(BRIDGE, changes).discretisation
+    assert discretisation == Discretisation("faces", (2, 3), coarse=0.5)
 
 
-def test_a_case_that_leaves_the_choice_may_still_say_its_mesh():
+def test_a_case_without_a_fidelity_may_state_its_mesh():
     case = af.Case.read(BRIDGE, ["model.cells=[2, 2]"])
     assert case.model["fidelity"] == "auto"
     assert case.discretisation == Discretisation(cells=(2, 2))
 
 
-def test_a_thousand_cells_may_be_meant():
+def test_a_thousand_cells_are_allowed():
     assert af.models.Discretisation(cells=(1000, 1000)).through == 1000
     for cells in ((1001, 1), (1, 1001), (0, 1)):
         with pytest.raises(af.InvalidInput, match="cells"):

@@ -54,7 +54,7 @@ def test_mirror_images_are_cut_alike(make, cell, cells):
 
 
 def test_cells_forced_by_another_side_are_dealt_evenly():
-    """Fill asks an even number of each of three chords, six in all: the intrados has two each."""
+    """Fill needs an even number on each of three chords, six in all: the intrados has two each."""
     made = one_arch(chords=3)
     division = divide_edges(made, af.models.Discretisation(cells=(2, 2)))
     keystone = next(k for k, each in enumerate(made.blocks) if each.name == "arch, voussoir 7")
@@ -83,10 +83,10 @@ def test_cells_are_twice_as_long_as_a_stone_is_thick_at_most(length, along):
     Where it is less than half a metre long, it is its height that is cut: at 0.24 m by three.
     """
     edges = find_edges(slab(length), [1, 1])
-    asked = af.models.Discretisation(cells=(1, 1))
-    wanted = _side_cells(edges, 1, asked)
+    discretisation = af.models.Discretisation(cells=(1, 1))
+    wanted = _side_cells(edges, 1, discretisation)
     assert sorted(wanted) == sorted([along, 1] if length > 0.5 else [1, 3])
-    assert _side_cells(edges, 0, asked) == [1, 1]  # a support does not deform
+    assert _side_cells(edges, 0, discretisation) == [1, 1]  # a support does not deform
     assert sorted(_side_cells(edges, 1, af.models.Discretisation(cells=(5, 7)))) == [5, 7]
 
 
@@ -98,12 +98,12 @@ def test_a_mesh_has_a_million_cells_at_most():
         _check_cell_count(edges, af.models.Discretisation(cells=(1000, 1000)))
     free = find_edges(slab(2.0, corners=None), [1, 1])
     for size, fits in ((0.0014144, True), (0.0014140, False)):
-        asked = af.models.Discretisation(cells=(1, 1), coarse=size)
+        discretisation = af.models.Discretisation(cells=(1, 1), coarse=size)
         if fits:
-            _check_cell_count(free, asked)
+            _check_cell_count(free, discretisation)
         else:
             with pytest.raises(af.errors.MeshError, match="a mesh of 1e"):
-                _check_cell_count(free, asked)
+                _check_cell_count(free, discretisation)
 
 
 def test_cells_grow_with_the_distance_from_fine_ones():
@@ -117,8 +117,8 @@ def test_cells_grow_with_the_distance_from_fine_ones():
 def test_an_edge_far_from_stones_has_as_many_cells_as_fit():
     """∫ ds over the size, by SciPy; the largest is half of the mean thickness, A / P."""
     structure = slab(3.0, 2.0, corners=None)
-    asked = af.models.Discretisation(cells=(8, 1), cell="triangle")
-    made = divide_edges(structure, asked)
+    discretisation = af.models.Discretisation(cells=(8, 1), cell="triangle")
+    made = divide_edges(structure, discretisation)
     edges, size = made.edges, made.sizes[1]
     assert size.max_size == pytest.approx(6.0 / 10.0)
     assert size.lengths == pytest.approx(3.0 / 8.0)

@@ -12,7 +12,7 @@ NEAR = 1e-6
 @pytest.mark.parametrize("size", [0.02, 1.0, 50.0])
 @pytest.mark.parametrize("turn", [0.0, 0.7])
 def test_points_on_an_edge_are_inserted_in_order(size, turn):
-    """Of a square of any size: from one side and the other as near as is told, ends left out."""
+    """A square of any size: points within `NEAR` of either side, its ends left out."""
     square = size * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     on = size * np.array([[0.7, 0.0], [0.2, 0.0], [1.0, 0.5]])
     aside = [0.9 * NEAR, -0.9 * NEAR, 1.1 * NEAR, -1.1 * NEAR]

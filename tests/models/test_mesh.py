@@ -123,7 +123,7 @@ HEAD = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
     ],
 )
 def test_no_file_whatever_it_is_called_runs_anything(stack, tmp_path, text, ending):
-    """Scripts of gmsh behind a header, in sections that it knows, and in files named elsewhere."""
+    """Scripts of gmsh behind a header, in known sections, and in files named elsewhere."""
     mark, other = tmp_path / "ran", tmp_path / "other.geo"
     call = f'SystemCall "touch {mark}";\n'
     other.write_text(call)
@@ -279,7 +279,7 @@ def test_supports_of_a_bridge_carry_its_weight(cell):
 
 
 def test_soil_has_the_cells_that_its_stones_impose():
-    """Four on each extrados, and cells inside that grow to no more than was asked."""
+    """Four on each extrados, and cells inside that grow to the given size at most."""
     structure = viaduct()
     soil = next(k for k, block in enumerate(structure.blocks) if block.name == "backfill")
     stones = {k for k, block in enumerate(structure.blocks) if block.part.endswith("arch")}
@@ -298,7 +298,7 @@ def test_soil_has_the_cells_that_its_stones_impose():
 
 
 def block(name, *outline, corners=(0, 1, 2, 3), fixed=False):
-    """A stone with a structured mesh unless it is told otherwise."""
+    """A stone, by default with a structured mesh."""
     return af.Block(outline, af.STONE, name, fixed=fixed, corners=corners)
 
 

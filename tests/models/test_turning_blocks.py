@@ -30,11 +30,11 @@ def pushed(structure, fidelity, displacements):
     ],
     ids=["column", "ring"],
 )
-def test_a_small_push_does_what_it_does_with_small_displacements(structure, fidelity, caplog):
+def test_a_small_push_acts_as_with_small_displacements(structure, fidelity, caplog):
     """Joints of a column have the extrados on the right, those of a ring on the left.
 
     The weight of soft stones that lean adds to what bends them, by some per cent; of what shears
-    them, which is small, it is more, so that of this only the sign is asked for.
+    them, which is small, it is more, so that of this only the sign is tested.
     """
     caplog.set_level(logging.ERROR)
     small, large = (pushed(structure, fidelity, kind) for kind in ("small", "large"))

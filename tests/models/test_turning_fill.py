@@ -131,7 +131,7 @@ def test_a_fill_hands_over_its_momentum(structures):
     assert held == pytest.approx(momentum, rel=1e-3, abs=1e-3 * mass * abs(turn))
 
 
-def test_how_far_faces_have_slid_is_told_in_facets():
+def test_slip_of_faces_is_stated_in_facets():
     """A stone whose face may bend, moved along its bed: over facets of 0.3 m, to either side."""
     tower = af.column(breadth=0.6, heights=[0.5, 0.5])
     model = af.build(tower, fidelity="full", displacements="large", cells=(2, 1))
@@ -145,7 +145,7 @@ def test_how_far_faces_have_slid_is_told_in_facets():
 
 
 def test_one_triangle_on_each_stone_leaves_no_facets_to_slide():
-    """Quadrilaterals have two facets or more on each stone, however few cells are asked for."""
+    """Quadrilaterals have two facets or more on each stone, at any number of cells."""
     arch = af.shapes.Arch(span=6.0, rise=1.5, thickness=0.4, voussoirs=11)
     bridge = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.3), width=3.0)
     fidelity = {"backfill": "full", "rest": "rigid"}

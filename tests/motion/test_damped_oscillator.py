@@ -70,15 +70,15 @@ def test_what_no_oscillator_has_is_refused(periods, damping, message):
 )
 def test_an_oscillation_has_forty_samples_up_to_a_thousand_a_step(period, parts, monkeypatch):
     """Of a record in steps of 10 ms, divided into no more parts than that takes."""
-    asked = []
+    calls = []
 
     def displacement(samples, dt, period, damping):
-        asked.append((len(samples), dt))
+        calls.append((len(samples), dt))
         return np.ones(len(samples))
 
     monkeypatch.setattr(response_spectra, "oscillator_displacement", displacement)
     response_spectra.find_peak_responses(np.ones(5), 0.01, np.array([period]), 0.05)
-    assert asked == [(4 * parts + 1, pytest.approx(0.01 / parts))]
+    assert calls == [(4 * parts + 1, pytest.approx(0.01 / parts))]
 
 
 def test_the_top_of_a_parabola_through_three_samples():

@@ -123,7 +123,7 @@ def test_cut_after_the_end_of_a_component_leaves_it_at_zero():
         af.Motion(sine(), 0.01).cut(5.0, 6.0)
 
 
-def test_cut_runs_to_the_end_where_it_is_told_to_go_on(shaking):
+def test_a_cut_without_an_end_runs_to_the_end(shaking):
     assert shaking.cut(4.0, 99.0).duration == pytest.approx(6.0)
     assert shaking.cut(4.0, np.inf).duration == pytest.approx(6.0)
 

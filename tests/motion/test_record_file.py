@@ -1,4 +1,4 @@
-"""The text of a record: its numbers, told apart from headers, and what is taken for damage."""
+"""The text of a record: numbers distinguished from headers, and text that is taken for damage."""
 
 from pathlib import Path
 
@@ -64,7 +64,7 @@ def test_a_block_ends_where_its_count_is_reached():
 
 @pytest.mark.parametrize(("count", "damaged"), [(32, False), (35, True), (66, False), (68, True)])
 def test_one_number_printed_unlike_three_in_a_hundred_is_damaged(count, damaged):
-    """One of 34 is 3 %; of two among twice as many the first is told."""
+    """One of 34 is 3 %; of two among twice as many the first is named."""
     odd = 1 if count < 50 else 2
     lines = text(*["0.125"] * (count - odd), *["0.25"] * odd)
     if damaged:

@@ -90,7 +90,7 @@ def test_real_records_have_their_published_count_and_peak(recorded, name, dt, co
 
 
 def test_what_no_ground_does_is_refused_however_it_is_read(write):
-    """Beyond 5 g it is a wrong unit, of which file is told; one of two columns may be sound."""
+    """Beyond 5 g the unit is wrong, and the file is named; one of two columns may be sound."""
     path = write("0.1 0.1\n0.2 -60.0\n0.0 0.1\n0.1 0.0\n")
     given = {"units": "m/s2", "dt": 0.01}
     for read in (read_channels, read_components, af.Motion.read):
@@ -140,7 +140,7 @@ def test_one_component_is_chosen_by_its_number(recorded):
         af.Motion.read(recorded / "peer_at2/NIS090.AT2", dt=0.01)
 
 
-def test_components_are_told_by_their_directions(write):
+def test_components_are_distinguished_by_their_directions(write):
     rows = "1 2 3\n-4 5 6\n0 8 8.5\n"
     path = write("# gal, dt = 0.01 s: N-S, E-W, U-D\n" + rows)
     found = read_components(path)
@@ -281,10 +281,11 @@ def test_time_and_acceleration_in_columns(write):
 
 
 @pytest.mark.parametrize(
-    "told", ["dt=0.005 sec", "dt = 5 ms", "time step: .005", "Sampling rate: 200 Hz", "DT 5.0E-3 s"]
+    "stated",
+    ["dt=0.005 sec", "dt = 5 ms", "time step: .005", "Sampling rate: 200 Hz", "DT 5.0E-3 s"],
 )
-def test_the_step_told_in_a_comment(write, told):
-    motion = af.Motion.read(write(f"% gal, {told}\n1\n-2\n3\n"))
+def test_the_step_stated_in_a_comment(write, stated):
+    motion = af.Motion.read(write(f"% gal, {stated}\n1\n-2\n3\n"))
     assert motion.dt == pytest.approx(0.005)
     assert motion.pga == pytest.approx(0.03)
 
@@ -436,10 +437,10 @@ def test_times_may_stray_by_a_quarter_of_a_step(write, jitter, uniform):
             read_channels(path)
 
 
-def test_a_step_that_is_told_twice_is_the_same_to_a_hundredth(write):
+def test_a_step_that_is_stated_twice_is_the_same_to_a_hundredth(write):
     rows = "1\n-2\n3\n"
-    for told, same in ((0.009905, True), (0.00989, False), (0.010095, True), (0.0102, False)):
-        path = write(f"# gal, dt = {told} s\n" + rows)
+    for stated, same in ((0.009905, True), (0.00989, False), (0.010095, True), (0.0102, False)):
+        path = write(f"# gal, dt = {stated} s\n" + rows)
         if same:
             assert read_channels(path, dt=0.01)[0].dt == 0.01
         else:
@@ -448,7 +449,7 @@ def test_a_step_that_is_told_twice_is_the_same_to_a_hundredth(write):
 
 
 def test_a_first_column_is_time_where_nine_in_ten_steps_grow(write):
-    """Of twenty steps one goes back, which is then told of; with three it is another component."""
+    """Of twenty steps one goes back, which is an error; with three it is another component."""
     for back, says in (([9], "time is not uniform"), ([5, 9, 13], "2 columns could be")):
         times = np.arange(21.0) * 0.01
         times[back] = times[[k - 1 for k in back]]

@@ -112,7 +112,7 @@ def test_significant_duration_holds_nine_tenths_of_the_energy(shaking):
         signal_processing.find_significant_window(shaking.horizontal, shaking.dt, 0.9, 0.1)
 
 
-def test_what_can_be_asked_for_ends_where_it_is_said_to():
+def test_arguments_are_accepted_up_to_their_documented_bounds():
     """The least degree, order and number of samples, all of the energy, and bands up to half."""
     rng = np.random.default_rng(3)
     samples, dt = rng.normal(size=40), 0.01

@@ -57,7 +57,7 @@ def test_the_horizontal_does_not_depend_on_the_vertical():
     assert np.abs(upright).max() == pytest.approx(1.0)
 
 
-def test_the_least_that_can_be_asked_for():
+def test_the_least_duration_and_peaks_that_are_accepted():
     """Fifty steps, a peak of a millimetre per second squared."""
     level, upright = generate_accelerogram(0.5, 0.01, pga=1e-3, ratio=0.05, seed=0)
     assert len(level) == 51

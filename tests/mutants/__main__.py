@@ -1,10 +1,10 @@
-"""Change physics in a copy of the package, one place at a time, and let tests run that come to it.
+"""Change physics in a copy of the package, one place at a time, and run the tests that execute it.
 
     python -m mutants [--count 60] [--seed 0] [--only dynamics/damping]
 
 A line for each change: the test that noticed it, or that none did. First all default tests run
-once, in some minutes, and say which statements they come to; that is kept in `out/reached.json`
-until a source or a test changes. A change is then met by the tests that come to its statement
+once, in some minutes, and record the statements that they execute in `out/reached.json`, which is
+kept until a source or a test changes. A change is then met by the tests that execute its statement
 alone, those of its own module and the shortest first, until one fails.
 
 What no test can notice, for it changes no number, is listed with its reason in `known.toml`, and
@@ -37,7 +37,7 @@ TESTS = [f"tests/{room}" for room in (*ROOMS, "validation", "verification")]
 TESTS.append("tests/test_doctests.py")
 
 DEFAULTS = "tests/verification/test_defaults.py"
-"""Tests of what is kept as a module is read: they come to no statement of it."""
+"""Tests of values that a module has once it is imported: they execute no statement of it."""
 
 FIRST, FILES = 4.0, 8
 """CPU time [s] and number of files of the tests that run first: most changes go no further."""
@@ -117,12 +117,12 @@ def _known() -> dict[str, str]:
 
 
 def _reached(place: Path) -> Reached:
-    """What each test comes to, found now or kept from before."""
+    """Statements that each test executes, found now or kept from before."""
     sources = [path for name in ("archfem", "tests") for path in (ROOT / name).rglob("*.py")]
     sources = [path for path in sources if path.parent != KNOWN.parent]
     if KEPT.exists() and KEPT.stat().st_mtime > max(path.stat().st_mtime for path in sources):
         return json.loads(KEPT.read_text())
-    print("all default tests run once, and say what they come to", flush=True)
+    print("all default tests run once, and record the statements that they execute", flush=True)
     for path in _modules(""):
         source = (ROOT / path).read_text(encoding="utf-8")
         (place / path).write_text(marked(source, path.as_posix()), encoding="utf-8")
@@ -149,13 +149,17 @@ def _noticed(place: Path, path: Path, number: int, change: Change, tests: Reache
 
 
 def _chosen(path: Path, change: Change, tests: Reached) -> list[list[str]]:
-    """Tests that come to a change: those that run first, and those that run then."""
-    meant = sorted(
-        (test for test in tests if _own(test, path) or _comes(test, tests[test][1], path, change)),
+    """Tests that execute a change: those that run first, and those that run then."""
+    executing = sorted(
+        (
+            test
+            for test in tests
+            if _own(test, path) or _executes(test, tests[test][1], path, change)
+        ),
         key=lambda test: (not _own(test, path), tests[test][0]),
     )
     first, then, early, spent = [], [], set(), 0.0
-    for test in meant:
+    for test in executing:
         file, taken = _file(test), tests[test][0]
         if spent + taken < FIRST and len(early | {file}) <= FILES:
             early.add(file)
@@ -165,13 +169,13 @@ def _chosen(path: Path, change: Change, tests: Reached) -> list[list[str]]:
         spent += taken
     # Those of one file together: they share what is made once for all of them.
     rank = {
-        file: number for number, file in enumerate(dict.fromkeys(_file(test) for test in meant))
+        file: number for number, file in enumerate(dict.fromkeys(_file(test) for test in executing))
     }
     return [sorted(each, key=lambda test: rank[_file(test)]) for each in (first, then) if each]
 
 
-def _comes(test: str, places: list[list[str | int]], path: Path, change: Change) -> bool:
-    """Whether a test comes to a change, as far as that is known."""
+def _executes(test: str, places: list[list[str | int]], path: Path, change: Change) -> bool:
+    """Whether a test executes a change, as far as that is known."""
     if _compiled(path):
         return test.startswith((f"tests/{path.parts[1]}/", "tests/verification"))
     if change.statement is None:

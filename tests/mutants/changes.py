@@ -12,11 +12,11 @@ NAMES |= {"minimum": "maximum", "argmax": "argmin", "argmin": "argmax"}
 FACTOR = 1.1
 """By which a number is multiplied; a whole number grows by one."""
 
-TOLD = ("logger.", "bar.", "tqdm")
-"""What begins a call that tells people of a run and gives nothing back: logs, bars of progress."""
+REPORTING = ("logger.", "bar.", "tqdm")
+"""Beginnings of calls that only report on a run: logs, bars of progress."""
 
 SHOWN = 90
-"""Letters of what stands around a change, by which it is told from others of its module."""
+"""Letters of the text around a change, which distinguishes it from others of its module."""
 
 SIMPLE = ast.expr | ast.keyword | ast.Return | ast.Assign | ast.AnnAssign | ast.AugAssign | ast.Expr
 
@@ -72,7 +72,7 @@ def changes(source: str) -> list[Change]:
     """Return what may be changed in a module.
 
     Words of errors, logs and bars of progress, annotations, imports, what a function that only
-    refuses does and sizes of a shape that are to be found (any number below zero asks for that)
+    refuses does and sizes of a shape that are to be found (any number below zero does that)
     are left out.
 
     Args:
@@ -95,9 +95,9 @@ def changed(source: str, number: int) -> str:
 
 
 def marked(source: str, name: str) -> str:
-    """Return a module that says which statements with changes it comes to.
+    """Return a module that reports each statement with changes as it executes.
 
-    Each is told to the function `_reached` among the built-in names, where there is one, as the
+    Each is reported to the function `_reached` among the built-in names, where there is one, as the
     module's name and the statement's line; so is the first statement of each function, which may
     read what is kept as the module is read.
 
@@ -151,7 +151,7 @@ def _places(tree: ast.AST, above: list[ast.AST]) -> Iterator[tuple[ast.AST, list
                 continue
             if _is_shape(around) and ast.unparse(node) == "-1":
                 continue
-            if isinstance(node, ast.Call) and ast.unparse(node.func).startswith(TOLD):
+            if isinstance(node, ast.Call) and ast.unparse(node.func).startswith(REPORTING):
                 continue
             yield node, around
             yield from _places(node, around)

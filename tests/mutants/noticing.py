@@ -1,4 +1,4 @@
-"""Which tests come to which statement, and whether one of some tests fails."""
+"""Statements that each test executes, and whether one of some tests fails."""
 
 import builtins
 import functools
@@ -27,7 +27,7 @@ KEEPS = "archfem._numba"
 """Module of archfem whose caches are of no physics: it chooses a place on disk once."""
 
 Reached = dict[str, tuple[float, list[list[str | int]]]]
-"""Of each test that passes: CPU time [s], and modules and lines that it comes to."""
+"""Of each test that passes: CPU time [s], and modules and lines that it executes."""
 
 
 def get_ready() -> None:
@@ -57,7 +57,7 @@ def failing(place: Path, tests: list[str], limit: float) -> str | None:
 
 
 def reached(place: Path, folders: list[str]) -> None:
-    """Write to `reached.json` what each of the tests that pass comes to, as `Reached`.
+    """Write to `reached.json` the statements that each passing test executes, as `Reached`.
 
     Args:
         place: folder of a copy of the package, its modules `marked`.
@@ -88,7 +88,7 @@ class Choice:
 
 
 class Reach:
-    """Plugin of pytest: what each test comes to, and its CPU time."""
+    """Plugin of pytest: statements that each test executes, and its CPU time."""
 
     def __init__(self, target: Path):
         self.target, self.found = target, {}
@@ -121,7 +121,7 @@ class Reach:
 
 
 def _forget(module: ModuleType) -> None:
-    """Empty the caches of physics and of a module of tests: each test is to come to its all."""
+    """Empty the caches of physics and of a module of tests: each test executes all it needs."""
     own = [each for name, each in sys.modules.items() if name.startswith("archfem.") and each]
     for each in (*own, module):
         for value in list(vars(each).values()):

@@ -28,7 +28,7 @@ def bonded(fidelity="rigid", rule="exact"):
 
 
 def under(model, horizontal, vertical, start=None):
-    """Equilibrium under multiples of the weight, from rest or as a start remembers."""
+    """Equilibrium under multiples of the weight, from rest or with the memory of a start."""
     load = model.load(af.BodyForce(horizontal, vertical))
     if start is not None:
         model = model.with_memory(start.model.memory)
@@ -242,7 +242,7 @@ def test_limit_analysis_tells_of_teeth_that_it_leaves_out(caplog):
     assert "joints dilate by up to 0.2" in caplog.text
 
 
-def test_weak_forms_say_who_knows_teeth_and_bonds():
+def test_weak_forms_name_a_fidelity_with_teeth_and_bonds():
     for given in (TEETH, {"friction": None, "tension": 1e3}):
         structure = block(height=0.1, **given).structure
         with pytest.raises(af.InvalidInput, match="use 'full'"):

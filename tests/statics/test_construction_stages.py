@@ -151,7 +151,7 @@ def test_blocks_that_move_far_go_on_from_where_they_were_built(fidelity, cells):
 
 
 def test_a_bridge_built_in_stages_is_in_balance_where_it_has_moved(bridge):
-    """Its joints carry what they do by small displacements, to what those change of its shape."""
+    """Its joints carry forces near those of small displacements."""
     small, large = (
         af.build(bridge, fidelity="rigid", cells=(2, 1), displacements=each, quadrature="exact")
         for each in ("small", "large")
@@ -161,10 +161,10 @@ def test_a_bridge_built_in_stages_is_in_balance_where_it_has_moved(bridge):
     rest = np.linalg.norm(far.model.force(far.q) - self_weight(far.model))
     assert rest <= 1e-9 * bridge.weight
     direct = af.dead_load(large)
-    apart, told = (
+    apart, between_ways = (
         np.abs(each.joints["N"].values - far.joints["N"].values).max() for each in (near, direct)
     )
-    assert apart < 0.05 * told
+    assert apart < 0.05 * between_ways
 
 
 def test_usual_stages_of_a_bridge(bridge):
@@ -193,7 +193,7 @@ def test_stages_that_build_nothing_are_refused(column, stages, words):
         af.dead_load(model, stages=stages)
 
 
-def test_what_cannot_stand_until_the_rest_is_placed_is_told(bridge):
+def test_a_stage_that_cannot_stand_is_named(bridge):
     """Fill without its walls' weight, placed as one ring without centring, falls at once."""
     ring = af.circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17, chords=1)
     with pytest.raises(af.DidNotConverge, match="'centring struck'"):

@@ -81,7 +81,7 @@ def test_rounding_is_that_of_the_highest_square_of_one_coordinate():
 
 
 def test_a_negative_stiffness_far_from_all_modes_that_are_sought_is_no_frequency_either():
-    """The search comes to the nearest modes alone, and the factor tells of the others."""
+    """The search finds the nearest modes alone, and the factor shows the others."""
     stiffness = sparse.diags([-1e6, *np.linspace(1.0, 1e3, 500)]).tocsr()
     with pytest.raises(af.DidNotConverge, match=r"singular or negative, with ω² = 1\.0e"):
         find_lowest_modes(stiffness, sparse.identity(501, format="csr"), 2)

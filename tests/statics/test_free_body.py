@@ -105,7 +105,7 @@ def test_what_cannot_be_cut_free_is_refused(stack):
         forces_on(stack, over_time, "block 1")
 
 
-def test_what_is_left_is_told_of_the_largest_force():
+def test_the_residual_is_relative_to_the_largest_force():
     body = FreeBody(
         af.column(breadth=1.0, heights=[1.0]).blocks[1],
         ("joint 0", "joint 1", "weight"),

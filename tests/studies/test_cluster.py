@@ -136,7 +136,7 @@ def test_a_scheduler_that_dies_leaves_what_was_finished(small_ring, finders, tmp
 
 
 @pytest.mark.slow
-def test_a_worker_that_ends_is_told(small_ring, finders, tmp_path, monkeypatch, caplog):
+def test_a_worker_that_ends_is_reported(small_ring, finders, tmp_path, monkeypatch, caplog):
     over = {"structure.thickness": [0.5 + 0.01 * k for k in range(12)]}
     find = {"name": "finders_of_tests:slowly", "seconds": 0.5}
     study = af.Study.of(small_ring, over, find)

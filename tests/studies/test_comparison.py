@@ -45,9 +45,9 @@ def unscaled(study):
 
 
 @pytest.mark.slow
-def test_a_study_finds_what_its_cases_do_alone(study, tmp_path):
-    asked = af.studies.Comparison.read(study, QUICK)
-    found = compared(asked, tmp_path / "out")
+def test_a_study_has_the_results_of_its_cases_alone(study, tmp_path):
+    comparison = af.studies.Comparison.read(study, QUICK)
+    found = compared(comparison, tmp_path / "out")
     case = af.Case.read(MESHES / "ring_suite.toml", QUICK)
     dead = af.cases.dead_load_of_case(case)
     (motion,) = (m for m in case.ground_suite().motions if m.name == "pair-1")
@@ -133,7 +133,7 @@ def never(*_, **__):
     raise AssertionError("a case was run again")
 
 
-def test_a_study_goes_on_where_it_was_ended(study, tmp_path, monkeypatch):
+def test_a_study_continues_where_it_was_ended(study, tmp_path, monkeypatch):
     unscaled(study)
     folder = tmp_path / "out"
     command = ["study", str(study), "--out", str(folder), "--workers", "1"]
@@ -143,10 +143,10 @@ def test_a_study_goes_on_where_it_was_ended(study, tmp_path, monkeypatch):
     assert (folder / "study.png").is_file()
 
     monkeypatch.setattr("archfem.studies.process_pool.evaluate_serially", never)
-    asked = af.studies.Comparison.read(study, QUICK)
-    found = compared(asked, folder)
+    comparison = af.studies.Comparison.read(study, QUICK)
+    found = compared(comparison, folder)
     assert af.studies.study_table(found) in table
-    assert json.loads((folder / "thin.json").read_text())["case"] == asked.cases["thin"].text()
+    assert json.loads((folder / "thin.json").read_text())["case"] == comparison.cases["thin"].text()
     assert af.commands.main(command) == 0
     assert (folder / "study.txt").read_text() == table
     assert set(af.studies.read_table(folder / "results.nc")["case"].values) == {"thick", "thin"}

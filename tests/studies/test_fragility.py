@@ -105,7 +105,7 @@ def test_variants_and_motions_share_the_variance_of_all_together():
     scales = [0.5, 0.8, 1.0, 1.7]
     found = spread(fragility(scale * drawn(30)) for scale in scales)
     pooled = fragility(np.concatenate([scale * drawn(30) for scale in scales]))
-    between = found.epistemic**2 * 3 / 4  # of these four alone, not of what they are samples of
+    between = found.epistemic**2 * 3 / 4  # of these four alone, not of their population
     assert pooled.dispersion**2 == pytest.approx(found.record**2 + between, rel=1e-6)
     assert pooled.median == pytest.approx(found.median, rel=1e-6)
     assert found.total == np.hypot(found.record, found.epistemic)

@@ -87,7 +87,7 @@ def test_a_motion_alone_is_a_list_of_one(small_ida, monkeypatch):
     assert len(points[0]) == 1
 
 
-def test_it_goes_on_where_it_ended(small_ida, monkeypatch):
+def test_it_continues_where_it_ended(small_ida, monkeypatch):
     case, folder, found = small_ida
 
     def never(*_):

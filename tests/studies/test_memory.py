@@ -103,9 +103,9 @@ def test_a_suite_is_matched_once_whatever_its_factors(monkeypatch):
     }
     cases = []
     for factors in ({}, {"scale": 1.3, "reduction": 3.0}, {"reduction": 2.0, "reversed": True}):
-        told = deepcopy(settings)
-        told["suite"] |= factors
-        cases.append(af.Case.of(told))
+        changed = deepcopy(settings)
+        changed["suite"] |= factors
+        cases.append(af.Case.of(changed))
     met = []
 
     def matched(suite, target):  # which would take a second
@@ -135,7 +135,7 @@ def test_a_pair_is_matched_once_by_all_workers(matching_study, tmp_path):
     assert (tables[0]["mean"].std("suite.pair") > 0.0).all()
 
 
-def test_models_are_told_apart_by_content():
+def test_models_are_distinguished_by_content():
     """Cases that were read apart share a model, and one that another key changes has its own."""
     first, again, other = (
         Point(settings, Path(), changes)
@@ -177,14 +177,14 @@ def test_a_mesh_serves_other_materials_and_no_other_shape():
     pytest.importorskip("dolfinx")
     from archfem.models.fem.mesh import get_mesh
 
-    asked = Discretisation("full", (2, 2))
+    discretisation = Discretisation("full", (2, 2))
     stiff, soft = (
         af.column(breadth=0.6, heights=[1.0], contact=af.Contact(stiffness, 3e8, 0.6, "joint"))
         for stiffness in (1e9, 2e9)
     )
-    first, again = get_mesh(stiff, asked), get_mesh(soft, asked)
+    first, again = get_mesh(stiff, discretisation), get_mesh(soft, discretisation)
     assert first.grid is again.grid
     assert again.structure is soft
     wider = af.column(breadth=0.7, heights=[1.0])
-    assert get_mesh(wider, asked).grid is not first.grid
+    assert get_mesh(wider, discretisation).grid is not first.grid
     assert get_mesh(stiff, Discretisation("full", (3, 2))).grid is not first.grid

@@ -1,4 +1,4 @@
-"""Stiffness of dry joints: the published relations, ranges, and what hangs on them."""
+"""Stiffness of dry joints: the published relations, ranges, and quantities that depend on them."""
 
 import pytest
 
@@ -42,7 +42,7 @@ def test_rigid_blocks_lend_their_flexibility_to_joints():
     assert af.joint_stiffness(5e9, 0.5, stress=1e6).normal > stiff.normal
 
 
-def test_the_report_tells_what_hangs_on_stiffness(small_ring):
+def test_the_report_shows_what_depends_on_stiffness(small_ring):
     found = af.studies.stiffness_report(
         small_ring, af.joint_stiffness(30e9, 0.5), "dead load", workers=1
     )

@@ -85,27 +85,27 @@ def test_what_is_finished_is_not_computed_again(study_file, tmp_path, monkeypatc
     study = af.Study.read(study_file, own_code=True)
     folder = tmp_path / "out"
     first = study.run(folder, workers=1)
-    asked = []
+    numbers = []
 
     def counted(points, question):
-        asked.extend(number for number, _ in points)
+        numbers.extend(number for number, _ in points)
         return iter([(number, {"found": {}, "error": "", "ours": True}) for number, _ in points])
 
     monkeypatch.setattr("archfem.studies.process_pool.evaluate_serially", counted)
     # what failed for no reason of the case's own is tried again: numbers 4 and 5
     study.run(folder, workers=1)
-    assert asked == [4, 5]
+    assert numbers == [4, 5]
     next(iter(folder.glob("points/*/*.json"))).unlink()
-    asked.clear()
+    numbers.clear()
     study.run(folder, workers=1)
-    assert len(asked) == 1
+    assert len(numbers) == 1
     assert set(first.data_vars) == {"twice", "voussoirs", "rows", "error"}
 
 
 @pytest.mark.parametrize(
     "what", ["case", "record", "rewritten", "option", "helper", "version", "program"]
 )
-def test_a_changed_case_is_told_apart(
+def test_a_changed_case_is_computed_anew(
     what, study_file, tmp_path, finders, at2, monkeypatch, caplog, undo
 ):
     at2(tmp_path / "a.at2", [0.1, 0.2, -0.1], 0.01)
@@ -125,7 +125,7 @@ def test_a_changed_case_is_told_apart(
         os.utime(record, ns=(then.st_atime_ns, then.st_mtime_ns))
         assert record.stat().st_size == then.st_size
         assert record.stat().st_mtime_ns == then.st_mtime_ns
-    elif what == "helper":  # beside the function that is asked, in its module
+    elif what == "helper":  # beside the function that is called, in its module
         module = finders / "finders_of_tests.py"
         source = module.read_text()
         module.write_text(source.replace("0.9", "0.8"))
@@ -291,7 +291,7 @@ def title(found):
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_progress_is_told_where_the_output_is_a_file(
+def test_progress_is_reported_where_the_output_is_a_file(
     small_ring, finders, tmp_path, monkeypatch, capsys, workers
 ):
     monkeypatch.setattr(result_store, "PROGRESS_INTERVAL", 0.05)
@@ -444,8 +444,8 @@ def test_samples_have_their_distribution_and_their_seed(small_ring, method):
         "analysis": {"damping": {"ratio": {"distribution": "lognorm", "s": 0.3, "scale": 0.05}}},
         "motion.scale": [1.0, 2.0],
     }
-    told = {"count": 256, "method": method, "seed": 4}
-    axes = parameter_axes(over, told)
+    samples = {"count": 256, "method": method, "seed": 4}
+    axes = parameter_axes(over, samples)
     assert [axis.name for axis in axes] == ["motion.scale", "sample"]
     assert axes[1].keys == ("structure.thickness", "analysis.damping.ratio")
     thickness, ratio = np.array(axes[1].rows).T
@@ -453,9 +453,9 @@ def test_samples_have_their_distribution_and_their_seed(small_ring, method):
     assert np.median(ratio) == pytest.approx(0.05, rel=0.01)
     assert np.log(ratio).std() == pytest.approx(0.3, rel=0.02)
     assert abs(np.corrcoef(thickness, ratio)[0, 1]) < 0.1
-    assert parameter_axes(over, told)[1].rows == axes[1].rows
-    assert parameter_axes(over, told | {"seed": 5})[1].rows != axes[1].rows
-    study = af.Study.of(small_ring, over, "dead load", samples=told)
+    assert parameter_axes(over, samples)[1].rows == axes[1].rows
+    assert parameter_axes(over, samples | {"seed": 5})[1].rows != axes[1].rows
+    study = af.Study.of(small_ring, over, "dead load", samples=samples)
     assert len(study.points) == 512
 
 
@@ -593,19 +593,19 @@ def test_points_of_one_model_are_taken_together(small_ring):
     assert sorted(sorted_points, key=lambda pair: pair[0]) == points
 
 
-def test_who_is_free_goes_on_with_the_model_that_it_knows(small_ring):
+def test_a_free_worker_continues_with_the_model_that_it_has(small_ring):
     over = {"motion.scale": [0.1, 0.2, 0.3], "structure.thickness": [0.5, 0.6, 0.7]}
     points = list(enumerate(af.Study.of(small_ring, over, "dead load").points))
     tasks = process_pool.TaskQueue(points, Evaluator.of("dead load"))
     first = tasks.pop(None, set())
     other = tasks.pop(None, {first.model})
     assert other.model != first.model
-    told = [first, *(tasks.pop(first.model, {other.model}) for _ in range(2))]
-    assert {task.model for task in told} == {first.model}
+    taken = [first, *(tasks.pop(first.model, {other.model}) for _ in range(2))]
+    assert {task.model for task in taken} == {first.model}
     third = tasks.pop(first.model, {other.model})
     assert third.model not in (first.model, other.model)
     tasks.put_back(third)
     rest = [tasks.pop(other.model, {third.model}) for _ in range(5)]
     assert [task.model for task in rest] == 2 * [other.model] + 3 * [third.model]
-    assert sorted(task.number for task in (*told, other, *rest)) == list(range(9))
+    assert sorted(task.number for task in (*taken, other, *rest)) == list(range(9))
     assert not tasks

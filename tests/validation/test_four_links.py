@@ -25,9 +25,9 @@ def arch(normal):
 @cache
 def pushed(normal, rule, most, control="path"):
     cells = (1, 1) if rule == "exact" else (4, 4)
-    asked = Discretisation("rigid", cells, quadrature=rule, displacements="large")
+    discretisation = Discretisation("rigid", cells, quadrature=rule, displacements="large")
     stop = af.statics.Stop(slope=0.0, displacement=most, steps=400)
-    model = build(arch(normal), asked)
+    model = build(arch(normal), discretisation)
     return af.pushover(model, af.BodyForce(1.0, 0.0), control=control, stop=stop)
 
 

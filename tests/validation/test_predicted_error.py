@@ -39,7 +39,7 @@ FILLED = {"backfill": "full", "rest": "condensed"}
 
 
 def quick(structure, discretisation):
-    """As many models as are asked for, all of rigid stones with as many facets."""
+    """Any number of models, all of rigid stones with as many facets."""
     return plain(structure, replace(discretisation, fidelity="rigid"))
 
 
@@ -87,8 +87,8 @@ def test_prediction_is_of_the_order_of_the_error(name, tolerance):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dt", [None, 0.005])
-def test_each_model_is_built_once_and_the_first_is_asked_for_the_damping(ring, dt):
-    built, asked = [], []
+def test_each_model_is_built_once_and_damping_is_computed_of_the_first(ring, dt):
+    built, damped = [], []
 
     def builder(structure, discretisation):
         model = quick(structure, discretisation)
@@ -96,7 +96,7 @@ def test_each_model_is_built_once_and_the_first_is_asked_for_the_damping(ring, d
         return model
 
     def damping(model):
-        asked.append(model)
+        damped.append(model)
         return af.Rayleigh(0.05, (8.0, 24.0))
 
     motion = af.Motion.synthetic(duration=0.25, pga=1.0, seed=1)
@@ -105,7 +105,7 @@ def test_each_model_is_built_once_and_the_first_is_asked_for_the_damping(ring, d
     ladder = ladder[:1] if dt else ladder
     wanted = [exact_discretisation(ring, fidelity, cells) for fidelity, cells, _ in ladder]
     assert [each for each, _ in built] == wanted[: len(built)]
-    assert asked == [built[0][1]]
+    assert damped == [built[0][1]]
 
 
 @pytest.mark.slow
@@ -157,12 +157,12 @@ def test_a_ring_under_fill_has_faces_and_the_fill_has_nodes(law):
     model = af.build(
         structure, fidelity="auto", tolerance=0.03, motion=motion, damping=damping, dt=0.005
     )
-    told = model.prediction
+    prediction = model.prediction
     assert model.fidelity == "backfill: full, rest: faces"
-    assert told.dt == 0.005
+    assert prediction.dt == 0.005
     finest = af.build(structure, fidelity=FILLED, cells=(12, 12))
     actual = actual_error(model, finest, motion, damping, 0.00125)
-    assert_near(told.error, actual)
+    assert_near(prediction.error, actual)
 
 
 @pytest.mark.slow
@@ -177,10 +177,10 @@ def test_without_a_motion_a_severe_one_is_assumed(ring):
 @pytest.mark.slow
 def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
     motion = af.Motion.synthetic(duration=0.25, pga=2.0, seed=3)
-    told = select_model(ring, 1e-9, motion, builder=quick).prediction
-    assert not told.is_met
+    prediction = select_model(ring, 1e-9, motion, builder=quick).prediction
+    assert not prediction.is_met
     assert "no setting meets the tolerance" in caplog.text
-    assert all(name in told.text for name, _ in told.candidates)
+    assert all(name in prediction.text for name, _ in prediction.candidates)
 
 
 @pytest.mark.slow

@@ -102,7 +102,7 @@ SHAKEN = {
 }
 
 TABLES = {"motion": MOTION, "masonry": MASONRY, "": BLOCKS, "dynamics": SHAKEN}
-TOLD = [
+DEFAULTS = [
     (f"{room}.{name}".lstrip("."), given)
     for room, table in TABLES.items()
     for name, given in table.items()
@@ -137,9 +137,9 @@ def is_number(value):
     )
 
 
-@pytest.mark.parametrize(("name", "given"), TOLD, ids=[name for name, _ in TOLD])
-def test_defaults_are_those_that_are_told(name, given):
-    """All numbers among them: a default that is new is to be told here too."""
+@pytest.mark.parametrize(("name", "given"), DEFAULTS, ids=[name for name, _ in DEFAULTS])
+def test_defaults_are_those_of_this_table(name, given):
+    """All numbers among them: a new default is to be added here too."""
     function = found(name)
     function = getattr(function, "__func__", function)
     known = {

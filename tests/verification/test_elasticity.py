@@ -127,7 +127,7 @@ ALPHA, BETA = 1e-4, 3e-4
 
 
 def exact(x, z, sin, cos):
-    """Displacements below and above a joint at z = 0 across which they jump as its springs ask.
+    """Displacements below and above a joint at z = 0 across which they jump by its springs.
 
     Below, u = (α sin x (1 + z)², -β (2 + cos x) z). Above, a field is added whose stress vanishes
     on the joint and which there equals (σ_xy / k_s, σ_yy / k_n). Written for NumPy and for UFL.

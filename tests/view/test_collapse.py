@@ -64,7 +64,7 @@ def test_map_of_capacity_carries_known_values(tmp_path):
     figure.savefig(tmp_path / "capacity.png")
 
 
-def test_the_load_is_drawn_and_told(ring):
+def test_the_load_is_drawn_and_named(ring):
     found = af.collapse_factor(ring, live=af.PointLoad(-1.0, (0.0, -1e4)))
     assert found.structure is ring
     assert found.live == (af.PointLoad(-1.0, (0.0, -1e4)),)

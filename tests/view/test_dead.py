@@ -19,13 +19,13 @@ def test_numbers_of_a_column_are_the_weights_above(heights):
     title = " ".join(page.axes[0].get_title().split())
     assert f"weight {heavy:.4g} kN" in title
     assert f"N from {light:.3g} to {heavy:.3g} kN" in title
-    told = " ".join(text.get_text() for text in page.legends[0].get_texts())
-    assert f"largest N = {heavy:.3g} kN" in re.sub(r"\s+", " ", told)
+    legend = " ".join(text.get_text() for text in page.legends[0].get_texts())
+    assert f"largest N = {heavy:.3g} kN" in re.sub(r"\s+", " ", legend)
 
 
-def test_letters_stand_at_the_joints_that_are_told(ring):
+def test_letters_stand_at_the_joints_of_the_legend(ring):
     page = draw_dead_load(af.dead_load(af.build(ring, fidelity="rigid")))
     letters = {text.get_text() for text in page.axes[0].texts}
-    told = [text.get_text() for text in page.legends[0].get_texts()]
+    legend = [text.get_text() for text in page.legends[0].get_texts()]
     assert letters == {"a", "b"}
-    assert sum(each.startswith("joint ") for each in told) == 2
+    assert sum(each.startswith("joint ") for each in legend) == 2

@@ -40,7 +40,7 @@ def test_an_instant_of_a_run_is_drawn_as_it_is_known(column, toppled):
 
 
 def test_small_displacements_of_a_run_are_magnified():
-    """A stiff column that is shaken: drawn by a round number farther than it went, and told."""
+    """A stiff column that is shaken: drawn magnified by a round number, which is stated."""
     stones = af.column(breadth=0.4, heights=[0.8, 0.8])
     model = af.build(stones, fidelity="rigid")
     motion = af.Motion(np.full(21, 0.5), 0.005)

@@ -44,7 +44,7 @@ def test_each_ring_and_pier_has_a_panel_of_its_own(bridge):
     assert names == ["hinge from |e| = 0.46", "quake"]
 
 
-def test_two_bridges_are_told_apart_by_dots(bridge, ring):
+def test_two_bridges_are_distinguished_by_dots(bridge, ring):
     """Parts of one name share a panel, whatever the number of their joints."""
     runs = {"before": history(bridge, 0.4), "after": history(bridge, 0.1)}
     for axes in draw_envelope(runs, dotted=["before"]).axes:
@@ -98,7 +98,7 @@ def test_ticks_are_names_of_joints():
     for joint in built.joints:
         names[joint.part].append(joint.name)
     for panel in draw_envelope({"run": history(built, 0.3)}).axes:
-        told = panel.xaxis.get_major_formatter()
+        formatter = panel.xaxis.get_major_formatter()
         for number, name in enumerate(names[panel.get_title()]):
-            assert f"joint {told(number, 0)}" == name
-        assert told(99, 0) == ""
+            assert f"joint {formatter(number, 0)}" == name
+        assert formatter(99, 0) == ""

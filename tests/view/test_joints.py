@@ -111,7 +111,7 @@ def test_joints_that_tell_most_are_no_twins(ring):
     assert most_stressed_joints(af.History(dataset)) == [4, 13]
 
 
-def test_friction_beyond_the_axis_is_told(ring):
+def test_friction_beyond_the_axis_is_stated(ring):
     """V / N of 9 where μ is 0.6: the axis ends at 1.8, and words say how far it goes."""
     time = np.linspace(0.0, 1.0, 11)
     found = np.zeros((11, 18, 3))

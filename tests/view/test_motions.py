@@ -72,8 +72,8 @@ def test_the_matched_band_is_shaded():
     shaking = af.Motion.synthetic(duration=5.0, seed=1)
     match = Match(shaking, {"horizontal": 0.02}, {}, {}, (0.1, 1.5))
     suite = af.Suite("one", (shaking,), matches=(match,))
-    told = [text.get_text() for text in draw_suite(suite).legends[0].get_texts()]
-    assert "matched, 0.1 to 1.5 s" in told
+    legend = [text.get_text() for text in draw_suite(suite).legends[0].get_texts()]
+    assert "matched, 0.1 to 1.5 s" in legend
 
 
 def test_mean_and_target_of_a_suite_have_colours_of_their_own(shaking):

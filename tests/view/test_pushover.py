@@ -27,9 +27,9 @@ def test_curve_hinges_and_limit_are_drawn(push, tmp_path):
     words = [text.get_text() for text in axes.texts]
     (limit,) = [line for line in axes.lines if line.get_label() == "limit analysis: 0.457"]
     assert set(limit.get_ydata()) == {0.457}
-    (told,) = [word for word in words if "extrados" in word]
-    assert told.splitlines()[0] == "1  joint 6, extrados"
-    assert len(told.splitlines()) == len(set(push.hinge_steps))
+    (label,) = [word for word in words if "extrados" in word]
+    assert label.splitlines()[0] == "1  joint 6, extrados"
+    assert len(label.splitlines()) == len(set(push.hinge_steps))
     figure.savefig(tmp_path / "push.png")
 
 

@@ -34,7 +34,7 @@ def test_the_map_shows_compression_at_corners_with_thrust_line_and_crosses(ring_
 
 
 def test_the_map_of_one_part_has_its_own_scale():
-    """Soil is left out unless it is asked for; there stresses are kPa."""
+    """Soil is left out unless it is requested; there stresses are kPa."""
     bridge = af.Case.read(Path(__file__).parents[2] / "meshes" / "prusias.toml").structure
     model = af.build(bridge, fidelity="full")
     q = af.dead_load(model).q

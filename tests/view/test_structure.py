@@ -1,4 +1,4 @@
-"""Pictures of structures show what the criteria say, where the joints are, with units."""
+"""Pictures of structures show states by the criteria, at the joints, with units."""
 
 import numpy as np
 import pytest

@@ -38,7 +38,7 @@ def test_the_level_of_the_reduced_motions_is_named_where_it_is_another():
 
 
 def test_definitions_by_which_nothing_fails_have_no_sign():
-    """That of a ring and a pier, where there are no piers; what the others mean is told."""
+    """That of a ring and a pier, where there are no piers; the others are explained."""
     many = {
         "ring": {
             "any joints at once": np.array([0.5, 2.0]),
@@ -46,8 +46,8 @@ def test_definitions_by_which_nothing_fails_have_no_sign():
         }
     }
     page = draw_study(many, title="a $ study")
-    told = [text.get_text() for text in page.legends[0].get_texts()]
-    assert told == ["enough joints fail at once", "median, and range of the pairs"]
+    legend = [text.get_text() for text in page.legends[0].get_texts()]
+    assert legend == ["enough joints fail at once", "median, and range of the pairs"]
     assert "first mechanism" in page.legends[0].get_title().get_text()
 
 

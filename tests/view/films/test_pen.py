@@ -1,4 +1,4 @@
-"""A pen draws where and as large as it is told."""
+"""A pen draws at the given place and in the given size."""
 
 import numpy as np
 import pytest

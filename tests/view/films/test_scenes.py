@@ -1,4 +1,4 @@
-"""Films and stills: as many frames as asked, of the right size, that show what moves."""
+"""Films and stills: the given number of frames, of the right size, that show the motion."""
 
 import imageio.v2 as imageio
 import numpy as np
@@ -32,7 +32,7 @@ def test_a_film_decodes_to_its_frames(model, run, tmp_path, suffix):
 
 
 @pytest.mark.parametrize(
-    ("asked", "frames", "fps"),
+    ("options", "frames", "fps"),
     [
         pytest.param({}, 6, 20.0, marks=pytest.mark.slow),  # as long as the run
         pytest.param(
@@ -41,8 +41,8 @@ def test_a_film_decodes_to_its_frames(model, run, tmp_path, suffix):
         ({"seconds": 0.2, "fps": 50.0}, 10, 50.0),
     ],
 )
-def test_a_film_lasts_as_long_as_asked(model, run, tmp_path, asked, frames, fps):
-    path = film(model, run, tmp_path / "film.mp4", size=(480, 320), **asked)
+def test_a_film_lasts_for_the_given_time(model, run, tmp_path, options, frames, fps):
+    path = film(model, run, tmp_path / "film.mp4", size=(480, 320), **options)
     with imageio.get_reader(path) as read:
         assert read.count_frames() == frames
         assert read.get_meta_data()["fps"] == pytest.approx(fps, rel=0.01)
@@ -80,7 +80,7 @@ def test_frames_of_a_run_that_chose_its_steps(model, tmp_path):
     assert len(imageio.mimread(path)) == 3
 
 
-def test_a_picture_knows_what_joints_remember_or_says_that_it_does_not(coarse, caplog):
+def test_a_picture_has_the_memory_of_joints_or_warns_that_it_has_not(coarse, caplog):
     """Of an equilibrium its own memory counts; coordinates alone are warned of."""
     dead = af.dead_load(coarse)
     assert dead.model.memory.any()

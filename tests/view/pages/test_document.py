@@ -29,7 +29,7 @@ def test_words_of_users_are_escaped_and_numbers_typeset():
 
 
 def test_text_contrasts_with_its_ground_in_both_colour_schemes():
-    """WCAG 2 asks for a contrast of 4.5 of body text; relative luminance as it defines."""
+    """WCAG 2 requires a contrast of 4.5 of body text; relative luminance as it defines."""
     style = (Path(document.__file__).parent / "templates" / "page.css").read_text(encoding="utf-8")
     schemes = [
         dict(re.findall(r"--([a-z]+): #([0-9a-f]{6})", part))

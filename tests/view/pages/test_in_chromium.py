@@ -1,4 +1,4 @@
-"""The player and the report in a browser: what is drawn is what the history says."""
+"""The player and the report in a browser: drawings agree with the history."""
 
 import re
 
@@ -24,7 +24,7 @@ slider.dispatchEvent(new Event("input", { bubbles: true }));
 
 
 def corners(driver, block):
-    """Corners of a block as drawn, back in metres, with what they are magnified by."""
+    """Corners of a block as drawn, back in metres, with their magnification."""
     found = driver.find_element("css selector", f"[data-block='{block}']").get_attribute("d")
     drawn = np.array(re.findall(r"(-?[\d.]+) (-?[\d.]+)", found), float)
     left, top, scale, by, time = driver.execute_script(SCALE)
@@ -122,8 +122,8 @@ def test_a_report_fits_its_screen_and_follows_the_colour_scheme(small, tmp_path,
     with browser(wide=wide) as driver:
         screen = {"width": wide, "height": 1400, "deviceScaleFactor": 1, "mobile": wide < 500}
         driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
-        scheme_asked = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
-        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", scheme_asked)
+        preference = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", preference)
         opened(driver, path)
         assert driver.execute_script("return document.documentElement.scrollWidth") <= wide
         paper = driver.execute_script("return getComputedStyle(document.body).backgroundColor")

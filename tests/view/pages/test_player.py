@@ -8,7 +8,7 @@ from pages import read_page
 import archfem as af
 
 
-def test_a_player_is_one_page_that_asks_for_nothing(rocked, tmp_path):
+def test_a_player_is_one_page_that_loads_nothing(rocked, tmp_path):
     model, run = rocked
     title = "</script><b>A & B</b>"
     made = af.view.player(run, model, title=title)
@@ -29,7 +29,7 @@ def test_a_notebook_shows_it_in_a_frame(rocked):
     assert inside == made.page
 
 
-def test_what_a_player_needs_is_asked_for(rocked, tmp_path):
+def test_data_that_a_player_needs_are_required(rocked, tmp_path):
     model, run = rocked
     with pytest.raises(af.InvalidInput, match="does not contain its structure"):
         af.view.player(af.History(run.dataset))

@@ -1,4 +1,4 @@
-"""What the player is given is what the history holds."""
+"""Data of the player are those of the history."""
 
 import json
 
