@@ -1,6 +1,6 @@
 """Write the scenes of the bench from a few lengths each: `python -m archbench.make_scenes`.
 
-The files in `scenes/` are what programs read; this module only saves typing their coordinates.
+Programs read the files in `scenes/`; this module only saves typing their coordinates.
 """
 
 import json

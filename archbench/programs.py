@@ -29,7 +29,7 @@ class Program:
         name: of the adapter's file.
         adapter: path of the file.
         needs: packages that pip installs in an environment of its own.
-        settings: by action, values of what is not physics; each is run.
+        settings: by action, values of numerical settings; each is run.
         cannot: by scene, or start of its name, why the program has no answer.
         python: "own" for an environment of its own, "bench" for that of the bench, or a path.
     """

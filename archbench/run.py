@@ -228,7 +228,7 @@ def _short(value: Any) -> Any:
 
 
 def check_inputs(names: Sequence[str]) -> list[str]:
-    """Return what is wrong with scenes and references."""
+    """Return the faults of scenes and references."""
     found = []
     for name in names:
         try:

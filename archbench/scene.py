@@ -1,4 +1,4 @@
-"""Scenes and references of the bench: files, their format, and what is wrong with them.
+"""Scenes and references of the bench: files, their format, and checks of them.
 
 A scene is a JSON file that describes blocks, joints, an action, and the quantities in question. It
 contains plain numbers in SI units, so that any program can read it. Reference values of a scene
@@ -53,7 +53,7 @@ class Reference:
         url: DOI or address.
         licence: terms on which the number is used.
         read_by: when and where it was read; empty for grade "m".
-        note: what a reader should know besides.
+        note: remarks for readers.
     """
 
     quantity: str
@@ -68,7 +68,7 @@ class Reference:
     note: str = ""
 
     def problems(self) -> list[str]:
-        """Return what is wrong with the value."""
+        """Return the fault of the value."""
         found = []
         if self.kind not in KINDS:
             found.append(f"kind {self.kind!r} is none of {sorted(KINDS)}")
@@ -133,7 +133,7 @@ def read_references(name: str, folder: Path = HERE) -> list[Reference]:
 
 
 def scene_problems(scene: dict[str, Any]) -> list[str]:
-    """Return what is wrong with a scene."""
+    """Return the faults of a scene."""
     needed = {"id", "title", "gravity", "width", "blocks", "joints", "laws", "action", "quantities"}
     if missing := needed - set(scene):
         return [f"{sorted(missing)} are missing"]
@@ -164,7 +164,7 @@ def scene_problems(scene: dict[str, Any]) -> list[str]:
 
 
 def _block_problems(block: dict[str, Any], grows: bool) -> list[str]:
-    """Return what is wrong with a block."""
+    """Return the faults of a block."""
     keys = {"name", "outline", "density", "fixed"} | ({"growth"} if grows else set())
     if set(block) != keys:
         return [f"block {block.get('name')!r} has keys {sorted(block)}, not {sorted(keys)}"]
@@ -181,7 +181,7 @@ def _block_problems(block: dict[str, Any], grows: bool) -> list[str]:
 
 
 def _joint_problems(joint: dict[str, Any], scene: dict[str, Any], grows: bool) -> list[str]:
-    """Return what is wrong with a joint."""
+    """Return the faults of a joint."""
     keys = {"blocks", "ends", "law"} | ({"growth"} if grows else set())
     if set(joint) != keys:
         return [f"joint {joint.get('blocks')} has keys {sorted(joint)}, not {sorted(keys)}"]

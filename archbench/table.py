@@ -34,7 +34,7 @@ class Row:
         unit: of the quantity.
         references: values of the strongest kind, one or several.
         answers: stored answers by program.
-        from_memory: what of the scene's geometry was not read in a source.
+        from_memory: parts of the scene's geometry that were not read in a source.
     """
 
     scene: str
@@ -343,7 +343,7 @@ def sections(found: Sequence[Row]) -> dict[str, str]:
 
 
 def with_sections(text: str, made: dict[str, str]) -> str:
-    """Return a page with its marked parts replaced by what was made."""
+    """Return a page with its marked parts replaced by the generated text."""
 
     def replaced(match: re.Match[str]) -> str:
         name = match.group(1)

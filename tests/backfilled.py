@@ -1,4 +1,4 @@
-"""Structures with a fill that tests of limit analysis share, and what it weighs by other means."""
+"""Structures with a fill for tests of limit analysis, and the weight of the fill by other means."""
 
 from dataclasses import replace
 

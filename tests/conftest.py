@@ -29,7 +29,7 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Let one worker of many compile what all need, while others do what needs nothing of it.
+    """Let one of many workers compile the kernels of all, while others run tests that need none.
 
     Each begins with a part of the list and later takes over from the end of another's part.
     """

@@ -1,4 +1,4 @@
-"""Drawings of outlines, as files that tests read, and whether a structure is what was drawn."""
+"""Drawings of outlines, as files that tests read, and a comparison of a structure with them."""
 
 import json
 

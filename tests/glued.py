@@ -1,4 +1,4 @@
-"""Structures whose joints never slide: what Newmark's method and HHT step."""
+"""Structures whose joints never slide, as Newmark's method and HHT require."""
 
 from dataclasses import replace
 

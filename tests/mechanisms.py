@@ -1,4 +1,4 @@
-"""Structures whose joints fail: what tests of mechanisms share."""
+"""Structures whose joints fail, shared by tests of mechanisms."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What tests of pictures share: joints that fail in known ways, and how to find what is drawn."""
+"""Helpers of tests of pictures: joints that fail in known ways, and search for drawn objects."""
 
 import numpy as np
 

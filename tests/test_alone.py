@@ -56,7 +56,7 @@ def test_rigid_stones_are_shaken_drawn_and_studied(alone, tmp_path):
 
 
 @pytest.mark.slow
-def test_what_needs_fenicsx_says_so_in_one_line(alone, tmp_path):
+def test_functions_that_need_fenicsx_state_it_in_one_line(alone, tmp_path):
     (tmp_path / "ring_paper.toml").write_text(alone("example", "ring_paper").stdout)
     for words in (("check",), ("modes", "--out", "modes"), ("mesh", "--out", "ring.msh")):
         ran = alone(*words[:1], str(tmp_path / "ring_paper.toml"), *words[1:])

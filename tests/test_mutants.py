@@ -1,4 +1,4 @@
-"""What `make mutants` changes in a module, what it leaves alone, and which tests it runs."""
+"""Places of a module that `make mutants` changes, places that it leaves, and the tests it runs."""
 
 import builtins
 import tomllib
@@ -44,7 +44,7 @@ def test_every_number_and_operator_of_the_physics_is_changed_once():
         assert text.count("raise ValueError") == 1
 
 
-def test_a_marked_module_tells_to_which_changes_it_comes(monkeypatch):
+def test_a_marked_module_reports_the_changes_that_it_executes(monkeypatch):
     space, came = {}, []
     monkeypatch.setattr(builtins, "_reached", came.append, raising=False)
     exec(marked(SOURCE, "own.py"), space)
@@ -54,7 +54,7 @@ def test_a_marked_module_tells_to_which_changes_it_comes(monkeypatch):
     assert {each.statement and each.statement.lineno for each in changes(SOURCE)} == {None, 8, 11}
 
 
-def test_a_change_meets_its_own_tests_and_those_that_come_to_it_the_shortest_first():
+def test_a_change_runs_its_own_tests_and_those_that_execute_it_shortest_first():
     path = Path("archfem/joints/law.py")
     change = changes("def f(x):\n    return 2 * x\n")[0]
     here, elsewhere = ["archfem/joints/law.py", 2], ["archfem/joints/law.py", 9]
@@ -68,7 +68,7 @@ def test_a_change_meets_its_own_tests_and_those_that_come_to_it_the_shortest_fir
     assert _chosen(path, change, tests) == [first, ["tests/a/test_any.py::long"]]
 
 
-def test_a_default_meets_the_tests_of_defaults_though_they_come_to_no_statement():
+def test_a_default_runs_the_tests_of_defaults_which_execute_no_statement():
     path, default = Path("archfem/joints/law.py"), changes("def f(x=2):\n    return x\n")[0]
     own, other = f"{DEFAULTS}::own", "tests/a/test_any.py::idle"
     assert default.statement is None
@@ -76,7 +76,7 @@ def test_a_default_meets_the_tests_of_defaults_though_they_come_to_no_statement(
     assert _chosen(path, default, {own: (0.1, []), other: (0.1, [])}) == [[own]]
 
 
-def test_what_changes_no_number_is_still_there_and_has_a_reason():
+def test_known_changes_of_no_number_exist_and_have_a_reason():
     for entry in tomllib.loads(KNOWN.read_text(encoding="utf-8"))["change"]:
         path, function, words = entry["what"].split(": ", 2)
         source = (ROOT / path).read_text(encoding="utf-8")

@@ -20,15 +20,15 @@ def written(tmp_path):
     return dataset, path
 
 
-def test_a_file_holds_what_was_written(written):
+def test_a_file_contains_the_written_data(written):
     dataset, path = written
     assert read_dataset(path, "history").identical(dataset)
-    with xr.open_dataset(path) as plain:  # what does not know of the seal passes over it
+    with xr.open_dataset(path) as plain:  # other readers ignore the seal
         assert plain["N"].equals(dataset["N"])
 
 
 def test_a_file_is_read_once(written, monkeypatch):
-    """What is taken to be sound is what is read: the file is gone before its numbers are wanted."""
+    """The checked data are the data that are read: the file is gone before its numbers are used."""
     dataset, path = written
     content = path.read_bytes()
     monkeypatch.setattr(

@@ -28,7 +28,7 @@ def test_every_notebook_has_a_number():
 
 
 def cells_of(notebook):
-    """What a notebook says and runs, cell by cell, without the note on how it was shipped."""
+    """Text and code of a notebook, cell by cell, without the note on how it was shipped."""
     return [
         (cell.cell_type, cell.source)
         for cell in notebook.cells
@@ -55,7 +55,7 @@ LONG = (
     "06_a_roman_bridge",
     "07_from_first_hinge_to_the_ground",
 )
-"""What these arrive at, tests of what they are about check as well."""
+"""Notebooks whose results other tests check as well."""
 
 
 @pytest.mark.parametrize(

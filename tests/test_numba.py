@@ -1,4 +1,4 @@
-"""Where compiled code is kept, and what becomes of damaged files."""
+"""The folder of compiled code, and the handling of damaged files."""
 
 import errno
 import os
@@ -13,7 +13,7 @@ import pytest
 from archfem import _numba
 
 
-def test_that_it_compiles_is_said_once_for_each_part(capsys, monkeypatch):
+def test_compilation_is_reported_once_for_each_part(capsys, monkeypatch):
     monkeypatch.setattr(_numba, "_announced", set())
     monkeypatch.setattr(_numba, "_time_compilation", lambda: 0.2)
     modules = ("joints.large.forces", "dynamics.solvers.base", "dynamics.solvers.supernodal_lu")
@@ -213,7 +213,7 @@ def test_a_full_disk_stops_no_run(monkeypatch, tmp_path, caplog):
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
-def test_without_any_folder_it_compiles_and_says_so(monkeypatch, caplog):
+def test_without_any_folder_it_compiles_and_reports_it(monkeypatch, caplog):
     for locator in numba.core.caching.CacheImpl._locator_classes:
         monkeypatch.setattr(locator, "from_function", lambda *_: None)
     _numba._warn_unsaved.cache_clear()

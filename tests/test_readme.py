@@ -1,4 +1,4 @@
-"""The README and the pages of the documentation: code runs, and what they name is there."""
+"""The README and the pages of the documentation: code runs, and names and files exist."""
 
 import json
 import re
@@ -20,14 +20,14 @@ PAGES = {
 WORDS = "\n".join(PAGES.values())
 
 RUN = re.compile(r"```python\n(.*?)```(?:(?:(?!```).)*?```text\n(.*?)```)?", re.DOTALL)
-"""A block of Python, and what it prints if the next block says so."""
+"""A block of Python, and the output that the next block shows, if it does."""
 
 SLOW = ("docs/tutorial.md", "docs/index.md", "docs/howto/verdict.md")
-"""What these run, the README's own lines or other tests do as well."""
+"""Pages whose code other tests or the README's lines run as well."""
 
 
 def run_blocks(page, capsys):
-    """Run a page's Python from first to last, each block on what those before left."""
+    """Run a page's Python from first to last, each block with the names of those before."""
     space = {"__name__": "__main__"}
     for code, printed in RUN.findall(PAGES[page]):
         exec(compile(code, page, "exec"), space)
@@ -47,7 +47,7 @@ def test_the_readme_is_short():
     assert len(README.splitlines()) <= 200
 
 
-def test_python_blocks_run_and_print_what_follows(tmp_path, monkeypatch, capsys):
+def test_python_blocks_run_and_print_the_following_block(tmp_path, monkeypatch, capsys):
     assert README.count("```python") == 1
     monkeypatch.chdir(tmp_path)
     run_blocks("README.md", capsys)
@@ -55,7 +55,7 @@ def test_python_blocks_run_and_print_what_follows(tmp_path, monkeypatch, capsys)
 
 
 @pytest.mark.parametrize("page", list(with_python()))
-def test_pages_run_and_print_what_follows(page, tmp_path, monkeypatch, capsys):
+def test_pages_run_and_print_the_following_blocks(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     run_blocks(page, capsys)
 
@@ -90,7 +90,7 @@ def test_commands_are_those_of_the_command_line(capsys):
 
 @pytest.mark.parametrize("name", sorted(set(re.findall(r"\baf\.([A-Za-z_][\w.]*\w)", WORDS))))
 def test_names_in_the_text_are_there(name):
-    """By their lists: to load what draws films takes its time."""
+    """By their lists: loading the modules of films takes seconds."""
     *places, last = name.split(".")
     assert last in dir(reduce(getattr, places, af))
 

@@ -1,4 +1,4 @@
-"""The how-to of tasks: its case files, commands and Python run, and print what it shows."""
+"""The how-to of tasks: its case files, commands and Python run, and print the shown output."""
 
 import re
 import shlex
@@ -50,7 +50,7 @@ def test_every_task_has_a_file_commands_and_python():
 @pytest.mark.parametrize(
     "task", [pytest.param(task, marks=() if task in QUICK else pytest.mark.slow) for task in TASKS]
 )
-def test_a_task_runs_and_prints_what_it_shows(task, tmp_path, monkeypatch, capsys):
+def test_a_task_runs_and_prints_the_output_that_it_shows(task, tmp_path, monkeypatch, capsys):
     if "--pdf" in TASKS[task] and BROWSER is None:
         pytest.skip("there is no chromium: apt-get install chromium")
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""Linear algebra takes one thread, whatever the environment says, and so gives the same bits."""
+"""Linear algebra takes one thread in any environment, and so gives the same bits."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Plain words in docstrings, comments, messages and documentation."""
+"""Plain words in docstrings, comments, messages, names of tests and documentation."""
 
 import ast
 import io
@@ -10,13 +10,16 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PYTHON = sorted((ROOT / "archfem").rglob("*.py"))
+TESTS = sorted(
+    {path.parent for name in ("tests", "archbench") for path in (ROOT / name).rglob("*.py")}
+)
 PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")]
 PAGES += sorted((ROOT / "docs").rglob("*.md"))
 PAGES += [*sorted((ROOT / "meshes").glob("*.toml")), *sorted((ROOT / "notebooks").glob("*.py"))]
 
 # Words for which mechanics, numerics or everyday English have a plainer one.
 AVOIDED = re.compile(
-    r"\b(told|asked|asks|knows|remembers|remembered|meant|lest|gravest|rungs?)\b"
+    r"\b(told|asked|asks|knows|remembers|remembered|meant|lest|gravest|waist|rungs?)\b"
     r"|\bcomes? to\b|\bcame to\b|\bhangs? on\b|\bgoes on\b"
     r"|\bwhat (it|they|this|that|one|an? \w+|the \w+) (does|do|has|have|gives?)\b",
     re.IGNORECASE,
@@ -47,9 +50,38 @@ def written(path):
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             yield node.lineno, node.value
+    yield from comments(source)
+
+
+def comments(source):
+    """Comments of a source, each with its line."""
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
         if token.type == tokenize.COMMENT:
             yield token.start[0], token.string
+
+
+def stated(source):
+    """Docstrings, comments and defined names of a module, with their lines; names as words.
+
+    Names that a module uses without defining them are no concern of it: keywords and attributes of
+    the package are part of its interface, as are strings that a test passes to it or expects of it.
+    """
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            yield node.lineno, str(node.value.value)
+        for field in ("name", "id", "arg", "attr", "asname"):
+            name = getattr(node, field, None)
+            is_use = isinstance(node, ast.keyword) or not isinstance(
+                getattr(node, "ctx", ast.Store()), ast.Store
+            )
+            if name and not is_use:
+                yield getattr(node, "lineno", 0), in_words(name)
+    yield from comments(source)
+
+
+def in_words(name):
+    """Words of a name, parted at underscores and at capitals inside it."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.replace("_", " "))
 
 
 def is_suspicious(source):
@@ -62,15 +94,26 @@ def is_suspicious(source):
 
 
 @pytest.mark.parametrize("path", PYTHON, ids=lambda path: str(path.relative_to(ROOT)))
-def test_the_package_speaks_plainly(path):
+def test_the_package_has_plain_words(path):
     if not is_suspicious(path.read_text(encoding="utf-8")):
         return
     places = [f"{line}: {found}" for line, text in written(path) for found in avoided(text)]
     assert not places, "\n".join(places)
 
 
+@pytest.mark.parametrize("folder", TESTS, ids=lambda folder: str(folder.relative_to(ROOT)))
+def test_tests_and_scenes_have_plain_words(folder):
+    places = []
+    for path in sorted(folder.glob("*.py")):
+        source = path.read_text(encoding="utf-8")
+        if is_suspicious(in_words(source)):
+            found = ((line, each) for line, text in stated(source) for each in avoided(text))
+            places += [f"{path.name}:{line}: {each}" for line, each in found]
+    assert not places, "\n".join(places)
+
+
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_the_documentation_speaks_plainly(path):
+def test_the_documentation_has_plain_words(path):
     if any(part in {"build", "made", "generated"} for part in path.relative_to(ROOT).parts):
         pytest.skip("generated page")
     assert not avoided(path.read_text(encoding="utf-8"))
@@ -83,3 +126,42 @@ def test_an_avoided_word_is_found():
     assert is_suspicious("a = 1  # it comes\n# to one")
     assert is_suspicious(r"a = 'it comes\nto one'")
     assert not is_suspicious("a = 1  # the block")
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "def test_layers_must_be_told(): pass",
+        "async def what_the_ring_has(): pass",
+        "class TimedTold: pass",
+        "def test(rung): pass",
+        "def test(*, asked=1): pass",
+        "def test(**told): pass",
+        "lambda rungs: 1",
+        "told, a = 1, 2",
+        "[1 for asked in a]",
+        "if (told := 1): pass",
+        "path.asked = []",
+        "import archfem as told",
+        "try:\n    pass\nexcept OSError as told:\n    pass",
+        'def test():\n    """Of each\n    rung."""',
+        'A = 1\n"""What a rung is."""',
+        "a = 1  # as it is told",
+    ],
+)
+def test_an_avoided_word_of_a_test_is_found(source):
+    assert is_suspicious(in_words(source))
+    assert [each for _, text in stated(source) for each in avoided(text)]
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "mesh_sensitivity(case, rungs=[])",
+        "study.asked.digest(found.rungs)",
+        'given = {"rungs": 1}',
+        "def test_a_block_comes_to_rest(): pass",
+    ],
+)
+def test_uses_of_public_names_and_plain_senses_are_no_avoided_words(source):
+    assert not [each for _, text in stated(source) for each in avoided(text)]

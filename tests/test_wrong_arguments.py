@@ -1,4 +1,4 @@
-"""Arguments of a wrong kind end in an error of ours that says what was given, and what to give."""
+"""Arguments of a wrong kind end in an archfem error that states the value and the valid ones."""
 
 import importlib
 import inspect
@@ -177,7 +177,7 @@ def public_functions():
     [object(), np.zeros(3), 10**400, "\ud800", None, [object()], np.ma.masked, {"a": np.zeros(2)}],
     ids=["object", "array", "huge", "surrogate", "none", "list", "masked", "table"],
 )
-def test_every_public_function_refuses_what_it_cannot_use(bad, tmp_path, monkeypatch):
+def test_every_public_function_refuses_unusable_arguments(bad, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     functions = public_functions()
     assert len(functions) > 100
@@ -296,7 +296,7 @@ def test_invalid_widths_and_gravities_are_refused():
 
 
 def test_a_model_that_has_no_operator_is_a_model(stack):
-    """What a protocol asks for may be None, as the operator of blocks that move far is."""
+    """A member of a protocol may be None, as the operator of blocks that move far is."""
     far = af.build(stack, fidelity="rigid", displacements="large")
     assert far.operator is None
     assert matches_annotation(far, af.models.Model)

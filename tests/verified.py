@@ -1,4 +1,4 @@
-"""What tests verify, as rows of a table: `pytest --verified=docs/verification.json`.
+"""Results that tests verify, as rows of a table: `pytest --verified=docs/verification.json`.
 
 A test with the fixture `verified` passes it computed values beside references that are independent
 of this package. With the option only those tests run, and the values are written to the file,

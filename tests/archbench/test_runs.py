@@ -207,7 +207,7 @@ def test_no_length_from_memory_is_shown_without_its_mark():
         assert ("from memory" in label) == bool(row.from_memory or row.grade == "m")
 
 
-def test_a_row_counts_what_lies_inside_the_uncertainty():
+def test_a_row_counts_answers_inside_the_uncertainty():
     (row,) = (row for row in table.rows() if row.scene == "S03")
     row_of_run = {"settings": {}, "values": {"factor": 0.37}, "cpu_s": 1.0}
     for value, inside in ((row.reference[0], True), (1.1 * row.reference[0], False)):

@@ -1,4 +1,4 @@
-"""Does the three-span bridge fall? What is left of it by scale, on models whose blocks move far.
+"""Fall of the three-span bridge: the stones left by scale, on models whose blocks move far.
 
     python tests/benchmarks/bridge_falls.py [--restored] [--pair pair-1 | --record FILE --column 2
         --units cm/s2 --dt 0.005 --vertical FILE] [--fill elastic jointed] [--scales 0.333 1 2]

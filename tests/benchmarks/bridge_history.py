@@ -1,4 +1,4 @@
-"""Did the Roman bridge have to stand? Table 3 of Demirel and Aldemir (2021), and what shaking does.
+"""Verdicts on the Roman bridge: table 3 of Demirel and Aldemir (2021), and time histories.
 
     python tests/benchmarks/bridge_history.py [--models] [--restored] [--pairs pair-1 …]
         [--paper] [--events "1999 Düzce" …]

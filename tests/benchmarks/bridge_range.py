@@ -1,4 +1,4 @@
-"""The verdict on the three-span bridge as a range: what the model leaves open, row by row.
+"""The verdict on the three-span bridge as a range over open modelling choices, row by row.
 
     python tests/benchmarks/bridge_range.py [--restored] [--pair pair-2] [--only "exact" …]
 
@@ -48,7 +48,7 @@ EXACT = "model.quadrature='exact'"
 
 @dataclass(frozen=True)
 class Setting:
-    """What a row of the table changes.
+    """The changes of a row of the table.
 
     Attributes:
         changes: of the case.

@@ -93,7 +93,7 @@ def load_dead(model) -> None:
 
 
 class Shaken(NamedTuple):
-    """What came of it.
+    """The result of a run.
 
     Attributes:
         seconds: of stepping alone, by the wall and of the processor.

@@ -34,7 +34,7 @@ RISE = 1e-4
 """Energy from nowhere, relative to the largest exchanged, from which a run is wrong."""
 
 WIDTH = 160
-"""Most letters of what there is to say."""
+"""Most letters of an outcome."""
 
 
 def contact(rng: np.random.Generator) -> af.Contact:
@@ -76,16 +76,16 @@ def structure(rng: np.random.Generator) -> af.Structure:
 
 @dataclass(frozen=True)
 class Came:
-    """What came of a run.
+    """The result of a run.
 
     Attributes:
         kind: in a word.
-        words: what there is to say.
+        words: the outcome or the error.
         steps: that were taken.
         halved: of those, that had to be halved.
         left: steps that a strategy left to SNES.
         drift: of energy, relative to the largest exchanged [-].
-        spent: CPU time of a step, what fell included [ms].
+        spent: CPU time of a step, fallen blocks included [ms].
     """
 
     kind: str
@@ -113,7 +113,7 @@ def tried(seed: int, displacements: str, duration: float = 4.0) -> Came:
         spent = 1e3 * (time.process_time() - begun)
     except af.ArchfemError as error:
         return Came(type(error).__name__, str(error)[:WIDTH])
-    except Exception as error:  # what no user should ever see
+    except Exception as error:  # an error that is not archfem's own
         return Came("FOREIGN", f"{type(error).__name__}: {error}"[:WIDTH])
     summary, finite = run.dataset.attrs, bool(np.isfinite(run.joints["N"]).all())
     steps, drift = summary["steps"], float(summary["energy_drift"])
@@ -317,7 +317,7 @@ def compare_neighbours(seeds: range, duration: float) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print what is not plain, and the totals."""
+    """Print unusual runs, and the totals."""
     made = plain_options(__doc__)
     made.add_argument("--count", type=int, default=200)
     made.add_argument("--seed", type=int, default=0)

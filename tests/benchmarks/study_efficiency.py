@@ -1,4 +1,4 @@
-"""What two workers are worth: histories of 20 s of the ring, or the bridge, on one process and two.
+"""Gain by two workers: histories of 20 s of the ring, or the bridge, on one process and two.
 
     python tests/benchmarks/study_efficiency.py --points 64 --repeat 5
     python tests/benchmarks/study_efficiency.py --bridge

@@ -1,4 +1,4 @@
-"""Case files: what is understood, what is refused and how."""
+"""Case files: accepted keys, and errors of invalid ones."""
 
 import tomllib
 from pathlib import Path
@@ -156,7 +156,7 @@ damping = { ratio = 0.05, frequencies = ["8 Hz", "16 Hz"] }
 """
 
 
-def test_a_case_says_only_what_differs_from_its_base(tmp_path):
+def test_a_case_states_only_differences_from_its_base(tmp_path):
     (tmp_path / "ring.toml").write_text(BASE)
     (tmp_path / "by_span.toml").write_text(
         'base = "ring.toml"\nremove = ["structure.radius", "structure.embrace"]\n'
@@ -206,7 +206,7 @@ def test_a_case_with_some_of_its_pairs_keeps_its_structure(small):
         af.Case.read(RING).alone("second")
 
 
-def test_a_case_may_say_all_that_a_discretisation_takes():
+def test_a_case_may_state_every_setting_of_a_discretisation():
     fields = set(af.models.Discretisation.__dataclass_fields__)
     assert {BUILD_KEYWORDS.get(key, key) for key in MODEL_KEYS} == fields | {"tolerance"}
     case = af.Case.read(RING, ["model.fidelity=auto", "model.tolerance=0.02"])

@@ -24,7 +24,7 @@ def test_a_case_that_is_printed_can_be_run_from_anywhere(name, tmp_path):
     assert af.Case.read(path).title == list_example_titles()[name]
 
 
-def test_a_copy_takes_along_what_it_refers_to(tmp_path):
+def test_a_copy_includes_the_files_it_refers_to(tmp_path):
     copies = copy_example("prusias_retrofit.toml", tmp_path / "new")
     names = {copy.name for copy in copies}
     assert names >= {"prusias_retrofit.toml", "prusias.toml", "prusias_wall.toml"}

@@ -1,4 +1,4 @@
-"""Modules of the user: what the page adds works, is permitted, and is checked."""
+"""Modules of the user: the examples of the page work, need permission, and are checked."""
 
 import os
 import re

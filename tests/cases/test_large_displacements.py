@@ -1,4 +1,4 @@
-"""Cases whose displacements may be large: what they refuse, and all that a run of one writes."""
+"""Cases whose displacements may be large: refused settings, and all files of a run."""
 
 import pytest
 

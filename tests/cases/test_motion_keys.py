@@ -28,11 +28,11 @@ def test_shipped_suite_is_six_horizontals_and_three_verticals():
     assert suite.motions[0].pga == pytest.approx(suite.pairs[0].pga / 3.0)
 
 
-def test_a_suite_is_matched_where_the_case_says_so():
+def test_a_suite_is_matched_on_request_of_the_case():
     target = {"code": "TBEC-2018", "ss": 1.140, "s1": 0.315, "site": "ZD"}
     settings = {"matched": True, "target": target, "pairs": {"one": pair()}}
     (match,) = build_suite(parse_suite(settings)).matches
-    # What the matching promises over its band, for each component.
+    # Bounds of the matched spectrum over its band, for each component.
     assert max(match.misfit.values()) < 0.05
     assert match.motion.name == "one"
 

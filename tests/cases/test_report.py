@@ -73,7 +73,7 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert f"{float(run.joints['friction'].max()):.3f}" in words
 
 
-def test_pairs_that_lack_are_said_and_cases_that_differ_refused(kept):
+def test_missing_pairs_are_named_and_different_cases_refused(kept):
     (kept / "second" / "history.nc").unlink()
     found = af.cases.open_results(kept)
     assert (list(found.runs), found.missing) == (["first"], ("second",))

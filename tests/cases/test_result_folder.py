@@ -101,7 +101,7 @@ def test_saving_replaces_no_file_of_a_run(two_runs, tmp_path):
     assert af.History.read(history.save(folder / "first" / "copy.nc")).outcome == history.outcome
 
 
-def test_a_run_redoes_what_is_of_another_run(two_runs):
+def test_a_run_replaces_results_of_another_run(two_runs):
     folder, other = two_runs
     for name in ("first/history.nc", "second/summary.txt"):
         (folder / name).write_bytes((other / name).read_bytes())

@@ -44,7 +44,7 @@ def test_shipped_bridges(path):
     assert structure.joints[structure.joint_number("main arch, joint 5")].part == "main arch"
 
 
-def test_a_table_of_parts_says_what_holds_for_all_of_them():
+def test_a_table_of_parts_has_keys_that_hold_for_all_parts():
     case = af.Case.read(
         RING.with_name("prusias.toml"),
         ["structure.piers.height=2.8", "structure.piers.south pier.height=2.4"],

@@ -161,7 +161,7 @@ def read(path, text):
     ],
     ids=range(15),
 )
-def test_what_nobody_means_is_refused_at_once(tmp_path, text, says):
+def test_absurd_files_are_refused_at_once(tmp_path, text, says):
     (tmp_path / "base.toml").write_text(COLUMN)
     begun = time.process_time()
     with pytest.raises(af.ArchfemError, match=says) as caught:

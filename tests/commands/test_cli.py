@@ -110,7 +110,7 @@ def test_run_of_a_ring_that_falls(tmp_path, capsys):
         (KeyboardInterrupt(), 130, "archfem: interrupted"),
     ],
 )
-def test_exit_codes_say_how_a_command_ended(error, code, says, capsys):
+def test_exit_codes_state_how_a_command_ended(error, code, says, capsys):
     def command():
         if error is not None:
             raise error
@@ -176,7 +176,7 @@ def column(tmp_path):
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_ends_a_motion_and_keeps_what_was_computed(
+def test_a_signal_ends_a_motion_and_keeps_its_steps(
     column, tmp_path, undrawn, monkeypatch, capsys, number, code
 ):
     def cut_short(case, motion, dead, damping):

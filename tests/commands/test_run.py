@@ -93,7 +93,7 @@ def run(small, *changes):
     return af.commands.main(["run", str(small), "--out", str(small.parent / "out"), *given])
 
 
-def test_one_line_runs_all_and_the_same_line_keeps_what_is_finished(small, undrawn, capsys):
+def test_one_command_runs_all_and_again_keeps_finished_runs(small, undrawn, capsys):
     out = small.parent / "out"
     assert run(small) == 0
     made = {path.name for path in out.iterdir()}
@@ -190,7 +190,7 @@ def test_a_motion_that_fails_is_kept_and_ends_the_command(small, undrawn, capsys
     assert not path.with_name("summary.txt").exists()
 
 
-def test_check_tells_how_strong_the_pairs_are(small, capsys):
+def test_check_states_the_strength_of_pairs(small, capsys):
     assert af.commands.main(["check", str(small)]) == 0
     said = capsys.readouterr().out
     assert re.search(r"first +horizontal .* 0\.0510 g", said)  # 1 m/s² by R = 2

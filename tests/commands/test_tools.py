@@ -108,7 +108,7 @@ def test_invalid_input_is_reported(kept, capsys, given, said):
     assert said in capsys.readouterr().err
 
 
-def test_a_history_without_a_case_says_how_to_give_one(kept, tmp_path, capsys):
+def test_a_history_without_a_case_is_refused_with_the_option_that_gives_one(kept, tmp_path, capsys):
     alone = tmp_path / "a" / "b" / "history.nc"
     alone.parent.mkdir(parents=True)
     alone.write_bytes((kept / "pair" / "history.nc").read_bytes())

@@ -1,4 +1,4 @@
-"""Speed against error: what is tried and compared, by runs that are known."""
+"""Speed against error: settings that are tried and compared, by known runs."""
 
 from time import process_time
 from types import SimpleNamespace

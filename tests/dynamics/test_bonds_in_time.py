@@ -175,7 +175,7 @@ def test_a_ring_of_teeth_and_bonds_neither_gains_nor_loses(rule, damping):
 
 @pytest.mark.slow
 def test_a_history_can_be_continued_from_its_file(tmp_path):
-    """What is broken and slid passes with `last_state`, of a run as saved."""
+    """Broken bonds and slips pass with `last_state`, also of a saved run."""
     given = {"friction": 0.3, "cohesion": 6e2, "tension": 2e3, "dilatancy": 0.1}
     model = block(1e9, **given)
     motion = pulse()
@@ -193,7 +193,7 @@ def test_a_history_can_be_continued_from_its_file(tmp_path):
     assert "tension" in kept.joints.coords
 
 
-def test_compiled_methods_and_old_schemes_say_that_they_cannot():
+def test_compiled_methods_and_other_schemes_refuse_bonds():
     model = block(1e9, friction=0.3, dilatancy=0.1)
     with pytest.raises(af.InvalidInput, match="neither dilate, nor resist tension"):
         af.time_history(model, STILL, dt=1e-3, method="newton")

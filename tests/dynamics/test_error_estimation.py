@@ -95,14 +95,14 @@ def runs_of(*peaks):
     return [RunPeaks(None if each is None else np.array([0.1, each])) for each in peaks]
 
 
-def test_the_finest_errs_by_what_is_left_at_order_two():
+def test_the_error_of_the_finest_run_is_extrapolated_at_order_two():
     """Peaks e + c h²: the errors are exactly those of the series."""
     steps = np.array([4.0, 2.0, 1.0])
     found = estimate_errors(runs_of(*(0.3 - 0.002 * steps**2)))
     assert found == pytest.approx(0.002 * steps**2)
 
 
-def test_a_single_run_says_nothing_of_its_error():
+def test_a_single_run_has_no_error_estimate():
     assert estimate_errors(runs_of(0.3)) == [np.inf]
 
 

@@ -60,7 +60,7 @@ def test_four_hinges_on_one_face_are_counted_and_do_not_move():
     assert stop_reason(MovingMechanism(), ring(), state(ring()), *twice) is None
 
 
-def test_one_sliding_joint_moves_a_block_that_nobody_counts():
+def test_one_sliding_joint_moves_a_block_without_a_counted_mechanism():
     stack = af.column(breadth=1.0, heights=[1.0, 1.0])
     sliding = state(stack, sliding={1: 0.6})
     assert stop_reason(CountedMechanism(), stack, sliding) is None
@@ -172,7 +172,7 @@ def hinging(structure, hinges):
 
 
 def at(scan, resultants, min_failures):
-    """What holds at one step."""
+    """An event of the state at one step."""
     (found,) = scan(resultants[None], min_failures)
     return found
 

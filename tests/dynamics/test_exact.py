@@ -1,4 +1,4 @@
-"""Steps solved by SNES, and what is done where one fails."""
+"""Steps solved by SNES, and the fallback where one fails."""
 
 import numpy as np
 import pytest

@@ -195,7 +195,7 @@ def test_a_block_stays_on_an_incline_for_as_long_as_one_looks():
     assert np.abs(states[-1].q - dead.q).max() < 1e-6 * np.abs(dead.q).max()
 
 
-# ---- what friction does
+# ---- work of friction
 
 
 def test_shear_is_at_its_limit_while_a_block_slides():
@@ -248,7 +248,7 @@ def test_a_run_in_two_parts_is_one_run():
 
 
 def test_a_history_can_be_continued():
-    """`last_state` of a history carries what the joints remember."""
+    """`last_state` of a history has the memory of the joints."""
     model, motion = block(0.25, 1e10), af.Motion.synthetic(duration=1.0, pga=5.0, seed=4)
     given = {"dt": 2e-3, "record": af.Record(fields_every=1)}
     whole = af.time_history(model, motion, **given)

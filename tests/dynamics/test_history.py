@@ -13,7 +13,7 @@ from archfem.dynamics.history import corner_displacements
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 
 
-def test_everything_said_of_a_run_obeys_its_criteria(run, model, tmp_path):
+def test_all_findings_of_a_run_follow_its_criteria(run, model, tmp_path):
     loose = run.with_criteria(af.Criteria(hinge=0.3, failures=5))
     assert loose.mechanism.time < run.mechanism.time
     assert len(loose.mechanism.joints) >= 5

@@ -44,7 +44,7 @@ def test_drift_is_reported_once(whole, caplog):
 
 @pytest.mark.parametrize("damps", [False, True])
 def test_energy_is_judged_at_every_step_however_many_come_at_once(ring, damps):
-    """Energy that comes from nowhere and goes again, or the other way round, within a batch."""
+    """Energy that appears without work and vanishes again, or the reverse, within a batch."""
     model = af.build(ring, fidelity="rigid")
     dead = af.dead_load(model)
     state = af.dynamics.State(0.0, dead.q, *np.zeros((2, model.size)))
@@ -80,7 +80,7 @@ def test_energy_is_judged_at_every_step_however_many_come_at_once(ring, damps):
                 assert word in said
 
 
-def test_all_steppers_are_refused_alike(whole):
+def test_all_steppers_are_refused_with_the_same_text(whole):
     """Of a run that makes energy: compiled steps come by 128, those of SNES one by one."""
     said = []
     for method in ("snes", "compliance"):
@@ -226,7 +226,7 @@ WAYS = [(scheme, method) for scheme in (NEWMARK, CONSERVING) for method in ("new
 """Schemes, and compiled methods."""
 
 
-def test_balance_counts_what_comes_and_goes():
+def test_the_balance_counts_energy_gained_and_lost():
     balance = EnergyBalance(0.0, -10.0)
     rows = np.array([[1.0, -9.0, 2.5, 0.5], [3.0, -9.0, 2.0, 0.0]])
     assert balance.add(rows)[0] == pytest.approx([0.0, 0.0])
@@ -293,7 +293,7 @@ def test_balance_is_exact_while_joints_stay_closed(stack, scheme, method):
 
 
 def test_a_restart_continues_with_its_own_balance(ring):
-    """Of a scheme that has one to tell."""
+    """A scheme with an energy balance."""
     model = af.build(glued(ring), fidelity="rigid")
     given = {"damping": DAMPING, "scheme": NEWMARK, "dt": 0.005}
     first = af.time_history(model, SHAKING.cut(0.0, 2.0), **given)

@@ -116,7 +116,7 @@ def test_every_run_of_a_search_has_the_criteria(on_piers):
     assert run.mechanisms["verified"] != usual  # the criteria tell
 
 
-def test_what_fails_nowhere_or_everywhere_is_said():
+def test_brackets_are_open_where_a_definition_fails_nowhere_or_everywhere():
     always, never = (lambda _: True), (lambda _: False)
     fails = dict(zip(DEFINITIONS, (always, never, never, never, beyond(2.0)), strict=True))
     found = searched(fails, between=(0.1, 3.0))
@@ -125,7 +125,7 @@ def test_what_fails_nowhere_or_everywhere_is_said():
     assert found["verified"].upper == pytest.approx(2.0, rel=0.05)
 
 
-def test_no_motion_beyond_what_a_motion_may_be_is_tried():
+def test_no_motion_beyond_five_g_is_tried():
     """A block so broad that it hinges nowhere, and so rough that it slides nowhere."""
     broad = af.build(glued(af.column(breadth=10.0, heights=[0.5])), fidelity="rigid")
     strong = af.Motion(np.array([0.0, 20.0, 0.0]), dt=0.01)
@@ -157,7 +157,7 @@ def test_a_run_without_equilibrium_counts_as_failed():
 
 
 def test_what_a_failed_run_met_is_kept(ring, monkeypatch):
-    """By Newmark's method, undamped, energy comes from nowhere before all joints fail at once."""
+    """By Newmark's method, undamped, energy grows without work before all joints fail at once."""
     newmark = partial(af.time_history, scheme=af.dynamics.Newmark())
     monkeypatch.setattr("archfem.dynamics.motion_scaling.time_history", newmark)
     model = af.build(glued(ring), fidelity="rigid")
@@ -170,7 +170,7 @@ def test_what_a_failed_run_met_is_kept(ring, monkeypatch):
     assert found["any joints at once"].upper == 1.0
 
 
-def test_ctrl_c_keeps_what_is_known(caplog):
+def test_ctrl_c_keeps_the_bracket_so_far(caplog):
     found = searched(
         {name: beyond(2.5) for name in DEFINITIONS},
         ended=lambda scale: Ending.INTERRUPTED if scale > 1.9 else Ending.FINISHED,
@@ -178,11 +178,13 @@ def test_ctrl_c_keeps_what_is_known(caplog):
     assert [run.scale for run in found.runs] == pytest.approx([1.0, 2.0**0.5, 2.0])
     assert found.interrupted
     assert "interrupted after 3 runs" in caplog.text
-    assert found["verified"].lower == pytest.approx(2.0**0.5)  # the broken-off run tells nothing
+    assert found["verified"].lower == pytest.approx(
+        2.0**0.5
+    )  # the broken-off run counts for nothing
     assert found["verified"].run is None
 
 
-def test_ctrl_c_between_runs_keeps_what_is_known():
+def test_ctrl_c_between_runs_keeps_the_bracket_so_far():
     made = pretended({name: beyond(2.5) for name in DEFINITIONS})
 
     def shaken(scale):
@@ -229,7 +231,7 @@ def fallen(*scales):
     return MechanismScales(("collapse",), tuple(runs))
 
 
-def test_collapse_is_between_what_stands_and_what_falls_by_every_step():
+def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     found = CollapseScale({0.01: fallen(1.0, -2.0, 3.0, -4.0), 0.005: fallen(0.5, 1.5, -2.5, 2.7)})
     assert (found.lower, found.upper) == (1.0, 2.5)
     assert found.above == (2.7, 3.0)
@@ -264,7 +266,7 @@ def test_no_bracket_rests_on_a_run_without_an_answer():
     ("between", "limits"),
     [((0.1, 10.0), (0.1, 2.4516625)), ((0.1, 2.0), (0.1, 2.0)), ((3.0, 4.0), (3.0, 3.0))],
 )
-def test_collapse_is_not_sought_beyond_what_a_motion_may_be(between, limits, monkeypatch):
+def test_collapse_is_not_sought_beyond_five_g(between, limits, monkeypatch):
     """Five g, of a motion of 20 m/s²; one scale where the least of the given ones is beyond."""
     ranges = []
     monkeypatch.setattr(

@@ -1,4 +1,4 @@
-"""What is recorded of a run, and how often."""
+"""The recorder of a run: quantities, and their frequency."""
 
 import subprocess
 import sys

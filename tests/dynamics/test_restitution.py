@@ -1,4 +1,4 @@
-"""What a rocking block keeps at an impact, against its equations of motion integrated by SciPy."""
+"""Restitution of a rocking block, against its equations of motion integrated by SciPy."""
 
 from functools import cache
 
@@ -249,7 +249,7 @@ def test_which_blocks_rock(given, rocks):
             _RockingBlock(**whole)
 
 
-def test_turning_is_slowed_by_what_is_left_at_the_largest_tilts():
+def test_restitution_follows_from_energy_at_the_largest_tilts():
     """Energies 1, 0.9 and 0.64 at the turning points: the fourth root of 0.64 an impact."""
     angle = np.array([0.2, 0.3, 0.1, -0.1, -0.25, -0.1, 0.1, 0.2, 0.15])
     energy = np.array([7.0, 1.0, 7.0, 7.0, 0.9, 7.0, 7.0, 0.64, 7.0])

@@ -1,4 +1,4 @@
-"""Batches of steps by a solver, and what it leaves to SNES."""
+"""Batches of steps by a solver, and steps that it leaves to SNES."""
 
 import numpy as np
 import pytest

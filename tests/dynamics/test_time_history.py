@@ -97,7 +97,7 @@ def test_a_run_continues_where_it_stopped(run, model, motion):
     assert second.joints["M"].values[1:] == pytest.approx(whole, rel=1e-6, abs=1e-3)
 
 
-def test_ctrl_c_keeps_what_was_computed(model, motion):
+def test_ctrl_c_keeps_the_computed_steps(model, motion):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # may be ignored here
     seen = []
 
@@ -174,7 +174,7 @@ def test_steps_are_given_or_predicted_or_chosen_by_a_tolerance(model):
         (None, 2, 2, (Ending.MET, "stones meeting outside their joints: together", 2)),
     ],
 )
-def test_what_comes_first_ends_a_run_within_a_batch(event, parting, meeting, said):
+def test_the_first_event_ends_a_run_within_a_batch(event, parting, meeting, said):
     """Each step has its length, the first from where the batch before ended.
 
     A run ends after the step of a separation, and before that of a meeting.

@@ -1,4 +1,4 @@
-"""Time histories of blocks that move as far as they like, and what they leave."""
+"""Time histories of blocks in large displacements, and their results."""
 
 from functools import cache
 from pathlib import Path

@@ -67,7 +67,7 @@ def test_falls_of_nearly_all_runs_are_not_explained():
     assert "no property separates them from the others" in found.sentence
 
 
-def test_runs_that_all_fail_are_said_to():
+def test_runs_that_all_fail_are_reported():
     found = made_up([False, False], scale=np.array([1.0, 2.0]))
     found.dataset["error"] = "run", np.array(["DidNotConverge: no equilibrium"] * 2)
     assert found.sentence == "2 of 2 runs have no answer: DidNotConverge: no equilibrium"
@@ -131,7 +131,7 @@ def test_what_alone_decides_explains_most_and_a_constant_nothing():
         ),
     ],
 )
-def test_the_sentence_names_what_separates_falls(columns, falls, where):
+def test_the_sentence_names_the_properties_that_separate_falls(columns, falls, where):
     assert made_up(falls, **columns).sentence.split(": ")[1].split(";")[0] == where
 
 

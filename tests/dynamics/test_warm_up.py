@@ -1,4 +1,4 @@
-"""Is what was compiled beforehand what runs need?"""
+"""Kernels that were compiled beforehand are those that runs need."""
 
 import numba.core.event as event
 import numpy as np
@@ -9,7 +9,7 @@ from archfem.dynamics.warm_up import COMPILED_VARIANTS, compile_variant
 
 
 class Compilations(event.Listener):
-    """Counts what is compiled and not found on disk or in memory."""
+    """Counts functions that are compiled and not found on disk or in memory."""
 
     def __init__(self):
         self.count = 0

@@ -54,7 +54,7 @@ def _spent() -> float:
 
 
 def _kept(folder: Path, name: str, came: Came) -> None:
-    """Keep what ended badly."""
+    """Keep a trial that ended badly."""
     folder.mkdir(parents=True, exist_ok=True)
     text = f"{came.kind}: {came.words}\n\n{came.input}"
     (folder / f"{name}.txt").write_text(text, encoding="utf-8", errors="backslashreplace")

@@ -15,11 +15,11 @@ from fuzz.case_files import BASES, DRAWING, RECORD
 from fuzz.trial import Came, judged
 
 CALLS: dict[str, tuple[Callable[..., Any], Callable[[], Mapping[str, Any]]]] = {}
-"""Functions by name, and what makes their arguments, all of which they take as they are."""
+"""Functions by name, and makers of their arguments, all of which are valid."""
 
 
 def ready() -> None:
-    """Make what calls are given, and what is compiled."""
+    """Make the arguments of calls, and compile kernels."""
     quake, model, run = af.Motion.synthetic(duration=0.5, pga=1.0), _model(), _run()
     wave = af.Motion.synthetic(duration=4.0, pga=1.0, dt=0.01)
     ring, column, dead = _ring(), _column(), af.dead_load(model)
@@ -230,7 +230,7 @@ def _said(value: Any) -> str:
 
 
 def _nonsense(answer: Any) -> str | None:
-    """Whether a number that came back is none."""
+    """Whether a returned number is none."""
     if isinstance(answer, af.Structure):
         areas = [block.area for block in answer.blocks]
         return None if np.all(np.isfinite(areas)) and min(areas) > 0.0 else f"areas {areas}"

@@ -164,7 +164,7 @@ DRAWING = (
 
 
 def ready() -> None:
-    """Load what `check` needs."""
+    """Load the modules that `check` needs."""
     from archfem.masonry.survey import outlines  # noqa: F401
     from archfem.units import in_unit
 
@@ -193,7 +193,7 @@ def trial(seed: int, number: int, folder: Path) -> Came:
 
 
 def checked(path: Path) -> str | None:
-    """Check a case and say what is wrong with what is printed."""
+    """Check a case and return the fault of the printed text."""
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
         tools.check(argparse.Namespace(case=str(path), changes=[]))

@@ -1,4 +1,4 @@
-"""Records of every format, damaged at random, and what reading one leads to."""
+"""Records of every format, damaged at random, and outcomes of reading one."""
 
 import numpy as np
 
@@ -268,7 +268,7 @@ def mutants(count, *, seed, sources=None):
 
 
 def outcome(path, original):
-    """Tell what reading a damaged file leads to, given the undamaged channels."""
+    """Return the outcome of reading a damaged file, given the undamaged channels."""
     try:
         channels = read_channels(path)
     except InvalidInput:

@@ -115,7 +115,7 @@ def samples() -> dict[str, list[bytes]]:
 
 
 def ready() -> None:
-    """Make the drawings, and load what reads them."""
+    """Make the drawings, and load the modules that read them."""
     samples()
     af.units.in_unit("1 m", "m", "x")
 

@@ -1,4 +1,4 @@
-"""Values that nobody means, and some that somebody might."""
+"""Absurd values, and some unusual valid ones."""
 
 from decimal import Decimal
 from fractions import Fraction
@@ -37,7 +37,7 @@ WORDS = (
     ),
     *("1 m; import os", "m**m", "1 m**1e9", "1 %", "1 delta_degC", "2 m @ 3", "1 dB", "1/0 m"),
 )
-"""Only what can be written in a file of UTF-8."""
+"""Only text that can be written in a file of UTF-8."""
 
 OBJECTS = (
     *(None, True, False, 1j, b"1", object(), (), [], {}, {"a": 1}, {1}, [1], [[1]], (1.0, 2.0)),

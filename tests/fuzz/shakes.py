@@ -13,7 +13,7 @@ sys.path.remove(str(SCRIPT.parent))
 
 
 def ready() -> None:
-    """Load what is compiled."""
+    """Load the compiled kernels."""
     tried(0, "small")
 
 

@@ -56,7 +56,7 @@ class _Worker:
         self.process.start()
         theirs.close()
         self.ended = False
-        self.pipe.recv()  # once it has imported what it needs
+        self.pipe.recv()  # once it has imported its modules
 
     def carry_out(self, number: int) -> Came:
         """Carry out one trial."""

@@ -1,4 +1,4 @@
-"""What came of a trial, and how a function's end is judged."""
+"""The result of a trial, and how the end of a call is judged."""
 
 import sys
 import traceback
@@ -13,7 +13,7 @@ KINDS = (ANSWERED, REFUSED, FOREIGN, HUNG, NONSENSE)
 BAD = (FOREIGN, HUNG, NONSENSE)
 
 WORDS = 200
-"""Most letters of what is said of a trial: errors may quote what was given."""
+"""Most letters of the words of a trial: errors may quote their input."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Came:
 
     Attributes:
         kind: one of `KINDS`.
-        words: the error, or what is wrong with the answer.
+        words: the error, or the fault of the answer.
         input: the call or file that was tried, as text from which it can be repeated.
     """
 
@@ -47,7 +47,7 @@ def judged(trial: Callable[[], str | None], input_text: str) -> Came:
         return Came(REFUSED, said[:WORDS], input_text)
     except (KeyboardInterrupt, SystemExit):
         raise
-    except BaseException as error:  # what no user should ever see
+    except BaseException as error:  # an error that is not archfem's own
         last = traceback.extract_tb(sys.exc_info()[2])[-1]
         where = f"{last.filename.rpartition('/')[2]}:{last.lineno}"
         words = f"{type(error).__name__} in {where}: {str(error)[:WORDS]}"

@@ -1,4 +1,4 @@
-"""What a hard case is, what it must leave behind, and the structures that many of them shake."""
+"""Hard cases: their definition, their required results, and structures that many of them use."""
 
 import logging
 from collections.abc import Callable
@@ -24,12 +24,12 @@ logger = logging.getLogger("archfem")
 
 @dataclass(frozen=True)
 class Found:
-    """What came of a case.
+    """The result of a case.
 
     Attributes:
         outcome: in words.
-        right: whether that is what it should be.
-        error: against what is known, or None.
+        right: whether the outcome is the expected one.
+        error: against the reference, or None.
         run: the history that the effort is read from, or None for statics.
     """
 
@@ -45,8 +45,8 @@ class Case:
 
     Attributes:
         name: of the case.
-        hard: what is hard about it.
-        study: does it, and judges what came of it.
+        hard: the difficulty of the case.
+        study: runs the case, and judges the result.
         quick: a second or so, and part of the default tests.
     """
 
@@ -163,7 +163,7 @@ def sound(run: af.History) -> None:
 
 
 def shaken(model, motion: af.Motion, *, dt: float = DT, damping=DAMPING, **given) -> af.History:
-    """Run a time history and look whether what it stored makes sense."""
+    """Run a time history and check the stored results."""
     run = af.time_history(model, motion, dt=dt, damping=damping, **given)
     sound(run)
     return run

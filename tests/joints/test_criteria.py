@@ -71,7 +71,7 @@ def test_mechanism_needs_four_joints_at_once(joints):
     assert af.limit.counted_mechanism(joints.isel(time=[0, 1, 3, 4])) is None
 
 
-def test_table_says_when_and_how_long(joints):
+def test_the_table_has_times_and_durations(joints):
     lines = tabulate_joints(joints).text.splitlines()
     assert len(lines) == 19
     assert lines[8].split()[8:12] == ["0.200", "s", "0.300", "s"]
@@ -177,7 +177,7 @@ def test_friction_of_the_criteria_stands_for_that_of_every_joint(joints):
     )  # one is open
 
 
-def test_joints_tell_by_which_criteria_they_were_judged(joints):
+def test_joints_keep_the_criteria_by_which_they_were_judged(joints):
     ours = Criteria(hinge=0.4, failures=3, friction=0.5)
     judged_so = with_failure_flags(joints, ours)
     assert Criteria.of(judged_so) == Criteria.of(judged_so.isel(time=2)) == ours

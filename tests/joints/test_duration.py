@@ -26,7 +26,7 @@ def test_a_record_lasts_for_the_step_that_ends_with_it():
         ([], 0.0, None),
     ],
 )
-def test_the_first_of_what_lasts_is_found(up, least, expected):
+def test_the_first_lasting_state_is_found(up, least, expected):
     assert find_lasting(up, TIME, least, lambda instant: instant) == expected
     # the same where every record is looked at, and by a watch of each step
     every = find_lasting(range(6), TIME, least, lambda k: k if k in up else None)

@@ -56,7 +56,7 @@ def test_a_block_that_slides_or_presses(ring):
 
 
 def test_openings_that_are_not_plane_give_the_nearest_plane():
-    """Against numpy's weighted polynomial fit of what the points of an elastic joint say."""
+    """Against numpy's weighted polynomial fit of gaps at the points of an elastic joint."""
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5)
     model = af.build(ring, fidelity="full", cells=(3, 3), quadrature="nodal")
     operator, q = model.operator, np.random.default_rng(1).normal(size=model.size)
@@ -85,7 +85,7 @@ def test_gauges_follow_supports_that_have_moved(fidelity):
     assert np.abs([*middle[1:], *rotation, *slip[1:]]).max() < 1e-12
 
 
-def test_points_that_are_not_about_the_middle_tell_of_it_all_the_same():
+def test_points_that_are_not_about_the_middle_give_its_displacement():
     """Of faces that part by g_0 - θ a, at three places a of any weights."""
     arm, weight = np.array([-0.1, 0.3, 0.6]), np.array([1.0, 2.0, 1.0])
     points = SimpleNamespace(joint=np.zeros(3, int), offset=arm, weight=weight, joint_count=1)

@@ -279,7 +279,7 @@ def block(friction, cohesion=0.0, rule="lobatto"):
 
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("cohesion", [0.0, 3e3])
-def test_a_loop_of_even_slip_costs_what_its_area_is(rule, cohesion):
+def test_a_loop_of_even_slip_dissipates_its_area(rule, cohesion):
     """Under constant N a loop of amplitude S is a parallelogram of area 4 Y (S - Y/k).
 
     Y = μ N + c A. Steps carry on from each other's memory, and their losses add up to the area.

@@ -1,4 +1,4 @@
-"""Joint laws of the user: closed forms, the built-in law written again, and what is refused."""
+"""Joint laws of the user: closed forms, the built-in law written again, and refused laws."""
 
 import re
 from dataclasses import dataclass, replace

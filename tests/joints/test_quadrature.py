@@ -1,4 +1,4 @@
-"""Rules along a joint: what they integrate exactly, and where their points are."""
+"""Rules along a joint: polynomials that they integrate exactly, and their points."""
 
 import numpy as np
 import pytest

@@ -45,7 +45,7 @@ def test_the_ratios_are_the_same_however_narrow_a_structure_is():
         assert np.ravel(found) == pytest.approx([0.1, 0.1], rel=1e-12)
 
 
-def test_faces_that_slid_are_judged_by_what_still_lies_on_the_other(ring):
+def test_faces_that_slid_are_judged_by_their_overlap(ring):
     """e is of the length h - |slip|, to either side; what has slid off has none."""
     resultants = np.tile([1000.0, 0.0, 55.0], (18, 1))
     faces = np.zeros((3, 18))

@@ -7,7 +7,7 @@ import archfem as af
 from archfem.joints.rigid_kinematics import block_motion_gaps, facet_ends, rigid_joint_operator
 
 SMALL = 1e-6
-"""A turn [rad]; its square is what small motions leave out."""
+"""A turn [rad]; small motions neglect its square."""
 
 
 def gap_by_hand(structure, points, motion, k):

@@ -1,4 +1,4 @@
-"""What joints carry as a table: its rows, and how many a sheet has."""
+"""Tables of joint forces: their rows, and the rows of a sheet."""
 
 import pytest
 

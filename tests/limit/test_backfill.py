@@ -171,7 +171,7 @@ def test_nothing_of_an_eroded_fill_under_paving_is_lost_between_two_rings():
     assert parts >= {"west arch", "east arch", "pier", "west wall", "east wall"}
 
 
-def test_paving_rests_on_what_is_under_the_fill():
+def test_paving_rests_on_the_blocks_under_the_fill():
     bare, paved = (profile(row_of_stones(paving=paving)).columns for paving in (0.0, 0.2))
     each = 0.5 * 0.2 * af.STONE.unit_weight
     for stone in range(1, 13):
@@ -241,7 +241,7 @@ def test_more_cover_spreads_a_load_wider():
     assert (np.diff(peak) < 0.0).all()
 
 
-def test_a_stone_that_stands_up_shades_what_is_behind_it():
+def test_a_stone_that_stands_up_shades_the_stones_behind_it():
     low = row_of_stones(1.0)
     tall = [
         af.Block(
@@ -282,7 +282,7 @@ def test_a_stone_that_stands_up_shades_what_is_behind_it():
     assert part.sum() == pytest.approx(1.0, rel=AREA_ROUND_OFF)
 
 
-def test_what_misses_the_structure_goes_into_the_ground():
+def test_pressure_that_misses_the_structure_acts_on_the_ground():
     fill = af.limit.Fill(friction_angle=35.0, dispersal="uniform", spread=45.0)
     _, _, part = profile(row_of_stones(1.0)).fan(np.array([0.0, 1.5]), fill)
     assert part.sum() == pytest.approx(0.5, rel=1e-6)

@@ -200,7 +200,7 @@ def factor_by_line_of_thrust(structure, fill, x):
     ],
     ids=["weight", "active", "passive in part", "passive"],
 )
-def test_an_arch_carries_what_its_line_of_thrust_can(fill):
+def test_an_arch_carries_the_load_of_its_line_of_thrust(fill):
     structure = arch_bridge()
     found = af.collapse_factor(structure, live=QUARTER, friction=None, fill=fill)
     expected = factor_by_line_of_thrust(structure, fill, QUARTER.x)

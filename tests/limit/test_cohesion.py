@@ -217,7 +217,7 @@ def block(held=HELD, friction=FRICTION):
 
 
 @pytest.mark.parametrize("friction", ["coulomb", "nonassociated"])
-def test_a_block_slides_on_what_is_closed_of_its_bed(friction, verified, caplog):
+def test_a_block_slides_on_the_closed_part_of_its_bed(friction, verified, caplog):
     """A pushover loses cohesion where the bed opens; limit analysis has it whole, and says so."""
     push = af.pushover(af.build(block(), fidelity="rigid"), SIDEWAYS)
     verified("block on a bed with cohesion, part of it open: limit", SLIDES, "statics", push.factor)
@@ -257,7 +257,7 @@ def test_joints_of_another_structure_are_refused():
         closed_cohesion(af.column(breadth=1.0, heights=[1.0, 1.0]), joints)
 
 
-def test_joints_without_cohesion_are_not_said_to_have_any(caplog):
+def test_joints_without_cohesion_are_not_named_as_cohesive(caplog):
     """Round-off of a search leaves a shear above μ N, which no cohesion holds."""
     structure = block_on_incline(0.0, glued(0.0))
     found = af.collapse_factor(structure, live=af.BodyForce(1.0))

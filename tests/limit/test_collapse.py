@@ -226,7 +226,7 @@ def test_a_load_that_presses_a_column_down_never_overturns_it():
     assert found.hinges == ()
 
 
-def test_an_arch_that_cannot_stand_says_so_and_falls():
+def test_an_arch_that_cannot_stand_is_reported_and_falls():
     thin = ring(thickness=0.2, embrace=180.0)
     found = collapse_factor(thin, live=SIDEWAYS)
     assert found.outcome is Outcome.INFEASIBLE

@@ -1,4 +1,4 @@
-"""What a limit analysis warns of: on made-up joints, at the bounds from which it does."""
+"""Warnings of limit analysis: on made-up joints, at the bounds from which they are given."""
 
 import logging
 from types import SimpleNamespace
@@ -11,7 +11,7 @@ from archfem.limit import collapse
 
 @pytest.fixture
 def warned(caplog):
-    """What was logged so far, in one line."""
+    """The messages logged so far, in one line."""
     with caplog.at_level(logging.WARNING, "archfem"):
         yield lambda: " ".join(caplog.messages)
 

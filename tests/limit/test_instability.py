@@ -1,4 +1,4 @@
-"""Why a structure does not stand under its own weight, and from what on it would."""
+"""Why a structure does not stand under its own weight, and the values from which it would."""
 
 import re
 

@@ -23,7 +23,7 @@ def test_gaps_are_those_of_the_points_at_the_joints(motion):
 
 
 def test_forces_do_the_work_of_their_balance(motion):
-    """F and V on the gaps of a motion, against what they leave on the blocks."""
+    """F and V on the gaps of a motion, against their resultants on the blocks."""
     blocks = RigidBlocks(arch())
     motion[[0, -1]] = 0.0
     forces = np.random.default_rng(4).standard_normal(3 * 18)

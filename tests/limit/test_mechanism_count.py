@@ -199,7 +199,7 @@ def shaken(instants, opening=None):
     return joints
 
 
-def test_what_lasts_25_ms_opens_2_5_mm_and_closes_is_said_to_be_that():
+def test_an_episode_of_25_ms_and_2_5_mm_that_closes_is_stated_so():
     """Wider openings before, after and of other joints are none of the mechanism's."""
     instants = [{}, {6: 0.5}, *[ALTERNATING] * 5, {6: 0.5}, ALTERNATING]
     joints = shaken(instants, [0.0, 9e-3, 1e-3, 2e-3, 2.5e-3, 1e-3, 1e-3, 8e-3, 7e-3])

@@ -83,7 +83,7 @@ def test_a_hinge_short_of_the_edge_counts_from_the_limit_on():
     assert verified_mechanism(structure, joints, limit=0.48).kind == "none"
 
 
-def test_a_sliding_block_moves_though_nobody_counts_it():
+def test_a_sliding_block_moves_without_a_counted_mechanism():
     structure = af.column(breadth=0.6, heights=[1.0, 1.0])
     found = verified_mechanism(structure, failing(structure, sliding={1: 0.61}))
     assert (found.kind, found.moved.blocks, found.counted) == ("local", (2,), None)
@@ -195,7 +195,7 @@ def random_state(structure, rng):
 
 
 @pytest.mark.parametrize("structure", [piers(chords=1), filled(), beside("side wall")], ids="abc")
-def test_loops_rule_out_only_what_the_programme_rules_out(structure):
+def test_loops_exclude_only_motions_that_the_programme_excludes(structure):
     """Two formulations: the cone of gaps that close every loop, and the programme in motions."""
     verifier, rng = af.limit.Verifier(structure), np.random.default_rng(1)
     agreed = {True: 0, False: 0}

@@ -332,7 +332,7 @@ def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
     assert np.isnan(found.joints["N"]).all()
 
 
-def test_the_words_tell_names_and_where_solutions_lie():
+def test_the_text_has_names_and_the_range_of_solutions():
     structure = wall(HALVES, 0.5)
     words = str(af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated"))
     assert "brick" in words

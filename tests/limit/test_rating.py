@@ -59,7 +59,7 @@ def test_the_factor_is_that_of_point_loads_at_the_worst_place(lorry_rating):
     assert float(found.moving.factors["factor"].min()) == pytest.approx(found.factor, rel=EXACT)
 
 
-def test_a_symmetric_bridge_is_rated_alike_in_both_directions(lorry_rating):
+def test_a_symmetric_bridge_has_one_rating_in_both_directions(lorry_rating):
     factors = lorry_rating.moving.factors["factor"]
     right, left = (factors.sel(direction=way).values for way in ("right", "left"))
     assert np.isfinite(right).sum() > 10

@@ -1,4 +1,4 @@
-"""The skeleton of stone below a fill: what is left out, and what can move."""
+"""The skeleton of stone below a fill: parts that are left out, and parts that can move."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from archfem.limit.mechanism_kinematics import find_rigid_regions
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 
 
-def test_fill_and_what_rests_on_it_are_left_out():
+def test_fill_and_parts_on_it_are_left_out():
     whole, bare = filled(), piers(chords=1)
     assert len(whole.joints) == len(bare.joints) + 5 + 2 + 1  # under, on, and between the pavers
     found = find_rigid_regions(whole)

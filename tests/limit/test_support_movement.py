@@ -1,4 +1,4 @@
-"""How far a support moves before what stands on it falls, in the geometry that it takes."""
+"""Movement of a support at which its structure falls, in the moved geometry."""
 
 from dataclasses import replace
 from itertools import combinations, product
@@ -172,7 +172,7 @@ def test_it_leaps_where_only_far_hinges_would_hold():
     assert hinged.admissible((0, 6, 9), (1, 1, 0), beyond)
 
 
-def test_weights_lose_what_the_thrust_does():
+def test_the_work_of_the_thrust_is_that_of_the_weights():
     ring = semicircle(0.2, 12)
     found = largest_movement(ring, SPREAD, friction=None)
     shares, works = np.array([(stage.share, stage.work) for stage in found.stages]).T
@@ -241,7 +241,7 @@ def test_the_words_name_the_joints():
     assert found.stages[-1].names == ("joint 1", "joint 4", "joint 7")
 
 
-def test_gaps_of_displaced_blocks_are_rates_of_what_is_open():
+def test_gaps_of_displaced_blocks_are_rates_of_opening():
     ring = semicircle(0.2, 6)
     chance = np.random.default_rng(2)
     blocks = DisplacedBlocks(ring, 0.05 * chance.standard_normal((8, 3)))

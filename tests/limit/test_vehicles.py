@@ -102,7 +102,7 @@ def test_where_nothing_is_too_much_the_worst_place_has_most_axles():
 
 
 @pytest.mark.slow
-def test_the_vehicle_comes_on_and_leaves():
+def test_the_vehicle_enters_and_leaves():
     found = over(arch_bridge(), *LORRY, fill=GRAVEL).factors
     axles, factors = found["axles"].values, found["factor"].values
     assert set(np.unique(axles)) == {1, 2, 3}  # of the last axle that leaves, too

@@ -1,4 +1,4 @@
-"""Bridges from their parts: closed forms of their lengths and areas, names, and what is refused."""
+"""Bridges from their parts: closed forms of lengths and areas, names, and refused parts."""
 
 from dataclasses import replace
 from math import radians, sin, tan

@@ -42,7 +42,7 @@ def test_what_lies_straight_runs_to_the_right_and_points_upwards():
 @pytest.mark.parametrize(("spread", "straight"), [(0.0049, True), (0.0051, False)])
 @pytest.mark.parametrize("upright", [False, True])
 def test_a_row_is_straight_up_to_a_spread_of_five_thousandths(spread, straight, upright):
-    """Four stones on a cross, whose spread is that of its arms; a pier is straight whatever."""
+    """Four stones on a cross, whose spread is that of its arms; a pier is always straight."""
     places = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, spread], [0.0, -spread]])
     places = places[:, ::-1] if upright else places
     way = _fit_direction(places, "ring")

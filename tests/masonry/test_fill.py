@@ -293,7 +293,7 @@ def test_slivers_are_joined_to_their_neighbour(part, pieces):
     assert sum(each.polygon.area for each in found) == pytest.approx(1.0 + part)
 
 
-def test_pieces_are_a_thousand_times_as_stiff_as_what_they_stand_for():
+def test_pieces_are_a_thousand_times_as_stiff_as_their_fill():
     slick = af.Contact(1e13, 1e13, 0.0)
     fill = jointed_fill(box(3.0, slick, slick), 1.0, angle=30.0)
     young = {block.material.young for block in fill.blocks if block.grain}

@@ -12,7 +12,7 @@ def test_a_small_turn_moves_points_as_a_rotation_does():
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     moved = (points - centroid) @ rotation.T + centroid + [0.2, 0.3] - points
     found = rigid_motion_matrix(points, centroid) @ [0.2, 0.3, turn]
-    assert found == pytest.approx(moved, abs=2.0 * turn**2)  # what small motions leave out
+    assert found == pytest.approx(moved, abs=2.0 * turn**2)  # terms that small motions neglect
 
 
 def test_each_point_may_have_a_centroid_of_its_own():

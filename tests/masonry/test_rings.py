@@ -1,4 +1,4 @@
-"""Rings from a few lengths: weights, spans, and what is refused."""
+"""Rings from a few lengths: weights, spans, and refused values."""
 
 from math import radians
 
@@ -8,7 +8,7 @@ import pytest
 import archfem as af
 
 
-def test_ring_weighs_what_it_should(ring):
+def test_ring_has_the_weight_of_its_sector(ring):
     assert ring.weight == pytest.approx(20e3 * 0.55 * 2.95 * radians(159.0), rel=1e-12)
     chorded = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
     turn = radians(159.0) / 17

@@ -35,7 +35,7 @@ def viaduct(west, east, middle, fill=FILL):
 
 
 def without_roles(structure):
-    """A structure of the same blocks and joints, whose roles nobody tells."""
+    """A structure of the same blocks and joints, whose roles are not given."""
     blocks, joints = (
         tuple(replace(each, role="") for each in members)
         for members in (structure.blocks, structure.joints)
@@ -135,7 +135,7 @@ def test_events_go_by_roles(event):
     assert len(set(endings)) == 1
 
 
-def test_all_else_goes_by_roles_too():
+def test_findings_and_pictures_go_by_roles_too():
     """Findings that studies keep, and panels of pictures."""
     seen = []
     for names in NAMES.values():

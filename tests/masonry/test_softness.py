@@ -35,7 +35,7 @@ def test_soil_is_soft_and_yields_and_stone_is_neither(viaduct):
     assert find_soft_blocks(viaduct) == find_yielding_blocks(viaduct) == (soil,)
 
 
-def test_bodies_yield_by_their_roles_whatever_they_are_called(viaduct):
+def test_bodies_yield_by_their_roles_and_not_their_names(viaduct):
     blocks, joints = (
         tuple(replace(each, part=f"Teil {len(each.part)}") for each in members)
         for members in (viaduct.blocks, viaduct.joints)

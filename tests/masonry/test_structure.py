@@ -1,4 +1,4 @@
-"""Structures: orientation of joints, arrays of them, names, and what is refused."""
+"""Structures: orientation of joints, arrays of them, names, and refused structures."""
 
 from dataclasses import replace
 
@@ -120,7 +120,7 @@ def test_a_structure_in_a_line():
     )
 
 
-def test_a_fingerprint_tells_geometry_to_a_billionth_of_its_size():
+def test_a_fingerprint_resolves_geometry_to_a_billionth_of_its_size():
     """Of the lower of two blocks the height; loads and names do not matter."""
 
     def pair(height, zero=0.0, **more):

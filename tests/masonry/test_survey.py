@@ -1,4 +1,4 @@
-"""Surveys as structures: corners, materials, layers and roles of what was drawn, and cases."""
+"""Surveys as structures: corners, materials, layers and roles of drawn outlines, and cases."""
 
 import json
 from pathlib import Path

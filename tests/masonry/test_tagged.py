@@ -1,4 +1,4 @@
-"""A user's own tagged mesh as a survey, and what is refused."""
+"""A user's own tagged mesh as a survey, and refused meshes."""
 
 from pathlib import Path
 
@@ -127,7 +127,7 @@ def test_edges_of_a_mesh_follow_an_arc(tmp_path):
     ],
 )
 def test_a_joint_has_the_name_of_a_curve_that_lies_on_it(stack, monkeypatch, ends, off, named):
-    """Told by the middles of its edges: all between the joint's ends, and none beside it."""
+    """Middles of the curve's edges decide: all between the joint's ends, and none beside it."""
     middles = np.array([[x, 1.0 + off] for x in ends])
     monkeypatch.setattr(outlines, "read_physical_curves", lambda path, factor: [("mine", middles)])
     found = outlines._name_joints(stack, Path("any.msh"), None)

@@ -1,4 +1,4 @@
-"""What cannot be built."""
+"""Models that cannot be built."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Into how many cells edges are cut: alike on both sides, and dealt evenly."""
+"""Numbers of cells along edges: equal on both sides, and dealt evenly."""
 
 from itertools import pairwise
 from types import SimpleNamespace
@@ -37,7 +37,7 @@ def cells_on_edges(structure, meshing):
 @pytest.mark.parametrize("cells", [(2, 2), (3, 5), (4, 4)])
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
 @pytest.mark.parametrize("make", ["ring of 16", "ring in chords", "fill", "fill on chords"])
-def test_mirror_images_are_cut_alike(make, cell, cells):
+def test_mirror_images_are_cut_equally(make, cell, cells):
     lengths = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 16}
     made = {
         "ring of 16": lambda: af.circular_arch(**lengths),

@@ -38,7 +38,7 @@ def test_force_is_the_slope_of_energy_where_nothing_slides(ring, fidelity):
 
 
 @pytest.mark.parametrize("late", [0.0, 0.3])
-def test_the_work_of_a_step_on_joints_that_hold_is_what_they_and_the_stones_store(late):
+def test_the_work_of_a_step_on_joints_that_hold_is_stored_energy(late):
     """Late forces are of (1/2 - l) of the start and (1/2 + l) of the end: of stones they lose l."""
     soft = af.Material(young=1e9, poisson=0.2, unit_weight=25e3)
     stack = glued(af.column(breadth=1.0, heights=[1.0, 1.0], material=soft))

@@ -1,4 +1,4 @@
-"""Meshes: what they cover, their files, and what is refused."""
+"""Meshes: their area, their files, and refused structures."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -122,7 +122,7 @@ HEAD = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
         ("{call}", "brep"),
     ],
 )
-def test_no_file_whatever_it_is_called_runs_anything(stack, tmp_path, text, ending):
+def test_no_file_of_any_name_runs_code(stack, tmp_path, text, ending):
     """Scripts of gmsh behind a header, in known sections, and in files named elsewhere."""
     mark, other = tmp_path / "ran", tmp_path / "other.geo"
     call = f'SystemCall "touch {mark}";\n'

@@ -44,7 +44,7 @@ def leaning(model):
 
 @pytest.mark.parametrize(("name", "fidelity"), CASES)
 def test_of_small_motions_it_is_the_model_of_small_displacements(structures, name, fidelity):
-    """What differs is of second order: it falls with the motion."""
+    """The difference is of second order: it falls with the motion."""
     model = af.build(structures[name], fidelity=fidelity, displacements="large", cells=(2, 2))
     small, whole = model.small, leaning(model)
     for part, most in ((1e-3, 1e-5), (1e-7, 1e-9)):

@@ -45,7 +45,7 @@ def test_rates_of_a_point_are_its_derivatives(point):
     assert made.force_rate(q, force, 8).toarray() == pytest.approx(bent, abs=NEAR)
 
 
-def test_a_point_of_what_does_not_turn_is_linear():
+def test_a_point_of_a_body_that_does_not_turn_is_linear():
     rows = sparse.csr_matrix([[1.0, 0.5, 0.0], [0.0, 2.0, -1.0]])
     still, q = FramelessPoint(rows), np.array([0.1, 0.2, 0.3])
     assert still.displacement(q) == pytest.approx(rows @ q)

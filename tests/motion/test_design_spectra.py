@@ -158,6 +158,6 @@ def test_table_is_straight_between_its_points():
         (lambda: TableSpectrum([0.1, 1.0], [1.0, 1.0]).horizontal(0.05), "below the table's"),
     ],
 )
-def test_what_the_codes_do_not_define_is_refused(build, message):
+def test_spectra_that_codes_do_not_define_are_refused(build, message):
     with pytest.raises(af.errors.InvalidInput, match=message):
         build()

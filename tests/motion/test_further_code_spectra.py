@@ -106,6 +106,6 @@ def test_eurocode_of_2024_at_its_corners():
         (lambda: Eurocode2024(0.5, 0.1, 1.0, 1.0).vertical(0.1), "give one by points"),
     ],
 )
-def test_what_the_codes_do_not_define_is_refused(build, message):
+def test_spectra_that_codes_do_not_define_are_refused(build, message):
     with pytest.raises(af.InvalidInput, match=message):
         build()

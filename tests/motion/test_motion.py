@@ -1,4 +1,4 @@
-"""`Motion` and what is done to its components."""
+"""`Motion` and operations on its components."""
 
 import numpy as np
 import pytest
@@ -92,7 +92,7 @@ def test_scaling_acts_on_all_components(shaking):
     ],
     ids=["scaled", "cut", "resampled", "baseline_corrected", "band_passed"],
 )
-def test_every_component_is_changed_alike(shaking, change):
+def test_every_component_is_changed_equally(shaking, change):
     alone = change(af.Motion(shaking.vertical, shaking.dt))
     changed = change(shaking)
     assert np.array_equal(changed.vertical, alone.horizontal)

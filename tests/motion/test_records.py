@@ -290,7 +290,7 @@ def test_the_step_stated_in_a_comment(write, stated):
     assert motion.pga == pytest.approx(0.03)
 
 
-def test_rounded_times_still_tell_the_step(write):
+def test_rounded_times_still_give_the_step(write):
     rows = "".join(f"{0.0066 * i:.3f} {i % 7}\n" for i in range(200))
     # Times are rounded to 0.0005 s, over 199 steps: 4e-4 of the step.
     assert af.Motion.read(write(rows), units="gal").dt == pytest.approx(0.0066, rel=5e-4)

@@ -1,4 +1,4 @@
-"""What is done to one sampled acceleration, against closed forms and its own promises."""
+"""Operations on one sampled acceleration, against closed forms and documented bounds."""
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ def test_base_lines_that_cannot_be_fitted_are_refused(count, degree):
         signal_processing.correct_baseline(np.ones(count), 0.01, degree)
 
 
-def test_band_pass_keeps_what_lies_inside_and_drops_what_lies_outside():
+def test_band_pass_keeps_frequencies_inside_and_drops_those_outside():
     slow, middle, fast = (sine(f, duration=40.0) for f in (0.05, 2.0, 30.0))
     passed = signal_processing.filter_band(slow + middle + fast, 0.01, 0.5, 10.0)
     inner = slice(1000, 3000)

@@ -73,7 +73,7 @@ def test_the_least_duration_and_peaks_that_are_accepted():
 def test_noise_has_the_spectrum_of_kanai_tajimi_and_clough_and_penzien(
     component, ground, monkeypatch
 ):
-    """What an impulse becomes, from the real and imaginary parts of both filters by hand.
+    """The response to an impulse, from the real and imaginary parts of both filters by hand.
 
     Firm ground by Clough and Penzien: 15 rad/s and 60 %; the high-pass is at a tenth of that.
     """

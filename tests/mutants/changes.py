@@ -1,4 +1,4 @@
-"""Places of a module where a number is made, and what may be changed there."""
+"""Places of a module where a number is made, and possible changes of them."""
 
 import ast
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ SIMPLE = ast.expr | ast.keyword | ast.Return | ast.Assign | ast.AnnAssign | ast.
 
 @dataclass
 class Change:
-    """What may be changed: the expression, what becomes of it, and what it stands in."""
+    """A possible change: the expression, its replacement, and the code around it."""
 
     node: ast.AST
     other: ast.expr
@@ -69,7 +69,7 @@ class Change:
 
 
 def changes(source: str) -> list[Change]:
-    """Return what may be changed in a module.
+    """Return the possible changes of a module.
 
     Words of errors, logs and bars of progress, annotations, imports, what a function that only
     refuses does and sizes of a shape that are to be found (any number below zero does that)
@@ -99,7 +99,7 @@ def marked(source: str, name: str) -> str:
 
     Each is reported to the function `_reached` among the built-in names, where there is one, as the
     module's name and the statement's line; so is the first statement of each function, which may
-    read what is kept as the module is read.
+    read values that the module has once it is imported.
 
     Args:
         source: of the module.
@@ -124,20 +124,20 @@ def marked(source: str, name: str) -> str:
 
 
 def _first_statements(tree: ast.AST) -> Iterator[ast.stmt]:
-    """What each function begins with, after its docstring."""
+    """The first statement of each function, after its docstring."""
     for function in ast.walk(tree):
         if isinstance(function, ast.FunctionDef):
             yield from function.body[int(ast.get_docstring(function) is not None) :][:1]
 
 
 def _found(tree: ast.AST) -> list[Change]:
-    """Expressions that may be changed, each with what it stands in and what becomes of it."""
+    """Expressions that may be changed, each with the code around it and its replacement."""
     places = ((node, around, _changed(node)) for node, around in _places(tree, []))
     return [Change(node, other, around) for node, around, other in places if other is not None]
 
 
 def _places(tree: ast.AST, above: list[ast.AST]) -> Iterator[tuple[ast.AST, list[ast.AST]]]:
-    """Expressions that compute, each with what it stands in."""
+    """Expressions that compute, each with the code around it."""
     around = [*above, tree]
     for field, value in ast.iter_fields(tree):
         if field in ("annotation", "returns", "decorator_list"):
@@ -168,7 +168,7 @@ def _is_shape(around: list[ast.AST]) -> bool:
 
 
 def _changed(node: ast.AST) -> ast.expr | None:
-    """What becomes of an expression; None where nothing is changed."""
+    """The replacement of an expression; None where nothing is changed."""
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
         if isinstance(node.value, int):
             return ast.Constant(node.value + 1)

@@ -31,7 +31,7 @@ Reached = dict[str, tuple[float, list[list[str | int]]]]
 
 
 def get_ready() -> None:
-    """Import what forks then need not."""
+    """Import modules before forking, so that forks need not."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     for name in BEFOREHAND:

@@ -118,7 +118,7 @@ def test_what_is_broken_stays_broken():
     assert turned[0] > 1.01 * turned[1]
 
 
-def test_rigid_blocks_and_faces_break_alike():
+def test_rigid_blocks_and_faces_break_equally():
     """A joint that is statically determinate: the same bonds, forces to 1e-9."""
     states = [
         under(block(each, friction=0.9, cohesion=20e3, tension=10e3), 0.55, -1.0)
@@ -235,7 +235,7 @@ def test_limit_analysis_refuses_bonds():
         af.stands(bonded().structure)
 
 
-def test_limit_analysis_tells_of_teeth_that_it_leaves_out(caplog):
+def test_limit_analysis_warns_of_teeth_that_it_leaves_out(caplog):
     structure = block(height=0.1, **TEETH).structure
     found = af.collapse_factor(structure, live=af.BodyForce(1.0, 0.0), friction="nonassociated")
     assert found.factor == pytest.approx(0.5, rel=1e-6)

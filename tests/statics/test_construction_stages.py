@@ -1,4 +1,4 @@
-"""Dead load by stages: closed forms of columns, balance of forces, and what comes after."""
+"""Dead load by stages: closed forms of columns, balance of forces, and later analyses."""
 
 from dataclasses import replace
 
@@ -106,7 +106,7 @@ def test_what_was_built_in_stages_is_in_balance(bridge):
     assert -carried == pytest.approx(bridge.weight, rel=1e-8)
 
 
-def test_runs_and_modes_go_on_from_what_was_built(column):
+def test_runs_and_modes_start_from_the_built_state(column):
     """A structure at rest stays at rest, though its joints began in different places."""
     model = af.build(column, fidelity="rigid")
     dead = af.dead_load(model, stages=one_by_one(column))
@@ -201,7 +201,7 @@ def test_a_stage_that_cannot_stand_is_named(bridge):
 
 
 @pytest.mark.parametrize(("friction", "tension"), [(None, 0.0), (0.6, 2e4)])
-def test_forces_on_what_stands_are_the_slope_of_its_energy(column, friction, tension):
+def test_forces_on_placed_blocks_are_the_slope_of_their_energy(column, friction, tension):
     """By central differences: two courses of three whose joints open and shear, and do not slide.
 
     A millionth of the largest force: steps of 1e-9 m lose 1e-16 of the energy over 1e-9 m.

@@ -131,7 +131,7 @@ def test_an_ordinary_ring_is_not_in_doubt():
     assert dead_load_doubts(resting(friction=None)) == ()
 
 
-def test_joints_that_never_slide_must_not_bear_what_no_stone_bears():
+def test_shear_beyond_friction_in_joints_that_never_slide_is_a_doubt():
     """Plane blocks one beside the other between walls: what holds them is shear alone."""
     dead = resting(embrace=7.0, friction=None)
     assert float(dead.joints["friction"].max()) > 3.5
@@ -139,11 +139,11 @@ def test_joints_that_never_slide_must_not_bear_what_no_stone_bears():
     assert "joints slide from 1 on: they hold only because they never slide" in doubt.cause
 
 
-def test_criteria_say_from_where_joints_slide():
+def test_doubts_use_the_friction_of_the_criteria():
     assert "slide from 0.2 on" in dead_load_doubts(resting(friction=None), 0.2)[0].cause
 
 
-def test_slips_and_coefficients_that_nobody_means():
+def test_large_slips_and_small_coefficients_are_doubts():
     """A wedge that friction does not hold comes to rest millimetres below where it was drawn."""
     slid, smooth = dead_load_doubts(resting(embrace=7.0, voussoirs=3, friction=1e-3))
     assert "joints slide by up to 1.18 mm" in slid.cause
@@ -153,7 +153,7 @@ def test_slips_and_coefficients_that_nobody_means():
 @pytest.mark.parametrize(
     ("read", "least", "factor"), [("friction", 1.0, 1.0), ("slip", 1e-3, 1e3), ("slip", -1e-3, 1e3)]
 )
-def test_doubts_begin_where_they_are_said_to(read, least, factor):
+def test_doubts_begin_at_their_documented_bounds(read, least, factor):
     """By two per cent to either side: V / N of one, a slip of a millimetre either way."""
     dead = resting()
     for share, doubted in ((0.98, False), (1.02, True)):

@@ -1,4 +1,4 @@
-"""One block cut free: what its joints and its weight do must balance, with the right senses."""
+"""One block cut free: forces of its joints and its weight balance, with the right senses."""
 
 from pathlib import Path
 
@@ -61,7 +61,7 @@ def test_shear_and_moment_have_the_senses_they_are_drawn_with(portal, tilt):
         assert abs(body.moment) < BALANCED * body.sizes.max()  # it acts at the centroid
 
 
-def test_what_a_joint_does_to_one_block_it_does_against_the_other(ring, ring_model):
+def test_forces_of_a_joint_on_its_two_blocks_are_opposite(ring, ring_model):
     joints = af.dead_load(ring_model).joints
     lower, higher = (forces_on(ring, joints, number) for number in (5, 6))
     assert lower.names == ("joint 4", "joint 5", "weight")

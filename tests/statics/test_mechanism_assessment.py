@@ -155,7 +155,7 @@ def test_the_ring_of_the_readme(ring, verified):
     assert found.curve["d"].values[-1] == found.d_0_star
 
 
-def test_an_arch_on_piers_has_the_mass_of_what_moves(verified):
+def test_an_arch_on_piers_has_the_mass_of_its_moving_blocks(verified):
     """Hinges at joints 3, 7, 11 and the right pier's base: bodies by instantaneous centres."""
     structure = af.arch_on_piers(
         radius=3.0, thickness=0.6, voussoirs=11, pier_breadth=1.2, courses=[1.5, 1.5]

@@ -1,4 +1,4 @@
-"""Newton's method: what it finds, and what it hands on to PETSc."""
+"""Newton's method: its solutions, and systems that it passes to PETSc."""
 
 import numpy as np
 import pytest

@@ -13,7 +13,7 @@ from archfem.statics.newton import EquilibriumSolver
 
 @pytest.fixture
 def alone(monkeypatch):
-    """As if FEniCSx and what it stands on were not installed."""
+    """FEniCSx and its libraries as if not installed."""
 
     def found(name):
         return None if name in ("dolfinx", "petsc4py", "mpi4py") else name
@@ -46,7 +46,7 @@ def test_a_dead_load_is_that_of_petsc(ring, monkeypatch):
     assert other.q == pytest.approx(usual.q, rel=1e-8, abs=1e-8 * np.abs(usual.q).max())
 
 
-def test_full_steps_of_what_is_small_do_without_petsc(monkeypatch):
+def test_full_steps_of_small_systems_need_no_petsc(monkeypatch):
     """PETSc searches along a step; options are for it alone, and so is what is large."""
     monkeypatch.setitem(sys.modules, "archfem.statics.snes", None)
     start = np.array([5.0])
@@ -69,7 +69,7 @@ def test_full_steps_of_what_is_small_do_without_petsc(monkeypatch):
         (lambda q: np.exp(q), lambda q: sparse.csr_matrix([[np.exp(q[0])]]), "too many iterations"),
     ],
 )
-def test_what_has_no_solution_says_why(alone, force, tangent, says):
+def test_an_equation_without_a_solution_is_refused_with_the_reason(alone, force, tangent, says):
     with pytest.raises(af.DidNotConverge, match=says):
         EquilibriumSolver(1).solve(force, tangent, np.array([0.0]), 1.0, ["basic"])
 
@@ -82,7 +82,7 @@ def test_a_step_that_leads_nowhere_down(alone, search, force):
         EquilibriumSolver(1).solve(force, stiffness, np.array([5.0]), 1.0, [search])
 
 
-def test_a_search_down_the_residual_finds_what_full_steps_go_to_and_fro_over(alone):
+def test_a_search_down_the_residual_converges_where_full_steps_oscillate(alone):
     """arctan from 2, whose full steps grow; it needs no energy, and the root is 0."""
 
     def slope(q):
@@ -94,7 +94,7 @@ def test_a_search_down_the_residual_finds_what_full_steps_go_to_and_fro_over(alo
     assert abs(solved.q[0]) < 1e-10  # the tolerance of a solve, relative to a load of 1
 
 
-def test_what_only_petsc_can_do_says_how_it_is_had(monkeypatch):
+def test_errors_of_missing_petsc_state_how_to_install_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "archfem.statics.snes", None)
     with pytest.raises(af.errors.NotInstalled, match="python3-dolfinx"):
         EquilibriumSolver(1, Newton(petsc={"pc_type": "svd"}))

@@ -127,7 +127,7 @@ def test_a_path_that_crawls_at_its_limit_ends_and_says_so():
         (1.01e-1, 0.0, STAGNATION_STEPS, True, STAGNATION_STEPS, False),
     ],
 )
-def test_what_hardly_moves_in_many_steps_crawls(
+def test_a_path_that_barely_moves_in_many_steps_crawls(
     moved, grown, steps, slides, most, crawls, monkeypatch
 ):
     """Shares are of the last displacement and factor; what lies before those steps is all one."""
@@ -298,7 +298,7 @@ def test_a_rule_ends_the_creep(slides, monkeypatch):
     )
 
 
-def test_only_what_slides_after_a_first_step_creeps(slides):
+def test_only_joints_that_slide_after_a_first_step_creep(slides):
     assert (
         pushover.continue_by_relaxation(RelaxedPath([True], states=1), STOP, af.Criteria()) is None
     )

@@ -296,7 +296,7 @@ def test_an_equilibrium_is_sought_until_it_is_in_balance_as_it_was_left(found):
 
 
 def test_the_first_may_be_in_balance_by_chance(found):
-    """What its joints then remember is looked at all the same."""
+    """The memory of its joints is checked even so."""
     found += [0, 0]
     _, solved = relaxation.solve_irreversible(None, Toothed(0.0), np.zeros(2), np.zeros(2))
     assert solved.q.tolist() == [2.0, 2.0]

@@ -1,4 +1,4 @@
-"""Why PETSc's solver ended, in our words; and what loading PETSc changes."""
+"""Why PETSc's solver ended, in archfem's words; and the effects of loading PETSc."""
 
 from pathlib import Path
 

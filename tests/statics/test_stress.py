@@ -89,7 +89,7 @@ def test_a_column_presses_with_the_weight_above():
     assert use["use"].values == pytest.approx(use["compression"].values / (56.0 * af.units.MPa))
 
 
-def test_corners_tell_the_peak_where_centres_miss_it(ring, ring_model, dead):
+def test_corners_have_the_peak_where_centres_miss_it(ring, ring_model, dead):
     """Against 16 × 16 cells, 4 × 4 centres are 13 % short of the peak, corners 3 %."""
     fine = af.build(ring, fidelity="full", cells=(16, 16))
     exact = float(strength_use(fine, af.dead_load(fine).q)["compression"].max())

@@ -114,7 +114,7 @@ def test_scheduler_and_workers_as_processes(study_file, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_dies_leaves_what_was_finished(small_ring, finders, tmp_path, monkeypatch):
+def test_a_scheduler_that_dies_leaves_the_finished_rows(small_ring, finders, tmp_path, monkeypatch):
     monkeypatch.setattr("archfem.studies.cluster.SCHEDULER_TIMEOUT", 20.0)
     over = {"structure.thickness": [0.5 + 0.01 * k for k in range(12)]}
     find = {"name": "finders_of_tests:slowly", "seconds": 0.5}

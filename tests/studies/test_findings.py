@@ -1,4 +1,4 @@
-"""What a study finds: kept in files, set side by side in tables."""
+"""Findings of a study: kept in files, set side by side in tables."""
 
 import json
 
@@ -30,7 +30,7 @@ def finding(**given):
     return Finding(**every | given)
 
 
-def test_a_study_tells_rings_from_piers_by_their_roles():
+def test_a_study_distinguishes_rings_from_piers_by_their_roles():
     named = {"runs": {}, "scales": {}, "dead": {"vault": 0.2, "stem": 0.1}}
     found = finding(roles={"vault": "ring", "stem": "pier"}, **named)
     run = finding().runs["a"] | {"eccentricity": {"vault": 0.41, "stem": 0.32}}

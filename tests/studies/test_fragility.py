@@ -25,7 +25,7 @@ def test_exact_capacities_give_mean_and_deviation_of_their_logarithms():
     assert found.misfit == pytest.approx(stats.kstest(capacities, fitted.cdf).statistic, rel=1e-6)
 
 
-def test_censored_capacities_give_what_the_likelihood_has_its_peak_at():
+def test_censored_capacities_give_the_curve_of_largest_likelihood():
     capacities = drawn(60)
     lower, upper = 0.9 * capacities, 1.1 * capacities
     beyond = capacities > 3.5
@@ -48,7 +48,7 @@ def test_many_samples_recover_their_curve():
     assert found.dispersion == pytest.approx(DISPERSION, rel=3 / np.sqrt(8000))
 
 
-def test_stripes_give_what_the_likelihood_has_its_peak_at():
+def test_stripes_give_the_curve_of_largest_likelihood():
     levels = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 6.0])
     share = stats.lognorm(s=DISPERSION, scale=MEDIAN).cdf(levels)
     exact = stripe_fragility(levels, 1e4 * share, 1e4, resamples=10)
@@ -88,7 +88,7 @@ def test_what_is_not_lognormal_is_seen():
     assert uneven.goodness < 0.01
 
 
-def test_a_curve_says_its_median_and_dispersion():
+def test_a_curve_states_its_median_and_dispersion():
     curve = fragility(np.exp([0.0, 1.0, 2.0]))
     assert str(curve).startswith(f"median {np.e:.3g} (")
     assert f"dispersion {curve.dispersion:.2f}, " in str(curve)
@@ -123,7 +123,7 @@ def test_variants_and_motions_share_the_variance_of_all_together():
         (([2.0, 1.0, 1.0], [1.0, 3.0, 0.5]), "none larger below"),
     ],
 )
-def test_capacities_that_tell_nothing(given, says):
+def test_invalid_capacities_are_refused(given, says):
     with pytest.raises(af.InvalidInput, match=says):
         fragility(*given)
     with pytest.raises(af.InvalidInput, match="no more failures"):

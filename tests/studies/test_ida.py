@@ -1,4 +1,4 @@
-"""Incremental dynamic analysis: brackets, curves, and what is made of them."""
+"""Incremental dynamic analysis: brackets, curves, and their summaries."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def small_ida(tmp_path_factory):
     )
 
 
-def test_brackets_hold_what_runs_at_their_ends_do(small_ida):
+def test_brackets_agree_with_runs_at_their_ends(small_ida):
     case, _, found = small_ida
     assert found.limits == ("first hinge", "four failures", "verified")
     motion = af.Motion.synthetic(seed=2, duration=0.6, pga=9.0)
@@ -170,7 +170,7 @@ def test_pairs_of_a_suite_are_the_motions_where_none_are_given(small_ida):
     assert halved.table["pga"].values == pytest.approx(0.5 * found.table["pga"].values)
 
 
-def test_a_motion_is_what_its_table_says(small_ida):
+def test_a_motion_is_that_of_its_table(small_ida):
     case, _, _ = small_ida
     motion = af.Motion.synthetic(seed=2, duration=0.6, pga=9.0)
     few = {"precision": 0.5, "between": (2.0, 2.0), "limits": ["first hinge"], "workers": 1}

@@ -1,4 +1,4 @@
-"""What a worker keeps between points answers nothing else, and saves what it may."""
+"""Caches of a worker between points: never of another point, and used where they may be."""
 
 from copy import copy, deepcopy
 from dataclasses import replace
@@ -94,7 +94,7 @@ def test_motions_are_read_once_at_any_scale_and_scaled_as_by_the_case(monkeypatc
     assert np.array_equal(turned.horizontal, -synthetic(**made[0]).horizontal)
 
 
-def test_a_suite_is_matched_once_whatever_its_factors(monkeypatch):
+def test_a_suite_is_matched_once_for_all_factors(monkeypatch):
     settings = {key: deepcopy(CASE[key]) for key in ("structure", "model", "analysis")}
     settings["suite"] = {
         "matched": True,

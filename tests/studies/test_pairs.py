@@ -1,4 +1,4 @@
-"""Pairs on processes leave what `carried_out` finds, and it is what it would have found itself."""
+"""Pairs on processes: the results that `carried_out` reads are those of one process."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Workers of a study: how they end, what they inherit, and who outlives whom."""
+"""Workers of a study: how they end, their settings, and the order in which processes end."""
 
 import os
 import re
@@ -43,7 +43,7 @@ def study_of(case, find, thicknesses, folder):
     return af.Study.of(case, over, find)
 
 
-def test_the_driver_says_once_what_workers_compile(small_ring, tmp_path, finders, capsys):
+def test_the_driver_reports_once_that_workers_compile(small_ring, tmp_path, finders, capsys):
     over = {"structure.thickness": [0.5, 0.6, 0.7, 0.8]}
     study = af.Study.of(small_ring, over, "finders_of_tests:compiling")
     study.run(tmp_path, workers=2)

@@ -27,12 +27,12 @@ from archfem.studies.shared_results import compute_once, share_results
 
 @pytest.fixture
 def undo():
-    """What is to be done after the test."""
+    """Calls to be made after the test."""
     with ExitStack() as stack:
         yield stack
 
 
-def test_a_study_finds_of_each_point_what_its_case_does_alone(small_ring, tmp_path):
+def test_each_point_of_a_study_has_the_results_of_its_case_alone(small_ring, tmp_path):
     over = {"structure.thickness": [0.5, 0.6], "motion.scale": [0.5, 2.0]}
     found = af.Study.of(small_ring, over).run(workers=1)
     assert dict(found.sizes) == {"structure.thickness": 2, "motion.scale": 2}
@@ -236,7 +236,7 @@ def test_a_second_driver_is_refused(study_file, tmp_path):
     )
 
 
-def test_a_full_disk_is_named_and_what_was_finished_stays(study_file, tmp_path, monkeypatch):
+def test_a_full_disk_is_named_and_finished_points_stay(study_file, tmp_path, monkeypatch):
     folder, written = tmp_path / "out", []
     fsync = os.fsync
 
@@ -304,7 +304,7 @@ def test_progress_is_reported_where_the_output_is_a_file(
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_repeated_warning_is_said_once(small_ring, finders, caplog, workers):
+def test_a_repeated_warning_is_logged_once(small_ring, finders, caplog, workers):
     over = {"structure.thickness": [0.5, 0.6, 0.7]}
     af.Study.of(small_ring, over, "finders_of_tests:noisy").run(workers=workers)
     said = [record.getMessage() for record in caplog.records]
@@ -315,7 +315,7 @@ def test_a_repeated_warning_is_said_once(small_ring, finders, caplog, workers):
     assert said[2:] == ["4 more warnings as above, of other runs, are not repeated"]
 
 
-def test_cases_and_what_is_computed_are_in_one_file(ring_file, tmp_path, capsys):
+def test_cases_and_findings_are_in_one_file(ring_file, tmp_path, capsys):
     path, folder = tmp_path / "study.toml", tmp_path / "out"
     path.write_text(
         'title = "two measures"\ncompute = "limit"\nset = ["limit.horizontal=1.0"]\n'
@@ -354,7 +354,7 @@ def test_pairs_that_another_worker_matches_are_left_for_later(small):
     assert tasks.pop(None, (), {"first"}).pair == "first"  # better than to wait
 
 
-def test_a_long_table_is_cut_and_equal_findings_are_said_once(small_ring):
+def test_a_long_table_is_cut_and_equal_findings_are_stated_once(small_ring):
     over = {"structure.thickness": ["0.5 m", "0.6 m", "0.7 m"]}
     table = af.Study.of(small_ring, over, lambda case: {"a": 1.5, "b": case.structure.weight}).run(
         workers=1
@@ -401,7 +401,7 @@ def test_cases_with_a_suite_are_computed_under_each_pair(small, tmp_path):
     assert all(len(finding.runs) == 2 for finding in study.findings(table).values())
 
 
-def test_status_tells_how_far_a_study_is(study_file, tmp_path, capsys):
+def test_status_states_the_progress_of_a_study(study_file, tmp_path, capsys):
     folder = tmp_path / "out"
     command = ["study", "--own-code", str(study_file), "--out", str(folder), "--workers", "1"]
     assert af.commands.main(command) == 0
@@ -468,7 +468,7 @@ def test_points_may_be_listed(small_ring):
     assert study.points[1].case.title == "other"
 
 
-def test_a_study_goes_over_pairs_of_a_suite(small):
+def test_a_study_varies_pairs_of_a_suite(small):
     case = af.Case.read(small)
     found = af.Study.of(case, {"suite.pair": ["first", "second"]}).run(workers=1)
     run = af.cases.run_time_history(
@@ -560,7 +560,7 @@ def test_the_job_for_slurm_in_the_documentation_is_a_script(tmp_path):
     assert "dask scheduler" in job.read_text()
 
 
-def test_a_file_runs_no_code_unless_one_says_so(study_file, tmp_path, capsys):
+def test_a_file_runs_no_code_without_permission(study_file, tmp_path, capsys):
     """A module beside the file would run as it is imported."""
     mark = tmp_path / "ran"
     (tmp_path / "beside.py").write_text(f"import pathlib\npathlib.Path({str(mark)!r}).touch()\n")

@@ -1,4 +1,4 @@
-"""Runs over uncertain properties: what is varied, and what each run gets."""
+"""Runs over uncertain properties: the varied properties, and the case of each run."""
 
 from dataclasses import replace
 
@@ -35,7 +35,7 @@ def motion():
 
 @pytest.fixture
 def calls(monkeypatch):
-    """What runs would get; they are not computed."""
+    """The cases of runs, which are not computed."""
     calls = []
 
     def state(*given):

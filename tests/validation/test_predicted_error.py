@@ -1,4 +1,4 @@
-"""Is what `fidelity="auto"` predicts what comes about? And the study of speed against error."""
+"""Predictions of `fidelity="auto"` against actual errors, and the study of speed against error."""
 
 from dataclasses import replace
 
@@ -110,7 +110,7 @@ def test_each_model_is_built_once_and_damping_is_computed_of_the_first(ring, dt)
 
 @pytest.mark.slow
 def test_damping_found_of_the_first_model_is_that_of_the_choice(ring):
-    """A function of the model, and what it gives, are the same to the last digit."""
+    """A function of the model, and its result, are the same to the last digit."""
     motion = af.Motion.synthetic(duration=1.0, pga=1.0, seed=1)
     first = plain(ring, exact_discretisation(ring, *TRIED_SETTINGS[0][:2]))
     given = af.dynamics.effective_damping(first, about=af.dead_load(first))
@@ -175,7 +175,7 @@ def test_without_a_motion_a_severe_one_is_assumed(ring):
 
 
 @pytest.mark.slow
-def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
+def test_a_tolerance_out_of_reach_is_warned_of(ring, caplog):
     motion = af.Motion.synthetic(duration=0.25, pga=2.0, seed=3)
     prediction = select_model(ring, 1e-9, motion, builder=quick).prediction
     assert not prediction.is_met

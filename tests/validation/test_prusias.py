@@ -1,4 +1,4 @@
-"""The Prusias ad Hypium bridge: what Demirel and Aldemir (2021) report, and a trial of it.
+"""The Prusias ad Hypium bridge: results of Demirel and Aldemir (2021), and an independent trial.
 
 They report a collapse mechanism under all of six motions at R = 3, by their criterion of four
 failed joints in one ring. Six made pairs give it under two by their law, and under none where
@@ -23,7 +23,7 @@ PAPER = [
     "criteria.friction=0.60",
     "analysis.scheme=newmark",
 ]
-"""The paper's law of joints, which are elastic in shear and judged by what they would need."""
+"""The paper's law of joints, which are elastic in shear and judged by the friction they need."""
 
 SPRINGS = "model={ fidelity = 'full', quadrature = 'nodal' }"
 

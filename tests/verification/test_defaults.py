@@ -110,7 +110,7 @@ DEFAULTS = [
 
 
 def found(name):
-    """What a path of names stands for."""
+    """The object of a path of names."""
     module, *inner = name.split(".")
     place = import_module("archfem")
     for each in (module, *inner):

@@ -156,7 +156,7 @@ def test_a_joint_at_the_crown(stones, fidelity):
     assert e == pytest.approx(e[::-1], abs=1e-6)
 
 
-def test_compiled_solvers_refuse_what_is_not_compiled(ring, full):
+def test_compiled_solvers_refuse_laws_that_are_not_compiled(ring, full):
     slow = af.build(glued(ring), cells=(1, 1), fidelity="monolithic")
     far = af.build(ring, fidelity="rigid", displacements="large")
     for model, method in ((slow, "newton"), (slow, "compliance"), (far, "compliance")):

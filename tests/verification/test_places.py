@@ -1,4 +1,4 @@
-"""What does not depend on where a structure stands: the origin of a drawing is nobody's.
+"""Results do not depend on where a structure stands: the origin of a drawing is arbitrary.
 
 Places go with the structure; forces, displacements and factors are what they were. A centre added
 where it is to be taken away, or a level in place of a rise, is nothing about the origin.
@@ -71,7 +71,7 @@ def at_rest(away):
 
 
 def at_the_limit(away):
-    """A bridge with its fill: factors, what moves, and blocks into which a fill is cut."""
+    """A bridge with its fill: factors, moving parts, and blocks into which a fill is cut."""
     bridge, found = moved(arch_bridge(), away), {}
     gravel, x = af.limit.Fill(friction_angle=35.0), float(away[0])
     for name, live in (

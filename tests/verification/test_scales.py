@@ -1,4 +1,4 @@
-"""What does not depend on scale: an arch in other units of force, and as a small copy of itself.
+"""Results do not depend on scale: an arch in other units of force, and a small copy of it.
 
 Buckingham's theorem: with lengths l, widths w and weights per volume γ times as large, forces are
 γ l² w, stresses γ l, stiffnesses of joints γ and times √l times as large, and all ratios the same.

@@ -1,4 +1,4 @@
-"""Pictures of limit analysis: what they show, not how they look."""
+"""Pictures of limit analysis: their content, not their looks."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Incremental dynamic analysis and fragility: what is drawn where."""
+"""Incremental dynamic analysis and fragility: positions of drawn objects."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ import archfem as af
 from archfem.view import draw_fragility, draw_ida
 
 
-def test_curves_turn_back_and_what_was_not_met_is_an_arrow():
+def test_curves_turn_back_and_unreached_capacities_are_arrows():
     curves = [
         ("a", np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.3, 0.2])),
         ("b", np.array([1.0, 2.0]), np.array([0.2, np.inf])),

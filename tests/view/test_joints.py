@@ -1,4 +1,4 @@
-"""Joints over time: what was recorded, and its limits."""
+"""Joints over time: recorded quantities, and their limits."""
 
 from dataclasses import replace
 
@@ -98,7 +98,7 @@ def test_joints_that_never_slide_have_no_limit(ring):
     assert len(draw_joints(held, [0]).axes[2].lines) == 1
 
 
-def test_joints_that_tell_most_are_no_twins(ring):
+def test_the_most_stressed_joints_are_no_mirror_images(ring):
     """Joints 4 and 13 hinge alike, mirror images; joint 9 slides for longest, and is the second."""
     time = np.linspace(0.0, 1.0, 11)
     found = np.zeros((11, 18, 3))

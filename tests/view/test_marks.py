@@ -8,7 +8,7 @@ import archfem as af
 from archfem.view.joint_marks import joint_marks
 
 
-def test_arrows_say_which_way_a_joint_slips(ring, joints):
+def test_arrows_show_the_direction_of_slip(ring, joints):
     """V > 0: the higher block, on the side of the normal, moves toward the extrados."""
     arrows = joint_marks(ring, joints).slips.reshape(-1, 2, 7, 2)
     for number, pair in zip(SLIDING, arrows, strict=True):

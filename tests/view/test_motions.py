@@ -1,4 +1,4 @@
-"""What the pictures of motions show, read back from the drawn lines."""
+"""Content of the pictures of motions, read back from the drawn lines."""
 
 from dataclasses import replace
 

@@ -58,8 +58,8 @@ def test_small_motions_move_ends_as_of_small_displacements(column):
     np.testing.assert_allclose(middle, wanted, atol=1e-11)
 
 
-def test_the_thrust_line_goes_through_the_hinge_of_moved_faces(column, toppled):
-    """At the last instant before stones are loose, between the ends of what overlaps."""
+def test_the_thrust_line_passes_through_the_hinge_of_moved_faces(column, toppled):
+    """The last instant before stones are loose, between the ends of the overlap."""
     q = toppled.dataset["last_q"].values
     joints = toppled.joints.isel(time=-1)
     ends = column.structure.ends + column.observer().joint_ends(q)

@@ -41,12 +41,12 @@ def test_several_curves_keep_their_discs_and_lose_the_words(push):
     assert len(discs) == len({*push.hinge_steps}) + len({*other.hinge_steps})
 
 
-def test_a_settlement_says_what_it_measures():
+def test_the_axis_of_a_settlement_names_its_quantity():
     push = af.pushover(MODEL, af.Settlement("left abutment", (-1.0, 0.0, 0.0)))
     assert "settlement" in draw_pushover({"spread": push}).axes[0].get_ylabel()
 
 
-def test_hinges_come_in_order_and_depend_on_what_counts_as_one(push):
+def test_hinges_are_in_order_and_depend_on_their_criterion(push):
     assert list(push.hinge_steps) == sorted(push.hinge_steps)
     strict = af.pushover(MODEL, af.BodyForce(1.0), criteria=af.Criteria(hinge=0.4999))
     assert set(strict.hinges) <= set(push.hinges)

@@ -1,4 +1,4 @@
-"""Tornado and convergence: what is drawn where."""
+"""Tornado and convergence: positions of drawn objects."""
 
 import numpy as np
 import pytest

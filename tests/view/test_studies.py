@@ -1,4 +1,4 @@
-"""A study in one picture: medians, ranges, and what was not reached."""
+"""A study in one picture: medians, ranges, and unreached capacities."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def lines(axes, marker):
     return np.concatenate(found)
 
 
-def test_medians_are_marks_and_what_was_not_reached_is_an_arrow():
+def test_medians_are_marks_and_unreached_capacities_are_arrows():
     axes = draw_study(FOUND, reduction=3.0).axes[0]
     assert sorted(lines(axes, "o")[:, 0]) == pytest.approx([0.5, 0.7, 1.2])
     ((place, row),) = lines(axes, ">")

@@ -72,7 +72,7 @@ def test_a_block_topples(verified):
 
 
 @pytest.mark.parametrize("restitution", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
-def test_a_rocking_block_loses_what_housner_says(restitution, verified):
+def test_a_rocking_block_loses_the_energy_of_housner(restitution, verified):
     structure = rocking_block()
     start = tilted(structure, 0.5 * TILT)
     falling = RigidBlockSimulation(structure, dt=2e-4, restitution=restitution)
@@ -88,7 +88,7 @@ def test_a_rocking_block_loses_what_housner_says(restitution, verified):
     verified(case, KEPT, "Housner (1963)", rates[1:] / rates[:-1])
 
 
-def test_what_is_heavy_pushes_what_is_light_as_momentum_says():
+def test_a_heavy_block_pushes_a_light_one_by_momentum():
     """Two boxes on a floor without friction meet at 2 m/s: (1 + e) m₁ / (m₁ + m₂) of it."""
     structure = floor((0.0, 0.0, 1.0, 1.0), (1.5, 0.0, 2.0, 1.0), friction=0.0)
     start = LooseBlocks.as_built(structure)

@@ -216,7 +216,7 @@ def test_strain_energy_lifts_blocks_out_of_compressed_joints(share):
 
 
 def test_energy_from_nowhere_is_refused(monkeypatch, chords):
-    """What a coarse step gains is above a bound far below the true one."""
+    """A coarse step gains energy: the height is above a bound far below the true one."""
     monkeypatch.setattr("archfem.dynamics.rigid_body.time_stepping.MAX_ENERGY_GAIN", 1e-12)
     monkeypatch.setattr("archfem.dynamics.rigid_body.time_stepping.ENERGY_GAIN_NOISE", 0.0)
     with pytest.raises(af.errors.DidNotConverge, match="from nowhere"):

@@ -39,7 +39,7 @@ def test_a_drawing_of_where_the_blocks_are(tmp_path, magnification):
 
 
 def test_a_drawing_is_a_survey_again(tmp_path):
-    """What is drawn of a state at rest is read as the structure it was made of."""
+    """The drawing of a state at rest is read as its structure."""
     ring = af.circular_arch(radius=2.0, thickness=0.4, embrace=150.0, voussoirs=5, chords=1)
     model = af.build(ring, fidelity="rigid")
     path = write_state(model, np.zeros(model.size), tmp_path / "ring.dxf")

@@ -1,4 +1,4 @@
-"""What blocks are coloured by, in which unit, and on which scale."""
+"""Quantities by which blocks are coloured, their units, and their scales."""
 
 import numpy as np
 import pytest

@@ -33,7 +33,7 @@ def test_few_fields_allow_of_little_slow_motion():
     assert slow_motion_timing(KEPT[::8], 5.0, (4.0, 5.0)).speeds.min() == pytest.approx(0.25)
 
 
-def test_a_film_of_another_length_tells_its_speed():
+def test_a_film_of_another_length_states_its_speed():
     assert even_timing(KEPT, 20.0, None).speeds == pytest.approx(1.0)
     assert even_timing(KEPT, 20.0, 40.0).speeds == pytest.approx(0.25)
 

@@ -1,4 +1,4 @@
-"""What stays the same over a film: how much is magnified, and what is seen."""
+"""Settings that are constant over a film: magnification, and the view."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Pictures of what falls: joints while they hold, then blocks alone, to the ground."""
+"""Pictures of falling structures: joints while they hold, then blocks alone, to the ground."""
 
 import imageio.v2 as imageio
 import numpy as np
@@ -35,7 +35,7 @@ def test_a_film_follows_blocks_to_the_ground(column, toppled, falls, tmp_path):
     assert len(imageio.mimread(path)) == round(10 * lasting)
 
 
-def test_the_view_has_room_for_what_falls_and_its_ground(setup, column, falls):
+def test_the_view_has_room_for_falling_blocks_and_the_ground(setup, column, falls):
     for time in falls.times[::10]:
         places = falls.places(column.cells.places, column.cells.block, time)
         assert (places >= setup.low).all()
@@ -100,7 +100,7 @@ def test_colours_span_the_fall_that_is_seen(setup, column, toppled, falls):
     assert far.scale.extend == "max"
 
 
-def test_the_legend_names_what_is_drawn(setup, toppled, falls):
+def test_the_legend_names_the_drawn_states(setup, toppled, falls):
     """No joint of the column slides, and loose blocks have no marks at all."""
     assert not toppled.joints["slide"].any()
     layout = FrameLayout(setup, (480, 320), toppled.joints, toppled)

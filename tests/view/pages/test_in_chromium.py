@@ -31,7 +31,7 @@ def corners(driver, block):
     return np.column_stack([left + drawn[:, 0] / scale, top - drawn[:, 1] / scale]), by, time, scale
 
 
-def test_the_player_draws_what_the_history_says(rocked, tmp_path):
+def test_the_player_draws_the_states_of_the_history(rocked, tmp_path):
     model, run = rocked
     path = af.view.player(run, model).save(tmp_path / "player.html")
     outlines = Outlines(model.structure)

@@ -1,4 +1,4 @@
-"""Arrays in a page come out as they went in, to half a quantum."""
+"""Arrays in a page are read as they were written, to half a quantum."""
 
 import numpy as np
 import pytest

@@ -74,7 +74,7 @@ def test_scenes_of_another_structure_or_model_are_refused(rocked, ring):
         Scene(model.structure, af.History(dataset), model)
 
 
-def test_the_legend_names_what_some_instant_shows(rocked):
+def test_the_legend_names_the_states_of_any_instant(rocked):
     model, run = rocked
     legend = {
         "hinge": ">hinge</span>",
