@@ -8,7 +8,7 @@ import pytest
 
 
 def each_once(*values: Sequence[Any]) -> list[Any]:
-    """Return all combinations of values; those that repeat what a few of them show are slow.
+    """Return all combinations of values; all but a few of them are slow.
 
     The few are the diagonal: the first values of all parameters, the second ones, and so on, where
     a shorter list begins anew. So each value is in one of them at least.

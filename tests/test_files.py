@@ -21,7 +21,7 @@ def test_a_file_appears_when_it_is_whole(tmp_path):
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_what_breaks_off_leaves_the_old_file(tmp_path):
+def test_an_interrupted_write_leaves_the_old_file(tmp_path):
     path = tmp_path / "run.txt"
     path.write_text("old")
 
@@ -99,7 +99,7 @@ def test_results_of_a_command_are_replaced_together(tmp_path):
         *("a.txt", "b.txt", "pair/c.txt", "modes.txt", "report.html", "archfem.json"),
     }
     write(tmp_path, "run", "two", a_txt="2")
-    # what the other run had alone is gone, and its report; the other command's file is its own
+    # files of the other run alone are gone, and its report; the other command's file is its own
     assert {*contents(tmp_path)} == {"a.txt", "modes.txt", "archfem.json"}
     assert not (tmp_path / "pair").exists()
     groups = _files.read_file_list(tmp_path)
@@ -108,7 +108,7 @@ def test_results_of_a_command_are_replaced_together(tmp_path):
     assert _files.read_file_list(tmp_path)["modes"].files == {}
 
 
-def test_what_was_written_from_other_results_vanishes_with_these(tmp_path):
+def test_files_of_other_results_are_removed_with_them(tmp_path):
     """A report stays only where the very same run is repeated."""
     for text, left in (("first", True), ("first", True), ("second", False)):
         write(tmp_path, "run", "inputs", case_toml=text)

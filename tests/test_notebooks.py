@@ -38,7 +38,7 @@ def cells_of(notebook):
 
 @pytest.mark.parametrize("name", EXPECTED)
 def test_notebooks_are_shipped_as_their_scripts_ran(name):
-    """`make notebooks` brings what is shipped up to date; all of it is below 6 MB."""
+    """`make notebooks` brings shipped notebooks up to date; all of it is below 6 MB."""
     jupytext = pytest.importorskip("jupytext")
     script, shipped = (jupytext.read(FOLDER / f"{name}.{end}") for end in ("py", "ipynb"))
     assert cells_of(shipped) == cells_of(script)

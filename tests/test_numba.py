@@ -100,8 +100,8 @@ def test_damaged_code_is_found_and_compiled_anew(which, damage, stored):
         compiled(hits=1)
 
 
-def test_of_several_processes_one_compiles(tmp_path):
-    """They begin at once, and the others load what the first one has stored."""
+def test_one_of_several_processes_compiles(tmp_path):
+    """They begin at once, and the others load the code that the first one has stored."""
     (tmp_path / "functions.py").write_text(FUNCTION)
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     environment["PYTHONPATH"] = os.pathsep.join([os.getcwd(), str(tmp_path)])
@@ -155,7 +155,7 @@ def test_code_is_loaded_without_being_compiled(stored):
     assert other(2) == 2.5
 
 
-def test_what_is_stored_is_counted(stored):
+def test_stored_functions_are_counted(stored):
     assert _numba.cache_folders() == [stored["index"].parent]
     assert _numba.count_cached_functions() == 1
     stored["index"].unlink()

@@ -28,7 +28,7 @@ def threads():
     return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
 
 
-def test_what_is_decorated_takes_one_thread_and_gives_them_back():
+def test_a_decorated_function_takes_one_thread_and_restores_the_limit():
     inner = single_threaded(threads)
     with threadpool_limits(limits=2, user_api="blas"):
         assert threads() == {2}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 
-def test_what_packages_warn_of_among_themselves_is_no_error():
+def test_warnings_between_other_packages_are_no_errors():
     """matplotlib says so where the system has another version of it."""
     module = "matplotlib.projections"
     with warnings.catch_warnings(record=True) as met:

@@ -148,7 +148,7 @@ MADE = [
 
 
 @pytest.mark.parametrize(("make", "says"), MADE, ids=range(len(MADE)))
-def test_what_is_made_of_wrong_arguments(make, says):
+def test_constructors_refuse_wrong_arguments(make, says):
     with pytest.raises(af.InvalidInput, match=says):
         make()
 

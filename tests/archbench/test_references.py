@@ -61,7 +61,7 @@ def four_hinges(scene):
             a, b, c, d = (ends[j, (first + k) % 2] for k, j in enumerate(joints))
             if (centre := intersection(a, b, d, c)) is None:
                 continue
-            # rotations of the three parts: the first is 1, hinges move alike on both sides
+            # rotations of the three parts: the first is 1, hinges move equally on both sides
             second = ratio(b - a, b - centre)
             third = second * ratio(c - centre, c - d)
             work = np.zeros(2)

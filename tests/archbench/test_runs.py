@@ -54,7 +54,7 @@ def test_a_run_returns_the_answer_with_version_settings_and_cost(tmp_path):
         ('"factor": 0.5', '"other": 0.5', "no number for factor"),
     ],
 )
-def test_a_run_that_goes_wrong_says_so(tmp_path, old, new, message):
+def test_a_failed_run_reports_its_error(tmp_path, old, new, message):
     found = answer(toy(tmp_path, GOOD.replace(old, new)), {"n": 1}, limit=2.0)
     assert message in found["failed"]
     assert run.failures("toy", {"S04": {"runs": [found]}}) == [f"toy S04: {found['failed']}"]

@@ -148,7 +148,7 @@ def evaluate(case: af.Case, precision: float = 0.1) -> dict[str, Any]:
     """Return the accelerations allowed by both checks, and the bracket of the fall [g]."""
     begun = time.process_time()
     friction = case.settings["contacts"]["stone to stone"]["friction"]
-    # Limit analysis of the map's 13 stones, whatever a variant divides the ring into.
+    # Limit analysis of the map's 13 stones, for every number of stones of a variant.
     text = json.dumps({**case.settings["structure"], "voussoirs": 13}, sort_keys=True)
     allowed = allowed_accelerations(text, friction)
     result, motion = af.studies.dead_load_of(case), af.studies.ground_motion(case)

@@ -228,7 +228,7 @@ def compare(name: str, tolerance: float | None, duration: float | None) -> list[
             structure, fidelity="auto", tolerance=tolerance, motion=motion, damping=damping
         )
 
-    choose(motion.cut(0.0, 0.5))  # compiles, and loads, what the timed choice needs
+    choose(motion.cut(0.0, 0.5))  # compiles and loads kernels of the timed choice
     begin = process_time()
     prediction = choose(motion).prediction
     choosing = process_time() - begin

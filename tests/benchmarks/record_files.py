@@ -20,7 +20,7 @@ from archfem.motion import RecordText
 from archfem.motion.records.reader import find_format, read_channels
 from archfem.motion.records.waveforms import find_waveform_format
 
-# What lies beside records and is none: events, stations, pictures, archives
+# Files beside records that are none: events, stations, pictures, archives
 OTHER_FILES = "json xml yml yaml csv png html h5 xlsx grd md pdf mat zip pkl"
 
 

@@ -118,7 +118,7 @@ class Worker:
 def serve() -> None:
     """Answer commands from the standard input, a line of JSON each."""
     answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # whatever else is printed must not mix with the answers
+    os.dup2(2, 1)  # other output must not mix with the answers
     logging.disable(logging.WARNING)
     worker = Worker()
     for line in sys.stdin:

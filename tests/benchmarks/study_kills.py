@@ -65,7 +65,7 @@ if __name__ == "__main__":
         list(af.cases.run_case(case, folder))
 """
 
-# Case or study of each command, and what is ended: the process itself, workers, their fork server
+# Case or study of each command, and killed processes: itself, workers, their fork server
 COMMANDS = {
     "run": ("run.toml", ("driver",)),
     "suite": ("suite.toml", ("driver", "worker", "server")),
@@ -169,7 +169,7 @@ class Command:
         if self.what in RESUMED:
             return
         if self.what != "verdict":
-            af.cases.open_results(out)  # completes what a killed command had finished
+            af.cases.open_results(out)  # completes the results of a killed command
         found = visible(out)
         if self.what == "python":  # whose pairs appear one by one
             del found["archfem.json"]

@@ -135,7 +135,7 @@ def test_a_case_takes_its_damping_from_the_modes(small):
         r"along x, has \d+\.\d % of the mass",
         how,
     )
-    # Before a model is chosen it comes from one of elastic blocks, lower by what these yield.
+    # Before a model is chosen it is of elastic blocks, and lower by their compliance.
     elastic = af.build(case.structure, fidelity="condensed")
     expected = expected_damping(case)(elastic).frequency
     assert expected == af.cases.damping_of(case, af.dead_load(elastic))[0].frequency

@@ -127,7 +127,7 @@ def test_geometry_errors_name_the_file():
         af.Case.read(RING, ["structure.thickness=9"])
 
 
-def test_motion_must_be_one_thing():
+def test_a_case_has_one_source_of_its_motion():
     with pytest.raises(af.InvalidInput, match="either a file, or synthetic"):
         af.Case.read(RING, ["motion.file=x.AT2"]).ground_motion()
     with pytest.raises(af.InvalidInput, match=r"x\.AT2"):

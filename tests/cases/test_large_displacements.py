@@ -49,7 +49,7 @@ def test_displacements_reach_the_model(path):
         ("model.quadrature=nodal", None),
     ],
 )
-def test_what_large_displacements_do_not_know_is_refused(path, change, says):
+def test_settings_without_large_displacements_are_refused(path, change, says):
     if says is None:
         assert af.Case.read(path, [change]).discretisation.rule.rule == change.split("=")[1]
         return
@@ -88,7 +88,7 @@ def held(path):
     return done.history
 
 
-def test_a_run_that_holds_says_so(held):
+def test_a_run_that_stands_is_reported_so(held):
     assert held.verdict.headline.startswith("stands")
     assert "largest displacement of a corner " in str(held.verdict)
     assert _verdict_facts([held])[0] == ("verdict", held.verdict.headline)

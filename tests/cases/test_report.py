@@ -37,7 +37,7 @@ save_fields_every = 10
 
 @pytest.fixture(scope="module")
 def carried_out(tmp_path_factory):
-    """Folder of a suite of two pairs, with what a report reads of it."""
+    """Folder of a suite of two pairs, with the files that a report reads."""
     folder = tmp_path_factory.mktemp("suite")
     case = af.Case.of(tomllib.loads(CASE))
     with replace_run(case, folder) as draft:

@@ -116,7 +116,7 @@ def test_a_run_replaces_results_of_another_run(two_runs):
     assert found == {"first": (False, False), "second": (True, False)}
 
 
-def test_what_an_earlier_call_finished_is_taken_over(two_runs):
+def test_results_of_an_earlier_call_are_adopted(two_runs):
     folder, _ = two_runs
     before = {name: (folder / name).read_bytes() for name in files_below(folder)}
     case = af.Case.read(folder / "case.toml")
@@ -227,7 +227,7 @@ def test_in_python_too_a_run_replaces_another_as_a_whole(two_runs):
     assert list(opened.runs) == ["synthetic 0"]
 
 
-def test_what_is_read_in_python_keeps_its_pictures(two_runs):
+def test_results_that_are_read_in_python_keep_their_pictures(two_runs):
     """Pairs are reused, and one that was swapped is computed anew: then the old pictures go."""
     folder, other = two_runs
     before = {name: (folder / name).read_bytes() for name in files_below(folder)}

@@ -143,7 +143,7 @@ def test_warnings_name_case_and_motion(caplog):
 
 
 def test_a_fidelity_is_doubted_where_the_next_finer_one_disagrees():
-    """Stones hardly stiffer than their joints: rigid ones err from the dead load on."""
+    """Stones barely stiffer than their joints: rigid ones err from the dead load on."""
     ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
     ring |= {"voussoirs": 7, "material": "stone"}
     motion = {"synthetic": {"duration": 1.0, "pga": 0.5, "seed": 1}}

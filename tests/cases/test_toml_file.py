@@ -29,7 +29,7 @@ def test_quantities():
         *[("300 gal", 3.0), ("300gal", 3.0), ("300 cm/s^2", 3.0), ("3e2cm/s^2", 3.0)],
     ],
 )
-def test_of_an_acceleration_g_is_gravity_and_gal_no_gallon(text, value):
+def test_units_of_acceleration_take_g_as_gravity_and_gal_as_no_gallon(text, value):
     assert af.units.in_unit(text, "m/s**2", "pga") == pytest.approx(value, rel=1e-9)
     with pytest.raises(af.InvalidInput, match="not in a unit like m"):
         af.units.in_unit("0.3 g", "m", "width")
@@ -62,12 +62,12 @@ def test_an_angle_is_no_pure_number(text, tangent):
         ([1.0], "not a number"),
     ],
 )
-def test_what_is_no_quantity(value, says):
+def test_an_invalid_quantity_is_refused(value, says):
     with pytest.raises(af.InvalidInput, match=f"key = .*{says}"):
         af.units.in_unit(value, "m", "key")
 
 
-def test_words_must_be_among_those_there_are():
+def test_a_choice_must_be_one_of_the_known_words():
     assert check_choice("a", {"a": 1, "b": 2}, "section.key") == "a"
     for wrong in ("c", None, ["a"]):
         with pytest.raises(af.InvalidInput, match=r"section.key = .* is not known: use one of"):
@@ -107,7 +107,7 @@ def test_names_with_spaces_and_dots_are_quoted_as_in_toml(path, names):
 
 
 @pytest.mark.parametrize("path", ["a..b", ".a", 'a."b', 'a.""', ""])
-def test_what_names_no_key(path):
+def test_a_path_that_names_no_key_is_refused(path):
     with pytest.raises(af.InvalidInput, match="names no key"):
         split_key_path(path)
 

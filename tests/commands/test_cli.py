@@ -203,7 +203,7 @@ def test_a_signal_ends_a_motion_and_keeps_its_steps(
 
 
 def test_a_full_disk_is_an_error_in_words(column, tmp_path, undrawn, capsys):
-    """A file may not be longer than 20 kB: so it is with a full disk, and the error is alike."""
+    """A file may not be longer than 20 kB, which acts as a full disk does."""
     out = tmp_path / "out"
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))

@@ -145,7 +145,7 @@ def test_an_interrupted_suite_continues_with_the_motions_left(small, undrawn, ca
     with pytest.raises(KeyboardInterrupt):
         run_with(small, broken_off)
     assert "run the same command again" in capsys.readouterr().err
-    assert run(small) == 3  # what is kept keeps its doubts
+    assert run(small) == 3  # kept results keep their doubts
     summary = (small.parent / "out" / "first" / "summary.txt").read_text()
     assert summary.startswith("no mechanism; 1 doubt\nin doubt: energy drifts\n")
     table = (small.parent / "out" / "suite.txt").read_text()

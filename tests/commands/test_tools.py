@@ -12,14 +12,14 @@ from archfem import _optional
 from archfem.commands import tools
 
 
-def test_what_is_there_has_its_version():
+def test_installed_libraries_have_their_version():
     found = {each.item: each.state for each in tools.diagnose_installation()}
     assert found["numpy"] == metadata.version("numpy")
     assert found["archfem"].startswith(metadata.version("archfem"))
     assert "compiled code" in found
 
 
-def test_all_is_well_ends_with_zero(monkeypatch, capsys):
+def test_a_sound_installation_ends_with_zero(monkeypatch, capsys):
     monkeypatch.setattr(tools, "diagnose_installation", lambda: [tools.Diagnosis("archfem", "1.0")])
     assert af.commands.main(["doctor"]) == 0
     assert capsys.readouterr().out.split() == ["archfem", "1.0", "all", "is", "well"]

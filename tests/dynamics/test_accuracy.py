@@ -35,7 +35,7 @@ def test_each_scene_is_tried_once(ring):
 
 
 def test_errors_are_the_largest_difference_to_the_reference(settings):
-    """The front has what none beats in both; of it the fastest within the tolerance is chosen."""
+    """The front has settings that none beats in both; the fastest within tolerance is chosen."""
     peaks = [[0.30, 0.2], [0.31, 0.2], [0.30, 0.25], [0.303, 0.2], None, [0.3, 0.202]]
     seconds = [9.0, 5.0, 0.5, 2.0, 0.1, 3.0]
     runs = [

@@ -45,7 +45,7 @@ def symmetric(size: int) -> ActiveRows:
 
 
 def test_rows_come_and_go_from_problem_to_problem():
-    """Gaps are those by all of F, whatever problem went before."""
+    """Gaps are those by all of F, after any other problem."""
     size, rng = 250, np.random.default_rng(1)
     active = symmetric(size)
     for _ in range(60):

@@ -48,7 +48,7 @@ def drift(energies):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dt", [8e-3, pytest.param(2e-3, marks=pytest.mark.slow)])
-def test_a_block_thrown_up_its_teeth_stops_as_it_should(dt):
+def test_a_block_thrown_up_its_teeth_stops_by_closed_form(dt):
     """m (g + t s̈) = N and m s̈ = -μ N: it stops after v² (1 + μ t) / (2 μ g), risen by t of that.
 
     On the way N = m g / (1 + μ t), and friction takes (μ - t) N s. The elastic slip of its bed,
@@ -93,14 +93,14 @@ def pulse(peak=8.0, duration=0.4, dt=0.05):
 
 @pytest.mark.slow
 def test_a_block_that_slides_to_and_fro_rises_by_how_far_it_is_out():
-    """Whatever the way there: at every step the rise is tan ψ |slid|, but for how it is pressed."""
+    """For any path: at every step the rise is tan ψ |slid|, but for compression."""
     model = block(1e8, friction=0.3, dilatancy=0.15)
     start, states, _, energies = run(model, pulse(), 4e-3)
     slid = np.array([state.memory.mean() for state in states])
     rise = np.array([state.q[1] - start.q[1] for state in states])
     assert np.ptp(slid) > 0.02
-    assert np.any(np.diff(np.abs(slid)) < -1e-5)  # it comes down as well
-    pressed = 2.0 * 2e3 / 1e8  # twice what the weight alone does, where the motion lifts it
+    assert np.any(np.diff(np.abs(slid)) < -1e-5)  # it also moves down
+    pressed = 2.0 * 2e3 / 1e8  # twice that of the weight alone, where the motion lifts it
     assert rise == pytest.approx(0.15 * np.abs(slid), abs=pressed)
     assert rise.max() > 50.0 * pressed
     off, least = drift(energies)
@@ -137,7 +137,7 @@ def test_a_bonded_block_swings_as_a_linear_one_until_it_breaks():
     assert np.sum(resultants[:, 0] == 0.0) > 100  # it flies
 
 
-def test_what_a_bond_loses_tends_to_its_elastic_energy():
+def test_the_loss_of_a_bond_tends_to_its_elastic_energy():
     """f_t² A / (2 k): in a step it is held at f_t to the end, an error of first order in dt."""
     stiffness, mass, tension = 1e6, 2e3 / GRAVITY, 4e3
     model = block(stiffness, friction=None, tension=tension)
@@ -156,7 +156,7 @@ def test_what_a_bond_loses_tends_to_its_elastic_energy():
     "damping", [pytest.param(None, marks=pytest.mark.slow), af.StiffnessDamping(0.05, 20.0)]
 )
 def test_a_ring_of_teeth_and_bonds_neither_gains_nor_loses(rule, damping):
-    """Bonds break, joints slide and rise; what is exchanged is kept to 1e-8, no step gains."""
+    """Bonds break, joints slide and rise; exchanged energy is kept to 1e-8, no step gains."""
     contact = af.Contact(1.48e9, 0.3e9, 0.3, cohesion=60e3, dilatancy=0.2, tension=40e3)
     structure = af.circular_arch(
         radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, contact=contact

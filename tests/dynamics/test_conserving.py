@@ -67,7 +67,7 @@ def balance(start, energy):
 @pytest.mark.parametrize("friction", [0.3, 0.6, None])
 @pytest.mark.parametrize("kind", ["rocking", "sliding"])
 def test_an_undamped_block_neither_gains_nor_loses(kind, friction, dt):
-    """To 1e-8 of what is exchanged, at any step; friction never gives; V ≤ μ N at every step."""
+    """To 1e-8 of the exchanged energy, at any step; friction never gives; V ≤ μ N at every step."""
     built = model(kind, friction)
     start, energy, resultants, _ = steps(built, SHAKE, dt)
     drift, exchanged = balance(start, energy)

@@ -62,7 +62,7 @@ def test_search_continues_until_the_share_is_reached(ring):
     )
 
 
-def test_a_search_that_is_cut_short_says_so(ring, caplog):
+def test_a_search_that_is_cut_short_is_reported(ring, caplog):
     model = af.build(ring, fidelity="rigid")
     found = effective_mode_range(model, mass_share=0.95, initial_count=2, max_count=4)
     assert (found.first, found.last) == (1, 4)

@@ -172,7 +172,7 @@ def hinging(structure, hinges):
 
 
 def at(scan, resultants, min_failures):
-    """An event of the state at one step."""
+    """The result of a scan of one step."""
     (found,) = scan(resultants[None], min_failures)
     return found
 
@@ -188,7 +188,7 @@ class Query:
         return frozenset({str(len(self.calls))})
 
 
-def test_no_query_runs_while_no_joint_fails_and_nothing_twice(ring):
+def test_a_query_runs_only_where_joints_fail_and_once_for_each_set(ring):
     query = Query()
     scan = FailureScan(ring, af.Criteria(), range(18), query)
     first, second = hinging(ring, {0: -0.5, 6: -0.5}), hinging(ring, {0: -0.5, 6: 0.5})

@@ -163,7 +163,7 @@ def test_a_block_handed_over_rocks_on_with_the_restitution_of_its_damping(ratio)
 
 @pytest.mark.parametrize("longest", [5e-4, 3e-4, 1.25e-4, 1e-4])
 def test_a_fall_that_fails_is_repeated_with_shorter_steps(tower, monkeypatch, longest):
-    """Down to an eighth of a millisecond, beyond which the error says what a user can do."""
+    """Down to an eighth of a millisecond, beyond which the error states remedies."""
 
     class Simulation:
         def __init__(self, structure, *, dt, rocking_ratio):
@@ -208,7 +208,7 @@ def test_loose_stones_rub_as_their_joints_did_or_by_six_tenths():
     ],
 )
 def test_friction_that_loose_stones_are_given_is_doubted(contact, words):
-    """A column on a cohesive joint topples under 0.4 g for 1 s whatever its friction."""
+    """A column on a cohesive joint topples under 0.4 g for 1 s at any friction."""
     column = af.column(breadth=0.6, heights=[2.4], contact=contact)
     run = af.time_history(
         af.build(column, fidelity="rigid", displacements="large"), pulse(0.4, 1.0), dt=2e-3

@@ -63,7 +63,7 @@ def test_rows_are_as_few_as_the_faces_allow(fidelity, rule, each):
 @pytest.mark.parametrize("rule", ["exact", "lobatto"])
 @pytest.mark.parametrize("fidelity", ["rigid", "condensed"])
 def test_forces_at_an_instant_are_those_of_the_operator(fidelity, rule):
-    """Normal forces of points, half of them open, and what open joints release in two ways."""
+    """Normal forces of points, half of them open, and forces that open joints release; two ways."""
     contact = af.Contact(1.48e9, 0.3e9, None)
     arch = af.circular_arch(
         radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, contact=contact

@@ -34,7 +34,7 @@ def test_flags_are_in_the_file_for_plain_xarray(run, tmp_path):
 
 
 def test_a_file_of_an_earlier_version(run, tmp_path):
-    """It is judged by the usual criteria, and tells only in words how its run ended."""
+    """It is judged by the usual criteria, and has the end of its run only as text."""
     old = run.dataset.drop_vars(["hinge", "slide", "open", "judged"])
     old.attrs = {
         key: value
@@ -58,7 +58,7 @@ def test_file_and_back(run, tmp_path):
         assert again.joints[flag].equals(run.joints[flag])
     assert again.dataset["last_q"].equals(run.dataset["last_q"])
     assert again.mechanism == run.mechanism
-    # what was read is written again as it is
+    # a history that was read is written unchanged
     twice = History.read(again.save(tmp_path / "twice.nc"), run.structure)
     assert twice.dataset.identical(again.dataset)
     with xr.open_dataset(path) as plain:
@@ -82,7 +82,7 @@ def test_coordinates_of_another_meaning_are_not_read(run, tmp_path, caplog):
     assert old.joints["N"].equals(History.read(run.save(path)).joints["N"])
 
 
-def test_what_is_kept_over_time_and_joint_is_packed(run, tmp_path):
+def test_arrays_over_time_and_joint_are_packed(run, tmp_path):
     with xr.open_dataset(run.save(tmp_path / "run.nc")) as plain:
         assert plain["N"].ndim == 2
         assert plain["N"].encoding["zlib"]
@@ -108,7 +108,7 @@ def test_a_history_has_the_blocks_that_can_move(run, model, motion, tmp_path):
     assert calm.mechanism is None
 
 
-def test_a_history_without_its_structure_says_so(run, tmp_path, stack):
+def test_a_history_without_its_structure_is_refused_with_the_reason(run, tmp_path, stack):
     path = run.save(tmp_path / "run.nc")
     alone = History.read(path)
     assert alone.mechanism == replace(run.mechanism, blocks=())
@@ -209,12 +209,12 @@ def test_a_run_gives_displacements_over_time_point_and_direction(tmp_path):
     np.testing.assert_array_equal(moved["time"], run.dataset["frame_time"])
     top = moved.where(moved["block"] == model.structure.blocks[-1].name, drop=True).sel(xy="x")
     assert top.sizes["point"] == 4
-    assert float(top[-1].max()) < 0.0  # the ground goes to the right, relative to it all goes left
+    assert float(top[-1].max()) < 0.0  # the ground moves right, relative to it all moves left
     read = af.History.read(run.save(tmp_path / "run.nc"))
     np.testing.assert_array_equal(read.displacement, moved)
 
 
-def test_a_run_without_fields_says_how_to_keep_them():
+def test_a_run_without_fields_is_refused_with_the_option_that_keeps_them():
     model = af.build(af.column(breadth=0.4, heights=[0.8]), fidelity="rigid")
     run = af.time_history(model, af.Motion([0.0, 0.1, 0.0], 0.01), dt=0.005)
     with pytest.raises(af.InvalidInput, match="fields_every=10"):

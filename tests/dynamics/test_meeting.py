@@ -249,7 +249,7 @@ def test_stones_with_a_joint_and_fill_are_exempt(pair):
 
 
 def test_stones_without_a_role_are_no_fill():
-    """Stones on joints stiffer than themselves meet too, whatever part they belong to."""
+    """Stones on joints stiffer than themselves meet too, in every part."""
     stiff = replace(CONTACT, normal_stiffness=1e11)
     stones = (stone("one", 0.0, 0.0, 0.6, 2.4), stone("two", 0.65, 0.0, 1.25, 2.4))
     built = on_floor(*stones)

@@ -17,7 +17,7 @@ MOTION = af.Motion(np.append(np.ones(401), np.zeros(1600)), 0.01)
 
 
 class Chosen:
-    """A selection by known peaks; what it runs, and the model it returns."""
+    """A selection by known peaks; its runs, and the model it returns."""
 
     def __init__(self, monkeypatch):
         self.steps, self.built, self.ends, self.parts = [], [], [], []
@@ -129,7 +129,7 @@ def test_a_given_step_is_compared_with_one_twice_as_long(chosen):
     assert chosen.of(0.3, 0.3, dt=0.01).dt == 0.01
 
 
-def test_what_joints_turn_is_doubted_of_small_displacements(chosen):
+def test_large_rotations_of_joints_are_a_doubt_of_small_displacements(chosen):
     prediction = chosen.of(0.3, 0.3, turn=0.004)
     assert prediction.small_displacement_error == pytest.approx(0.012)
     assert "by the assumption of small displacements" in prediction.text

@@ -233,10 +233,10 @@ def test_the_balance_counts_energy_gained_and_lost():
     assert balance.largest_exchange == pytest.approx(4.5)
     drift, fractions = balance.add(np.array([[8.0, -9.0, 0.0, 0.0], [3.0, -9.0, 0.0, 0.0]]))
     assert drift == pytest.approx([5.0, 0.0])
-    assert fractions == pytest.approx([5.0 / 9.0, 0.0])  # of what was exchanged until then
+    assert fractions == pytest.approx([5.0 / 9.0, 0.0])  # of the energy exchanged until then
 
 
-def test_what_is_as_good_as_nothing_is_not_judged():
+def test_drift_is_relative_to_a_least_exchanged_energy():
     """Of 10 J under self-weight a hundredth of a joule is exchanged at least."""
     _, fractions = EnergyBalance(0.0, -10.0).add(np.array([[1e-4, -10.0, 0.0, 0.0]]))
     assert fractions == pytest.approx([0.01])
@@ -293,7 +293,7 @@ def test_balance_is_exact_while_joints_stay_closed(stack, scheme, method):
 
 
 def test_a_restart_continues_with_its_own_balance(ring):
-    """A scheme with an energy balance."""
+    """By a scheme with an energy balance."""
     model = af.build(glued(ring), fidelity="rigid")
     given = {"damping": DAMPING, "scheme": NEWMARK, "dt": 0.005}
     first = af.time_history(model, SHAKING.cut(0.0, 2.0), **given)

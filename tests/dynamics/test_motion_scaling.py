@@ -156,7 +156,7 @@ def test_a_run_without_equilibrium_counts_as_failed():
     assert found.table().count(words) == len(DEFINITIONS)
 
 
-def test_what_a_failed_run_met_is_kept(ring, monkeypatch):
+def test_mechanisms_of_a_failed_run_are_kept(ring, monkeypatch):
     """By Newmark's method, undamped, energy grows without work before all joints fail at once."""
     newmark = partial(af.time_history, scheme=af.dynamics.Newmark())
     monkeypatch.setattr("archfem.dynamics.motion_scaling.time_history", newmark)

@@ -44,7 +44,7 @@ def _steps(equation, start, widest):
     "widest",
     [pytest.param(40, id="band"), pytest.param(0, id="sparse factor", marks=pytest.mark.slow)],
 )
-def test_it_gives_the_history_of_snes(damping, widest):
+def test_the_solver_gives_the_history_of_snes(damping, widest):
     """And the same bits again, whether the tangent is a band or sparse."""
     equation, start = sliding_ring(damping=damping)
     runs = [_steps(equation, start, widest) for _ in range(2)]

@@ -54,7 +54,7 @@ def test_a_long_run_needs_little_more_memory_than_its_record(tmp_path):
     assert 1024 * (long_peak - peak) / (long_size - size) < 140
 
 
-def test_what_is_recorded(run, model, motion):
+def test_recorded_quantities_have_their_dimensions_and_values(run, model, motion):
     assert run.joints["eccentricity"].dims == ("time", "joint")
     assert run.joints.sizes == {"time": 601, "joint": 18}
     assert run.time[-1] == pytest.approx(3.0)

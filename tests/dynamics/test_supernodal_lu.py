@@ -53,7 +53,7 @@ def factorise(panels, places, added):
 
 # the kernel is compiled anew where a test calls it from Python; the history below is by it too
 @pytest.mark.slow
-def test_it_solves_as_superlu_does_whatever_is_added(grid):
+def test_solutions_are_those_of_superlu_for_any_added_entries(grid):
     matrix, elimination, places = grid
     panels = panels_of(matrix, elimination, *places)
     assert 0 < panels.changed.sum() < len(elimination.groups)

@@ -45,7 +45,7 @@ def model(fidelity="rigid", friction=0.6, displacements="large", quadrature="exa
 @pytest.mark.parametrize("friction", [0.4, None])
 @pytest.mark.parametrize("fidelity", ["rigid", "faces"])
 def test_small_motions_are_those_of_small_displacements(fidelity, friction, quadrature):
-    """Forces and tangents at random states of 1 nm: what is left is of second order."""
+    """Forces and tangents at random states of 1 nm: the difference is of second order."""
     far = model(fidelity, friction, quadrature=quadrature)
     near = far.small
     q = 1e-9 * np.random.default_rng(0).normal(size=far.size)
@@ -130,8 +130,8 @@ def test_a_block_let_go_swings_for_its_period(verified):
     assert abs(run.dataset.attrs["energy_drift"]) < 1e-6
 
 
-def test_a_ring_stands_or_falls_and_says_so(tmp_path):
-    """Under a pulse of 0.2 g and of 0.7 g; the file tells it too."""
+def test_a_ring_stands_or_falls_as_reported(tmp_path):
+    """Under a pulse of 0.2 g and of 0.7 g; the saved history agrees."""
     stands = af.time_history(model(), PULSE.scaled(0.3), dt=0.005, damping=DAMPED)
     assert (stands.fall.kind, stands.fall.time, stands.fall.blocks) == ("stands", None, ())
     assert stands.verdict.outcome == "stands"
@@ -180,7 +180,7 @@ def test_the_scale_at_which_it_falls_is_between_a_run_that_stands_and_one_that_f
     assert "stands" in found.table()
 
 
-def test_what_is_not_known_for_large_displacements_is_refused():
+def test_models_without_large_displacements_are_refused():
     with pytest.raises(
         InvalidInput, match="large displacements do not exist with fidelity 'monolithic'"
     ):

@@ -122,8 +122,8 @@ def test_the_total_time_with_enough_failures_is_stated(run):
     assert f"{words}{5 * max(lengths):.3g} ms at the longest" in str(run.verdict)
 
 
-def test_a_run_that_was_broken_off_says_so_first(model, motion):
-    """After a failed step the state of collapse is unknown; what was found until then remains."""
+def test_a_run_that_was_broken_off_is_reported_first(model, motion):
+    """After a failed step the state of collapse is unknown; earlier findings remain."""
 
     class Failing(af.dynamics.Stepper):
         def batches(self, start, dt, end):
@@ -141,7 +141,7 @@ def test_a_run_that_was_broken_off_says_so_first(model, motion):
     assert run.verdict.headline.startswith(f"no mechanism, but the run {run.verdict.incomplete}; ")
 
 
-def test_a_calm_run_says_so(model, motion):
+def test_a_calm_run_is_reported_as_calm(model, motion):
     damping = af.Rayleigh(0.05, (8.0, 16.0))
     calm = af.time_history(model, motion.scaled(0.1), dt=0.005, damping=damping).verdict
     assert (calm.outcome, calm.headline) == ("no mechanism", "no mechanism; no doubts")
@@ -247,7 +247,7 @@ def paced(model, motion):
 
 @pytest.mark.slow
 def test_mechanisms_too_short_to_count_are_reported(paced):
-    """By a loop over the record: what counts lasts long enough, and what came before is named."""
+    """By a loop over the record: a counted mechanism lasts long enough, earlier ones are named."""
     step = np.diff(paced.time, prepend=0.0)
     failed = (paced.joints["hinge"].values != 0) | paced.joints["slide"] | paced.joints["open"]
     runs, begin = [], None

@@ -94,7 +94,7 @@ def test_importance_is_the_correlation_ratio_of_ranks():
     assert list(found.importance()) == sorted(expected, key=lambda name: -expected[name])
 
 
-def test_what_alone_decides_explains_most_and_a_constant_nothing():
+def test_a_deciding_property_explains_all_and_a_constant_one_nothing():
     label = np.array(["a", "b"] * 10)
     found = made_up(label == "a", sign=label, dt=["as given"] * 20, scale=np.arange(20.0))
     assert found.importance()["sign"] == pytest.approx(1.0)

@@ -22,7 +22,7 @@ class Compilations(event.Listener):
 
 
 @pytest.mark.parametrize("kind", [each for each in COMPILED_VARIANTS if "large" not in each])
-def test_a_run_finds_it_all(kind):
+def test_a_run_finds_every_kernel_compiled(kind):
     """Another structure, at another fidelity, by another rule."""
     compile_variant(kind)
     method, scheme = kind.split(", ")

@@ -183,7 +183,7 @@ def strong(cut=None):
 
 
 def damped(joints, scheme):
-    """Steppers agree, whatever the damping acts on; by HHT in joints that never slide."""
+    """Steppers agree for every part that damping acts on; by HHT in joints that never slide."""
     damping = replace(DAMPING, joints=joints)
     made = bridge(arches=[span()], backfill=fill())
     return compared(glued(made) if scheme else made, damping=damping, scheme=scheme)

@@ -35,7 +35,7 @@ def wide():
 
 
 def semicircle(ratio, stiffer=1000.0):
-    """17 stones cut along chords, on joints so stiff that the ring hardly shortens."""
+    """17 stones cut along chords, on joints so stiff that the ring barely shortens."""
     return af.circular_arch(
         radius=3.0,
         thickness=3.0 * ratio,

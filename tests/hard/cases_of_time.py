@@ -162,7 +162,7 @@ def undamped(fidelity):
 
 @case("undamped, HHT(-0.1)", "losses at impact are the scheme's", quick=True)
 def undamped_hht():
-    """Sound, but the drift is said: what impacts lose is the scheme's choice."""
+    """Sound, but the drift is reported: the loss in impacts depends on the scheme."""
     model = af.build(glued(ring()), fidelity="rigid")
     run = shaken(model, quake(2.0), damping=None, scheme=af.HHT(-0.1))
     lost = run.dataset.attrs["energy_drift"]

@@ -88,7 +88,7 @@ def test_a_path_of_springs_is_that_of_scalar_laws():
 
 
 def test_a_bonded_joint_is_linear_elastic_below_its_strength():
-    """Facets and springs alike: N = -k A g, M = k I θ, and the same energy."""
+    """Facets and springs: N = -k A g, M = k I θ, and the same energy."""
     contact = af.Contact(2e9, 1e9, None, tension=1e6)
     structure = af.column(breadth=1.0, heights=[1.0], width=2.0, contact=contact)
     for rule in RULES:

@@ -36,7 +36,7 @@ def test_the_first_lasting_state_is_found(up, least, expected):
     assert bool(ends) == (expected is not None)
 
 
-def test_it_adds_up_from_nothing():
+def test_a_duration_adds_up_from_zero():
     unbroken = DurationCounter(0.25)
     steps = [(True, 0.2), (True, 0.05), (False, 0.3), (True, 0.2), (True, 0.1)]
     assert [unbroken.add_step(*each) for each in steps] == [False, True, False, False, True]

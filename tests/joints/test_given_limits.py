@@ -25,7 +25,7 @@ def test_with_coulombs_limits_forces_are_coulombs(pushed):
     assert np.array_equal(given.force(q), joints.force(q))
 
 
-def test_its_tangent_is_symmetric_and_the_derivative_of_its_force(pushed):
+def test_the_tangent_is_symmetric_and_the_derivative_of_the_force(pushed):
     model, q = pushed
     half = TrescaJoints.of(model.operator, 0.5 * np.abs(model.operator.trial_shear(q)))
     held = model.with_joint_law(half)
@@ -40,7 +40,7 @@ def test_its_tangent_is_symmetric_and_the_derivative_of_its_force(pushed):
 
 
 @pytest.mark.parametrize(("share", "holds"), [(0.98, True), (1.02, False)])
-def test_it_holds_along_up_to_its_limit_and_not_at_all_beyond(pushed, share, holds):
+def test_the_tangent_along_is_elastic_below_the_limit_and_zero_beyond(pushed, share, holds):
     model, q = pushed
     elastic = np.abs(model.operator.trial_shear(q))
     held = TrescaJoints.of(model.operator, elastic / share)

@@ -211,7 +211,7 @@ def test_the_pose_follows_its_discrete_derivative(seed, turns):
 
 @pytest.mark.parametrize("facets", [True, False])
 @pytest.mark.parametrize(("shapes", "fill"), KINDS)
-def test_what_has_turned_round_is_to_hold_as_if_nothing_slid(shapes, fill, facets):
+def test_a_slip_that_reversed_holds_as_a_joint_that_never_slid(shapes, fill, facets):
     """Force and what it lacks, and the rate, are then those of joints that never slide."""
     rng = np.random.default_rng(shapes + 7)
     joints, size = two_joints(shapes, 0.3, facets, rng, fill), 2 * (3 + shapes)

@@ -111,7 +111,7 @@ def test_crushed_mortar_stays_closed():
     assert not crushed[1].any()
     unloaded = af.statics.equilibrium_under(loaded.model, model.load(af.BodyForce(0.0, -0.5)))
     operator = unloaded.model.operator
-    # elastic by half the pressure, on what is crushed
+    # elastic by half the pressure, on the crushed part
     gaps = operator.openings(unloaded.q).reshape(2, -1)
     np.testing.assert_allclose(gaps[0], -18e3 / 0.5e9 - 24e3 / 1.0e9, rtol=1e-6)
     np.testing.assert_allclose(gaps[1], -12e3 / 1.0e9, rtol=1e-6)

@@ -46,7 +46,7 @@ def test_the_ratios_are_the_same_however_narrow_a_structure_is():
 
 
 def test_faces_that_slid_are_judged_by_their_overlap(ring):
-    """e is of the length h - |slip|, to either side; what has slid off has none."""
+    """e is of the length h - |slip|, to either side; a face that has slid off has none."""
     resultants = np.tile([1000.0, 0.0, 55.0], (18, 1))
     faces = np.zeros((3, 18))
     faces[2, :3] = 0.11, -0.275, 0.6

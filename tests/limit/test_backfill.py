@@ -290,7 +290,7 @@ def test_pressure_that_misses_the_structure_acts_on_the_ground():
 
 @pytest.mark.parametrize("free", [1, 200])
 @pytest.mark.parametrize(("share", "stands"), [(0.98, True), (1.02, False)])
-def test_what_is_missing_may_be_the_rounding_of_as_many_blocks_as_move(free, share, stands):
+def test_the_residual_may_be_the_rounding_of_all_blocks_that_move(free, share, stands):
     dead = SimpleNamespace(blocks=SimpleNamespace(structure=SimpleNamespace(free=range(free))))
     fall = SimpleNamespace(value=share * 1e-8 * free)
     assert is_balanced(fall, dead) is stands

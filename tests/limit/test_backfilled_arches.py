@@ -267,7 +267,7 @@ def test_more_cover_carries_more():
 
 
 def test_width_cancels():
-    """Widths cancel: weights and earth pressure grow alike."""
+    """Widths cancel: weights and earth pressure grow equally."""
     expected = af.collapse_factor(arch_bridge(), live=SIDEWAYS, fill=GRAVEL).factor
     found = af.collapse_factor(arch_bridge(width=7.0), live=SIDEWAYS, fill=GRAVEL).factor
     assert found == pytest.approx(expected, rel=EXACT)
@@ -301,7 +301,7 @@ def test_order_of_blocks_does_not_matter():
     np.testing.assert_allclose(other.motion, one.motion[::-1], atol=1e-6)
 
 
-def test_what_is_found_is_numbered_as_the_whole_structure():
+def test_results_have_the_numbering_of_the_whole_structure():
     structure = arch_bridge()
     found = af.collapse_factor(structure, live=QUARTER, fill=GRAVEL)
     soil = structure.blocks.index(fill_of(structure))

@@ -186,7 +186,7 @@ def test_a_shaken_block_is_a_mechanism_only_beyond_friction_and_cohesion(peak, s
         assert halted.time[-1] == run.verified.moved.time
 
 
-def test_what_cohesion_holds_falls_as_a_joint_opens():
+def test_the_force_of_cohesion_falls_as_a_joint_opens():
     """Of a plane face pressed without tension 3 (1/2 - |e|) touches: 0.3 of it at e = 0.4."""
     contact = af.Contact(1e9, 4e8, 0.5, cohesion=10e3)
     structure = af.column(breadth=2.0, heights=[1.0], width=0.5, contact=contact)
@@ -239,7 +239,7 @@ def test_nothing_is_warned_of_where_no_cohesion_is_lost(held, friction, caplog):
     assert ("fail partly open" in caplog.text) == lost
 
 
-def test_what_is_closed_is_three_times_from_the_thrust_to_the_edge():
+def test_the_closed_part_is_three_times_the_distance_from_thrust_to_edge():
     structure = af.column(breadth=0.5, heights=[1.0] * 5, contact=block().joints[0].contact)
     joints = af.dead_load(af.build(structure, fidelity="rigid")).joints.copy(deep=True)
     joints["N"][:] = [1.0, 1.0, 1.0, 0.0, 0.06]

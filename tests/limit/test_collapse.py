@@ -355,8 +355,8 @@ def test_invalid_input_is_refused(call, message):
     ("way", "hinges", "slides"),
     [((1.0, 0.0, 0.0), 0, 2), ((0.0, -1.0, 0.0), 2, 1)],
 )
-def test_what_moves_over_a_support_does_not_depend_on_how_far_it_goes(way, hinges, slides):
-    """By a metre, a millimetre or a micrometre: joints slide apart by μ of what they slip."""
+def test_the_mechanism_over_a_support_does_not_depend_on_its_movement(way, hinges, slides):
+    """By a metre, a millimetre or a micrometre: joints slide apart by μ of their slip."""
     ring = af.circular_arch(
         **{"radius": 2.95, "thickness": 0.8, "embrace": 120.0, "voussoirs": 7, "chords": 1},
         contact=af.Contact(1.48e9, 0.3e9, 0.3),

@@ -37,7 +37,7 @@ def test_joints_that_slide_are_named_with_their_factor(warned):
 @pytest.mark.parametrize(
     ("shear", "friction", "failing", "count"),
     [
-        (23.999, 0.5, {0, 1}, 0),  # c A of what is closed 4 N, and 0.5 of 40 N
+        (23.999, 0.5, {0, 1}, 0),  # c A of the closed part 4 N, and 0.5 of 40 N
         (24.00002, 0.5, {0, 1}, 0),  # within a millionth of both parts of it
         (24.001, 0.5, {0, 1}, 2),
         (-24.001, 0.5, {0, 1}, 2),

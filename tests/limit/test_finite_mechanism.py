@@ -198,7 +198,7 @@ def bonded_wall(rows, columns, breadth=0.5, height=0.25):
 
 @pytest.mark.slow
 def test_a_corner_of_a_bonded_wall_turns_away_from_the_stones_it_slides_on():
-    """The factor without dilatancy; then the corner leaves what it slid on along a circle."""
+    """The factor without dilatancy; then the corner leaves its sliding face along a circle."""
     wall = bonded_wall(6, 4)
     flat = af.collapse_factor(wall, live=af.BodyForce(1.0), friction="nonassociated")
     path = follow(wall)

@@ -91,7 +91,7 @@ def test_the_words_of_demirel_and_aldemir(failures, found):
 
 
 def test_the_words_of_demirel_and_aldemir_begin_with_four_in_a_ring():
-    """They count what slides, and joints that do both once; a wider count begins before."""
+    """They count sliding joints, and joints that also hinge once; a wider count begins before."""
     structure = piers(2)
     instants = [RING, RING | {0: 0.5}, RING | FOURTH | {0: 0.5}, RING | FOURTH]
     joints = history(structure, instants)
@@ -132,7 +132,7 @@ def test_two_rings_without_piers_are_local_each():
     assert (met.kind, met.part, met.joints) == ("local", "left arch", tuple(of["left arch"][:4]))
 
 
-def test_what_is_shorter_than_a_mechanism_lasts_does_not_count_by_any_definition():
+def test_states_shorter_than_the_least_duration_count_by_no_definition():
     """Four hinges for 0.2 ms, and later, first some and then others, for 1.1 ms in all."""
     ring, other = arch(), {0: -0.5, 6: 0.5, 12: -0.5, 16: 0.5}
     joints = history(ring, [{}, ALTERNATING, {}, ALTERNATING, other, {}])

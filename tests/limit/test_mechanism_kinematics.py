@@ -242,7 +242,7 @@ def test_self_stresses_do_no_work_and_joints_in_no_loop_have_none():
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 @pytest.mark.parametrize(("wall", "moves"), [((1.0, 1.0), True), ((0.0, 0.0), False)])
 def test_a_block_on_ice_slides_away_from_a_wall(side, wall, moves):
-    """Its bed lets it slide either way, and a wall beside it open: it goes away from the wall."""
+    """Its bed lets it slide either way, and a wall beside it open: it moves away from the wall."""
 
     def box(x, y, name, fixed=False):
         corners = ((x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]))

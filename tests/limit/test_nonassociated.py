@@ -103,7 +103,7 @@ def least_by_integers(structure, live, force=30.0, motion=30.0):
     """Least factor by a mixed-integer programme: a second formulation, with a proof of its own.
 
     Each end is open or pressed, each joint slides one way, the other, or not, with end forces up to
-    `force` block weights and gaps up to `motion` times what the live load moves on average.
+    `force` block weights and gaps up to `motion` times the mean movement of the live load.
     """
     blocks = RigidBlocks(structure)
     dead, push = (

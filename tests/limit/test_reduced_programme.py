@@ -144,7 +144,7 @@ def test_large_walls_and_rings_take_seconds():
 @pytest.mark.parametrize(
     ("structure", "different"), [(ring(), 6), (bonded_wall(3, 3), 7)], ids=["ring", "wall"]
 )
-def test_what_is_kept_of_a_programme_serves_those_of_other_loads_and_costs(structure, different):
+def test_kept_parts_of_a_programme_serve_other_loads_and_costs(structure, different):
     """Each optimum is that of blocks on which nothing was solved before, to the last digit.
 
     The ring hinges: more cohesion does not change its factor.

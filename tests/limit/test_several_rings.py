@@ -52,7 +52,7 @@ def arch_of_rings(rings, friction, stones=12, radius=3.0, thickness=0.6, embrace
 
 @pytest.mark.parametrize("leaves", [1, 2, 3])
 def test_leaves_without_friction_topple_one_by_one(leaves):
-    """Each turns about its own toe at b / (n h), whatever presses it from behind."""
+    """Each turns about its own toe at b / (n h), for any pressure from behind."""
     width, height = 0.9 / leaves, 2.7
     blocks = [
         af.Block(((-1.0, -0.5), (2.0, -0.5), (2.0, 0.0), (-1.0, 0.0)), af.STONE, "support", True)

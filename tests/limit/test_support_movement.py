@@ -146,9 +146,7 @@ def test_every_state_is_one_of_three_hinges_and_the_last_one_is_the_last(
 
 
 @pytest.mark.parametrize(("thickness", "settlement"), [(0.15, SPREAD), (0.2, SINK)])
-def test_it_falls_where_no_three_hinges_at_all_hold_the_thrust_line(
-    thickness, settlement, verified
-):
+def test_a_ring_falls_where_no_three_hinges_hold_the_thrust_line(thickness, settlement, verified):
     ring = semicircle(thickness, 8)
     found = largest_movement(ring, settlement, friction=None)
     hinged, shift = ThreeHinges(ring), np.array(settlement.motion[:2])
@@ -161,7 +159,7 @@ def test_it_falls_where_no_three_hinges_at_all_hold_the_thrust_line(
     )
 
 
-def test_it_leaps_where_only_far_hinges_would_hold():
+def test_a_ring_leaps_where_only_far_hinges_would_hold():
     ring = semicircle(0.2, 10)
     found = largest_movement(ring, SINK, friction=None)
     assert found.end is End.LEAPS

@@ -222,7 +222,7 @@ def test_invalid_input_is_refused(given, says):
 
 
 def test_the_weakest_solution_at_a_place_is_kept(monkeypatch):
-    """There and back again: each search begins with what was found beside it just before."""
+    """There and back again: each search begins with the solution found beside it just before."""
     values, calls = iter([0.1, 0.3, None, None, 0.2, 0.4]), []
 
     def weakest_from(programme, starts):

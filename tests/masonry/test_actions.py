@@ -1,4 +1,4 @@
-"""Actions: where loads stand, which supports settle, and what is refused."""
+"""Actions: places of loads, supports that settle, and refused actions."""
 
 import numpy as np
 import pytest

@@ -54,6 +54,6 @@ def test_rough_points_have_the_circle_of_least_squares():
         ([(0, 0), (1, 1, 1)], r"points\[1\]"),
     ],
 )
-def test_what_makes_no_circle(points, says):
+def test_points_on_no_circle_are_refused(points, says):
     with pytest.raises(af.InvalidInput, match=says):
         fitted_circle(points)

@@ -158,7 +158,7 @@ def test_a_semicircle_by_any_shape_has_its_least_thickness(shape):
         (lambda: shapes.arch_along("abc", thickness=0.1, voussoirs=3), "not a row of values"),
     ],
 )
-def test_what_is_no_arch_is_refused(make, says):
+def test_invalid_arches_are_refused(make, says):
     with pytest.raises((af.InvalidStructure, af.InvalidInput), match=says):
         make()
 

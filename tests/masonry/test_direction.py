@@ -32,7 +32,7 @@ def test_a_pier_stands_whatever_its_stones(stack):
     assert find_directions(flat.blocks, lines(flat))["column"].upright
 
 
-def test_what_lies_straight_runs_to_the_right_and_points_upwards():
+def test_a_straight_part_runs_to_the_right_and_points_upwards():
     way = Direction(np.zeros(2), None, upright=False)
     assert way.outward(np.array([3.0, 1.0])).tolist() == [0.0, 1.0]
     assert way.along(np.array([3.0, 1.0])) == 3.0

@@ -78,7 +78,7 @@ def pressed(structure, move):
 
 @pytest.mark.parametrize("size", [1.0, 0.5, pytest.param(0.25, marks=pytest.mark.slow)])
 def test_compliance_does_not_depend_on_the_size(size):
-    """A fill between smooth walls is pressed like a bar: E ε, whatever is cut, clipped or merged.
+    """A fill between smooth walls is pressed like a bar: E ε, however it is cut, clipped or merged.
 
     The push outweighs the fill's own pressure, so that all joints are closed.
     """

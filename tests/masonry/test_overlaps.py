@@ -36,8 +36,8 @@ def test_an_overlap_is_reported_with_its_depth_and_its_place():
         assert ("raise snap above that" in words) is remedy
 
 
-def test_of_small_blocks_too():
-    """Centimetres of one and a half: what they share is 1 mm by 1 cm, 2 A / P = 0.909 mm deep."""
+def test_overlaps_of_small_blocks_are_refused_too():
+    """Centimetres of one and a half: the overlap is 1 mm by 1 cm, 2 A / P = 0.909 mm deep."""
     with pytest.raises(af.errors.InvalidStructure, match=r"by 0.1 cm², about 0.909 mm deep"):
         check_overlaps([box(0.0, 0.0, 0.015, 0.01), box(0.014, 0.0, 0.015, 0.01)], NAMES)
 
@@ -53,7 +53,7 @@ def test_outlines_are_the_same_to_a_millionth_of_their_area(share, same):
     ("body", "refused"),
     [(np.array([-1, -1]), False), (np.array([-1, 1]), True), (None, True)],
 )
-def test_it_does_not_matter_between_supports(body, refused):
+def test_overlaps_are_refused_unless_between_supports(body, refused):
     outlines = [box(0.0, 0.0), box(0.5, 0.0)]
     if refused:
         with pytest.raises(af.errors.InvalidStructure, match="overlap"):

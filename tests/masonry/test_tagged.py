@@ -105,7 +105,7 @@ def test_parts_by_the_names_of_blocks():
 
 
 def test_edges_of_a_mesh_follow_an_arc(tmp_path):
-    """What archfem writes itself is read as a survey: a ring of stones in chords."""
+    """A mesh that archfem wrote is read as a survey: a ring of stones in chords."""
     ring = af.circular_arch(radius=2.0, thickness=0.4, embrace=150.0, voussoirs=3)
     af.models.write_mesh(ring, tmp_path / "ring.msh", af.models.Discretisation(cells=(2, 4)))
     layers = {name: af.masonry.Layer(fixed=True) for name in ("left abutment", "right abutment")}

@@ -37,7 +37,7 @@ def test_an_inclined_load_has_the_arm_of_the_arc(fidelity):
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize(("cell", "corners"), [("quadrilateral", 4), ("triangle", 3)])
 def test_cells_of_all_nodes_cover_the_blocks_once(cell, corners, degree):
-    """Whatever nodes they have between their corners."""
+    """Cells with any nodes between their corners."""
     stack = af.column(breadth=1.0, heights=[1.0, 2.0])
     cells = af.build(stack, cells=(2, 2), cell=cell, degree=degree).cells
     assert {len(polygon) for polygon in cells.polygons} == {corners}

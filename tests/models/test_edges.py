@@ -28,7 +28,7 @@ def test_points_on_an_edge_are_inserted_in_order(size, turn):
 
 
 def test_a_joint_has_the_edges_that_both_blocks_have_between_its_ends():
-    """A narrow block on a wide one: of the wide one's top only what it stands on."""
+    """A narrow block on a wide one: of the wide one's top only the part under it."""
     wide, narrow = af.column(breadth=1.0, heights=[0.5]), af.column(breadth=0.4, heights=[0.5])
     top = np.array(narrow.blocks[1].outline) + np.array([0.1, 0.5])
     upper = af.Block(tuple(map(tuple, top)), af.STONE, "upper", part="column", role="pier")

@@ -94,7 +94,7 @@ def test_a_script_is_not_a_mesh_and_is_never_run(stack, tmp_path, hidden):
 
 
 def test_nothing_beside_or_behind_a_mesh_is_run(stack, tmp_path):
-    """Gmsh merges the options beside a file, a script; what follows the last section is ignored."""
+    """Gmsh merges the options beside a file, a script; text after the last section is ignored."""
     mark, path = tmp_path / "ran", tmp_path / "stack.msh"
     write_mesh(stack, path)
     call = f'SystemCall "touch {mark}";\n'

@@ -43,7 +43,7 @@ def leaning(model):
 
 
 @pytest.mark.parametrize(("name", "fidelity"), CASES)
-def test_of_small_motions_it_is_the_model_of_small_displacements(structures, name, fidelity):
+def test_small_motions_give_the_model_of_small_displacements(structures, name, fidelity):
     """The difference is of second order: it falls with the motion."""
     model = af.build(structures[name], fidelity=fidelity, displacements="large", cells=(2, 2))
     small, whole = model.small, leaning(model)
@@ -93,7 +93,7 @@ def test_the_tangent_of_a_step_is_the_derivative_of_its_force(structures, name, 
 
 @pytest.mark.parametrize(("name", "fidelity"), [CASES[0], CASES[2]])
 def test_energy_is_kept(structures, name, fidelity):
-    """Without damping: what the ground puts in is stored, moves, or is rubbed away."""
+    """Without damping: the work of the ground is stored, kinetic, or lost by friction."""
     model = af.build(structures[name], fidelity=fidelity, displacements="large", cells=(2, 2))
     shake = af.Motion.synthetic(duration=0.5, pga=4.0, seed=3)
     run = af.time_history(model, shake, dt=0.005)

@@ -60,7 +60,7 @@ def test_interpolation_keeps_the_samples_and_the_straight_lines():
         ([0.1], np.nan, r"damping ratio \[-\] = nan"),
     ],
 )
-def test_what_no_oscillator_has_is_refused(periods, damping, message):
+def test_invalid_periods_and_damping_are_refused(periods, damping, message):
     with pytest.raises(af.errors.InvalidInput, match=message):
         response_spectra.find_peak_responses(STEP, DT, np.array(periods), damping)
 

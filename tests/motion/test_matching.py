@@ -75,7 +75,7 @@ def test_a_table_that_begins_above_zero_will_do(shaking):
     assert matched(shaking.with_vertical(None), table).misfit["horizontal"] < 0.05
 
 
-def test_what_cannot_be_matched_is_refused(shaking):
+def test_motions_and_bands_that_cannot_be_matched_are_refused(shaking):
     with pytest.raises(af.errors.InvalidInput, match="shorter than 20 s"):
         matched(shaking, CASE_STUDY, band=(0.05, 10.0))
     with pytest.raises(af.errors.InvalidInput, match="at rest"):
@@ -104,7 +104,7 @@ def test_real_records_match(name):
 
 
 @pytest.mark.parametrize(("period", "damping"), [(0.3, 0.05), (0.8, 0.2)])
-def test_what_each_sample_adds_to_a_response_is_the_response(period, damping):
+def test_the_sum_of_impulse_responses_is_the_response(period, damping):
     """Of a smooth motion, against the exact oscillator; the sum of rectangles errs by (ω Δt)²."""
     dt, times = 0.002, 0.002 * np.arange(600)
     samples = np.sin(5.0 * times) * times * np.exp(-times)

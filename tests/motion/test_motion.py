@@ -38,7 +38,7 @@ def test_components_keep_their_own_lengths():
         ([0.0, 5.01 * af.units.STANDARD_GRAVITY], 0.01, "wrong unit"),
     ],
 )
-def test_what_is_no_motion_is_refused(samples, dt, message):
+def test_invalid_motions_are_refused(samples, dt, message):
     with pytest.raises(af.errors.InvalidInput, match=message):
         af.Motion(samples, dt)
 

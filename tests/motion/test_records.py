@@ -89,7 +89,7 @@ def test_real_records_have_their_published_count_and_peak(recorded, name, dt, co
         assert reached == pytest.approx(peak, abs=digits * 1.001)
 
 
-def test_what_no_ground_does_is_refused_however_it_is_read(write):
+def test_accelerations_beyond_five_g_are_refused_by_every_reader(write):
     """Beyond 5 g the unit is wrong, and the file is named; one of two columns may be sound."""
     path = write("0.1 0.1\n0.2 -60.0\n0.0 0.1\n0.1 0.0\n")
     given = {"units": "m/s2", "dt": 0.01}
@@ -371,7 +371,7 @@ KNET_PEAK, AFAD_PEAK = f"(gal)   {PEAK:.3f}", f"(U-D) {PEAK}"
         ("esm", "S: 0.40", "S: 0.3795", True),
         ("esm", "S: 0.40", "S: 0.422", False),
         ("esm", "S: 0.40", "S: 0.378", False),
-        # COSMOS tells whole seconds: by one and a step; -999 is a peak that is not known
+        # COSMOS states whole seconds: by one and a step; -999 is a peak that is not known
         ("cosmos", "approx    0", "approx    1", True),
         ("cosmos", "approx    0", "approx    2", False),
         ("cosmos", f"{PEAK:15.6f}", f"{-999.0:15.6f}", True),
@@ -425,7 +425,7 @@ def test_a_direction_of_peer_has_twelve_letters_at_most(write, words, direction)
 
 @pytest.mark.parametrize(("jitter", "uniform"), [(0.24, True), (0.26, False)])
 def test_times_may_stray_by_a_quarter_of_a_step(write, jitter, uniform):
-    """Of many steps one time is off, which hardly moves the line through all of them."""
+    """Of many steps one time is off, which barely moves the line through all of them."""
     times = 0.01 * np.arange(400.0)
     times[200] += 0.01 * jitter
     rows = "".join(f"{time:.7f} {k % 7}\n" for k, time in enumerate(times))
@@ -475,7 +475,7 @@ def test_times_begin_anywhere_and_keep_to_their_line_by_a_quarter_of_a_step(writ
 
 
 def test_columns_of_afad_are_named_on_their_last_line(write):
-    """Another line that names three directions, before the peaks, tells nothing."""
+    """Another line that names three directions, before the peaks, counts for nothing."""
     head, peaks = SAMPLES["afad"].split("RAW PGA")
     (first, *others) = read_channels(write(f"{head}  U-D  N-S  E-W\r\nRAW PGA{peaks}"))
     assert [each.direction for each in (first, *others)] == ["N-S", "E-W", "U-D"]
@@ -515,7 +515,7 @@ def test_counts_of_knet_are_about_their_mean(write):
 def test_a_film_is_read_at_even_times(write, jitter):
     """Beyond a quarter of a step its trace, straight between the points, is sampled each 1 ms."""
     times = 0.01 * np.arange(101.0)
-    times[50] += 0.01 * jitter  # of so many points one hardly moves the line through all
+    times[50] += 0.01 * jitter  # of so many points one barely moves the line through all
     slope = 2.0  # m/s² per second: a straight line, which stays one
     numbers = np.column_stack([times, 100.0 * slope * times]).ravel()
     head = SAMPLES["smc_film"].partition("|made for a test\n")[0]

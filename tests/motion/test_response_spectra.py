@@ -94,7 +94,7 @@ def test_spectrum_does_not_depend_on_how_finely_the_motion_is_sampled():
     coarse, fine = (
         response_spectrum(shaking, PERIODS) for shaking in (motion, motion.resampled(0.001))
     )
-    # The same straight lines; what differs is where peaks between samples are found.
+    # The same straight lines; the difference is in peaks between samples.
     assert coarse == pytest.approx(fine, rel=1e-4)
 
 

@@ -31,7 +31,7 @@ KNOWN = Path(__file__).with_name("known.toml")
 ROOMS = ("motion", "masonry", "joints", "limit", "models", "statics", "dynamics")
 ROOMS += ("studies", "cases")
 IDLE = ("dynamics/warm_up",)
-"""Modules whose numbers nobody sees: runs that are made to compile what steps need."""
+"""Modules whose numbers are never used: runs that are made to compile the kernels of steps."""
 
 TESTS = [f"tests/{room}" for room in (*ROOMS, "validation", "verification")]
 TESTS.append("tests/test_doctests.py")

@@ -71,9 +71,9 @@ class Change:
 def changes(source: str) -> list[Change]:
     """Return the possible changes of a module.
 
-    Words of errors, logs and bars of progress, annotations, imports, what a function that only
-    refuses does and sizes of a shape that are to be found (any number below zero does that)
-    are left out.
+    Words of errors, logs and bars of progress, annotations, imports, bodies of
+    functions that only refuse, and sizes of a shape that are to be found (negative numbers) are
+    left out.
 
     Args:
         source: of the module.

@@ -103,7 +103,7 @@ def test_a_crack_stops_where_the_rest_bears_the_load(fidelity):
         assert float(state.joints[key][0]) == pytest.approx(float(dry.joints[key][0]), rel=1e-8)
 
 
-def test_what_is_broken_stays_broken():
+def test_broken_bonds_stay_broken():
     """Unloaded and loaded again, to what a fresh bed bears unbroken, it turns more than that."""
     model = block(friction=0.9, cohesion=60e3, tension=10e3, cells=16)
     first = under(model, 0.6, -1.0)

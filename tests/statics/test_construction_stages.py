@@ -89,7 +89,7 @@ def test_a_ring_that_leaves_its_centring_stands_as_if_built_at_once(fidelity, di
     assert staged.q == pytest.approx(direct.q, abs=1e-7 * np.abs(direct.q).max())
 
 
-def test_what_was_built_in_stages_is_in_balance(bridge):
+def test_a_bridge_built_in_stages_is_in_balance(bridge):
     model = af.build(bridge, fidelity="rigid", cells=(2, 1))
     found = af.dead_load(model, stages=usual_stages(bridge, layers=3))
     weight = self_weight(found.model)

@@ -132,7 +132,7 @@ def test_an_ordinary_ring_is_not_in_doubt():
 
 
 def test_shear_beyond_friction_in_joints_that_never_slide_is_a_doubt():
-    """Plane blocks one beside the other between walls: what holds them is shear alone."""
+    """Plane blocks one beside the other between walls: shear alone holds them."""
     dead = resting(embrace=7.0, friction=None)
     assert float(dead.joints["friction"].max()) > 3.5
     (doubt,) = dead_load_doubts(dead)
@@ -186,7 +186,7 @@ def smooth(friction):
     return {"model": dead.model, "joints": dead.joints}
 
 
-def test_what_limit_analysis_does_not_let_stand():
+def test_a_state_beyond_limit_analysis_is_a_doubt():
     """A state of joints with 0.6, put to joints with 0.2: no thrust line is within those."""
     dead = resting()
     weaker = af.build(
@@ -207,7 +207,7 @@ def test_what_limit_analysis_does_not_let_stand():
 
 
 @pytest.mark.parametrize(("embrace", "code"), [(159.0, 0), (7.0, 3)])
-def test_check_says_so(embrace, code, tmp_path, capsys):
+def test_the_check_command_prints_doubts(embrace, code, tmp_path, capsys):
     path = tmp_path / "ring.toml"
     path.write_text(
         '[structure]\nshape = "circular_arch"\nradius = 2.95\nthickness = 0.55\nvoussoirs = 9\n'
@@ -253,7 +253,7 @@ def test_an_error_of_large_displacements_states_the_stiffness_that_is_needed(ver
 
 
 def test_the_error_also_states_that_a_ring_carries_a_thousandth_of_its_weight():
-    """The first step of the load is longer than what it carries."""
+    """The first step of the load is larger than the load that it carries."""
     with pytest.raises(af.DidNotConverge, match=r"(39|4[01])0 times as stiff, k_n from [56]\.\de"):
         dead_load(thin_ring(1.48e9))
 

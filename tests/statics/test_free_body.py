@@ -92,7 +92,7 @@ def test_an_open_joint_acts_at_its_middle(stack):
     assert body.forces[0] == pytest.approx([-500.0, 0.0])
 
 
-def test_what_cannot_be_cut_free_is_refused(stack):
+def test_blocks_that_cannot_be_cut_free_are_refused(stack):
     joints = af.joints.joint_dataset(stack, np.array([[3e4, 0.0, 0.0], [1e4, 0.0, 0.0]]))
     with pytest.raises(af.InvalidInput, match=r"'base' is fixed.*that can move"):
         forces_on(stack, joints, "base")

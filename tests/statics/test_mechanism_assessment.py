@@ -220,7 +220,7 @@ def test_displacement_checks_of_a_rigid_block(name, share, factor, secant, dampi
 
 
 def test_a_mechanism_that_the_ground_does_not_start_passes():
-    """a0*/FC above the ground acceleration passes, whatever the displacement spectrum."""
+    """a0*/FC above the ground acceleration passes, for any displacement spectrum."""
     weak = af.motion.TableSpectrum([0.0, 4.0], [0.05, 3.0])
     found = af.kinematic_assessment(af.column(breadth=0.6, heights=[2.4]), weak)
     assert found.displacement.demand > found.displacement.capacity

@@ -91,7 +91,7 @@ def test_column_against_a_chain_of_springs(fidelity):
     squares = 4.0 * spring / mass * np.sin(0.5 * angle) ** 2
     shapes = np.sin(np.arange(1, count + 1) * angle[:, None])
     effective = mass * shapes.sum(axis=1) ** 2 / (shapes**2).sum(axis=1)
-    # "faces" blocks yield E / (L k_n), 1/12500, of what their joints do.
+    # "faces" blocks yield E / (L k_n), 1/12500, of the compliance of their joints.
     near = SAME if fidelity == "rigid" else 1e-4
     assert found.frequencies[upright][:count] == pytest.approx(hertz(squares), rel=near)
     assert found.effective_masses[upright, 1][:count] == pytest.approx(effective, rel=10.0 * near)

@@ -57,7 +57,7 @@ def test_an_error_within_a_solve_is_not_swallowed(error):
 
 
 def test_rounding_is_that_of_the_stiffest_coordinate():
-    """A soft spring that goes a kilometre far, beside one that is stiff and hardly moves.
+    """A soft spring that moves a kilometre, beside one that is stiff and barely moves.
 
     With 1e12 N/m rounding, 8 eps K q, is 1.8 N under a load of 1 N; with less it is nothing.
     """

@@ -47,7 +47,7 @@ def test_a_dead_load_is_that_of_petsc(ring, monkeypatch):
 
 
 def test_full_steps_of_small_systems_need_no_petsc(monkeypatch):
-    """PETSc searches along a step; options are for it alone, and so is what is large."""
+    """PETSc searches along a step; options are for it alone, and so are large systems."""
     monkeypatch.setitem(sys.modules, "archfem.statics.snes", None)
     start = np.array([5.0])
     light = EquilibriumSolver(1, prefer_scipy=True)
@@ -101,7 +101,7 @@ def test_errors_of_missing_petsc_state_how_to_install_it(monkeypatch):
 
 
 @pytest.mark.parametrize("library", ["PETSc", "SciPy"])
-def test_what_only_rounding_holds_is_no_equilibrium(library, request):
+def test_a_block_held_by_rounding_alone_is_no_equilibrium(library, request):
     """A stiff block that flies away, but for a stiffness of the size of rounding: 1e9 m far."""
     if library == "SciPy":
         request.getfixturevalue("alone")

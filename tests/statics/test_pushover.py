@@ -241,7 +241,7 @@ def test_rules_that_would_stop_at_once_or_never_are_refused(given, message):
         Stop(**given)
 
 
-def test_what_moved_is_named():
+def test_the_outcome_names_the_load_or_the_support_that_moved():
     stop = Stop(displacement=1e-5)
     for load, what in ((af.BodyForce(1.0), "load"), (af.Settlement(0, (-1.0, 0, 0)), "support")):
         assert f"the {what} moved by" in pushover(rigid(RING), load, stop=stop).outcome
@@ -380,7 +380,7 @@ def test_steps_grow_by_a_tenth_and_are_halved_where_they_fail():
 
 
 def test_steps_are_given_up_below_a_thousandth_of_the_first():
-    """2^-9 is still tried, 2^-10 is not: then what slides decides what is said."""
+    """2^-9 is still tried, 2^-10 is not: then the sliding joints decide the reason."""
     path = Steps([True] * 99)
     with pytest.raises(af.DidNotConverge, match="no equilibrium just after the dead load"):
         follow(path, "force", Stop(), af.Criteria())

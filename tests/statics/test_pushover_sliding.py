@@ -106,7 +106,7 @@ def test_a_bridge_under_fill_in_pieces_tends_to_the_limit_of_flat_sliding(
 
 
 @pytest.mark.slow
-def test_a_path_that_crawls_at_its_limit_ends_and_says_so():
+def test_a_path_that_crawls_at_its_limit_ends_with_that_reason():
     model = af.build(filled_bridge(0.0, 2.2), fidelity="rigid", cells=(2, 1))
     push = af.pushover(model, SIDEWAYS)
     assert "it crawls: in 40 steps the load moved by less than a tenth" in push.outcome

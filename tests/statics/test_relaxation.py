@@ -84,7 +84,7 @@ def test_soil_joints_slide_and_newton_finds_the_dead_load(bridge, fidelity):
 
 
 def test_fill_in_pieces_creeps_to_rest(bridge):
-    """Its free ends stand by what cohesion there is; no joint bears more than Mohr and Coulomb."""
+    """Its free ends stand by cohesion; no joint bears more than Mohr and Coulomb."""
     fill = af.masonry.jointed_fill(bridge, 0.8, angle=35.0, cohesion=10e3)
     model = af.build(fill, fidelity="rigid", cells=(2, 1))
     found = af.dead_load(model)
@@ -120,7 +120,7 @@ def test_a_support_spreads_under_fill_in_pieces(bridge):
 
 
 def test_a_load_on_fill_in_pieces_continues_by_creep(bridge):
-    """Each state is in balance and none beyond Coulomb; what cannot be borne adds none."""
+    """Each state is in balance and none beyond Coulomb; loads that cannot be borne add none."""
     fill = af.masonry.jointed_fill(bridge, 0.8, angle=35.0, cohesion=10e3)
     dead = af.dead_load(af.build(fill, fidelity="rigid", cells=(2, 1)))
     path = LoadPath.of(dead.model, [af.BodyForce(1.0)], dead)

@@ -121,7 +121,7 @@ def test_joints_and_fields_agree_on_the_strength_used(ring):
 
 
 def of_eccentricity(structure, e, normal=2.0e5):
-    """All joints alike."""
+    """The same in all joints."""
     moment = [normal * e * joint.depth for joint in structure.joints]
     rows = np.column_stack([np.full(len(moment), normal), np.zeros(len(moment)), moment])
     return af.joints.joint_dataset(structure, rows)
@@ -195,7 +195,7 @@ def test_where_edges_of_joints_slide_the_field_tends_to_the_same_share_of_the_ed
     assert coarse[0] / converged == pytest.approx(0.79, abs=0.02)
 
 
-def test_what_strength_is_unknown_is_not_used(stack):
+def test_the_use_of_an_unknown_strength_is_no_number(stack):
     soil = replace(
         stack, blocks=tuple(replace(b, material=af.masonry.BACKFILL) for b in stack.blocks)
     )
@@ -236,7 +236,7 @@ def test_a_run_gives_the_largest_of_all_instants(ring_model, dead):
     assert set(found["compression_time"].values) == {0.1}
 
 
-def test_what_has_no_field_is_refused(ring, ring_model, dead):
+def test_models_and_runs_without_a_field_are_refused(ring, ring_model, dead):
     rigid = af.build(ring, fidelity="rigid")
     for evaluate in (af.statics.principal_stresses, strength_use):
         with pytest.raises(af.InvalidInput, match=r"rigid blocks .*fidelity='faces'.*joint_stress"):

@@ -40,7 +40,7 @@ def compared(comparison, folder):
 
 
 def unscaled(study):
-    """Let a study run each motion as it is: how factors are found is not what is tested."""
+    """Let a study run each motion unscaled: the search for factors is not tested here."""
     study.write_text(study.read_text().replace("[0.3, 2.0]", "[1.0, 1.0]"))
 
 

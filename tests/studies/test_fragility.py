@@ -80,7 +80,7 @@ def test_bands_hold_the_truth_about_as_often_as_they_say():
     assert (high > found.probability([1.0, MEDIAN, 6.0])).all()
 
 
-def test_what_is_not_lognormal_is_seen():
+def test_goodness_rejects_samples_that_are_not_lognormal():
     two_heaps = np.concatenate([drawn(30) * 0.1, drawn(30) * 10.0])
     assert fragility(two_heaps).goodness < 0.05
     assert fragility(drawn(60)).goodness > 0.05
@@ -94,7 +94,7 @@ def test_a_curve_states_its_median_and_dispersion():
     assert f"dispersion {curve.dispersion:.2f}, " in str(curve)
 
 
-def test_what_is_not_known_of_the_structure_widens_the_curve():
+def test_uncertainty_of_the_structure_widens_the_curve():
     found = fragility(drawn(30))
     wider = found.widened(0.3)
     assert wider.dispersion == pytest.approx(np.hypot(found.dispersion, 0.3))

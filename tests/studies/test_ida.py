@@ -55,7 +55,7 @@ def test_brackets_agree_with_runs_at_their_ends(small_ida):
         assert (found.table["first hinge"] <= found.table[limit]).all()
 
 
-def test_measures_grow_with_the_scale_as_they_do(small_ida):
+def test_measures_grow_with_the_scale_by_their_definition(small_ida):
     _, _, found = small_ida
     motion = af.Motion.synthetic(seed=1, duration=0.6, pga=9.0)
     scale = float(found.table["verified"][0])
@@ -87,7 +87,7 @@ def test_a_motion_alone_is_a_list_of_one(small_ida, monkeypatch):
     assert len(points[0]) == 1
 
 
-def test_it_continues_where_it_ended(small_ida, monkeypatch):
+def test_an_analysis_continues_where_it_ended(small_ida, monkeypatch):
     case, folder, found = small_ida
 
     def never(*_):

@@ -69,7 +69,7 @@ def test_runs_of_one_model_are_those_of_new_models_whatever_ran_before(displacem
     for number in (0, 1, 0, 1, 1):
         assert same(run(model, number), alone[number])
     assert not same(*alone)
-    assert len(base.advance.signatures) == compiled  # copies are of the types of what was made
+    assert len(base.advance.signatures) == compiled  # copies have the types of the originals
     # another damping, and a copy that was changed, have matrices of their own
     assert not same(run(model, 0, StiffnessDamping(0.1, 9.0)), alone[0])
     heavier = copy(model)

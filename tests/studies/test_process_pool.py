@@ -16,7 +16,7 @@ from archfem.studies import process_pool
 
 
 def lives(process):
-    """Whether a process is there that has not ended; one that nobody has waited for has."""
+    """Whether a process exists and has not ended; a zombie has ended."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:

@@ -81,7 +81,7 @@ def test_plain_xarray_and_pandas_read_the_table(study_file, tmp_path):
     assert af.studies.read_table(tmp_path / "out" / "results.nc").identical(found)
 
 
-def test_what_is_finished_is_not_computed_again(study_file, tmp_path, monkeypatch):
+def test_finished_points_are_not_computed_again(study_file, tmp_path, monkeypatch):
     study = af.Study.read(study_file, own_code=True)
     folder = tmp_path / "out"
     first = study.run(folder, workers=1)
@@ -92,7 +92,7 @@ def test_what_is_finished_is_not_computed_again(study_file, tmp_path, monkeypatc
         return iter([(number, {"found": {}, "error": "", "ours": True}) for number, _ in points])
 
     monkeypatch.setattr("archfem.studies.process_pool.evaluate_serially", counted)
-    # what failed for no reason of the case's own is tried again: numbers 4 and 5
+    # points that failed for no reason of the case's own are tried again: numbers 4 and 5
     study.run(folder, workers=1)
     assert numbers == [4, 5]
     next(iter(folder.glob("points/*/*.json"))).unlink()
@@ -328,7 +328,7 @@ def test_cases_and_findings_are_in_one_file(ring_file, tmp_path, capsys):
     said = capsys.readouterr().out
     found = af.studies.read_table(folder / "results.nc")
     assert found["factor"].dims == ("case", "structure.width")
-    assert found["structure.width"].values.tolist() == [1.0, 1.5]  # numbers, whatever was written
+    assert found["structure.width"].values.tolist() == [1.0, 1.5]  # numbers in any notation
     assert found["structure.width"].attrs["units"] == "m"
     for name, changes in (("as it stands", []), ("thicker", ["structure.thickness=0.9"])):
         case = af.Case.read(ring_file, ["limit.horizontal=1.0", *changes])

@@ -49,7 +49,7 @@ def test_peaks(load, rule, peak, verified):
 @pytest.mark.parametrize(
     ("load", "rule", "left"), [(POINT, "nodal", 16.69), (POINT, "exact", 16.36)]
 )
-def test_what_is_borne_after_a_tenth_of_a_metre(load, rule, left):
+def test_load_factors_after_a_tenth_of_a_metre(load, rule, left):
     """Within 3 %: the load's own displacement, of a point that turns with its voussoir."""
     found = curve(load, rule, "displacement")
     factor = np.interp(0.1, found["displacement"], found["factor"])

@@ -2,7 +2,7 @@
 
 Oppenheim's arch (Earthq. Eng. Struct. Dyn. 21 (1992) 1005): seven voussoirs, 10 m by 1.5 m, 157.5°.
 Pushed sideways it turns about four hinges. Where those stay, the factor that balances it follows
-from the geometry of three links alone, whatever the rotation: by virtual work here.
+from the geometry of three links alone, at any rotation: by virtual work here.
 """
 
 from functools import cache
@@ -101,7 +101,7 @@ def links():
 
 
 @pytest.mark.slow
-def test_it_follows_four_links_until_a_hinge_moves_on(verified):
+def test_the_arch_follows_four_links_until_a_hinge_moves(verified):
     """Within 0.1 % up to a turn of 0.027 at the springing, where half of the factor is gone."""
     factor, chain, _ = links()
     found = pushed(1e12, "nodal", 0.02, "arc length")

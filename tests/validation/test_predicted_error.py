@@ -185,7 +185,7 @@ def test_a_tolerance_out_of_reach_is_warned_of(ring, caplog):
 
 @pytest.mark.slow
 def test_study_of_speed_against_error(ring):
-    """Exact facets beat springs on one mesh; what is chosen is the fastest within the tolerance.
+    """Exact facets beat springs on one mesh; the fastest within the tolerance is chosen.
 
     Of joints that never slide: where they do, plane faces with one facet a joint follow the sliding
     near the end of what is closed to 0.02 only.
@@ -215,7 +215,7 @@ def test_study_of_speed_against_error(ring):
 
 
 def test_a_setting_that_fails_is_reported_as_such(ring, monkeypatch):
-    """Steps of 10 ms end in an error; what the others find stands."""
+    """Steps of 10 ms end in an error; results of the others stand."""
 
     def failing(model, motion, **options):
         if options["dt"] == 0.01 and motion.duration > 0.02:

@@ -170,7 +170,7 @@ def test_the_criterion_of_the_paper_is_met_for_an_instant_by_its_own_law_alone()
 
 
 @pytest.mark.slow
-def test_it_stands_at_the_peak_of_1999(verified):
+def test_the_bridge_stands_at_the_peak_of_1999(verified):
     """Joints slide and stones move without limit, under the pair that displaces it most."""
     own = af.Case.read(MESHES / "prusias.toml", ["suite.reduction=1"]).alone("pair-6")
     motion = own.ground_suite().motions[0].scaled_to_pga(0.299 * STANDARD_GRAVITY)

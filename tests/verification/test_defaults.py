@@ -1,7 +1,7 @@
 """Default values of the arguments of the physics.
 
 A script that leaves an argument out relies on its default as on any other number. The tables are a
-second copy: who changes a default changes what scripts compute, and is to say so here too.
+second copy: a changed default changes the results of scripts, and is to be changed here too.
 """
 
 import inspect

@@ -103,7 +103,7 @@ def pushed(model, dead):
 
 @pytest.mark.slow
 def test_energy_balance_of_an_undamped_rocking_ring(model, dead):
-    """A push that opens joints: what the weight and the springs give is kept, but for O(dt²)."""
+    """A push that opens joints: energy of the weight and the springs is kept, but for O(dt²)."""
     start, given = pushed(model, dead)
     drift = [np.ptp(energies(model, start, dt, 0.2, NEWMARK)) / given for dt in (5e-4, 2.5e-4)]
     assert drift[0] < 0.02

@@ -61,7 +61,7 @@ def at_rest(fidelity, rule):
     ],
 )
 def test_supports_that_move_together_change_nothing(fidelity, rule, motion):
-    """The ring goes with them, a rigid motion of everything, although its joints could slide."""
+    """The ring moves with them, a rigid motion of everything, although its joints could slide."""
     reference = at_rest(fidelity, rule)
     moved = model = af.build(RING, fidelity=fidelity, cells=(2, 2), quadrature=rule)
     for block in (0, len(RING.blocks) - 1):
@@ -74,7 +74,7 @@ def test_supports_that_move_together_change_nothing(fidelity, rule, motion):
 
 
 @pytest.mark.parametrize("fidelity", FIDELITIES)
-def test_what_supports_pull_is_the_derivative_of_the_force(fidelity):
+def test_support_forces_are_the_derivative_of_the_force(fidelity):
     """By differences, on joints that never slide, where some are open in part."""
     model = af.build(glued(RING), fidelity=fidelity, cells=(2, 2), quadrature="lobatto")
     q, motion = af.dead_load(model).q, np.zeros_like(model.support_motion)
@@ -145,7 +145,7 @@ def test_two_blocks_on_a_support_that_sinks_a_little():
 
 @pytest.mark.parametrize("rule", ["lobatto", "exact"])
 def test_two_blocks_on_a_support_that_sinks_far_are_carried_by_three_hinges(rule):
-    """Moments about the hinges alone give the thrust between the blocks, whatever the stiffness.
+    """Moments about the hinges alone give the thrust between the blocks, at any stiffness.
 
     Hinges are corners where springs end in a point; a facet is closed over a length of its own,
     and hinges where its pressure acts.

@@ -59,7 +59,7 @@ def column():
 
 @pytest.fixture(scope="session")
 def toppled(column):
-    """Its run under a swing of the ground of 8 m/s² in a second."""
+    """A run of the column under a swing of the ground of 8 m/s² in a second."""
     time = np.linspace(0.0, 1.0, 201)
     motion = af.Motion(8.0 * np.sin(2.0 * np.pi * time), 0.005, name="swing")
     return af.time_history(column, motion, dt=0.005, record=af.Record(fields_every=5))

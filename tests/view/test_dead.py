@@ -10,7 +10,7 @@ from archfem.view import draw_dead_load
 
 @pytest.mark.parametrize("heights", [[0.8, 0.8], [0.8, 0.8, 0.4]])
 def test_numbers_of_a_column_are_the_weights_above(heights):
-    """N at the base is the weight of all stones, by the unit weight of stone."""
+    """Stones of the default density: N at the base is the weight of all."""
     stones = af.column(breadth=0.4, heights=heights)
     dead = af.dead_load(af.build(stones, fidelity="rigid"))
     page = draw_dead_load(dead)

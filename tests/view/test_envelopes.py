@@ -45,7 +45,7 @@ def test_each_ring_and_pier_has_a_panel_of_its_own(bridge):
 
 
 def test_two_bridges_are_distinguished_by_dots(bridge, ring):
-    """Parts of one name share a panel, whatever the number of their joints."""
+    """Parts of one name share a panel, for any number of their joints."""
     runs = {"before": history(bridge, 0.4), "after": history(bridge, 0.1)}
     for axes in draw_envelope(runs, dotted=["before"]).axes:
         lines = {line.get_label(): line.get_linestyle() for line in axes.lines}

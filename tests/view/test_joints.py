@@ -99,7 +99,7 @@ def test_joints_that_never_slide_have_no_limit(ring):
 
 
 def test_the_most_stressed_joints_are_no_mirror_images(ring):
-    """Joints 4 and 13 hinge alike, mirror images; joint 9 slides for longest, and is the second."""
+    """Joints 4 and 13 hinge equally, mirror images; joint 9 slides for longest, and is second."""
     time = np.linspace(0.0, 1.0, 11)
     found = np.zeros((11, 18, 3))
     found[..., 0] = 1e4
@@ -112,7 +112,7 @@ def test_the_most_stressed_joints_are_no_mirror_images(ring):
 
 
 def test_friction_beyond_the_axis_is_stated(ring):
-    """V / N of 9 where μ is 0.6: the axis ends at 1.8, and words say how far it goes."""
+    """V / N of 9 where μ is 0.6: the axis ends at 1.8, and text states the largest value."""
     time = np.linspace(0.0, 1.0, 11)
     found = np.zeros((11, 18, 3))
     found[..., 0] = 1e4

@@ -114,7 +114,7 @@ def test_a_fall_is_drawn_at_four_instants(toppled):
     assert len(times) == 4
     assert times == sorted(times)
     assert times[0] == pytest.approx(float(toppled.dataset["fall_time"][0]), abs=0.006)
-    FigureCanvasAgg(figure).draw()  # equal scales shrink axes that do not suit what they show
+    FigureCanvasAgg(figure).draw()  # equal scales shrink axes of another aspect ratio
     boxes = [axes.get_position() for axes in figure.axes]
     assert sum(box.width * box.height for box in boxes) > 0.7
 

@@ -7,7 +7,7 @@ import archfem as af
 from archfem.view import draw_convergence, draw_tornado
 
 
-def test_what_matters_most_is_at_the_top():
+def test_the_most_important_property_is_at_the_top():
     figure = draw_tornado({"k_n": (0.9, 1.1), "k_s": (0.5, 1.2), "damping": (1.0, 1.01)}, 1.0)
     (axes,) = figure.axes
     assert [text.get_text() for text in axes.get_yticklabels()] == ["damping", "k_n", "k_s"]

@@ -48,7 +48,7 @@ def test_a_tilted_box_touches_at_its_corner():
     assert gaps[0] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_what_lies_on_the_ground_touches_it():
+def test_a_block_on_the_ground_touches_it():
     poses = np.zeros((2, 3))
     poses[1] = 100.0, -1.0, 0.0  # far beside the floor, whose foot is the ground
     bodies, points, normals, _ = touching(floor((0.0, 0.0, 0.5, 2.0)), poses)

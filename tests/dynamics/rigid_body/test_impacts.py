@@ -157,7 +157,7 @@ def test_invalid_ratios_are_refused():
 
 
 def test_ratios_without_effect_are_refused():
-    """Housner's ratios of rectangles bound what is given, except where the closing end slides."""
+    """Housner's ratios of rectangles bound the given ratio, except where the closing end slides."""
     structure = floor((-1.0, 0.0, -0.4, 2.4), (0.4, 0.0, 1.0, 1.2))
     slender, stocky = 1.0 - 1.5 * 0.6**2 / (0.6**2 + np.array([2.4, 1.2]) ** 2)
     with pytest.raises(

@@ -153,7 +153,7 @@ def test_a_semicircle_stands_by_friction_farther_from_its_least_thickness(fricti
 
 
 def test_the_ground_may_be_moved_up_and_down():
-    """Weightless on a ground that falls as fast: what is thrown goes straight on."""
+    """Weightless on a ground that falls as fast: a thrown block moves in a straight line."""
     structure = floor((0.0, 0.0, 0.5, 0.5))
     start = LooseBlocks.as_built(structure)
     start.velocities[1] = 0.5, 1.0, 2.0
@@ -207,7 +207,7 @@ def test_strain_energy_lifts_blocks_out_of_compressed_joints(share):
     energy = share * weight * 2e-3
     start = replace(start, strain_energy=energy)
     end = RigidBlockSimulation(structure).final_frame(start, 0.02)
-    # the admissible overlap is a thousandth of the block; corrections halve what is beyond
+    # the admissible overlap is a thousandth of the block; corrections halve the excess
     lift = min(2e-3 - 0.8e-3, share * 2e-3)
     assert end.poses[1, 1] + 2e-3 == pytest.approx(lift, rel=0.02)
     assert end.energy.potential == pytest.approx(weight * lift, rel=0.02)
@@ -216,7 +216,7 @@ def test_strain_energy_lifts_blocks_out_of_compressed_joints(share):
 
 
 def test_energy_from_nowhere_is_refused(monkeypatch, chords):
-    """A coarse step gains energy: the height is above a bound far below the true one."""
+    """A coarse step gains energy beyond a bound that is set far below the true one."""
     monkeypatch.setattr("archfem.dynamics.rigid_body.time_stepping.MAX_ENERGY_GAIN", 1e-12)
     monkeypatch.setattr("archfem.dynamics.rigid_body.time_stepping.ENERGY_GAIN_NOISE", 0.0)
     with pytest.raises(af.errors.DidNotConverge, match="from nowhere"):
@@ -234,7 +234,7 @@ def test_rest_is_reported_only_once_the_ground_rests(chords):
     assert end.time == pytest.approx(1.5, abs=0.05)  # half a second after the motion
 
 
-def test_what_swings_slowly_does_not_rest():
+def test_a_column_that_swings_slowly_does_not_rest():
     """A tenth of a degree beyond balance a column takes over a second to be seen to move."""
     structure = floor((-0.3, 0.0, 0.3, 2.4), friction=5.0)
     start = tilted(structure, np.arctan(0.25) + 0.002)

@@ -12,7 +12,7 @@ ROUND_OFF = 1e-12
 
 @pytest.mark.parametrize("fidelity", ["rigid", "full"])
 def test_faces_are_where_their_edges_say(fidelity):
-    """What interpolates displacements gives the corners themselves, within edges or at their ends.
+    """Interpolated displacements give the corners themselves, within edges or at their ends.
 
     In a portal, on whose piers the ring stands on a part of their heads.
     """

@@ -38,7 +38,7 @@ def test_a_film_of_another_length_states_its_speed():
     assert even_timing(KEPT, 20.0, 40.0).speeds == pytest.approx(0.25)
 
 
-def test_what_matters_is_the_mechanism_or_the_fall(run, column, toppled):
+def test_the_decisive_window_has_the_mechanism_or_the_fall(run, column, toppled):
     falls = FallingBlocks.of(column.structure, toppled)
     start, end = decisive_window(toppled)
     assert start < falls.times[0] < end

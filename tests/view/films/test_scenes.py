@@ -63,7 +63,7 @@ def test_frames_follow_at_even_times_whatever_the_steps(model):
 
 
 def test_frames_of_a_run_that_chose_its_steps(model, tmp_path):
-    """Each frame tells its own time, and its joints are of a record next to it."""
+    """Each frame states its own time, and its joints are of a record next to it."""
     time = np.linspace(0.0, 0.3, 61)
     motion = af.Motion(6.0 * np.sin(2.0 * np.pi * time / 0.3), 0.005)
     run = af.time_history(model, motion, record=af.Record(fields_every=2))

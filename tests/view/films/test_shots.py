@@ -44,7 +44,7 @@ def test_the_view_has_room_for_falling_blocks_and_the_ground(setup, column, fall
     assert setup.low[1] < falls.level
 
 
-def test_what_flies_far_is_not_followed(setup, falls, column):
+def test_the_view_does_not_follow_blocks_that_fly_far(setup, falls, column):
     away = falls.poses + np.array([1e3, 0.0, 0.0])
     far = setup.with_falls(FallingBlocks(falls.structure, falls.times, away, falls.level))
     assert (

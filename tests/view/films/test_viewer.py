@@ -149,7 +149,7 @@ def test_the_slider_of_a_page_shows_one_instant(shaken, tmp_path, wide):
 
 
 @pytest.mark.parametrize(("renderer", "suffix"), [("vtk", ".mp4"), ("matplotlib", ".html")])
-def test_what_no_renderer_writes_is_refused(shaken, tmp_path, renderer, suffix):
+def test_formats_that_a_renderer_does_not_write_are_refused(shaken, tmp_path, renderer, suffix):
     model, run = shaken
     with pytest.raises(af.InvalidInput, match="use"):
         af.view.film(model, run, tmp_path / f"film{suffix}", renderer=renderer)
