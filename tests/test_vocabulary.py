@@ -1,4 +1,4 @@
-"""Plain words in docstrings, comments, messages, names of tests and documentation."""
+"""Plain words in docstrings, comments, messages, names of tests and scripts, and documentation."""
 
 import ast
 import io
@@ -10,9 +10,8 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PYTHON = sorted((ROOT / "archfem").rglob("*.py"))
-TESTS = sorted(
-    {path.parent for name in ("tests", "archbench") for path in (ROOT / name).rglob("*.py")}
-)
+SCRIPTS = {path.parent for name in ("tests", "archbench") for path in (ROOT / name).rglob("*.py")}
+SCRIPTS = sorted({*SCRIPTS, ROOT / "docs", ROOT / "docs" / "extensions"})
 PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")]
 PAGES += sorted((ROOT / "docs").rglob("*.md"))
 PAGES += [*sorted((ROOT / "meshes").glob("*.toml")), *sorted((ROOT / "notebooks").glob("*.py"))]
@@ -101,8 +100,8 @@ def test_the_package_has_plain_words(path):
     assert not places, "\n".join(places)
 
 
-@pytest.mark.parametrize("folder", TESTS, ids=lambda folder: str(folder.relative_to(ROOT)))
-def test_tests_and_scenes_have_plain_words(folder):
+@pytest.mark.parametrize("folder", SCRIPTS, ids=lambda folder: str(folder.relative_to(ROOT)))
+def test_tests_and_scripts_have_plain_words(folder):
     places = []
     for path in sorted(folder.glob("*.py")):
         source = path.read_text(encoding="utf-8")

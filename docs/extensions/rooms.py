@@ -117,8 +117,8 @@ def write_pages(folder: Path) -> None:
     for room, values in public().items():
         lines = [*title(room), f"``archfem.{room}``: {ROOMS[room]}.", ""]
         lines += table(sorted(values, key=lambda name: (name.count("."), name.lower())))
-        told = inspect.getdoc(importlib.import_module(f"archfem.{room}")) or ""
-        modules = [line for line in told.splitlines() if line.startswith("    ")]
+        docstring = inspect.getdoc(importlib.import_module(f"archfem.{room}")) or ""
+        modules = [line for line in docstring.splitlines() if line.startswith("    ")]
         lines += [*title("Its modules", "-"), ".. code-block:: text", "", *modules, ""]
         keep(folder / f"{room}.rst", lines)
     for name, says in PLAIN.items():
@@ -136,7 +136,7 @@ def keep(path: Path, lines: list[str]) -> None:
 
 def plain(_app: Sphinx, kind: str, _name: str, value: Any, _options: Any, lines: list[str]) -> None:
     """Convert a docstring to reStructuredText: formulas verbatim, no mark-up but backticks."""
-    told, before, outer, inside, section = [], "", 0, 0, False
+    output, before, outer, inside, section = [], "", 0, 0, False
     for line in without_types(lines):
         indent, blank = len(line) - len(line.lstrip()), not line.strip()
         if not blank and not indent:
@@ -144,17 +144,17 @@ def plain(_app: Sphinx, kind: str, _name: str, value: Any, _options: Any, lines:
         if not blank and indent < inside:
             inside = 0
         if not blank and not section and not inside and indent >= outer + 4 and not before.strip():
-            told += [" " * outer + ".. code-block:: text", ""]
+            output += [" " * outer + ".. code-block:: text", ""]
             inside = indent
         if not blank and not inside:
             outer = indent
-        told.append(line if inside or line.lstrip().startswith((">>>", "...")) else escaped(line))
+        output.append(line if inside or line.lstrip().startswith((">>>", "...")) else escaped(line))
         before = line
     if kind == "data":
-        told = [f"A `{type(value).__name__}`."]
+        output = [f"A `{type(value).__name__}`."]
     if kind in {"property", "attribute"}:  # text before a colon there is not a type
-        told = [line.replace(":", COLON) for line in told]
-    lines[:] = told
+        output = [line.replace(":", COLON) for line in output]
+    lines[:] = output
 
 
 def restored(
