@@ -4,13 +4,13 @@ import numpy as np
 
 
 def displacement(points, block, motion):
-    """Of points (k, 2) of a block whose centroid moves by (u, v, θ)."""
+    """Displacements of points (k, 2) of a block whose centroid moves by (u, v, θ)."""
     arm = points - block.centroid
     return motion[:2] + motion[2] * np.column_stack([-arm[:, 1], arm[:, 0]])
 
 
 def jumps(structure, motion):
-    """From the lower to the higher block, at both ends of each joint (n_joints, 2, 2)."""
+    """Jumps from the lower to the higher block, at both ends of each joint (n_joints, 2, 2)."""
     return np.array(
         [
             displacement(joint.ends, structure.blocks[joint.higher], motion[joint.higher])

@@ -64,7 +64,7 @@ def test_a_file_of_an_earlier_version_has_no_seal(written, tmp_path):
 
 @pytest.mark.slow
 def test_a_damaged_history_is_run_again(small, undrawn, capsys):
-    """Of two finished pairs the one whose file has another byte is run again."""
+    """The one of two finished pairs whose file has another byte is run again."""
     out = small.parent / "out"
     command = ["run", str(small), "--out", str(out)]
     assert af.commands.main(command) == 0

@@ -169,7 +169,7 @@ def test_code_is_compiled_anew_if_any_kernel_has_changed(stored, monkeypatch):
 
 
 def test_code_of_a_function_at_another_line_is_deleted(stored, monkeypatch):
-    """Of another function, or of another Python, it stays."""
+    """Code of another function, or of another Python, stays."""
     folder, name = stored["index"].parent, stored["index"].name
     line = re.search(r"-(\d+)\.", name)[1]
     moved = folder / name.replace(f"-{line}.", "-7.")

@@ -37,7 +37,7 @@ def test_a_decorated_function_takes_one_thread_and_restores_the_limit():
 
 
 def test_a_run_takes_one_thread():
-    """As seen from within, by its event."""
+    """An event of the run reads the number of threads."""
     seen = {}
     column = af.column(breadth=1.0, heights=[1.0])
     with threadpool_limits(limits=2, user_api="blas"):

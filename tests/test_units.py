@@ -15,7 +15,7 @@ def registry():
 
 @pytest.mark.parametrize(("unit", "si"), [(name, si) for name, (si, _) in COMMON_UNITS.items()])
 def test_common_units_are_those_of_the_registry(registry, unit, si):
-    """To the last digit, so that a case gives the same numbers either way."""
+    """Units agree to the last digit, so that a case gives the same numbers either way."""
     for number in (*np.random.default_rng(1).uniform(-1e3, 1e3, 50).round(3), 0.0, 1.48):
         expected = registry.Quantity(f"{number} {unit}").to(si).magnitude
         assert af.units.in_unit(f" {number}{unit}", si, "length") == expected

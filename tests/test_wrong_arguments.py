@@ -259,7 +259,7 @@ def test_pushover(model, given, says):
 
 
 def test_a_start_of_another_structure_is_refused(model, tmp_path):
-    """Of as many coordinates, and joints of the same names."""
+    """The other structure has as many coordinates, and joints of the same names."""
     thicker = af.build(
         af.circular_arch(radius=2.95, thickness=0.65, embrace=159.0, voussoirs=7), fidelity="rigid"
     )

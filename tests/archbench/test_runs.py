@@ -173,7 +173,7 @@ def test_every_program_answers_one_scene_where_it_is_installed(name):
 
 
 def test_archfem_answers_as_it_is_stored():
-    """As `make archbench-quick`, for every scene that takes less than 0.3 seconds."""
+    """The same check as `make archbench-quick`, for scenes that take less than 0.3 seconds."""
     differences, count = run.compare_with_stored(cost=0.3)
     assert differences == []
     assert count >= 20

@@ -16,7 +16,7 @@ STILL = af.Motion(np.zeros(6), 0.1)
 
 @cache
 def block(stiffness, **given):
-    """So flat that its bed stays closed: 1 m broad and 0.1 m high, 2 kN."""
+    """A block so flat that its bed stays closed: 1 m broad and 0.1 m high, 2 kN."""
     contact = af.Contact(stiffness, stiffness, **given)
     structure = af.column(breadth=1.0, heights=[0.1], contact=contact)
     return af.build(structure, fidelity="rigid", quadrature="lobatto")

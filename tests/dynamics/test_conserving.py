@@ -67,7 +67,7 @@ def balance(start, energy):
 @pytest.mark.parametrize("friction", [0.3, 0.6, None])
 @pytest.mark.parametrize("kind", ["rocking", "sliding"])
 def test_an_undamped_block_neither_gains_nor_loses(kind, friction, dt):
-    """To 1e-8 of the exchanged energy, at any step; friction never gives; V ≤ μ N at every step."""
+    """Drift is below 1e-8 of the exchanged energy; friction gives none; V ≤ μ N at every step."""
     built = model(kind, friction)
     start, energy, resultants, _ = steps(built, SHAKE, dt)
     drift, exchanged = balance(start, energy)
@@ -232,7 +232,7 @@ def shaken(fidelity, rule, method):
     ),
 )
 def test_solvers_step_as_snes_does(fidelity, rule, method):
-    """To 1e-8 over 60 steps in which joints open and slide; some are glued."""
+    """Histories agree to 1e-8 over 60 steps in which joints open and slide; some are glued."""
     slow, fast = (shaken(fidelity, rule, each) for each in ("snes", method))
     assert np.abs(slow[3][-1].memory).max() > 1e-5
     assert (slow[2][:, :, 0].min(axis=0) < slow[2][0, :, 0]).any()

@@ -148,7 +148,7 @@ def test_invalid_stiffness_damping_is_refused(given, words):
 
 @pytest.mark.parametrize(("breadth", "number"), [(0.14, 2), (0.145, 1)])
 def test_the_first_effective_mode_has_five_percent(breadth, number):
-    """Of a slender block beside a wide one: the lowest mode is its own, with 4.9 or 5.1 %."""
+    """A slender block beside a wide one has the lowest mode, with 4.9 or 5.1 % of the mass."""
     contact = af.Contact(1e9, 0.5e9)
 
     def box(left, right, low, high, name):
@@ -176,7 +176,7 @@ def test_the_first_effective_mode_has_five_percent(breadth, number):
 def test_twice_as_many_modes_are_computed_until_they_have_the_share(
     reached, counts, monkeypatch, caplog
 ):
-    """Of a model with as many coordinates, whose modes have their share from some number on."""
+    """The modes of a model with 50 coordinates have the share from some number on."""
     computed = []
 
     def modes(model, count, about):

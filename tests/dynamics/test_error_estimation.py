@@ -39,7 +39,7 @@ def window_of(strong, length, dt=0.01):
 
 
 def test_the_strongest_part_has_six_tenths_of_the_intensity():
-    """Of ten even seconds, six, wherever they are; upward motion does not count."""
+    """Ten even seconds give six, at any time; upward motion does not count."""
     motion, found = window_of((6.0, 16.0), 20.0)
     assert found.duration == pytest.approx(6.5, abs=0.03)
     energy = np.sum(found.horizontal[round(0.5 / found.dt) :] ** 2) / np.sum(motion.horizontal**2)
@@ -62,7 +62,7 @@ def test_a_short_motion_is_taken_as_it_is():
 
 @pytest.mark.parametrize(("slenderness", "known"), [(2.0, 0.4), (80.0, 0.02)])
 def test_a_severe_motion_brings_the_thrust_near_the_edge(slenderness, known):
-    """Of a block under a g, e = a H / (2 B): 0.4 at a = 0.8 B / H, but 2 % of g at least.
+    """A block under a g has e = a H / (2 B): 0.4 at a = 0.8 B / H, but 2 % of g at least.
 
     Found by ten halvings of 2 g: to 2 g / 1024.
     """
@@ -75,7 +75,7 @@ def test_a_severe_motion_brings_the_thrust_near_the_edge(slenderness, known):
 
 
 def test_usual_damping_is_five_per_cent_at_the_first_frequency():
-    """Of a rigid block on a closed joint: sway and rocking by their two by two matrices."""
+    """A rigid block on a closed joint: sway and rocking by their two by two matrices."""
     breadth, height = 0.6, 2.4
     contact = af.Contact(1e9, 4e8)
     block = af.column(breadth=breadth, heights=[height], contact=contact)
@@ -124,7 +124,7 @@ def test_a_run_that_fails_has_no_peaks(monkeypatch, stack):
 
 
 def test_parts_about_peaks_give_the_peaks_of_the_whole_run():
-    """In the same steps, from states on the way: the parts are those that decide."""
+    """The parts have the same steps, from states on the way, and include the decisive ones."""
     model = af.build(COLUMN, fidelity="rigid")
     motion = af.Motion.synthetic(duration=6.0, pga=1.5, seed=3)
     damping = default_damping(model)

@@ -32,7 +32,7 @@ def test_balance_of_a_step_taken_in_halves(ring, breaking):
 
 
 def test_a_step_taken_in_halves_makes_no_energy(model, breaking):
-    """Nor loses any, though joints open and slide; and both halves leave the memory of joints."""
+    """Halves also lose no energy, though joints open and slide; both keep the memory of joints."""
     short = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3).cut(1.0, 1.4)
     damping = af.Rayleigh(0.05, (8.0, 16.0))
     fine = af.time_history(model, short, dt=0.0025, damping=damping)

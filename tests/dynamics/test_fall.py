@@ -163,7 +163,7 @@ def test_a_block_handed_over_rocks_on_with_the_restitution_of_its_damping(ratio)
 
 @pytest.mark.parametrize("longest", [5e-4, 3e-4, 1.25e-4, 1e-4])
 def test_a_fall_that_fails_is_repeated_with_shorter_steps(tower, monkeypatch, longest):
-    """Down to an eighth of a millisecond, beyond which the error states remedies."""
+    """Steps go down to an eighth of a millisecond, beyond which the error states remedies."""
 
     class Simulation:
         def __init__(self, structure, *, dt, rocking_ratio):
@@ -430,7 +430,7 @@ def test_a_kind_of_collapse_near_another_is_doubted(kind, displacement, residual
 
 
 def test_stones_of_no_role_count_whatever_their_joints_are():
-    """Of stones on joints of 40 GPa/m the large one yields first, and is lost like the others."""
+    """On joints of 40 GPa/m the large stone yields first, and is lost like the others."""
     contact = af.Contact(4e10, 2e10, 0.6)
     column = af.column(breadth=1.0, heights=[0.3, 2.0], contact=contact)
     blocks = tuple(replace(block, role="other") for block in column.blocks)

@@ -18,7 +18,7 @@ GRAVITY = af.units.G
 
 @cache
 def block(friction, stiffness):
-    """So flat that its bed stays closed: 1 m broad and 0.1 m high."""
+    """A block so flat that its bed stays closed: 1 m broad and 0.1 m high."""
     contact = af.Contact(stiffness, stiffness, friction)
     structure = af.column(breadth=1.0, heights=[0.1], contact=contact)
     return af.build(structure, fidelity="rigid", quadrature="lobatto")
@@ -53,7 +53,7 @@ def slid(friction, stiffness, motion, dt):
 
 
 def test_newmarks_block_slides_by_closed_form(verified):
-    """To 1e-6 of 0.19 m, in steps of 0.25 ms at k = 3e11 Pa/m.
+    """The slip agrees to 1e-6 of 0.19 m, in steps of 0.25 ms at k = 3e11 Pa/m.
 
     In the step in which it stops the path is not straight: an error of a dt² / 8, here 3e-8 m. The
     elastic slip leaves 7e-7 (below), with the other sign.
@@ -79,7 +79,7 @@ def test_a_block_that_slides_far_is_never_left_to_snes(method):
 
 @pytest.mark.slow
 def test_elastic_slip_errs_in_proportion_to_its_size():
-    """Of a block that stops and stays the error is as 1/k_s, if steps are short enough."""
+    """The error of a block that stops and stays is as 1/k_s, if steps are short enough."""
     expected, _ = slide(pulse().horizontal, 0.05, 0.3 * GRAVITY)
     sizes = np.array([1e8, 1e9, 1e10])
     errors = [abs(slid(0.3, k, pulse(), 1e-4) / expected - 1.0) for k in sizes]

@@ -32,7 +32,7 @@ def rubbing(fidelity, rule):
 @pytest.mark.parametrize("rule", ["exact", "lobatto", "gauss"])
 @pytest.mark.parametrize("fidelity", ["rigid", "faces", "condensed"])
 def test_gaps_at_all_points_follow_from_the_rows(fidelity, rule):
-    """To rounding of the coordinates, here metres; supports have moved by millimetres."""
+    """Gaps agree to rounding of the coordinates, here metres; supports moved by millimetres."""
     joints = rubbing(fidelity, rule).operator
     rows = gap_rows(joints)
     q = np.random.default_rng(1).standard_normal(joints.opening.shape[1])

@@ -94,7 +94,7 @@ def test_a_cheap_setting_that_took_longer_to_find_than_to_run_is_not_chosen(chos
     ("difference", "step"), [(0.0, 5.0), (0.003, 5.0), (0.006, 5.0), (0.012, 3.5), (0.0299, 2.5)]
 )
 def test_the_longest_step_within_the_tolerance_is_taken(chosen, difference, step):
-    """Of those of 0.5 ms; errors of steps are of order 2, and 0.003 is left of 0.012 at 2.5 ms."""
+    """Steps are multiples of 0.5 ms; errors are of order 2: 0.003 of 0.012 is left at 2.5 ms."""
     prediction = chosen.of(0.3 + difference, 0.3)
     assert 1e3 * prediction.dt == pytest.approx(step)
     assert prediction.error == pytest.approx(REST * difference * (step / 2.5) ** 2)

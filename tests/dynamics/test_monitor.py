@@ -81,7 +81,7 @@ def test_energy_is_judged_at_every_step_however_many_come_at_once(ring, damps):
 
 
 def test_all_steppers_are_refused_with_the_same_text(whole):
-    """Of a run that makes energy: compiled steps come by 128, those of SNES one by one."""
+    """The run gains energy; compiled steps arrive by 128, those of SNES one by one."""
     said = []
     for method in ("snes", "compliance"):
         with pytest.raises(af.DidNotConverge) as caught:
@@ -237,7 +237,7 @@ def test_the_balance_counts_energy_gained_and_lost():
 
 
 def test_drift_is_relative_to_a_least_exchanged_energy():
-    """Of 10 J under self-weight a hundredth of a joule is exchanged at least."""
+    """The least exchange is a thousandth of the 10 J under self-weight."""
     _, fractions = EnergyBalance(0.0, -10.0).add(np.array([[1e-4, -10.0, 0.0, 0.0]]))
     assert fractions == pytest.approx([0.01])
 
@@ -261,7 +261,7 @@ def drift_by(method, ring, rule, joints, scheme):
     ("way", "rule", "joints"), each_once(WAYS, ("lobatto", "exact"), ("closed", "initial"))
 )
 def test_all_steppers_keep_the_same_balance(ring, way, rule, joints):
-    """To the 1e-8 within which their histories agree; by the conserving scheme without drift."""
+    """Balances agree to 1e-8, as histories do; by the conserving scheme without drift."""
     scheme, fast = way
     slow, model = drift_by("snes", ring, rule, joints, scheme)
     quick, _ = drift_by(fast, ring, rule, joints, scheme)

@@ -45,7 +45,7 @@ def _steps(equation, start, widest):
     [pytest.param(40, id="band"), pytest.param(0, id="sparse factor", marks=pytest.mark.slow)],
 )
 def test_the_solver_gives_the_history_of_snes(damping, widest):
-    """And the same bits again, whether the tangent is a band or sparse."""
+    """A second run gives the same bits, whether the tangent is a band or sparse."""
     equation, start = sliding_ring(damping=damping)
     runs = [_steps(equation, start, widest) for _ in range(2)]
     assert not any(batch.fallback for batch in runs[0])
@@ -110,7 +110,7 @@ def banded(rng, size, half):
 
 @pytest.mark.parametrize(("size", "half"), [(1, 0), (2, 1), (7, 3), (40, 5), (40, 12), (9, 8)])
 def test_a_band_is_solved_with_row_exchanges(size, half):
-    """Of matrices with any diagonal, also one of zeros."""
+    """Matrices have any diagonal, also one of zeros."""
     rng = np.random.default_rng(size + half)
     for diagonal in (1.0, 1e-9, 0.0 if half else 1.0):
         matrix = banded(rng, size, half)
@@ -130,7 +130,7 @@ def test_a_singular_band_is_reported():
 
 
 def test_the_narrower_order_is_taken():
-    """Of a shuffled chain that of Cuthill and McKee, of an ordered one the given one at most."""
+    """A shuffled chain gets the order of Cuthill and McKee; an ordered one keeps its width."""
     chain = sparse.diags([1.0, 1.0, 1.0], [-1, 0, 1], (30, 30)).tocsr()
     shuffle = np.random.default_rng(2).permutation(30)
     for matrix in (chain, chain[shuffle][:, shuffle]):

@@ -103,7 +103,7 @@ def integrated(lag, normal=1e9, impacts=2):
 @pytest.mark.slow
 @pytest.mark.parametrize("wanted", [0.97, pytest.param(0.95, marks=pytest.mark.slow), 0.92])
 def test_found_damping_gives_the_wanted_restitution(wanted):
-    """To 1e-3, by the block's own equations, and by a run of the package on a finer scale."""
+    """Within 1e-3, by the block's own equations, and by a run of the package on a finer scale."""
     given = {"contact": contact(friction=None), "material": STONE}
     damping = restitution_damping(wanted, BREADTH, HEIGHT, **given)
     assert damping.mass == 0.0
@@ -143,7 +143,7 @@ def in_large_motion(damping, impacts=2, dt=1e-3):
 
 @pytest.mark.parametrize("ratio", [0.1, 0.5, 1.5])
 def test_blocks_that_move_far_lose_as_much(ratio):
-    """So damping found on small displacements serves large ones.
+    """Damping that is found by small displacements therefore serves large ones.
 
     To 5e-3: beyond critical damping a part is lost on the way from impact to impact, which takes
     the longer the less of its moment a tilted block keeps.

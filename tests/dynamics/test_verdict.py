@@ -219,7 +219,7 @@ def test_the_share_of_damping_by_mass_is_that_of_the_energy_lost():
 @pytest.mark.parametrize("fidelity", ["rigid", pytest.param("faces", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("scheme", [af.dynamics.Conserving(), af.dynamics.Newmark()])
 def test_openings_follow_from_displacements_whatever_steps(ring, motion, fidelity, scheme):
-    """Of every method those of SNES, and at each frame those that the coordinates give."""
+    """Every method has those of SNES, and each frame those of its coordinates."""
     slides = scheme == af.dynamics.Conserving()
     model = af.build(ring if slides else glued(ring), fidelity=fidelity)
     given = {"damping": af.Rayleigh(0.05, (8.0, 16.0)), "scheme": scheme, "dt": 0.005}

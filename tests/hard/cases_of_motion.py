@@ -124,7 +124,7 @@ def mirrored():
 @case("restart from a stored state", "the same history", quick=True)
 @case("restart, SNES", "the same history", method="snes", fidelity="rigid")
 def restarted(method="auto", fidelity="faces"):
-    """At 2 s, through a file, of a run of 4 s."""
+    """A run of 4 s that is restarted at 2 s, through a file."""
     model = af.build(ring(), fidelity=fidelity, cells=(2, 2))
     motion = quake(2.0, duration=4.0)
     whole = shaken(model, motion, method=method)

@@ -106,7 +106,7 @@ def test_a_bonded_joint_is_linear_elastic_below_its_strength():
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("seed", range(4))
 def test_forces_are_the_slope_of_the_energy_where_nothing_slides(rule, seed):
-    """Of bonds that never slide, some broken: a central difference over 1e-9 m, to 1e-6."""
+    """Bonds never slide, some are broken: a central difference over 1e-9 m, to 1e-6."""
     contact = af.Contact(1.48e9, 0.3e9, None, tension=60e3)
     structure = af.circular_arch(
         radius=2.95, thickness=0.55, embrace=159.0, voussoirs=7, contact=contact

@@ -86,7 +86,7 @@ def test_gauges_follow_supports_that_have_moved(fidelity):
 
 
 def test_points_that_are_not_about_the_middle_give_its_displacement():
-    """Of faces that part by g_0 - θ a, at three places a of any weights."""
+    """Faces part by g_0 - θ a, at three places a of any weights."""
     arm, weight = np.array([-0.1, 0.3, 0.6]), np.array([1.0, 2.0, 1.0])
     points = SimpleNamespace(joint=np.zeros(3, int), offset=arm, weight=weight, joint_count=1)
     gaps, slips = 2e-3 - 1e-2 * arm, np.array([1e-3, 2e-3, 5e-3])

@@ -103,7 +103,7 @@ def test_a_path_of_springs_is_that_of_scalar_return_mappings():
 
 @pytest.mark.parametrize("rule", RULES)
 def test_no_point_bears_more_shear_than_friction_holds(rule):
-    """And none at all where it is open: |t| ≤ μ N + c A at every point, to rounding."""
+    """Open points bear none: |t| ≤ μ N + c A at every point, to rounding."""
     for seed in range(10):
         model, q, _ = places(mixed(rule=rule), seed)
         operator = model.operator
@@ -245,7 +245,7 @@ def test_the_rates_of_a_step_shorter_than_rounding_are_those_of_a_slide():
 
 
 def misfit(model, first, last, late):
-    """Of a step's tangent against a central difference, relative."""
+    """Relative difference of a step's tangent from a central difference."""
     passage = model.begin_step(first, late)
     step = 1e-10 * np.random.default_rng(7).standard_normal(model.size)
     change = passage.force(last + step) - passage.force(last - step)

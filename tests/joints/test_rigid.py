@@ -25,7 +25,7 @@ def gap_by_hand(structure, points, motion, k):
 
 @pytest.mark.parametrize("rule", ["lobatto", "exact", "gauss"])
 def test_gaps_follow_motions_of_both_blocks(ring, rule):
-    """Of all blocks, and of those that are free by the operator: the fixed ones stay then."""
+    """All blocks move, or by the operator the free ones alone."""
     operator = rigid_joint_operator(ring, 3, af.joints.Quadrature(rule))
     points, rng = operator.points, np.random.default_rng(4)
     motion = SMALL * rng.normal(size=(len(ring.blocks), 3))

@@ -48,7 +48,7 @@ def in_triangles(structure, triangles, angle, ends=(), loose=()):
 
 
 def test_a_wedge_of_triangles_resists_a_wall_as_rankine_has_it():
-    """Of triangles cut at 45° - φ/2 the exact wedge is one of the mechanisms."""
+    """Triangles cut at 45° - φ/2 have the exact wedge among their mechanisms."""
     angle, height, layers = 30.0, 2.0, 4
     wall = retaining_wall(6.0, height, friction=0.3)
     step = np.array([np.tan(np.radians(45.0 + angle / 2.0)), 1.0]) * height / layers

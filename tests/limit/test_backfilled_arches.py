@@ -103,7 +103,7 @@ def test_cohesion_holds_a_wall_back():
 
 
 def test_paving_on_the_fill_presses_through_it():
-    """Of a load q on all of the fill, the pressure is K_a q more, and the force at h/2."""
+    """A load q on all of the fill adds the pressure K_a q, and its force at h/2."""
     wall = retaining_wall(1.5, 2.0, 9.0)
     paving = rectangle(0.0, 2.0, 6.0, 2.3, "paving")
     rough = replace(af.masonry.STONE_TO_STONE, friction=9.0)

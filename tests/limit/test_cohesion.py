@@ -187,7 +187,7 @@ def test_a_shaken_block_is_a_mechanism_only_beyond_friction_and_cohesion(peak, s
 
 
 def test_the_force_of_cohesion_falls_as_a_joint_opens():
-    """Of a plane face pressed without tension 3 (1/2 - |e|) touches: 0.3 of it at e = 0.4."""
+    """The closed part of a plane face without tension is 3 (1/2 - |e|): 0.3 at e = 0.4."""
     contact = af.Contact(1e9, 4e8, 0.5, cohesion=10e3)
     structure = af.column(breadth=2.0, heights=[1.0], width=0.5, contact=contact)
     normal, whole = 20e3, 10e3 * 2.0 * 0.5

@@ -48,7 +48,7 @@ def test_joints_that_slide_are_named_with_their_factor(warned):
 def test_joints_that_hold_by_more_cohesion_than_is_closed_are_named(
     shear, friction, failing, count, warned, monkeypatch
 ):
-    """Of 10 N of cohesion, 40 % is closed."""
+    """The closed part has 40 % of 10 N of cohesion."""
     monkeypatch.setattr(
         collapse, "contact_fractions", lambda structure, normal, moment: np.full(2, 0.4)
     )

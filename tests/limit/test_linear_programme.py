@@ -13,7 +13,7 @@ from archfem.limit.linear_programme import RigidBlocks, rigid_load
 
 @pytest.fixture
 def motion():
-    """Of all blocks of the arch, supports included."""
+    """A motion of all blocks of the arch, supports included."""
     return np.random.default_rng(3).standard_normal((19, 3))
 
 
@@ -84,7 +84,7 @@ def test_strong_joints_respect_the_stress_block():
 
 
 def test_further_unknowns_keep_within_their_limit():
-    """Of a stay that holds a column back with up to T at its top, λ W h/2 = W b/2 + T h."""
+    """A stay holds a column back with up to T at its top: λ W h/2 = W b/2 + T h."""
     block = af.column(breadth=0.6, heights=[2.4])
     _, dead = self_weight_programme(block, "coulomb", None, None)
     sideways = dead.with_load_factor(rigid_load(block, [SIDEWAYS]))

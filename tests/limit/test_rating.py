@@ -25,7 +25,7 @@ def scaled(joint, share):
 
 @pytest.fixture(scope="module")
 def lorry_rating():
-    """Of a lorry with unequal axles, on a bridge three metres wide."""
+    """The rating of a lorry with unequal axles, on a bridge three metres wide."""
     lorry = Vehicle("lorry", (60e3, 115e3), (3.2,), live=1.35)
     bridge = arch_bridge(width=3.0, voussoirs=8)
     return af.rate(bridge, lorry, width=2.0, dead=1.1, fill=GRAVEL)

@@ -79,7 +79,7 @@ class ThreeHinges:
         return self.inside(stones, ends, joints, start, force)
 
     def reaction(self, stones, joints, hinges):
-        """Of what lies left of the first hinge on the rest: moments about the other two."""
+        """Force of the part left of the first hinge on the rest, by moments about the other two."""
         rows, known = [], []
         for pivot, last in zip(hinges[1:], joints[1:], strict=True):
             arm = hinges[0] - pivot

@@ -62,7 +62,7 @@ def test_each_place_is_a_row_of_point_loads(fill, direction):
 
 @pytest.mark.slow
 def test_sliding_flat_is_searched_from_place_to_place(monkeypatch):
-    """As weak as by the whole search at each place, in a fifth of its programmes."""
+    """Results are as weak as by the whole search at each place, in a fifth of its programmes."""
     solved, solve = [], Programme.solve
     monkeypatch.setattr(Programme, "solve", lambda self: solved.append(self) or solve(self))
     slick = af.Contact(1.48e9, 0.3e9, 0.3)
@@ -157,7 +157,7 @@ def descent(structure, motion, x):
 
 @pytest.mark.slow
 def test_more_cover_spreads_axles_and_carries_more():
-    """Of a weightless fill without strength, only the spreading is left."""
+    """A weightless fill without strength has only the spreading."""
     soil = af.Material(SOIL.young, SOIL.poisson, 1e-3, None, "light")
     fill = af.limit.Fill(friction_angle=0.0, mobilisation=0.0, active=0.0, spread=40.0)
     worst = [over(arch_bridge(c, soil), 1e5, fill=fill).worst.factor for c in (0.05, 0.4, 0.9)]

@@ -243,7 +243,7 @@ def test_a_line_begins_on_the_left_or_where_it_stands_at_its_foot(step, first):
 @pytest.mark.parametrize(("share", "touch"), [(0.98, True), (1.02, False)])
 @pytest.mark.parametrize("upright", [False, True])
 def test_blocks_touch_within_a_millionth_of_all_blocks(share, touch, upright):
-    """Of the diagonal of the corners, which span two metres by one, wherever they are."""
+    """The length is the diagonal of the corners, which span two metres by one at any place."""
     gap = share * 1e-6 * np.hypot(2.0, 1.0)
     if upright:
         blocks = [box(50, 70, 51, 71, "a"), box(50, 71 + gap, 51, 72, "b")]

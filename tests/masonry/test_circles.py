@@ -32,7 +32,7 @@ def test_points_of_a_circle(arch):
 
 
 def test_rough_points_have_the_circle_of_least_squares():
-    """As found by a search that uses no property of circles."""
+    """A search that uses no property of circles finds the same."""
     radius, points = intrados(*ARCHES[1])
     points = points + np.random.default_rng(4).normal(0.0, 0.02, points.shape)
     found = fitted_circle(points)

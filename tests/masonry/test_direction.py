@@ -52,7 +52,7 @@ def test_a_row_is_straight_up_to_a_spread_of_five_thousandths(spread, straight, 
 
 
 def test_a_ring_of_few_stones_is_found_from_them_too():
-    """Of two stones one joint lies between: a circle through its middle and both centroids."""
+    """Two stones and their joint: a circle through its middle and both centroids."""
     ring = af.circular_arch(radius=2.0, thickness=0.4, embrace=90.0, voussoirs=2)
     way = find_directions(ring.blocks, lines(ring))["arch"]
     x, y = max((block.centroid for block in ring.blocks if not block.fixed), key=lambda c: c[0])

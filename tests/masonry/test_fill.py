@@ -284,7 +284,7 @@ def test_pieces_are_halves_of_equilateral_triangles():
 
 @pytest.mark.parametrize(("part", "pieces"), [(0.29, 1), (0.31, 2)])
 def test_slivers_are_joined_to_their_neighbour(part, pieces):
-    """Of three tenths of a whole piece on."""
+    """Pieces are kept from three tenths of a whole one on."""
     least = 0.3 * 1.0
     whole = shapely.box(0.0, 0.0, 1.0, 1.0)
     rest = shapely.box(1.0, 0.0, 1.0 + part, 1.0)

@@ -15,7 +15,7 @@ def box(x, y, width=1.0, height=1.0):
 
 @pytest.mark.parametrize(("share", "apart"), [(0.98, True), (1.02, False)])
 def test_an_overlap_is_none_up_to_a_millionth_of_all_outlines(share, apart):
-    """Of a strip d by 1 m, 2 A / P = d / (1 + d); all of them are 2 m by 1 m large."""
+    """A strip d by 1 m has 2 A / P = d / (1 + d); all outlines are 2 m by 1 m large."""
     deep = share * 1e-6 * np.hypot(2.0, 1.0)
     outlines = [box(0.0, 0.0), box(1.0 - deep, 0.0)]
     if apart:

@@ -137,7 +137,7 @@ def test_vertices_move_by_twice_the_tolerance_at_most(tmp_path, step, refused):
 
 
 def test_areas_have_the_sense_of_their_outline():
-    """Of a triangle, a square and an angle, wherever they are, by Green's theorem by hand."""
+    """A triangle, a square and an angle, at any place, by Green's theorem by hand."""
     angle = np.array([[0, 0], [3, 0], [3, 1], [1, 1], [1, 2], [0, 2]], float)
     outlines = {4.5: [[0, 0], [3, 0], [1, 3]], 1.0: square(0, 0), 4.0: angle}
     for area, outline in outlines.items():

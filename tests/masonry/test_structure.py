@@ -121,7 +121,7 @@ def test_a_structure_in_a_line():
 
 
 def test_a_fingerprint_resolves_geometry_to_a_billionth_of_its_size():
-    """Of the lower of two blocks the height; loads and names do not matter."""
+    """The height of the lower of two blocks changes; loads and names do not matter."""
 
     def pair(height, zero=0.0, **more):
         boxes = {"base": (zero, 3.0, -1.0, zero), "tall": (0, 1, 0, 3), "low": (2, 3, 0, height)}

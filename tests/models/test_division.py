@@ -78,7 +78,7 @@ def slab(length, height=1.0, corners=(1, 2, 3, 0)):
     ("length", "along"), [(3.9, 2), (4.0, 2), (4.0 + 1.5e-6, 2), (4.1, 3), (0.24, 1), (6.1, 4)]
 )
 def test_cells_are_twice_as_long_as_a_stone_is_thick_at_most(length, along):
-    """Of a slab a metre high, one cell through its thickness: a millionth of a cell makes none.
+    """A slab a metre high has one cell through its thickness; a millionth of a cell adds none.
 
     Where it is less than half a metre long, it is its height that is cut: at 0.24 m by three.
     """
@@ -142,7 +142,7 @@ def test_an_edge_far_from_stones_has_as_many_cells_as_fit():
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_an_edge_between_blocks_has_the_cells_of_the_finer(order):
-    """Whichever comes first; those through a structured block are not theirs to cut."""
+    """The order of blocks does not matter; edges through a structured block are not cut."""
     edges = SimpleNamespace(
         structured=[2],
         around={0: np.array([0, 1]), 1: np.array([1, 2]), 2: np.array([2])},

@@ -48,7 +48,7 @@ def test_a_joint_has_the_edges_that_both_blocks_have_between_its_ends():
 @pytest.mark.parametrize(("off", "points"), [(0.9e-6, 6), (1.1e-6, 8)])
 @pytest.mark.parametrize("size", [0.05, 40.0])
 def test_corners_are_one_up_to_a_millionth_of_the_structure(size, off, points):
-    """Of a square on another, moved along their joint; both lie in a box of 1 by 2."""
+    """A square on another, moved along their joint; both lie in a box of 1 by 2."""
     lower = size * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     shift = off * size * np.hypot(1.0, 2.0)
     upper = lower + np.array([shift, size])

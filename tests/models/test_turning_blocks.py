@@ -52,7 +52,7 @@ def test_a_small_push_acts_as_with_small_displacements(structure, fidelity, capl
 
 @pytest.mark.parametrize("fidelity", ["rigid", "faces"])
 def test_own_coordinates_are_about_centres_of_mass(fidelity):
-    """There pushing a block does not turn it, and elastic motions have no momentum.
+    """A push through the centre does not turn a block, and elastic motions have no momentum.
 
     The mass of cells with straight sides is not where that of stones with arcs is.
     """

@@ -16,7 +16,7 @@ NEAR = 1e-8
 
 @pytest.fixture
 def point():
-    """On a block with two modes, whose coordinates are 2 to 6 of eight."""
+    """A point of a block with two modes, whose coordinates are 2 to 6 of eight."""
     shapes = np.array([[0.3, -0.2], [0.5, 0.4]])
     return RotatingPoint(2, np.array([0.7, -0.4]), shapes), np.random.default_rng(1).normal(size=8)
 
@@ -54,7 +54,7 @@ def test_a_point_of_a_body_that_does_not_turn_is_linear():
 
 
 def test_points_of_stones_turn_and_strain_as_their_frames_do():
-    """Of a stone meshed inside: its corners by `RotatingPoint`, all of its places at once."""
+    """A stone is meshed inside: its corners by `RotatingPoint`, all of its places at once."""
     structure = af.column(breadth=0.4, heights=[0.8, 0.8])
     model = af.build(structure, fidelity="faces", cells=(2, 2), displacements="large")
     cells, rng = model.cells, np.random.default_rng(2)

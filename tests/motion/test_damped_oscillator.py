@@ -69,7 +69,7 @@ def test_invalid_periods_and_damping_are_refused(periods, damping, message):
     ("period", "parts"), [(0.4, 1), (0.39, 2), (0.2, 2), (0.05, 8), (4e-4, 1000), (3e-4, 1000)]
 )
 def test_an_oscillation_has_forty_samples_up_to_a_thousand_a_step(period, parts, monkeypatch):
-    """Of a record in steps of 10 ms, divided into no more parts than that takes."""
+    """A record in steps of 10 ms is divided into no more parts than necessary."""
     calls = []
 
     def displacement(samples, dt, period, damping):

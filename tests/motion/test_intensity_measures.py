@@ -40,7 +40,7 @@ def test_a_motion_at_rest_measures_nothing():
 
 
 def test_housner_intensity_goes_from_a_tenth_to_two_and_a_half_seconds(monkeypatch):
-    """Of an even spectrum of 1 m/s² in acceleration: ∫ T / 2π dT, which trapezia do exactly."""
+    """An even spectrum of 1 m/s² in acceleration has ∫ T / 2π dT, which trapezia give exactly."""
     even = "archfem.motion.response_spectra.response_spectrum"
 
     def one(motion, periods, **_):

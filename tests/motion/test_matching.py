@@ -105,7 +105,7 @@ def test_real_records_match(name):
 
 @pytest.mark.parametrize(("period", "damping"), [(0.3, 0.05), (0.8, 0.2)])
 def test_the_sum_of_impulse_responses_is_the_response(period, damping):
-    """Of a smooth motion, against the exact oscillator; the sum of rectangles errs by (ω Δt)²."""
+    """A smooth motion against the exact oscillator; the sum of rectangles errs by (ω Δt)²."""
     dt, times = 0.002, 0.002 * np.arange(600)
     samples = np.sin(5.0 * times) * times * np.exp(-times)
     moved = response_spectra.oscillator_displacement(samples, dt, period, damping)
@@ -119,7 +119,7 @@ def test_the_sum_of_impulse_responses_is_the_response(period, damping):
 
 @pytest.mark.parametrize("centre", [5.0, 0.3, 9.8])
 def test_a_wavelet_moves_the_ground_by_a_cosine_under_a_bell(centre):
-    """Of size one; away from the ends the second differences of a closed form, and no drift.
+    """The wavelet has size one: second differences of a closed form off the ends, and no drift.
 
     Where it is brought to zero far from its middle it has faded to 1e-7.
     """
@@ -150,7 +150,7 @@ def test_wavelets_that_reach_an_end_are_brought_to_zero_within_a_period():
 
 
 def test_the_misfit_is_taken_evenly_in_log_period():
-    """Of a motion against half of its own spectrum up to a period and all of it beyond."""
+    """The target is half of the motion's spectrum up to a period and all of it beyond."""
     motion = af.Motion.synthetic(duration=6.0, dt=0.01, seed=3)
     own = af.response_spectrum(motion, np.geomspace(0.05, 2.0, 400)) / af.units.STANDARD_GRAVITY
 

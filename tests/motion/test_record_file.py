@@ -27,7 +27,7 @@ def test_numbers_of_a_line_however_they_are_parted():
 
 
 def test_columns_of_a_stated_width_separate_numbers_without_signs():
-    """Of ten letters each, run together."""
+    """Numbers of ten letters each, without spaces."""
     line = "123.4567891.23456E01     -0.50"
     with pytest.raises(af.InvalidInput, match="line 1: not a number"):
         text(line).parse_row(0)

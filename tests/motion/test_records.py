@@ -425,7 +425,7 @@ def test_a_direction_of_peer_has_twelve_letters_at_most(write, words, direction)
 
 @pytest.mark.parametrize(("jitter", "uniform"), [(0.24, True), (0.26, False)])
 def test_times_may_stray_by_a_quarter_of_a_step(write, jitter, uniform):
-    """Of many steps one time is off, which barely moves the line through all of them."""
+    """One time of many steps is off, which barely moves the line through all of them."""
     times = 0.01 * np.arange(400.0)
     times[200] += 0.01 * jitter
     rows = "".join(f"{time:.7f} {k % 7}\n" for k, time in enumerate(times))
@@ -449,7 +449,7 @@ def test_a_step_that_is_stated_twice_is_the_same_to_a_hundredth(write):
 
 
 def test_a_first_column_is_time_where_nine_in_ten_steps_grow(write):
-    """Of twenty steps one goes back, which is an error; with three it is another component."""
+    """One of twenty steps goes back, which is an error; with three it is another component."""
     for back, says in (([9], "time is not uniform"), ([5, 9, 13], "2 columns could be")):
         times = np.arange(21.0) * 0.01
         times[back] = times[[k - 1 for k in back]]

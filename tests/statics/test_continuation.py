@@ -36,7 +36,7 @@ def test_a_load_moves_by_its_work_over_its_size(model):
 
 
 def test_forces_of_a_load_are_the_slope_of_its_work(model):
-    """And their rate theirs, by central differences: only where blocks turn far is there one."""
+    """Their rate is their slope, by central differences; there is none unless blocks turn."""
     load, q = GrowingLoad.of(model, ACTIONS), 0.1 * np.array([1.0, -2.0, 3.0, 1.0, 2.0, -2.0])
     steps = 1e-6 * np.eye(model.size)
     slope = [

@@ -66,7 +66,7 @@ def test_modes_that_are_not_found():
 @pytest.mark.parametrize("size", [3, 30])
 @pytest.mark.parametrize("least", [-1e6, 1e-9])
 def test_a_mechanism_has_no_modes(size, least):
-    """Nor has what is held by no more than the rounding of the stiffest coordinate, 1e-7 here."""
+    """A stiffness below the rounding of the stiffest coordinate, 1e-7 here, counts as zero."""
     stiff = sparse.diags([least, *np.linspace(2.0, 1e6, size - 1)]).tocsr()
     with pytest.raises(af.DidNotConverge, match="singular or negative"):
         find_lowest_modes(stiff, sparse.identity(size, format="csr"), 2)

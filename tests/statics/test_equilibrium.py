@@ -94,7 +94,7 @@ def grown(most, ways=("whole", "half", "least")):
 
 
 def test_steps_of_a_load_are_halved_where_there_is_no_equilibrium():
-    """To a half, and from then on as long as that; each begins where the last one ended."""
+    """Steps are halved, and then kept; each begins where the last one ended."""
     calls, found = grown(lambda count: 0.6 if count == 1 else 1.0)
     assert calls == [(1.0, "whole", 0.0), (0.5, "half", 0.0), (1.0, "half", 0.5)]
     assert (found.iterations, found.steps, found.q[0]) == (5 + 6, 2 + 2, 1.0)

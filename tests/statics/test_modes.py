@@ -184,7 +184,7 @@ def test_table():
 
 
 def test_modes_in_a_line():
-    """Of the block: sway has no mass along y, and the two lowest have all of that."""
+    """Sway of the block has no mass along y, and the two lowest modes have all of it."""
     found = modes(block(), 2)
     structure = found.model.structure
     share = f"{found.effective_masses[:, 0].sum() / of_blocks(structure):.0%}"

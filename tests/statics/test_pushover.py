@@ -277,7 +277,7 @@ def test_spreading_supports_bring_meshed_fidelities_to_the_least_thrust(fidelity
 
 @pytest.mark.parametrize("motion", [(-2.0, 0.0, 0.0), (-1.0, -0.3, 0.4)])
 def test_work_on_a_settlement_is_the_thrust_on_the_support(motion):
-    """Of N and V on the point at M / N from mid-depth, which moves and turns with the support."""
+    """Work of N and V on the point at M / N from mid-depth, which moves with the support."""
     found = pushover(rigid(RING), af.Settlement("left abutment", motion), stop=Stop(steps=3))
     joint, last = RING.joints[0], found.joints.isel(step=-1, joint=0)
     support = RING.blocks[RING.block_number("left abutment")]
@@ -314,7 +314,7 @@ def test_joints_turn_as_the_mechanism_of_limit_analysis():
 
 
 def test_openings_over_a_settlement_are_those_of_its_equilibria():
-    """Of each step, and of the dead load on a support moved so far at once."""
+    """Openings of each step are those of the dead load on a support moved so far at once."""
     model, found = rigid(RING), spread((-1.0, 0.0, 0.0))
     step = int(np.argmin(np.abs(found.curve["displacement"].values - 2e-3)))
     far = float(found.curve["displacement"][step])
@@ -327,7 +327,7 @@ def test_openings_over_a_settlement_are_those_of_its_equilibria():
 
 
 def test_a_limit_is_extrapolated_from_the_last_doubling():
-    """Of a curve that is λ - C d^-1/2: exact; flat to a millionth, or too steep, by hand."""
+    """A curve λ - C d^-1/2 is exact; flat to a millionth, or too steep, by hand."""
     moved = np.concatenate([[0.0], np.geomspace(1e-6, 1e-3, 40)])
     factors = np.concatenate([[0.0], 0.3 - 1e-5 * moved[1:] ** -0.5])
     found, off = _extrapolate_limit(moved, factors)
@@ -388,7 +388,7 @@ def test_steps_are_given_up_below_a_thousandth_of_the_first():
 
 
 def test_rules_end_a_path_where_they_are_met():
-    """Of a slope, a displacement as part of the size, a load that is gone, and so many steps."""
+    """Rules: a slope, a displacement relative to the size, a vanished load, a number of steps."""
     path, criteria = Steps(), af.Criteria()
     path.displacements, path.factors = np.array([0.0, 0.5]), [0.0, 1.0]
     path.model.structure.size = 5.0
@@ -411,7 +411,7 @@ def test_rules_end_a_path_where_they_are_met():
 
 
 def test_arc_length_continues_in_the_direction_of_the_last_step():
-    """Of length one, half of each at first; the units of both are those of the first step."""
+    """Arcs have length one, half of each at first; both units are those of the first step."""
     path = Steps()
     path.unit = (0.5, 2.0)
     follow(path, "arc length", Stop(steps=3), af.Criteria())

@@ -68,7 +68,7 @@ def test_stripes_give_the_curve_of_largest_likelihood():
 
 
 def test_bands_hold_the_truth_about_as_often_as_they_say():
-    """Of 60 intervals of 90 %, by 40 motions each, 47 or more hold it but for one case in 500."""
+    """47 or more of 60 intervals of 90 %, by 40 motions each, hold it but for one case in 500."""
     held = 0
     for seed in range(60):
         low, high = fragility(drawn(40, seed), resamples=200).interval(0.9)

@@ -122,7 +122,7 @@ def test_a_study_stops_if_no_worker_starts(small_ring, tmp_path, finders, monkey
 
 
 def test_a_dead_worker_does_not_end_its_driver(small_ring, tmp_path, finders):
-    """Where gmsh has restored the default action of SIGPIPE."""
+    """The driver also survives after gmsh has restored the default action of SIGPIPE."""
     usual = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     try:
         table = study_of(small_ring, "deadly", [0.5, 0.81, 0.82], tmp_path).run(workers=2)

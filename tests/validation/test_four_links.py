@@ -69,7 +69,7 @@ class Links:
         return np.array([first, second, np.arctan2(end[1], end[0]) - angle[2]])
 
     def places(self, first):
-        """Where the weights are: their mean, over all voussoirs (2,) [m]."""
+        """Mean position of the weights, over all voussoirs (2,) [m]."""
         turns, pivot, total, weight = self.turns(first), self.pivots[0], np.zeros(2), 0.0
         for bar, (blocks, turn) in enumerate(zip(self.links, turns, strict=True)):
             c, s = np.cos(turn), np.sin(turn)

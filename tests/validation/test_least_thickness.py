@@ -54,7 +54,7 @@ def ring(thickness, voussoirs, embrace=180.0, friction=0.6):
 
 @pytest.fixture(scope="module")
 def least():
-    """Of 66 stones, joints 20 from the crown lie at 54.55°, as near to 54.48° as matters."""
+    """Joints 20 of 66 stones from the crown lie at 54.55°, near enough to 54.48°."""
     return af.minimum_thickness(lambda t: ring(t, 66), friction=None)
 
 
@@ -132,7 +132,7 @@ def test_below_that_friction_more_thickness_is_needed():
 
 @pytest.mark.slow
 def test_embrace_of_120_degrees(verified):
-    """Of 76 stones, joints 25 from the crown lie at 39.47°, as near to 39.5° as matters."""
+    """Joints 25 of 76 stones from the crown lie at 39.47°, near enough to 39.5°."""
     found = af.minimum_thickness(lambda t: ring(t, 76, embrace=120.0), friction=None)
     assert found == pytest.approx(0.02285, abs=1e-5)
     spread = af.collapse_factor(

@@ -51,7 +51,7 @@ def filled():
     ],
 )
 def test_history_is_that_of_snes(filled, rule, joints, scheme):
-    """To 1e-8 of the largest, with a sixth of the joint points open, and the energies too.
+    """Histories and energies agree to 1e-8 of the largest, with a sixth of the points open.
 
     A few steps in which exact facets slide, fewer than a tenth, are left to SNES.
     """
@@ -157,7 +157,7 @@ def with_crumbs(rng):
 
 
 def test_factor_bears_entries_that_rounding_has_left_on_one_side():
-    """Of 300 matrices, three such entries used to lie outside the plan of the factor."""
+    """Three such entries of 300 matrices used to lie outside the plan of the factor."""
     rng = np.random.default_rng(1)
     for _ in range(300):
         matrix = with_crumbs(rng)
@@ -212,7 +212,7 @@ def shuffled_structure(rng):
     ("first", "count"), [(0, 40), pytest.param(40, 2000, marks=pytest.mark.slow)]
 )
 def test_each_solve_of_a_random_structure_is_that_of_superlu(first, count):
-    """In another order, by another factor: 1e-8, with 1e12 between stiff and soft at most."""
+    """Another order and another factor agree to 1e-8, with 1e12 between stiff and soft at most."""
     for seed in range(first, first + count):
         rng = np.random.default_rng(seed)
         fidelity = "rigid" if rng.random() < 0.85 else "faces"
@@ -246,7 +246,7 @@ def test_matrix_that_is_not_definite_is_refused():
 
 
 def test_images_follow_the_state():
-    """Of a random matrix, under HHT, against its products with the state."""
+    """Images of a random matrix, under HHT, against its products with the state."""
     rng = np.random.default_rng(4)
     numbers = step_numbers(0.005, (0.3025, 0.6, -0.1), 1e-3, 0.4)
     matrix = rng.standard_normal((8, 8))

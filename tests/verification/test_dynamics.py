@@ -111,7 +111,7 @@ def test_energy_balance_of_an_undamped_rocking_ring(model, dead):
 
 
 def test_the_conserving_scheme_keeps_the_energy_of_a_rocking_ring(model, dead, verified):
-    """Of the same push, with steps ten times as long: to what SNES leaves, 1e-8 of the forces."""
+    """The same push, with steps ten times as long: to the tolerance of SNES, 1e-8 of the forces."""
     start, given = pushed(model, dead)
     off = np.ptp(energies(model, start, 5e-3, 0.2, CONSERVING)) / given
     assert off < 1e-6

@@ -45,7 +45,7 @@ def test_joints_that_never_slide_are_spanned_unless_they_are_with_soil(arch, mod
 
 
 def test_the_basis_holds_rigid_motions(models):
-    """Of every block on its own, exactly: without them no mechanism could form."""
+    """Every block has its own, exactly: without them no mechanism could form."""
     cells = models["faces"].cells
     drawn = np.random.default_rng(1).normal(size=(cells.block.max() + 1, 3))[cells.block]
     x, y = cells.places.T

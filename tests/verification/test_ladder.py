@@ -121,7 +121,7 @@ def quick(fidelity, rule, way):
     ],
 )
 def test_compiled_steppers_give_the_history_of_snes(ring, fidelity, rule, joints, scheme):
-    """To 1e-8 of the largest, joints opening and closing, and sliding where the scheme allows."""
+    """Histories agree to 1e-8 of the largest, as joints open, and slide where the scheme allows."""
     slides = scheme == CONSERVING
     structure = ring if slides else glued(ring)
     model = af.build(structure, fidelity=fidelity, quadrature=rule, cells=(2, 2))

@@ -179,7 +179,7 @@ def test_the_gap_of_a_support_is_its_motion_across_the_joint():
 
 @pytest.mark.parametrize("scheme", [af.dynamics.Conserving(), af.dynamics.Newmark()])
 def test_a_settled_ring_is_shaken(scheme):
-    """So little that nothing happens; by Newmark's method each step has to be solved."""
+    """The motion is too small to change forces; by Newmark's method each step has to be solved."""
     averaged = scheme == af.dynamics.Conserving()
     model = af.build(RING if averaged else glued(RING), fidelity="rigid")
     model = model.settled(af.Settlement("left abutment", (-1e-3, 0.0, 0.0)))

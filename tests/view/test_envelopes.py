@@ -59,7 +59,7 @@ def test_two_bridges_are_distinguished_by_dots(bridge, ring):
 
 
 def test_many_parts_go_on_several_rows(ring):
-    """Of ten rings of 18 joints four fit side by side; all panels share one scale."""
+    """Four of ten rings of 18 joints fit side by side; all panels share one scale."""
     parts = [f"arch {number}" for number in range(1, 11)]
     one = draw_envelope({"quake": history(ring, 0.2)}).axes[0]
     assert one.get_title() == ""

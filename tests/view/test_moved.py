@@ -51,7 +51,7 @@ def test_ends_of_a_hinge_are_those_of_both_faces(column):
 
 
 def test_small_motions_move_ends_as_of_small_displacements(column):
-    """To the square of the motion, 1e-6 of 1e-3."""
+    """Ends agree to the square of the motion, 1e-6 of 1e-3."""
     small = af.build(column.structure, fidelity="rigid")
     q = 1e-6 * np.random.default_rng(1).standard_normal(column.size)
     middle, wanted = (model.observer().joint_ends(q).mean(axis=1) for model in (column, small))

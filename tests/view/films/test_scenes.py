@@ -81,7 +81,7 @@ def test_frames_of_a_run_that_chose_its_steps(model, tmp_path):
 
 
 def test_a_picture_has_the_memory_of_joints_or_warns_that_it_has_not(coarse, caplog):
-    """Of an equilibrium its own memory counts; coordinates alone are warned of."""
+    """An equilibrium has its own memory; coordinates alone are warned of."""
     dead = af.dead_load(coarse)
     assert dead.model.memory.any()
     of_state = picture(coarse, dead, size=SIZE)

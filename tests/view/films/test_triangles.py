@@ -20,7 +20,7 @@ def cells_of(*outlines):
 
 
 def area(corners):
-    """Of triangles, positive where they run anticlockwise."""
+    """Areas of triangles, positive where they run anticlockwise."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
 

@@ -91,7 +91,7 @@ def test_a_click_on_a_joint_shows_it_and_play_moves_on(rocked, tmp_path):
 
 
 def test_a_report_prints_without_cutting_a_figure(small, tmp_path):
-    """Of each figure all is on one page; it may not break, and none is higher than a page."""
+    """Each figure is on one page: it may not break, and none is higher than a page."""
     case = af.Case.read(small, ["output.save_fields_every=10"])
     *_, run = af.cases.run_case(case, pairs=["first"])
     path = run.report(tmp_path / "report.html")
@@ -132,7 +132,7 @@ def test_a_report_fits_its_screen_and_follows_the_colour_scheme(small, tmp_path,
 
 
 def test_a_text_table_scrolls_and_sentences_wrap(tmp_path):
-    """On a phone, a line of a table is a line, and what follows it is read without scrolling."""
+    """On a phone, a line of a table is a line, and the text below is read without scrolling."""
     table = "\n".join("mode  " + "  ".join(f"frequency {k}" for k in range(9)) for _ in range(4))
     text = f"{table}\n\n{'damping in a sentence ' * 9}"
     page = Document("modes", "", (), [Section("Modes", [TextBlock(text, "lines")])]).page

@@ -29,7 +29,7 @@ def test_a_notebook_shows_it_in_a_frame(rocked):
     assert inside == made.page
 
 
-def test_data_that_a_player_needs_are_required(rocked, tmp_path):
+def test_a_player_needs_the_structure_and_the_model(rocked, tmp_path):
     model, run = rocked
     with pytest.raises(af.InvalidInput, match="does not contain its structure"):
         af.view.player(af.History(run.dataset))
