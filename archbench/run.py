@@ -146,8 +146,8 @@ def _missing_numbers(found: Answer, scene: dict[str, Any]) -> str:
 def run_scene(chosen: Sequence[Program], name: str, limit: float = TIME_LIMIT) -> dict[str, Answer]:
     """Run programs on a scene with each of their settings; return the answers by program.
 
-    Beside the first settings of each other program archfem runs its own in turn with it, and the
-    processor times of both are the "cost" of the answer.
+    The first settings of each other program run in turn with those of archfem. The processor times
+    of both are the "cost" of the answer.
     """
     scene = read_scene(name)
     kind = scene["action"]["kind"]

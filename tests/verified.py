@@ -2,8 +2,8 @@
 
 A test with the fixture `verified` passes it computed values beside references that are independent
 of this package. With the option only those tests run, and the values are written to the file,
-from which the documentation makes its table. Numbers are rounded to the digits of the table, and
-differences that are round-off to a power of ten above, so that every machine writes the same.
+from which the documentation makes its table. Numbers are rounded to the digits of the table.
+Differences that are round-off are rounded up to a power of ten: every machine writes the same.
 Cases of one name are one row, with the largest of their differences.
 """
 

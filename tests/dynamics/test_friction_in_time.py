@@ -103,9 +103,9 @@ def test_a_block_below_its_limit_does_not_slide():
 def test_newmarks_block_under_an_earthquake(friction):
     """A synthetic motion: within 1e-3 of the way that it slides to and fro.
 
-    Where it turns round without rest, its shear goes from one limit to the other over twice the
-    elastic slip, in which it gains speed as the root of 1/k_s, and in one step, of which the force
-    has one sign: an error of order dt. So this converges slower than the block that stops.
+    Where it reverses without rest, its shear passes from one limit to the other over twice the
+    elastic slip, in which it gains speed as the root of 1/k_s. In that step the force has one sign:
+    an error of order dt. So this converges slower than the block that stops.
     """
     motion = af.Motion.synthetic(duration=5.0, pga=6.0, seed=2, vertical_ratio=0.0)
     expected, path = slide(motion.horizontal, motion.dt, friction * GRAVITY)
@@ -128,8 +128,8 @@ def test_newmarks_block_under_a_record(friction):
 def test_newmarks_block_under_a_record_in_the_limit():
     """Stiffer and in shorter steps to 1e-5 of the way: 6.8e-6 at k = 1e13 Pa/m and 0.02 ms.
 
-    Less is not to be had of elastic shear. Each turn errs as the root of 1/k and as dt, and at
-    k = 1e15 the slip of 0.2 m, times k, rounds to as much of the friction as that takes away.
+    Elastic shear reaches no less. Each reversal errs as the root of 1/k and as dt. At k = 1e15 the
+    slip of 0.2 m, times k, rounds to as much of the friction as the larger k gains.
     """
     motion = erzincan()
     expected, path = slide(motion.horizontal, motion.dt, 0.2 * GRAVITY)

@@ -145,8 +145,8 @@ def in_large_motion(damping, impacts=2, dt=1e-3):
 def test_blocks_that_move_far_lose_as_much(ratio):
     """Damping that is found by small displacements therefore serves large ones.
 
-    To 5e-3: beyond critical damping a part is lost on the way from impact to impact, which takes
-    the longer the less of its moment a tilted block keeps.
+    Ratios agree to 5e-3. Beyond critical damping a part is lost between impacts, whose time is
+    longer the less of its moment a tilted block keeps.
     """
     assert in_large_motion(of_bounce(ratio)) == pytest.approx(TABLE[ratio], abs=5e-3)
 

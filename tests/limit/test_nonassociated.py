@@ -102,7 +102,7 @@ def check(structure, live, found):
 def least_by_integers(structure, live, force=30.0, motion=30.0):
     """Least factor by a mixed-integer programme: a second formulation, with a proof of its own.
 
-    Each end is open or pressed, each joint slides one way, the other, or not, with end forces up to
+    Each end is open or pressed; each joint slides one way, the other, or not. End forces are up to
     `force` block weights and gaps up to `motion` times the mean movement of the live load.
     """
     blocks = RigidBlocks(structure)

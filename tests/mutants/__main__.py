@@ -3,12 +3,12 @@
     python -m mutants [--count 60] [--seed 0] [--only dynamics/damping]
 
 A line for each change: the test that noticed it, or that none did. First all default tests run
-once, in some minutes, and record the statements that they execute in `out/reached.json`, which is
-kept until a source or a test changes. A change is then met by the tests that execute its statement
-alone, those of its own module and the shortest first, until one fails.
+once, in some minutes, and record the statements that they execute in `out/reached.json`. The file
+is kept until a source or a test changes. Only tests that execute the statement of a change run on
+it, those of its own module and the shortest first, until one fails.
 
-What no test can notice, for it changes no number, is listed with its reason in `known.toml`, and
-does not count. Modules that numba compiles are left out unless `--only` names their path:
+Changes that no test can notice, for they change no number, are listed with their reason in
+`known.toml`, and do not count. Modules that numba compiles are left out unless `--only` names their path:
 each change of theirs takes a minute to compile.
 """
 

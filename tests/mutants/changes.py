@@ -71,9 +71,8 @@ class Change:
 def changes(source: str) -> list[Change]:
     """Return the possible changes of a module.
 
-    Words of errors, logs and bars of progress, annotations, imports, bodies of
-    functions that only refuse, and sizes of a shape that are to be found (negative numbers) are
-    left out.
+    Words of errors, logs and bars of progress, annotations and imports are left out. So are bodies
+    of functions that only refuse, and sizes of a shape that are to be found (negative numbers).
 
     Args:
         source: of the module.
