@@ -8,8 +8,8 @@ is kept until a source or a test changes. Only tests that execute the statement 
 it, those of its own module and the shortest first, until one fails.
 
 Changes that no test can notice, for they change no number, are listed with their reason in
-`known.toml`, and do not count. Modules that numba compiles are left out unless `--only` names their path:
-each change of theirs takes a minute to compile.
+`known.toml`, and do not count. Modules that numba compiles are left out unless `--only` names
+their path: each change of theirs takes a minute to compile.
 """
 
 import argparse
