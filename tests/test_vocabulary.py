@@ -62,20 +62,31 @@ def comments(source):
 def stated(source):
     """Docstrings, comments and defined names of a module, with their lines; names as words.
 
-    Names that a module uses without defining them are no concern of it: keywords and attributes of
-    the package are part of its interface, as are strings that a test passes to it or expects of it.
+    Keywords and attributes of the package that a module only uses are no names of its own. Strings
+    are data that a test passes or expects.
     """
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             yield node.lineno, str(node.value.value)
-        for field in ("name", "id", "arg", "attr", "asname"):
-            name = getattr(node, field, None)
-            is_use = isinstance(node, ast.keyword) or not isinstance(
-                getattr(node, "ctx", ast.Store()), ast.Store
-            )
-            if name and not is_use:
-                yield getattr(node, "lineno", 0), in_words(name)
+        if name := defined_name(node):
+            yield node.lineno, in_words(name)
     yield from comments(source)
+
+
+def defined_name(node):
+    """The name that a node of the syntax tree defines, or None."""
+    match node:
+        case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef() | ast.ExceptHandler():
+            return node.name
+        case ast.arg():
+            return node.arg
+        case ast.alias():
+            return node.asname
+        case ast.Name(ctx=ast.Store()):
+            return node.id
+        case ast.Attribute(ctx=ast.Store()):
+            return node.attr
+    return None
 
 
 def in_words(name):
@@ -159,6 +170,7 @@ def test_an_avoided_word_of_a_test_is_found(source):
         "mesh_sensitivity(case, rungs=[])",
         "study.asked.digest(found.rungs)",
         'given = {"rungs": 1}',
+        "from archfem import rungs",
         "def test_a_block_comes_to_rest(): pass",
     ],
 )
