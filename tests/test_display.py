@@ -60,17 +60,17 @@ def things():
     ]
 
 
-def test_there_is_one_of_each_kind(things):
+def test_one_result_of_each_kind_is_tested(things):
     assert {type(each) for each in things} == set(ResultDisplay.__subclasses__())
 
 
-def test_each_draws_itself(things):
+def test_each_result_draws_itself(things):
     for each in things:
         assert isinstance(each.plot(), Figure), type(each)
         assert isinstance(each._repr_html_(), str)
 
 
-def test_each_is_shown_in_a_line_or_two(things):
+def test_each_result_is_shown_in_a_line_or_two(things):
     for each in things:
         words = repr(each)
         assert words.startswith(type(each).__name__)

@@ -197,7 +197,7 @@ def test_a_damaged_list_is_refused_and_written_anew(text, tmp_path):
     _files.check_listed(tmp_path / "a.txt", b"2")
 
 
-def test_sealed_numbers_come_back_and_changed_ones_do_not(tmp_path):
+def test_sealed_numbers_are_read_and_changed_ones_refused(tmp_path):
     path, content = tmp_path / "row.json", {"b": [0.1, 1e300, float("inf")], "a": "text"}
     _files.write_sealed_json(path, content)
     assert _files.read_sealed_json(path, "row") == content

@@ -37,7 +37,7 @@ def test_a_file_is_read_once(written, monkeypatch):
     assert read_dataset(path, "history").identical(dataset)
 
 
-def test_any_damage_is_known(written):
+def test_any_damage_is_detected(written):
     """Each of 100 files is cut off, or has a byte changed, left out or put in, seal included."""
     _, path = written
     whole, rng = path.read_bytes(), np.random.default_rng(1)

@@ -95,7 +95,7 @@ def test_names_in_the_text_are_there(name):
     assert last in dir(reduce(getattr, places, af))
 
 
-def test_the_table_of_verification_names_tests_that_tell():
+def test_the_table_of_verification_names_tests_that_record_results():
     for row in json.loads((ROOT / "docs" / "verification.json").read_text(encoding="utf-8")):
         assert "verified(" in (ROOT / row["test"]).read_text(encoding="utf-8")
 

@@ -22,7 +22,7 @@ def test_warnings_of_archfem_and_of_tests_are_errors(category):
         warnings.warn("deprecated", category)  # noqa: B028  (of this module)
 
 
-def test_numbers_that_are_none_are_errors_wherever_they_come_from():
+def test_invalid_operations_on_numbers_are_errors_in_every_module():
     with pytest.raises(RuntimeWarning):
         np.ones(1) / np.zeros(1)
     with pytest.raises(RuntimeWarning):

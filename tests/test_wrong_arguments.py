@@ -199,18 +199,18 @@ def test_cells_are_two_whole_numbers(fidelity, cells):
 
 
 @pytest.mark.parametrize("coarse", [5e-324, 1.7e308])
-def test_where_nothing_is_meshed_at_will_cells_of_any_size_will_do(coarse):
+def test_the_cell_size_is_ignored_where_no_block_is_unstructured(coarse):
     assert af.build(RING, fidelity="faces", coarse=coarse).size == 6 * 7
 
 
-def test_a_step_beyond_all_numbers_is_none(tmp_path):
+def test_a_step_beyond_the_range_of_numbers_is_refused(tmp_path):
     (tmp_path / "record.txt").write_text("0.1\n0.2\n0.1\n")
     with pytest.raises(af.InvalidInput, match=r"dt \[s\] = 1000.* is not a finite number"):
         af.Motion.read(tmp_path / "record.txt", units="g", dt=10**400)
 
 
 @pytest.mark.parametrize("key", ["fidelity", "cell", "degree", "quadrature", "displacements"])
-def test_an_array_is_no_word(key):
+def test_an_array_in_place_of_a_word_is_refused(key):
     with pytest.raises(af.InvalidInput, match=rf"{key} .*array.*(not known|of degree)"):
         af.build(RING, **{key: np.zeros(3)})
 

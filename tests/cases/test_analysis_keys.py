@@ -142,7 +142,7 @@ def test_a_case_takes_its_damping_from_the_modes(small):
     assert expected == pytest.approx(damping.frequency, rel=0.05)
 
 
-def test_rayleigh_damping_is_a_word_away(small):
+def test_rayleigh_damping_is_set_by_its_kind(small):
     case = af.Case.read(
         small, ["analysis.damping.kind=rayleigh", "analysis.damping.mass_share=0.95"]
     )

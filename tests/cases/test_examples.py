@@ -34,7 +34,7 @@ def test_a_copy_includes_the_files_it_refers_to(tmp_path):
         copy_example("prusias", tmp_path / "new")
 
 
-def test_a_name_that_is_none():
+def test_an_unknown_example_is_refused():
     with pytest.raises(af.InvalidInput, match=r"no case 'rign', but these: .*ring"):
         read_example("rign")
 

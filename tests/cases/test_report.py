@@ -116,7 +116,7 @@ def test_a_run_in_memory_has_a_report_and_a_player(small, undrawn, tmp_path):
     assert "contains no displacements" in run.player().scene.data["note"]
 
 
-def test_a_history_has_them_too(kept, tmp_path):
+def test_a_history_has_a_report_and_a_player_too(kept, tmp_path):
     """By the case that it keeps; one of a model made in Python has a player alone."""
     run = af.History.read(kept / "first" / "history.nc")
     run.dataset.attrs["title"] = "of another name: second"  # `motion` alone names what it ran

@@ -74,7 +74,7 @@ def test_a_choice_must_be_one_of_the_known_words():
             check_choice(wrong, ("a", "b"), "section.key")
 
 
-def test_tables_go_over_those_of_another_case():
+def test_tables_override_those_of_another_case():
     below = {"a": {"x": 1, "y": 2}, "b": 3}
     assert merge_tables(below, {"a": {"y": 4}, "b": {"z": 5}}) == {
         "a": {"x": 1, "y": 4},
@@ -170,7 +170,7 @@ def test_absurd_files_are_refused_at_once(tmp_path, text, says):
     assert len(str(caught.value)) < 5000
 
 
-def test_a_byte_order_mark_is_no_matter(tmp_path):
+def test_a_byte_order_mark_is_ignored(tmp_path):
     assert read(tmp_path / "case.toml", b"\xef\xbb\xbf" + COLUMN.encode()).structure.free == (1,)
 
 
@@ -193,7 +193,7 @@ def test_devices_pipes_and_folders_are_no_files(tmp_path, read):
             read(path)
 
 
-def test_nor_are_they_drawings_of_a_case(tmp_path):
+def test_devices_and_pipes_are_no_drawings_of_a_case(tmp_path):
     os.mkfifo(tmp_path / "pipe.dxf")
     for path in [*devices(tmp_path), tmp_path / "pipe.dxf"]:
         drawn = {"shape": "outlines", "file": str(path), "unit": "m", "snap": 0.01}

@@ -44,7 +44,7 @@ def test_run_command(tmp_path, capsys):
     assert "damping: 5 % at 8.00 and 16.00 Hz" in said
 
 
-def test_a_rest_without_modes_is_shaken_all_the_same(tmp_path, undrawn, monkeypatch, capsys):
+def test_a_case_without_modes_is_shaken_with_usual_damping(tmp_path, undrawn, monkeypatch, capsys):
     def none(model, count, about):
         raise af.DidNotConverge("no modes")
 

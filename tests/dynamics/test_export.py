@@ -141,7 +141,7 @@ def corners(grid, number):
     return np.unique(np.concatenate([grid.get_cell(int(cell)).point_ids for cell in cells]))
 
 
-def test_what_cannot_be_written(run, tmp_path):
+def test_histories_that_cannot_be_written_are_refused(run, tmp_path):
     model, history = run
     with pytest.raises(af.InvalidInput, match=r"does not end in \.pvd"):
         history.to_vtk(model, tmp_path / "run.vtk")

@@ -197,7 +197,7 @@ def test_ctrl_c_between_runs_keeps_the_bracket_so_far():
     assert [run.scale for run in found.runs] == pytest.approx([1.0, 2.0**0.5])
 
 
-def test_hand_made_runs():
+def test_scales_of_given_runs():
     hit = af.limit.Mechanism("local", "arch", (1, 2, 3, 4), 1.5)
     met = {scale: hit if scale in (2.0, 4.0) else None for scale in (1.0, 2.0, 3.0, 4.0)}
     runs = [

@@ -81,7 +81,7 @@ def test_the_width_of_the_band_selects(ring, fidelity, scheme, damping, method):
         assert narrow == (method == "newton")
 
 
-def test_large_displacements_select_it_whatever_the_width(ring):
+def test_large_displacements_select_the_solver_at_any_width(ring):
     model = af.build(ring, fidelity="faces", cells=(4, 4), displacements="large")
     assert select_solver(af.dynamics.Equation(model, MOTION)).name == "newton"
 

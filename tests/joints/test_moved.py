@@ -56,7 +56,7 @@ def test_the_discrete_derivative_gives_the_change_of_the_measures(seed):
 
 
 @pytest.mark.parametrize("x", [0.0, 1e-9, 1e-3, 0.2499, -0.2499, 0.3, 2.0])
-def test_small_turns(x):
+def test_series_of_small_turns(x):
     """Against NumPy, and the derivative of sin x / x against differences of it."""
     assert rotation_series(x)[:2] == pytest.approx((np.cos(x), np.sinc(x / np.pi)), abs=2e-16)
     assert cosine_sine(x) == pytest.approx((np.cos(x), np.sin(x)), abs=2e-16)

@@ -210,7 +210,7 @@ def test_an_episode_of_25_ms_and_2_5_mm_that_closes_is_stated_so():
     assert str(met) == "it lasts 25 ms, opens by up to 2.5 mm and closes again"
 
 
-def test_further_failures_do_not_end_it():
+def test_further_failures_do_not_end_an_episode():
     joints = shaken([ALTERNATING, ALTERNATING | {9: 0.5}, ALTERNATING, {}])
     assert episode(joints, af.limit.counted_mechanism(joints)).duration == pytest.approx(0.015)
 

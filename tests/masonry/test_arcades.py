@@ -56,7 +56,7 @@ def test_an_arch_between_buttresses():
         ({"rises": 1.5}, "either embrace or rise"),
     ],
 )
-def test_numbers_that_do_not_go_together(change, says):
+def test_inconsistent_numbers_are_refused(change, says):
     given = {"spans": [4.0, 4.0], "embraces": 150.0, "thicknesses": 0.5, "voussoirs": 9}
     given |= {"heights": 2.0, "breadths": 1.5, **change}
     with pytest.raises(af.InvalidStructure, match=says):

@@ -354,7 +354,7 @@ def test_gravity_width_and_material_are_passed_on():
         ),
     ],
 )
-def test_parts_that_do_not_go_together(change, says):
+def test_inconsistent_parts_are_refused(change, says):
     with pytest.raises(af.errors.InvalidStructure, match=says):
         af.bridge(**PAIR | change)
 

@@ -156,7 +156,7 @@ def test_check_command(capsys):
     ("turn", "bend", "four"),
     [(44.0, 0.0, False), (46.0, 0.0, True), (90, 9.0, True), (90, 11.0, False)],
 )
-def test_corners_turn_by_45_degrees_and_what_is_none_by_less_than_ten(tmp_path, turn, bend, four):
+def test_corners_turn_by_45_degrees_and_other_vertices_by_less_than_ten(tmp_path, turn, bend, four):
     """A rhombus of that turn at two of its vertices, one of whose sides bends in its middle."""
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     off = 0.5 * np.tan(np.radians(bend / 2.0))

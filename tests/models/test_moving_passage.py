@@ -53,7 +53,7 @@ def test_the_tangent_of_a_step_is_the_derivative_of_its_force(fidelity, left):
 
 
 @pytest.mark.parametrize("fidelity", ["rigid", "faces"])
-def test_at_an_instant_energy_gives_the_force_and_that_the_tangent(fidelity):
+def test_at_an_instant_force_and_tangent_are_slopes_of_the_energy(fidelity):
     """Along a line, by central differences of what rounds to 1e-9 of the largest."""
     model, first, last = moved(fidelity, 2, friction=None)
     way, step = last - first, 1e-4

@@ -32,7 +32,7 @@ def test_peak_has_its_sign_and_its_time():
 
 
 @pytest.mark.parametrize("period", [5e-324, 1e-300, 1e-12])
-def test_one_that_is_as_good_as_rigid_does_too(period):
+def test_a_nearly_rigid_oscillator_follows_the_ground_too(period):
     samples = np.array([0.0, 1.0, -3.0, 2.0])
     values, times = response_spectra.find_peak_responses(samples, 0.1, np.array([period]), 0.05)
     assert (values.tolist(), times.tolist()) == ([-3.0], [0.2])

@@ -55,7 +55,7 @@ def test_matching_keeps_the_character_of_the_motion(match, shaking):
     assert moved > 0.7
 
 
-def test_matching_twice_changes_nothing_much(match):
+def test_matching_twice_changes_little(match):
     again = matched(match.motion, CASE_STUDY)
     # Already below the misfit at which the rounds stop: only drift and scale are touched.
     assert np.abs(again.motion.horizontal - match.motion.horizontal).max() < 0.05 * match.motion.pga
@@ -69,7 +69,7 @@ def test_other_spectra_and_bands(shaking):
     assert match.motion.components == ("horizontal",)
 
 
-def test_a_table_that_begins_above_zero_will_do(shaking):
+def test_a_table_that_begins_above_zero_is_accepted(shaking):
     periods = np.geomspace(0.05, 2.0, 60)
     table = af.motion.TableSpectrum(periods, CASE_STUDY.horizontal(periods))
     assert matched(shaking.with_vertical(None), table).misfit["horizontal"] < 0.05

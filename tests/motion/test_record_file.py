@@ -16,7 +16,7 @@ def text(*lines, ended=True):
     return RecordText(PLACE, lines, ended)
 
 
-def test_numbers_of_a_line_however_they_are_parted():
+def test_numbers_of_a_line_are_read_with_any_separator():
     rows = text("1 -2.5 3E2", " 1,2; 3", "1.5-2.5+3.5", ".1D+01-.2d-01", "1000200030000", "")
     assert rows.parse_row(0) == [1.0, -2.5, 300.0]
     assert rows.parse_row(1) == [1.0, 2.0, 3.0]

@@ -146,7 +146,7 @@ def test_events_are_read_named_or_unknown(tmp_path):
         af.select_records(tmp_path, CODE, 0.3, count=6, rule=rule, events={"x*": "a"})
 
 
-def test_a_rule_that_is_missed_says_by_how_much(folder):
+def test_a_missed_rule_states_its_shortfall(folder):
     with pytest.raises(af.DidNotConverge, match="no set was found that meets") as caught:
         af.select_records(folder, CODE, 0.3, count=4, scales=(0.1, 0.5))
     nearest = caught.value.last

@@ -35,7 +35,7 @@ def test_synthetic_suite_is_matched_and_repeats():
     assert suite.motions[0].pga == pytest.approx(suite.pairs[0].pga / 3.0)
 
 
-def test_suites_that_cannot_be_are_refused():
+def test_invalid_suites_are_refused():
     with pytest.raises(af.errors.InvalidInput, match="has no motion"):
         af.Suite("empty", ())
     with pytest.raises(af.errors.InvalidInput, match="cannot share 2 verticals"):

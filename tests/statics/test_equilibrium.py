@@ -258,7 +258,7 @@ def test_the_error_also_states_that_a_ring_carries_a_thousandth_of_its_weight():
         dead_load(thin_ring(1.48e9))
 
 
-def test_cohesion_has_no_stiffness_that_would_do():
+def test_with_cohesion_no_needed_stiffness_is_stated():
     contact = af.Contact(1e11, 0.2e11, 0.6, cohesion=1.0)
     ring = thin_ring(1e11).structure
     joints = tuple(replace(joint, contact=contact) for joint in ring.joints)

@@ -181,7 +181,7 @@ class Slow(LoadPath):
         return self.creeps.pop(0)
 
 
-def test_creep_takes_the_place_of_failed_steps_and_the_seldomer_the_oftener_in_vain(monkeypatch):
+def test_creep_replaces_failed_steps_and_is_tried_less_after_failures(monkeypatch):
     """After 1, 2 and 3 trials in vain, 1, 3 and 7 steps must fail; after a success, none."""
     monkeypatch.setattr(pushover, "sliding_joints", lambda path, criteria: ["bed 3"])
     path = Slow([False, False, False, True, False])

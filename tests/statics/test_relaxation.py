@@ -286,7 +286,7 @@ def found(monkeypatch):
     return made
 
 
-def test_an_equilibrium_is_sought_until_it_is_in_balance_as_it_was_left(found):
+def test_an_equilibrium_is_repeated_until_its_memory_is_in_balance(found):
     found += [3, 2, 0, 7]
     model, solved = relaxation.solve_irreversible(None, Toothed(-0.1), np.zeros(2), np.zeros(2))
     assert (solved.iterations, solved.residual) == (5, 0.25)
@@ -295,7 +295,7 @@ def test_an_equilibrium_is_sought_until_it_is_in_balance_as_it_was_left(found):
     assert found == [7]
 
 
-def test_the_first_may_be_in_balance_by_chance(found):
+def test_the_first_equilibrium_may_be_in_balance_by_chance(found):
     """The memory of its joints is checked even so."""
     found += [0, 0]
     _, solved = relaxation.solve_irreversible(None, Toothed(0.0), np.zeros(2), np.zeros(2))

@@ -67,7 +67,7 @@ def test_stripes_give_the_curve_of_largest_likelihood():
     assert found.goodness > 0.05
 
 
-def test_bands_hold_the_truth_about_as_often_as_they_say():
+def test_confidence_bands_hold_the_truth_at_their_stated_rate():
     """47 or more of 60 intervals of 90 %, by 40 motions each, hold it but for one case in 500."""
     held = 0
     for seed in range(60):

@@ -80,7 +80,7 @@ def test_rigid_blocks_for_paraview(tmp_path):
     assert inner == pytest.approx(2.0 * 0.4 * np.radians(150.0) * np.sin(turn) / turn, rel=1e-9)
 
 
-def test_what_cannot_be_written(tmp_path):
+def test_states_that_cannot_be_written_are_refused(tmp_path):
     column = af.column(breadth=1.0, heights=[1.0])
     model = af.build(column, fidelity="rigid")
     with pytest.raises(af.InvalidInput, match="meshio does not write this model as"):
