@@ -266,8 +266,9 @@ def compare_with_stored(cost: float = 2.0, tolerance: float = 1e-3) -> tuple[lis
                 continue
             found = adapter.run(read_scene(name), stored["settings"])["values"]
             count += 1
+            what = f"{name}, {stored['settings']}"
             differences += [
-                f"{name}, {quantity}, {stored['settings']}: {found[quantity]:.6g}, stored {value:.6g}"
+                f"{what}, {quantity}: {found[quantity]:.6g}, stored {value:.6g}"
                 for quantity, value in stored["values"].items()
                 if not math.isclose(found[quantity], value, rel_tol=tolerance)
             ]

@@ -174,15 +174,17 @@ def test_every_program_answers_one_scene_where_it_is_installed(name):
 
 
 @pytest.mark.parametrize(
-    ("cost", "least"),
+    ("cost", "tolerance", "least"),
     [
-        pytest.param(0.3, 70, id="limit analysis"),
-        pytest.param(60.0, 140, id="all", marks=pytest.mark.slow),
+        (0.3, 1e-3, 70),
+        # amplitudes of falls are searched to 1 %, and hang on the rounding of the processor
+        pytest.param(60.0, 1e-2, 140, marks=pytest.mark.slow),
     ],
+    ids=["cheap", "all"],
 )
-def test_archfem_answers_as_it_is_stored(cost, least):
+def test_archfem_answers_as_it_is_stored(cost, tolerance, least):
     """As `make archbench-quick`, for stored runs of less processor time, by all their settings."""
-    differences, count = run.compare_with_stored(cost)
+    differences, count = run.compare_with_stored(cost, tolerance)
     assert differences == []
     assert count >= least
 
@@ -194,7 +196,7 @@ def test_a_stored_answer_that_is_no_longer_true_is_told(tmp_path, monkeypatch):
     run.store("archfem", {"S27": stored}, tmp_path)
     monkeypatch.setattr(run, "results_of", partial(run.results_of, folder=tmp_path))
     (difference,), count = run.compare_with_stored()
-    assert difference.startswith("S27, load, {'mobilisation': 0.0, 'cohesion': 0.0}: ")
+    assert difference.startswith("S27, {'mobilisation': 0.0, 'cohesion': 0.0}, load: ")
     assert count == len(stored["runs"])
 
 
