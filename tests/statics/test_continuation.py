@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import archfem as af
+from archfem.statics import continuation
 from archfem.statics.continuation import GrowingLoad
 
 ACTIONS = [af.BodyForce(0.3, -0.4), af.PointLoad(0.2, (3e3, -4e3))]
@@ -50,3 +52,34 @@ def test_forces_of_a_load_are_the_slope_of_its_work(model):
     else:
         assert rate.toarray() == pytest.approx(bent, abs=1e-3)
         assert np.abs(bent).max() > 100.0
+
+
+@pytest.mark.parametrize("size", [12, 450])
+def test_the_sense_of_a_path_is_the_sign_of_a_determinant(size):
+    """By NumPy's dense factors, whatever the units of the coordinates."""
+    rng = np.random.default_rng(size)
+    signs = []
+    for _ in range(8):
+        tangent, load, row = rng.normal(size=(size, size)), *rng.normal(size=(2, size + 1))
+        tangent *= 10.0 ** rng.uniform(-8.0, 8.0, (size, 1))
+        matrix = np.vstack([np.column_stack([tangent, -load[:size]]), row])
+        signs.append(np.linalg.slogdet(matrix)[0])
+        found = continuation._determinant_sign(sparse.csr_matrix(tangent), load[:size], row)
+        assert found == signs[-1]
+    assert set(signs) == {-1.0, 1.0}
+
+
+def test_a_path_has_no_sense_where_two_motions_meet_no_resistance():
+    """Its matrix is singular but for rounding, whose sign is a coin toss.
+
+    Two directions bear nothing, and the border holds one of them. A spring of 1e-9 of the stiffness
+    along the other gives the sign back: the determinant is its stiffness times positive numbers.
+    """
+    rng = np.random.default_rng(1)
+    turned = np.linalg.qr(rng.normal(size=(30, 30)))[0]
+    load, row = turned[:, 0], np.append(turned[:, 0], 0.0)
+    for spring, sign in ((0.0, {0.0}), (1e-9, {1.0}), (-1e-9, {-1.0})):
+        stiffness = np.r_[0.0, spring, np.ones(28)] * 1e11
+        for scale in (1.0, 3.0, 7.0):  # which round otherwise
+            tangent = sparse.csr_matrix((turned * stiffness * scale) @ turned.T)
+            assert {continuation._determinant_sign(tangent, load, row)} == sign
