@@ -176,7 +176,7 @@ def test_every_program_answers_one_scene_where_it_is_installed(name):
 @pytest.mark.parametrize(
     ("cost", "tolerance", "least"),
     [
-        (0.3, 1e-3, 70),
+        (0.1, 1e-3, 40),
         # amplitudes of falls are searched to 1 %, and hang on the rounding of the processor
         pytest.param(60.0, 1e-2, 140, marks=pytest.mark.slow),
     ],
