@@ -318,7 +318,7 @@ def steps_of(breadth, height):
 
 
 def test_steps_grow_by_half_from_a_thousandth_to_a_hundredth_of_the_size():
-    """Of a squat block, whose factor changes by less than 4 % in each; the last ends at its fall."""
+    """Of a squat block, whose factor changes by less than 4 %; the last ends at its fall."""
     steps, _ = steps_of(2.0, 1.0)
     expected = np.minimum(1e-3 * 1.5 ** np.arange(len(steps)), 1e-2)
     np.testing.assert_allclose(steps[:-1], expected[:-1], rtol=1e-5)  # chords of a circle
