@@ -49,3 +49,24 @@ def test_findings_that_have_no_numbers(small_ring):
         af.mesh_sensitivity(small_ring, "colour", **few)
     with pytest.raises(af.InvalidInput, match="the coarsest first"):
         converged([1.0, 2.0, 4.0], [1.0, 2.0, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("order", "plausible"), [(0.45, False), (0.51, True), (2.09, True), (2.2, False)]
+)
+def test_orders_from_a_half_to_that_of_the_scheme_are_plausible(order, plausible):
+    """A tenth above two is left to chance."""
+    sizes = np.array([4.0, 2.0, 1.0])
+    found = converged(sizes, 3.0 + 0.2 * sizes**order)
+    assert found.order == pytest.approx(order, rel=1e-8)
+    assert (found.limit == pytest.approx(3.0, abs=1e-8)) is plausible
+    assert list(found.sizes) == [4.0, 2.0, 1.0]
+
+
+def test_differences_that_hardly_fall_have_an_order_near_zero():
+    found = converged([40.0, 20.0, 10.0], [1.0, 2.04, 3.0])
+    assert found.order == pytest.approx(np.log2(1.04 / 0.96), rel=1e-9)
+    assert list(found.sizes) == [4.0, 2.0, 1.0]
+    assert found.limit == 3.0
+    assert found.error == pytest.approx(6.0)
+    assert np.isnan(converged([4.0, 2.0, 1.0], [1.0, 2.0, 3.0]).order)
