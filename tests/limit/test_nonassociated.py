@@ -413,3 +413,19 @@ def test_shear_is_held_by_cohesion_and_friction_unless_it_never_slides():
     limited = nonassociated.with_shear_limits(rough, np.array([0.7]))
     assert np.isinf(limited.friction).all()
     assert nonassociated.with_shear_limits(dead, np.array([0.7])).friction.tolist() == [0.0]
+
+
+def test_bounds_are_those_of_the_weakest_and_the_strongest_solution(monkeypatch):
+    """Of three that a search finds, and the associated factor."""
+    programme, optimum = programmed(ring(voussoirs=5))
+    found = [
+        nonassociated.AlternatingIterate(replace(optimum, value=value), 0.0, True)
+        for value in (-0.4, -0.3, -0.5)
+    ]
+    monkeypatch.setattr(nonassociated, "_find_solutions", lambda programme, starts: list(found))
+    monkeypatch.setattr(nonassociated, "descend", lambda *given, **options: iter([]))
+    state, bounds = nonassociated.search_nonassociated(programme, optimum, -1.0)
+    assert state.value == -0.3
+    assert bounds.between == (0.3, 0.5)
+    assert bounds.starts == (41, 3)
+    assert bounds.bracket[1] == pytest.approx(optimum.unknowns[0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.studies import converged
+from archfem.studies import converged, convergence
 
 
 @pytest.mark.parametrize("order", [0.6, 1.0, 2.0])
@@ -70,3 +70,34 @@ def test_differences_that_hardly_fall_have_an_order_near_zero():
     assert found.limit == 3.0
     assert found.error == pytest.approx(6.0)
     assert np.isnan(converged([4.0, 2.0, 1.0], [1.0, 2.0, 3.0]).order)
+
+
+class Asked(Exception):
+    """Told what a study would have been asked for."""
+
+
+@pytest.mark.parametrize(
+    ("find", "shaken", "asked"),
+    [
+        (None, True, "history"),
+        (None, False, "dead load"),
+        ("dead load", True, "dead load"),
+        ("scales", False, "scales"),
+    ],
+)
+def test_what_is_asked_for_is_found_and_else_the_history_or_the_dead_load(
+    small_ring, monkeypatch, find, shaken, asked
+):
+    """Over three meshes, four rules, three rungs, and over time steps of what moves."""
+
+    def of(case, points, find, **given):
+        raise Asked(find, len(points), points[0])
+
+    monkeypatch.setattr(convergence.Study, "of", of)
+    case = small_ring if shaken else af.Case.of({"structure": small_ring.settings["structure"]})
+    assert case.has_motion is shaken
+    with pytest.raises(Asked) as caught:
+        af.mesh_sensitivity(case, find=find)
+    still = asked == "dead load"
+    finest = {"model.cells": [2, 2]} | ({} if still else {"analysis.dt": 0.0025})
+    assert caught.value.args == (asked, 10 if still else 13, finest)
