@@ -8,6 +8,7 @@ import xarray as xr
 
 import archfem as af
 from archfem.cases.report import sections
+from archfem.cases.report.checks import _check_row, supported_weight_ratio
 from archfem.cases.report.report_data import build_player, rebuild_motion
 from archfem.cases.result_text import format_ratio, tabulate_joints, tabulate_motions, tabulate_runs
 from archfem.joints.resultants import joint_dataset
@@ -239,3 +240,16 @@ def test_players_of_a_page_share_its_size_but_stay_legible(players, megabytes, m
     run = SimpleNamespace(dataset={})
     build_player(SimpleNamespace(structure=None), run, "a title", players)
     assert seen[0][4] == 1e6 * megabytes
+
+
+def test_supports_are_judged_by_the_first_record_and_iterations_by_the_largest(piers, runs):
+    """That of the dead load, which supports bear whole; later they bear inertia too."""
+    run = runs["first"]
+    row = _check_row(SimpleNamespace(structure=piers), "first", run)
+    later = supported_weight_ratio(piers, run.joints.isel(time=1, drop=True))
+    assert row[2] == "1.0000 of the weight"
+    assert f"{later:.4f}" != "1.0000"
+    assert row[3] == f"≤ {int(run.dataset['iterations'].max())} a record"
+    assert (row[0], row[-1]) == ("first", run.outcome)
+    without = SimpleNamespace(joints=run.joints, outcome="", dataset=xr.Dataset())
+    assert _check_row(SimpleNamespace(structure=piers), "", without)[3] == "–"
