@@ -168,7 +168,7 @@ def _chosen(path: Path, change: Change, tests: Reached) -> list[list[str]]:
     """Tests that come to a change: those that run first, and those that run then."""
     meant = sorted(
         (test for test in tests if _own(test, path) or _comes(test, tests[test][1], path, change)),
-        key=lambda test: (not _own(test, path), tests[test][0]),
+        key=lambda test: (not (_own(test, path) or test.startswith(DEFAULTS)), tests[test][0]),
     )
     first, then, early, spent = [], [], set(), 0.0
     for test in meant:
