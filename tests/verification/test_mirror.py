@@ -78,7 +78,7 @@ def unmirrored(motion, side):
 
 def at_rest(side):
     """Rigid blocks under their weight, loads, and a support that moves; dry, and with bonds."""
-    found, stop = {}, af.statics.Stop(steps=3)
+    found, stop = {}, af.statics.Stop(steps=2)
     held = af.Contact(1.48e9, 0.3e9, 0.6, cohesion=2e4, tension=2e4, dilatancy=0.1)
     spread = af.Settlement(0, (-0.01 * side, -0.02, 0.03 * side))
     loads = [af.BodyForce(side, -0.1), af.PointLoad(-0.4 * side, (3e3 * side, -5e3))]
