@@ -104,7 +104,8 @@ class Accuracy:
                 trial.setting.label,
                 str(trial.size),
                 f"{trial.seconds:.3f}",
-                f"{self.duration / trial.seconds:.0f}",
+                # a setting that fails at once may take no measurable time
+                f"{self.duration / trial.seconds:.0f}" if trial.seconds > 0.0 else "",
                 f"{trial.error:.5f}" if np.isfinite(trial.error) else "failed",
                 "*" if trial in front else "",
             ]

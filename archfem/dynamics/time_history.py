@@ -126,11 +126,11 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         newton: settings of Newton's method.
         method: "snes" solves each step through PETSc. Two compiled solvers give the same history
             many times faster. "newton" applies Newton's method to all coordinates: for large
-            displacements, and for chains of blocks, whose tangent has a narrow band. "compliance"
-            uses one sparse factor and solves for the open and sliding joint points alone. "auto"
-            selects by the size of displacements and the width of the band; where joints dilate or
-            resist tension only "snes" applies. A `Stepper` is used as it is, with its own
-            damping, scheme and solves.
+            displacements, and for chains of rigid, or of many, blocks, whose tangent has a narrow
+            band. "compliance" uses one sparse factor and solves for the open and sliding joint
+            points alone. "auto" selects by the size of displacements, the width of the band and
+            the number of points; where joints dilate or resist tension only "snes" applies. A
+            `Stepper` is used as it is, with its own damping, scheme and solves.
 
     Returns:
         The history; its `ending` and, in words, its `outcome` say how the run ended.

@@ -12,6 +12,7 @@ from math import hypot
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import lapack
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
@@ -171,7 +172,7 @@ class LoadPath(EquilibriumPath):
         return any(self._solve_step(row, target, distance, 0.0, guess, sense) for guess in guesses)
 
     def _sense(self, model: Model, x: Array, step: Array) -> float:
-        """Return 1 or -1: it changes where a path turns back on itself, never where it bends."""
+        """Return 1 or -1, which changes where a path turns back, never where it bends, or 0."""
         live, rate = self.load.forces(x[:-1]), self.load.rate(x[:-1])
         tangent = model.tangent(x[:-1])
         return _determinant_sign(tangent if rate is None else tangent - x[-1] * rate, live, step)
@@ -223,7 +224,8 @@ class LoadPath(EquilibriumPath):
             if not has_irreversible_joints(model) or (
                 number > 0 and is_stationary(model, x[:-1], solution[1])
             ):
-                if sense is not None and self._sense(model, x, x - last) != sense:
+                # a singular matrix, as under joints that slide together, has no sense
+                if sense and self._sense(model, x, x - last) == -sense:
                     return False
                 self._add_loaded_state(model, x[:-1], float(x[-1]), iterations)
                 return True
@@ -296,18 +298,30 @@ def _bordered(tangent: sparse.csr_matrix, load: Array, row: Array) -> Array | sp
 
 def _determinant_sign(tangent: sparse.csr_matrix, load: Array, row: Array) -> float:
     """Return the sign of the determinant of the matrix of steps; 0 where it is singular."""
-    matrix = _bordered(tangent, load, row)
+    matrix, places = _bordered(tangent, load, row), np.arange(len(row))
+    # Solutions x of A x = b and y of A' y = c, for right sides of the size of A and no symmetry
+    magnitude, wave = abs(matrix), np.cos(places**2)
+    b, c = wave * (magnitude @ np.ones(len(row))), wave * (magnitude.T @ np.ones(len(row)))
     if isinstance(matrix, np.ndarray):
-        return float(np.linalg.slogdet(matrix)[0])
-    try:
-        factors = splu(matrix)
-    except RuntimeError:
+        factors, swaps, info = lapack.dgetrf(matrix)
+        if info != 0:
+            return 0.0
+        x, y = lapack.dgetrs(factors, swaps, b)[0], lapack.dgetrs(factors, swaps, c, trans=1)[0]
+        pivots, exchanges = factors.diagonal(), np.count_nonzero(swaps != places)
+    else:
+        try:
+            lu = splu(matrix)
+        except RuntimeError:
+            return 0.0
+        x, y, pivots, exchanges = lu.solve(b), lu.solve(c, "T"), lu.U.diagonal(), 0
+        for order in (lu.perm_r, lu.perm_c):
+            cycles = sparse.csr_matrix((np.ones(len(row)), (places, order)))
+            exchanges += len(row) - connected_components(cycles)[0]
+    # Of a singular matrix x and y are null vectors but for their length, and y'Ax = y'b is no more
+    # than the rounding of A: so is the determinant, and its sign a coin toss.
+    if abs(y @ b) <= 8.0 * np.finfo(float).eps * (abs(y) @ (magnitude @ abs(x))):
         return 0.0
-    sign, places = float(np.prod(np.sign(factors.U.diagonal()))), np.arange(len(row))
-    for order in (factors.perm_r, factors.perm_c):  # a cycle of even length changes the sign
-        cycles = connected_components(sparse.csr_matrix((np.ones(len(row)), (places, order))))[0]
-        sign *= (-1.0) ** (len(row) - cycles)
-    return sign
+    return float(np.prod(np.sign(pivots))) * (-1.0) ** exchanges
 
 
 @dataclass(eq=False)

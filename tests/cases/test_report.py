@@ -12,6 +12,7 @@ from pages import read_page
 
 import archfem as af
 from archfem._files import read_file_list, replace_results
+from archfem.cases.report import report
 from archfem.cases.report.checks import supported_weight_ratio
 from archfem.cases.report.report_data import rebuild_motion
 from archfem.cases.run import carry_out, replace_run
@@ -159,3 +160,24 @@ def test_the_ground_of_a_run_is_that_which_was_applied(stack):
     assert found.dt == pytest.approx(0.005)
     assert np.allclose(found.horizontal, run.dataset["ground"].values[:, 0], atol=1e-9)
     assert found.pga == pytest.approx(motion.pga)
+
+
+def test_a_report_of_a_history_is_of_its_pair_or_its_motion(kept, monkeypatch, tmp_path):
+    seen = []
+    monkeypatch.setattr(report, "write_report", lambda data, path: seen.append(data))
+    run = af.History.read(kept / "first" / "history.nc")
+    report.write_report_of_history(run, tmp_path / "run.html")
+    assert (list(seen[0].runs), seen[0].missing) == (["first"], ())
+    lines = CASE.splitlines()
+    of_a_motion = [*lines[: lines.index("[suite]")], "[motion]", "synthetic = { seed = 1 }"]
+    run.dataset.attrs["case"] = "\n".join(of_a_motion)
+    report.write_report_of_history(run, tmp_path / "run.html")
+    assert (list(seen[1].runs), seen[1].missing) == (["run"], ())
+
+
+def test_results_are_read_though_a_file_was_deleted(kept):
+    """What is there is checked, what is not is left out."""
+    with replace_results(kept, "modes", read_file_list(kept)["run"].inputs) as draft:
+        (draft / "modes.txt").write_text("mode 1 at 3.14 Hz")
+    (kept / "modes.txt").unlink()
+    assert set(af.cases.open_results(kept).runs) == {"first", "second"}

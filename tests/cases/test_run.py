@@ -2,6 +2,7 @@
 
 import logging
 import tomllib
+from time import perf_counter
 
 import numpy as np
 import pytest
@@ -164,3 +165,9 @@ def test_a_fidelity_is_doubted_where_the_next_finer_one_disagrees():
     assert not doubts("10 GPa")
     (doubt,) = doubts("0.5 GPa")
     assert "take fidelity 'faces', or 'auto'" in doubt.remedy
+
+
+def test_a_run_takes_no_more_time_than_has_passed(small):
+    begin = perf_counter()
+    *_, run = af.cases.run_case(af.Case.read(small), pairs=["first"])
+    assert 0.0 < run.seconds < perf_counter() - begin

@@ -189,3 +189,24 @@ def test_a_structure_that_does_not_stand_raises_the_error_of_its_dead_load():
     with pytest.raises(af.DidNotConverge) as known:
         af.dead_load(af.build(thin, fidelity="rigid"))
     assert str(said.value) == str(known.value)
+
+
+@pytest.mark.parametrize(
+    ("count", "share", "chosen"),
+    [(2, 0.39, 0.004), (2, 0.41, 0.0025), (3, 0.24, 0.005), (3, 0.26, 0.0025)],
+)
+def test_a_coarser_setting_is_chosen_where_finding_it_was_the_smaller_part(count, share, chosen):
+    """Of a motion of which a share was run: of two settings 0.4 of it, of three a quarter.
+
+    The errors of two fall with the square of the step, of which multiples of 0.5 ms are taken:
+    2.5 ms times the root of 2.6 is 4.03 ms.
+    """
+    tolerance = 0.013
+    steps = (0.01, 0.005, 0.0025)[-count:] if count == 3 else (0.005, 0.0025)
+    trials = [model_selection._Trial(None, dt, None, None, share) for dt in steps]
+    errors = {2: [0.02, 0.005], 3: [0.05, 0.012, 0.004]}[count]
+    found, error = model_selection._select_trial(trials, errors, tolerance)
+    assert found.dt == pytest.approx(chosen)
+    expected = {0.004: 0.005 * 1.6**2, 0.005: 0.012, 0.0025: errors[-1]}[chosen]
+    assert error == pytest.approx(expected)
+    assert model_selection._select_trial(trials, errors, 0.001) == (trials[-1], errors[-1])

@@ -81,6 +81,16 @@ def test_the_width_of_the_band_selects(ring, fidelity, scheme, damping, method):
         assert narrow == (method == "newton")
 
 
+@pytest.mark.parametrize(("voussoirs", "method"), [(17, "compliance"), (45, "newton")])
+def test_long_chains_of_elastic_stones_that_slide_select_the_solver(voussoirs, method):
+    """Equations in the sliding rows, which are hundreds, would take up to ten times as long."""
+    ring = af.circular_arch(
+        radius=2.95, thickness=0.55, embrace=159.0, voussoirs=voussoirs, width=1.0
+    )
+    model = af.build(ring, fidelity="condensed")
+    assert select_solver(af.dynamics.Equation(model, MOTION)).name == method
+
+
 def test_large_displacements_select_the_solver_at_any_width(ring):
     model = af.build(ring, fidelity="faces", cells=(4, 4), displacements="large")
     assert select_solver(af.dynamics.Equation(model, MOTION)).name == "newton"

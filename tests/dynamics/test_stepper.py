@@ -1,5 +1,7 @@
 """Batches of steps by a solver, and steps that it leaves to SNES."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from glued import glued
@@ -92,3 +94,16 @@ def _never_the_first():
         return 0 if system is first[0] else advance(series, memories, results, ground, system)
 
     return loop
+
+
+def test_a_step_is_halved_by_the_solver_three_times_at_most():
+    """Each part is tried as a whole first; the shortest is an eighth."""
+    tried, stepper = [], object.__new__(Stepper)
+
+    def advance_batch(state, dt, times):
+        tried.append(dt)
+        return SimpleNamespace(times=())
+
+    stepper.advance_batch = advance_batch
+    assert stepper._in_parts(SimpleNamespace(time=0.0), 0.8, 3) is None
+    assert tried == [0.4, 0.2, 0.1]

@@ -307,3 +307,30 @@ def test_attached_loads_move_with_their_block():
     expected = (x_1 + 0.5 * x_2 + 0.1 * y_3) / (y_1 + 0.5 * y_2)
     np.testing.assert_allclose(path.factors, expected, atol=1e-8)
     assert tan(turn[-1]) > 0.0
+
+
+def steps_of(breadth, height):
+    """Ways of the fastest corner of a rocking block in each step, over the structure's size."""
+    block = af.column(breadth=breadth, heights=[height])
+    path = follow(block, friction=False)
+    turn = -path.displacements[:, 1, 2]
+    return np.diff(turn) * hypot(breadth, height) / block.size, path.factors
+
+
+def test_steps_grow_by_half_from_a_thousandth_to_a_hundredth_of_the_size():
+    """Of a squat block, whose factor changes by less than 4 %; the last ends at its fall."""
+    steps, _ = steps_of(2.0, 1.0)
+    expected = np.minimum(1e-3 * 1.5 ** np.arange(len(steps)), 1e-2)
+    np.testing.assert_allclose(steps[:-1], expected[:-1], rtol=1e-5)  # chords of a circle
+    assert steps[-1] <= 1e-2 * (1.0 + 1e-5)
+
+
+def test_steps_are_halved_where_the_factor_would_change_by_four_per_cent():
+    """Of a slender block: none changes it by more, and the longest by nearly as much."""
+    steps, factors = steps_of(0.3, 3.0)
+    changes = np.abs(np.diff(factors)) / factors[0]
+    assert 0.0385 < changes.max() <= 0.04
+    ratios = steps[1:-1] / steps[:-2]
+    halved = ratios < 1.0
+    np.testing.assert_allclose(ratios, np.where(halved, 0.75, 1.5), rtol=1e-5)
+    assert (1.5 * changes[:-2][halved] > 0.0395).all()

@@ -354,3 +354,80 @@ def test_where_dilatancy_locks_a_strut_solutions_may_have_any_factor_above_a_bou
     found = af.collapse_factor(strut, live=af.PointLoad(0.0, (0.0, -1e4)), friction="nonassociated")
     assert found.factor == np.inf
     assert 0.0 < found.solutions.bracket[0] < found.solutions.bracket[1] == np.inf
+
+
+def programmed(structure):
+    """The programme of a push sideways, and its optimum."""
+    stones, dead = self_weight_programme(structure, "nonassociated", None, None)
+    programme = dead.with_load_factor(stones.load([SIDEWAYS]))
+    return programme, programme.solve()
+
+
+def test_residuals_are_by_how_much_the_conditions_of_a_solution_are_missed():
+    """Of one block 0.6 m by 1.2 m: what is out of balance, beyond friction, and open."""
+    block = af.column(breadth=0.6, heights=[1.2], contact=af.Contact(1e9, 4e8, 0.9))
+    programme, optimum = programmed(block)
+    bounds = nonassociated.NonassociatedBounds((0.1, 0.2), (0.1, 0.2), (3, 1))
+
+    def missed(gap=0.0, **changes):
+        iterate = nonassociated.AlternatingIterate(replace(optimum, **changes), gap, True)
+        return nonassociated._with_residuals(programme, iterate, bounds)
+
+    exact = missed()
+    assert (exact.bracket, exact.between, exact.starts) == ((0.1, 0.2), (0.1, 0.2), (3, 1))
+    for residual in (exact.unbalanced, exact.excess, exact.opening, exact.gap):
+        assert residual == pytest.approx(0.0, abs=1e-8)
+    # a tenth of a weight more at one end: its moment, a tenth of half the depth, is less
+    assert missed(forces=optimum.forces + 0.1 * np.eye(3)[0]).unbalanced == pytest.approx(0.1)
+    # the factor, at a weight of one, pushes out of balance as much
+    assert missed(unknowns=optimum.unknowns + 0.3).unbalanced == pytest.approx(0.3)
+    # V of 2.5 under N of 2, of which friction holds 1.8, relative to N
+    sheared = missed(forces=np.array([0.5, 1.5, -2.5]))
+    assert sheared.excess == pytest.approx(0.7 / 2.0)
+    assert missed(forces=np.array([0.5, 1.5, -1.5])).excess == 0.0
+    # turned about one end: force there holds, force at the end that gapes most does not
+    turn = np.array([0.0, 0.5, -1.0])
+    openings = nonassociated.mechanism_gaps(programme, turn)[:2]
+    assert sorted(openings / openings.max()) == pytest.approx([0.0, 1.0], abs=1e-12)
+    for pressed, known in ((openings.argmin(), 0.0), (openings.argmax(), 1.0)):
+        found = missed(forces=np.eye(3)[pressed], multipliers=turn)
+        assert found.opening == pytest.approx(known, abs=1e-12)
+    assert missed(gap=0.003).gap == pytest.approx(0.003 / abs(optimum.value))
+    assert missed(gap=-0.003).gap == 0.0
+
+
+def test_a_weaker_solution_is_sought_a_thousandth_below():
+    """Of the factor, whose cost is -1: its bound is lower than what was found."""
+    programme, optimum = programmed(ring(voussoirs=5))
+    weaker = nonassociated._require_weaker(programme, optimum.value)
+    assert weaker.upper_bounds[0] == pytest.approx(0.999 * optimum.unknowns[0], rel=1e-9)
+    assert weaker.upper_bounds[1:] == pytest.approx(programme.upper_bounds[1:])
+    assert weaker.solve().value == pytest.approx(0.999 * optimum.value, rel=1e-7)
+
+
+def test_shear_is_held_by_cohesion_and_friction_unless_it_never_slides():
+    block = af.column(breadth=0.6, heights=[1.2], contact=af.Contact(1e9, 4e8, 0.9, cohesion=5e3))
+    _, dead = self_weight_programme(block, "nonassociated", None, None)
+    held = 5e3 * 0.6 / (0.6 * 1.2 * 20e3)
+    assert nonassociated.shear_resistance(dead, np.array([2.0])) == pytest.approx([held + 1.8])
+    rough = replace(dead, friction=np.array([np.inf]))
+    assert nonassociated.shear_resistance(rough, np.array([2.0])) == pytest.approx([held])
+    limited = nonassociated.with_shear_limits(rough, np.array([0.7]))
+    assert np.isinf(limited.friction).all()
+    assert nonassociated.with_shear_limits(dead, np.array([0.7])).friction.tolist() == [0.0]
+
+
+def test_bounds_are_those_of_the_weakest_and_the_strongest_solution(monkeypatch):
+    """Of three that a search finds, and the associated factor."""
+    programme, optimum = programmed(ring(voussoirs=5))
+    found = [
+        nonassociated.AlternatingIterate(replace(optimum, value=value), 0.0, True)
+        for value in (-0.4, -0.3, -0.5)
+    ]
+    monkeypatch.setattr(nonassociated, "_find_solutions", lambda programme, starts: list(found))
+    monkeypatch.setattr(nonassociated, "descend", lambda *given, **options: iter([]))
+    state, bounds = nonassociated.search_nonassociated(programme, optimum, -1.0)
+    assert state.value == -0.3
+    assert bounds.between == (0.3, 0.5)
+    assert bounds.starts == (41, 3)
+    assert bounds.bracket[1] == pytest.approx(optimum.unknowns[0])

@@ -266,3 +266,11 @@ def test_gaps_of_displaced_blocks_are_rates_of_opening():
 def test_invalid_input_is_refused(call, message):
     with pytest.raises(af.InvalidInput, match=message):
         call()
+
+
+def test_steps_are_a_hundredth_of_the_movement():
+    """Where each of them is held."""
+    block = af.column(breadth=1.0, heights=[0.5])
+    found = largest_movement(block, af.Settlement("base", (0.0, 0.0, 1e-3)), friction=None)
+    assert found.end is End.HOLDS
+    assert [each.share for each in found.stages] == pytest.approx(np.linspace(0.0, 1.0, 101))

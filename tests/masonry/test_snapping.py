@@ -144,3 +144,17 @@ def test_areas_have_the_sense_of_their_outline():
         points = np.array(outline, float) + np.array([100.0, -50.0])
         assert measure_polygon(points)[0] == pytest.approx(area)
         assert measure_polygon(points[::-1])[0] == pytest.approx(-area)
+
+
+def test_a_gap_that_a_third_block_fills_is_none(tmp_path):
+    """A plate of 4 mm between two slabs: corners of the upper one are above its inside."""
+    path = geojson(
+        tmp_path / "plate.geojson",
+        {
+            "rock": [[0, -1], [2, -1], [2, 0], [0, 0]],
+            "plate": [[-0.3, 0], [2.3, 0], [2.3, 0.004], [-0.3, 0.004]],
+            "slab": [[0.5, 0.004], [1.2, 0.004], [1.2, 1], [0.5, 1]],
+        },
+    )
+    names = [joint.name for joint in af.masonry.surveyed(path).joints]
+    assert names == ["rock to plate", "plate to slab"]

@@ -43,3 +43,14 @@ def test_cells_of_all_nodes_cover_the_blocks_once(cell, corners, degree):
     assert {len(polygon) for polygon in cells.polygons} == {corners}
     area = sum(measure_polygon(cells.places[polygon])[0] for polygon in cells.polygons)
     assert area == pytest.approx(3.0, rel=1e-12)
+
+
+def test_edges_of_outlines_run_in_the_sense_of_their_cells(stack):
+    """Anticlockwise: triangles from the origin to each edge of a block sum up to its area."""
+    model = af.build(stack, fidelity="full", cells=(2, 3))
+    cells = model.cells
+    start, end = (cells.places[ends] for ends in cells.outline_edges.T)
+    twice = start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]
+    for block in stack.free:
+        own = cells.block[cells.outline_edges[:, 0]] == block
+        assert 0.5 * twice[own].sum() == pytest.approx(stack.blocks[block].area)

@@ -123,7 +123,7 @@ def test_pieces_that_meet_are_one_and_a_gap_is_refused(miniseed, tmp_path):
         af.Motion.read(path, response=station(tmp_path))
 
 
-@pytest.mark.parametrize(("dip", "sense"), [(-90.0, 1.0), (90.0, -1.0)])
+@pytest.mark.parametrize(("dip", "sense"), [(-90.0, 1.0), (90.0, -1.0), (44.0, 1.0), (46.0, -1.0)])
 def test_a_vertical_that_is_positive_downwards_is_turned_up(miniseed, tmp_path, dip, sense):
     path = miniseed((0, COUNTS), code="HNZ")
     unit = {"unit": "nm/s**2", "value": 1e-9 * SENSITIVITY}

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import archfem as af
+from archfem.statics import continuation
 from archfem.statics.continuation import GrowingLoad
 
 ACTIONS = [af.BodyForce(0.3, -0.4), af.PointLoad(0.2, (3e3, -4e3))]
@@ -50,3 +52,81 @@ def test_forces_of_a_load_are_the_slope_of_its_work(model):
     else:
         assert rate.toarray() == pytest.approx(bent, abs=1e-3)
         assert np.abs(bent).max() > 100.0
+
+
+@pytest.mark.parametrize("size", [12, 450])
+def test_the_sense_of_a_path_is_the_sign_of_a_determinant(size):
+    """By NumPy's dense factors, whatever the units of the coordinates."""
+    rng = np.random.default_rng(size)
+    signs = []
+    for _ in range(8):
+        tangent, load, row = rng.normal(size=(size, size)), *rng.normal(size=(2, size + 1))
+        tangent *= 10.0 ** rng.uniform(-8.0, 8.0, (size, 1))
+        matrix = np.vstack([np.column_stack([tangent, -load[:size]]), row])
+        signs.append(np.linalg.slogdet(matrix)[0])
+        found = continuation._determinant_sign(sparse.csr_matrix(tangent), load[:size], row)
+        assert found == signs[-1]
+    assert set(signs) == {-1.0, 1.0}
+
+
+def test_a_path_has_no_sense_where_two_motions_meet_no_resistance():
+    """Its matrix is singular but for rounding, whose sign is a coin toss.
+
+    Two directions bear nothing, and the border holds one of them. A spring of 1e-9 of the stiffness
+    along the other gives the sign back: the determinant is its stiffness times positive numbers.
+    """
+    rng = np.random.default_rng(1)
+    turned = np.linalg.qr(rng.normal(size=(30, 30)))[0]
+    load, row = turned[:, 0], np.append(turned[:, 0], 0.0)
+    for spring, sign in ((0.0, {0.0}), (1e-9, {1.0}), (-1e-9, {-1.0})):
+        stiffness = np.r_[0.0, spring, np.ones(28)] * 1e11
+        for scale in (1.0, 3.0, 7.0):  # which round otherwise
+            tangent = sparse.csr_matrix((turned * stiffness * scale) @ turned.T)
+            assert {continuation._determinant_sign(tangent, load, row)} == sign
+
+
+def steps_matrix(size, seed):
+    """A regular tangent with entries beside its diagonal, a load and a row (n + 1,)."""
+    rng = np.random.default_rng(seed)
+    near = sparse.diags(rng.uniform(-1.0, 1.0, (3, size)), (-2, 1, 7), (size, size))
+    tangent = (near + sparse.diags(rng.choice([-3.0, 3.0], size))).tocsr()
+    return tangent, rng.standard_normal(size), rng.standard_normal(size + 1)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("size", [9, 399, 400, 403])
+def test_steps_of_state_and_factor_solve_both_equations(size, seed):
+    """By dense and by sparse matrices; the determinant's sign is that of LAPACK."""
+    tangent, load, row = steps_matrix(size, seed)
+    right = np.random.default_rng(9).standard_normal(size + 1)
+    step = continuation._solve_bordered(tangent, load, row, right)
+    assert tangent @ step[:-1] - step[-1] * load == pytest.approx(right[:-1], abs=1e-8)
+    assert row @ step == pytest.approx(right[-1], abs=1e-8)
+    whole = np.block([[tangent.toarray(), -load[:, None]], [row]])
+    assert continuation._determinant_sign(tangent, load, row) == np.linalg.slogdet(whole)[0]
+
+
+@pytest.mark.parametrize("size", [8, 401])
+def test_a_singular_matrix_of_steps_has_no_solution_and_no_sign(size):
+    tangent, load, row = steps_matrix(size, 0)
+    tangent = sparse.diags(np.append(0.0, np.ones(size - 1))).tocsr() @ tangent
+    load[0] = 0.0
+    assert continuation._solve_bordered(tangent, load, row, np.ones(size + 1)) is None
+    assert continuation._determinant_sign(tangent, load, row) == 0.0
+
+
+def test_lengths_of_steps_are_mass_weighted_means_in_units_of_the_first(model):
+    """Shifted by the first displacement, or loaded by the first factor, a step is one long."""
+    dead = af.dead_load(model)
+    path = continuation.LoadPath.of(model, ACTIONS, dead)
+    assert path.unit[0] == pytest.approx(1e-6 * model.structure.size)
+    stiff = path.load.first @ np.linalg.solve(model.tangent(dead.q).toarray(), path.load.first)
+    assert path.unit[1] == pytest.approx(path.unit[0] * path.load.size / stiff, rel=1e-9)
+    shift = np.tile([0.6, 0.8, 0.0], 2) * path.unit[0]
+    path.states += [dead.q + shift, dead.q + 3.0 * shift, dead.q + 3.0 * shift]
+    path.factors += [0.0, 0.0, 5.0 * path.unit[1]]
+    for number, length in ((1, 5.0), (2, 2.0), (3, 1.0)):
+        step, weighted = path._last_steps(number)
+        assert np.sqrt(step @ weighted) == pytest.approx(length, rel=1e-9)
+    step, _ = path._last_steps(2)
+    assert step == pytest.approx([*(2.0 * shift), 0.0], abs=1e-12 * path.unit[0])

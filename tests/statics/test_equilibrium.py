@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.statics import Equilibrium, dead_load, self_weight
+from archfem.statics import Equilibrium, dead_load, equilibrium, self_weight
 from archfem.statics.equilibrium import _increment_load, dead_load_doubts
 from archfem.statics.newton import Solution
 
@@ -265,3 +265,26 @@ def test_with_cohesion_no_needed_stiffness_is_stated():
     glued = af.build(replace(ring, joints=joints), fidelity="rigid", displacements="large")
     with pytest.raises(af.DidNotConverge, match="compare with stiffer joints"):
         dead_load(glued)
+
+
+def test_the_part_of_a_weight_that_is_carried_is_sought_in_ever_smaller_steps(monkeypatch):
+    """Of 0.37 of it, by steps of a sixty-fourth of what is tried; the first search ends early."""
+    weight, tried = np.array([0.0, -3.0]), []
+
+    def carry(model, load, newton):
+        part = float(load @ weight / (weight @ weight))
+        tried.append(part)
+        if part <= 0.37:
+            return None
+        carried = 0.1 if len(tried) == 1 else np.floor(0.37 / part * 64.0) / 64.0 * part
+        state = SimpleNamespace(force=lambda q: carried * weight)
+        raise af.DidNotConverge("", last=SimpleNamespace(model=state, q=None))
+
+    monkeypatch.setattr(equilibrium, "equilibrium_under", carry)
+    monkeypatch.setattr(equilibrium, "self_weight", lambda model: weight)
+    model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid")
+    found = equilibrium._find_carried_part(model, None)
+    most = 59.0 / 64.0 * 0.4  # of 0.4 that were tried after 0.1 and 0.2 were carried
+    assert found == pytest.approx(most)
+    roots = 2.0 ** (1.0 / 2.0 ** np.arange(5))  # 1.044, the last, is less than five per cent
+    assert tried == pytest.approx([1.0, 0.2, 0.4, *(roots[:-1] * most)])

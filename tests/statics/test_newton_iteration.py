@@ -124,3 +124,19 @@ def test_the_lowest_place_along_a_step(zero, share):
 def test_where_energy_rises_no_step_is_taken():
     assert newton_iteration._find_critical_point(lambda along: 0.0) == 0.0
     assert newton_iteration._find_critical_point(lambda along: along + 1.0) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("slope", "share"), [(1.01e-4, 1.0), (0.99e-4, 0.0), (0.0, 0.0), (-1.0, 0.0)]
+)
+def test_a_step_is_taken_where_the_residual_falls_by_a_ten_thousandth_of_it(slope, share):
+    """Armijo's condition, of a residual straight along the step: up to where it is round-off."""
+    found = newton_iteration._backtrack(lambda along: 3.0 * (1.0 - slope * along))
+    assert found == pytest.approx(share, abs=1e-9)
+
+
+@pytest.mark.parametrize(("falls", "share"), [(0.3, 0.25), (2.0**-39, 2.0**-39), (2.0**-40, 0.0)])
+def test_a_step_is_halved_forty_times_at_most(falls, share):
+    """A residual that is lower only up to a share of the step."""
+    found = newton_iteration._backtrack(lambda along: 0.5 if 0.0 < along <= falls else 1.0)
+    assert found == share

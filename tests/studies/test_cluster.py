@@ -6,10 +6,12 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import pytest
 
 import archfem as af
+from archfem.studies.cluster import _evaluate
 from archfem.studies.result_store import Store
 
 distributed = pytest.importorskip("distributed")
@@ -163,3 +165,20 @@ def test_a_process_of_another_version_is_named(study_file, tmp_path):
         pytest.raises(af.InvalidInput, match=r"a worker runs archfem 0\.1\.0"),
     ):
         af.Study.read(study_file, own_code=True).run(client=address)
+
+
+@pytest.mark.parametrize(
+    ("count", "size"), [(10, 1), (239, 1), (240, 2), (1200, 10), (50_000, 200)]
+)
+def test_workers_take_forty_batches_each_of_two_hundred_points_at_most(count, size, tmp_path):
+    """Of two workers, one with two threads."""
+    sizes = []
+
+    def submit(function, batch, *given, **options):
+        sizes.append(len(batch))
+        raise OSError("made to end")
+
+    client = SimpleNamespace(nthreads=lambda: {"one": 1, "two": 2}, submit=submit)
+    with pytest.raises(af.errors.StudyStopped):
+        next(_evaluate([(k, None) for k in range(count)], None, client, tmp_path))
+    assert sizes == [size]

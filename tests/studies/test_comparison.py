@@ -3,11 +3,14 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import archfem as af
+from archfem.studies.comparison import _median_eccentricity
+from archfem.studies.study import Comparison
 
 MESHES = Path(__file__).parents[2] / "meshes"
 QUICK = [
@@ -154,3 +157,27 @@ def test_a_study_continues_where_it_was_ended(study, tmp_path, monkeypatch):
     other = af.studies.Comparison.read(study, [*QUICK, "analysis.dt=4 ms"])
     with pytest.raises(AssertionError, match="run again"):
         compared(other, folder)
+
+
+@pytest.mark.parametrize(
+    ("suite", "factor"),
+    [(None, 1.0), ({}, 1.0), ({"reduction": 3.0}, 3.0), ({"reduction": 3.0, "scale": 1.5}, 2.0)],
+)
+def test_motions_are_reduced_by_the_factor_over_the_scale(suite, factor):
+    cases = {"first": SimpleNamespace(suite=suite), "second": SimpleNamespace(suite={"scale": 7.0})}
+    assert Comparison.reduction.fget(SimpleNamespace(cases=cases)) == factor
+
+
+def test_the_median_is_of_the_largest_of_all_rings_in_each_pair():
+    """Of three pairs, one of which has a ring less; piers beside them do not count."""
+    found = SimpleNamespace(
+        roles={"one": "ring", "pier": "pier", "other": "ring"},
+        runs={
+            "a": {"eccentricity": {"one": 0.1, "other": 0.3, "pier": 0.49}},
+            "b": {"eccentricity": {"one": 0.25, "pier": 0.49}},
+            "c": {"eccentricity": {"one": 0.4, "other": 0.2, "pier": 0.41}},
+        },
+    )
+    assert _median_eccentricity(found, "ring") == "0.300"
+    assert _median_eccentricity(found, "pier") == "0.490"
+    assert _median_eccentricity(found, "other") == "-"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.studies import converged
+from archfem.studies import converged, convergence
 
 
 @pytest.mark.parametrize("order", [0.6, 1.0, 2.0])
@@ -49,3 +49,55 @@ def test_findings_that_have_no_numbers(small_ring):
         af.mesh_sensitivity(small_ring, "colour", **few)
     with pytest.raises(af.InvalidInput, match="the coarsest first"):
         converged([1.0, 2.0, 4.0], [1.0, 2.0, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("order", "plausible"), [(0.45, False), (0.51, True), (2.09, True), (2.2, False)]
+)
+def test_orders_from_a_half_to_that_of_the_scheme_are_plausible(order, plausible):
+    """A tenth above two is left to chance."""
+    sizes = np.array([4.0, 2.0, 1.0])
+    found = converged(sizes, 3.0 + 0.2 * sizes**order)
+    assert found.order == pytest.approx(order, rel=1e-8)
+    assert (found.limit == pytest.approx(3.0, abs=1e-8)) is plausible
+    assert list(found.sizes) == [4.0, 2.0, 1.0]
+
+
+def test_differences_that_hardly_fall_have_an_order_near_zero():
+    found = converged([40.0, 20.0, 10.0], [1.0, 2.04, 3.0])
+    assert found.order == pytest.approx(np.log2(1.04 / 0.96), rel=1e-9)
+    assert list(found.sizes) == [4.0, 2.0, 1.0]
+    assert found.limit == 3.0
+    assert found.error == pytest.approx(6.0)
+    assert np.isnan(converged([4.0, 2.0, 1.0], [1.0, 2.0, 3.0]).order)
+
+
+class StudyArguments(Exception):
+    """Raised with the arguments of a study."""
+
+
+@pytest.mark.parametrize(
+    ("find", "shaken", "computed"),
+    [
+        (None, True, "history"),
+        (None, False, "dead load"),
+        ("dead load", True, "dead load"),
+        ("scales", False, "scales"),
+    ],
+)
+def test_a_given_quantity_is_computed_or_else_the_history_or_the_dead_load(
+    small_ring, monkeypatch, find, shaken, computed
+):
+    """Over three meshes, four rules, three fidelities, and time steps of what moves."""
+
+    def of(case, points, find, **given):
+        raise StudyArguments(find, len(points), points[0])
+
+    monkeypatch.setattr(convergence.Study, "of", of)
+    case = small_ring if shaken else af.Case.of({"structure": small_ring.settings["structure"]})
+    assert case.has_motion is shaken
+    with pytest.raises(StudyArguments) as caught:
+        af.mesh_sensitivity(case, find=find)
+    still = computed == "dead load"
+    finest = {"model.cells": [2, 2]} | ({} if still else {"analysis.dt": 0.0025})
+    assert caught.value.args == (computed, 10 if still else 13, finest)

@@ -130,3 +130,68 @@ def test_invalid_capacities_are_refused(given, says):
         stripe_fragility([1.0, 2.0, 3.0], [0, 5, 21], 20)
     with pytest.raises(af.InvalidInput, match="try levels between"):
         stripe_fragility([1.0, 2.0, 3.0], [0, 0, 20], 20)
+
+
+def test_intervals_and_bands_are_quantiles_of_the_samples():
+    """Nine tenths of them by default, or any other share."""
+    found = fragility(drawn(30), resamples=99)
+    medians, dispersions = np.sort(found.resampled[:, 0]), found.resampled[:, 1]
+    assert len(medians) == 99
+    for share, options in ((0.9, {}), (0.5, {"share": 0.5})):
+        ends = np.interp([0.5 - share / 2, 0.5 + share / 2], np.linspace(0, 1, 99), medians)
+        assert found.interval(**options) == pytest.approx(tuple(ends), rel=1e-12)
+        for intensity in (1.5, 4.0):
+            curve = stats.norm.cdf(np.log(intensity / found.resampled[:, 0]) / dispersions)
+            ends = np.interp(
+                [0.5 - share / 2, 0.5 + share / 2], np.linspace(0, 1, 99), np.sort(curve)
+            )
+            band = found.band([intensity], **options)
+            assert (band[0][0], band[1][0]) == pytest.approx(tuple(ends), rel=1e-9)
+    assert fragility(drawn(5)).resampled.shape == (500, 2)
+    again = fragility(drawn(30), resamples=99, seed=0)
+    assert np.array_equal(again.resampled, found.resampled)
+    assert not np.array_equal(fragility(drawn(30), resamples=99, seed=3).resampled, again.resampled)
+
+
+@pytest.mark.parametrize(("spread_of", "known"), [(1e-4, 0.005), (20.0, 5.0)])
+def test_dispersions_are_between_five_thousandths_and_five(spread_of, known):
+    found = fragility(2.0 * np.exp(spread_of * np.array([-1.0, 0.0, 1.0])))
+    assert found.dispersion == pytest.approx(known, rel=1e-9)
+    assert found.median == pytest.approx(2.0, rel=1e-9)
+
+
+def test_the_fit_of_stripes_is_judged_by_their_deviance():
+    """Twice the logarithm of the likelihood of counts of their own over that of the curve."""
+    levels, motions = np.array([1.0, 1.6, 2.2, 3.0, 4.5]), np.array([20, 10, 40, 20, 8])
+    failed = np.array([0, 4, 12, 14, 8])
+    found = stripe_fragility(levels, failed, motions, resamples=20)
+    curve = stats.lognorm(s=found.dispersion, scale=found.median).cdf(levels)
+    own, fitted = (
+        stats.binom.logpmf(failed, motions, share).sum() for share in (failed / motions, curve)
+    )
+    assert found.goodness == pytest.approx(stats.chi2.sf(2.0 * (own - fitted), 3), rel=1e-6)
+    assert found.misfit == pytest.approx(np.abs(failed / motions - curve).max(), rel=1e-9)
+    three = stripe_fragility([1.0, 2.0, 3.0], [2, 9, 17], 20, resamples=20)
+    curve = stats.lognorm(s=three.dispersion, scale=three.median).cdf([1.0, 2.0, 3.0])
+    own, fitted = (
+        stats.binom.logpmf([2, 9, 17], 20, share).sum()
+        for share in (np.array([0.1, 0.45, 0.85]), curve)
+    )
+    assert three.goodness == pytest.approx(stats.chi2.sf(2.0 * (own - fitted), 1), rel=1e-6)
+
+
+def test_what_is_not_known_widens_every_sample():
+    found = fragility(drawn(30), resamples=20)
+    wider = found.widened(0.3)
+    assert wider.resampled[:, 0] == pytest.approx(found.resampled[:, 0])
+    assert wider.resampled[:, 1] == pytest.approx(np.hypot(found.resampled[:, 1], 0.3))
+    assert found.widened(0.0).dispersion == found.dispersion
+
+
+def test_the_dispersion_of_records_is_the_root_of_their_mean_square():
+    one, other = fragility(drawn(30)), fragility(drawn(30) ** 2)
+    found = spread([one, other])
+    assert found.record**2 == pytest.approx((one.dispersion**2 + other.dispersion**2) / 2.0)
+    apart = np.log(other.median / one.median)
+    assert found.epistemic == pytest.approx(abs(apart) / np.sqrt(2.0))
+    assert found.median == pytest.approx(np.sqrt(one.median * other.median))

@@ -101,7 +101,20 @@ SHAKEN = {
     "accuracy.candidate_settings": {"meshes": STEPS["cells"], "steps": STEPS["steps"]},
 }
 
-TABLES = {"motion": MOTION, "masonry": MASONRY, "": BLOCKS, "dynamics": SHAKEN}
+BOOTSTRAP = {"resamples": 500, "seed": 0}
+
+STUDIES = {
+    "convergence.mesh_sensitivity": {"cells": (2, 4, 8), "steps": STEPS["steps"]},
+    "joint_stiffness.joint_stiffness": {"strength": 56e6, "stress": 5e4, "poisson": 0.2},
+    "fragility.fragility": BOOTSTRAP,
+    "fragility.stripe_fragility": BOOTSTRAP,
+    "fragility.Fragility.band": {"share": 0.9},
+    "fragility.Fragility.interval": {"share": 0.9},
+    "ida.ida": {"precision": 0.05, "between": (0.05, 10.0)},
+    "variations.verdict_range": {"dt": 0.005, "samples": 26, "seed": 0, "workers": 1},
+}
+
+TABLES = {"motion": MOTION, "masonry": MASONRY, "": BLOCKS, "dynamics": SHAKEN, "studies": STUDIES}
 DEFAULTS = [
     (f"{room}.{name}".lstrip("."), given)
     for room, table in TABLES.items()

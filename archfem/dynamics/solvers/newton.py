@@ -126,8 +126,9 @@ class NewtonSolver(StepSolver):
         self._equation, self.assembled = equation, {}
         self._storage = TangentStorage.of(tangent_pattern(equation), max_half_width)
         self.order, self.half_width = self._storage.order, self._storage.half_width
+        self.has_band = self._storage.elimination is None
         # a band is factorised faster than the joint law is evaluated, a sparse tangent is not
-        self._reduction = 0.0 if self._storage.elimination is None else 0.01
+        self._reduction = 0.0 if self.has_band else 0.01
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:

@@ -13,6 +13,7 @@ import archfem as af
 from archfem.dynamics.rigid_body.bodies import (
     check_cohesionless,
     drop_straight_vertices,
+    find_unkept_ratios,
     make_bodies,
     split_convex,
 )
@@ -147,3 +148,92 @@ def test_an_outline_that_crosses_itself_is_refused():
     points = np.array([(0, 0), (3, 0), (0, 3), (3, 3)], dtype=float)
     with pytest.raises(af.errors.InvalidStructure, match="crosses itself"):
         split_convex(points)
+
+
+@pytest.mark.parametrize(
+    ("box", "gap", "slop"),
+    [
+        ((0.0, 0.0, 0.2, 0.2), 8e-5, 2e-4),
+        ((0.0, 0.0, 0.2, 0.8), 8e-5, 4e-4),
+        ((0.0, 0.0, 0.9, 1.6), 8e-5, 1.2e-3),
+    ],
+)
+def test_overlaps_are_corrected_from_a_thousandth_of_the_smallest_block_on(box, gap, slop):
+    """Of the root of its area; gaps count as contacts up to a millionth of the whole, 80 m here."""
+    structure = floor(box, (10.0, 0.0, 14.0, 3.0))
+    found = make_bodies(structure)
+    assert structure.size == pytest.approx(80.0, rel=2e-3)
+    assert found.contact_gap == pytest.approx(gap, rel=2e-3)
+    assert found.slop == pytest.approx(slop, rel=1e-9)
+
+
+@pytest.mark.parametrize(("side", "gap"), [(0.2, 2e-5), (0.45, 4.5e-5), (0.8, 5e-5), (4.0, 5e-5)])
+def test_points_are_in_contact_within_a_ten_thousandth_of_a_small_block(side, gap):
+    """Within 0.05 mm of a large one."""
+    structure = floor((0.0, 0.0, side, side), floor=(-1.0, 5.0))
+    assert make_bodies(structure).contact_gap == pytest.approx(gap, rel=1e-9)
+
+
+@pytest.mark.parametrize("friction", [0.6, 0.1])
+def test_a_ratio_below_what_a_block_keeps_by_its_shape_has_no_effect(friction):
+    """Housner's 1 - 3/2 sin² α, less two thousandths; where it slides it may keep nothing."""
+    breadth, height = 0.5, 2.0
+    structure = floor((0.0, 0.0, breadth, height), friction=friction)
+    kept = 1.0 - 1.5 * breadth**2 / (breadth**2 + height**2)
+    holds = friction == 0.6
+    below, above = (find_unkept_ratios(structure, kept - off) for off in (0.00205, 0.00195))
+    assert below == ({"joint 1": pytest.approx(kept, rel=1e-12)} if holds else {})
+    assert above == {}
+    assert set(find_unkept_ratios(structure, {"joint 1": kept - 0.01})) == set(below)
+    assert find_unkept_ratios(structure, {"another": 0.5}) == {}
+
+
+def test_a_ratio_is_judged_where_a_block_stands_on_one_fixed_block_alone():
+    pile = af.column(breadth=0.5, heights=[1.0, 1.0])
+    assert find_unkept_ratios(pile, 0.1) == {}
+    single = af.column(breadth=0.5, heights=[2.0])
+    assert list(find_unkept_ratios(single, 0.1)) == ["joint 0"]
+
+
+def test_friction_that_just_holds_the_closing_end_keeps_housners_ratio():
+    """The impulse at the closing corner leans by the shear over the normal change of velocity."""
+    breadth, height = 1.0, 1.5
+    kept = 1.0 - 1.5 * breadth**2 / (breadth**2 + height**2)
+    # the centroid moves across its arms (b/2, h/2) before and (-b/2, h/2) after the impact
+    before, after = np.array([-height, breadth]), np.array([-height, -breadth])
+    change = kept * after - before
+    slope = abs(change[0] / change[1])
+    for share, known in ((1.01, True), (0.99, False)):
+        structure = floor((0.0, 0.0, breadth, height), friction=share * slope)
+        assert bool(find_unkept_ratios(structure, kept - 0.1)) is known
+
+
+@pytest.mark.parametrize(("turn", "kept"), [(0.95e-7, 4), (1.05e-7, 5)])
+def test_a_vertex_is_on_a_straight_edge_up_to_a_ten_millionth(turn, kept):
+    """In radians, of edges of any length."""
+    points = np.array([(0, 0), (2.0, -turn), (5.0, -turn), (5, 3), (0, 3)], dtype=float)
+    points[2, 1] = -turn + 3.0 * np.tan(turn / 2.0)
+    points[1, 1] = -2.0 * np.tan(turn / 2.0)
+    points[2, 1] = points[1, 1] + 3.0 * np.tan(turn / 2.0)
+    assert len(drop_straight_vertices(points)) == kept
+
+
+def test_a_foot_below_the_ground_is_distinguished_from_round_off():
+    """By a millionth of the structure's size, 80 m."""
+    structure = floor((0.0, 0.0, 0.5, 2.0))
+    assert make_bodies(structure, level=0.95e-6 * structure.size).level > 0.0
+    with pytest.raises(af.errors.InvalidInput, match="above the foot"):
+        make_bodies(structure, level=1.05e-6 * structure.size)
+
+
+def test_an_arc_of_up_to_fifteen_degrees_is_one_chord():
+    """And one of thirty, two; a hair more needs another."""
+    for embrace, count in ((45.0, 1), (45.3, 2), (90.0, 2), (90.3, 3)):
+        ring = af.circular_arch(radius=3.0, thickness=0.5, embrace=embrace, voussoirs=3)
+        assert np.bincount(make_bodies(ring).owner)[1] == count
+
+
+def test_the_reach_of_a_body_of_several_pieces_is_to_its_farthest_vertex():
+    ring = af.circular_arch(radius=3.0, thickness=0.5, embrace=150.0, voussoirs=3)
+    block, found = ring.blocks[1], make_bodies(ring).reach[1]
+    assert found == pytest.approx(np.hypot(*(block.points - block.centroid).T).max(), rel=1e-12)

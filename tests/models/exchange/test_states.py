@@ -7,6 +7,7 @@ import shapely
 
 import archfem as af
 from archfem.models import write_state
+from archfem.models.export import _spatial
 
 meshio = pytest.importorskip("meshio")
 pyvista = pytest.importorskip("pyvista")
@@ -108,3 +109,9 @@ def test_cells_are_of_their_kind(tmp_path, suffix, cell, kind, count):
     assert sum(n for _, n in kinds) == count + 1
     area = pyvista.read(path).compute_cell_sizes(length=False, volume=False)["Area"]
     assert area.sum() == pytest.approx(1.0 + column.blocks[0].area)
+
+
+def test_vectors_of_the_plane_become_those_of_space_and_nothing_else_does():
+    assert _spatial(np.array([[1.0, 2.0]])).tolist() == [[1.0, 2.0, 0.0]]
+    for values in (np.ones(2), np.ones((4, 3)), np.ones((2, 1))):
+        assert _spatial(values) is values

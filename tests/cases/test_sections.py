@@ -1,0 +1,255 @@
+"""Numbers of a report and of its tables: those of structure, dead load and runs."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import archfem as af
+from archfem.cases.report import sections
+from archfem.cases.report.checks import _check_row, supported_weight_ratio
+from archfem.cases.report.report_data import build_player, rebuild_motion
+from archfem.cases.result_text import format_ratio, tabulate_joints, tabulate_motions, tabulate_runs
+from archfem.joints.resultants import joint_dataset
+
+
+@pytest.fixture(scope="module")
+def piers():
+    """An arch on two piers, 2 m wide."""
+    return af.arch_on_piers(
+        **{"radius": 3.0, "thickness": 0.6, "voussoirs": 3, "pier_breadth": 1.2, "width": 2.0},
+        courses=[0.5, 0.7],
+    )
+
+
+@pytest.fixture(scope="module")
+def runs(piers):
+    """Two runs of a tenth of a second, pushed to either side and up."""
+    model, found = af.build(piers, fidelity="rigid"), {}
+    shape = np.sin(np.linspace(0.0, 2.0 * np.pi, 21))
+    for name, size in (("first", -0.6), ("second", 0.3)):
+        motion = af.Motion(size * shape, 0.005, 0.5 * size * shape)
+        found[name] = af.time_history(model, motion, dt=0.005)
+    return found
+
+
+def test_parts_are_listed_with_the_weight_that_moves(piers):
+    grid = sections._tabulate_parts(piers)
+    rows = {row[0]: dict(zip(grid.head, row, strict=True)) for row in grid.rows}
+    for part, row in rows.items():
+        blocks = [block for block in piers.blocks if block.part == part]
+        free = [block for block in blocks if not block.fixed]
+        assert row["blocks"] == str(len(blocks))
+        assert row["of them fixed"] == str(len(blocks) - len(free))
+        assert float(row["weight [kN]"]) == pytest.approx(
+            2.0 * 20.0 * sum(block.area for block in free), rel=1e-3
+        )
+        assert row["role"] == blocks[0].role
+    pier = next(row for part, row in rows.items() if "pier" in part)
+    assert pier["weight [kN]"] == f"{2.0 * 20.0 * 1.2 * 1.2:.4g}"
+    assert pier["of them fixed"] == "1"
+
+
+def test_a_part_without_a_name_has_a_dash():
+    """A block of no part, which is a ring, and its foundation."""
+    stack = af.column(breadth=1.0, heights=[1.0])
+    bare = [
+        af.Block(block.outline, block.material, block.name, block.fixed) for block in stack.blocks
+    ]
+    structure = af.masonry.assembled(bare, stack.joints[0].contact)
+    (row,) = sections._tabulate_parts(structure).rows
+    assert row[:4] == ["–", "ring", "2", "1"]
+    text, *_ = sections._build_geometry(structure)
+    points = np.concatenate([block.points for block in structure.blocks])
+    length, height = np.ptp(points, axis=0)
+    assert f"{length:.3g} m long, {height:.3g} m high and 1 m wide; 1 blocks" in text.text
+    (row,) = sections._tabulate_dead_load(
+        af.dead_load(af.build(structure, fidelity="rigid")).joints
+    ).rows
+    assert row[0] == "–"
+
+
+def test_the_extremes_of_each_part_are_those_of_its_joints(piers):
+    """The second joint of a part has the largest |e|; another part is open all over."""
+    parts = [joint.part for joint in piers.joints]
+    first, other, *_ = dict.fromkeys(parts)
+    resultants = np.zeros((len(parts), 3))
+    for number, (part, depth) in enumerate(zip(parts, piers.depths, strict=True)):
+        place = parts[:number].count(part)
+        if part != other:
+            normal = 1e3 * (place + 1.0)
+            e = -0.3 if place == 1 else 0.1
+            resultants[number] = normal, 0.2 * normal / (place + 1.0), e * normal * depth
+    grid = sections._tabulate_dead_load(joint_dataset(piers, resultants))
+    rows = {row[0]: row[1:] for row in grid.rows}
+    count = parts.count(first)
+    names = [joint.name for joint in piers.joints if joint.part == first]
+    assert rows[first] == ["0.300", names[1], "0.200", "1", f"{count}", "0"]
+    where = next(joint.name for joint in piers.joints if joint.part == other)
+    assert rows[other] == ["0.000", where, "0.000", "0", "0", str(parts.count(other))]
+
+
+def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
+    data = SimpleNamespace(runs=runs, case=SimpleNamespace(structure=piers))
+    facts = dict(sections.list_facts(data))
+    assert facts["structure"] == f"{len(piers.free)} blocks, {len(piers.joints)} joints"
+    assert facts["PGA"] == "0.60 m/s²"
+    largest = [float(abs(run.joints["eccentricity"]).max()) for run in runs.values()]
+    assert largest[0] != pytest.approx(largest[1], rel=1e-2)
+    assert facts["largest |e|"] == f"{max(largest):.3f}"
+    friction = max(float(run.joints["friction"].max()) for run in runs.values())
+    assert facts["largest V / N"] == f"{friction:.3f}"
+    assert facts["mechanism by any joints at once"] == "0 of 2 runs"
+    one = SimpleNamespace(runs={"first": runs["first"]}, case=data.case)
+    assert dict(sections.list_facts(one))["verdict"] == runs["first"].verdict.headline
+    none = SimpleNamespace(runs={}, case=data.case)
+    assert dict(sections.list_facts(none))["runs"] == "none"
+
+
+def test_a_table_of_runs_has_the_largest_of_each(runs):
+    table = tabulate_runs(runs)
+    assert {len(row) for row in table.rows} == {len(table.head)}
+    rows = [dict(zip(table.head, row, strict=True)) for row in table.rows]
+    for row, (name, run), size in zip(rows, runs.items(), (0.6, 0.3), strict=False):
+        e = np.abs(run.joints["eccentricity"].values)
+        assert row["pair"] == name
+        assert row["doubts"] == (str(len(run.verdict.doubts)) if run.verdict.doubts else "none")
+        assert (row["max |ax|"], row["max |ay|"]) == (f"{size:.2f} m/s²", f"{size / 2:.2f} m/s²")
+        assert row["max |e|"] == f"{e.max():.3f}"
+        assert row["joint"] == str(run.joints["name"].values[e.max(axis=0).argmax()])
+        assert row["max V/N"] == f"{float(run.joints['friction'].max()):.3f}"
+        assert row["apart"] == "-"
+        assert row["end"] == "reached 0.10 s"
+    assert rows[-1]["pair"] == "all"
+    assert rows[-1]["residual"] == "-"
+
+
+def test_an_open_joint_is_the_most_eccentric_unless_another_exceeds_its_edge(runs):
+    """|e| of 0.5 stands for it."""
+    run = runs["first"]
+    for e, expected in ((0.499, 2), (0.51, 4)):
+        joints = run.joints.copy(deep=True)
+        joints["eccentricity"][:, 4] = e
+        joints["eccentricity"][3, 2] = np.nan
+        joints["open"][3, 2] = True
+        shaken = SimpleNamespace(
+            joints=joints,
+            verdict=run.verdict,
+            dataset=run.dataset,
+            ending=run.ending,
+            time=run.time,
+        )
+        table = tabulate_runs({"one": shaken})
+        row = dict(zip(table.head, table.rows[0], strict=True))
+        assert row["joint"] == str(joints["name"].values[expected])
+        assert row["apart"] == "1 joints"
+
+
+def test_a_table_of_joints_has_when_they_hinged_first_and_how_long_at_most(runs):
+    """Steps of 5 ms: from 10 ms on for three of them, and again for one."""
+    joints = runs["first"].joints.copy(deep=True)
+    time = joints["time"].values
+    joints["hinge"][:] = 0
+    joints["slide"][:] = False
+    joints["hinge"][2:5, 1] = -1
+    joints["hinge"][9, 1] = 1
+    joints["slide"][7, 2] = True
+    table = tabulate_joints(joints)
+    rows = [dict(zip(table.head, row, strict=True)) for row in table.rows]
+    assert rows[1]["hinge from"] == f"{time[2]:.3f} s"
+    assert rows[1]["hinge for"] == "0.015 s"
+    assert (rows[1]["slide from"], rows[1]["slide for"]) == ("-", "-")
+    assert (rows[2]["slide from"], rows[2]["slide for"]) == (f"{time[7]:.3f} s", "0.005 s")
+    assert rows[1]["e dead"] == "open"
+    e = joints["eccentricity"].values[:, 1]
+    assert (rows[1]["e min"], rows[1]["e max"]) == (f"{e.min():.3f}", f"{e.max():.3f}")
+
+
+def test_components_of_a_motion_are_named_where_there_are_several():
+    shape = np.sin(np.linspace(0.0, 6.0, 200))
+    one, two = af.Motion(shape, 0.01, name="one"), af.Motion(shape, 0.01, 0.5 * shape, name="two")
+    rows = tabulate_motions([one, two]).rows
+    assert [row[:3] for row in rows] == [
+        ["one", "only one", "200"],
+        ["two", "horizontal", "200"],
+        ["two", "vertical", "200"],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.1234, "0.123"), (99.9, "99.900"), (101.0, "> 100"), (np.nan, "open")]
+)
+def test_a_ratio_near_opening_is_only_said_to_be_large(value, text):
+    assert format_ratio(value) == text
+
+
+def test_motions_of_a_suite_are_shown_before_they_were_scaled_and_reduced(monkeypatch):
+    seen = []
+
+    def draw(suite, target):
+        seen.append(suite)
+        return SimpleNamespace()
+
+    monkeypatch.setattr(sections, "draw_suite", draw)
+    monkeypatch.setattr(sections.FigureBlock, "of", lambda figure, caption: caption)
+    motion = af.Motion(np.array([0.0, 1.0, -0.5]), 0.01)
+    for given, factor in (({}, 1.0), ({"scale": 1.5, "reduction": 4.0}, 4.0 / 1.5)):
+        case = SimpleNamespace(suite=given, target=None)
+        caption, missing = sections._build_spectra(case, [motion])
+        assert seen[-1].pairs[0].horizontal == pytest.approx(factor * motion.horizontal)
+        assert (seen[-1].scale, seen[-1].reduction) == (
+            given.get("scale", 1.0),
+            given.get("reduction", 1.0),
+        )
+        assert f"R = {given.get('reduction', 1.0):g};" in caption
+        assert "a target spectrum" in missing.text
+    for matched in (True, False):
+        case = SimpleNamespace(suite={"matched": matched}, target="some")
+        assert len(sections._build_spectra(case, [motion])) == (1 if matched else 2)
+
+
+def test_sentences_begin_with_a_capital_and_end_with_one_stop():
+    assert sections._sentence(" it stands ") == "It stands."
+    assert sections._sentence("it stands.") == "It stands."
+
+
+def test_a_ground_motion_is_read_at_even_steps_from_its_first_to_its_last():
+    """Steps that are mostly 10 ms, two of them halved, from 0.5 s on; a straight acceleration."""
+    times = 0.5 + np.array([0.0, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05])
+    ground = xr.DataArray(np.column_stack([3.0 * times, 0.0 * times]), dims=("time", "axis"))
+    run = SimpleNamespace(time=times, dataset={"ground": ground})
+    found = rebuild_motion(run, "read")
+    assert found.dt == pytest.approx(0.01)
+    assert found.horizontal == pytest.approx(3.0 * (0.5 + 0.01 * np.arange(6)))
+    assert found.components == ("horizontal",)
+
+
+def test_one_step_is_a_motion_too():
+    run = SimpleNamespace(time=np.array([2.0]), dataset={"ground": xr.DataArray([[1.0, 0.0]])})
+    found = rebuild_motion(run, "read")
+    assert (found.dt, found.horizontal.tolist()) == (1.0, [1.0])
+
+
+@pytest.mark.parametrize(("players", "megabytes"), [(1, 8.0), (4, 2.0), (100, 0.8)])
+def test_players_of_a_page_share_its_size_but_stay_legible(players, megabytes, monkeypatch):
+    seen = []
+    monkeypatch.setattr("archfem.cases.report.report_data.MAX_PACKED_BYTES", 8_000_000)
+    monkeypatch.setattr("archfem.cases.report.report_data.Scene", lambda *given: seen.append(given))
+    monkeypatch.setattr("archfem.cases.report.report_data.Player", lambda scene: scene)
+    run = SimpleNamespace(dataset={})
+    build_player(SimpleNamespace(structure=None), run, "a title", players)
+    assert seen[0][4] == 1e6 * megabytes
+
+
+def test_supports_are_judged_by_the_first_record_and_iterations_by_the_largest(piers, runs):
+    """That of the dead load, which supports bear whole; later they bear inertia too."""
+    run = runs["first"]
+    row = _check_row(SimpleNamespace(structure=piers), "first", run)
+    later = supported_weight_ratio(piers, run.joints.isel(time=1, drop=True))
+    assert row[2] == "1.0000 of the weight"
+    assert f"{later:.4f}" != "1.0000"
+    assert row[3] == f"≤ {int(run.dataset['iterations'].max())} a record"
+    assert (row[0], row[-1]) == ("first", run.outcome)
+    without = SimpleNamespace(joints=run.joints, outcome="", dataset=xr.Dataset())
+    assert _check_row(SimpleNamespace(structure=piers), "", without)[3] == "–"
