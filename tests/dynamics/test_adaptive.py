@@ -75,17 +75,28 @@ def bent(share, dt):
         (0.005, 0.0025, 0.02),
         (0.003, 0.0015, 0.012),
         (0.05, 0.0125, 0.0125),
-        (2.9e-4, 1.45e-4, 4.64e-3),
-        (1.4e-4, 1.4e-4, 4.48e-3),
-        (5e-5, 1e-4, 3.2e-3),
+        (2.9e-4, 1.45e-4, 18.56e-3),
+        (1.4e-4, 1.4e-4, 17.92e-3),
+        (5e-5, 1e-4, 12.8e-3),
     ],
 )
 def test_steps_at_rest_are_doubled_after_32_up_to_20_ms(sample, first, longest):
-    """From half of the sample's length on; never beyond 20 ms, nor at first below 0.1 ms."""
-    count = round(np.log2(longest / first))
-    lengths = first * 2.0 ** np.repeat(np.arange(count + 1), 32)
+    """From half of the sample's length on; never beyond 20 ms, nor at first below 0.1 ms.
+
+    After five doublings 31 steps of a length make the time a multiple of twice that length.
+    """
+    levels = np.arange(round(np.log2(longest / first)) + 1)
+    lengths = first * 2.0 ** np.repeat(levels, np.where(levels < 5, 32, 31))
     _, found = stepped(Known(lambda time: 0.0 * time, sample), lengths.sum() + 4.0 * longest)
     assert found == pytest.approx([*lengths, *(4 * [longest])], rel=1e-12)
+
+
+def test_steps_without_a_solver_are_as_long_as_their_error_allows():
+    """One at a time, each of which may be doubled."""
+    stepper = Known(lambda time: 0.0 * time)
+    stepper.solver = None
+    _, found = stepped(stepper, 0.32)
+    assert found == pytest.approx([0.005, 0.005, 0.01, *(15 * [0.02])])
 
 
 def test_a_run_ends_with_shorter_steps_where_the_last_would_go_too_far():

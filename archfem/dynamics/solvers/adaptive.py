@@ -54,8 +54,11 @@ class AdaptiveStepper:
         while done < total:
             while level > 0 and (done % 2**level or done + 2**level > total):
                 level -= 1
-            # 32 steps between two checks of the error
-            count = min(32, (total - done) // 2**level)
+            # 32 steps between two checks of the error; SNES takes one at a time
+            count = min(32 if self.stepper.solver is not None else 1, (total - done) // 2**level)
+            # an odd number of steps so far is made even, so that the length can be doubled
+            if count > 1 and (done // 2**level + count) % 2 == 1:
+                count -= 1
             ends = start.time + tick * (done + 2**level * np.arange(1, count + 1))
             batch, worst = self._try_steps(state, tick * 2**level, ends, level == 0)
             if batch is None:
