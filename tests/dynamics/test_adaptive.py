@@ -119,7 +119,7 @@ def test_steps_are_halved_beyond_the_tolerance_and_doubled_below_a_tenth_of_it(s
 
 
 @pytest.mark.parametrize(("share", "unmet"), [(1.01, 1.0), (0.99, 0.0)])
-def test_steps_of_a_tenth_of_a_millisecond_are_taken_whatever_their_error(share, unmet):
+def test_steps_of_a_tenth_of_a_millisecond_are_taken_at_any_error(share, unmet):
     """But for the first two, of which no error is known, they count as steps that do not meet it.
 
     The longer steps before are two of each length, of 5 ms to 0.16 ms.
@@ -158,7 +158,7 @@ def test_thrust_is_measured_at_half_the_compression_at_rest_at_least():
     assert found._scale_moments(resultants) == pytest.approx(expected)
 
 
-def test_what_the_solver_gives_up_is_halved_and_at_last_taken_without_it():
+def test_steps_that_the_solver_gives_up_are_halved_and_at_last_taken_without_it():
     _, steps = stepped(Known(lambda time: 0.0 * time, longest=0.003), 0.08 + 0.0025)
     assert steps == pytest.approx(0.0025)
     tick = 0.01 / 128
