@@ -176,7 +176,7 @@ def test_a_report_of_a_history_is_of_its_pair_or_its_motion(kept, monkeypatch, t
 
 
 def test_results_are_read_though_a_file_was_deleted(kept):
-    """What is there is checked, what is not is left out."""
+    """Present files are checked, and missing ones are left out."""
     with replace_results(kept, "modes", read_file_list(kept)["run"].inputs) as draft:
         (draft / "modes.txt").write_text("mode 1 at 3.14 Hz")
     (kept / "modes.txt").unlink()

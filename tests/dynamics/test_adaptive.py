@@ -109,7 +109,7 @@ def test_a_run_ends_with_shorter_steps_where_the_last_would_go_too_far():
     [(1.01, (2, 0.0025)), (0.99, (32, 0.005)), (0.102, (32, 0.005)), (0.098, (32, 0.01))],
 )
 def test_steps_are_halved_beyond_the_tolerance_and_doubled_below_a_tenth_of_it(share, lengths):
-    """Of e = c t² the error is c dt² / 3 in every step that two others go before."""
+    """The error of e = c t² is c dt² / 3 in every step after the second."""
     found, steps = stepped(Known(bent(share, 0.005)), 0.64)
     count, after = lengths
     assert steps[:count] == pytest.approx(0.005)
@@ -147,7 +147,7 @@ def test_the_error_of_steps_of_several_lengths_is_that_of_a_parabola():
 
 
 def test_thrust_is_measured_at_half_the_compression_at_rest_at_least():
-    """Of a joint that is hardly pressed at rest, at half of half the mean."""
+    """A joint that is barely pressed at rest is measured at half of half the mean."""
     stepper = Known(lambda time: 0.0 * time)
     found = AdaptiveStepper(stepper, TOLERANCE, stepper.fallback_step(SimpleNamespace(time=0), 1))
     least = np.array([0.5 * 1e4, 0.25 * 5.5e3])

@@ -196,7 +196,7 @@ def test_a_structure_that_does_not_stand_raises_the_error_of_its_dead_load():
     [(2, 0.39, 0.004), (2, 0.41, 0.0025), (3, 0.24, 0.005), (3, 0.26, 0.0025)],
 )
 def test_a_coarser_setting_is_chosen_where_finding_it_was_the_smaller_part(count, share, chosen):
-    """Of a motion of which a share was run: of two settings 0.4 of it, of three a quarter.
+    """A share of the motion was run: 0.4 of it by two settings, a quarter by three.
 
     The errors of two fall with the square of the step, of which multiples of 0.5 ms are taken:
     2.5 ms times the root of 2.6 is 4.03 ms.

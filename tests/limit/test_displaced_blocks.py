@@ -101,7 +101,7 @@ def test_dead_loads_do_the_work_of_weights_and_forces_at_their_points(blocks):
 
 
 def test_gaps_and_slips_have_the_rates_of_corners_seen_from_faces(bodies):
-    """Of corners of either block, wherever they are: gaps by `gaps`, slips along the face."""
+    """Corners of either block, at any place: gaps by `gaps`, slips along the face."""
     velocity, blocks = velocities(bodies), bodies.blocks
     motion, pairs = bodies.spread(velocity), blocks.structure.pairs
     contacts, gaps, slips = [], [], []
@@ -196,7 +196,7 @@ def test_a_corner_is_on_a_face_up_to_a_millionth_of_the_size(side, beyond, touch
 
 
 def test_corners_that_coincide_are_one_contact_of_the_higher_block():
-    """Of equal faces; one that has slid touches by a corner of each."""
+    """Equal faces coincide; faces that have slid touch by a corner of each."""
     equal = pile((-0.5, -0.5, 0.5, 0.0), (-0.5, 0.0, 0.5, 1.0))
 
     def touching(x):
@@ -220,7 +220,7 @@ def test_welded_blocks_are_bodies_and_those_on_supports_at_rest():
 
 
 def test_faces_beyond_their_joint_slide_on_all_of_it():
-    """Of a wide block the whole of its top, of a narrow one its foot."""
+    """The face of a wide block is the whole of its top, that of a narrow one its foot."""
     corners = find_corners(TWO)
     assert corners[0, 0, :, 0] == pytest.approx([-1.0, 1.0])
     assert corners[1, 0, :, 0] == pytest.approx([-0.5, 0.5])

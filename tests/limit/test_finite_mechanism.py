@@ -318,7 +318,7 @@ def steps_of(breadth, height):
 
 
 def test_steps_grow_by_half_from_a_thousandth_to_a_hundredth_of_the_size():
-    """Of a squat block, whose factor changes by less than 4 %; the last ends at its fall."""
+    """The factor of a squat block changes by less than 4 %; the last step ends at its fall."""
     steps, _ = steps_of(2.0, 1.0)
     expected = np.minimum(1e-3 * 1.5 ** np.arange(len(steps)), 1e-2)
     np.testing.assert_allclose(steps[:-1], expected[:-1], rtol=1e-5)  # chords of a circle
@@ -326,7 +326,7 @@ def test_steps_grow_by_half_from_a_thousandth_to_a_hundredth_of_the_size():
 
 
 def test_steps_are_halved_where_the_factor_would_change_by_four_per_cent():
-    """Of a slender block: none changes it by more, and the longest by nearly as much."""
+    """A slender block: no step changes it by more, and the longest by nearly as much."""
     steps, factors = steps_of(0.3, 3.0)
     changes = np.abs(np.diff(factors)) / factors[0]
     assert 0.0385 < changes.max() <= 0.04

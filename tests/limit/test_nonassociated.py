@@ -364,7 +364,7 @@ def programmed(structure):
 
 
 def test_residuals_are_by_how_much_the_conditions_of_a_solution_are_missed():
-    """Of one block 0.6 m by 1.2 m: what is out of balance, beyond friction, and open."""
+    """One block 0.6 m by 1.2 m: the imbalance, the excess over friction, and the opening."""
     block = af.column(breadth=0.6, heights=[1.2], contact=af.Contact(1e9, 4e8, 0.9))
     programme, optimum = programmed(block)
     bounds = nonassociated.NonassociatedBounds((0.1, 0.2), (0.1, 0.2), (3, 1))
@@ -397,7 +397,7 @@ def test_residuals_are_by_how_much_the_conditions_of_a_solution_are_missed():
 
 
 def test_a_weaker_solution_is_sought_a_thousandth_below():
-    """Of the factor, whose cost is -1: its bound is lower than what was found."""
+    """The cost of the factor is -1: its bound is lower than the factor that was found."""
     programme, optimum = programmed(ring(voussoirs=5))
     weaker = nonassociated._require_weaker(programme, optimum.value)
     assert weaker.upper_bounds[0] == pytest.approx(0.999 * optimum.unknowns[0], rel=1e-9)
@@ -418,7 +418,7 @@ def test_shear_is_held_by_cohesion_and_friction_unless_it_never_slides():
 
 
 def test_bounds_are_those_of_the_weakest_and_the_strongest_solution(monkeypatch):
-    """Of three that a search finds, and the associated factor."""
+    """The search finds three solutions, beside the associated factor."""
     programme, optimum = programmed(ring(voussoirs=5))
     found = [
         nonassociated.AlternatingIterate(replace(optimum, value=value), 0.0, True)

@@ -171,7 +171,7 @@ def test_a_process_of_another_version_is_named(study_file, tmp_path):
     ("count", "size"), [(10, 1), (239, 1), (240, 2), (1200, 10), (50_000, 200)]
 )
 def test_workers_take_forty_batches_each_of_two_hundred_points_at_most(count, size, tmp_path):
-    """Of two workers, one with two threads."""
+    """There are two workers, one with two threads."""
     sizes = []
 
     def submit(function, batch, *given, **options):

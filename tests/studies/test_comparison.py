@@ -169,7 +169,7 @@ def test_motions_are_reduced_by_the_factor_over_the_scale(suite, factor):
 
 
 def test_the_median_is_of_the_largest_of_all_rings_in_each_pair():
-    """Of three pairs, one of which has a ring less; piers beside them do not count."""
+    """One of three pairs has a ring less; piers beside them do not count."""
     found = SimpleNamespace(
         roles={"one": "ring", "pier": "pier", "other": "ring"},
         runs={

@@ -63,7 +63,7 @@ def test_orders_from_a_half_to_that_of_the_scheme_are_plausible(order, plausible
     assert list(found.sizes) == [4.0, 2.0, 1.0]
 
 
-def test_differences_that_hardly_fall_have_an_order_near_zero():
+def test_differences_that_barely_fall_have_an_order_near_zero():
     found = converged([40.0, 20.0, 10.0], [1.0, 2.04, 3.0])
     assert found.order == pytest.approx(np.log2(1.04 / 0.96), rel=1e-9)
     assert list(found.sizes) == [4.0, 2.0, 1.0]

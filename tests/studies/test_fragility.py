@@ -180,7 +180,7 @@ def test_the_fit_of_stripes_is_judged_by_their_deviance():
     assert three.goodness == pytest.approx(stats.chi2.sf(2.0 * (own - fitted), 1), rel=1e-6)
 
 
-def test_what_is_not_known_widens_every_sample():
+def test_uncertainty_of_the_structure_widens_every_sample():
     found = fragility(drawn(30), resamples=20)
     wider = found.widened(0.3)
     assert wider.resampled[:, 0] == pytest.approx(found.resampled[:, 0])

@@ -18,7 +18,7 @@ from archfem.studies.result_store import Progress, Status
         ({"rate": 2.0, "run_rate": 0.5, "runs_left": 40.0}, 80.0),
     ],
 )
-def test_what_remains_is_left_at_the_rate_of_points_or_of_runs(given, remaining):
+def test_the_remaining_time_follows_the_rate_of_points_or_of_runs(given, remaining):
     assert Status(10, 4, 0, **given).remaining == pytest.approx(remaining)
     assert Status(10, 10, 0, **given).remaining == 0.0
 

@@ -159,7 +159,7 @@ def test_an_outline_that_crosses_itself_is_refused():
     ],
 )
 def test_overlaps_are_corrected_from_a_thousandth_of_the_smallest_block_on(box, gap, slop):
-    """Of the root of its area; gaps count as contacts up to a millionth of the whole, 80 m here."""
+    """Its size is the root of its area; gaps are contacts up to a millionth of the whole, 80 m here."""
     structure = floor(box, (10.0, 0.0, 14.0, 3.0))
     found = make_bodies(structure)
     assert structure.size == pytest.approx(80.0, rel=2e-3)
@@ -227,7 +227,7 @@ def test_a_foot_below_the_ground_is_distinguished_from_round_off():
 
 
 def test_an_arc_of_up_to_fifteen_degrees_is_one_chord():
-    """And one of thirty, two; a hair more needs another."""
+    """An arc of thirty degrees has two; 0.1 degrees more need another."""
     for embrace, count in ((45.0, 1), (45.3, 2), (90.0, 2), (90.3, 3)):
         ring = af.circular_arch(radius=3.0, thickness=0.5, embrace=embrace, voussoirs=3)
         assert np.bincount(make_bodies(ring).owner)[1] == count
