@@ -268,7 +268,7 @@ def test_with_cohesion_no_needed_stiffness_is_stated():
 
 
 def test_the_part_of_a_weight_that_is_carried_is_sought_in_ever_smaller_steps(monkeypatch):
-    """0.37 of it is carried, by steps of a sixty-fourth of the load; the first search ends early."""
+    """0.37 is carried, in steps of a sixty-fourth of the load; the first search ends early."""
     weight, tried = np.array([0.0, -3.0]), []
 
     def carry(model, load, newton):

@@ -159,7 +159,7 @@ def test_an_outline_that_crosses_itself_is_refused():
     ],
 )
 def test_overlaps_are_corrected_from_a_thousandth_of_the_smallest_block_on(box, gap, slop):
-    """Its size is the root of its area; gaps are contacts up to a millionth of the whole, 80 m here."""
+    """Its size is the root of its area; gaps up to a millionth of the whole, 80 m, are contacts."""
     structure = floor(box, (10.0, 0.0, 14.0, 3.0))
     found = make_bodies(structure)
     assert structure.size == pytest.approx(80.0, rel=2e-3)
