@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+import xarray as xr
 
 import archfem as af
 from archfem._files import read_file_list, replace_results
@@ -236,10 +237,12 @@ def test_results_that_are_read_in_python_keep_their_pictures(two_runs):
     assert [(run.reused, run.path.is_relative_to(folder)) for run in runs] == [(True, True)] * 2
     assert {name: (folder / name).read_bytes() for name in files_below(folder)} == before
     path = folder / "first" / "history.nc"
+    stored = xr.load_dataset(path)
     path.write_bytes((other / "first" / "history.nc").read_bytes())
     runs = [each for each in af.cases.run_case(case, folder) if isinstance(each, af.cases.Run)]
     assert [run.reused for run in runs] == [False, True]
-    assert path.read_bytes() == before["first/history.nc"]
+    # some versions of HDF5 write the time into the file, which is then no longer the same
+    assert xr.load_dataset(path).identical(stored)
     assert "suite.txt" not in files_below(folder)
     assert af.cases.open_results(folder).missing == ()
 
