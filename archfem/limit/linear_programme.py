@@ -31,9 +31,6 @@ from archfem.joints.rigid_kinematics import jump_rates
 from archfem.masonry.loads import BodyForce, PointLoad
 from archfem.masonry.structure import Structure, largest_displacement, rigid_motion_matrix
 
-# Reduced balances that blocks keep for further programmes: a search without dilatancy uses four
-MAX_KEPT_REDUCTIONS = 8
-
 
 class NoEquilibrium(DidNotConverge):
     """The programme is infeasible: no forces within the limits balance the loads."""
@@ -151,8 +148,8 @@ class RigidBlocks:
             if (blocks := single.tobytes()) not in self._chains:
                 links, pivots = _find_chains(self.structure, single)
                 self._chains[blocks] = Chains(self.balance, links, pivots)
-            # a search without dilatancy alternates between a few
-            if len(self._reductions) == MAX_KEPT_REDUCTIONS:
+            # a search without dilatancy alternates between four; eight leave room
+            if len(self._reductions) == 8:
                 self._reductions.pop(next(iter(self._reductions)))
             chains = self._chains[blocks]
             self._reductions[key] = ReducedBalance(chains, columns, friction, coheres)
