@@ -8,6 +8,7 @@ from archfem.dynamics.solvers.base import StepSolver
 from archfem.dynamics.solvers.compliance import ComplianceSolver
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.integrator import Stepper
+from archfem.dynamics.solvers.joint_law import gap_rows
 from archfem.dynamics.solvers.newton import NewtonSolver
 from archfem.dynamics.solvers.snes import SnesSolver
 from archfem.errors import InvalidInput
@@ -67,13 +68,13 @@ def select_solver(equation: Equation) -> StepSolver | None:
         return None
     if equation.model.large_displacements or joints is None:
         return newton
-    # A point of a joint that slides has two rows.
-    rows = len(joints.points.offset) * (1.0 if joints.slides else 0.5)
-    # Chains of rigid stones have a half width of 8 to 11, and take 0.6 to 0.85 of the time of the
+    rows = len(gap_rows(joints).offset)
+    # Chains of rigid stones have a half width of 5 to 11, and take 0.6 to 0.85 of the time of the
     # compliance method. Short ones that never slide take up to 1.7 times as long: their equations
     # in the open rows are few.
     if newton.half_width <= 12:
-        return newton if joints.slides or rows > 30 else ComplianceSolver.of(equation)
-    # Rings of 25 to 90 elastic stones under strong motions: up to 34 stones the compliance method
-    # takes 0.3 to 0.9 of the time, from 45 that slide on up to ten times as long.
-    return newton if newton.has_band and rows > 350 else ComplianceSolver.of(equation)
+        return newton if joints.slides or rows > 60 else ComplianceSolver.of(equation)
+    # Under strong motions the compliance method takes 0.3 to 0.9 of the time up to 350 rows, as of
+    # a ring of 34 elastic stones or a wall of 44 rigid ones. From 45 elastic stones that slide on,
+    # which have 460 rows, it takes up to ten times as long.
+    return newton if newton.has_band and rows > 400 else ComplianceSolver.of(equation)
