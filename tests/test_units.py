@@ -5,7 +5,6 @@ import pint
 import pytest
 
 import archfem as af
-from archfem.units import COMMON_UNITS, in_si_unit
 
 
 @pytest.fixture(scope="module")
@@ -13,7 +12,9 @@ def registry():
     return pint.UnitRegistry()
 
 
-@pytest.mark.parametrize(("unit", "si"), [(name, si) for name, (si, _) in COMMON_UNITS.items()])
+@pytest.mark.parametrize(
+    ("unit", "si"), [(name, si) for name, (si, _) in af.units.COMMON_UNITS.items()]
+)
 def test_common_units_are_those_of_the_registry(registry, unit, si):
     """Units agree to the last digit, so that a case gives the same numbers either way."""
     for number in (*np.random.default_rng(1).uniform(-1e3, 1e3, 50).round(3), 0.0, 1.48):
@@ -65,6 +66,6 @@ def test_a_mass_in_place_of_a_weight_is_refused_with_its_weight(mass):
     ],
 )
 def test_quantities_of_one_unit_are_numbers_and_other_values_stay(values, numbers, unit):
-    found, found_unit = in_si_unit(values)
+    found, found_unit = af.units.in_si_unit(values)
     assert found == pytest.approx(numbers) if unit else found == numbers
     assert found_unit == unit

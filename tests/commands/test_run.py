@@ -12,7 +12,6 @@ import pytest
 import archfem as af
 from archfem.cases.run import carry_out
 from archfem.commands.run import print_results
-from archfem.units import STANDARD_GRAVITY
 
 RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
 
@@ -264,7 +263,7 @@ def test_selected_records_become_a_suite(tmp_path, at2, undrawn, capsys, monkeyp
     records.mkdir()
     for day in range(1, 5):
         motion = af.Motion.synthetic(duration=2.0, seed=day, dt=0.01, vertical_ratio=0.0)
-        at2(records / f"1990010{day}.AT2", motion.horizontal / STANDARD_GRAVITY, 0.01)
+        at2(records / f"1990010{day}.AT2", motion.horizontal / af.units.STANDARD_GRAVITY, 0.01)
     # two components in one file, of which the second is nearer to the spectrum
     rows = "\n".join(f"{0.1 * a:.5f} {a:.5f}" for a in motion.horizontal)
     (records / "19900109.txt").write_text(f"# N-S E-W m/s2, dt = 0.01\n{rows}\n")

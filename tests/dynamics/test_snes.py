@@ -7,7 +7,6 @@ import pytest
 
 import archfem as af
 from archfem.dynamics import Equation
-from archfem.dynamics.solvers.snes import SnesSolver
 
 DAMPINGS = (
     None,
@@ -31,7 +30,7 @@ def test_a_step_with_closed_joints_takes_one_iteration(damping, scheme):
     """The equation is linear then, and Newton's method exact, from any guess and for any step."""
     model, motion = stack(af.Contact(1e9, 4e8, None))
     equation = Equation(model, motion, damping, scheme)
-    solver, state = SnesSolver(equation), equation.at_rest(af.dead_load(model).q)
+    solver, state = af.dynamics.SnesSolver(equation), equation.at_rest(af.dead_load(model).q)
     for dt in (0.005, 0.02, 0.001):
         step = solver.whole(state, dt)
         assert step.iterations == 1
@@ -52,7 +51,7 @@ def test_a_step_is_halved_eight_times_at_most(scheme):
 
     start = equation.at_rest(af.dead_load(model).q)
     with pytest.raises(af.DidNotConverge, match=r"step from t = 0 s failed, down to 3.91e-05 s"):
-        next(SnesSolver(equation, attempts=fail).steps(start, 0.01, 0.01))
+        next(af.dynamics.SnesSolver(equation, attempts=fail).steps(start, 0.01, 0.01))
     assert tried == pytest.approx(0.01 / 2.0 ** np.arange(9))
 
 
@@ -75,7 +74,7 @@ def test_damping_by_the_scheme_is_advised_where_it_applies(scheme, friction, kin
 
     start = equation.at_rest(np.zeros(model.size))
     with pytest.raises(af.DidNotConverge, match=words):
-        next(SnesSolver(equation, attempts=fail).steps(start, 0.01, 0.01))
+        next(af.dynamics.SnesSolver(equation, attempts=fail).steps(start, 0.01, 0.01))
 
 
 @pytest.mark.parametrize(("share", "said"), [(0.95e-6, False), (1.05e-6, True)])
@@ -90,6 +89,6 @@ def test_joints_are_too_stiff_where_rounding_bears_a_millionth_of_the_weight(sha
         for k, joint in enumerate(plain.joints)
     )
     model = af.build(replace(plain, joints=joints), fidelity="rigid")
-    solver = SnesSolver(Equation(model, af.Motion(np.zeros(9), 0.01)))
+    solver = af.dynamics.SnesSolver(Equation(model, af.Motion(np.zeros(9), 0.01)))
     assert solver._rounding_share() == pytest.approx(share, rel=1e-9)
     assert ("joints are so stiff" in solver._remedy()) is said

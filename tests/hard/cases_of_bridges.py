@@ -7,9 +7,7 @@ from glued import glued
 
 import archfem as af
 from archfem.masonry import BACKFILL, SOIL_TO_STONE
-from archfem.masonry.shapes import Arch, Backfill, Paving, Pier, Sidewall, bridge
 from archfem.statics import Equilibrium, Newton, forces_on
-from archfem.units import MPa
 from hard.setting import (
     DT,
     IN_BALANCE,
@@ -30,13 +28,13 @@ CLOSED = 1e-7
 """Forces on a block close within this part of the largest of all, after a dead load to 1e-12."""
 
 
-def span(name="arch", **given) -> Arch:
+def span(name="arch", **given) -> af.shapes.Arch:
     """A ring of 4 m."""
     lengths = {"span": 4.0, "embrace": 150.0, "thickness": 0.45, "voussoirs": 9}
-    return Arch(measured="centre line", name=name, **{**lengths, **given})
+    return af.shapes.Arch(measured="centre line", name=name, **{**lengths, **given})
 
 
-def fill(cover=0.4, young=None, joints=1.0, **given) -> Backfill:
+def fill(cover=0.4, young=None, joints=1.0, **given) -> af.shapes.Backfill:
     """Fill of so stiff a soil, with joints to stone so many times stiffer."""
     soil = BACKFILL if young is None else replace(BACKFILL, young=young)
     contact = replace(
@@ -44,13 +42,16 @@ def fill(cover=0.4, young=None, joints=1.0, **given) -> Backfill:
         normal_stiffness=joints * SOIL_TO_STONE.normal_stiffness,
         shear_stiffness=joints * SOIL_TO_STONE.shear_stiffness,
     )
-    return Backfill(cover=cover, material=soil, contact=contact, **given)
+    return af.shapes.Backfill(cover=cover, material=soil, contact=contact, **given)
 
 
-def walls(**given) -> list[Sidewall]:
+def walls(**given) -> list[af.shapes.Sidewall]:
     """Two sidewalls."""
     lengths = {"length": 2.0, "height": 1.2, "above": 0.6}
-    return [Sidewall(name=f"{side} sidewall", **{**lengths, **given}) for side in ("west", "east")]
+    return [
+        af.shapes.Sidewall(name=f"{side} sidewall", **{**lengths, **given})
+        for side in ("west", "east")
+    ]
 
 
 def unbalanced(dead: Equilibrium) -> float:
@@ -90,19 +91,21 @@ def compared(structure, *, pga=3.0, duration=0.3, tolerance=1e-7, build=None, **
     return answer(run, off(run, exact), tolerance, f"; {largest:.3f} at rest")
 
 
-@case("fill of 0.5 MPa", "soil 60 000 times softer than stone", young=0.5 * MPa, quick=True)
-@case("fill of 600 MPa", "soil as stiff as its joints", young=600.0 * MPa)
+@case(
+    "fill of 0.5 MPa", "soil 60 000 times softer than stone", young=0.5 * af.units.MPa, quick=True
+)
+@case("fill of 600 MPa", "soil as stiff as its joints", young=600e6)
 @case("soil joints 100 × softer", "fill sinks by centimetres", joints=0.01, quick=True)
 @case("cover of 20 mm", "fill as thin as it may be over the crown", cover=0.02, quick=True)
 def filled(**given):
     """One filled span; compliance against SNES."""
-    return compared(bridge(arches=[span()], backfill=fill(**given)))
+    return compared(af.bridge(arches=[span()], backfill=fill(**given)))
 
 
 @case("soil joints 100 × stiffer", "soil joints stiffer than stone joints")
 def stiffly_filled():
     """Every step of compliance in balance, where SNES cycles and takes most steps in halves."""
-    dead = standing(bridge(arches=[span()], backfill=fill(joints=100.0)))
+    dead = standing(af.bridge(arches=[span()], backfill=fill(joints=100.0)))
     motion, record = quake(3.0, seed=5).cut(1.0, 1.3), af.Record(fields_every=1)
     given = {"start": dead, "damping": DAMPING, "newton": TIGHT, "record": record}
     run = shaken(dead.model, motion, method="compliance", **given)
@@ -120,21 +123,21 @@ BY_PART = {"backfill": "full", "rest": "faces"}
     quick=True,
 )
 def fidelities(fidelity):
-    return compared(bridge(arches=[span()], backfill=fill()), build={"fidelity": fidelity})
+    return compared(af.bridge(arches=[span()], backfill=fill()), build={"fidelity": fidelity})
 
 
 @case("filled segment of 30°", "thrust of many times the weight", quick=True)
 def flat():
     arch = span(embrace=30.0, voussoirs=15)
-    return compared(bridge(arches=[arch], backfill=fill()), tolerance=1e-6)
+    return compared(af.bridge(arches=[arch], backfill=fill()), tolerance=1e-6)
 
 
 @case("piers of 20 m, 50 courses", "slender piers under rings", quick=True)
 def tall():
     """Against half the step."""
     rings = [span("west arch"), span("east arch")]
-    pier = Pier(gap=2.0, height=20.0, course=0.4)
-    return against_half_the_step(bridge(arches=rings, piers=[pier]), fidelity="faces")
+    pier = af.shapes.Pier(gap=2.0, height=20.0, course=0.4)
+    return against_half_the_step(af.bridge(arches=rings, piers=[pier]), fidelity="faces")
 
 
 def against_half_the_step(structure, *, pga=0.5, tolerance=0.01, **build):
@@ -152,31 +155,31 @@ def against_half_the_step(structure, *, pga=0.5, tolerance=0.01, **build):
 def viaduct(filled=True):
     """Bare against half the step, filled against SNES."""
     rings = [span(f"arch {k}", voussoirs=11) for k in range(1, 9)]
-    piers = [Pier(name=f"pier {k}", gap=1.4, height=4.0) for k in range(1, 8)]
+    piers = [af.shapes.Pier(name=f"pier {k}", gap=1.4, height=4.0) for k in range(1, 8)]
     if filled:
-        return compared(bridge(arches=rings, piers=piers, backfill=fill()), duration=0.2)
-    return against_half_the_step(bridge(arches=rings, piers=piers), fidelity="faces")
+        return compared(af.bridge(arches=rings, piers=piers, backfill=fill()), duration=0.2)
+    return against_half_the_step(af.bridge(arches=rings, piers=piers), fidelity="faces")
 
 
 @case("paving on an eroded deck", "pavers along slopes, and on the hump", quick=True)
 def paved():
     soil = fill(cover=0.8, erosion=0.4, hump=0.5)
-    paving = Paving(thickness=0.2, length=0.5)
-    return compared(bridge(arches=[span()], sidewalls=walls(), backfill=soil, paving=paving))
+    paving = af.shapes.Paving(thickness=0.2, length=0.5)
+    return compared(af.bridge(arches=[span()], sidewalls=walls(), backfill=soil, paving=paving))
 
 
 @case("sidewalls retained", "fixed wall behind courses", state="retained", quick=True)
 @case("sidewalls fixed", "fill on one piece of rock", state="fixed")
 @case("sidewalls free", "courses that the ring pushes outwards", state="free")
 def retained(state):
-    return compared(bridge(arches=[span()], sidewalls=walls(state=state), backfill=fill()))
+    return compared(af.bridge(arches=[span()], sidewalls=walls(state=state), backfill=fill()))
 
 
 @case("filled span at 0.8 g, also vertically", "unscaled record, 6 s")
 @case("filled span at 0.8 g, 0.4 s", "as strong vertically", cut=(1.2, 1.6), quick=True)
 def strong(cut=None):
     """Compliance against SNES."""
-    dead = standing(bridge(arches=[span()], backfill=fill()))
+    dead = standing(af.bridge(arches=[span()], backfill=fill()))
     motion = quake(8.0, seed=5, vertical=1.0)
     run, exact = both(dead, motion.cut(*cut) if cut else motion)
     return answer(run, off(run, exact), 1e-6)
@@ -185,7 +188,7 @@ def strong(cut=None):
 def damped(joints, scheme):
     """Steppers agree for every part that damping acts on; by HHT in joints that never slide."""
     damping = replace(DAMPING, joints=joints)
-    made = bridge(arches=[span()], backfill=fill())
+    made = af.bridge(arches=[span()], backfill=fill())
     return compared(glued(made) if scheme else made, damping=damping, scheme=scheme)
 
 
@@ -202,13 +205,13 @@ for _joints in ("none", "initial", "closed"):
 
 @case("filled span, 20 ms steps", "sampled coarsely", quick=True)
 def coarse_steps():
-    return compared(bridge(arches=[span()], backfill=fill()), dt=0.02, duration=0.8)
+    return compared(af.bridge(arches=[span()], backfill=fill()), dt=0.02, duration=0.8)
 
 
 @case("bare bridge of thin rings", "cannot stand", quick=True)
 def thin():
     rings = [span("west arch", thickness=0.08), span("east arch", thickness=0.08)]
-    return falls(bridge(arches=rings, piers=[Pier(gap=1.0, height=2.0)]))
+    return falls(af.bridge(arches=rings, piers=[af.shapes.Pier(gap=1.0, height=2.0)]))
 
 
 @case("wide flat span on a slender pier", "side thrust topples the pier", quick=True)
@@ -217,7 +220,7 @@ def toppling():
         span("west arch", span=8.0, embrace=60.0, voussoirs=15),
         span("east arch", span=3.0),
     ]
-    return falls(bridge(arches=rings, piers=[Pier(gap=0.5, height=6.0)]))
+    return falls(af.bridge(arches=rings, piers=[af.shapes.Pier(gap=0.5, height=6.0)]))
 
 
 def falls(structure):

@@ -10,7 +10,6 @@ import archfem as af
 from archfem.joints.criteria import with_failure_flags
 from archfem.limit import End, Outcome, closed_cohesion
 from archfem.limit.collapse import warn_cohesion
-from archfem.units import kPa
 
 EXACT = 1e-7
 """Relative: the programme is solved to 1e-9 block weights."""
@@ -37,7 +36,7 @@ def block_on_incline(slope, contact, breadth=1.2, height=0.3, width=0.7):
 
 
 @pytest.mark.parametrize("friction", SLIDING)
-@pytest.mark.parametrize("cohesion", [0.0, 0.5 * kPa, 1.0 * kPa])
+@pytest.mark.parametrize("cohesion", [0.0, 0.5 * af.units.kPa, 1.0 * af.units.kPa])
 def test_a_pushed_block_slides_at_its_friction_and_cohesion(friction, cohesion):
     """λ W = μ W + c A, well before it overturns at breadth over height, 4."""
     structure = block_on_incline(0.0, glued(cohesion))
@@ -52,7 +51,7 @@ def test_a_pushed_block_slides_at_its_friction_and_cohesion(friction, cohesion):
 @pytest.mark.parametrize("downhill", [True, False])
 def test_a_block_pushed_along_an_incline(friction, downhill):
     """Along the face ±W sin α + λ W cos α = c A + μ (W cos α ∓ λ W sin α), downhill above."""
-    slope, cohesion, mu = 0.2, 0.8 * kPa, 0.4
+    slope, cohesion, mu = 0.2, 0.8 * af.units.kPa, 0.4
     structure = block_on_incline(slope, glued(cohesion, mu))
     push = af.BodyForce(-1.0 if downhill else 1.0)
     found = af.collapse_factor(structure, live=push, friction=friction)
@@ -81,7 +80,7 @@ def test_a_block_glued_between_walls_lifts_at_its_weight_and_both_faces():
         af.Block(tuple(map(tuple, square + np.array([x, 0.0]))), af.STONE, name, fixed=x != 0.0)
         for x, name in ((0.0, "block"), (-1.0, "left"), (1.0, "right"))
     ]
-    cohesion = 3.0 * kPa
+    cohesion = 3.0 * af.units.kPa
     structure = af.masonry.assembled(blocks, glued(cohesion))
     lift = af.PointLoad(0.5, (0.0, 1.0))
     assert af.collapse_factor(structure, live=lift).outcome is Outcome.UNBOUNDED
@@ -92,7 +91,7 @@ def test_a_block_glued_between_walls_lifts_at_its_weight_and_both_faces():
 
 def test_the_mechanism_pays_for_cohesion():
     """Upper theorem: live work is that of the weights, and c A on every slip."""
-    contact = glued(2.0 * kPa, 0.35)
+    contact = glued(2.0 * af.units.kPa, 0.35)
     structure = af.circular_arch(
         radius=3.0, thickness=0.8, embrace=120.0, voussoirs=9, contact=contact
     )
@@ -108,7 +107,7 @@ def test_the_mechanism_pays_for_cohesion():
     work = push.force[0] * (found.motion[number, 0] - found.motion[number, 2] * arm[1])
     weights = [b.area * b.material.unit_weight * structure.width for b in structure.blocks]
     slips = np.abs(gaps(structure, found.motion)[:, 2])
-    lost = 2.0 * kPa * structure.width * structure.depths @ slips
+    lost = 2.0 * af.units.kPa * structure.width * structure.depths @ slips
     assert found.factor * work == pytest.approx(weights @ found.motion[:, 1] + lost, rel=1e-6)
 
 
@@ -130,7 +129,7 @@ def test_a_support_moves_as_far_with_enough_cohesion_as_without_sliding():
         apart = af.Settlement("left abutment", (-4.0, 0.0, 0.0))
         return af.limit.largest_movement(structure, apart, friction=friction, tolerance=1e-3)
 
-    dry, held, never = spread(0.0), spread(20.0 * kPa), spread(0.0, None)
+    dry, held, never = spread(0.0), spread(20.0 * af.units.kPa), spread(0.0, None)
     assert dry.end is End.SLIDES
     assert dry.largest < held.largest == never.largest
     assert held.end is never.end is End.FALLS

@@ -9,7 +9,6 @@ import pytest
 
 import archfem as af
 from archfem.motion import SELECTION_RULES, SelectionRule, response_spectrum, rotated_spectrum
-from archfem.units import STANDARD_GRAVITY
 
 # Public records, which are not part of the sources: they are tested where they are at hand.
 RECORDS = Path(__file__).parents[2].parent / "shared" / "records"
@@ -19,7 +18,7 @@ CODE = af.Eurocode8(0.25, "B")
 
 def write_at2(path, samples, event="Test, 1/2/1990", direction="180", dt=0.01):
     """Write accelerations [m/s²] to a file of format AT2."""
-    rows = "\n".join(f"{sample / STANDARD_GRAVITY:.6f}" for sample in samples)
+    rows = "\n".join(f"{sample / af.units.STANDARD_GRAVITY:.6f}" for sample in samples)
     head = f"PEER RECORD\n{event}, Station, {direction}\nACCELERATION IN UNITS OF G\n"
     path.write_text(f"{head}NPTS= {len(samples)}, DT= {dt:.4f} SEC\n{rows}\n")
 
@@ -57,11 +56,11 @@ def test_mean_meets_the_rule_at_other_periods(folder):
         motion = af.Motion.read(path).scaled(record.scale)
         rows.append(response_spectrum(motion, periods))
         peaks.append(motion.pga)
-    ratio = np.mean(rows, axis=0) / (CODE.horizontal(periods) * STANDARD_GRAVITY)
+    ratio = np.mean(rows, axis=0) / (CODE.horizontal(periods) * af.units.STANDARD_GRAVITY)
     # between two of its 120 periods, 2 % apart, the mean is below both by less than 0.5 %
     assert ratio.min() >= 0.9 - 5e-3
     assert ratio.min() == pytest.approx(found.bounds[0], abs=5e-3)
-    assert np.mean(peaks) >= CODE.horizontal(0.0) * STANDARD_GRAVITY * (1.0 - 1e-9)
+    assert np.mean(peaks) >= CODE.horizontal(0.0) * af.units.STANDARD_GRAVITY * (1.0 - 1e-9)
     suite = found.suite()
     assert [motion.pga for motion in suite.motions] == pytest.approx(peaks)
     assert found.spectra_at(periods) == pytest.approx(suite.spectra(periods))
@@ -90,10 +89,10 @@ def test_selection_is_the_best_of_all_sets(folder):
     paths = sorted(folder.glob("*0.AT2"))
     motions = [af.Motion.read(path) for path in paths]
     periods = np.geomspace(0.06, 0.6, 60)
-    goal = CODE.horizontal(periods) * STANDARD_GRAVITY
+    goal = CODE.horizontal(periods) * af.units.STANDARD_GRAVITY
     rows = np.array([response_spectrum(motion, periods) for motion in motions]) / goal
     peaks = np.array([motion.pga for motion in motions])
-    peaks /= CODE.horizontal(0.0) * STANDARD_GRAVITY
+    peaks /= CODE.horizontal(0.0) * af.units.STANDARD_GRAVITY
     events = [path.name[:4] for path in paths]
     least, best = all_sets(rows, peaks, events, (0.2, 5.0))
     found = af.select_records(folder, CODE, 0.3, count=3, scales=(0.2, 5.0))
@@ -152,7 +151,7 @@ def test_a_missed_rule_states_its_shortfall(folder):
     nearest = caught.value.last
     ratio = nearest.spectra.mean(axis=0) / nearest.target
     peaks = np.mean([record.scale * record.motion.pga for record in nearest.records])
-    peaks /= CODE.horizontal(0.0) * STANDARD_GRAVITY
+    peaks /= CODE.horizontal(0.0) * af.units.STANDARD_GRAVITY
     assert nearest.shortfall == pytest.approx(max(0.9 - ratio.min(), 1.0 - peaks))
     assert f"missed by {nearest.shortfall:.3g}" in str(caught.value)
     narrow = replace(SELECTION_RULES["NTC-2018"], longest=0.4, longest_ratio=0.0, upper=0.95)
@@ -165,7 +164,7 @@ def test_each_bound_decides_where_it_is_tight(folder):
     rule = replace(SELECTION_RULES["EC8"], lower=0.0, zero_period=2.0)
     found = af.select_records(folder, CODE, 0.3, count=3, rule=rule)
     peaks = np.mean([record.scale * record.motion.pga for record in found.records])
-    peaks /= CODE.horizontal(0.0) * STANDARD_GRAVITY
+    peaks /= CODE.horizontal(0.0) * af.units.STANDARD_GRAVITY
     assert peaks == pytest.approx(2.0)
     assert found.zero_period_ratio == pytest.approx(2.0)
     rule = replace(rule, upper=0.8, zero_period=0.0)

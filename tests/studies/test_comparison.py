@@ -10,7 +10,6 @@ import pytest
 
 import archfem as af
 from archfem.studies.comparison import _median_eccentricity
-from archfem.studies.study import Comparison
 
 MESHES = Path(__file__).parents[2] / "meshes"
 QUICK = [
@@ -165,7 +164,7 @@ def test_a_study_continues_where_it_was_ended(study, tmp_path, monkeypatch):
 )
 def test_motions_are_reduced_by_the_factor_over_the_scale(suite, factor):
     cases = {"first": SimpleNamespace(suite=suite), "second": SimpleNamespace(suite={"scale": 7.0})}
-    assert Comparison.reduction.fget(SimpleNamespace(cases=cases)) == factor
+    assert af.studies.Comparison.reduction.fget(SimpleNamespace(cases=cases)) == factor
 
 
 def test_the_median_is_of_the_largest_of_all_rings_in_each_pair():

@@ -4,8 +4,9 @@ from math import inf
 
 import pytest
 
+import archfem as af
 from archfem.studies import result_store
-from archfem.studies.result_store import Progress, Status
+from archfem.studies.result_store import Progress
 
 
 @pytest.mark.parametrize(
@@ -19,8 +20,8 @@ from archfem.studies.result_store import Progress, Status
     ],
 )
 def test_the_remaining_time_follows_the_rate_of_points_or_of_runs(given, remaining):
-    assert Status(10, 4, 0, **given).remaining == pytest.approx(remaining)
-    assert Status(10, 10, 0, **given).remaining == 0.0
+    assert af.studies.Status(10, 4, 0, **given).remaining == pytest.approx(remaining)
+    assert af.studies.Status(10, 10, 0, **given).remaining == 0.0
 
 
 @pytest.mark.parametrize(
@@ -36,8 +37,8 @@ def test_the_remaining_time_follows_the_rate_of_points_or_of_runs(given, remaini
     ],
 )
 def test_a_status_says_what_is_known(given, words):
-    assert str(Status(10, 4, 1, **given)) == words
-    assert str(Status(4, 4, 0)) == "4 of 4 points done, 0 failed, not running"
+    assert str(af.studies.Status(10, 4, 1, **given)) == words
+    assert str(af.studies.Status(4, 4, 0)) == "4 of 4 points done, 0 failed, not running"
 
 
 class Kept:

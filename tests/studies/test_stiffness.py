@@ -4,15 +4,16 @@ import pytest
 
 import archfem as af
 from archfem.studies.joint_stiffness import _normal
-from archfem.units import MPa, mm
 
 
 def test_a_joint_by_hand():
     """JRC 10, JCS = σ_c = 50 MPa at 1 MPa: a = 0.2 mm, k_i = 15.35 MPa/mm, v = 0.1080 mm."""
     closure = -0.1032 - 0.074 + 1.135 * 250.0**-0.251
     stiff = 15.35 * (1.0 - 1.0 / (closure * 15.35 + 1.0)) ** -2
-    found = _normal(10.0, 50.0 * MPa, 50.0 * MPa, 1.0 * MPa)
-    assert found * mm / MPa == pytest.approx(stiff / (2.0 + 0.0004 * 500.0), rel=1e-12)
+    found = _normal(10.0, 50.0 * af.units.MPa, 50.0 * af.units.MPa, 1.0 * af.units.MPa)
+    assert found * af.units.mm / af.units.MPa == pytest.approx(
+        stiff / (2.0 + 0.0004 * 500.0), rel=1e-12
+    )
 
 
 def test_ranges_are_ordered_and_near_the_paper():

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 import archfem as af
-from archfem.units import STANDARD_GRAVITY
 
 MESHES = Path(__file__).parents[2] / "meshes"
 PAPER_STRESS = 0.6e6
@@ -173,7 +172,7 @@ def test_the_criterion_of_the_paper_is_met_for_an_instant_by_its_own_law_alone()
 def test_the_bridge_stands_at_the_peak_of_1999(verified):
     """Joints slide and stones move without limit, under the pair that displaces it most."""
     own = af.Case.read(MESHES / "prusias.toml", ["suite.reduction=1"]).alone("pair-6")
-    motion = own.ground_suite().motions[0].scaled_to_pga(0.299 * STANDARD_GRAVITY)
+    motion = own.ground_suite().motions[0].scaled_to_pga(0.299 * af.units.STANDARD_GRAVITY)
     fidelity = {"backfill": "full", "rest": "rigid"}
     model = af.build(own.structure, fidelity=fidelity, displacements="large", cells=(2, 2))
     damping = af.effective_damping(model, 0.05)

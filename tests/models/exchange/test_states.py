@@ -7,7 +7,6 @@ import shapely
 
 import archfem as af
 from archfem.models import write_state
-from archfem.models.export import _spatial
 
 meshio = pytest.importorskip("meshio")
 pyvista = pytest.importorskip("pyvista")
@@ -111,7 +110,14 @@ def test_cells_are_of_their_kind(tmp_path, suffix, cell, kind, count):
     assert area.sum() == pytest.approx(1.0 + column.blocks[0].area)
 
 
-def test_vectors_of_the_plane_become_those_of_space_and_nothing_else_does():
-    assert _spatial(np.array([[1.0, 2.0]])).tolist() == [[1.0, 2.0, 0.0]]
-    for values in (np.ones(2), np.ones((4, 3)), np.ones((2, 1))):
-        assert _spatial(values) is values
+@pytest.mark.parametrize("suffix", [".vtu", ".vtk"])
+def test_vectors_of_the_plane_become_those_of_space(tmp_path, suffix):
+    """Points and displacements; cell data of one number stay of one."""
+    model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="full", cells=(2, 3))
+    q = np.tile([0.01, -0.002], model.size // 2)
+    path = write_state(model, q, tmp_path / f"state{suffix}", magnification=1.0)
+    grid = pyvista.read(path)
+    assert not grid.points[:, 2].any()
+    moved = grid.point_data["displacement"]
+    assert moved[moved[:, 0] > 0.0] == pytest.approx(np.tile([0.01, -0.002, 0.0], (12, 1)))
+    assert {grid.cell_data[name].ndim for name in grid.cell_data} == {1}
