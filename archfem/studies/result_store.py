@@ -6,6 +6,7 @@ The table is an `xarray.Dataset`, written as NetCDF, CSV and Parquet.
 import io
 import logging
 import re
+import shutil
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -317,6 +318,10 @@ def write_table(table: xr.Dataset, folder: Path, inputs: str) -> None:
     with explain_full_disk(folder), _files.stage_results(folder, "study", inputs) as draft:
         netcdf, csv, excel = (draft / name for name in RESULT_FILES)
         write_dataset(table, netcdf)
+        # Some versions of HDF5 write the time into a file: a table of the same content stays, and
+        # with it what was derived from it.
+        if _holds_same(folder / netcdf.name, netcdf):
+            shutil.copyfile(folder / netcdf.name, netcdf)
         with _files.atomic_write(csv) as part:
             quoted.to_csv(part, index=False)
         with suppress(ImportError), _files.atomic_write(draft / "results.parquet") as part:
@@ -324,6 +329,13 @@ def write_table(table: xr.Dataset, folder: Path, inputs: str) -> None:
         if len(frame) <= 1_048_575:  # rows of a sheet of Excel below the header
             with suppress(ImportError), _files.atomic_write(excel) as part:
                 _write_sheet(quoted, part)
+
+
+def _holds_same(stored: Path, table: Path) -> bool:
+    """Return whether a stored file is intact and has the table of another."""
+    with suppress(InvalidInput):
+        return read_table(stored).identical(read_table(table))
+    return False
 
 
 def _flatten(table: xr.Dataset) -> pd.DataFrame:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from types import SimpleNamespace
 
 import pytest
+from study_tables import equal_tables
 
 import archfem as af
 from archfem.studies.cluster import _evaluate
@@ -63,11 +64,7 @@ def test_a_client_gives_the_rows_that_processes_give(study_file, tmp_path, clien
     study = af.Study.read(study_file, own_code=True)
     found = study.run(tmp_path / "out", client=client)
     assert found.identical(study.run(tmp_path / "serial", workers=1))
-    names = ("results.nc", "results.csv")
-    assert all(
-        (tmp_path / "out" / name).read_bytes() == (tmp_path / "serial" / name).read_bytes()
-        for name in names
-    )
+    assert equal_tables(tmp_path / "out", tmp_path / "serial")
 
 
 def test_a_pair_is_matched_once_on_a_cluster(matching_study, tmp_path, client):
@@ -108,11 +105,7 @@ def test_scheduler_and_workers_as_processes(study_file, tmp_path, capsys):
         command = ["study", "--own-code", str(study_file), "--out", str(tmp_path / "out")]
         assert af.commands.main([*command, "--scheduler", address]) == 0
     af.Study.read(study_file, own_code=True).run(tmp_path / "serial", workers=1)
-    names = ("results.nc", "results.csv")
-    assert all(
-        (tmp_path / "out" / name).read_bytes() == (tmp_path / "serial" / name).read_bytes()
-        for name in names
-    )
+    assert equal_tables(tmp_path / "out", tmp_path / "serial")
 
 
 @pytest.mark.slow
