@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+import archfem as af
 from archfem.commands import tools
 from fuzz import odd
 from fuzz.trial import Came, judged
@@ -166,9 +167,8 @@ DRAWING = (
 def ready() -> None:
     """Load the modules that `check` needs."""
     from archfem.masonry.survey import outlines  # noqa: F401
-    from archfem.units import in_unit
 
-    in_unit("1 m", "m", "x")
+    af.units.in_unit("1 m", "m", "x")
 
 
 def trial(seed: int, number: int, folder: Path) -> Came:

@@ -10,7 +10,6 @@ import pytest
 
 import archfem as af
 from archfem._netcdf import write_dataset
-from archfem.studies.comparison import _median_eccentricity
 
 MESHES = Path(__file__).parents[2] / "meshes"
 QUICK = [
@@ -173,18 +172,3 @@ def test_a_study_continues_where_it_was_ended(study, tmp_path, monkeypatch):
 def test_motions_are_reduced_by_the_factor_over_the_scale(suite, factor):
     cases = {"first": SimpleNamespace(suite=suite), "second": SimpleNamespace(suite={"scale": 7.0})}
     assert af.studies.Comparison.reduction.fget(SimpleNamespace(cases=cases)) == factor
-
-
-def test_the_median_is_of_the_largest_of_all_rings_in_each_pair():
-    """One of three pairs has a ring less; piers beside them do not count."""
-    found = SimpleNamespace(
-        roles={"one": "ring", "pier": "pier", "other": "ring"},
-        runs={
-            "a": {"eccentricity": {"one": 0.1, "other": 0.3, "pier": 0.49}},
-            "b": {"eccentricity": {"one": 0.25, "pier": 0.49}},
-            "c": {"eccentricity": {"one": 0.4, "other": 0.2, "pier": 0.41}},
-        },
-    )
-    assert _median_eccentricity(found, "ring") == "0.300"
-    assert _median_eccentricity(found, "pier") == "0.490"
-    assert _median_eccentricity(found, "other") == "-"

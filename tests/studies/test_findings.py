@@ -39,6 +39,25 @@ def test_a_study_distinguishes_rings_from_piers_by_their_roles():
     assert row[head.index("|e| rings") :].split()[:2] == ["0.410", "0.320"]
 
 
+def test_the_median_is_of_the_largest_of_all_rings_in_each_pair():
+    """One of three pairs has a ring less; piers beside them do not count."""
+    roles = {"one": "ring", "pier": "pier", "other": "ring"}
+    eccentricities = (
+        {"one": 0.1, "other": 0.3, "pier": 0.49},
+        {"one": 0.25, "pier": 0.49},
+        {"one": 0.4, "other": 0.2, "pier": 0.41},
+    )
+    plain = finding().runs["a"]
+    runs = {
+        str(pair): plain | {"eccentricity": values} for pair, values in enumerate(eccentricities)
+    }
+    both = finding(roles=roles, runs=runs)
+    no_pier = finding(roles={"one": "ring", "pier": "other", "other": "ring"}, runs=runs)
+    head, *rows = study_table({"both": both, "no pier": no_pier}).splitlines()[:3]
+    cells = [row[head.index("|e| rings") :].split()[:2] for row in rows]
+    assert cells == [["0.300", "0.490"], ["0.300", "-"]]
+
+
 def test_findings_are_written_as_they_are(tmp_path):
     path = tmp_path / "case.json"
     write_finding(finding(search={"precision": 0.1, "between": [0.2, 2.0]}), path)
