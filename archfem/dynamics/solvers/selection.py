@@ -56,7 +56,7 @@ def select_solver(equation: Equation) -> StepSolver | None:
     """Return the solver of a run, or None where only SNES applies.
 
     Newton's method on the whole structure takes large displacements, and small ones where the
-    tangent is a narrow band, as of a chain of rigid stones, or a band with joints of many points.
+    tangent is a narrow band, as of a chain of rigid stones, or a band with many rows of gaps.
     Its time grows with the square of the width; that of the compliance method with the square of
     the number of rows that open and slide, and tenfold where minimal residuals fail.
     """
