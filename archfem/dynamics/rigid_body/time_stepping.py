@@ -514,7 +514,7 @@ def _separate(bodies, parameters, workspace, touching):  # type: ignore
         excess = -bodies.slop - (contacts.gap[k] + half * speed)
         deepest = max(deepest, excess)
         # the displacement of the contact, and no friction
-        rows[k, 6] = 0.5 * excess if excess > 0.0 else excess
+        rows[k, 6] = excess
         rows[k, 7] = rows[k, 8] = 0.0
     if deepest <= 0.0:
         return False
