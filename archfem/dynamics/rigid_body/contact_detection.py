@@ -125,16 +125,20 @@ def _sort(world):  # type: ignore
 
 
 @entry
-def find_contacts(bodies, world, contacts):  # type: ignore
-    """Find all contact points; return their number, or -1 where the workspace is too small."""
+def find_contacts(bodies, world, contacts, motion):  # type: ignore
+    """Find all contact points; return their number, or -1 where the workspace is too small.
+
+    The motion is of the middle of the step: poses, velocities with the ground's, and half a step.
+    Contacts are also points that would else be in each other by its end.
+    """
     count, capacity = 0, len(contacts.key) - 4  # a pair and the ground add up to four points
-    order, boxes, margin = world.order, world.boxes, bodies.contact_gap
+    order, boxes, margin = world.order, world.boxes, _largest_gap(bodies, motion)
     for k in range(len(order)):
         one = order[k]
         body = bodies.owner[one]
         free = bodies.inverse_mass[body, 0] > 0.0
         if free and boxes[one, 2] <= bodies.level + margin:
-            count = _touch_ground(bodies, world, one, contacts, count)
+            count = _touch_ground(bodies, world, one, motion, contacts, count)
         for later in range(k + 1, len(order)):
             two = order[later]
             # all further pieces begin beyond this one
@@ -144,24 +148,54 @@ def find_contacts(bodies, world, contacts):  # type: ignore
             other = bodies.owner[two]
             # pieces of one body, and of two fixed bodies, have no contact
             if not apart and body != other and (free or bodies.inverse_mass[other, 0] > 0.0):
-                count = _touch(bodies, world, min(one, two), max(one, two), contacts, count)
+                pieces = min(one, two), max(one, two)
+                count = _touch(bodies, world, pieces, (margin, motion), contacts, count)
             if count > capacity:
                 return -1
     return count
 
 
 @entry
-def _touch_ground(bodies, world, piece, contacts, count):  # type: ignore
+def _largest_gap(bodies, motion):  # type: ignore
+    """Return the largest gap that a contact can have [m]."""
+    _, speeds, half = motion
+    fastest = 0.0
+    for b in range(len(bodies.mass)):
+        speed = np.sqrt(speeds[b, 0] ** 2 + speeds[b, 1] ** 2)
+        fastest = max(fastest, speed + bodies.reach[b] * abs(speeds[b, 2]))
+    return max(bodies.contact_gap, 2.0 * half * fastest - bodies.slop)
+
+
+@entry
+def _is_contact(bodies, motion, pair, place, gap):  # type: ignore
+    """Return whether two points touch, or would be too deep in each other by the step's end."""
+    if gap <= bodies.contact_gap:
+        return True
+    (middle, speeds, half), (a, b), (point, normal) = motion, pair, place
+    # impacts that rebound follow from the velocities before, which a contact would change
+    if bodies.rocking[a, b] > 0.0:
+        return False
+    (xa, ya), (xb, yb) = _arm(bodies, middle, point, a), _arm(bodies, middle, point, b)
+    arms = xa * normal[1] - ya * normal[0], xb * normal[1] - yb * normal[0]
+    return gap + half * relative_speed(speeds, pair, normal, arms) < -bodies.slop
+
+
+@entry
+def _touch_ground(bodies, world, piece, motion, contacts, count):  # type: ignore
     """Add the outermost vertices of a piece that touch the ground, one or two."""
     left, right = -1, -1
+    pair, down = (bodies.owner[piece], len(bodies.mass)), (0.0, -1.0)
     for k in range(bodies.piece_starts[piece], bodies.piece_starts[piece + 1]):
-        if world.points[k, 1] <= bodies.level + bodies.contact_gap:
+        point = world.points[k, 0], world.points[k, 1]
+        if _is_contact(bodies, motion, pair, (point, down), point[1] - bodies.level):
             if left < 0 or world.points[k, 0] < world.points[left, 0]:
                 left = k
             if right < 0 or world.points[k, 0] > world.points[right, 0]:
                 right = k
     pieces, ground = len(bodies.owner), len(bodies.mass)
     for k in (left, right):
+        if k < 0:
+            break
         gap = world.points[k, 1] - bodies.level
         # the normal points from the piece, the first body, to the ground, the second: downward
         contacts.bodies[count, 0], contacts.bodies[count, 1] = bodies.owner[piece], ground
@@ -186,13 +220,13 @@ def _edge_distance(bodies, world, edge, piece):  # type: ignore
 
 
 @entry
-def _separation(bodies, world, one, two):  # type: ignore
+def _separation(bodies, world, one, two, margin):  # type: ignore
     """Return the largest separation of two pieces along normals of the first, and its edge."""
     best, edge = -np.inf, -1
     for k in range(bodies.piece_starts[one], bodies.piece_starts[one + 1]):
         nearest = _edge_distance(bodies, world, k, two)
         # any separating edge ends the test, but only outer edges can be the reference
-        if nearest > bodies.contact_gap:
+        if nearest > margin:
             return nearest, k
         if bodies.outer[k] and nearest > best:
             best, edge = nearest, k
@@ -200,18 +234,19 @@ def _separation(bodies, world, one, two):  # type: ignore
 
 
 @entry
-def _touch(bodies, world, one, two, contacts, count):  # type: ignore
+def _touch(bodies, world, pieces, limits, contacts, count):  # type: ignore
     """Add the contact points of two pieces."""
-    here, edge = _separation(bodies, world, one, two)
-    if here > bodies.contact_gap:
+    (one, two), (margin, motion) = pieces, limits
+    here, edge = _separation(bodies, world, one, two, margin)
+    if here > margin:
         return count
-    there, other = _separation(bodies, world, two, one)
-    if there > bodies.contact_gap:
+    there, other = _separation(bodies, world, two, one, margin)
+    if there > margin:
         return count
     # the reference edge is that of the larger separation
     if there > here:
-        return _clip(bodies, world, two, other, one, -1.0, contacts, count)
-    return _clip(bodies, world, one, edge, two, 1.0, contacts, count)
+        return _clip(bodies, world, (two, other, one, -1.0), motion, contacts, count)
+    return _clip(bodies, world, (one, edge, two, 1.0), motion, contacts, count)
 
 
 @entry
@@ -221,8 +256,9 @@ def _next_vertex(bodies, piece, k):  # type: ignore
 
 
 @entry
-def _clip(bodies, world, one, edge, two, sign, contacts, count):  # type: ignore
+def _clip(bodies, world, reference, motion, contacts, count):  # type: ignore
     """Add the end points of the incident edge, clipped to the reference edge, that touch it."""
+    one, edge, two, sign = reference
     n, start = world.normals[edge], world.points[edge]
     end = world.points[_next_vertex(bodies, one, edge)]
     tx, ty = end[0] - start[0], end[1] - start[1]
@@ -244,18 +280,18 @@ def _clip(bodies, world, one, edge, two, sign, contacts, count):  # type: ignore
     if low > high:
         return count
     first, second = (one, two) if sign > 0.0 else (two, one)
+    pair, normal = (bodies.owner[first], bodies.owner[second]), (sign * n[0], sign * n[1])
     for x in (low, high):
         # gap by linear interpolation along the incident edge
         y = ya if xb == xa else ya + (yb - ya) * (x - xa) / (xb - xa)
-        if y <= bodies.contact_gap:
-            contacts.bodies[count, 0] = bodies.owner[first]
-            contacts.bodies[count, 1] = bodies.owner[second]
+        # the contact point is midway between both edges
+        point = start[0] + x * tx + 0.5 * y * n[0], start[1] + x * ty + 0.5 * y * n[1]
+        if _is_contact(bodies, motion, pair, (point, normal), y):
+            contacts.bodies[count, 0], contacts.bodies[count, 1] = pair
             contacts.key[count] = first * (len(bodies.owner) + 1) + second
-            # the contact point is midway between both edges
             for axis in range(2):
-                t = tx if axis == 0 else ty
-                contacts.point[count, axis] = start[axis] + x * t + 0.5 * y * n[axis]
-                contacts.normal[count, axis] = sign * n[axis]
+                contacts.point[count, axis] = point[axis]
+                contacts.normal[count, axis] = normal[axis]
             contacts.gap[count] = y
             count += 1
         if low == high:
@@ -344,6 +380,9 @@ def prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
         rows[k, 6] = -0.5 * parameters.dt * (pull_x * nx + pull_y * ny)
         rows[k, 7] = -0.5 * parameters.dt * (pull_y * nx - pull_x * ny)
         rows[k, 8] = bodies.friction[a, b]
+        # points that are still apart close by the end of the step at most
+        if contacts.gap[k] > bodies.contact_gap:
+            rows[k, 6] -= 2.0 * contacts.gap[k] / parameters.dt
     for k in range(touching):
         rows[k, 9] = rows[k, 13] = 0.0
         if not has_partner(contacts, k, touching):

@@ -452,13 +452,15 @@ def _begin_step(bodies, parameters, workspace, state):  # type: ignore
     half, count = 0.5 * parameters.dt, len(q)
     middle[:] = q + half * v
     place_pieces(bodies, middle, workspace.world)
-    touching = find_contacts(bodies, workspace.world, contacts)
+    # contacts and targets follow from the velocities before the step, hence first
+    speeds[:count] = v
+    speeds[count] = 0.0
+    # an impact that rebounds is one of a single step
+    ahead = half if parameters.restitution == 0.0 else 0.0
+    touching = find_contacts(bodies, workspace.world, contacts, (middle, speeds, ahead))
     if touching < 0:
         return -1, False
     restore_impulses(bodies, middle, contacts, touching, workspace.stored)
-    # targets follow from the velocities before the step, hence first
-    speeds[:count] = v
-    speeds[count] = 0.0
     prepare_rows(bodies, parameters, workspace, touching)
     rebounds = _add_rebounds(bodies, parameters, workspace, touching)
     # free velocities: inertia forces of the ground motion, and weight

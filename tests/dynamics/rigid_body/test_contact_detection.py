@@ -19,8 +19,9 @@ def touching(structure, poses, **options):
     """Bodies, points, normals and gaps of all contacts."""
     bodies = make_bodies(structure, **options)
     world, found = allocate_pieces(bodies), allocate_contacts(len(bodies.owner))
-    place_pieces(bodies, np.asarray(poses, dtype=float), world)
-    count = find_contacts(bodies, world, found)
+    poses = np.asarray(poses, dtype=float)
+    place_pieces(bodies, poses, world)
+    count = find_contacts(bodies, world, found, (poses, np.zeros((len(poses) + 1, 3)), 0.0))
     return found.bodies[:count], found.point[:count], found.normal[:count], found.gap[:count]
 
 
