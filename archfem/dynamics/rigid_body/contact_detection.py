@@ -149,10 +149,10 @@ def find_contacts(bodies, world, contacts, motion):  # type: ignore
             # pieces of one body, and of two fixed bodies, have no contact
             if not apart and body != other and (free or bodies.inverse_mass[other, 0] > 0.0):
                 pieces = min(one, two), max(one, two)
-                count = _touch(bodies, world, pieces, (margin, motion), contacts, count)
+                count = _touch(bodies, world, pieces, margin, contacts, count)
             if count > capacity:
                 return -1
-    return count
+    return _keep_crossing(bodies, motion, contacts, count) if margin > bodies.contact_gap else count
 
 
 @entry
@@ -167,17 +167,30 @@ def _largest_gap(bodies, motion):  # type: ignore
 
 
 @entry
-def _is_contact(bodies, motion, pair, place, gap):  # type: ignore
-    """Return whether two points touch, or would be too deep in each other by the step's end."""
-    if gap <= bodies.contact_gap:
-        return True
+def _will_cross(bodies, motion, pair, place, gap):  # type: ignore
+    """Return whether two points would be too deep in each other by the end of the step."""
     (middle, speeds, half), (a, b), (point, normal) = motion, pair, place
-    # impacts that rebound follow from the velocities before, which a contact would change
-    if bodies.rocking[a, b] > 0.0:
-        return False
     (xa, ya), (xb, yb) = _arm(bodies, middle, point, a), _arm(bodies, middle, point, b)
     arms = xa * normal[1] - ya * normal[0], xb * normal[1] - yb * normal[0]
     return gap + half * relative_speed(speeds, pair, normal, arms) < -bodies.slop
+
+
+@entry
+def _keep_crossing(bodies, motion, contacts, count):  # type: ignore
+    """Drop points that neither touch nor will cross; return the number of the others."""
+    kept = 0
+    for k in range(count):
+        gap, pair = contacts.gap[k], (contacts.bodies[k, 0], contacts.bodies[k, 1])
+        place = contacts.point[k], contacts.normal[k]
+        if gap > bodies.contact_gap and not _will_cross(bodies, motion, pair, place, gap):
+            continue
+        contacts.key[kept], contacts.gap[kept] = contacts.key[k], gap
+        for axis in range(2):
+            contacts.bodies[kept, axis] = contacts.bodies[k, axis]
+            contacts.point[kept, axis] = contacts.point[k, axis]
+            contacts.normal[kept, axis] = contacts.normal[k, axis]
+        kept += 1
+    return kept
 
 
 @entry
@@ -187,7 +200,8 @@ def _touch_ground(bodies, world, piece, motion, contacts, count):  # type: ignor
     pair, down = (bodies.owner[piece], len(bodies.mass)), (0.0, -1.0)
     for k in range(bodies.piece_starts[piece], bodies.piece_starts[piece + 1]):
         point = world.points[k, 0], world.points[k, 1]
-        if _is_contact(bodies, motion, pair, (point, down), point[1] - bodies.level):
+        gap = point[1] - bodies.level
+        if gap <= bodies.contact_gap or _will_cross(bodies, motion, pair, (point, down), gap):
             if left < 0 or world.points[k, 0] < world.points[left, 0]:
                 left = k
             if right < 0 or world.points[k, 0] > world.points[right, 0]:
@@ -234,9 +248,9 @@ def _separation(bodies, world, one, two, margin):  # type: ignore
 
 
 @entry
-def _touch(bodies, world, pieces, limits, contacts, count):  # type: ignore
+def _touch(bodies, world, pieces, margin, contacts, count):  # type: ignore
     """Add the contact points of two pieces."""
-    (one, two), (margin, motion) = pieces, limits
+    one, two = pieces
     here, edge = _separation(bodies, world, one, two, margin)
     if here > margin:
         return count
@@ -245,8 +259,8 @@ def _touch(bodies, world, pieces, limits, contacts, count):  # type: ignore
         return count
     # the reference edge is that of the larger separation
     if there > here:
-        return _clip(bodies, world, (two, other, one, -1.0), motion, contacts, count)
-    return _clip(bodies, world, (one, edge, two, 1.0), motion, contacts, count)
+        return _clip(bodies, world, (two, other, one, -1.0), margin, contacts, count)
+    return _clip(bodies, world, (one, edge, two, 1.0), margin, contacts, count)
 
 
 @entry
@@ -256,7 +270,7 @@ def _next_vertex(bodies, piece, k):  # type: ignore
 
 
 @entry
-def _clip(bodies, world, reference, motion, contacts, count):  # type: ignore
+def _clip(bodies, world, reference, margin, contacts, count):  # type: ignore
     """Add the end points of the incident edge, clipped to the reference edge, that touch it."""
     one, edge, two, sign = reference
     n, start = world.normals[edge], world.points[edge]
@@ -280,18 +294,18 @@ def _clip(bodies, world, reference, motion, contacts, count):  # type: ignore
     if low > high:
         return count
     first, second = (one, two) if sign > 0.0 else (two, one)
-    pair, normal = (bodies.owner[first], bodies.owner[second]), (sign * n[0], sign * n[1])
     for x in (low, high):
         # gap by linear interpolation along the incident edge
         y = ya if xb == xa else ya + (yb - ya) * (x - xa) / (xb - xa)
-        # the contact point is midway between both edges
-        point = start[0] + x * tx + 0.5 * y * n[0], start[1] + x * ty + 0.5 * y * n[1]
-        if _is_contact(bodies, motion, pair, (point, normal), y):
-            contacts.bodies[count, 0], contacts.bodies[count, 1] = pair
+        if y <= margin:
+            contacts.bodies[count, 0] = bodies.owner[first]
+            contacts.bodies[count, 1] = bodies.owner[second]
             contacts.key[count] = first * (len(bodies.owner) + 1) + second
+            # the contact point is midway between both edges
             for axis in range(2):
-                contacts.point[count, axis] = point[axis]
-                contacts.normal[count, axis] = normal[axis]
+                t = tx if axis == 0 else ty
+                contacts.point[count, axis] = start[axis] + x * t + 0.5 * y * n[axis]
+                contacts.normal[count, axis] = sign * n[axis]
             contacts.gap[count] = y
             count += 1
         if low == high:

@@ -78,6 +78,7 @@ class StepParameters(NamedTuple):
 
     dt: float  # Δt [s]
     gravity: float  # downward [m/s²]
+    ahead: float  # time by which contacts are foreseen, half a step where nothing rebounds [s]
     restitution: float  # e [-]
     min_impact_speed: float  # speed of approach below which e is zero [m/s]
     min_rocking_speed: float  # the same for the speed ratio of a rocking block [m/s]
@@ -240,8 +241,11 @@ class _Run:
         # speed of a free fall after one step
         weight_speed = self._weight_speed = simulation.structure.gravity * simulation.dt
         # impacts below 0.05 m/s, the speed of a fall by 0.13 mm, do not bounce
+        # a rebound follows from the velocities before the impact, which a foreseen contact changes
+        rebounds = simulation.restitution > 0.0 or bool(bodies.rocking.any())
         self._parameters = StepParameters(
-            *(simulation.dt, simulation.structure.gravity, simulation.restitution),
+            *(simulation.dt, simulation.structure.gravity),
+            *(0.0 if rebounds else 0.5 * simulation.dt, simulation.restitution),
             *(0.05, 2.0 * weight_speed),
             MAX_SWEEPS * -(-len(simulation.structure.free) // 100),
             SETTLED * weight_speed,
@@ -455,9 +459,8 @@ def _begin_step(bodies, parameters, workspace, state):  # type: ignore
     # contacts and targets follow from the velocities before the step, hence first
     speeds[:count] = v
     speeds[count] = 0.0
-    # an impact that rebounds is one of a single step
-    ahead = half if parameters.restitution == 0.0 else 0.0
-    touching = find_contacts(bodies, workspace.world, contacts, (middle, speeds, ahead))
+    motion = middle, speeds, parameters.ahead
+    touching = find_contacts(bodies, workspace.world, contacts, motion)
     if touching < 0:
         return -1, False
     restore_impulses(bodies, middle, contacts, touching, workspace.stored)
