@@ -45,7 +45,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code of `exit_code`, or 143 if SIGTERM ended the command; the process exits with 2
         if the arguments are not understood.
     """
-    options = _build_parser().parse_args(arguments)
+    parser = _build_parser()
+    if not (sys.argv[1:] if arguments is None else arguments):
+        parser.exit(2, parser.format_help())
+    options = parser.parse_args(arguments)
     if isinstance(sys.stdout, TextIOWrapper):
         # Lines are printed without delay, also into a pipe. Characters that the terminal does not
         # know are printed as their codes.

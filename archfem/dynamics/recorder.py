@@ -168,6 +168,7 @@ class Recorder:
         attributes = {
             "title": f"{structure.name}: {motion.name or 'time history'}",
             "motion": motion.name,
+            "pga": motion.pga,  # [m/s²], which steps between its samples miss
             "outcome": outcome,
             "ended": str(ending),
             "fidelity": self.model.fidelity,

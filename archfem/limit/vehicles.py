@@ -227,6 +227,8 @@ class Rating(ResultDisplay):
     def __str__(self) -> str:
         """Describe outcome, worst places, mechanism, factors and sources, a line each."""
         vehicle = self.vehicle
+        own = vehicle.source == vehicle.grade  # "given"
+        source = vehicle.source if own else f"{vehicle.source} ({vehicle.grade})"
         factors = self.moving.factors["factor"].min("position")
         least = (f"{way} {float(factors.sel(direction=way)):.4g}" for way in DRIVING_DIRECTIONS)
         favourable = "EN 1990:2002, Table A2.4(B), favourable; from memory"
@@ -237,7 +239,7 @@ class Rating(ResultDisplay):
                 f"{self.moving}",
                 f"geometric factor of safety at that place: {self._geometric_text()}",
                 f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN "
-                f"over {self.width:.3g} m of width; {vehicle.source} ({vehicle.grade})",
+                f"over {self.width:.3g} m of width; {source}",
                 f"live load by {self.live:g} ({self._source('live')})",
                 f"impact by {self.impact:g} ({self._source('impact')})",
                 f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",

@@ -137,13 +137,19 @@ class AssessmentCheck:
         """Whether the spectrum as given is withstood."""
         return self.ratio >= 1.0
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether the ratio is that up to which the mechanism is not set in motion."""
+        return self.ratio > (1.0 + 1e-9) * self.capacity / self.demand  # but for round-off
+
     def __str__(self) -> str:
         """Describe capacity, demand and outcome in one line."""
         period = "" if np.isnan(self.period) else f" at T = {self.period:.3f} s"
+        rest = ", up to there the ground does not set the mechanism in motion"
         return (
             f"{self.name}: capacity {self.capacity:.4g} {self.unit}, demand {self.demand:.4g} "
             f"{self.unit}{period}: {'passes' if self.passes else 'fails'}, the spectrum may be "
-            f"{self.ratio:.3g} times as strong"
+            f"{self.ratio:.3g} times as strong{rest if self.at_rest else ''}"
         )
 
 

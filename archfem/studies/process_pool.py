@@ -141,7 +141,9 @@ class RepeatedWarnings:
     def log_count(self) -> None:
         """Log how many warnings were not repeated."""
         if repeated := self._counts.total() - len(self._counts):
-            logger.warning("%d more warnings as above, of other runs, are not repeated", repeated)
+            said = "1 more warning" if repeated == 1 else f"{repeated} more warnings"
+            verb = "is" if repeated == 1 else "are"
+            logger.warning("%s as above, of other runs, %s not repeated", said, verb)
 
 
 def evaluate_on_processes(

@@ -63,7 +63,7 @@ def draw_dead_load(dead: Equilibrium, *, criteria: Criteria | None = None) -> Fi
     axes, normal = figure.axes[0], assessed_joints(dead.joints)["N"].values / kN
     title = (
         f"{structure.name}: dead load, weight {structure.weight / kN:.4g} kN, "
-        f"N from {normal.min():.3g} to {normal.max():.3g} kN"
+        f"N from {_write_force(normal.min())} to {_write_force(normal.max())} kN"
     )
     set_title(axes, title)
     for letter, (number, texts) in zip(ascii_lowercase, _extremes(dead).items(), strict=False):
@@ -92,17 +92,22 @@ def _extremes(dead: Equilibrium) -> dict[int, list[str]]:
     normal, e, friction = (own[key].values for key in ("N", "eccentricity", "friction"))
     numbers = own["joint"].values
     extremes: dict[int, list[str]] = {}
-    for ranked, values, text in (
-        (normal / kN, normal / kN, "largest N = {:.3g} kN"),
-        (-normal / kN, normal / kN, "least N = {:.3g} kN"),
-        (np.abs(e), e, "largest |e|: e = {:.3f}"),
-        (friction, friction, "largest V/N = {:.3f}"),
+    for ranked, values, write in (
+        (normal / kN, normal / kN, lambda force: f"largest N = {_write_force(force)} kN"),
+        (-normal / kN, normal / kN, lambda force: f"least N = {_write_force(force)} kN"),
+        (np.abs(e), e, "largest |e|: e = {:.3f}".format),
+        (friction, friction, "largest V/N = {:.3f}".format),
     ):
         if np.isfinite(ranked).any():
             # rounded: of equal values in a symmetric structure the first is marked
             place = int(np.nanargmax(np.round(ranked, 9)))
-            extremes.setdefault(int(numbers[place]), []).append(text.format(values[place]))
+            extremes.setdefault(int(numbers[place]), []).append(write(values[place]))
     return extremes
+
+
+def _write_force(force: float) -> str:
+    """Write a force with three figures, without a power of ten."""
+    return f"{float(f'{force:.3g}'):.9g}"
 
 
 @validate_arguments

@@ -216,6 +216,30 @@ def test_a_case_may_state_every_setting_of_a_discretisation():
     assert case.discretisation.coarse == pytest.approx(0.5)
 
 
+SAMPLES = {"samples": [1.0, 2.0, 4.0], "dt": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("key", "usual", "given", "read"),
+    [
+        ("model.tolerance", 0.005, {"fidelity": "auto"}, lambda case: case.tolerance),
+        ("motion.scale", 1.0, SAMPLES, lambda case: case.ground_motion().pga),
+        ("motion.start", 0.0, SAMPLES | {"end": 0.01}, lambda case: case.ground_motion().duration),
+        ("suite.scale", 1.0, {"pairs": {"a": SAMPLES}}, lambda case: case.ground_suite().scale),
+        ("suite.reduction", 1.0, {"pairs": {"a": SAMPLES}}, lambda c: c.ground_suite().reduction),
+        ("limit.horizontal", 0.0, {"vertical": 0.3}, lambda case: case.limit),
+        ("limit.vertical", 0.0, {"horizontal": 0.3}, lambda case: case.limit),
+    ],
+)
+def test_a_key_that_is_left_out_has_its_usual_value(key, usual, given, read):
+    column = {"structure": {"shape": "column", "breadth": 1.0, "heights": [1.0]}}
+    section, name = key.split(".")
+    left_out, stated = (
+        read(af.Case.of(column | {section: table})) for table in (given, given | {name: usual})
+    )
+    assert left_out == stated
+
+
 def test_a_study_is_no_case(tmp_path):
     (tmp_path / "study.toml").write_text('case = "ring.toml"\n[vary]\nstructure.width = [1, 2]\n')
     with pytest.raises(

@@ -106,6 +106,14 @@ def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
     assert dict(sections.list_facts(none))["runs"] == "none"
 
 
+def test_the_pga_of_a_report_is_that_of_the_motion_and_not_of_the_steps(piers):
+    motion = af.Motion(np.array([0.0, 2.0, -1.0, 0.0]), 0.005)
+    run = af.time_history(af.build(piers, fidelity="rigid"), motion, dt=0.003)
+    assert np.abs(run.dataset["ground"]).max() < 1.9
+    data = SimpleNamespace(runs={"only": run}, case=SimpleNamespace(structure=piers))
+    assert dict(sections.list_facts(data))["PGA"] == "2.00 m/s²"
+
+
 def test_a_table_of_runs_has_the_largest_of_each(runs):
     table = tabulate_runs(runs)
     assert {len(row) for row in table.rows} == {len(table.head)}

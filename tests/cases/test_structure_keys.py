@@ -137,6 +137,13 @@ def test_a_case_is_built_in_stages():
     assert af.cases.dead_load_of_case(built).model.initial_gaps is not None
 
 
+def test_usual_stages_have_four_layers_of_a_fill_without_cohesion():
+    fill = {key: value for key, value in FILL.items() if key != "cohesion"}
+    built = case(fill, dead_load={"stages": "usual"})
+    assert [stage.name for stage in built.stages][3:] == [f"fill, layer {k}" for k in (1, 2, 3, 4)]
+    assert {j.contact.cohesion for j in built.structure.joints if j.contact.name == "fill"} == {0.0}
+
+
 def test_stages_of_a_cases_own():
     own = [
         {"blocks": ["left wall", "right wall"]},

@@ -170,6 +170,17 @@ def test_absurd_files_are_refused_at_once(tmp_path, text, says):
     assert len(str(caught.value)) < 5000
 
 
+@pytest.mark.parametrize("value", ["1", "[]", "{}"])
+@pytest.mark.parametrize("head", [0, 10, 19])
+def test_a_value_lies_twenty_deep_at_most(tmp_path, head, value):
+    """Tables of a header and those of a dotted key count together."""
+    header = f"[{'.'.join('a' * head)}]\n" if head else ""
+    for depth, says in ((20, "unknown key 'a'"), (21, "more than 20 tables or lists")):
+        text = f"{header}{'.'.join('a' * (depth - head))} = {value}\n"
+        with pytest.raises(af.InvalidInput, match=says):
+            read(tmp_path / "case.toml", text)
+
+
 def test_a_byte_order_mark_is_ignored(tmp_path):
     assert read(tmp_path / "case.toml", b"\xef\xbb\xbf" + COLUMN.encode()).structure.free == (1,)
 

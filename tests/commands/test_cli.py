@@ -3,6 +3,7 @@
 import errno
 import io
 import os
+import re
 import resource
 import signal
 import sys
@@ -124,6 +125,14 @@ def test_words_that_are_no_command_end_with_two(capsys):
     with pytest.raises(SystemExit, match="2"):
         af.commands.main(["rum", "ring.toml"])
     assert "invalid choice: 'rum'" in capsys.readouterr().err
+
+
+def test_no_command_ends_with_two_and_lists_the_commands(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        af.commands.main([])
+    said = capsys.readouterr().err
+    assert re.search(r"^ +limit +collapse factor", said, re.MULTILINE)
+    assert re.search(r"^ +report ", said, re.MULTILINE)
 
 
 def test_a_quoted_name_may_be_changed(capsys):

@@ -5,7 +5,6 @@ import pytest
 
 import archfem as af
 from archfem.motion import signal_processing
-from archfem.motion.signal_processing import generate_accelerogram, generate_enveloped_noise
 
 
 def test_synthetic_motion_repeats_and_ends_at_rest():
@@ -32,14 +31,13 @@ def test_a_motion_without_end_or_samples_is_refused():
         af.Motion.synthetic(dt=0.0)
 
 
-@pytest.mark.parametrize("component", ["horizontal", "vertical"])
-def test_noise_has_a_peak_of_one_and_ends_at_rest(component):
-    random = np.random.default_rng(2)
-    noise = generate_enveloped_noise(1500, 0.01, random=random, component=component)
-    assert np.abs(noise).max() == 1.0
-    motion = af.Motion(noise, 0.01)
-    assert motion.velocity()[-1] == pytest.approx(0.0, abs=1e-9)
-    assert motion.displacement()[-1] == pytest.approx(0.0, abs=1e-9)
+def test_components_have_their_peaks_and_end_at_rest():
+    motion = af.Motion.synthetic(duration=15.0, dt=0.01, pga=1.0, vertical_ratio=0.5, seed=2)
+    assert np.abs(motion.horizontal).max() == 1.0
+    assert np.abs(motion.vertical).max() == 0.5
+    for component in motion.components:
+        assert motion.velocity(component)[-1] == pytest.approx(0.0, abs=1e-9)
+        assert motion.displacement(component)[-1] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_envelope_rises_stays_and_fades():
@@ -49,24 +47,23 @@ def test_envelope_rises_stays_and_fades():
 
 
 def test_the_horizontal_does_not_depend_on_the_vertical():
-    options = {"pga": 2.0, "seed": 4}
-    level, upright = generate_accelerogram(5.0, 0.01, ratio=0.5, **options)
-    alone, nothing = generate_accelerogram(5.0, 0.01, ratio=0.0, **options)
-    assert nothing is None
-    assert np.array_equal(level, alone)
-    assert np.abs(upright).max() == pytest.approx(1.0)
+    options = {"duration": 5.0, "dt": 0.01, "pga": 2.0, "seed": 4}
+    both, alone = (af.Motion.synthetic(vertical_ratio=ratio, **options) for ratio in (0.5, 0.0))
+    assert alone.vertical is None
+    assert np.array_equal(both.horizontal, alone.horizontal)
+    assert np.abs(both.vertical).max() == pytest.approx(1.0)
 
 
 def test_the_least_duration_and_peaks_that_are_accepted():
     """Fifty steps, a peak of a millimetre per second squared."""
-    level, upright = generate_accelerogram(0.5, 0.01, pga=1e-3, ratio=0.05, seed=0)
-    assert len(level) == 51
-    assert np.abs(level).max() == pytest.approx(1e-3)
-    assert np.abs(upright).max() == pytest.approx(5e-5)
-    for given in ({"duration": 0.49}, {"pga": 0.0}, {"ratio": -0.05}):
-        options = {"duration": 0.5, "pga": 1.0, "ratio": 0.5} | given
+    motion = af.Motion.synthetic(duration=0.5, dt=0.01, pga=1e-3, vertical_ratio=0.05)
+    assert len(motion.horizontal) == 51
+    assert np.abs(motion.horizontal).max() == pytest.approx(1e-3)
+    assert np.abs(motion.vertical).max() == pytest.approx(5e-5)
+    for given in ({"duration": 0.49}, {"pga": 0.0}, {"vertical_ratio": -0.05}):
+        options = {"duration": 0.5, "dt": 0.01, "pga": 1.0, "vertical_ratio": 0.5} | given
         with pytest.raises(af.errors.InvalidInput, match="50 samples or more"):
-            generate_accelerogram(options.pop("duration"), 0.01, seed=0, **options)
+            af.Motion.synthetic(**options)
 
 
 @pytest.mark.parametrize(("component", "ground"), [("horizontal", 15.0), ("vertical", 25.0)])
@@ -87,7 +84,9 @@ def test_noise_has_the_spectrum_of_kanai_tajimi_and_clough_and_penzien(
 
     monkeypatch.setattr(signal_processing, "correct_baseline", lambda samples, dt: samples)
     monkeypatch.setattr(signal_processing, "intensity_envelope", np.ones)
-    found = generate_enveloped_noise(count, dt, random=Impulse, component=component)
+    monkeypatch.setattr(np.random, "default_rng", lambda seed: Impulse)
+    given = {"duration": (count - 1) * dt, "dt": dt, "pga": 1.0, "vertical_ratio": 1.0}
+    found = af.Motion.synthetic(**given).component(component)
     response = np.zeros(count)
     for k in range(count + 1):
         omega = 2.0 * np.pi * k / (2 * count * dt)

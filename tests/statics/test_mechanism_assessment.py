@@ -226,6 +226,12 @@ def test_a_mechanism_that_the_ground_does_not_start_passes():
     assert found.displacement.demand > found.displacement.capacity
     assert found.displacement.ratio == pytest.approx(0.25 / 1.35 / 0.05, rel=1e-3)
     assert found.passes
+    # without these words a capacity below the demand reads as if it failed
+    assert str(found.displacement).endswith(
+        "3.7 times as strong, up to there the ground does not set the mechanism in motion"
+    )
+    assert found.displacement.at_rest
+    assert not found.linear.at_rest
 
 
 def test_rules_of_another_code_and_motions():

@@ -1,19 +1,22 @@
 """Stiffness of dry joints: the published relations, ranges, and quantities that depend on them."""
 
+import numpy as np
 import pytest
 
 import archfem as af
-from archfem.studies.joint_stiffness import _normal
 
 
-def test_a_joint_by_hand():
-    """JRC 10, JCS = σ_c = 50 MPa at 1 MPa: a = 0.2 mm, k_i = 15.35 MPa/mm, v = 0.1080 mm."""
-    closure = -0.1032 - 0.074 + 1.135 * 250.0**-0.251
-    stiff = 15.35 * (1.0 - 1.0 / (closure * 15.35 + 1.0)) ** -2
-    found = _normal(10.0, 50.0 * af.units.MPa, 50.0 * af.units.MPa, 1.0 * af.units.MPa)
-    assert found * af.units.mm / af.units.MPa == pytest.approx(
-        stiff / (2.0 + 0.0004 * 500.0), rel=1e-12
-    )
+def test_dressed_joints_by_hand():
+    """JCS = σ_c = 50 MPa at 1 MPa; softest at JRC 8, a = 0.16 mm, stiffest at 4, a = 0.08 mm."""
+    expected = [
+        initial * (1.0 - 1.0 / (closure * initial + 1.0)) ** -2 / mismatch
+        for initial, closure, mismatch in (
+            (13.10, -0.1032 - 0.0592 + 1.135 * 312.5**-0.251, 2.16),
+            (12.35, -0.1032 - 0.0296 + 1.135 * 625.0**-0.251, 2.08),
+        )
+    ]
+    low, _, high = af.joint_stiffness(30e9, 0.5, strength=50e6, stress=1e6).normal
+    assert [low, high] == pytest.approx(1e9 * np.array(expected), rel=1e-12)
 
 
 def test_ranges_are_ordered_and_near_the_paper():

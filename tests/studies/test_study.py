@@ -452,6 +452,8 @@ def test_samples_have_their_distribution_and_their_seed(small_ring, method):
     assert abs(np.corrcoef(thickness, ratio)[0, 1]) < 0.1
     assert parameter_axes(over, samples)[1].rows == axes[1].rows
     assert parameter_axes(over, samples | {"seed": 5})[1].rows != axes[1].rows
+    left_out = {key: value for key, value in samples.items() if key != "seed"}
+    assert parameter_axes(over, left_out)[1] == parameter_axes(over, left_out | {"seed": 0})[1]
     study = af.Study.of(small_ring, over, "dead load", samples=samples)
     assert len(study.points) == 512
 

@@ -23,6 +23,13 @@ def test_numbers_of_a_column_are_the_weights_above(heights):
     assert f"largest N = {heavy:.3g} kN" in re.sub(r"\s+", " ", legend)
 
 
+def test_a_force_beyond_a_meganewton_is_written_without_a_power_of_ten():
+    stones = af.column(breadth=3.0, heights=[20.6], width=9.6)  # 11 866 kN
+    page = draw_dead_load(af.dead_load(af.build(stones, fidelity="rigid")))
+    assert "N from 11900 to 11900 kN" in " ".join(page.axes[0].get_title().split())
+    assert any("largest N = 11900 kN" in text.get_text() for text in page.legends[0].get_texts())
+
+
 def test_letters_stand_at_the_joints_of_the_legend(ring):
     page = draw_dead_load(af.dead_load(af.build(ring, fidelity="rigid")))
     letters = {text.get_text() for text in page.axes[0].texts}

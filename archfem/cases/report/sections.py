@@ -374,8 +374,11 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     if not runs:
         return [blocks, ("runs", "none")]
     facts = [*_verdict_facts(runs), blocks]
-    # Horizontal ground acceleration as recorded.
-    pga = max(float(np.abs(run.dataset["ground"].values[:, 0]).max()) for run in runs)
+    # Files of older versions have the acceleration at their steps alone.
+    pga = max(
+        run.dataset.attrs.get("pga", float(np.abs(run.dataset["ground"].values[:, 0]).max()))
+        for run in runs
+    )
     joints = [assessed_joints(run.joints) for run in runs]
     eccentricity = max(float(abs(each["eccentricity"]).max()) for each in joints)
     opened = " (joints came apart)" if any(bool(each["open"].any()) for each in joints) else ""

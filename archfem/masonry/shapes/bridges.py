@@ -37,7 +37,9 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
 ) -> Structure:
     """Return a bridge built from its parts, from left to right.
 
-    Lengths are measured from the left end of the deck (x) and from the springing level (y).
+    Coordinates are measured from the left end of the left sidewall (x) and from the springing
+    level (y). Without sidewalls x is zero at the middle of the first springing joint, outside the
+    clear span.
     Joints are named by part: "main arch, joint 5" counted from the left springing, "north pier,
     base" and "north pier, joint 1" upwards; others by the blocks they separate. In beds "intrados"
     is the left end.
