@@ -128,8 +128,8 @@ def _sort(world):  # type: ignore
 def find_contacts(bodies, world, contacts, motion):  # type: ignore
     """Find all contact points; return their number, or -1 where the workspace is too small.
 
-    The motion is of the middle of the step: poses, velocities with the ground's, and half a step.
-    Contacts are also points that would else be in each other by its end.
+    The motion is of the middle of the step: poses, velocities with the ground's, and foresight [s].
+    Points that would be too deep in each other after that time are contacts too.
     """
     count, capacity = 0, len(contacts.key) - 4  # a pair and the ground add up to four points
     order, boxes, margin = world.order, world.boxes, _largest_gap(bodies, motion)
@@ -158,33 +158,40 @@ def find_contacts(bodies, world, contacts, motion):  # type: ignore
 @entry
 def _largest_gap(bodies, motion):  # type: ignore
     """Return the largest gap that a contact can have [m]."""
-    _, speeds, half = motion
+    _, speeds, foresight = motion
     fastest = 0.0
     for b in range(len(bodies.mass)):
         speed = np.sqrt(speeds[b, 0] ** 2 + speeds[b, 1] ** 2)
         fastest = max(fastest, speed + bodies.reach[b] * abs(speeds[b, 2]))
-    return max(bodies.contact_gap, 2.0 * half * fastest - bodies.slop)
+    return max(bodies.contact_gap, 2.0 * foresight * fastest - bodies.slop)
 
 
 @entry
 def _will_cross(bodies, motion, pair, place, gap):  # type: ignore
-    """Return whether two points would be too deep in each other by the end of the step."""
-    (middle, speeds, half), (a, b), (point, normal) = motion, pair, place
+    """Return whether two points will be too deep in each other if nothing stops them."""
+    (middle, speeds, foresight), (a, b), (point, normal) = motion, pair, place
     (xa, ya), (xb, yb) = _arm(bodies, middle, point, a), _arm(bodies, middle, point, b)
     arms = xa * normal[1] - ya * normal[0], xb * normal[1] - yb * normal[0]
-    return gap + half * relative_speed(speeds, pair, normal, arms) < -bodies.slop
+    return gap + foresight * relative_speed(speeds, pair, normal, arms) < -bodies.slop
 
 
 @entry
 def _keep_crossing(bodies, motion, contacts, count):  # type: ignore
-    """Drop points that neither touch nor will cross; return the number of the others."""
-    kept = 0
+    """Drop points that neither touch nor will cross; return the number of the others.
+
+    Where one point of a face will cross, the other is kept too: the impact may turn it in.
+    """
+    kept, crossing = 0, False
     for k in range(count):
-        gap, pair = contacts.gap[k], (contacts.bodies[k, 0], contacts.bodies[k, 1])
-        place = contacts.point[k], contacts.normal[k]
-        if gap > bodies.contact_gap and not _will_cross(bodies, motion, pair, place, gap):
+        if k == 0 or contacts.key[k] != contacts.key[k - 1]:
+            last = k + 2 if has_partner(contacts, k, count) else k + 1
+            crossing = False
+            for j in range(k, last):
+                pair, place = contacts.bodies[j], (contacts.point[j], contacts.normal[j])
+                crossing |= _will_cross(bodies, motion, pair, place, contacts.gap[j])
+        if contacts.gap[k] > bodies.contact_gap and not crossing:
             continue
-        contacts.key[kept], contacts.gap[kept] = contacts.key[k], gap
+        contacts.key[kept], contacts.gap[kept] = contacts.key[k], contacts.gap[k]
         for axis in range(2):
             contacts.bodies[kept, axis] = contacts.bodies[k, axis]
             contacts.point[kept, axis] = contacts.point[k, axis]
@@ -394,7 +401,7 @@ def prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
         rows[k, 6] = -0.5 * parameters.dt * (pull_x * nx + pull_y * ny)
         rows[k, 7] = -0.5 * parameters.dt * (pull_y * nx - pull_x * ny)
         rows[k, 8] = bodies.friction[a, b]
-        # points that are still apart close by the end of the step at most
+        # points that are still apart may close by the end of the step
         if contacts.gap[k] > bodies.contact_gap:
             rows[k, 6] -= 2.0 * contacts.gap[k] / parameters.dt
     for k in range(touching):

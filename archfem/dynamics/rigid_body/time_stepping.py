@@ -11,6 +11,7 @@ each with both of its points at once, solve for the impulses P, from those of th
 have momentum with restart (Nesterov, Soviet Math. Dokl. 27 (1983) 372; O'Donoghue and Candès,
 Found. Comput. Math. 15 (2015) 715), and end once no contact violates its conditions by more than a
 stated speed. Rebounds are reduced where they would add energy. Overlaps are corrected in positions.
+Without rebounds, points that would pass each other by the end of the step are contacts too.
 """
 
 from collections.abc import Iterator, Mapping
@@ -78,7 +79,7 @@ class StepParameters(NamedTuple):
 
     dt: float  # Δt [s]
     gravity: float  # downward [m/s²]
-    ahead: float  # time by which contacts are foreseen, half a step where nothing rebounds [s]
+    foresight: float  # time by which contacts are foreseen, half a step or none [s]
     restitution: float  # e [-]
     min_impact_speed: float  # speed of approach below which e is zero [m/s]
     min_rocking_speed: float  # the same for the speed ratio of a rocking block [m/s]
@@ -240,12 +241,12 @@ class _Run:
         self._v[bodies.inverse_mass[:-1, 0] == 0.0] = 0.0
         # speed of a free fall after one step
         weight_speed = self._weight_speed = simulation.structure.gravity * simulation.dt
-        # impacts below 0.05 m/s, the speed of a fall by 0.13 mm, do not bounce
         # a rebound follows from the velocities before the impact, which a foreseen contact changes
         rebounds = simulation.restitution > 0.0 or bool(bodies.rocking.any())
         self._parameters = StepParameters(
             *(simulation.dt, simulation.structure.gravity),
             *(0.0 if rebounds else 0.5 * simulation.dt, simulation.restitution),
+            # impacts below 0.05 m/s, the speed of a fall by 0.13 mm, do not bounce
             *(0.05, 2.0 * weight_speed),
             MAX_SWEEPS * -(-len(simulation.structure.free) // 100),
             SETTLED * weight_speed,
@@ -459,7 +460,7 @@ def _begin_step(bodies, parameters, workspace, state):  # type: ignore
     # contacts and targets follow from the velocities before the step, hence first
     speeds[:count] = v
     speeds[count] = 0.0
-    motion = middle, speeds, parameters.ahead
+    motion = middle, speeds, parameters.foresight
     touching = find_contacts(bodies, workspace.world, contacts, motion)
     if touching < 0:
         return -1, False
@@ -507,8 +508,8 @@ def _limit_rebounds(bodies, parameters, workspace, touching, step):  # type: ign
 def _separate(bodies, parameters, workspace, touching):  # type: ignore
     """Find displacements that reduce overlaps; return whether there are any, in `speeds`.
 
-    They are the least, weighted by mass, that undo a share of the overlaps beyond the admissible
-    one and cause no others. No velocity changes.
+    They are the least, weighted by mass, that undo overlaps beyond the admissible one and cause no
+    others. No velocity changes.
     """
     contacts, speeds, rows = workspace.contacts, workspace.speeds, workspace.rows
     deepest, half = 0.0, 0.5 * parameters.dt
