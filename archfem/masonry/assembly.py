@@ -176,14 +176,13 @@ def _select_owner(a: Block, b: Block, line: Array, directions: Mapping[str, Dire
     """Select the block whose part includes the joint, by the rules of `assembled`."""
     if a.fixed != b.fixed:
         return b if a.fixed else a
-    rank = {"other": 0, "ring": 1, "pier": 2}
     for block, other in ((a, b), (b, a)):
         direction = directions.get(block.part)
         if direction is not None and other.role != block.role and direction.separates(line):
             below = other.centroid[1] < line[:, 1].mean()
             if block.role == "ring" or (other.role == "other" and below):
                 return block
-    return min((b, a), key=lambda block: rank[block.role])
+    return min((b, a), key=lambda block: ("other", "ring", "pier").index(block.role))
 
 
 def _order_joints(

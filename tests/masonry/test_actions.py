@@ -56,6 +56,16 @@ def test_only_supports_settle(stack, block):
         af.Settlement(block, (0.0, 0.0, 0.0)).place(stack)
 
 
+def test_an_attached_load_stays_with_any_block_and_weighs_nothing_or_more():
+    assert af.masonry.AttachedLoad(0, (0.0, 1.0), weight=0.0).block == 0
+    for given, says in (
+        ({"block": -1}, "block = -1 is not a whole"),
+        ({"weight": -0.1}, "below 0"),
+    ):
+        with pytest.raises(af.errors.InvalidInput, match=says):
+            af.masonry.AttachedLoad(**{"block": 0, "point": (0.0, 1.0)} | given)
+
+
 def test_one_load_or_several():
     push, weight = af.BodyForce(0.1), af.PointLoad(0.0, (0.0, -1.0))
     assert list_loads(push) == [push]

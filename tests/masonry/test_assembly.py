@@ -250,3 +250,70 @@ def test_blocks_touch_within_a_millionth_of_all_blocks(share, touch, upright):
     else:
         blocks = [box(50, 70, 51, 71, "a"), box(51 + gap, 70, 52, 71, "b")]
     assert len(touching(blocks)) == touch
+
+
+def stones(upper, *, lower=None):
+    """A slab below a line from left to right, 1 m above its foot, and a stone above that line."""
+    low = ((0.0, 0.0), (12.0, 0.0), *reversed(lower or upper))
+    return [
+        af.Block(low, af.STONE, "a", fixed=True),
+        af.Block((*upper, (12.0, 5.0), (0.0, 5.0)), af.STONE, "b"),
+    ]
+
+
+NEAR = 13e-6
+"""Within which blocks of 12 m by 5 m touch: a millionth of their diagonal [m]."""
+
+
+@pytest.mark.parametrize(("share", "pieces"), [(1.9, 1), (2.1, 2)])
+def test_a_face_is_straight_where_it_bends_by_twice_the_distance_of_touching(share, pieces):
+    """A short piece, which ends so far off the line of the long one beside it."""
+    face = ((0.0, 1.0 + share * NEAR), (1.0, 1.0), (12.0, 1.0))
+    assert len(touching(stones(face))) == pieces
+
+
+@pytest.mark.parametrize(("share", "pieces"), [(1.9, 1), (2.1, 2)])
+def test_a_face_goes_on_beyond_a_notch_of_twice_the_distance_of_touching(share, pieces):
+    notch = share * NEAR
+    face = ((0.0, 1.0), (5.0, 1.0), (5.0, 0.9), (5.0 + notch, 0.9), (5.0 + notch, 1.0), (12.0, 1.0))
+    touch = touching(stones(((0.0, 1.0), (12.0, 1.0)), lower=face))
+    assert len(touch) == pieces
+
+
+@pytest.mark.parametrize(("share", "touch"), [(3.9, 0), (4.1, 1)])
+def test_a_line_is_longer_than_four_times_the_distance_of_touching(share, touch):
+    """The stone begins so far from the end of the slab, and stands out beyond it."""
+    begin = 11.0 - share * NEAR
+    blocks = [box(0.0, 0.0, 11.0, 1.0, "a"), box(begin, 1.0, 12.0, 5.0, "b")]
+    assert len(touching(blocks)) == touch
+
+
+def test_joints_along_a_toothed_face_are_counted_from_the_left():
+    face = ((0.0, 1.0), (4.0, 1.0), (4.4, 4.5), (4.8, 1.2), (12.0, 1.0))
+    joints = assembled(stones(face), af.masonry.STONE_TO_STONE).joints
+    assert [joint.name for joint in joints] == [f"a to b, {k}" for k in range(1, 5)]
+    assert np.all(np.diff([joint.middle[0] for joint in joints]) > 0.0)
+
+
+@pytest.mark.parametrize("step", [(0.05, 0.0), (0.0, 0.05)])
+def test_the_ends_of_a_short_joint_have_the_order_of_a_long_one(step):
+    line = np.array([[2.0, 3.0], [2.0 + step[0], 3.0 + step[1]]])
+    assert _orient_line(line).tolist() == _orient_line(line[::-1]).tolist() == line.tolist()
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "owner"),
+    [("ring", "other", "other"), ("ring", "pier", "ring"), ("other", "pier", "other")],
+)
+def test_a_joint_along_two_parts_belongs_to_fill_or_else_to_a_ring(one, other, owner):
+    """Two upright stacks beside one another on a rock, whichever comes first."""
+    for roles in ((one, other), (other, one)):
+        blocks = [box(0.0, -1.0, 2.0, 0.0, "rock", fixed=True, part="rock", role="other")]
+        blocks += [
+            box(x, y, x + 1.0, y + 1.0, f"{part} {y}", part=part, role=role)
+            for x, part, role in zip((0.0, 1.0), ("left", "right"), roles, strict=True)
+            for y in (0.0, 1.0)
+        ]
+        joints = assembled(blocks, af.masonry.STONE_TO_STONE).joints
+        between = [each.role for each in joints if abs(each.middle[0] - 1.0) < 0.1]
+        assert between == [owner, owner]

@@ -49,6 +49,7 @@ def test_rough_points_have_the_circle_of_least_squares():
 @pytest.mark.parametrize(
     ("points", "says"),
     [
+        ([], "0 points on a line"),
         ([(0, 0), (1, 1)], "make no circle"),
         ([(0, 0), (1, 1), (2, 2), (3, 3)], "make no circle"),
         ([(0, 0), (1, 1, 1)], r"points\[1\]"),
@@ -57,3 +58,16 @@ def test_rough_points_have_the_circle_of_least_squares():
 def test_points_on_no_circle_are_refused(points, says):
     with pytest.raises(af.InvalidInput, match=says):
         fitted_circle(points)
+
+
+@pytest.mark.parametrize("chord", [1e-3, 1.0, 1e3])
+def test_points_are_on_a_line_by_their_shape_at_any_size(chord):
+    """An arc with a rise of 1e-5 of its chord is one, and 1e-7 of it is round-off of a survey."""
+    across = np.linspace(-0.5, 0.5, 9)
+    for rise in (1e-5, 1e-7):
+        points = chord * np.column_stack([across, rise * (1.0 - 4.0 * across**2)])
+        if rise > 1e-6:
+            assert fitted_circle(points).radius == pytest.approx(chord / (8.0 * rise), rel=1e-3)
+        else:
+            with pytest.raises(af.InvalidInput, match="on a line"):
+                fitted_circle(points)

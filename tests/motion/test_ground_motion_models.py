@@ -84,6 +84,7 @@ def test_peaks_of_the_six_earthquakes_at_the_bridge(verified):
             {"model": "CB14", "distance": 400e3},
             "dist_.* = 400 is outside its range from None to 300",
         ),
+        ({"model": "CB14", "depth": 21e3}, "depth_hyp = 21 is outside its range from 0 to 20"),
         ({"model": "ASB14", "region": "italy"}, "ASB14 has no regions: leave out region = 'italy'"),
         ({"region": "mars"}, "BSSA14: region 'mars' is none of"),
         ({"model": "I14", "v_s30": 500.0, "mechanism": "normal"}, "mechanism 'NS' is none of"),
@@ -94,6 +95,17 @@ def test_values_outside_the_range_of_a_model_are_refused(given, says):
     settings = {"magnitude": 7.3, "distance": 90e3, "v_s30": 270.0} | given
     with pytest.raises(af.InvalidInput, match=says):
         peak_ground_acceleration(**settings)
+
+
+def test_a_site_may_be_at_the_fault_and_a_hypocentre_at_the_surface():
+    pytest.importorskip("pygmm")
+    near = peak_ground_acceleration(6.5, 0.0, v_s30=760.0)
+    assert near.median == pytest.approx(bssa14(6.5, 0.0, 760.0), rel=2e-3)
+    shallow, deep = (
+        peak_ground_acceleration(6.5, 5e3, v_s30=760.0, model="CB14", depth=depth).median
+        for depth in (0.0, 15e3)
+    )
+    assert 0.0 < shallow < deep  # of CB14, whose term grows below 7 km
 
 
 def test_wrong_models_and_a_missing_package_are_named(monkeypatch):

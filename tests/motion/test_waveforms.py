@@ -15,12 +15,12 @@ SENSITIVITY = 4e5  # counts per m/s²
 WAVE = (COUNTS - COUNTS.mean()) / SENSITIVITY
 
 
-def sac(samples, order="<", channel="HNE"):
+def sac(samples, order="<", channel="HNE", version=6):
     """Lay out a SAC file: 70 floats, 40 integers, 24 words of eight letters, samples."""
     floats, integers = np.full(70, -12345.0), np.full(40, -12345)
     floats[[0, 5, 6]] = 0.01, 0.0, 0.01 * (len(samples) - 1)
     integers[[0, 1, 2, 3, 4, 5]] = 2020, 1, 0, 0, 0, 0
-    integers[[6, 9, 15, 35]] = 6, len(samples), 1, 1
+    integers[[6, 9, 15, 35]] = version, len(samples), 1, 1
     words = [b"-12345  "] * 24
     words[0], words[20], words[21] = b"PLC     ", channel.encode().ljust(8), b"XX      "
     head = struct.pack(f"{order}70f40i", *floats, *integers)
@@ -63,8 +63,8 @@ def miniseed(tmp_path):
 def test_without_obspy_the_error_names_the_extra(tmp_path, monkeypatch):
     path = tmp_path / "record.sac"
     monkeypatch.setitem(sys.modules, "obspy", None)
-    for order in "<>":
-        path.write_bytes(sac(WAVE, order))
+    for order, version in (("<", 6), (">", 6), ("<", 7), (">", 7)):
+        path.write_bytes(sac(WAVE, order, version=version))
         with pytest.raises(af.errors.NotInstalled, match=r"pip install 'archfem\[seismology\]'"):
             af.Motion.read(path, units="m/s2")
     path.write_bytes(b"000001D PLC  ")

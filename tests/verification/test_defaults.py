@@ -32,7 +32,10 @@ MOTION = {
     "signal_processing.correct_baseline": {"degree": 6},
     "signal_processing.filter_band": {"order": 4},
     "signal_processing.find_significant_window": {"low": 0.05, "high": 0.95},
+    "ground_motion_models.peak_ground_acceleration": {"depth": 10e3},
+    "record_selection.select_records": {"count": 7, "scales": (1.0 / 3.0, 3.0)},
     "response_spectra.response_spectrum": PERCENT,
+    "response_spectra.rotated_spectrum": {"percentile": 50.0, **PERCENT},
     "response_spectra.scaled_to_spectrum": PERCENT,
     "suite.Suite": {"scale": 1.0, "reduction": 1.0},
     "suite.Suite.paired": {"scale": 1.0, "reduction": 1.0},
@@ -44,6 +47,7 @@ MOTION = {
 
 MASONRY = {
     "loads.BodyForce": {"vertical": 0.0},
+    "loads.AttachedLoad": {"weight": 0.0, "force": (0.0, 0.0)},
     "assembly.assembled": STRUCTURE,
     "block.Block.drawn": {"pieces": 16},
     "backfill.jointed_fill": {"cohesion": 0.0},

@@ -78,7 +78,7 @@ def register_record_format(
         if any(not isinstance(channel, Channel) for channel in channels):
             raise text.error(f"record format '{name}' returned another thing than a Channel")
         for channel in channels:
-            text.check_step(channel.dt, 0)
+            text.check_step(channel.dt)
         return channels
 
     _registered_formats[name] = RecordFormat(name, tuple(marks.items()), read_checked)

@@ -20,7 +20,7 @@ def find_waveform_format(content: bytes) -> str | None:
     if re.match(rb"\d{6}[DRQM][ \0]|MS\x03", content):
         return "miniSEED"
     # SAC has no mark but the version of its header, number 77 of its words of four bytes
-    version = content[304:308] if len(content) >= 632 else b""
+    version = content[304:308]
     known = {number.to_bytes(4, order) for number in (6, 7) for order in ("little", "big")}
     return "SAC" if version in known else None
 
