@@ -96,6 +96,8 @@ def test_files_that_are_no_drawings(tmp_path):
         ("d.geojson", '{"features": [3]}', "feature 1 is 3, where GeoJSON has an object"),
         ("c.geojson", '{"type": "FeatureCollection", "features": []}', "no closed outlines"),
         ("a.dxf", "nonsense", "it is no DXF drawing that ezdxf reads"),
+        ("e.geojson", " " * 2**25, "it is not JSON"),
+        ("f.geojson", " " * (2**25 + 1), "has 33554433 bytes, and a drawing at most 33554432"),
     ):
         (tmp_path / name).write_text(text)
         with pytest.raises(af.errors.InvalidInput, match=says):

@@ -58,10 +58,21 @@ LOWER = {"rock": square(0, -1)}
 @pytest.mark.parametrize(
     ("outlines", "says"),
     [
-        (LOWER | {"a": square(0, 0), "b": square(0.2, 0.2)}, "'a' and 'b' overlap by 6.4e.03 cm²"),
+        (LOWER | {"a": square(0, 0), "b": square(0.2, 0.2)}, "overlap by 6.4e.03 cm².* outlines$"),
         (LOWER | {"a": square(0, -0.004)}, "'rock' and 'a' overlap by 40 cm², about 3.98 mm deep"),
-        (LOWER | {"a": square(0, 0.004)}, "are 4 mm apart at .* raise snap = 0.001 m above"),
-        (LOWER | {"a": [[-0.1, 0.003], [2, 0], [2, 1], [0, 1]]}, r"are 2.86 mm apart at .0\.000"),
+        (LOWER | {"a": square(0, -0.004)}, "correct their outlines, or raise snap above that$"),
+        (
+            LOWER | {"a": square(0, 0.004)},
+            r"are 4 mm apart at .* \(4 such places, .* raise snap = 0.001 m above",
+        ),
+        (
+            LOWER | {"a": [[-0.1, 0.003], [2, 0], [2, 1], [0, 1]]},
+            r"are 2.86 mm apart at \(0\.000, 0\.000\) \(2 such places, this is the widest\), just",
+        ),
+        (
+            LOWER | {"a": [[-0.1, 0.0033], [1, 0], [1, 1], [-0.1, 1]]},
+            r"are 3 mm apart at \(0\.000, 0\.000\), just more",
+        ),
         (LOWER | {"a": square(0, 0), "b": square(0, 0)}, "'a' and 'b' are the same"),
         (LOWER | {"a": [[0, 0], [1, 1], [1, 0], [0, 1]]}, "'a' crosses or touches itself"),
         (LOWER | {"a": square(0.998, 0)}, "'rock' and 'a' touch along 2 mm only"),
@@ -102,17 +113,16 @@ def test_intended_gaps_are_left(tmp_path):
     assert names == ["rock to a", "rock to b", "rock to c"]
 
 
+@pytest.mark.parametrize("west", [0.0, 1e4])
 @pytest.mark.parametrize(("gap", "intended"), [(4.9e-3, False), (5.1e-3, True)])
-def test_a_gap_counts_as_intended_from_five_times_the_tolerance(tmp_path, gap, intended):
-    """Two stones side by side on a rock, and a short contact with its edge."""
-    rock = [[0, -1], [4, -1], [4, 0], [0, 0]]
-    apart = geojson(
-        tmp_path / "gap.geojson", {"rock": rock, "a": square(0, 0), "b": square(1 + gap, 0)}
-    )
-    short = geojson(
-        tmp_path / "short.geojson",
-        {"rock": rock, "a": [[4 - gap, 0], [5, 0], [5, 1], [4 - gap, 1]]},
-    )
+def test_a_gap_counts_as_intended_from_five_times_the_tolerance(tmp_path, gap, intended, west):
+    """Two stones side by side on a rock, and a short contact with its edge, at any place."""
+    rock = [[west, -1], [west + 4, -1], [west + 4, 0], [west, 0]]
+    stones = {"a": square(west, 0), "b": square(west + 1 + gap, 0)}
+    apart = geojson(tmp_path / "gap.geojson", {"rock": rock} | stones)
+    begin = west + 4 - gap
+    stone = [[begin, 0], [west + 5, 0], [west + 5, 1], [begin, 1]]
+    short = geojson(tmp_path / "short.geojson", {"rock": rock, "a": stone})
     if intended:
         assert len(af.masonry.surveyed(apart).joints) == 2
         assert af.masonry.surveyed(short).joints[0].depth == pytest.approx(gap)
@@ -147,14 +157,57 @@ def test_areas_have_the_sense_of_their_outline():
 
 
 def test_a_gap_that_a_third_block_fills_is_none(tmp_path):
-    """A plate of 4 mm between two slabs: corners of the upper one are above its inside."""
+    """The floor of a trough, 4 mm thick, between a rock and the slab that lies in it."""
+    bottom, floor = [[0.5, 0], [1.35, 0]], [[0.7, 0.004], [1.3, 0.004]]
     path = geojson(
-        tmp_path / "plate.geojson",
+        tmp_path / "trough.geojson",
         {
             "rock": [[0, -1], [2, -1], [2, 0], [0, 0]],
-            "plate": [[-0.3, 0], [2.3, 0], [2.3, 0.004], [-0.3, 0.004]],
-            "slab": [[0.5, 0.004], [1.2, 0.004], [1.2, 1], [0.5, 1]],
+            "trough": [*bottom, [1.35, 1], [1.3, 1], *floor[::-1], [0.7, 1], [0.5, 1]],
+            "slab": [*floor, [1.3, 1], [0.7, 1]],
         },
     )
     names = [joint.name for joint in af.masonry.surveyed(path).joints]
-    assert names == ["rock to plate", "plate to slab"]
+    assert names == ["rock to trough", *(f"trough to slab, {k}" for k in (1, 2, 3))]
+
+
+def test_gaps_that_blocks_touch_across_are_none(tmp_path):
+    """In a drawing 70 m large, blocks touch within 70 µm, here more than five times snap."""
+    rock = [[0, -40], [60, -40], [60, 0], [0, 0]]
+    stones = {f"{x}": square(x, 6e-5) for x in (10, 20)}
+    path = geojson(tmp_path / "large.geojson", {"rock": rock} | stones)
+    assert len(af.masonry.surveyed(path, snap=1e-5).joints) == 2
+
+
+def test_a_vertex_beside_a_corner_merges_with_it(tmp_path):
+    """Nearly as far as snap in both directions, which is farther than snap at a slant."""
+    stone = [[0.9e-3, 0.9e-3], [1, 0], [1, 1], [0, 1]]
+    found = af.read_outlines(geojson(tmp_path / "near.geojson", LOWER | {"a": stone}))
+    rock, stone = (block.points for block in found.blocks)
+    assert stone[0] == pytest.approx([0.45e-3, 0.45e-3], abs=1e-12)
+    assert np.any(np.all(rock == stone[0], axis=1))
+
+
+def test_a_vertex_near_two_edges_is_moved_to_the_nearer_one(tmp_path):
+    """A stone on a wedge, near its tip: 0.1 mm above its upper side and 0.9 mm above its foot."""
+    along = np.array([-1.0, 0.2]) / np.hypot(1.0, 0.2)
+    off = 1e-4 * np.array([0.2, 1.0]) / np.hypot(1.0, 0.2)
+    near, far = (np.array([1.0, 0.0]) + s * along + off for s in (4e-3, 0.8))
+    stone = [far.tolist(), near.tolist(), [near[0], 1.0], [far[0], 1.0]]
+    wedge = [[0, 0], [1, 0], [0, 0.2]]
+    found = af.read_outlines(geojson(tmp_path / "wedge.geojson", {"wedge": wedge, "a": stone}))
+    assert found.moved == pytest.approx(1e-4)
+
+
+def test_joints_that_bend_by_less_than_snap_are_made_straight_and_free_faces_are_not(tmp_path):
+    """A middle stone: its left face bends by half of snap, its bed as much, its top by more."""
+    bed, top, side = [0.5, 0.5e-3], [[0.7, 1.0], [0.3, 1.03]], [-0.5e-3, 0.5]
+    outlines = {
+        "rock": [[0, -1], [1, -1], [1, 0], bed, [0, 0]],
+        "stone": [[0, 0], bed, [1, 0], [1, 1], *top, [0, 1], side],
+        "cap": [[0, 1], *top[::-1], [1, 1], [1, 2], [0, 2]],
+    }
+    found = af.read_outlines(geojson(tmp_path / "bent.geojson", outlines))
+    straight = [[0, 0], [0.5, 0.0], [1, 0], [1, 1], *top, [0, 1], side]
+    assert found.blocks[1].points == pytest.approx(np.array(straight, float), abs=1e-12)
+    assert found.moved == pytest.approx(0.5e-3)
