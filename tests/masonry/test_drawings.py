@@ -3,6 +3,7 @@
 import json
 import resource
 import struct
+from pathlib import Path
 
 import ezdxf
 import pytest
@@ -159,7 +160,8 @@ def test_a_block_is_between_two_centimetres_and_twenty_metres_large(tmp_path, si
     ("place", "said"), [((179.9, 89.9), True), ((180.1, 0), False), ((0, 90.1), False)]
 )
 def test_small_blocks_within_the_globe_may_be_in_degrees(tmp_path, place, said):
-    path = geojson(tmp_path / "any.geojson", {"a": square(*place, 1e-5)})
+    outlines = {"a": square(*place, 1e-5), "b": square(0, 0, 1e-5)}
+    path = geojson(tmp_path / "any.geojson", outlines)
     with pytest.raises(af.InvalidInput) as caught:
         read_drawing(path)
     assert ("degrees (CRS84)" in str(caught.value)) is said
@@ -217,6 +219,29 @@ def test_reading_a_drawing_leaves_the_limits_of_the_process_as_they_were(viaduct
     before = resource.getrlimit(resource.RLIMIT_AS)
     read_drawing(dxf(tmp_path / "viaduct.dxf", viaduct))
     assert resource.getrlimit(resource.RLIMIT_AS) == before
+
+
+@pytest.mark.parametrize("own", [None, 2**29])
+def test_a_library_may_take_a_gigabyte_or_what_the_process_may(tmp_path, monkeypatch, own):
+    limits = resource.getrlimit(resource.RLIMIT_AS)
+    taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    found = []
+
+    def read(path):
+        found.append(resource.getrlimit(resource.RLIMIT_AS)[0])
+        return ezdxf.new(units=6)
+
+    monkeypatch.setattr("ezdxf.filemanagement.readfile", read)
+    (tmp_path / "a.dxf").write_text("0")
+    try:
+        if own is not None:
+            resource.setrlimit(resource.RLIMIT_AS, (taken + own, limits[1]))
+        with pytest.raises(af.InvalidInput, match="no closed outlines"):
+            read_drawing(tmp_path / "a.dxf")
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)
+    # what the test itself takes meanwhile is far less
+    assert found == [pytest.approx(taken + (own or 2**30), abs=2**27)]
 
 
 def test_lines_in_place_of_outlines_are_counted(tmp_path):

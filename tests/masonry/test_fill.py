@@ -1,5 +1,6 @@
 """Fill in pieces: compliance that no size changes, and earth pressures of Coulomb and Rankine."""
 
+from dataclasses import replace
 from math import radians, sqrt, tan
 
 import numpy as np
@@ -312,3 +313,20 @@ def test_pieces_are_counted_by_their_area():
     assert len(cut(2.1).blocks) > len(whole.blocks)
     with pytest.raises(af.InvalidInput, match=r"make 1\.9 of a fill"):
         cut(1.9)
+
+
+def test_the_tiling_goes_with_a_long_fill_wherever_it_lies():
+    """Six metres by 0.3 m, cut at two places: the same pieces, which are the whole fill."""
+    smooth = af.Contact(1e10, 1e10, 0.0)
+    shift = np.array([-64.0, -32.0])
+    found = []
+    for place in (np.zeros(2), shift):
+        blocks = [
+            replace(each, outline=tuple(map(tuple, (each.points + place).tolist())))
+            for each in box(6.0, smooth, smooth, height=0.3).blocks
+        ]
+        cut = jointed_fill(af.masonry.assembled(blocks, smooth), 0.3, angle=30.0)
+        found.append([each for each in cut.blocks if each.grain])
+    assert sum(each.area for each in found[0]) == pytest.approx(6.0 * 0.3)
+    for here, there in zip(*found, strict=True):
+        assert there.points == pytest.approx(here.points + shift, abs=1e-6)

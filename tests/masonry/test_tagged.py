@@ -15,7 +15,7 @@ pytest.importorskip("meshio")
 LAYERS = {"ground": af.masonry.Layer(fixed=True), "pier": af.masonry.Layer()}
 
 
-def own(path, *, version=4.1, binary=False, curve="waist", apart=False):
+def own(path, *, version=4.1, binary=False, curve="waist", apart=False, **mesh):
     """A mesh as a user makes it: two stones on the ground, tags and names of the user's own."""
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
@@ -37,6 +37,8 @@ def own(path, *, version=4.1, binary=False, curve="waist", apart=False):
             if curve and abs(y - 1.0) < 1e-9 and abs(x) < 0.4:
                 gmsh.model.addPhysicalGroup(1, [tag], 5, curve)
         gmsh.option.setNumber("Mesh.MeshSizeMax", 0.3)
+        for name, value in mesh.items():
+            gmsh.option.setNumber(f"Mesh.{name}", value)
         gmsh.model.mesh.generate(2)
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", int(binary))
@@ -59,6 +61,15 @@ def test_blocks_by_physical_surface_and_joints_found(tmp_path, version, binary):
     assert blocks["ground"].fixed
     assert {joint.name for joint in structure.joints} == {"pier, base", "waist"}
     assert structure.depths == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(("quads", "incomplete"), [(0, 0), (1, 0), (1, 1)])
+def test_cells_of_second_order_count_by_their_corners(tmp_path, quads, incomplete):
+    """Triangles of six nodes, quadrilaterals of nine or eight, and lines of three."""
+    order = {"ElementOrder": 2, "SecondOrderIncomplete": incomplete, "RecombineAll": quads}
+    structure = af.masonry.surveyed(own(tmp_path / "own.msh", **order), layers=LAYERS)
+    assert sorted(block.area for block in structure.blocks) == pytest.approx([0.6, 0.8, 1.0])
+    assert {joint.name for joint in structure.joints} == {"pier, base", "waist"}
 
 
 @pytest.mark.parametrize("curve", ["waist", None])
@@ -122,13 +133,16 @@ def test_edges_of_a_mesh_follow_an_arc(tmp_path):
         ((-0.49, 0.49), 0.0, True),
         ((-0.49, 0.51), 0.0, False),
         ((-0.51, 0.1), 0.0, False),
-        ((0.2, 0.3), 1e-5, False),
-        ((0.2, 0.3), 1e-7, True),
+        ((0.2, 0.3), 1.1e-6, False),
+        ((0.2, 0.3), 0.9e-6, True),
     ],
 )
 def test_a_joint_has_the_name_of_a_curve_that_lies_on_it(stack, monkeypatch, ends, off, named):
-    """Middles of the curve's edges decide: all between the joint's ends, and none beside it."""
-    middles = np.array([[x, 1.0 + off] for x in ends])
+    """Middles of the curve's edges decide: all between the joint's ends, and none beside it.
+
+    Beside it begins a millionth of the structure's size away.
+    """
+    middles = np.array([[x, 1.0 + off * stack.size] for x in ends])
     monkeypatch.setattr(outlines, "read_physical_curves", lambda path, factor: [("mine", middles)])
     found = outlines._name_joints(stack, Path("any.msh"), None)
     assert [joint.name == "mine" for joint in found.joints] == [False, named]
@@ -162,6 +176,11 @@ $EndElements
         ("\n4 0 1 0\n", "\n7 0 1 0\n", r"cells \(triangle\) have nodes that are not in the file"),
         ("1 1 3 4\n", "1 1 3 9\n", "no mesh of gmsh that meshio reads"),
         ("1 1 3 4\n", "1 1 3 2\n", "'stone' is in pieces or has a hole"),
+        (
+            "2\n1 2 2 1 1 1 2 3\n",
+            "3\n3 2 2 1 1 1 2 3\n1 2 2 1 1 1 2 3\n",
+            "'stone' .* or its cells overlap",
+        ),
         ("3 1 1 0\n4 0 1 0\n", "3 2 0 0\n4 3 0 0\n", "'stone' has no area"),
         ("3 1 1 0\n", "3 1 nan 0\n", "the mesh has coordinates that are no finite points"),
         ("3 1 1 0\n", "3 1 1e300 0\n", "a coordinate of 1e"),
@@ -179,3 +198,37 @@ def test_a_damaged_mesh_is_refused_in_words(before, after, says, tmp_path):
     path.write_text(WORDS.replace(before, after))
     with pytest.raises(af.InvalidInput, match=says):
         read_physical_surfaces(path)
+
+
+FAN = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$Nodes
+6
+1 0 0 0
+2 1 0 0
+3 1 1 0
+4 0 1 0
+5 1.1 0.5 0
+6 0.5 {} 0
+$EndNodes
+$Elements
+4
+1 2 2 1 1 1 6 4
+2 2 2 1 1 6 2 3
+3 2 2 1 1 6 4 3
+4 2 2 1 1 2 5 3
+$EndElements
+"""
+
+
+@pytest.mark.parametrize("scale", [1e-2, 1.0, 1e2])
+@pytest.mark.parametrize(("sine", "kept"), [(0.95e-9, False), (1.05e-9, True)])
+def test_an_outline_bends_where_a_sine_is_above_a_billionth(tmp_path, scale, sine, kept):
+    """Cells large and small, one of which is given clockwise, around a point in the lower side."""
+    (tmp_path / "fan.msh").write_text(FAN.format(f"{-sine / 4.0:.17g}"))
+    ((_, outline),) = read_physical_surfaces(tmp_path / "fan.msh", scale)
+    corners = [(0.0, 0.0), *([(0.5, 0.0)] if kept else []), (1.0, 0.0), (1.1, 0.5), (1.0, 1.0)]
+    corners = scale * np.array([*corners, (0.0, 1.0)])
+    first = int(np.argmin(np.abs(outline).sum(axis=1)))
+    assert np.roll(outline, -first, axis=0) == pytest.approx(corners, abs=1e-8 * scale)

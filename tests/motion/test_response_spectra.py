@@ -141,6 +141,29 @@ def test_rotd_of_a_pair_along_a_line_is_that_of_the_line(verified):
     verified("RotD50 over RotD100 of a pair along a line", 0.5**0.5, "closed form", ratio)
 
 
+@pytest.mark.parametrize(("samples", "period"), [(5, 1.0), (27, 1.01), (27, 0.02 / 600.0)])
+def test_rotd_refines_a_peak_between_its_neighbours_as_a_spectrum_does(samples, period):
+    """A step of acceleration, whose largest answer is the last sample, the last but one, a first.
+
+    Undamped it is twice the static one after half a period: at a quarter of a sample past the last
+    but one. A rigid oscillator is followed in a thousand parts of a step, about half a period each.
+    """
+    line = af.Motion(np.ones(samples), 0.02)
+    turned = np.radians(40.0)
+    across = af.Motion(np.sin(turned) * line.horizontal, line.dt)
+    pair = af.Motion(np.cos(turned) * line.horizontal, line.dt).with_transverse(across)
+    expected = float(response_spectrum(line, period, 0.0))
+    found = float(rotated_spectrum(pair, period, 100.0, damping=0.0))
+    assert found == pytest.approx(expected, rel=1e-9)
+    if samples == 27 and period > 1.0:
+        assert expected == pytest.approx(2.0, rel=1e-5)
+
+
+def test_rotd_of_a_pair_at_rest_is_zero():
+    rest = af.Motion(np.zeros(9), 0.01)
+    assert rotated_spectrum(rest.with_transverse(rest), [0.0, 0.3]).tolist() == [0.0, 0.0]
+
+
 def test_rotd_of_a_circular_pair_is_the_same_in_all_directions():
     """The amplitude of a steady response under a rotating acceleration, for each direction."""
     forcing, peak, dt = 0.5, 2.0, 0.004

@@ -158,12 +158,19 @@ def test_resampling_puts_turning_points_on_the_nearest_new_sample():
         1.0,
     ]
     assert signal_processing.resample_peaks(np.array([2.0]), 0.1, 0.3).tolist() == [2.0]
-    assert len(signal_processing.resample_peaks(samples, 0.1, 0.5)) == 2
-    assert len(signal_processing.resample_peaks(samples, 0.1, 0.49)) == 3
+    # small peaks as well; a turn at zero is none
+    small = signal_processing.resample_peaks(0.01 * samples, 0.1, 0.25)
+    assert small == pytest.approx([0.03, -0.02, 0.04])
+    for turn, kept in ((0.0, 1.5), (0.1, 0.1)):
+        samples = np.array([2.0, turn, 3.0, 4.0])
+        found = signal_processing.resample_peaks(samples, 0.1, 0.15)
+        assert found == pytest.approx([2.0, kept, 4.0])
+    assert len(signal_processing.resample_peaks(np.arange(6.0), 0.1, 0.5)) == 2
+    assert len(signal_processing.resample_peaks(np.arange(6.0), 0.1, 0.49)) == 3
 
 
 def test_the_last_instant_may_come_late_by_a_millionth_of_a_sample():
     found = signal_processing.interpolate_samples(
         np.array([1.0, 3.0]), 1.0 + np.array([0.9e-6, 1.05e-6])
     )
-    assert found.tolist() == [pytest.approx(3.0), 0.0]
+    assert found.tolist() == [3.0, 0.0]
