@@ -172,9 +172,9 @@ def test_a_gap_that_a_third_block_fills_is_none(tmp_path):
 
 
 def test_gaps_that_blocks_touch_across_are_none(tmp_path):
-    """In a drawing 70 m large, blocks touch within 70 µm, here more than five times snap."""
+    """In a drawing 70 m large, blocks touch within 70 µm, here more than four times snap."""
     rock = [[0, -40], [60, -40], [60, 0], [0, 0]]
-    stones = {f"{x}": square(x, 6e-5) for x in (10, 20)}
+    stones = {f"{x}": square(x, 4e-5) for x in (10, 20)}
     path = geojson(tmp_path / "large.geojson", {"rock": rock} | stones)
     assert len(af.masonry.surveyed(path, snap=1e-5).joints) == 2
 

@@ -175,6 +175,7 @@ $EndElements
     [
         ("\n4 0 1 0\n", "\n7 0 1 0\n", r"cells \(triangle\) have nodes that are not in the file"),
         ("1 1 3 4\n", "1 1 3 9\n", "no mesh of gmsh that meshio reads"),
+        ("1 2 2 1 1 1 2 3\n2 2 2 1 1 1 3 4", "1 2 0 1 2 3\n2 2 0 1 3 4", "no physical surface"),
         ("1 1 3 4\n", "1 1 3 2\n", "'stone' is in pieces or has a hole"),
         (
             "2\n1 2 2 1 1 1 2 3\n",

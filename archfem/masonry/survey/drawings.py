@@ -343,10 +343,10 @@ def _load_msh(
         ) from error
     with _foreign_reader("meshio", "mesh of gmsh"):
         read = meshio.gmsh.read(path)
-        tags = read.cell_data.get("gmsh:physical", [np.empty(0)] * len(read.cells))
+        tags = read.cell_data.get("gmsh:physical", [])  # none where nothing is tagged
         blocks = [
             (each.type, np.array(each.data, dtype=np.intp), np.array(tag, dtype=np.intp))
-            for each, tag in zip(read.cells, tags, strict=True)
+            for each, tag in zip(read.cells, tags, strict=False)
         ]
         groups = [(name, int(tag), int(size)) for name, (tag, size) in read.field_data.items()]
         points = np.array(read.points, dtype=float)
