@@ -34,6 +34,18 @@ def test_an_arc_below_is_met_too():
     assert hung.top(beside) == pytest.approx(-beside / np.tan(np.radians(20.0)), abs=1e-12)
 
 
+def test_arcs_are_met_where_they_are_upright():
+    """Quarters of a ring about (3, 1): one that is upright at its end, and one within."""
+    for begin, height in ((0.0, 1.0), (-45.0, 1.0)):
+        angles = np.radians([begin, begin + 90.0])
+        outer, inner = (r * np.column_stack([np.cos(angles), np.sin(angles)]) for r in (2.0, 1.0))
+        corners = np.array([3.0, 1.0]) + [*outer, *inner[::-1]]
+        quarter = af.Block(tuple(map(tuple, corners.tolist())), af.STONE, "quarter", centre=(3, 1))
+        assert quarter.top(5.0) == pytest.approx(height, abs=1e-6)
+        x = 3.0 + 2.0 * np.cos(np.radians(40.0))
+        assert quarter.top(x) == pytest.approx(1.0 + 2.0 * np.sin(np.radians(40.0)))
+
+
 def test_a_point_load_beside_the_structure_is_refused(stack):
     with pytest.raises(af.errors.InvalidInput, match=r"x = 0.6 m misses .* from -0.5 to 0.5 m"):
         af.PointLoad(0.6, (0.0, -1.0)).place(stack)

@@ -292,6 +292,10 @@ def test_slivers_are_joined_to_their_neighbour(part, pieces):
     found = _merge_slivers([_Piece(whole, (0.5, 0.5)), _Piece(rest, (1.5, 0.5))], least, 1e-9)
     assert len(found) == pieces
     assert sum(each.polygon.area for each in found) == pytest.approx(1.0 + part)
+    # one that touches no other stays
+    away = shapely.box(1.5, 0.0, 1.5 + part, 1.0)
+    apart = [_Piece(whole, (0.5, 0.5)), _Piece(away, (1.6, 0.5))]
+    assert len(_merge_slivers(apart, least, 1e-9)) == 2
 
 
 def test_pieces_are_a_thousand_times_as_stiff_as_their_fill():
@@ -330,3 +334,29 @@ def test_the_tiling_goes_with_a_long_fill_wherever_it_lies():
     assert sum(each.area for each in found[0]) == pytest.approx(6.0 * 0.3)
     for here, there in zip(*found, strict=True):
         assert there.points == pytest.approx(here.points + shift, abs=1e-6)
+
+
+def test_joints_to_stone_are_in_series_with_the_fill_beside_them():
+    """Whole pieces on a floor, between walls of 60°: the circle inscribed in each touches them."""
+    size, stone = 0.6, af.Contact(0.3e9, 0.12e9, 0.6)
+    side, rise = sqrt(3.0) * size, 1.5 * size
+
+    def body(points, name, **kind):
+        return af.Block(tuple(points), af.STONE, name, role="other", part=name, **kind)
+
+    left = [(-side, 0.0), (-0.5 * side, rise), (-2.0 * side, rise), (-2.0 * side, 0.0)]
+    fill = body([(-side, 0.0), (side, 0.0), (0.5 * side, rise), (-0.5 * side, rise)], "fill")
+    blocks = [
+        body([(-side, -1.0), (side, -1.0), (side, 0.0), (-side, 0.0)], "floor", fixed=True),
+        replace(fill, material=BACKFILL),
+        body(left, "left wall", fixed=True),
+        body([(-x, y) for x, y in left[::-1]], "right wall", fixed=True),
+    ]
+    cut = jointed_fill(af.masonry.assembled(blocks, stone), size, angle=30.0)
+    soil = (sqrt(3.0) - 1.0) / 4.0 * size / BACKFILL.young
+    against = [j for j in cut.joints if not all(cut.blocks[n].grain for n in j.blocks)]
+    assert len(against) == 4 + 2 + 2
+    for joint in against:
+        law = joint.contact
+        assert 1.0 / law.normal_stiffness == pytest.approx(1.0 / 0.3e9 + soil)
+        assert 1.0 / law.shear_stiffness == pytest.approx(1.0 / 0.12e9 + soil)
