@@ -39,7 +39,7 @@ def test_arcs_are_met_where_they_are_upright():
     for begin, height in ((0.0, 1.0), (-45.0, 1.0)):
         angles = np.radians([begin, begin + 90.0])
         outer, inner = (r * np.column_stack([np.cos(angles), np.sin(angles)]) for r in (2.0, 1.0))
-        corners = np.array([3.0, 1.0]) + [*outer, *inner[::-1]]
+        corners = np.vstack([outer, inner[::-1]]) + np.array([3.0, 1.0])
         quarter = af.Block(tuple(map(tuple, corners.tolist())), af.STONE, "quarter", centre=(3, 1))
         assert quarter.top(5.0) == pytest.approx(height, abs=1e-6)
         x = 3.0 + 2.0 * np.cos(np.radians(40.0))

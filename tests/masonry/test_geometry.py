@@ -27,7 +27,8 @@ def test_a_polygon_the_wrong_way_round_has_a_negative_area():
 
 def test_triangles_of_a_polygon_fill_it():
     """An angle, whose inner corner no triangle may cross."""
-    angle = np.array([[0, 0], [3, 0], [3, 1], [1, 1], [1, 2], [0, 2]], float) + [10.0, -5.0]
+    shift = np.array([10.0, -5.0])
+    angle = np.array([[0, 0], [3, 0], [3, 1], [1, 1], [1, 2], [0, 2]]) + shift
     corners = angle[triangulate_polygon(angle)]
     (a, b), inner = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0), [11.0, -4.0]
     areas = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
