@@ -17,7 +17,7 @@ from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.run import DeadLoadResult, log_prefix, run_time_history
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.motion_scaling import mechanism_scales
-from archfem.dynamics.verdict import MECHANISM_DEFINITIONS
+from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints, part_roles
 from archfem.limit.mechanism_count import Mechanism
@@ -212,6 +212,15 @@ NAMED_EVALUATORS: Mapping[str, Callable[..., Findings]] = {
     "comparison": evaluate_comparison,
 }
 
+# SI units of findings by function; findings without one are ratios, counts or words
+FINDING_UNITS: Mapping[Callable[..., Mapping[str, Any]], Mapping[str, str]] = {
+    evaluate_history: {
+        "rotation": "rad",
+        **dict.fromkeys(("opening", "slip", "largest_displacement", "residual_displacement"), "m"),
+        **dict.fromkeys((*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION), "s"),
+    },
+    evaluate_dead_load: {"N": "N", "frequency": "Hz"},
+}
 
 _registered_findings: dict[str, Callable[..., Findings]] = {}
 
@@ -272,6 +281,11 @@ class Evaluator:
         except (OSError, TypeError):
             source = ""
         return f"{name} {sorted(self.options.items())!r}\n{source}"
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """SI units of its findings, by name."""
+        return FINDING_UNITS.get(self.find, {})
 
     def digest(self, point: Point) -> str:
         """Return a digest of all that the findings of a point depend on, files included."""

@@ -274,9 +274,12 @@ def status(folder: str | Path) -> Status:
 
 
 def build_table(
-    axes: Sequence[Axis], rows: Sequence[Row], attributes: Mapping[str, Any]
+    axes: Sequence[Axis],
+    rows: Sequence[Row],
+    units: Mapping[str, str],
+    attributes: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Return the rows of a study as a dataset over its axes."""
+    """Return the rows of a study as a dataset over its axes, findings with their units."""
     table = xr.Dataset(attrs=dict(attributes))
     for axis in axes:
         for k, key in enumerate(axis.keys):
@@ -296,7 +299,8 @@ def build_table(
         if any(isinstance(value, list) for value in values):
             table[key] = (*dims, "entry"), _pad(values, rows).reshape(*sizes, -1)
         else:
-            table[key] = dims, _to_array(values).reshape(sizes)
+            attributes = {"units": units[name]} if name in units else {}
+            table[key] = dims, _to_array(values).reshape(sizes), attributes
     table["error"] = dims, np.array([row["error"] for row in rows], dtype=object).reshape(sizes)
     return table
 

@@ -174,7 +174,7 @@ class Study:
                 stack.enter_context(store.lock())
                 shared = store.shared.resolve()
             rows = self._collect_rows(store, shared, workers, client)
-            table = build_table(self.axes, rows, self._attributes)
+            table = build_table(self.axes, rows, self.asked.units, self._attributes)
             if store is not None:
                 write_table(table, store.folder, hash_json(store.read_plan()["points"]))
         return table

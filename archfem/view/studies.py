@@ -1,7 +1,8 @@
 """Figures of studies: IDA, fragility, sensitivity, convergence, and accuracy over time."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Protocol
+from itertools import product
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import xarray as xr
@@ -52,19 +53,21 @@ class ConvergencePaths(Protocol):
 
 
 @validate_arguments
-def draw_findings(table: xr.Dataset, max_findings: int = 4, max_keys: int = 3) -> Figure:
+def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) -> Figure:
     """Draw the findings of a study over each key that varies.
 
     Points that differ in one number alone are joined by a line. Colours are the values of a key in
-    words, such as the case.
+    words, such as the case. Findings without negative values begin at zero over words, whose
+    distances mean nothing.
 
     Args:
         table: table of a study, as by `Study.run`.
-        max_findings: number of findings that are drawn, the first ones that differ.
+        max_panels: number of panels: the first findings that differ are drawn.
         max_keys: number of keys that they are drawn over.
 
     Returns:
-        The figure, with a row for each finding and a column for each key.
+        The figure, with a row for each finding and a column for each key; a panel for each finding
+        where a single key varies.
 
     Raises:
         InvalidInput: no finding is a number that differs between points.
@@ -74,35 +77,40 @@ def draw_findings(table: xr.Dataset, max_findings: int = 4, max_keys: int = 3) -
     differs = {name: frame[name].replace(np.inf, np.nan).nunique() > 1 for name in frame}
     # numbers of points and samples are no keys of the case
     plain = [name for name in flat.coords if name not in ("point", "sample", "variation")]
-    keys = [str(name) for name in plain if differs[name]]
-    rows = [name for name in flat.data_vars if differs[name] and frame[name].dtype.kind == "f"]
-    rows, columns = rows[:max_findings], keys[:max_keys]
-    if not rows or not keys:
+    keys = [str(name) for name in plain if differs[name]][:max_keys]
+    names = [name for name in flat.data_vars if differs[name] and frame[name].dtype.kind == "f"]
+    if not names or not keys:
         raise InvalidInput("no finding is a number that differs between points")
-    figure = new_figure(max(0.6 + 2.6 * len(columns), COLUMN_WIDTH), 0.9 + 1.5 * len(rows))
-    panels = figure.subplots(len(rows), len(columns), sharex="col", sharey="row", squeeze=False)
-    for (row, column), axes in np.ndenumerate(panels):
-        key, name = columns[column], rows[row]
-        label = _label_key(flat, key) if row == len(rows) - 1 else ""
-        style_axes(axes, label, "" if column else str(name))
+    names = names[: max(max_panels // len(keys), 1)]
+    columns = len(keys) if len(keys) > 1 else min(len(names), 3)
+    rows = -(-len(names) * len(keys) // columns)
+    figure = new_figure(max(0.6 + 2.6 * columns, COLUMN_WIDTH), 0.9 + 1.5 * rows)
+    same: Literal["row", "none"] = "row" if len(keys) > 1 else "none"
+    panels = figure.subplots(rows, columns, sharex="col", sharey=same, squeeze=False).ravel()
+    for number, (axes, (name, key)) in enumerate(zip(panels, product(names, keys), strict=False)):
+        is_lowest = number + columns >= len(names) * len(keys)
+        axes.tick_params(labelbottom=is_lowest)
+        label = "" if len(keys) > 1 and number % columns else _label_key(flat, str(name), "\n")
+        style_axes(axes, _label_key(flat, key) if is_lowest else "", label)
         others = [each for each in keys if each != key]
         # words first: a case says more than a number
         few = [each for each in others if frame[each].nunique() <= len(LINE_COLOURS)]
         coloured = next((each for each in few if frame[each].dtype.kind not in "fi"), None)
         coloured = coloured or next(iter(few), None)
-        values = frame.rename(columns={name: "value"})
-        _draw_over_key(axes, values, key, others, coloured)
-        if row == 0 and coloured is not None:
+        _draw_over_key(axes, frame.rename(columns={name: "value"}), key, others, coloured)
+        if number < columns and coloured is not None:
             place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 3}
             style = {"fontsize": LABEL_SIZE, "title_fontsize": LABEL_SIZE, "frameon": False}
             axes.legend(title=_label_key(flat, coloured), **place, **style)
+    for axes in panels[len(names) * len(keys) :]:
+        axes.remove()
     return figure
 
 
-def _label_key(table: xr.Dataset, key: str) -> str:
-    """Return a key of a case with the unit of its values."""
+def _label_key(table: xr.Dataset, key: str, gap: str = " ") -> str:
+    """Return a key of a case, or a finding, with the unit of its values."""
     unit = table[key].attrs.get("units")
-    return f"{key} [{unit}]" if unit else key
+    return f"{key}{gap}[{unit}]" if unit else key
 
 
 def _draw_over_key(
@@ -127,6 +135,9 @@ def _draw_over_key(
         known = group[np.isfinite(group["value"])].sort_values(key)
         style = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
         axes.plot(known[key], known["value"], "o-" if joined else "o", **style)
+    finite = frame["value"][np.isfinite(frame["value"])]
+    if in_words and finite.min() >= 0.0:
+        axes.set_ylim(0.0, 1.1 * finite.max())
 
 
 def draw_study(

@@ -45,6 +45,9 @@ def test_each_point_of_a_study_has_the_results_of_its_case_alone(small_ring, tmp
     there = found.sel({"structure.thickness": 0.5, "motion.scale": 2.0})
     for name in ("eccentricity", "rotation", "verified", "largest_displacement"):
         assert float(there[name]) == pytest.approx(alone[name], rel=1e-6)
+    units = {name: there[name].attrs.get("units") for name in ("slip", "rotation", "friction")}
+    assert units == {"slip": "m", "rotation": "rad", "friction": None}
+    assert {there[each].attrs["units"] for each in af.dynamics.MECHANISM_DEFINITIONS} == {"s"}
     assert (found["eccentricity"].diff("motion.scale") > 0.0).all()
 
 

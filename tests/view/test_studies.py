@@ -73,3 +73,21 @@ def test_points_that_differ_in_one_number_are_joined_and_coloured_by_the_case():
     assert all(line.get_linestyle() == "None" for line in over_case.lines)
     with pytest.raises(af.InvalidInput, match="no finding is a number"):
         draw_findings(table[["error"]])
+
+
+def test_cases_alone_are_compared_from_zero_with_all_that_differs():
+    """A panel for each finding, in rows of three."""
+    values = {f"finding {k}": ("case", [1.0 + k, 1.1 + k]) for k in range(4)}
+    values["slip"] = "case", [0.01, 0.02], {"units": "m"}
+    values["drift"] = "case", [-1.0, 1.0]
+    values["same"] = "case", [2.0, 2.0]
+    table = xr.Dataset(values, {"case": ["thin", "thick"]})
+    panels = draw_findings(table).axes
+    labels = [axes.get_ylabel() for axes in panels]
+    assert labels == [*(f"finding {k}" for k in range(4)), "slip\n[m]", "drift"]
+    assert [axes.get_ylim()[0] for axes in panels[:5]] == [0.0] * 5
+    assert panels[4].get_ylim()[1] == pytest.approx(0.022)
+    assert panels[5].get_ylim()[0] < -1.0
+    assert panels[0].get_position().y0 > panels[3].get_position().y0
+    assert [axes.get_xlabel() for axes in panels] == [*[""] * 3, *["case"] * 3]
+    assert len(draw_findings(table, max_panels=2).axes) == 2
