@@ -273,7 +273,7 @@ def test_a_face_is_straight_where_it_bends_by_twice_the_distance_of_touching(sha
 
 
 @pytest.mark.parametrize(("share", "pieces"), [(1.9, 1), (2.1, 2)])
-def test_a_face_goes_on_beyond_a_notch_of_twice_the_distance_of_touching(share, pieces):
+def test_a_line_continues_over_a_notch_up_to_twice_the_distance_of_touching(share, pieces):
     notch = share * NEAR
     face = ((0.0, 1.0), (5.0, 1.0), (5.0, 0.9), (5.0 + notch, 0.9), (5.0 + notch, 1.0), (12.0, 1.0))
     touch = touching(stones(((0.0, 1.0), (12.0, 1.0)), lower=face))
