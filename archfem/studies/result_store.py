@@ -36,7 +36,7 @@ from archfem.units import in_si_unit
 logger = logging.getLogger("archfem")
 
 # Files of the table as NetCDF, CSV and for Excel
-RESULT_FILES = "results.nc", "results.csv", "results.xlsx"
+RESULT_FILES = "results.nc", "results.csv", "results.xlsx", "results.parquet"
 
 # Time between lines of progress where the output is no terminal [s]
 PROGRESS_INTERVAL = 5.0
@@ -320,7 +320,7 @@ def write_table(table: xr.Dataset, folder: Path, inputs: str) -> None:
     frame = _flatten(table)
     quoted = frame.map(_quote_formula).rename(columns=_quote_formula)
     with explain_full_disk(folder), _files.stage_results(folder, "study", inputs) as draft:
-        netcdf, csv, excel = (draft / name for name in RESULT_FILES)
+        netcdf, csv, excel, parquet = (draft / name for name in RESULT_FILES)
         write_dataset(table, netcdf)
         # Some versions of HDF5 write the time into a file: a table of the same content stays, and
         # with it what was derived from it.
@@ -328,7 +328,7 @@ def write_table(table: xr.Dataset, folder: Path, inputs: str) -> None:
             shutil.copyfile(folder / netcdf.name, netcdf)
         with _files.atomic_write(csv) as part:
             quoted.to_csv(part, index=False)
-        with suppress(ImportError), _files.atomic_write(draft / "results.parquet") as part:
+        with suppress(ImportError), _files.atomic_write(parquet) as part:
             frame.to_parquet(part, index=False)
         if len(frame) <= 1_048_575:  # rows of a sheet of Excel below the header
             with suppress(ImportError), _files.atomic_write(excel) as part:
