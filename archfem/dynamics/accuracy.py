@@ -22,7 +22,7 @@ from archfem.dynamics.model_selection import (
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
-from archfem.joints.criteria import assessed_joints
+from archfem.joints.criteria import assessed_joints, eccentricity_magnitude
 from archfem.masonry.structure import Structure
 from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
@@ -205,7 +205,7 @@ def time_run(
 
 def peak_eccentricities(run: History) -> Array:
     """Return the largest |e| of each assessed joint of a run (n,) [-]; 0.5 where it came apart."""
-    return abs(assessed_joints(run.joints)["eccentricity"]).fillna(0.5).max("time").values
+    return eccentricity_magnitude(assessed_joints(run.joints)).max("time").values
 
 
 def compare_runs(

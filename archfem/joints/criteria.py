@@ -300,6 +300,11 @@ def part_roles(joints: xr.Dataset) -> dict[str, str]:
     return dict(zip(parts, roles, strict=True))
 
 
+def eccentricity_magnitude(joints: xr.Dataset) -> xr.DataArray:
+    """Return |e| of joints [-], 0.5 where they are open."""
+    return abs(joints["eccentricity"]).fillna(0.5)
+
+
 @validate_arguments
 def assessed_joints(joints: xr.Dataset) -> xr.Dataset:
     """Return the joints of rings and piers, or all where there are neither, with their numbers.

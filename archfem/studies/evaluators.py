@@ -19,7 +19,7 @@ from archfem.dynamics.history import Ending, History, first_mechanisms, partial_
 from archfem.dynamics.motion_scaling import mechanism_scales
 from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.criteria import assessed_joints, part_roles
+from archfem.joints.criteria import assessed_joints, eccentricity_magnitude, part_roles
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import suggest_name
 from archfem.motion.motion import Motion
@@ -35,7 +35,7 @@ def evaluate_dead_load(case: Case) -> Findings:
     result = dead_load_of(case)
     joints = assessed_joints(result.dead.joints)
     return {
-        "eccentricity": float(abs(joints["eccentricity"]).fillna(0.5).max()),
+        "eccentricity": float(eccentricity_magnitude(joints).max()),
         "friction": float(joints["friction"].max()),
         "N": float(joints["N"].min()),
         **_describe_first_mode(result),
@@ -121,7 +121,8 @@ def evaluate_scales(
 
 def scales_of(result: DeadLoadResult, motion: Motion, **options: Any) -> Findings:
     """Return the scales of a motion at first mechanisms, as `evaluate_scales` does."""
-    options["between"] = tuple(options.get("between", (0.05, 5.0)))
+    if "between" in options:  # a list in a study file
+        options["between"] = tuple(options["between"])
     with log_prefix(result.case.title, motion.name):
         scales = mechanism_scales(
             result.dead.model,
@@ -159,7 +160,7 @@ def evaluate_comparison(case: Case, scales: Mapping[str, Any] | None = None) -> 
     findings: Findings = {
         **_describe_first_mode(result),
         **_prefix("role", part_roles(joints)),
-        **_prefix("dead", _largest_by_part(abs(joints["eccentricity"]).fillna(0.5))),
+        **_prefix("dead", _largest_by_part(eccentricity_magnitude(joints))),
     }
     try:
         run = run_motion(result, motion)

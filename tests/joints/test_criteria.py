@@ -10,7 +10,7 @@ import archfem as af
 from archfem.cases.result_text import tabulate_joints
 from archfem.dynamics import MECHANISM_DEFINITIONS
 from archfem.joints import Criteria, assessed_joints
-from archfem.joints.criteria import sliding_ratio, with_failure_flags
+from archfem.joints.criteria import eccentricity_magnitude, sliding_ratio, with_failure_flags
 
 
 def test_flags(joints):
@@ -213,3 +213,9 @@ def test_four_hinges_make_a_mechanism_and_three_do_not(ring):
         resultants[:count, 1] = 700.0
         found = af.limit.counted_mechanism(af.joints.joint_dataset(ring, resultants))
         assert (found is not None) is (count == 4)
+
+
+def test_open_joints_count_as_hinges():
+    """One of three, where the thrust that it lacks would have its edge."""
+    joints = xr.Dataset({"eccentricity": ("joint", [-0.3, np.nan, 0.2])})
+    assert eccentricity_magnitude(joints).values.tolist() == [0.3, 0.5, 0.2]

@@ -88,9 +88,10 @@ def ending(case, folder):
     if thickness < 0.65:
         deadly(case, folder)
     elif thickness < 0.75:
-        os._exit(7)
+        os._exit(0)
     elif thickness < 0.805:
         print("an exit is noted")
+        print("so are errors", file=sys.stderr)
         sys.exit(5)
     handles = {os.readlink(each) for each in Path("/proc/self/fd").iterdir() if each.is_symlink()}
     return {

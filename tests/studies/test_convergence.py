@@ -1,7 +1,10 @@
 """Orders, limits and error bars of values whose law is known, and of a ring's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import xarray as xr
 
 import archfem as af
 from archfem.studies import converged, convergence
@@ -11,7 +14,8 @@ from archfem.studies import converged, convergence
 @pytest.mark.parametrize("sizes", [(4.0, 2.0, 1.0), (5.0, 2.0, 1.0), (9.0, 4.0, 2.0, 1.0)])
 def test_powers_of_the_size_give_their_order_and_limit(order, sizes):
     values = 3.0 + 0.2 * np.array(sizes) ** order
-    found = converged(sizes, values)
+    found = converged(0.5 * np.array(sizes), values)
+    assert found.sizes.tolist() == list(sizes)  # relative to the finest
     assert found.order == pytest.approx(order, rel=1e-8)
     assert found.limit == pytest.approx(3.0, abs=1e-8)
     assert found.error == pytest.approx(1.25 * 0.2, rel=1e-7)
@@ -101,3 +105,27 @@ def test_a_given_quantity_is_computed_or_else_the_history_or_the_dead_load(
     still = computed == "dead load"
     finest = {"model.cells": [2, 2]} | ({} if still else {"analysis.dt": 0.0025})
     assert caught.value.args == (computed, 10 if still else 13, finest)
+
+
+def tabulated(values):
+    """A table of three meshes and three steps."""
+    varied = {"varied": 3 * ["mesh"] + 3 * ["step"], "to": ["4", "2", "1"] * 2}
+    found = {"slip": ("point", values), "error": ("point", 6 * [""])}
+    return xr.Dataset(found, {name: ("point", each) for name, each in varied.items()})
+
+
+def test_errors_of_mesh_and_step_add_up():
+    """Values of first order in both, with bars of 1.25 times the rest."""
+    found = convergence._sensitivity(tabulated([1.4, 1.2, 1.1, 1.7, 1.3, 1.1]), "slip")
+    assert found.mesh.error == pytest.approx(1.25 * 0.1)
+    assert found.step.error == pytest.approx(1.25 * 0.2)
+    assert found.error == pytest.approx(1.25 * 0.3)
+    assert replace(found, step=None).error == pytest.approx(1.25 * 0.1)
+    for wrong in (np.nan, np.inf):
+        with pytest.raises(af.InvalidInput, match=f"'slip' is {wrong} for a mesh or a step"):
+            convergence._sensitivity(tabulated([1.4, 1.2, 1.1, 1.7, wrong, 1.1]), "slip")
+
+
+def test_a_setting_that_failed_has_no_coordinates_and_no_time():
+    found = convergence._to_run(xr.Dataset({"coordinates": np.nan}))
+    assert (found.size, found.seconds, found.peaks) == (0, np.inf, None)

@@ -7,6 +7,7 @@ from scipy.integrate import trapezoid
 
 import archfem as af
 from archfem import ida
+from archfem.dynamics.motion_scaling import MechanismScales
 from archfem.studies import ida as ida_module
 
 
@@ -157,6 +158,51 @@ def test_fractiles_are_those_of_curves_drawn_by_hand():
     assert found.not_monotonic("verified") == ["b"]
     low, high = found.capacities("verified")
     assert (low.tolist(), high.tolist()) == ([1.0, 1.0, 4.0], [2.0, 2.0, np.inf])
+
+
+def test_fractiles_are_the_median_and_a_standard_deviation_to_either_side():
+    """Of 51 motions with demands 0 to 50: the 16th, 50th and 84th of a hundred."""
+    rows = {
+        "pga": ("motion", np.ones(51)),
+        "scale": (("motion", "entry"), np.ones((51, 1))),
+        "rotation": (("motion", "entry"), np.arange(51.0)[:, None]),
+    }
+    found = af.studies.Ida(xr.Dataset(rows, {"motion": [f"{k}" for k in range(51)]}))
+    assert found.fractiles(np.array([1.0]))[:, 0] == pytest.approx([8.0, 25.0, 42.0])
+
+
+@pytest.mark.parametrize(
+    ("runs", "filled"),
+    [
+        ([1.0], []),
+        ([1.0, 1.19], []),
+        ([1.0, 1.21], [1.1]),
+        ([1.0, 4.0, 4.5], [2.0, np.sqrt(2.0), np.sqrt(8.0), 2.0**0.25]),
+        ([0.5, 1.0, 3.0], [np.sqrt(3.0), np.sqrt(0.5), 3.0**0.25, 3.0**0.75]),
+    ],
+)
+def test_up_to_four_runs_fill_the_widest_gaps_of_a_curve(small_ring, monkeypatch, runs, filled):
+    asked = {}
+
+    def search(run_scaled, limits, precision, between):
+        asked.update(precision=precision, between=between)
+        scales = MechanismScales(limits)
+        for scale in runs:
+            scales = scales.with_run(run_scaled(scale))
+        return scales
+
+    reached = dict.fromkeys(ida_module.LIMIT_STATES, False)
+    run = {"demands": dict.fromkeys(ida_module.DEMAND_NAMES, 1.0), "reached": reached, "fall": None}
+    ended = {"ending": "finished", "outcome": "reached the end"}
+    monkeypatch.setattr(ida_module, "search_scales", search)
+    monkeypatch.setattr(ida_module, "_run", lambda result, motion: run | ended)
+    found = ida_module.search_limit_states(small_ring, None, 0.2, (0.3, 100.0))
+    assert found["scale"] == pytest.approx(sorted([*runs, *filled]))
+    # a peak of 3 m/s² may be scaled up to 5 g
+    assert asked == {"precision": 0.2, "between": (0.3, pytest.approx(5.0 * 9.81 / 3.0, rel=1e-3))}
+    dead = af.cases.dead_load_of_case(small_ring)
+    (frequency,) = af.modes(dead.model, 1, about=dead).frequencies
+    assert found["period"] == pytest.approx(1.0 / frequency)
 
 
 def test_pairs_of_a_suite_are_the_motions_where_none_are_given(small_ida):

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from multiprocessing import forkserver
 from pathlib import Path
 
@@ -78,7 +79,7 @@ def test_deaths_of_workers_are_reported_and_nothing_is_inherited(
     table = study.run(tmp_path / "out", workers=2)
     errors = dict(zip(thicknesses, table["error"].values, strict=True))
     assert "2 processes that computed this point ended, the last with signal 9" in errors.pop(0.6)
-    assert errors.pop(0.7).endswith("the last with exit code 7")
+    assert errors.pop(0.7).endswith("the last with exit code 0")
     assert errors.pop(0.8).endswith("the last with exit code 5")  # by sys.exit
     assert not any(errors.values())  # 0.5 ended its first process alone
     messages = [record.getMessage() for record in caplog.records]
@@ -96,7 +97,9 @@ def test_deaths_of_workers_are_reported_and_nothing_is_inherited(
     assert len(set(rows["parent"].values)) == 1
     assert not any(map(lives, map(int, set(rows["process"].values))))
     assert not any(Path(f"/proc/{int(each)}").exists() for each in rows["process"].values)
-    assert "an exit is noted" in (tmp_path / "out" / "workers.log").read_text()
+    log = (tmp_path / "out" / "workers.log").read_text()
+    assert "an exit is noted" in log
+    assert "so are errors" in log
 
 
 def test_a_study_outlives_its_fork_server(small_ring, tmp_path, finders):
@@ -174,3 +177,39 @@ def test_no_worker_outlives_a_driver_that_is_ended(small_ring, tmp_path, finders
         time.sleep(0.05)
     driver.wait(timeout=20.0)
     assert all_end([*begun, *workers], within=5.0)  # long before their points would
+
+
+def test_repeated_warnings_are_counted(caplog):
+    repeated = process_pool.RepeatedWarnings()
+    repeated.log(["joint 1 slid by 2e-3 m", "joint 4 slid by 0.5 m", "an opening"])
+    repeated.log_count()
+    repeated.log(["joint 7 slid by 0.1 m"])
+    repeated.log_count()
+    assert [record.getMessage() for record in caplog.records] == [
+        "joint 1 slid by 2e-3 m",
+        "an opening",
+        "1 more warning as above, of other runs, is not repeated",
+        "2 more warnings as above, of other runs, are not repeated",
+    ]
+
+
+def test_a_point_is_given_up_after_three_workers_and_each_uses_one_thread(monkeypatch, tmp_path):
+    assert process_pool.MAX_DEATHS_PER_POINT == 3
+    given = []
+
+    @contextmanager
+    def limit_threads(limits):
+        yield given.append(limits)
+
+    monkeypatch.setattr(process_pool, "threadpool_limits", limit_threads)
+    assert list(process_pool.evaluate_points([], None, workers=1)) == []
+    version = process_pool.describe_version()
+    assert process_pool.evaluate_batch([], None, version, tmp_path) == (version, [])
+    assert process_pool.evaluate_batch([], None, "another", tmp_path) == (version, [])
+    assert given == [1, 1]
+
+
+def test_workers_search_modules_where_the_driver_does(monkeypatch):
+    monkeypatch.setattr(sys, "path", ["", "/first", "/second"])
+    with process_pool._isolate_start():
+        assert os.environ["PYTHONPATH"].split(os.pathsep) == [os.getcwd(), "/first", "/second"]

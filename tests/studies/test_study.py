@@ -488,6 +488,32 @@ def test_a_study_varies_pairs_of_a_suite(small):
     )
 
 
+def test_limit_analysis_needs_no_pairs(small, tmp_path):
+    """Each pair of a suite is a point of a history, and none of what has no motion."""
+    path = tmp_path / "study.toml"
+    text = (
+        'case = "small.toml"\nset = ["limit.horizontal=1.0"]\nvary.structure.breadth = [1.0, 2.0]\n'
+    )
+    for compute, points in (("limit", 2), ("dead load", 2), ("history", 4)):
+        path.write_text(f'{text}compute = "{compute}"\n')
+        assert len(af.Study.read(path).points) == points
+
+
+def test_pairs_that_all_fail_have_their_errors(small, tmp_path, monkeypatch):
+    case, errors = af.Case.read(small), ["no first equilibrium", "nor a second"]
+    table = xr.Dataset({"error": ("suite.pair", errors)})
+    monkeypatch.setattr(af.Study, "run", lambda *_, **__: table)
+    assert af.studies.study.compute_pairs(case, tmp_path) == errors
+    ended = table.assign(ended=("suite.pair", ["", "interrupted"]), error=("suite.pair", ["a", ""]))
+    monkeypatch.setattr(af.Study, "run", lambda *_, **__: ended)
+    assert af.studies.study.compute_pairs(case, tmp_path) == ["a", "interrupted"]
+
+
+def test_values_may_be_an_array(small_ring):
+    study = af.Study.of(small_ring, {"structure.thickness": np.array([0.5, 0.6])}, "dead load")
+    assert [dict(point.changes)["structure.thickness"] for point in study.points] == [0.5, 0.6]
+
+
 GOOD = 'case = "ring.toml"\ncompute = "dead load"\n'
 RANDOM = "vary.structure.thickness = { distribution = 'norm', loc = 0.5, scale = 0.01 }\n"
 
@@ -508,6 +534,7 @@ RANDOM = "vary.structure.thickness = { distribution = 'norm', loc = 0.5, scale =
         (f"{GOOD}vary = {{}}", "varies nothing: give a table of keys"),
         (f"{GOOD}vary.structure.thickness = 0.5", "give a list of values, or a distribution"),
         (f"{GOOD}vary.structure.thickness = [0.5, -0.5]", "thickness = -0.5 is no case"),
+        (f"{GOOD}vary.structure.thickness = [0.5, 0.6, 100.0]", "thickness = 100.0 is no case"),
         (f"{GOOD}{RANDOM}", "say how they are sampled"),
         (f"{GOOD}{RANDOM}samples = {{ count = 12, method = 'sobol' }}", "powers of 2 alone"),
         (f"{GOOD}{RANDOM}samples = {{ count = 8, method = 'halton' }}", "use one of"),
