@@ -19,7 +19,7 @@ from archfem.masonry.structure import Structure, join_joint_names
 class DeepenedBlocks(RigidBlocks):
     """Rigid blocks with joints deepened about their mid-points by a factor, at unchanged weight."""
 
-    factor: float = 1.0
+    factor: float
 
     @property
     def balance(self) -> sparse.csr_matrix:

@@ -1,6 +1,7 @@
 """Why a structure does not stand under its own weight, and the values from which it would."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -71,3 +72,30 @@ def test_nothing_holds_a_block_that_hangs():
     hanging = [[0.0, -1.0], [1.0, -1.0], [1.0, -0.5], [0.0, -0.5]]
     text = explain_instability(on_a_bed(hanging))
     assert text.startswith("no compression in its joints can hold 'stone'")
+
+
+def test_the_joint_that_slides_and_the_block_that_nothing_holds_are_named():
+    """A stack on a slope of 0.35, one of its beds smooth; and a second block that hangs."""
+    tilt = np.arctan(0.35)
+    c, s = np.cos(tilt), np.sin(tilt)
+
+    def cube(low, name, **kind):
+        points = np.array([[0.0, low], [1.0, low], [1.0, low + 0.5], [0.0, low + 0.5]])
+        turned = points @ np.array([[c, s], [-s, c]])
+        return af.Block(tuple(map(tuple, turned)), STONE, name, **kind)
+
+    blocks = [cube(-0.5, "bed", fixed=True), cube(0.0, "low"), cube(0.5, "top")]
+    stack = af.masonry.assembled(blocks, af.Contact(1e10, 4e9, 0.9))
+    smooth = replace(stack.joints[1].contact, friction=0.2)
+    joints = (stack.joints[0], replace(stack.joints[1], contact=smooth))
+    text = explain_instability(replace(stack, joints=joints))
+    assert text.startswith(f"joints slide ({joints[1].name}): it stands from")
+    assert value(r"coefficient of friction of ([\d.]+)", text) == pytest.approx(0.35, rel=0.02)
+    outlines = {"lintel": (-0.5, 0.0), "hanging": (-1.0, -0.5)}
+    shifted = [
+        af.Block(((3.0, a), (4.0, a), (4.0, b), (3.0, b)), STONE, name, fixed=name == "lintel")
+        for name, (a, b) in outlines.items()
+    ]
+    both = af.masonry.assembled([*shifted, *blocks[:2]], af.Contact(1e10, 4e9, 0.9))
+    text = explain_instability(both)
+    assert text.startswith("no compression in its joints can hold 'hanging'")
