@@ -365,3 +365,9 @@ def test_the_mechanism_over_a_support_does_not_depend_on_its_movement(way, hinge
         motion = tuple(far * each for each in way)
         found = af.collapse_factor(ring, live=af.Settlement("right abutment", motion))
         assert (len(found.hinges), len(found.sliding)) == (hinges, slides)
+
+
+def test_a_mechanism_that_only_slides_has_no_hinges():
+    block = af.column(breadth=1.0, heights=[0.5], contact=af.Contact(1e10, 4e9, 0.3))
+    found = af.collapse_factor(block, live=af.BodyForce(1.0))
+    assert "factor 0.3; hinges: none; sliding: joint" in str(found)

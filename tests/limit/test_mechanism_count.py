@@ -248,3 +248,10 @@ def test_durations_are_written_in_fitting_units():
         "1 s",
         "12.3 s",
     ]
+
+
+def test_damage_over_a_record_is_that_of_the_part_that_fails_first():
+    """Two joints of the right pier, one after the other, and then two of the ring."""
+    joints = history(piers(2), [{18: 0.5}, {19: 0.5}, {3: 0.5}, {6: -0.5}])
+    found = counted_mechanisms(joints, af.Criteria(failures=2))["one part over the record"]
+    assert (found.part, found.time, found.joints) == ("right pier", 1.0, (18, 19))

@@ -274,3 +274,26 @@ def test_steps_are_a_hundredth_of_the_movement():
     found = largest_movement(block, af.Settlement("base", (0.0, 0.0, 1e-3)), friction=None)
     assert found.end is End.HOLDS
     assert [each.share for each in found.stages] == pytest.approx(np.linspace(0.0, 1.0, 101))
+
+
+@pytest.mark.parametrize("settlement", [SPREAD, SINK])
+def test_blocks_neither_overlap_nor_slide_where_the_support_has_come_to(settlement):
+    """To rounding, by the places of their corners, after large steps of the support."""
+    ring = semicircle(0.15, 11, contact=rough(np.inf))
+    found = largest_movement(ring, settlement)
+    moved = DisplacedBlocks(ring, found.displacement)
+    intrados, extrados, slip = moved.current_gaps
+    bound = 1e-8 * ring.size
+    assert min(intrados.min(), extrados.min()) >= -bound
+    assert np.abs(slip).max() <= bound
+    assert len(found.stages[-1].hinges) >= 3
+
+
+@pytest.mark.parametrize(
+    ("friction", "end", "slope"), [(0.3, End.SLIDES, 0.3), (5.0, End.FALLS, 1.0)]
+)
+def test_a_cube_on_ground_that_tilts_slides_or_falls(friction, end, slope):
+    cube = af.column(breadth=1.0, heights=[1.0], contact=rough(friction))
+    found = largest_movement(cube, af.Settlement(0, (0.0, 0.0, 1.0)), tolerance=5e-3)
+    assert found.end is end
+    assert found.largest == pytest.approx(np.arctan(slope), abs=5e-3)
