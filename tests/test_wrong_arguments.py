@@ -39,6 +39,7 @@ MADE = [
     (lambda: af.CountedMechanism(limit="0.46"), "criteria hinge .* = '0.46' is not a finite"),
     (lambda: af.CountedMechanism(failures=2.5), "criteria failures = 2.5 is not a whole number"),
     (lambda: af.CountedMechanism(kinds="local"), "kinds = 'local': give some of"),
+    (lambda: af.CountedMechanism(kinds=("locally",)), "kinds = .'locally',.: give some of"),
     (lambda: af.CountedMechanism(kinds=3), "kinds = 3: give some of"),
     (lambda: af.CountedMechanism(criteria=0.46), "criteria is a float: give Criteria"),
     (lambda: af.dynamics.MovingMechanism(kinds=("all",)), r"kinds = \('all',\): give some of"),

@@ -1,13 +1,21 @@
 """Motions, suites and target spectra of case files."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import archfem as af
-from archfem.cases.motion_keys import build_motion, build_suite, parse_motion, parse_suite
+from archfem.cases.motion_keys import (
+    build_motion,
+    build_suite,
+    parse_motion,
+    parse_suite,
+    write_selected_suite,
+)
 
 SHIPPED = Path(__file__).parents[2] / "meshes" / "ring_suite.toml"
 
@@ -132,3 +140,22 @@ def test_a_synthetic_vertical_has_the_given_peak():
 def test_codes_by_name(small, target, period, value):
     spectrum = af.Case.read(small, [f"suite.target={target}"]).target
     assert spectrum.horizontal(period) == pytest.approx(value)
+
+
+def test_a_selected_component_is_named_by_its_column(tmp_path):
+    """Three components beside the times of a plain file."""
+    times = 0.01 * np.arange(50)
+    samples = [size * np.sin(20.0 * times) for size in (1.0, 2.0, 0.5)]
+    np.savetxt(
+        tmp_path / "three.csv", np.column_stack([times, *samples]), delimiter=",", header="s, m/s2"
+    )
+    path = tmp_path / "three.csv"
+    motions = [af.Motion.read(path, column=column) for column in (2, 3, 4)]
+    for column, motion in zip((2, 3, 4), motions, strict=True):
+        record = SimpleNamespace(
+            motion=replace(motion, name="a"), sources={"horizontal": (path, "")}, scale=1.5
+        )
+        selection = SimpleNamespace(records=[record], rule=SimpleNamespace(name="few"))
+        text = write_selected_suite(selection, tmp_path, {})
+        (pair,) = tomllib.loads(text)["suite"]["pairs"].values()
+        assert (pair["file"], pair.get("column"), pair["scale"]) == ("three.csv", column, 1.5)

@@ -245,6 +245,13 @@ def test_one_step_is_a_motion_too():
     assert (found.dt, found.horizontal.tolist()) == (1.0, [1.0])
 
 
+def test_two_steps_are_a_motion_of_their_interval():
+    ground = xr.DataArray([[1.0, 0.0], [3.0, 0.0]])
+    run = SimpleNamespace(time=np.array([2.0, 2.5]), dataset={"ground": ground})
+    found = rebuild_motion(run, "read")
+    assert (found.dt, found.horizontal.tolist()) == (0.5, [1.0, 3.0])
+
+
 @pytest.mark.parametrize(("players", "megabytes"), [(1, 8.0), (4, 2.0), (100, 0.8)])
 def test_players_of_a_page_share_its_size_but_stay_legible(players, megabytes, monkeypatch):
     seen = []

@@ -242,3 +242,14 @@ def test_solvers_step_as_snes_does(fidelity, rule, method):
     a, b = slow[3][-1], fast[3][-1]
     assert b.q == pytest.approx(a.q, abs=1e-8 * np.abs(a.q).max())
     assert b.memory == pytest.approx(a.memory, abs=1e-8 * np.abs(a.memory).max())
+
+
+def test_damping_by_mass_decelerates_what_moves():
+    """By 4 π ζ f g / (f + g) of its velocity, of rigid stones whose joints are not damped."""
+    built, damping = model("ring", 0.6), af.Rayleigh(0.05, (4.0, 12.0), "none")
+    equation = af.dynamics.Equation(built, af.Motion(np.zeros(2), 0.01), damping)
+    start = equation.at_rest(dead_load(built).q, memory=dead_load(built).model.memory)
+    velocity = 1e-3 * np.random.default_rng(3).normal(size=built.size)
+    moving = equation.accelerated(replace(start, velocity=velocity))
+    change = moving.acceleration - start.acceleration
+    assert change == pytest.approx(-4.0 * np.pi * 0.05 * 3.0 * velocity, rel=1e-6)

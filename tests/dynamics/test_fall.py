@@ -17,7 +17,7 @@ from archfem.dynamics import (
     fall,
     release_blocks,
 )
-from archfem.dynamics.time_history import _doubt_impulses
+from archfem.dynamics.time_history import _doubt_impulses, _doubt_tolerance
 from archfem.masonry.stiffness_ratio import estimate_block_stiffness
 
 BREADTH = 0.5
@@ -396,7 +396,15 @@ def test_a_run_without_frames_is_refused():
         classify_collapse(floor((0.0, 0.0, 0.5, 2.0)), [])
 
 
-@pytest.mark.parametrize(("share", "count"), [(0.02, 0), (0.03, 1)])
+@pytest.mark.parametrize(("share", "count"), [(0.0199, 0), (0.0201, 1)])
+def test_steps_that_missed_their_tolerance_are_doubted(share, count):
+    attributes = {"tolerance": 1e-3, "tolerance_unmet": share}
+    doubts = _doubt_tolerance(SimpleNamespace(dataset=xr.Dataset(attrs=attributes)))
+    assert len(doubts) == count
+    assert all("more than 0.001 in |e| in 2% of the run" in doubt.cause for doubt in doubts)
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.02, 0), (0.0201, 1), (0.03, 1)])
 def test_a_fall_whose_impulses_did_not_settle_is_doubted(share, count):
     history = SimpleNamespace(
         dataset=xr.Dataset(attrs={"fall_unsettled": share, "fall_violation": 0.2})
@@ -404,7 +412,8 @@ def test_a_fall_whose_impulses_did_not_settle_is_doubted(share, count):
     doubts = _doubt_impulses(history)
     assert len(doubts) == count
     assert all(
-        "did not settle in 3% of the steps" in doubt.cause and "by up to 0.2 of" in doubt.cause
+        f"did not settle in {share:.0%} of the steps" in doubt.cause
+        and "by up to 0.2 of" in doubt.cause
         for doubt in doubts
     )
 

@@ -73,6 +73,9 @@ def test_coordinates_of_another_meaning_are_not_read(run, tmp_path, caplog):
     path = History(elastic).save(tmp_path / "run.nc")
     assert af.dynamics.last_state(History.read(path)).q.shape == run.dataset["last_q"].shape
     assert not caplog.text
+    for changes in ({"fidelity": "rigid"}, {"displacements": "small"}):
+        kept = elastic.assign_attrs(coordinates_version=1, **changes)
+        assert "last_q" in History.read(History(kept).save(path)).dataset
     del elastic.attrs["coordinates_version"]
     old = History.read(History(elastic).save(path))
     assert "coordinates of an earlier version" in caplog.text

@@ -54,3 +54,34 @@ def test_edges_of_outlines_run_in_the_sense_of_their_cells(stack):
     for block in stack.free:
         own = cells.block[cells.outline_edges[:, 0]] == block
         assert 0.5 * twice[own].sum() == pytest.approx(stack.blocks[block].area)
+
+
+@pytest.mark.parametrize(
+    ("point", "fraction", "beside"),
+    [
+        ((1.2, 0.25), 0.25, (0.2, 0.0)),
+        ((1.2, -0.3), None, (0.2, -0.3)),
+        ((-0.1, 1.4), None, (-0.1, 0.4)),
+        ((0.5, 0.9), 0.5, (0.0, -0.1)),
+    ],
+)
+def test_the_nearest_place_of_a_block_is_on_its_rim(point, fraction, beside):
+    """Of a unit square: within a side, or at a corner."""
+    model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid")
+    cells = model.cells
+    low = cells.places.min(axis=0)
+    ends, share, vector = cells.nearest_edge(1, low + point)
+    assert vector == pytest.approx(beside)
+    a, b = cells.places[ends]
+    assert a + share * (b - a) - low == pytest.approx(np.subtract(point, beside))
+    assert share in (0.0, 1.0) if fraction is None else share == pytest.approx(fraction)
+
+
+def test_readings_of_many_states_are_those_of_each(ring):
+    """A support moved: joints have gaps in the first place."""
+    model = af.build(ring, fidelity="rigid").settled(af.Settlement(0, (-0.01, 0.002, 0.001)))
+    observer = model.observer()
+    states = 1e-4 * np.random.default_rng(1).normal(size=(3, model.size))
+    assert observer.read_many(states) == pytest.approx(np.array([observer.read(q) for q in states]))
+    assert np.abs(observer.read(np.zeros(model.size))).max() == pytest.approx(0.01, rel=0.1)
+    assert model.face_mismatch(states[0]) == (0.0, "")

@@ -34,8 +34,8 @@ ROOMS += ("studies", "cases")
 IDLE = ("dynamics/warm_up",)
 """Modules whose numbers are never used: runs that are made to compile the kernels of steps."""
 
-TESTS = [f"tests/{room}" for room in (*ROOMS, "validation", "verification")]
-TESTS.append("tests/test_doctests.py")
+TESTS = [f"tests/{room}" for room in (*ROOMS, "view", "commands", "validation", "verification")]
+TESTS += ["tests/test_doctests.py", "tests/test_wrong_arguments.py"]
 
 DIGEST = Path("archfem/_numba.py")
 """Module that tells by a digest whether compiled code is as new as what stands beside kernels."""

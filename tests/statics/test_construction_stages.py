@@ -218,6 +218,28 @@ def test_forces_on_placed_blocks_are_the_slope_of_their_energy(column, friction,
     assert np.abs(force[:6]).min() > 1e-3 * np.abs(force).max()
 
 
+def test_the_tangent_is_that_of_placed_blocks_and_holds_the_others(column):
+    """Central differences of forces of the lower two courses; the third is on springs alone."""
+    contact = af.Contact(1.48e9, 0.30e9, None)
+    joints = tuple(replace(joint, contact=contact) for joint in column.joints)
+    model = af.build(replace(column, joints=joints), fidelity="faces")
+    site = PartialStructure(model)
+    site = site.placed([1], np.zeros(site.size)).placed([2], np.zeros(site.size))
+    q = -1e-6 * np.linspace(1.0, 2.0, site.size)
+    tangent = site.tangent(q).toarray()
+    steps = 1e-10 * np.eye(site.size)
+    slopes = np.array([(site.force(q + step) - site.force(q - step)) / 2e-10 for step in steps])
+    assert tangent == pytest.approx(slopes.T, abs=1e-5 * tangent.max())
+    energies = [(site.energy(q + step) - site.energy(q - step)) / 2e-10 for step in steps]
+    placed = np.isin(model.cells.block, [1, 2])
+    free = abs(model.cells.shape_functions[np.repeat(placed, 2)]).sum(axis=0).A1 > 0.0
+    force = site.force(q)
+    assert np.array(energies)[free] == pytest.approx(force[free], abs=1e-5 * abs(force).max())
+    held = tangent[~free]
+    assert np.count_nonzero(held) == len(held)
+    assert np.count_nonzero(tangent[:, ~free]) == len(held)
+
+
 @pytest.mark.parametrize(
     ("count", "words"), [(5, "'block 4', 'block 5']: every"), (6, "'block 5'] and 1 more: every")]
 )

@@ -83,6 +83,7 @@ BLOCKS = {
     "limit.support_movement.largest_movement": {"tolerance": 1e-4},
     "limit.thickness.minimum_thickness": {"tolerance": 1e-6},
     "models.discretisation.Discretisation": {"cells": (4, 4), "degree": 1},
+    "models.fem.space.build_broken_space": {"degree": 1},
     "models.export.write_state": {"magnification": 1.0},
     "models.linear_blocks.build_rigid_model": {"cells": 4},
     "models.model.Prediction": {"small_displacement_error": 0.0},
