@@ -14,7 +14,7 @@ import archfem as af
 from archfem._files import read_file_list, replace_results
 from archfem.cases.report import report
 from archfem.cases.report.checks import supported_weight_ratio
-from archfem.cases.report.report_data import rebuild_motion
+from archfem.cases.report.report_data import ReportData, rebuild_motion
 from archfem.cases.run import carry_out, replace_run
 
 CASE = """
@@ -64,6 +64,7 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert all(scene["note"] == "" for scene in read.scenes)
     assert "a column <b>& more</b> under two pairs" in words
     assert "mode 1 at 3.14 Hz" in words
+    assert "Ground motions" in words
     assert "Not among the results: stress in the blocks, for they are rigid" in words
     assert "Not among the results: a target spectrum" in words
     assert "another case" not in words
@@ -115,6 +116,12 @@ def test_a_run_in_memory_has_a_report_and_a_player(small, undrawn, tmp_path):
     words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
     assert "5 % of critical at 5 Hz, proportional to stiffness" in words
     assert "contains no displacements" in run.player().scene.data["note"]
+    assert "Not among the results: a predicted error of the model" in words
+    assert "Ground motions" not in words
+    assert "The run is not complete" not in words
+    data = ReportData(case, {"first": run.history})
+    assert data.dead["N"].values.tolist() == run.history.joints["N"][0].values.tolist()
+    assert ReportData(case, {"first": run.history}, tmp_path).files == {}  # none were written
 
 
 def test_a_history_has_a_report_and_a_player_too(kept, tmp_path):

@@ -9,6 +9,7 @@ from archfem.cases.result_text import (
     describe_collapse,
     describe_run,
     describe_run_quality,
+    describe_verdicts,
     tabulate_joints,
     tabulate_runs,
 )
@@ -69,3 +70,9 @@ def test_limit_analysis_in_words(ring):
     )
     lifted = af.collapse_factor(slab, live=af.BodyForce(0.0, -1.0))
     assert describe_collapse(slab, lifted) == "limit analysis: this load never overturns it"
+
+
+def test_verdicts_of_several_runs_are_counted(run):
+    assert describe_verdicts([run]) == run.verdict.headline
+    outcome, doubtful = run.verdict.outcome, "2" if run.verdict.doubts else "none"
+    assert describe_verdicts([run, run]) == f"{outcome} in 2 of 2 runs; doubts in {doubtful}"

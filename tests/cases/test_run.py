@@ -9,7 +9,8 @@ import pytest
 
 import archfem as af
 from archfem.cases import provenance
-from archfem.cases.run import load_finished_run, log_prefix
+from archfem.cases.run import DeadLoadResult, doubt_fidelity, load_finished_run, log_prefix
+from archfem.joints import joint_dataset
 
 
 def names(results):
@@ -171,3 +172,56 @@ def test_a_run_takes_no_more_time_than_has_passed(small):
     begin = perf_counter()
     *_, run = af.cases.run_case(af.Case.read(small), pairs=["first"])
     assert 0.0 < run.seconds < perf_counter() - begin
+
+
+def test_steps_are_saved_each_and_fields_of_a_film_every_tenth(small):
+    case = af.Case.read(small, ["output.animation=true", "analysis.dt=0.01"])
+    dead, (motion, _) = af.cases.dead_load_of_case(case), case.ground_suite().motions
+    run = af.cases.run_time_history(case, motion, dead)
+    assert run.time == pytest.approx(0.01 * np.arange(101))
+    plain = af.Case.read(small, ["analysis.dt=0.01", "output.save_every=4"])
+    few = af.cases.run_time_history(plain, motion, dead)
+    assert few.time == pytest.approx(0.04 * np.arange(26))
+    assert "q" not in few.dataset
+    assert run.dataset["q"].sizes["frame"] == 11
+
+
+def test_the_finest_fidelity_has_none_to_compare_with(small):
+    pytest.importorskip("dolfinx")
+    case = af.Case.read(small, ["model.fidelity=full", "model.cells=[1, 1]"])
+    assert DeadLoadResult.of(case).finer is None
+    other, dead = DeadLoadResult.of(af.Case.read(small)).finer
+    assert (other.settings["model"]["fidelity"], dead.model.fidelity) == ("faces", "faces")
+
+
+@pytest.mark.parametrize(
+    ("size", "count"), [(0.2, 0), (0.2295, 0), (0.2305, 1), (0.1705, 0), (0.1695, 1)]
+)
+def test_fidelities_are_compared_over_the_first_half_second(small, monkeypatch, size, count):
+    """By the largest |e| of each joint, up to where the shorter run ends: above 0.03."""
+    case = af.Case.read(small)
+    motion = case.ground_suite().motions[0]
+    column, seen = case.structure, []
+
+    def run_of(values):
+        forces = np.zeros((len(values), 2, 3))
+        forces[..., 0], forces[..., 2] = 1e3, 1e3 * np.array(values)[:, None]
+        return af.History(joint_dataset(column, forces, 0.1 * np.arange(len(values))), column)
+
+    def finer(other, given, dead, damping):
+        seen.append(given)
+        return run_of([0.0, size, 0.1])
+
+    monkeypatch.setattr("archfem.cases.run.run_time_history", finer)
+    doubts = doubt_fidelity(DeadLoadResult.of(case), motion, run_of([0.0, -0.2, 0.05, 0.3]))
+    assert len(doubts) == count
+    assert all("within the first 0.2 s fidelity 'rigid'" in each.cause for each in doubts)
+    (first,) = seen
+    assert first.duration == pytest.approx(0.5)
+    assert first.horizontal == pytest.approx(motion.horizontal[: len(first.horizontal)])
+
+
+def test_modules_of_a_case_are_among_its_files(tmp_path):
+    settings = {"extensions": ["laws.py", "a_package"], "structure": {"file": "stones.dxf"}}
+    found = provenance.list_input_files(settings, tmp_path)
+    assert found == [tmp_path / "stones.dxf", tmp_path / "laws.py"]

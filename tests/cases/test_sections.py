@@ -106,6 +106,13 @@ def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
     assert dict(sections.list_facts(none))["runs"] == "none"
 
 
+def test_the_pga_of_older_files_is_that_at_their_steps(piers, runs):
+    old = af.History(runs["first"].dataset.drop_attrs(), piers)
+    old.dataset.attrs |= {k: v for k, v in runs["first"].dataset.attrs.items() if k != "pga"}
+    data = SimpleNamespace(runs={"only": old}, case=SimpleNamespace(structure=piers))
+    assert dict(sections.list_facts(data))["PGA"] == "0.60 m/s²"
+
+
 def test_the_pga_of_a_report_is_that_of_the_motion_and_not_of_the_steps(piers):
     motion = af.Motion(np.array([0.0, 2.0, -1.0, 0.0]), 0.005)
     run = af.time_history(af.build(piers, fidelity="rigid"), motion, dt=0.003)

@@ -277,7 +277,7 @@ def test_steps_are_a_hundredth_of_the_movement():
 
 
 @pytest.mark.parametrize("settlement", [SPREAD, SINK])
-def test_blocks_neither_overlap_nor_slide_where_the_support_has_come_to(settlement):
+def test_blocks_neither_overlap_nor_slide_at_the_end_of_a_movement(settlement):
     """To rounding, by the places of their corners, after large steps of the support."""
     ring = semicircle(0.15, 11, contact=rough(np.inf))
     found = largest_movement(ring, settlement)
