@@ -146,7 +146,9 @@ def test_too_little_memory_for_libraries_is_refused(limit, monkeypatch, capsys):
     monkeypatch.setattr(resource, "getrlimit", lambda kind: (allowed, resource.RLIM_INFINITY))
     short = limit is not None and limit < 1.5
     assert af.commands.main(["examples"]) == int(short)
-    said = f"memory is limited to {limit:.2f} GiB, and libraries alone take 1.50 GiB" if short else ""
+    said = (
+        f"memory is limited to {limit:.2f} GiB, and libraries alone take 1.50 GiB" if short else ""
+    )
     assert said in capsys.readouterr().err
 
 

@@ -199,7 +199,10 @@ def test_up_to_four_runs_fill_the_widest_gaps_of_a_curve(small_ring, monkeypatch
     found = ida_module.search_limit_states(small_ring, None, 0.2, (0.3, 100.0))
     assert found["scale"] == pytest.approx(sorted([*runs, *filled]))
     # a peak of 3 m/s² may be scaled up to 5 g
-    assert requested == {"precision": 0.2, "between": (0.3, pytest.approx(5.0 * 9.81 / 3.0, rel=1e-3))}
+    assert requested == {
+        "precision": 0.2,
+        "between": (0.3, pytest.approx(5.0 * 9.81 / 3.0, rel=1e-3)),
+    }
     dead = af.cases.dead_load_of_case(small_ring)
     (frequency,) = af.modes(dead.model, 1, about=dead).frequencies
     assert found["period"] == pytest.approx(1.0 / frequency)
