@@ -6,7 +6,7 @@ import pytest
 
 import archfem as af
 from archfem.studies import result_store
-from archfem.studies.result_store import Progress
+from archfem.studies.result_store import Progress, Store
 
 
 @pytest.mark.parametrize(
@@ -101,3 +101,18 @@ def test_points_of_milliseconds_are_written_once_a_second(progress):
         now["time"] = second
         found.add(failed=False)
     assert [status.done for status in store.written] == [6, 9, 11]
+    assert found._status.runs_left == 0.0  # points without runs of their own
+
+
+def test_errors_that_would_be_raised_again_are_kept(tmp_path):
+    """Those of archfem; that of a library or of a function of the user may not occur again."""
+    store = Store(tmp_path)
+    rows = {
+        "aa1": {"found": {"x": 1.0}, "error": "", "ours": True},
+        "bb2": {"found": {}, "error": "DidNotConverge: no equilibrium", "ours": True},
+        "cc3": {"found": {}, "error": "MemoryError", "ours": False},
+    }
+    for digest, row in rows.items():
+        store.write_row(digest, row)
+    del rows["cc3"]
+    assert store.load_rows(["aa1", "bb2", "cc3", "dd4"]) == rows
