@@ -82,8 +82,9 @@ def test_rates_are_those_since_the_driver_began(progress):
 
 def test_runs_under_way_beyond_those_expected_leave_none(progress):
     found, _, now = progress
-    now["time"] = 102.0
+    now.update(time=102.0, runs=31)
     found.add(failed=False, runs=1)
+    assert found._status.runs_left == 14.0  # one for each point that is left
     now["runs"] += 30
     assert found._status.runs_left == 0.0
 
