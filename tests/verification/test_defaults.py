@@ -115,6 +115,7 @@ STUDIES = {
     "fragility.Fragility.band": {"share": 0.9},
     "fragility.Fragility.interval": {"share": 0.9},
     "evaluators.evaluate_scales": {"precision": 0.05, "between": (0.05, 5.0)},
+    "result_store.format_table": {"max_rows": 50},
     "ida.ida": {"precision": 0.05, "between": (0.05, 10.0)},
     "variations.verdict_range": {"dt": 0.005, "samples": 26, "seed": 0, "workers": 1},
 }
