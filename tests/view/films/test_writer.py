@@ -1,14 +1,12 @@
 """Films are written in one stroke."""
 
 from time import sleep
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
 
 import archfem as af
-from archfem.view.films import film
 from archfem.view.films.encoder import film_path, write_film
 
 
@@ -45,17 +43,3 @@ def test_a_gif_lasts_as_long_as_its_frames_and_repeats_for_ever(tmp_path):
         assert read.n_frames == 3
         assert read.info["duration"] == 200.0
         assert read.info["loop"] == 0
-
-
-@pytest.mark.parametrize(
-    ("triangles", "kept"), [(1, 60), (1666, 60), (2000, 50), (9091, 10), (20_000, 5), (10**6, 5)]
-)
-def test_a_page_holds_a_hundred_thousand_triangles(triangles, kept):
-    """In sixty instants at most, and in five at least."""
-    setup = SimpleNamespace(triangles=SimpleNamespace(cell=np.zeros(triangles)))
-    times = np.linspace(1.0, 9.0, 801)
-    chosen = film._thin(times, setup)
-    assert len(chosen) == kept
-    assert chosen[[0, -1]].tolist() == [1.0, 9.0]
-    assert np.diff(chosen) == pytest.approx(8.0 / (kept - 1), abs=0.011)
-    assert film._thin(times[:4], setup).tolist() == times[:4].tolist()
