@@ -74,9 +74,9 @@ def fields_at(run: History, times: Array) -> Array:
 
 def _interpolate(known: Array, values: Array, times: Array) -> Array:
     """Interpolate values (f, …) at known times (f,) linearly, constant beyond their range."""
-    after = np.searchsorted(known, times).clip(1, max(len(known) - 1, 1))
+    after = np.maximum(np.searchsorted(known, times), 1)
     before, after = after - 1, np.minimum(after, len(known) - 1)
-    # a single frame has no interval; any length gives its value
+    # beyond the last frame there is no interval; any length gives its value
     length = np.where(after > before, known[after] - known[before], 1.0)
     share = np.clip((times - known[before]) / length, 0.0, 1.0)
     share = share.reshape(-1, *[1] * (values.ndim - 1))

@@ -1,5 +1,6 @@
 """Command line: arguments, exit codes, signals and full disks."""
 
+import argparse
 import errno
 import io
 import os
@@ -9,6 +10,7 @@ import signal
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import archfem as af
@@ -133,6 +135,44 @@ def test_no_command_ends_with_two_and_lists_the_commands(capsys):
     said = capsys.readouterr().err
     assert re.search(r"^ +limit +collapse factor", said, re.MULTILINE)
     assert re.search(r"^ +report ", said, re.MULTILINE)
+
+
+GIB = 2**30
+
+
+@pytest.mark.parametrize("limit", [0.5, 1.49, 1.5, 4.0, None])
+def test_too_little_memory_for_libraries_is_refused(limit, monkeypatch, capsys):
+    allowed = resource.RLIM_INFINITY if limit is None else int(limit * GIB)
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: (allowed, resource.RLIM_INFINITY))
+    short = limit is not None and limit < 1.5
+    assert af.commands.main(["examples"]) == int(short)
+    said = (
+        f"memory is limited to {limit:.2f} GiB, and libraries alone take 1.50 GiB" if short else ""
+    )
+    assert said in capsys.readouterr().err
+
+
+def test_an_option_that_is_left_out_has_the_value_in_its_help(monkeypatch):
+    """Numbers in parentheses at the end of the help, such as "(6)"; ranges have two."""
+    stated = {}
+
+    def note(parser, *flags, **given):
+        if numbers := re.search(r"\(([\d. ]+)\)$", given.get("help", "")):
+            default = given.get("default")
+            values = [float(each) for each in numbers[1].split()]
+            stated[f"{parser.prog} {flags[0]}"] = values, default
+        return add(parser, *flags, **given)
+
+    add = argparse.ArgumentParser.add_argument
+    monkeypatch.setattr(argparse.ArgumentParser, "add_argument", note)
+    with pytest.raises(SystemExit):
+        af.commands.main(["--version"])
+    own = {name: each for name, each in stated.items() if each[1] is not None}
+    assert set(stated) - set(own) == {"archfem rate --dead", "archfem animate --fps"}
+    assert len(own) == 7
+    for numbers, default in own.values():
+        # help has three digits
+        assert numbers == pytest.approx(np.atleast_1d(default).tolist(), rel=1e-2)
 
 
 def test_a_quoted_name_may_be_changed(capsys):

@@ -45,13 +45,30 @@ def test_run_command(tmp_path, capsys):
 
 def test_a_case_without_modes_is_shaken_with_usual_damping(tmp_path, undrawn, monkeypatch, capsys):
     def none(model, count, about):
-        raise af.DidNotConverge("no modes")
+        raise af.DidNotConverge(f"none of {count}")
 
     monkeypatch.setattr("archfem.statics.modes.modes", none)
     changes = ["model.fidelity=rigid", "motion.end=0.1", "output.animation=false"]
     given = [part for change in changes for part in ("--set", change)]
     assert af.commands.main(["run", str(RING), "--out", str(tmp_path), *given]) == 0
-    assert "no modes about dead load: no modes\ndamping: 5 %" in capsys.readouterr().out
+    assert "no modes about dead load: none of 4\ndamping: 5 %" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_modes_are_tabulated_and_the_first_two_filmed(count, tmp_path, undrawn, monkeypatch):
+    filmed = []
+
+    def film(modes, path, numbers):
+        filmed.extend(numbers)
+        path.touch()
+        return path
+
+    monkeypatch.setattr("archfem.view.films.film.film_modes", film)
+    given = ["--count", str(count), "--set", "model.fidelity=rigid", "--out", str(tmp_path)]
+    assert af.commands.main(["modes", str(RING), *given]) == 0
+    assert filmed == [1, 2][:count]
+    table = (tmp_path / "modes.txt").read_text(encoding="utf-8")
+    assert len(re.findall(r"^\d+ +[\d.]+ Hz", table, re.MULTILINE)) == count
 
 
 def test_criteria_of_a_case_are_obeyed(tmp_path, undrawn, capsys):

@@ -18,15 +18,16 @@ from archfem.studies.result_store import Store
 distributed = pytest.importorskip("distributed")
 
 
+def local_cluster(workers):
+    """A scheduler and workers in this process."""
+    options = {"threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    return distributed.LocalCluster(n_workers=workers, **options)
+
+
 @pytest.fixture
 def client():
     """A scheduler and two workers in this process."""
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
+    with local_cluster(2) as cluster, distributed.Client(cluster) as client:
         yield client
 
 
@@ -75,12 +76,12 @@ def test_a_pair_is_matched_once_on_a_cluster(matching_study, tmp_path, client):
     assert (found["mean"].values == serial.run(workers=1)["mean"].values).all()
 
 
-def test_a_worker_of_another_version_is_named(study_file, client, monkeypatch):
+def test_a_worker_of_another_version_is_named(study_file, monkeypatch):
+    """It is the only one, of a scheduler that is given by its address."""
     monkeypatch.setattr("archfem.studies.cluster.describe_version", lambda: "9.9.9")
-    with pytest.raises(
-        af.InvalidInput, match=r"a worker runs archfem .*, this is 9\.9\.9: install"
-    ):
-        af.Study.read(study_file, own_code=True).run(client=client)
+    says = r"a worker runs archfem .*, this is 9\.9\.9: install"
+    with local_cluster(1) as cluster, pytest.raises(af.InvalidInput, match=says):
+        af.Study.read(study_file, own_code=True).run(client=cluster.scheduler_address)
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "no address"])

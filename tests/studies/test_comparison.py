@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import archfem as af
 from archfem._netcdf import write_dataset
@@ -163,6 +164,30 @@ def test_a_study_continues_where_it_was_ended(study, tmp_path, monkeypatch):
     other = af.studies.Comparison.read(study, [*QUICK, "analysis.dt=4 ms"])
     with pytest.raises(AssertionError, match="run again"):
         compared(other, folder)
+
+
+def test_findings_state_the_falls_and_the_first_mechanisms_of_runs(study):
+    """Blocks of the first case fall after a mechanism; the second stands, at all scales."""
+    comparison = af.studies.Comparison.read(study, QUICK)
+    columns = {
+        **{"error": ["", ""], "frequency": [20.0, 9.0], "mass": [0.7, 0.8]},
+        **{"role: arch": ["ring", "ring"], "dead: arch": [0.1, 0.2]},
+        **{"eccentricity: arch": [0.3, 0.4], "friction: arch": [0.5, np.inf]},
+        **{"mechanism: verified": ["global", ""], "time: verified": [1.5, np.inf]},
+        **{"fall": ["fallen", ""], "ended": ["collapsed", "finished"], "outcome": ["fell", "ran"]},
+    }
+    for name in DEFINITIONS:
+        columns |= {f"scale: {name}": [1.2, np.inf], f"survives: {name}": [1.1, 2.0]}
+    table = xr.Dataset({name: ("point", values) for name, values in columns.items()})
+    found = comparison.findings(table)
+    assert list(found) == ["thick", "thin"]
+    thick, thin = (finding.runs["pair-1"] for finding in found.values())
+    assert (thick["fall"], thin["fall"]) == ("fallen", None)
+    assert thick["mechanisms"]["verified"] == {"kind": "global", "time": 1.5}
+    assert thin["mechanisms"]["verified"] is None
+    assert (thick["friction"], thin["friction"]) == ({"arch": 0.5}, {"arch": np.inf})
+    assert found["thick"].scales == {"pair-1": dict.fromkeys(DEFINITIONS, (1.2, 1.1))}
+    assert np.isinf(found["thin"].least("verified")).all()
 
 
 @pytest.mark.parametrize(

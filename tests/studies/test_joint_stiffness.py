@@ -31,12 +31,16 @@ def closing(jrc, stone, jcs, sigma):
 @pytest.mark.parametrize("condition", FACES)
 @pytest.mark.parametrize(
     ("stone", "sigma", "spacing"),
-    [(56.0, 0.05, 0.5), (200.0, 3.0, 0.3), (20.0, 15.0, 2.0), (2e3, 0.01, 0.4), (0.9, 0.05, 0.5)],
+    [
+        *((56.0, 0.05, 0.5), (200.0, 3.0, 0.3), (20.0, 15.0, 2.0), (2e3, 0.01, 0.4)),
+        *((2e4, 1e-4, 0.4), (0.9, 0.05, 0.5)),
+    ],
 )
 def test_ranges_are_those_of_the_relations(condition, stone, sigma, spacing):
     """Regressions are cut off where they would be negative, and angles at 70 degrees.
 
-    Of the fourth stone closures and angles are; of the last, k_i of the smoothest dressed faces.
+    Of the fourth stone closures and angles are, of the next all angles but the smoothest's; of the
+    last, k_i of the smoothest dressed faces.
     """
     young, poisson = 20e9, 0.3
     given = {"strength": 1e6 * stone, "stress": 1e6 * sigma, "poisson": poisson}

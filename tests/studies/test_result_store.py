@@ -6,7 +6,7 @@ import pytest
 
 import archfem as af
 from archfem.studies import result_store
-from archfem.studies.result_store import Progress
+from archfem.studies.result_store import Progress, Store
 
 
 @pytest.mark.parametrize(
@@ -82,8 +82,9 @@ def test_rates_are_those_since_the_driver_began(progress):
 
 def test_runs_under_way_beyond_those_expected_leave_none(progress):
     found, _, now = progress
-    now["time"] = 102.0
+    now.update(time=102.0, runs=31)
     found.add(failed=False, runs=1)
+    assert found._status.runs_left == 14.0  # one for each point that is left
     now["runs"] += 30
     assert found._status.runs_left == 0.0
 
@@ -101,3 +102,18 @@ def test_points_of_milliseconds_are_written_once_a_second(progress):
         now["time"] = second
         found.add(failed=False)
     assert [status.done for status in store.written] == [6, 9, 11]
+    assert found._status.runs_left == 0.0  # points without runs of their own
+
+
+def test_errors_that_would_be_raised_again_are_kept(tmp_path):
+    """Those of archfem; that of a library or of a function of the user may not occur again."""
+    store = Store(tmp_path)
+    rows = {
+        "aa1": {"found": {"x": 1.0}, "error": "", "ours": True},
+        "bb2": {"found": {}, "error": "DidNotConverge: no equilibrium", "ours": True},
+        "cc3": {"found": {}, "error": "MemoryError", "ours": False},
+    }
+    for digest, row in rows.items():
+        store.write_row(digest, row)
+    del rows["cc3"]
+    assert store.load_rows(["aa1", "bb2", "cc3", "dd4"]) == rows

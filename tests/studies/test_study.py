@@ -64,9 +64,10 @@ def test_two_processes_and_one_give_the_same_bits(study_file, tmp_path):
 
 def test_keys_with_spaces_are_coordinates_too(small_ring, tmp_path):
     axis = "contacts.stone_to_stone.friction"
-    over = {"contacts.stone to stone.friction": [0.5, 0.6], "title": ["a/b"]}
+    over = {"contacts.stone to stone.friction": [0.5, 0.6], "title": ["1 m/s"]}
     found = af.Study.of(small_ring, over, "dead load").run(tmp_path, workers=1)
     assert found[axis].values.tolist() == [0.5, 0.6]
+    assert found["title"].values.tolist() == ["1 m/s"]  # a name, whatever it looks like
     assert af.studies.read_table(tmp_path / "results.nc").identical(found)
 
 
@@ -356,13 +357,37 @@ def test_pairs_that_another_worker_matches_are_left_for_later(small):
 
 def test_a_long_table_is_cut_and_equal_findings_are_stated_once(small_ring):
     over = {"structure.thickness": ["0.5 m", "0.6 m", "0.7 m"]}
-    table = af.Study.of(small_ring, over, lambda case: {"a": 1.5, "b": case.structure.weight}).run(
-        workers=1
-    )
+
+    def find(case):
+        depth = case.structure.joints[0].depth
+        return {"a": 1.5, "b": case.structure.weight, "c": float(depth > 0.55)}
+
+    table = af.Study.of(small_ring, over, find).run(workers=1)
     lines = result_store.format_table(table, max_rows=2).splitlines()
-    assert lines[0].split() == ["structure.thickness", "[m]", "b"]
-    assert [line.split()[0] for line in lines[1:3]] == ["0.5", "0.6"]
+    assert lines[0].split() == ["structure.thickness", "[m]", "b", "c"]
+    assert [line.split()[::2] for line in lines[1:3]] == [["0.5", "0"], ["0.6", "1"]]
     assert lines[3:] == ["… 1 more points", "the same at all points: a = 1.5"]
+
+
+def test_a_table_that_no_sheet_can_hold_is_not_written_for_excel(tmp_path, monkeypatch):
+    """A sheet has 2^20 rows, one of them for the names."""
+    written = []
+
+    def write(frame, path, **_):
+        Path(path).touch()
+
+    def write_sheet(frame, path):
+        written.append(len(frame))
+        write(frame, path)
+
+    monkeypatch.setattr(result_store, "_write_sheet", write_sheet)
+    for name in ("to_csv", "to_parquet"):
+        monkeypatch.setattr(pd.DataFrame, name, write)
+    for rows in (2**20 - 1, 2**20):
+        frame = pd.DataFrame(index=range(rows))
+        monkeypatch.setattr(result_store, "_flatten", lambda table, frame=frame: frame)
+        result_store.write_table(xr.Dataset(), tmp_path, "")
+    assert written == [2**20 - 1]
 
 
 def test_the_study_files_of_the_documentation_are_read(tmp_path):

@@ -1,6 +1,7 @@
 """Runs over uncertain properties: the varied properties, and the case of each run."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -101,6 +102,25 @@ def test_joint_rules_select_the_method(column, motion, monkeypatch):
     assert len({each["displacement"] for each in (exact, springs, blocks)}) == 3
 
 
+@pytest.mark.parametrize(("dt", "steps"), [(0.01, 2e-3), (0.005, 2e-3), (0.002, 8e-4)])
+def test_rigid_blocks_have_shorter_steps_and_time_to_settle(column, motion, monkeypatch, dt, steps):
+    """Of 2 ms, or of 0.4 of the step if that is less; they rest 20 s after the motion."""
+    given = {}
+
+    class Simulation:
+        def __init__(self, structure, dt):
+            given["dt"] = dt
+
+        def frames(self, bodies, end, motion, spacing):
+            given.update(end=end, spacing=spacing)
+
+    standing = CollapseState("stands", None, (), 0.0, 0.0, True)
+    monkeypatch.setattr(variations, "RigidBlockSimulation", Simulation)
+    monkeypatch.setattr(variations, "classify_collapse", lambda structure, frames: standing)
+    variations._run_rigid_blocks(column, motion, dt)
+    assert given == {"dt": pytest.approx(steps), "end": motion.duration + 20.0, "spacing": 0.05}
+
+
 @pytest.mark.parametrize(
     ("given", "kind", "expected"),
     [
@@ -146,8 +166,14 @@ def test_the_run_as_given_comes_first_then_each_change_alone(column, motion, cal
         }
         for k in range(rows.sizes["run"])
     ]
-    alone = [{name: value} for name, values in DEFAULT_RANGES.items() for value in values]
-    assert changed == [{}, *(each for each in alone if not each.items() <= neutral.items())]
+    assert changed == [
+        {},
+        *({"joint_rule": rule} for rule in ("three points", "rigid")),
+        *({name: factor} for name in ("k_n", "k_s") for factor in (1.0 / 3.0, 3.0)),
+        *({"friction": added} for added in (-0.1, 0.1)),
+        *({"damping_ratio": factor} for factor in (0.5, 2.0)),
+        *({"damping_kind": "mass and stiffness"}, {"sign": "reversed"}, {"dt": "half"}),
+    ]
     assert found.dataset["sampled"].values[-3:].all()
     assert found.dataset.sizes["run"] == len(changed) + 3 == len(calls)
     contact = column.joints[0].contact
@@ -168,6 +194,42 @@ def test_the_sample_is_a_latin_hypercube(column, motion, calls):
         assert set(counts) == {12 // len(DEFAULT_RANGES[name])}
     again = af.verdict_range(column, motion, samples=12, seed=3, vary={"scale": (0.5, 0.9)})
     assert again.dataset.identical(found.dataset)
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high", "in_logarithm"),
+    [
+        *(("scale", 0.05, 0.15, True), ("scale", 1.0, 2.1, True), ("scale", 2.1, 1.0, True)),
+        *(("scale", 1.0, 2.0, False), ("friction", 0.0, 0.1, False), ("k_n", 3.0, 3.0, False)),
+    ],
+)
+def test_factors_over_more_than_twice_are_spread_in_their_logarithm(
+    column, motion, calls, name, low, high, in_logarithm
+):
+    """Each of forty equal parts of the range, in one measure or the other, has one sample."""
+    vary = HELD | {name: (low, high)}
+    found = af.verdict_range(column, motion, samples=40, vary=vary)
+    values = found.dataset[name].values[-40:]
+    if low == high:
+        assert set(values) == {low}
+        return
+    low, high = sorted((low, high))
+    share = (values - low) / (high - low)
+    if in_logarithm:
+        share = np.log(values / low) / np.log(high / low)
+    assert sorted(np.floor(40.0 * share)) == list(range(40))
+
+
+@pytest.mark.parametrize(("upper", "ratio"), [(0.9, 1.5), (np.inf, 2.0)])
+def test_scales_of_a_bracket_are_varied_between_its_ends(column, motion, calls, upper, ratio):
+    """To twice the lower one where nothing falls."""
+    bracket = SimpleNamespace(lower=0.6, upper=upper)
+    found = variations.verdict_range_of_bracket(bracket, column, motion, samples=2, vary=HELD)
+    assert found.dataset["scale"].values[:2] == pytest.approx([1.0, ratio])
+    peaks = [np.abs(moved.horizontal).max() for _, moved, *_ in calls[:2]]
+    assert peaks == pytest.approx([0.6 * motion.pga, 0.6 * ratio * motion.pga])
+    with pytest.raises(af.InvalidInput, match="it fell at the smallest scale"):
+        variations.verdict_range_of_bracket(SimpleNamespace(lower=0.0, upper=upper), column, motion)
 
 
 def test_a_property_that_is_held_does_not_vary(column, motion, calls):

@@ -116,11 +116,22 @@ STUDIES = {
     "fragility.Fragility.band": {"share": 0.9},
     "fragility.Fragility.interval": {"share": 0.9},
     "evaluators.evaluate_scales": {"precision": 0.05, "between": (0.05, 5.0)},
+    "result_store.format_table": {"max_rows": 50},
     "ida.ida": {"precision": 0.05, "between": (0.05, 10.0)},
     "variations.verdict_range": {"dt": 0.005, "samples": 26, "seed": 0, "workers": 1},
 }
 
+VIEW = {
+    "films.film.film": {"fps": 20.0, "size": (1280, 720)},
+    "films.film.picture": {"size": (1280, 720)},
+    "films.film.film_modes": {"swings": 1},
+    "motions.draw_spectra": PERCENT,
+    "structure.draw_displaced": {"magnification": 1.0},
+    "studies.draw_study": {"reduction": 1.0},
+}
+
 TABLES = {"motion": MOTION, "masonry": MASONRY, "": BLOCKS, "dynamics": SHAKEN, "studies": STUDIES}
+TABLES |= {"view": VIEW}
 DEFAULTS = [
     (f"{room}.{name}".lstrip("."), given)
     for room, table in TABLES.items()

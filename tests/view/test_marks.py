@@ -5,6 +5,7 @@ import pytest
 from pictures import SLIDING, WEIGHT, resultants
 
 import archfem as af
+from archfem.view import joint_marks as marks_of
 from archfem.view.joint_marks import joint_marks
 
 
@@ -93,3 +94,37 @@ def test_no_thrust_line_runs_along_the_ground():
     links = joint_marks(portal, af.joints.joint_dataset(portal, rows)).links
     assert len(links) == 5
     assert (np.abs(np.diff(links[..., 1])) > 0.5).sum() == 4  # the lintel's alone is level
+
+
+@pytest.mark.parametrize(
+    ("displacement", "by"),
+    [
+        *((0.0, 1.0), (0.5, 1.0), (0.041, 1.0), (0.039, 2.0)),
+        # between two steps the nearer by their ratio
+        *((0.06 / 3.1, 2.0), (0.06 / 3.2, 5.0), (0.06 / 7.0, 5.0), (0.06 / 7.1, 10.0)),
+        *((0.06 / 2e6, 2e6), (0.06 / 5e11, 5e11), (1e-30, 5e11)),
+    ],
+)
+def test_a_magnification_shows_a_displacement_as_a_twentieth_of_the_structure(displacement, by):
+    """The round number by which it comes nearest to 6 % of the size; 1 from 4 % on."""
+    assert marks_of.round_magnification(displacement) == by
+
+
+def test_a_mechanism_is_drawn_as_large_and_only_where_it_moves(column):
+    """The two upper stones turn about a corner; the lower ones move by less than can be seen."""
+    structure = column.structure
+    motion = np.zeros((4, 3))
+    motion[2] = motion[3] = [0.0, 0.0, 3.0]
+    scaled = marks_of.scale_motion(structure, motion)
+    outlines = marks_of.outline_moving_blocks(structure, scaled)
+    assert len(outlines) == 2
+    moved = [
+        np.abs(o - b.drawn()).max() for o, b in zip(outlines, structure.blocks[2:], strict=True)
+    ]
+    corner = np.hypot(0.2, 0.4) * np.abs(scaled[2, 2])  # half of 0.4 m and of 0.8 m
+    assert corner == pytest.approx(0.06 * structure.size, rel=0.01)
+    assert 0.8 * corner < max(moved) < corner
+    for share, count in ((0.9e-4, 0), (1.05e-4, 1)):
+        motion = np.zeros((4, 3))
+        motion[1, 0] = share * structure.size
+        assert len(marks_of.outline_moving_blocks(structure, motion)) == count

@@ -81,6 +81,16 @@ def test_poses_of_a_fall_run_straight_between_frames(column, toppled):
         np.testing.assert_allclose(falls.pose(time), pose, atol=1e-12)
 
 
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_poses_are_interpolated_and_held_beyond_the_frames(column, count):
+    random = np.random.default_rng(3)
+    times, poses = 2.0 + random.uniform(0.1, 0.5, count).cumsum(), random.normal(size=(count, 4, 3))
+    falls = FallingBlocks(column.structure, times, poses, 0.0)
+    for time in np.linspace(times[0] - 0.2, times[-1] + 0.2, 17):
+        held = [np.interp(time, times, each) for each in poses.reshape(count, -1).T]
+        np.testing.assert_allclose(falls.pose(time).ravel(), held, atol=1e-12)
+
+
 def test_a_fall_begins_where_the_model_left_off_and_ends_above_ground(column, toppled):
     falls, cells = FallingBlocks.of(column.structure, toppled), column.cells
     before = cells.places + cells.displacement(toppled.dataset["last_q"].values)

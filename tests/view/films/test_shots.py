@@ -1,11 +1,13 @@
 """Pictures of falling structures: joints while they hold, then blocks alone, to the ground."""
 
+from types import SimpleNamespace
+
 import imageio.v2 as imageio
 import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view import film
+from archfem.view import film, films
 from archfem.view.films.frames import frames_of_fall, frames_of_run
 from archfem.view.films.renderer import FrameLayout
 from archfem.view.films.settings import Setup
@@ -123,3 +125,31 @@ def test_names_of_instants_do_not_overlap(setup, hinged_late, size):
     first, second = (texts[name].get_window_extent() for name in ("mechanism", "blocks loose"))
     # a letter apart, so that they read as two
     assert 0.0 < first.x0 < first.x1 + 5.0 < second.x0 < second.x1 < size[0]
+
+
+def test_failed_joints_are_counted_in_words(model, joints):
+    """Of a state with three hinges, two sliding joints and two open ones; of one without any."""
+    still = np.zeros(model.size)
+    setup = Setup.of(model, still[None], "displacement", 1.0)
+    assert films.frames.frame_of_state(setup, still, joints).words == [
+        "3 hinging",
+        "2 sliding",
+        "2 open",
+    ]
+    assert films.frames.frame_of_state(setup, still, joints).time == 3.66
+    held = joints.assign({name: 0 * joints[name] for name in ("hinge", "slide", "open")})
+    assert films.frames.frame_of_state(setup, still, held).words == []
+
+
+@pytest.mark.parametrize(
+    ("triangles", "kept"), [(1, 60), (1666, 60), (2000, 50), (9091, 10), (20_000, 5), (10**6, 5)]
+)
+def test_a_page_holds_a_hundred_thousand_triangles(triangles, kept):
+    """In sixty instants at most, and in five at least."""
+    setup = SimpleNamespace(triangles=SimpleNamespace(cell=np.zeros(triangles)))
+    times = np.linspace(1.0, 9.0, 801)
+    chosen = films.film._thin(times, setup)
+    assert len(chosen) == kept
+    assert chosen[[0, -1]].tolist() == [1.0, 9.0]
+    assert np.diff(chosen) == pytest.approx(8.0 / (kept - 1), abs=0.011)
+    assert films.film._thin(times[:4], setup).tolist() == times[:4].tolist()

@@ -4,6 +4,7 @@ from time import sleep
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import archfem as af
 from archfem.view.films.encoder import film_path, write_film
@@ -33,3 +34,12 @@ def test_a_film_has_one_of_two_suffixes(tmp_path):
         assert film_path(tmp_path / name) == tmp_path / name
     with pytest.raises(af.InvalidInput, match=r"suffix '\.avi': use one of \('\.mp4', '\.gif'\)"):
         film_path(tmp_path / "film.avi")
+
+
+def test_a_gif_lasts_as_long_as_its_frames_and_repeats_for_ever(tmp_path):
+    images = np.zeros((3, 32, 48, 3), dtype=np.uint8)
+    images[1, :16], images[2, 16:] = 255, 255
+    with Image.open(write_film(tmp_path / "film.gif", images, fps=5.0)) as read:
+        assert read.n_frames == 3
+        assert read.info["duration"] == 200.0
+        assert read.info["loop"] == 0

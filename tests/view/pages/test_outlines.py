@@ -19,6 +19,11 @@ def test_chords_stay_near_their_arcs(ring):
                 middles = np.linalg.norm(0.5 * (arc[1:] + arc[:-1]) - centre, axis=1)
                 assert np.ptp(radii) < 1e-9
                 assert radii[0] - middles.min() < 2e-4 * ring.size
+            # of the longer arc: one chord less would not
+            arms = block.points[:2] - centre
+            radius = np.linalg.norm(block.points - centre, axis=1).max()
+            angle = np.arccos(arms[0] @ arms[1] / np.prod(np.linalg.norm(arms, axis=1)))
+            assert radius * (angle / (half - 2)) ** 2 / 8.0 > 2e-4 * ring.size
     assert block_kinds(ring).count("support") == 2
     assert block_kinds(ring).count("stone") == 17
 

@@ -29,7 +29,10 @@ def test_a_page_holds_the_history_to_its_quantum(rocked):
     assert np.abs(found["ground"].T - run.dataset["ground"].values).max() <= quantum["ground"]
     hinge = (found["flags"].astype(int) & 3) - 1
     assert np.array_equal(hinge, run.joints["hinge"].values.T)
-    assert np.array_equal(found["flags"].astype(int) & 4 > 0, run.joints["slide"].values.T)
+    turned = run.joints["rotation"].values > 0.0
+    bits = {4: run.joints["slide"], 8: run.joints["open"], 16: run.joints["V"] > 0.0, 32: turned}
+    for bit, state in bits.items():
+        assert np.array_equal(found["flags"].astype(int) & bit > 0, np.asarray(state).T)
     moved = Outlines(model.structure).displacements(model, run.dataset["q"].values)
     rows = moved.reshape(len(moved), -1).T
     assert np.abs(found["frame_points"] - rows).max() <= quantum["frame_points"]
@@ -56,6 +59,66 @@ def test_where_there_is_little_room_steps_are_left_out(rocked):
     assert len(data["bytes"]) <= room
     assert found["time"][0, -1] == pytest.approx(run.time[-1], abs=1e-6)
     assert np.abs(found["time"][0] - data["still"]).min() < 1e-5
+
+
+def test_frames_are_those_that_can_be_told_apart(stack):
+    """Of 200 fields a second 40 are kept, and the last."""
+    model = af.build(stack, fidelity="rigid")
+    motion = af.Motion.synthetic(seed=1, duration=0.32, pga=6.0)
+    run = af.time_history(model, motion, dt=0.005, record=af.Record(fields_every=1))
+    times = Scene(model.structure, run, model).moved[0]
+    assert np.diff(times)[:-1] == pytest.approx(0.025)
+    assert times[[0, -1]] == pytest.approx(run.time[[0, -1]])
+
+
+def seen(points, moved):
+    """Lower left and upper right corner of points, as built and moved."""
+    every = np.concatenate([points, moved.reshape(-1, 2)])
+    return every.min(axis=0), every.max(axis=0)
+
+
+def test_the_view_has_room_for_displacements_that_are_magnified_somewhat_more(rocked):
+    """By a fifth, and 4 % of the structure's size beside them."""
+    model, run = rocked
+    outlines, margin = Outlines(model.structure), 0.04 * model.structure.size
+    points, moved = outlines.points, outlines.displacements(model, run.dataset["q"].values)
+    scene = Scene(model.structure, run, model)
+    assert scene.magnification > 1.0
+    low, high = seen(points, points + 1.2 * scene.magnification * moved)
+    assert scene.box == (pytest.approx(low - margin), pytest.approx(high + margin))
+    still = Scene(model.structure, af.History(run.dataset.drop_vars("q")))
+    low, high = seen(points, points)
+    assert still.box == (pytest.approx(low - margin), pytest.approx(high + margin))
+
+
+@pytest.mark.parametrize("away", [0.0, 0.2, -1e3, 1e3])
+def test_the_view_follows_loose_blocks_as_far_as_half_a_structure(column, toppled, away):
+    structure, outlines = column.structure, Outlines(column.structure)
+    fallen, size = toppled.dataset.copy(deep=True), structure.size
+    fallen["fall_pose"][..., 0] += away
+    scene = Scene(structure, af.History(fallen, structure), column)
+    fields = [*fallen["q"].values, fallen["last_q"].values]
+    moved = outlines.displacements(column, np.array(fields))
+    low, high = seen(outlines.points, outlines.points + 1.2 * moved)
+    ends = outlines.points + scene.fallen[1].reshape(-1, *outlines.points.shape)
+    left, right = ends[..., 0].min(), ends[..., 0].max()
+    margin = 0.04 * size
+    assert scene.box[0][0] == pytest.approx(min(low[0], max(left, low[0] - 0.5 * size)) - margin)
+    assert scene.box[1][0] == pytest.approx(max(high[0], min(right, high[0] + 0.5 * size)) + margin)
+    assert scene.box[0][1] == pytest.approx(scene.falls.level - margin, abs=0.02 * size)
+    assert scene.box[0][1] <= scene.falls.level - margin
+
+
+@pytest.mark.parametrize(
+    ("opening", "by"), [(1e-5, 5e4), (0.03, 10.0), (0.21, 2.0), (0.23, 1.0), (0.9, 1.0)]
+)
+def test_openings_without_displacements_are_seen_as_a_third_of_the_depth(rocked, opening, by):
+    """As nearly as a round number makes them: joints are 1 m deep."""
+    model, run = rocked
+    dataset = run.dataset.drop_vars("q")
+    dataset["opening"] = dataset["opening"] * opening / float(dataset["opening"].max())
+    assert (dataset["depth"] == 1.0).all()
+    assert Scene(model.structure, af.History(dataset)).magnification == by
 
 
 def test_without_displacements_blocks_stand_still(rocked):
