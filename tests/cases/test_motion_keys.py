@@ -2,11 +2,13 @@
 
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import archfem as af
+from archfem.cases import motion_keys
 from archfem.cases.motion_keys import build_motion, build_suite, parse_motion, parse_suite
 
 SHIPPED = Path(__file__).parents[2] / "meshes" / "ring_suite.toml"
@@ -132,3 +134,28 @@ def test_a_synthetic_vertical_has_the_given_peak():
 def test_codes_by_name(small, target, period, value):
     spectrum = af.Case.read(small, [f"suite.target={target}"]).target
     assert spectrum.horizontal(period) == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    ("columns", "level"),
+    [("N-S E-W U-D", 1), ("N-S E-W U-D", 2), ("U-D N-S E-W", 3), ("time E-W N-S U-D", 3)],
+)
+def test_a_selected_record_is_read_again_from_its_columns(columns, level, tmp_path):
+    """Components of one file: either horizontal one of them, and the vertical."""
+    names = columns.split()
+    table = np.random.default_rng(1).normal(size=(20, len(names))).round(4)
+    if "time" in names:
+        table[:, 0] = (0.01 * np.arange(20)).round(2)
+    path, upright = tmp_path / "three.txt", names.index("U-D")
+    rows = "\n".join(" ".join(f"{value:.4f}" for value in row) for row in table)
+    path.write_text(f"# {columns} m/s2, dt = 0.01\n{rows}\n")
+    motion = af.Motion(table[:, level - 1], 0.01, table[:, upright], "three E-W")
+    record = SimpleNamespace(
+        motion=motion, scale=1.5, sources={"horizontal": (path, 1), "vertical": (path, 2)}
+    )
+    selection = SimpleNamespace(rule=SimpleNamespace(name="EC8"), records=[record])
+    target = {"code": "EC8", "ag": 0.25, "ground": "B"}
+    text = motion_keys.write_selected_suite(selection, tmp_path, target)
+    (pair,) = build_suite(parse_suite(tomllib.loads(text)["suite"])).pairs
+    assert pair.horizontal.tolist() == (1.5 * motion.horizontal).tolist()
+    assert pair.vertical.tolist() == (1.5 * motion.vertical).tolist()

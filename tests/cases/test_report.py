@@ -66,6 +66,7 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert "mode 1 at 3.14 Hz" in words
     assert "Not among the results: stress in the blocks, for they are rigid" in words
     assert "Not among the results: a target spectrum" in words
+    assert "Not among the results: a predicted error of the model" in words
     assert "another case" not in words
     case = af.Case.read(kept / "case.toml")
     assert sha256(case.text().encode()).hexdigest() in words
@@ -97,6 +98,11 @@ def test_folders_that_hold_no_results_are_refused(kept, tmp_path):
         af.cases.open_results(tmp_path)
     with pytest.raises(af.InvalidInput, match="of one pair of a suite; give the suite's folder"):
         af.cases.open_results(kept / "first")
+    (kept / "empty").mkdir()
+    shutil.copytree(kept / "first", tmp_path / "alone")
+    for other in (kept / "empty", tmp_path / "alone"):
+        with pytest.raises(af.InvalidInput, match=r"has no case.toml.*run the case again"):
+            af.cases.open_results(other)
     (tmp_path / "study.json").write_text("{}")
     with pytest.raises(af.InvalidInput, match="it is of a study"):
         af.cases.open_results(tmp_path)

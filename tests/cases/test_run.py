@@ -3,12 +3,14 @@
 import logging
 import tomllib
 from time import perf_counter
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import archfem as af
 from archfem.cases import provenance
+from archfem.cases import run as run_module
 from archfem.cases.run import load_finished_run, log_prefix
 
 
@@ -103,6 +105,9 @@ def test_pairs_are_run_again_where_their_files_have_changed(small, tmp_path, at2
     path = shaken.save(tmp_path / "history.nc")
     assert load_finished_run(path, case, motion).outcome == shaken.outcome
     assert load_finished_run(path, case, motion.scaled(1.01)) is None
+    for off, same in ((0.95e-6, True), (1.05e-6, False)):  # round-off of matching is below 1e-6
+        other = af.Motion(motion.horizontal + off, motion.dt)
+        assert (load_finished_run(path, case, other) is not None) is same
     at2(tmp_path / "level.AT2", [0.0, 0.06, -0.06, 0.0], 0.01)
     assert load_finished_run(path, case, motion) is None  # before the motions are compared
 
@@ -167,7 +172,76 @@ def test_a_fidelity_is_doubted_where_the_next_finer_one_disagrees():
     assert "take fidelity 'faces', or 'auto'" in doubt.remedy
 
 
-def test_a_run_takes_no_more_time_than_has_passed(small):
+def test_a_run_and_its_dead_load_take_no_more_time_than_has_passed(small):
     begin = perf_counter()
-    *_, run = af.cases.run_case(af.Case.read(small), pairs=["first"])
-    assert 0.0 < run.seconds < perf_counter() - begin
+    rest, _, run = af.cases.run_case(af.Case.read(small), pairs=["first"])
+    assert min(rest.seconds, run.seconds) > 0.0
+    assert rest.seconds + run.seconds < perf_counter() - begin
+
+
+def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, monkeypatch):
+    """By the largest |e| of each joint, until either run ends; 0.03 is in no doubt."""
+    begun = []
+
+    def history(*rows):
+        """A joint pressed by 1 N, 1 m deep, has e = M; records are 0.1 s apart."""
+        resultants = np.zeros((len(rows), 2, 3))
+        resultants[..., 0], resultants[..., 2] = 1.0, rows
+        time = 0.1 * np.arange(len(rows))
+        joints = af.joints.joint_dataset(stack, resultants, time)
+        return SimpleNamespace(time=time, joints=joints)
+
+    def doubts(coarse, finer):
+        def run(case, motion, *_):
+            begun.append(motion)
+            return finer
+
+        monkeypatch.setattr(run_module, "run_time_history", run)
+        rigid, faces = (
+            SimpleNamespace(model=SimpleNamespace(fidelity=name)) for name in ("rigid", "faces")
+        )
+        rest = SimpleNamespace(dead=rigid, finer=(None, faces), damping=(None, ""))
+        return [each.cause for each in run_module.doubt_fidelity(rest, motion, coarse)]
+
+    motion = af.Motion(0.1 * np.arange(1.0, 101.0), 0.01)
+    coarse = history((0.0, 0.0), (0.1, -0.2))
+    assert doubts(coarse, history((0.0, 0.0), (0.129, -0.171))) == []
+    (said,) = doubts(coarse, history((0.0, 0.0), (0.1, -0.2315)))
+    assert said == (
+        "within the first 0.1 s fidelity 'rigid' differs from 'faces' by 0.032 in the largest |e| "
+        "of a joint"
+    )
+    longer = history((0.0, 0.0), (0.1, -0.2), (0.4, 0.4))
+    assert doubts(coarse, longer) == doubts(longer, coarse) == []
+    assert begun[0].horizontal.tolist() == motion.horizontal[:51].tolist()
+    motion = af.Motion(np.arange(1.0, 4.0), 0.01)
+    assert doubts(coarse, coarse) == []
+    assert begun[-1].horizontal.tolist() == [1.0, 2.0, 3.0]
+
+
+def test_some_models_have_no_finer_one_to_compare_with(small, monkeypatch):
+    """The finest, one whose error is predicted, and any where FEniCSx is not installed."""
+
+    def finer(fidelity, prediction=None):
+        model = SimpleNamespace(fidelity=fidelity, prediction=prediction)
+        return af.cases.DeadLoadResult(case, SimpleNamespace(model=model)).finer
+
+    case = af.Case.read(small)
+    other, dead = finer("rigid")
+    assert (other.discretisation.fidelity, dead.model.fidelity) == ("faces", "faces")
+    assert finer("full") is None
+    assert finer("rigid", "an error of 0.01") is None
+    monkeypatch.setattr(run_module, "find_spec", lambda name: None)
+    assert finer("rigid") is None
+
+
+def test_each_step_is_recorded_and_a_film_shows_every_tenth(small):
+    case = af.Case.read(small, ["output.animation=true", "analysis.dt=0.005"])
+    (motion, _) = case.ground_suite().motions
+    run = af.cases.run_time_history(case, motion, af.cases.dead_load_of_case(case))
+    assert run.time == pytest.approx(0.005 * np.arange(201))
+    assert run.dataset["frame_time"].values == pytest.approx(0.05 * np.arange(21))
+    every = af.Case.read(small, ["output.save_every=4", "analysis.dt=0.005"])
+    run = af.cases.run_time_history(every, motion, af.cases.dead_load_of_case(every))
+    assert run.time == pytest.approx(0.02 * np.arange(51))
+    assert "q" not in run.dataset
