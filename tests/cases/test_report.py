@@ -12,9 +12,8 @@ from pages import read_page
 
 import archfem as af
 from archfem._files import read_file_list, replace_results
-from archfem.cases.report import report
+from archfem.cases.report import report, report_data
 from archfem.cases.report.checks import supported_weight_ratio
-from archfem.cases.report.report_data import rebuild_motion
 from archfem.cases.run import carry_out, replace_run
 
 CASE = """
@@ -162,7 +161,7 @@ def test_supports_bear_the_weight(ring, caplog):
 def test_the_ground_of_a_run_is_that_which_was_applied(stack):
     motion = af.Motion.synthetic(seed=3, duration=1.0, pga=1.0)
     run = af.time_history(af.build(stack, fidelity="rigid"), motion, dt=0.005)
-    found = rebuild_motion(run, "ground")
+    found = report_data.rebuild_motion(run, "ground")
     assert found.dt == pytest.approx(0.005)
     assert np.allclose(found.horizontal, run.dataset["ground"].values[:, 0], atol=1e-9)
     assert found.pga == pytest.approx(motion.pga)
