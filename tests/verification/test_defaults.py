@@ -86,6 +86,9 @@ BLOCKS = {
     "models.export.write_state": {"magnification": 1.0},
     "models.linear_blocks.build_rigid_model": {"cells": 4},
     "models.model.Prediction": {"small_displacement_error": 0.0},
+    "statics.mechanism_assessment.kinematic_assessment": {
+        **{"direction": 1.0, "q": 2.0, "confidence_factor": 1.35}
+    },
     "statics.pushover.Stop": {"slope": 1e-6, "displacement": 0.1, "steps": 400},
     "statics.newton.Newton": {"tolerance": 1e-10},
 }
