@@ -155,7 +155,9 @@ def test_reported_iterations_are_those_made(stack, ring, monkeypatch):
     assert solved.iterations == sum(made) > 0
     for stages in (None, af.masonry.usual_stages(stack)):
         made.clear()
-        assert af.dead_load(model, stages=stages).iterations == sum(made) > 0
+        found = af.dead_load(model, stages=stages)
+        assert found.iterations == sum(made) > 0
+        assert found.steps == len(made)
     settled = model.settled(af.Settlement("base", (0.0, -0.01, 0.0)))
     made.clear()
     found = af.dead_load(settled)
