@@ -358,3 +358,16 @@ def test_sliding_joints_are_named_where_nothing_more_is_found(slides, control, g
     assert said == "no equilibrium was found past a factor of 0.4"
     with pytest.raises(af.DidNotConverge, match="just after the dead load"):
         pushover.failure_message(RelaxedPath([], states=1), control, af.Criteria())
+
+
+def test_hinges_of_one_step_are_in_the_order_of_their_eccentricities(stack):
+    """Joint 0 hinges first by less than joint 1 in a case, and a step before it in the other."""
+    for first, expected in ((0.0, ((1, "intrados"), (0, "extrados"))),
+                            (0.47, ((0, "extrados"), (1, "intrados")))):  # fmt: skip
+        rows = np.zeros((3, 2, 3))
+        rows[..., 0] = 1e3  # a joint is 1 m deep
+        rows[1, 0, 2], rows[2, :, 2] = 1e3 * first, (470.0, -490.0)
+        joints = af.joints.joint_dataset(stack, rows, np.arange(3.0)).rename(time="step")
+        hinges, steps = pushover.hinge_order(joints)
+        assert hinges == expected
+        assert steps == ((2, 2) if first == 0.0 else (1, 2))
