@@ -466,8 +466,7 @@ def doubt_fidelity(
         return []
     other, dead = finer
     try:
-        start = motion.cut(0.0, min(duration, motion.duration))
-        run = run_time_history(other, start, dead, at_rest.damping[0])
+        run = run_time_history(other, motion.cut(0.0, duration), dead, at_rest.damping[0])
     except ArchfemError:  # it has no equilibrium at some step: no comparison
         return []
     # either run may have ended before, by an event or a failed step

@@ -79,9 +79,9 @@ class Equilibrium(ResultDisplay):
                 f"the state is of another structure, '{self.model.structure.name}', whose blocks "
                 f"are elsewhere than those of '{model.structure.name}': give the same model's"
             )
-        gaps = self.model.initial_gaps
-        if gaps is not None and gaps is not model.initial_gaps:
-            model = model.with_initial_gaps(gaps)
+        gaps, others = self.model.initial_gaps, model.initial_gaps
+        if gaps is not others:  # what was built in one go has none
+            model = model.with_initial_gaps(np.zeros_like(others) if gaps is None else gaps)
         return model.with_memory(self.model.memory)
 
     @cached_property

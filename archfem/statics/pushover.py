@@ -197,7 +197,8 @@ def follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
     # normals (displacement, factor) of the added equation; that of arc length turns with the curve
     fixed = {"displacement": np.array([1.0, 0.0]), "force": np.array([0.0, 1.0])}
     min_distance, easy_iterations, easy_growth = 1e-3, 4, 1.4
-    distance, direction, taken = 1.0, np.array([1.0, 1.0]) / np.sqrt(2.0), [1.0]
+    distance, direction = 1.0, np.array([1.0, 1.0]) / np.sqrt(2.0)
+    taken: list[float] = []
     if control == "path" and path.model.large_displacements:
         stop = replace(stop, slope=0.0)
     relaxation = _StepRelaxation(path, criteria, stop.displacement * path.model.structure.size)

@@ -148,6 +148,35 @@ def test_a_module_that_has_changed_is_refused(permitted):
         af.cases.load_extension(path)
 
 
+def test_a_module_is_found_before_others_of_its_name(permitted, monkeypatch):
+    elsewhere = permitted / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.syspath_prepend(str(elsewhere))
+    for folder in (permitted, elsewhere):
+        (folder / "twice_there.py").write_text(f"place = {folder.name!r}")
+    assert af.cases.load_extension(permitted / "twice_there.py").place == permitted.name
+
+
+def test_a_case_takes_a_module_as_it_was_loaded(permitted):
+    """Permitted and unchanged, or deleted since: a report reads its case without the file."""
+    path = permitted / "module_of_a_case.py"
+    path.write_text("")
+    column = {"shape": "column", "breadth": 1.0, "heights": [1.0]}
+    settings = {"extensions": [path.name], "structure": column}
+    for names in ([path.name], ["never_there.py"]):
+        with pytest.raises(af.InvalidInput, match="is code, which no file runs by itself"):
+            af.Case.of({**settings, "extensions": names}, permitted)
+    af.cases.load_extension(path)
+    assert len(af.Case.of(settings, permitted).structure.free) == 1
+    digest = hash_inputs(settings, permitted)
+    path.write_text("# changed")
+    assert hash_inputs(settings, permitted) != digest
+    with pytest.raises(af.InvalidInput, match="has changed since it was loaded"):
+        af.Case.of(settings, permitted)
+    path.unlink()
+    assert len(af.Case.of(settings, permitted).structure.free) == 1
+
+
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
     """A distribution on the path, as pip leaves it, whose module registers a joint law."""

@@ -1,7 +1,6 @@
 """Motions, suites and target spectra of case files."""
 
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,13 +8,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.cases.motion_keys import (
-    build_motion,
-    build_suite,
-    parse_motion,
-    parse_suite,
-    write_selected_suite,
-)
+from archfem.cases import motion_keys
+from archfem.cases.motion_keys import build_motion, build_suite, parse_motion, parse_suite
 
 SHIPPED = Path(__file__).parents[2] / "meshes" / "ring_suite.toml"
 
@@ -142,20 +136,26 @@ def test_codes_by_name(small, target, period, value):
     assert spectrum.horizontal(period) == pytest.approx(value)
 
 
-def test_a_selected_component_is_named_by_its_column(tmp_path):
-    """Three components beside the times of a plain file."""
-    times = 0.01 * np.arange(50)
-    samples = [size * np.sin(20.0 * times) for size in (1.0, 2.0, 0.5)]
-    np.savetxt(
-        tmp_path / "three.csv", np.column_stack([times, *samples]), delimiter=",", header="s, m/s2"
+@pytest.mark.parametrize(
+    ("columns", "level"),
+    [("N-S E-W U-D", 1), ("N-S E-W U-D", 2), ("U-D N-S E-W", 3), ("time E-W N-S U-D", 3)],
+)
+def test_a_selected_record_is_read_again_from_its_columns(columns, level, tmp_path):
+    """Components of one file: either horizontal one of them, and the vertical."""
+    names = columns.split()
+    table = np.random.default_rng(1).normal(size=(20, len(names))).round(4)
+    if "time" in names:
+        table[:, 0] = (0.01 * np.arange(20)).round(2)
+    path, upright = tmp_path / "three.txt", names.index("U-D")
+    rows = "\n".join(" ".join(f"{value:.4f}" for value in row) for row in table)
+    path.write_text(f"# {columns} m/s2, dt = 0.01\n{rows}\n")
+    motion = af.Motion(table[:, level - 1], 0.01, table[:, upright], "three E-W")
+    record = SimpleNamespace(
+        motion=motion, scale=1.5, sources={"horizontal": (path, 1), "vertical": (path, 2)}
     )
-    path = tmp_path / "three.csv"
-    motions = [af.Motion.read(path, column=column) for column in (2, 3, 4)]
-    for column, motion in zip((2, 3, 4), motions, strict=True):
-        record = SimpleNamespace(
-            motion=replace(motion, name="a"), sources={"horizontal": (path, "")}, scale=1.5
-        )
-        selection = SimpleNamespace(records=[record], rule=SimpleNamespace(name="few"))
-        text = write_selected_suite(selection, tmp_path, {})
-        (pair,) = tomllib.loads(text)["suite"]["pairs"].values()
-        assert (pair["file"], pair.get("column"), pair["scale"]) == ("three.csv", column, 1.5)
+    selection = SimpleNamespace(rule=SimpleNamespace(name="EC8"), records=[record])
+    target = {"code": "EC8", "ag": 0.25, "ground": "B"}
+    text = motion_keys.write_selected_suite(selection, tmp_path, target)
+    (pair,) = build_suite(parse_suite(tomllib.loads(text)["suite"])).pairs
+    assert pair.horizontal.tolist() == (1.5 * motion.horizontal).tolist()
+    assert pair.vertical.tolist() == (1.5 * motion.vertical).tolist()

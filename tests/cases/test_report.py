@@ -12,9 +12,8 @@ from pages import read_page
 
 import archfem as af
 from archfem._files import read_file_list, replace_results
-from archfem.cases.report import report
+from archfem.cases.report import report, report_data
 from archfem.cases.report.checks import supported_weight_ratio
-from archfem.cases.report.report_data import ReportData, rebuild_motion
 from archfem.cases.run import carry_out, replace_run
 
 CASE = """
@@ -67,6 +66,7 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert "Ground motions" in words
     assert "Not among the results: stress in the blocks, for they are rigid" in words
     assert "Not among the results: a target spectrum" in words
+    assert "Not among the results: a predicted error of the model" in words
     assert "another case" not in words
     case = af.Case.read(kept / "case.toml")
     assert sha256(case.text().encode()).hexdigest() in words
@@ -98,6 +98,11 @@ def test_folders_that_hold_no_results_are_refused(kept, tmp_path):
         af.cases.open_results(tmp_path)
     with pytest.raises(af.InvalidInput, match="of one pair of a suite; give the suite's folder"):
         af.cases.open_results(kept / "first")
+    (kept / "empty").mkdir()
+    shutil.copytree(kept / "first", tmp_path / "alone")
+    for other in (kept / "empty", tmp_path / "alone"):
+        with pytest.raises(af.InvalidInput, match=r"has no case.toml.*run the case again"):
+            af.cases.open_results(other)
     (tmp_path / "study.json").write_text("{}")
     with pytest.raises(af.InvalidInput, match="it is of a study"):
         af.cases.open_results(tmp_path)
@@ -119,9 +124,11 @@ def test_a_run_in_memory_has_a_report_and_a_player(small, undrawn, tmp_path):
     assert "Not among the results: a predicted error of the model" in words
     assert "Ground motions" not in words
     assert "The run is not complete" not in words
-    data = ReportData(case, {"first": run.history})
+    data = report_data.ReportData(case, {"first": run.history})
     assert data.dead["N"].values.tolist() == run.history.joints["N"][0].values.tolist()
-    assert ReportData(case, {"first": run.history}, tmp_path).files == {}  # none were written
+    assert (
+        report_data.ReportData(case, {"first": run.history}, tmp_path).files == {}
+    )  # none were written
 
 
 def test_a_history_has_a_report_and_a_player_too(kept, tmp_path):
@@ -163,7 +170,7 @@ def test_supports_bear_the_weight(ring, caplog):
 def test_the_ground_of_a_run_is_that_which_was_applied(stack):
     motion = af.Motion.synthetic(seed=3, duration=1.0, pga=1.0)
     run = af.time_history(af.build(stack, fidelity="rigid"), motion, dt=0.005)
-    found = rebuild_motion(run, "ground")
+    found = report_data.rebuild_motion(run, "ground")
     assert found.dt == pytest.approx(0.005)
     assert np.allclose(found.horizontal, run.dataset["ground"].values[:, 0], atol=1e-9)
     assert found.pga == pytest.approx(motion.pga)

@@ -269,6 +269,43 @@ def test_no_pair_of_another_case_stays_among_those_of_a_suite(two_runs):
     assert reused == [False, True]
 
 
+def test_pairs_are_reused_as_others_join_the_suite(two_runs):
+    folder, _ = two_runs
+    third = "suite.pairs.third={synthetic={seed=3, duration=0.3, pga=1.0}}"
+    case = af.Case.read(folder / "case.toml", [third])
+    runs = [each for each in af.cases.run_case(case, folder) if isinstance(each, af.cases.Run)]
+    assert {run.motion.name: run.reused for run in runs} == {
+        **{"first": True, "second": True},
+        "third": False,
+    }
+
+
+def test_a_pair_that_is_interrupted_joins_those_that_are_finished(two_runs):
+    """It replaces nothing, as no earlier run has it."""
+    folder, _ = two_runs
+    case = af.Case.read(folder / "case.toml", ["suite.scale=3"])
+    list(af.cases.run_case(case, folder, pairs=["second"]))
+
+    def interrupted(*given):
+        history = af.cases.run_time_history(*given)
+        history.dataset.attrs["ended"] = "interrupted"
+        return history
+
+    *_, run = af.cases.run_case(case, folder, run_motion=interrupted)
+    assert run.path == folder / "first" / "history.nc"
+    assert set(af.cases.open_results(folder).runs) == {"first", "second"}
+
+
+def test_no_files_are_adopted_of_a_pair_that_has_none(two_runs, tmp_path):
+    """A run made in Python has a history alone; its summary is still to be written."""
+    case, folder = af.Case.read(two_runs[0] / "case.toml"), tmp_path / "new"
+    list(af.cases.run_case(case, folder, pairs=["first"]))
+    with replace_run(case, folder) as draft:
+        *_, run = carry_out(case, draft, pairs=["first"])
+        assert run.reused
+        assert not results.adopt_files(run)
+
+
 def test_disks_without_links_get_copies(two_runs, tmp_path, monkeypatch):
     def refuse(*_):
         raise OSError("no links")

@@ -3,14 +3,15 @@
 import logging
 import tomllib
 from time import perf_counter
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import archfem as af
 from archfem.cases import provenance
-from archfem.cases.run import DeadLoadResult, doubt_fidelity, load_finished_run, log_prefix
-from archfem.joints import joint_dataset
+from archfem.cases import run as run_module
+from archfem.cases.run import load_finished_run, log_prefix
 
 
 def names(results):
@@ -104,6 +105,9 @@ def test_pairs_are_run_again_where_their_files_have_changed(small, tmp_path, at2
     path = shaken.save(tmp_path / "history.nc")
     assert load_finished_run(path, case, motion).outcome == shaken.outcome
     assert load_finished_run(path, case, motion.scaled(1.01)) is None
+    for off, same in ((0.95e-6, True), (1.05e-6, False)):  # round-off of matching is below 1e-6
+        other = af.Motion(motion.horizontal + off, motion.dt)
+        assert (load_finished_run(path, case, other) is not None) is same
     at2(tmp_path / "level.AT2", [0.0, 0.06, -0.06, 0.0], 0.01)
     assert load_finished_run(path, case, motion) is None  # before the motions are compared
 
@@ -168,57 +172,79 @@ def test_a_fidelity_is_doubted_where_the_next_finer_one_disagrees():
     assert "take fidelity 'faces', or 'auto'" in doubt.remedy
 
 
-def test_a_run_takes_no_more_time_than_has_passed(small):
+def test_a_run_and_its_dead_load_take_no_more_time_than_has_passed(small):
     begin = perf_counter()
-    *_, run = af.cases.run_case(af.Case.read(small), pairs=["first"])
-    assert 0.0 < run.seconds < perf_counter() - begin
+    rest, _, run = af.cases.run_case(af.Case.read(small), pairs=["first"])
+    assert min(rest.seconds, run.seconds) > 0.0
+    assert rest.seconds + run.seconds < perf_counter() - begin
 
 
-def test_steps_are_saved_each_and_fields_of_a_film_every_tenth(small):
-    case = af.Case.read(small, ["output.animation=true", "analysis.dt=0.01"])
-    dead, (motion, _) = af.cases.dead_load_of_case(case), case.ground_suite().motions
-    run = af.cases.run_time_history(case, motion, dead)
-    assert run.time == pytest.approx(0.01 * np.arange(101))
-    plain = af.Case.read(small, ["analysis.dt=0.01", "output.save_every=4"])
-    few = af.cases.run_time_history(plain, motion, dead)
-    assert few.time == pytest.approx(0.04 * np.arange(26))
-    assert "q" not in few.dataset
-    assert run.dataset["q"].sizes["frame"] == 11
+def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, monkeypatch):
+    """By the largest |e| of each joint, until either run ends; 0.03 is in no doubt."""
+    begun = []
+
+    def history(*rows):
+        """A joint pressed by 1 N, 1 m deep, has e = M; records are 0.1 s apart."""
+        resultants = np.zeros((len(rows), 2, 3))
+        resultants[..., 0], resultants[..., 2] = 1.0, rows
+        time = 0.1 * np.arange(len(rows))
+        joints = af.joints.joint_dataset(stack, resultants, time)
+        return SimpleNamespace(time=time, joints=joints)
+
+    def doubts(coarse, finer):
+        def run(case, motion, *_):
+            begun.append(motion)
+            return finer
+
+        monkeypatch.setattr(run_module, "run_time_history", run)
+        rigid, faces = (
+            SimpleNamespace(model=SimpleNamespace(fidelity=name)) for name in ("rigid", "faces")
+        )
+        rest = SimpleNamespace(dead=rigid, finer=(None, faces), damping=(None, ""))
+        return [each.cause for each in run_module.doubt_fidelity(rest, motion, coarse)]
+
+    motion = af.Motion(0.1 * np.arange(1.0, 101.0), 0.01)
+    coarse = history((0.0, 0.0), (0.1, -0.2))
+    assert doubts(coarse, history((0.0, 0.0), (0.129, -0.171))) == []
+    (said,) = doubts(coarse, history((0.0, 0.0), (0.1, -0.2315)))
+    assert said == (
+        "within the first 0.1 s fidelity 'rigid' differs from 'faces' by 0.032 in the largest |e| "
+        "of a joint"
+    )
+    longer = history((0.0, 0.0), (0.1, -0.2), (0.4, 0.4))
+    assert doubts(coarse, longer) == doubts(longer, coarse) == []
+    assert begun[0].horizontal.tolist() == motion.horizontal[:51].tolist()
+    motion = af.Motion(np.arange(1.0, 4.0), 0.01)
+    assert doubts(coarse, coarse) == []
+    assert begun[-1].horizontal.tolist() == [1.0, 2.0, 3.0]
 
 
-def test_the_finest_fidelity_has_none_to_compare_with(small):
-    pytest.importorskip("dolfinx")
-    case = af.Case.read(small, ["model.fidelity=full", "model.cells=[1, 1]"])
-    assert DeadLoadResult.of(case).finer is None
-    other, dead = DeadLoadResult.of(af.Case.read(small)).finer
-    assert (other.settings["model"]["fidelity"], dead.model.fidelity) == ("faces", "faces")
+def test_some_models_have_no_finer_one_to_compare_with(small, monkeypatch):
+    """The finest, one whose error is predicted, and any where FEniCSx is not installed."""
 
+    def finer(fidelity, prediction=None):
+        model = SimpleNamespace(fidelity=fidelity, prediction=prediction)
+        return af.cases.DeadLoadResult(case, SimpleNamespace(model=model)).finer
 
-@pytest.mark.parametrize(
-    ("size", "count"), [(0.2, 0), (0.2295, 0), (0.2305, 1), (0.1705, 0), (0.1695, 1)]
-)
-def test_fidelities_are_compared_over_the_first_half_second(small, monkeypatch, size, count):
-    """By the largest |e| of each joint, up to where the shorter run ends: above 0.03."""
     case = af.Case.read(small)
-    motion = case.ground_suite().motions[0]
-    column, seen = case.structure, []
+    other, dead = finer("rigid")
+    assert (other.discretisation.fidelity, dead.model.fidelity) == ("faces", "faces")
+    assert finer("full") is None
+    assert finer("rigid", "an error of 0.01") is None
+    monkeypatch.setattr(run_module, "find_spec", lambda name: None)
+    assert finer("rigid") is None
 
-    def run_of(values):
-        forces = np.zeros((len(values), 2, 3))
-        forces[..., 0], forces[..., 2] = 1e3, 1e3 * np.array(values)[:, None]
-        return af.History(joint_dataset(column, forces, 0.1 * np.arange(len(values))), column)
 
-    def finer(other, given, dead, damping):
-        seen.append(given)
-        return run_of([0.0, size, 0.1])
-
-    monkeypatch.setattr("archfem.cases.run.run_time_history", finer)
-    doubts = doubt_fidelity(DeadLoadResult.of(case), motion, run_of([0.0, -0.2, 0.05, 0.3]))
-    assert len(doubts) == count
-    assert all("within the first 0.2 s fidelity 'rigid'" in each.cause for each in doubts)
-    (first,) = seen
-    assert first.duration == pytest.approx(0.5)
-    assert first.horizontal == pytest.approx(motion.horizontal[: len(first.horizontal)])
+def test_each_step_is_recorded_and_a_film_shows_every_tenth(small):
+    case = af.Case.read(small, ["output.animation=true", "analysis.dt=0.005"])
+    (motion, _) = case.ground_suite().motions
+    run = af.cases.run_time_history(case, motion, af.cases.dead_load_of_case(case))
+    assert run.time == pytest.approx(0.005 * np.arange(201))
+    assert run.dataset["frame_time"].values == pytest.approx(0.05 * np.arange(21))
+    every = af.Case.read(small, ["output.save_every=4", "analysis.dt=0.005"])
+    run = af.cases.run_time_history(every, motion, af.cases.dead_load_of_case(every))
+    assert run.time == pytest.approx(0.02 * np.arange(51))
+    assert "q" not in run.dataset
 
 
 def test_modules_of_a_case_are_among_its_files(tmp_path):

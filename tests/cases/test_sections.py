@@ -7,9 +7,9 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.cases.report import sections
+from archfem._files import replace_results
+from archfem.cases.report import report_data, sections
 from archfem.cases.report.checks import _check_row, supported_weight_ratio
-from archfem.cases.report.report_data import build_player, rebuild_motion
 from archfem.cases.result_text import tabulate_joints, tabulate_motions, tabulate_runs
 
 
@@ -100,6 +100,9 @@ def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
     friction = max(float(run.joints["friction"].max()) for run in runs.values())
     assert facts["largest V / N"] == f"{friction:.3f}"
     assert facts["mechanism by any joints at once"] == "0 of 2 runs"
+    doubtful = sum(bool(run.verdict.doubts) for run in runs.values()) or "none"
+    outcome = runs["first"].verdict.outcome
+    assert facts["verdict"] == f"{outcome} in 2 of 2 runs; doubts in {doubtful}"
     one = SimpleNamespace(runs={"first": runs["first"]}, case=data.case)
     assert dict(sections.list_facts(one))["verdict"] == runs["first"].verdict.headline
     none = SimpleNamespace(runs={}, case=data.case)
@@ -119,6 +122,74 @@ def test_the_pga_of_a_report_is_that_of_the_motion_and_not_of_the_steps(piers):
     assert np.abs(run.dataset["ground"]).max() < 1.9
     data = SimpleNamespace(runs={"only": run}, case=SimpleNamespace(structure=piers))
     assert dict(sections.list_facts(data))["PGA"] == "2.00 m/s²"
+    del run.dataset.attrs["pga"]  # as in files of older versions
+    largest = float(np.abs(run.dataset["ground"][:, 0]).max())
+    assert dict(sections.list_facts(data))["PGA"] == f"{largest:.2f} m/s²"
+
+
+def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatch):
+    """A single run has the only player, and no sections below its own."""
+    for name in ("draw_motion", "draw_spectra", "draw_suite"):
+        monkeypatch.setattr(sections, name, lambda *_: None)
+    monkeypatch.setattr(sections.FigureBlock, "of", lambda figure, caption: caption)
+    monkeypatch.setattr(sections, "draw_envelopes", lambda *_: [])
+    monkeypatch.setattr(sections, "build_player", lambda *given: f"one of {given[-1]} players")
+    case = SimpleNamespace(title="piers", structure=piers, suite=None, target=None)
+    one = report_data.ReportData(case, {"first": runs["first"]})
+    assert one.dead["N"].values.tolist() == runs["first"].joints["N"].values[0].tolist()
+    assert sections.build_ground_section(one).title == "Ground motion"
+    response, mechanism = sections.build_run_sections(one)
+    assert response.pieces[0] == "one of 1 players"
+    assert (response.level, mechanism.level) == (2, 2)
+    pairs = report_data.ReportData(SimpleNamespace(**vars(case) | {"suite": {}}), runs)
+    assert sections.build_ground_section(pairs).title == "Ground motions"
+    *_, first, second = sections.build_run_sections(pairs)
+    assert (first.pieces[0], second.pieces[0]) == ("one of 2 players",) * 2
+    assert (first.level, second.level) == (3, 3)
+
+
+def test_a_run_that_was_broken_off_is_reported_as_such(runs, piers, monkeypatch):
+    monkeypatch.setattr(sections, "draw_envelopes", lambda *_: [])
+    monkeypatch.setattr(sections, "build_player", lambda *_: "player")
+    whole, case = runs["first"], SimpleNamespace(title="piers", structure=piers, suite=None)
+    broken = af.History(whole.dataset.assign_attrs(ended="interrupted"), piers)
+    for run, said in ((whole, 0), (broken, 1)):
+        blocks = sections.build_run_sections(report_data.ReportData(case, {"run": run}))[0].pieces
+        assert blocks[said] == "player"
+    assert blocks[0].text == f"The run is not complete: {broken.outcome}."
+
+
+def test_a_folder_without_a_run_has_no_files_to_report(tmp_path):
+    with replace_results(tmp_path, "modes", "some inputs") as draft:
+        (draft / "modes.txt").write_text("mode 1 at 3.14 Hz")
+    assert report_data.ReportData(None, {}, tmp_path).files == {}
+
+
+@pytest.mark.parametrize(
+    ("fidelity", "expected"),
+    [
+        ("faces", "faces"),
+        ("pier: left: full, rest: faces", {"pier: left": "full", "rest": "faces"}),
+    ],
+)
+def test_a_player_takes_the_model_that_was_selected(fidelity, expected, monkeypatch):
+    """By name, or by part as `Discretisation.name` writes it; a model of the case stays its own."""
+    seen = []
+
+    def built(structure, discretisation):
+        seen.append(discretisation)
+        return SimpleNamespace(size=3)
+
+    monkeypatch.setattr(report_data, "build", built)
+    monkeypatch.setattr(report_data, "Scene", lambda *given: given)
+    monkeypatch.setattr(report_data, "Player", lambda scene: scene)
+    own = af.models.Discretisation("rigid")
+    run = SimpleNamespace(dataset=xr.Dataset({"q": ("coordinate", np.zeros(3))}))
+    run.dataset.attrs["fidelity"] = fidelity
+    for selects in (True, False):
+        case = SimpleNamespace(structure=None, discretisation=own, selects_model=selects)
+        assert report_data.build_player(case, run, "a title")[2].size == 3
+    assert seen == [af.models.Discretisation(expected), own]
 
 
 def test_a_table_of_runs_has_the_largest_of_each(runs):
@@ -240,22 +311,24 @@ def test_a_ground_motion_is_read_at_even_steps_from_its_first_to_its_last():
     times = 0.5 + np.array([0.0, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05])
     ground = xr.DataArray(np.column_stack([3.0 * times, 0.0 * times]), dims=("time", "axis"))
     run = SimpleNamespace(time=times, dataset={"ground": ground})
-    found = rebuild_motion(run, "read")
+    found = report_data.rebuild_motion(run, "read")
     assert found.dt == pytest.approx(0.01)
     assert found.horizontal == pytest.approx(3.0 * (0.5 + 0.01 * np.arange(6)))
     assert found.components == ("horizontal",)
 
 
-def test_one_step_is_a_motion_too():
-    run = SimpleNamespace(time=np.array([2.0]), dataset={"ground": xr.DataArray([[1.0, 0.0]])})
-    found = rebuild_motion(run, "read")
-    assert (found.dt, found.horizontal.tolist()) == (1.0, [1.0])
+@pytest.mark.parametrize(("times", "dt"), [([2.0], 1.0), ([2.0, 2.25], 0.25)])
+def test_one_step_is_a_motion_too(times, dt):
+    ground = xr.DataArray([[1.0, 0.0], [3.0, 0.0]][: len(times)])
+    run = SimpleNamespace(time=np.array(times), dataset={"ground": ground})
+    found = report_data.rebuild_motion(run, "read")
+    assert (found.dt, found.horizontal.tolist()) == (dt, [1.0, 3.0][: len(times)])
 
 
 def test_two_steps_are_a_motion_of_their_interval():
     ground = xr.DataArray([[1.0, 0.0], [3.0, 0.0]])
     run = SimpleNamespace(time=np.array([2.0, 2.5]), dataset={"ground": ground})
-    found = rebuild_motion(run, "read")
+    found = report_data.rebuild_motion(run, "read")
     assert (found.dt, found.horizontal.tolist()) == (0.5, [1.0, 3.0])
 
 
@@ -265,9 +338,11 @@ def test_players_of_a_page_share_its_size_but_stay_legible(players, megabytes, m
     monkeypatch.setattr("archfem.cases.report.report_data.MAX_PACKED_BYTES", 8_000_000)
     monkeypatch.setattr("archfem.cases.report.report_data.Scene", lambda *given: seen.append(given))
     monkeypatch.setattr("archfem.cases.report.report_data.Player", lambda scene: scene)
-    run = SimpleNamespace(dataset={})
-    build_player(SimpleNamespace(structure=None), run, "a title", players)
+    case, run = SimpleNamespace(structure=None), SimpleNamespace(dataset={})
+    report_data.build_player(case, run, "a title", players)
     assert seen[0][4] == 1e6 * megabytes
+    report_data.build_player(case, run, "the only one")
+    assert seen[1][4] == 8e6
 
 
 def test_supports_are_judged_by_the_first_record_and_iterations_by_the_largest(piers, runs):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.joints.step_average import StepForces
 
 RULES = ("lobatto", "exact")
 
@@ -206,3 +207,37 @@ def test_a_broken_bond_is_a_dry_joint():
         steps = bonded.begin_step(first, 0.1), dry.begin_step(first, 0.1)
         assert np.array_equal(steps[0].force(last), steps[1].force(last))
         assert np.array_equal(steps[0].updated_memory(last)[:count], steps[1].updated_memory(last))
+
+
+@pytest.mark.parametrize("slid", [0.0, 5e-3])
+@pytest.mark.parametrize("way", [2e-3, 1.55e-4])
+def test_teeth_have_settled_at_a_billionth_of_their_rise(slid, way):
+    """Of the largest in the step, or of that of an elastic slip, as where points barely slide.
+
+    A block on a level joint is shifted, pressed by 0.05 mm at one end and 0.15 mm at the other.
+    """
+    contact = af.Contact(2e9, 1e9, 0.5, dilatancy=0.1)
+    column = af.column(breadth=1.0, heights=[1.0], contact=contact)
+    joints = af.build(column, fidelity="rigid", quadrature="lobatto", cells=(2, 1)).operator
+    initial = 0.1 * slid * np.ones(len(joints.points.offset))
+    joints = joints.with_memory(initial / 0.1)
+    first, last = (
+        np.array([slid + shift - 0.5e-4, initial[0] - 1e-4, 1e-4]) for shift in (0.0, way)
+    )
+    assert joints.slips(last) == pytest.approx(slid + way)
+    assert StepForces(joints, first, 0.0).dissipation(first) == pytest.approx(0.0, abs=1e-9)
+
+    def target(rise):
+        return 0.1 * np.abs(StepForces(joints, first, 0.0, rise).updated_memory(last))
+
+    begun = StepForces(joints, first, 0.0).with_dilatancy(last)
+    assert begun.end_opening == pytest.approx(target(None), rel=1e-12)
+    rise = begun.end_opening
+    for _ in range(TURNS):
+        rise = target(rise)
+    elastic = 0.1 * (slid + way) - rise
+    bound = 1e-9 * max(np.abs(rise - initial).max(), elastic.max())
+    error = np.abs(target(rise + 1e-10) - rise - 1e-10).max()
+    for share in (0.98, 1.02):
+        step = StepForces(joints, first, 0.0, rise + 1e-10 * share * bound / error)
+        assert (step.with_dilatancy(last) is step) is (share < 1.0)

@@ -220,6 +220,12 @@ def test_the_tangent_of_a_step_of_springs_is_exact(fidelity, late, seed):
 
 
 @pytest.mark.parametrize("late", [0.0, 0.4])
+def test_the_tangent_of_a_step_of_joints_that_never_slide_is_exact(late):
+    model, first, last = places(ring(friction=None, cohesion=0.0), 1)
+    assert misfit(model, first, last, late) < 1e-8
+
+
+@pytest.mark.parametrize("late", [0.0, 0.4])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_tangent_of_a_step_of_facets_is_that_of_gauss_rule(late, seed):
     """The rule's places move with the openings, which its derivative leaves out: about 1e-3."""

@@ -11,7 +11,14 @@ BREAKS = np.array([-0.3, -0.1, 0.05, 0.3])
 
 @pytest.mark.parametrize(
     ("rule", "points", "exact"),
-    [("lobatto", 2, 1), ("lobatto", 3, 3), ("lobatto", 4, 5), ("gauss", 2, 3), ("gauss", 3, 5)],
+    [
+        ("lobatto", 2, 1),
+        ("lobatto", 3, 3),
+        ("lobatto", 4, 5),
+        ("gauss", 1, 1),
+        ("gauss", 2, 3),
+        ("gauss", 3, 5),
+    ],
 )
 def test_polynomials_are_integrated_exactly_up_to_the_degree(rule, points, exact):
     x, w = Quadrature(rule, points).on_joint(BREAKS)
@@ -22,6 +29,7 @@ def test_polynomials_are_integrated_exactly_up_to_the_degree(rule, points, exact
 
 
 def test_shared_points_are_given_once():
+    assert len(Quadrature("lobatto", 64).on_joint(BREAKS)[0]) == 3 * 63 + 1
     assert len(Quadrature().on_joint(BREAKS)[0]) == 7
     assert len(Quadrature("nodal").on_joint(np.linspace(0, 1, 5))[0]) == 5  # the paper's springs
     assert len(Quadrature("gauss").on_joint(BREAKS)[0]) == 9
@@ -68,6 +76,7 @@ def test_lobatto_has_points_at_the_ends_and_gauss_has_not():
         (("nodal", 4), "leave points out"),
         (("lobatto", 1), "1 lobatto points"),
         (("trapezoidal", 1), "1 trapezoidal points"),
+        (("gauss", 65), "65 gauss points on a facet: give between 1 and 64"),
     ],
 )
 def test_refusals(arguments, says):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.joints import resultants as resultants_module
 from archfem.joints.resultants import eccentricity_and_friction
 
 DEPTH = 0.55
@@ -74,3 +75,23 @@ def test_variables_of_a_long_record_are_those_of_its_steps(ring):
     assert {0, 1, -1} == set(np.unique(whole["hinge"]))
     assert whole["open"].any()
     assert whole["slide"].any()
+
+
+@pytest.mark.parametrize(
+    ("shape", "parts"),
+    [((9, 2, 3), [4, 4, 1]), ((4, 2, 3), [4]), ((9, 3), [9])],
+    ids=["a long record", "a short record", "one instant"],
+)
+def test_steps_are_taken_in_parts_and_joints_together(shape, parts):
+    """Four steps at a time."""
+    given, taken = np.random.default_rng(1).normal(size=shape), []
+
+    def derive(some, faces):
+        taken.append(len(some))
+        return {"twice N": ("dims", 2.0 * some[..., 0], "attributes")}
+
+    found = resultants_module._derive_in_parts(derive, given, None, 4)
+    assert taken == parts
+    dims, values, attributes = found["twice N"]
+    assert (dims, attributes) == ("dims", "attributes")
+    assert values.tolist() == (2.0 * given[..., 0]).tolist()

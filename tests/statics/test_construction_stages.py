@@ -263,3 +263,21 @@ def test_fill_is_placed_in_layers_of_equal_height(bridge):
         assert k / 3 <= min(own) + 1e-12
         assert max(own) <= (k + 1) / 3 + 1e-12
     assert [each.centring for each in usual_stages(bridge)].count(True) == 1
+
+
+@pytest.mark.parametrize("displacements", ["small", "large"])
+def test_a_state_has_its_own_gaps_on_a_model_that_was_built_otherwise(displacements):
+    """Built in stages or in one go: the first joints of a path are those of the state itself."""
+    piers = af.arch_on_piers(
+        radius=3.0, thickness=0.6, voussoirs=3, pier_breadth=1.2, courses=[0.8, 0.8]
+    )
+    model = af.build(piers, fidelity="rigid", displacements=displacements)
+    states = [af.dead_load(model, stages=stages) for stages in (None, usual_stages(piers))]
+    assert np.abs(states[1].model.initial_gaps).max() > 1e-6
+    for state, other in (states, states[::-1]):
+        path = af.pushover(
+            other.model, af.BodyForce(0.1), start=state, stop=af.statics.Stop(steps=1)
+        )
+        for name in ("N", "V", "M"):
+            found, expected = path.joints[name].values[0], state.joints[name].values
+            assert found == pytest.approx(expected, abs=1e-9 * piers.weight)

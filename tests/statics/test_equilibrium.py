@@ -259,7 +259,7 @@ def test_the_error_also_states_that_a_ring_carries_a_thousandth_of_its_weight():
 
 
 def test_with_cohesion_no_needed_stiffness_is_stated():
-    contact = af.Contact(1e11, 0.2e11, 0.6, cohesion=1.0)
+    contact = af.Contact(1e11, 0.2e11, 0.6, cohesion=0.05)
     ring = thin_ring(1e11).structure
     joints = tuple(replace(joint, contact=contact) for joint in ring.joints)
     glued = af.build(replace(ring, joints=joints), fidelity="rigid", displacements="large")
@@ -288,3 +288,55 @@ def test_the_part_of_a_weight_that_is_carried_is_sought_in_ever_smaller_steps(mo
     assert found == pytest.approx(most)
     roots = 2.0 ** (1.0 / 2.0 ** np.arange(5))  # 1.044, the last, is less than five per cent
     assert tried == pytest.approx([1.0, 0.2, 0.4, *(roots[:-1] * most)])
+
+
+@pytest.mark.parametrize(
+    ("carried", "tried", "most"),
+    [
+        # nothing, the first sixty-fourth, 5 % more than that, no more, and nothing further
+        (
+            [0.0, 1.0 / 64.0, 1.05 / 64.0, 1.05 / 64.0, None],
+            [1.0, 1.0 / 64.0, 2.0 / 64.0, 2.1 / 64.0, 2.0**0.5 * 1.05 / 64.0],
+            1.05 / 64.0,
+        ),
+        ([0.7, 1.0], [1.0, 1.0], 1.0),  # the whole, at a second trial
+        ([None], [1.0], None),
+    ],
+)
+def test_trials_follow_the_part_of_a_weight_that_was_carried(carried, tried, most, monkeypatch):
+    """Twice the largest part is tried next, the whole at most; the root of two where that fails."""
+    weight, loads, left = np.array([0.0, -3.0]), [], list(carried)
+
+    def carry(model, load, newton):
+        part = left.pop(0)
+        loads.append(float(load @ weight / (weight @ weight)))
+        if part is None:
+            raise af.DidNotConverge("", last=None)
+        if part < loads[-1]:
+            state = SimpleNamespace(force=lambda q: part * weight)
+            raise af.DidNotConverge("", last=SimpleNamespace(model=state, q=None))
+
+    monkeypatch.setattr(equilibrium, "equilibrium_under", carry)
+    monkeypatch.setattr(equilibrium, "self_weight", lambda model: weight)
+    model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid")
+    found = equilibrium._find_carried_part(model, None)
+    assert found == (most and pytest.approx(most))
+    assert loads == pytest.approx(tried)
+
+
+def test_the_stiffness_that_is_needed_is_that_of_the_softest_joint(stack, monkeypatch):
+    """0.42 of the weight is carried: joints 2.5 times as stiff carry it with 5 % to spare."""
+    soft, other = stack.joints
+    stiff = replace(other, contact=replace(other.contact, normal_stiffness=7e9))
+    soft = replace(soft, contact=replace(soft.contact, normal_stiffness=2e9))
+    model = af.build(replace(stack, joints=(soft, stiff)), fidelity="rigid")
+
+    def fail(*_):
+        raise af.DidNotConverge("made to fail", last=None)
+
+    monkeypatch.setattr(equilibrium, "equilibrium_under", fail)
+    monkeypatch.setattr(equilibrium, "_find_carried_part", lambda model, newton: 0.42)
+    with pytest.raises(
+        af.DidNotConverge, match=r"if they are 2\.5 times as stiff, k_n from 5e\+09"
+    ):
+        dead_load(model)

@@ -5,10 +5,10 @@ from math import atan2, pi, sqrt
 
 import numpy as np
 import pytest
-from backfilled import arch_bridge
+from backfilled import SOIL, arch_bridge, rectangle
 
 import archfem as af
-from archfem.statics import LIMIT_STATES, LimitState
+from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
 from archfem.statics.mechanism_assessment import spectral_acceleration
 
 G = 9.81
@@ -58,6 +58,13 @@ def test_a_rigid_block(verified):
     expected = {"alpha_0": 0.25, "e_star": 1.0, "a_0_star": a, "d_0_star": d, "T_s": secant}
     expected["M_star"] = 0.6 * 2.4 * STONE / G
     check_values(found, expected, verified, "rigid block 0.6 x 2.4 m")
+    assert str(found).startswith("kinematic assessment of column, pushed to the right\n")
+    assert found.notes == ()
+    periods = np.array([0.1, 1.0, 3.0])
+    displacement, acceleration = found.demand(periods)
+    spectrum = 9.80665 * replace(SPECTRUM, damping=0.08).horizontal(periods)
+    assert acceleration == pytest.approx(spectrum)
+    assert displacement == pytest.approx(spectrum * periods**2 / (4.0 * pi**2))
 
 
 def two_storeys():
@@ -96,6 +103,7 @@ def test_a_wall_of_two_storeys_with_floors(verified):
     d_0 = moved * (weights @ heights**2) / (heights[1] * (weights @ heights))
     expected = {"alpha_0": factor, "e_star": share, "a_0_star": acceleration, "d_0_star": d_0}
     check_values(found, expected, verified, "wall of two storeys with floors")
+    assert "pushed to the left\n" in str(found)
     assert found.control == "second storey"
 
 
@@ -319,6 +327,7 @@ def test_words_table_and_a_mechanism_that_never_moves(ring):
     )
     locked = af.kinematic_assessment(piers, SPECTRUM, part="left pier")
     assert (locked.alpha_0, locked.displacement, locked.passes) == (np.inf, None, True)
+    assert locked.M_star == 0.0
     assert "no horizontal force makes it a mechanism" in str(locked)
 
 
@@ -329,7 +338,8 @@ def test_words_table_and_a_mechanism_that_never_moves(ring):
         ({"friction": "dry"}, "friction 'dry' is not known: use 'coulomb'"),
         ({"limit_state": "SLV"}, "limit_state 'SLV' is not known: use one of"),
         ({"q": 0.5}, "q 0.5 is not between 1 and 10"),
-        ({"confidence_factor": 13.5}, "confidence_factor 13.5 is not between 1 and 2"),
+        ({"q": 10.5}, "q 10.5 is not between 1 and 10"),
+        ({"confidence_factor": 2.1}, "confidence_factor 2.1 is not between 1 and 2"),
         ({"part": "tower"}, "there is no part 'tower' that moves: use one of"),
         ({"blocks": []}, "has none that moves: name some of voussoir 1"),
         ({"blocks": ["voussoir 99"]}, "there is no block 'voussoir 99'"),
@@ -351,8 +361,13 @@ def test_refused_structures_and_rules():
     push = af.masonry.AttachedLoad(1, (0.0, 2.4), force=(2e4, 0.0))
     with pytest.raises(af.InvalidInput, match="does not stand"):
         af.kinematic_assessment(wall, SPECTRUM, loads=[push])
-    with pytest.raises(af.InvalidInput, match="share = 40 is not above 0 and up to 1"):
-        LimitState("x", 40, 2.0, 1.0, 0.05, "")
+    # pushed to the right it stands, and falls to the left by itself
+    leaning = af.Block(((0.0, 0.0), (0.5, 0.0), (-0.4, 1.5), (-0.9, 1.5)), af.STONE, "leaning")
+    base = box(0.0, 0.5, -0.5, 0.0, "base", fixed=True)
+    with pytest.raises(af.InvalidInput, match="does not stand under its own weight"):
+        af.kinematic_assessment(
+            af.Structure((base, leaning), (bed((0, 1), 0.0, 0.5, 0.0),)), SPECTRUM
+        )
     bond = af.Contact(1e9, 1e9, 0.6, cohesion=1e5, tension=1e5)
     bonded = af.column(breadth=0.6, heights=[2.4], contact=bond)
     with pytest.raises(af.InvalidInput, match="tensile strength"):
@@ -361,3 +376,78 @@ def test_refused_structures_and_rules():
         af.masonry.AttachedLoad(1, (0.0, 1.0), weight=-1.0)
     with pytest.raises(af.InvalidInput, match=r"above 1e\+09 N: give newtons"):
         af.masonry.AttachedLoad(1, (0.0, 1.0), weight=1e12)
+
+
+@pytest.mark.parametrize(
+    ("name", "most"),
+    [("share", 1.0), ("period_factor", 10.0), ("secant_share", 1.0), ("damping", 0.5)],
+)
+def test_rules_of_a_code_are_ratios(name, most):
+    rules = LIMIT_STATES["NTC-2018 SLV"]
+    assert getattr(replace(rules, **{name: most}), name) == most
+    for value in (0.0, 1.04 * most):
+        says = f"{name} = {value:.4g} is not above 0 and up to {most:g}"
+        with pytest.raises(af.InvalidInput, match=says):
+            replace(rules, **{name: value})
+
+
+@pytest.mark.parametrize(
+    ("ratio", "passes", "at_rest"),
+    [
+        (0.5, False, False),
+        (0.5 * (1.0 + 0.95e-9), False, False),  # round-off of a ratio of 2 to 4
+        (0.5 * (1.0 + 1.05e-9), False, True),
+        (0.99, False, True),
+        (1.01, True, True),
+    ],
+)
+def test_a_check_is_passed_from_a_ratio_of_one_on(ratio, passes, at_rest):
+    check = AssessmentCheck("of our own", 2.0, 4.0, "m", ratio, 1.0, "a test")
+    assert (check.passes, check.at_rest) == (passes, at_rest)
+
+
+def test_a_fill_rests_on_the_stone_below_it():
+    """Stone and fill turn together about the stone's corner; what rests on rock does not move."""
+    soil = ((0.0, 0.5), (0.5, 0.5), (0.5, 0.0), (1.0, 0.0), (1.0, 1.5), (0.0, 1.5))
+    blocks = [
+        rectangle(0.0, -1.0, 1.0, 0.0, "rock", fixed=True),
+        rectangle(0.0, 0.0, 0.5, 0.5, "stone"),
+        af.Block(soil, SOIL, "soil", role="other"),
+    ]
+
+    def contact(a, b):
+        stones = "soil" not in (a.name, b.name)
+        return af.masonry.STONE_TO_STONE if stones else af.masonry.SOIL_TO_STONE
+
+    structure = af.masonry.assembled(blocks, contact)
+    found = af.kinematic_assessment(structure, SPECTRUM, direction=-1.0, friction=None)
+    weights, heights = np.array([0.25 * STONE, 0.5 * SOIL.unit_weight]), np.array([0.25, 0.5])
+    factor = weights.sum() * 0.25 / (weights @ heights)
+    share, acceleration = oscillator(weights, heights, factor)
+    assert (found.alpha_0, found.e_star) == pytest.approx((factor, share), rel=1e-6)
+    assert found.a_0_star == pytest.approx(acceleration, rel=1e-6)
+    assert "the fill counts as weight" in found.notes[0]
+
+
+def test_sliding_without_dilatancy_is_searched_for_whole_structures_only():
+    """Slabs slide, and a pier turns: then there is nothing to search for."""
+    slabs, pier = (af.column(breadth=b, heights=[h, h]) for b, h in ((4.0, 0.5), (0.6, 1.2)))
+    part = {"blocks": [2], "friction": "nonassociated"}
+    with pytest.raises(af.InvalidInput, match="is searched for the whole structure only"):
+        af.kinematic_assessment(slabs, SPECTRUM, **part)
+    assert af.kinematic_assessment(slabs, SPECTRUM, blocks=[2]).alpha_0 == pytest.approx(0.6)
+    assert af.kinematic_assessment(pier, SPECTRUM, **part).alpha_0 == pytest.approx(0.5)
+
+
+def test_notes_tell_where_the_curve_is_an_upper_bound(ring):
+    """From the last place but one on, and of a factor that is less by a thousandth."""
+    placed = mechanism_assessment.PlacedBlocks.at_rest(RING, (), 1.0)
+    last, factor = len(ring.path.factors) - 1, ring.path.mechanisms[0].factor
+    for holds, share, said in (
+        (last, 0.9995, []),
+        (last - 1, 0.9995, ["beyond d* = "]),
+        (last, 0.99895, ["sliding that dilates"]),
+    ):
+        oscillator = mechanism_assessment._Oscillator(placed, ring.path, holds, False)
+        notes = oscillator.notes(share * factor)
+        assert all(note.startswith(start) for note, start in zip(notes, said, strict=True))

@@ -74,3 +74,35 @@ def test_rounding_is_that_of_the_stiffest_coordinate():
         else:
             with pytest.raises(af.DidNotConverge, match=r"rounding holds it|iterations"):
                 solver.solve(*given, np.zeros(2), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "out_of_balance", "scale", "refused"),
+    [
+        (1.0, 0.98e-10, 1.0, ""),
+        (1.0, 1.02e-10, 1.0, "too many"),
+        (1e7, 1.77e-8, 1.0, ""),
+        (1e7, 1.79e-8, 1.0, "too many"),
+        (1e9, 0.98e-7, 1.0, ""),
+        (1e9, 1.02e-7, 1.0, "too many"),
+        (5.5e14, 0.98e-7, 1e3, ""),
+        (5.8e14, 0.98e-7, 1e3, "nothing but rounding holds it, displaced by 1.0e"),
+    ],
+)
+def test_what_is_out_of_balance_is_accepted_up_to_rounding(
+    stiffness, out_of_balance, scale, refused
+):
+    """A coordinate at 1 m, where rounding is 8 eps K: 17.8 nN for 1e7 N/m, a newton for 5.6e14.
+
+    1e-10 of the load is always accepted, 1e-7 never; rounding of 1e-3 of the load holds nothing.
+    """
+    solver = EquilibriumSolver(1, prefer_scipy=True)
+    tangent = sparse.csr_matrix([[stiffness]])
+    force = np.array([out_of_balance])
+    given = (lambda q: force, lambda q: tangent, np.ones(1), scale, ["basic"])
+    if refused:
+        with pytest.raises(af.DidNotConverge, match=f"after 12 iterations: {refused}"):
+            solver.solve(*given)
+    else:
+        solved = solver.solve(*given)
+        assert (solved.iterations, solved.residual) == (0, out_of_balance)

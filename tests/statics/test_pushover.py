@@ -338,6 +338,19 @@ def test_a_limit_is_extrapolated_from_the_last_doubling():
         found, off = _extrapolate_limit(np.array([0.0, 1.0, 2.0, 4.0]), last)
         assert bool(found == last[-1]) is flat
         assert off == pytest.approx(1e-6 * last[-1]) or not flat
+    # a last step of a 22nd of the way brings half of what one of an eleventh would
+    for last, growth, flat in ((1.0 / 22.0, 0.48e-6, True), (1.0 / 22.0, 0.52e-6, False),
+                               (0.0, 0.95e-6, True)):  # fmt: skip
+        factors = np.array([0.0, 0.1, 1.0 - growth, 1.0])
+        found, _ = _extrapolate_limit(np.array([0.0, 0.3, 1.0 - last, 1.0]), factors)
+        assert bool(found == 1.0) is flat
+    # C is that of the first step beyond half of the way
+    found, off = _extrapolate_limit(
+        np.array([0.0, 0.52, 0.9, 1.0]), np.array([0.0, 0.95, 0.99, 1.0])
+    )
+    assert off == pytest.approx(0.05 / (0.52**-0.5 - 1.0), rel=1e-9)
+    assert found == pytest.approx(1.0 + off, rel=1e-9)
+    assert np.isnan(_extrapolate_limit(np.array([0.0, 2.0, 1.0]), np.array([0.0, 0.9, 1.0]))).all()
     for share, known in ((0.19, True), (0.21, False)):
         root = 2.0**-0.5  # of the displacement half as large, which the last one lies beyond
         rise = share * (1.0 - root) / root
@@ -351,8 +364,8 @@ class Steps:
 
     moving, units = "load", "1"
 
-    def __init__(self, fails=(), iterations=9):
-        self.fails, self.distances, self.each = list(fails), [], iterations
+    def __init__(self, fails=(), slope=1.0):
+        self.fails, self.distances, self.slope = list(fails), [], slope
         self.borders = []
         self.unit, self.states, self.iterations = (1.0, 1.0), [0], [0]
         self.displacements, self.factors = np.zeros(1), [0.0]
@@ -365,9 +378,9 @@ class Steps:
         if self.fails and self.fails.pop(0):
             return False
         self.states.append(0)
-        self.iterations.append(self.each)
+        self.iterations.append(9)
         self.displacements = np.append(self.displacements, self.displacements[-1] + distance)
-        self.factors.append(self.factors[-1] + distance)
+        self.factors.append(self.factors[-1] + self.slope * distance)
         return True
 
 
@@ -380,11 +393,28 @@ def test_steps_grow_by_a_tenth_and_are_halved_where_they_fail():
 
 
 def test_steps_are_given_up_below_a_thousandth_of_the_first():
-    """2^-9 is still tried, 2^-10 is not: then the sliding joints decide the reason."""
+    """2^-9 is still tried, 2^-10 is not, but 1.1 of it: sliding joints then decide the reason."""
     path = Steps([True] * 99)
     with pytest.raises(af.DidNotConverge, match="no equilibrium just after the dead load"):
         follow(path, "force", Stop(), af.Criteria())
     assert path.distances == pytest.approx(0.5 ** np.arange(10))
+    path = Steps([False, *[True] * 99])
+    assert follow(path, "force", Stop(), af.Criteria()).startswith("the load cannot grow beyond")
+    assert path.distances[1:] == pytest.approx(1.1 * 0.5 ** np.arange(11))
+
+
+@pytest.mark.parametrize(
+    ("control", "large", "outcome"),
+    [
+        ("path", False, "the slope fell to 0.05 of the initial one"),
+        ("path", True, "3 steps were taken"),
+        ("force", True, "the slope fell to 0.05 of the initial one"),
+    ],
+)
+def test_a_path_of_large_displacements_continues_past_its_peak(control, large, outcome):
+    path = Steps(slope=0.05)
+    path.model.large_displacements = large
+    assert follow(path, control, Stop(slope=0.06, steps=3), af.Criteria()) == outcome
 
 
 def test_rules_end_a_path_where_they_are_met():
@@ -404,6 +434,8 @@ def test_rules_end_a_path_where_they_are_met():
     assert (
         stop_reason(path, Stop(displacement=1.0, steps=2), criteria, even) == "2 steps were taken"
     )
+    path.factors = [0.0, 0.05]
+    assert stop_reason(path, Stop(displacement=1.0), criteria, even) is None
     path.factors = [0.0, -1e-9]
     assert stop_reason(path, Stop(displacement=1.0), criteria, even) == "it bears no load any more"
     path.units = "N m"

@@ -210,6 +210,10 @@ def test_creep_brings_as_much_load_as_the_step_would_have_brought(monkeypatch):
             np.array(border), distance
         )
         assert path.creep_calls == [(pytest.approx(grown), 9.0)]
+    path = Slow([True])
+    path.factors = [0.395, 0.4]  # 0.05 units in 2 of displacement
+    assert pushover._StepRelaxation(path, af.Criteria(), 9.0).advance(np.array([1.0, 0.0]), 1.0)
+    assert path.creep_calls == [(pytest.approx(0.0025), 9.0)]
     falling, fresh, settled = Slow(), Slow(), SimpleNamespace(states=[0, 0])
     falling.factors, fresh.states = [0.4, 0.4], [0]
     for path in (falling, fresh, settled):
@@ -252,6 +256,9 @@ class RelaxedPath(LoadPath):
         self.displacements = np.append(self.displacements, self.displacements[-1] + 0.5)
         return True
 
+    def advance(self, border, distance):
+        return False
+
 
 @pytest.fixture
 def slides(monkeypatch):
@@ -288,6 +295,30 @@ def test_a_path_has_ended_once_its_slope_is_small_enough():
     assert pushover.stop_reason(RelaxedPath([]), stop, af.Criteria(), moved) == (
         "the slope fell to 0.005 of the initial one"
     )
+
+
+def test_a_path_creeps_where_its_steps_fail_as_far_as_the_rules_let_it(slides):
+    """To a quarter of its size, 8 m; the last step brought two units of way and four of load."""
+    path = RelaxedPath([True])
+    assert pushover.follow(path, "force", STOP, af.Criteria()) == "the load moved by 2.5 m"
+    assert path.creep_calls == [(pytest.approx(0.1), 2.0)]
+
+
+@pytest.mark.parametrize(
+    ("ways", "bend", "longest"),
+    [
+        ([-0.4, 0.0, 0.3], 0.1, (4.0 * 5e-4 * 3.0 / 0.1) ** 0.5),
+        ([-0.2, 0.0, 0.25], 1.0, 0.125),  # but no less than half of the last step
+        ([-0.2, 0.0, 0.297], 1.0, 0.1485),
+        ([-0.2, 0.0, 0.303], 1.0, np.inf),  # 3 % below the peak, which is past
+        ([-0.2, 0.0], 1.0, np.inf),
+    ],
+)
+def test_steps_miss_a_peak_by_a_two_thousandth_of_it(ways, bend, longest):
+    """λ = 3 - bend s²: amid a step L it is higher than at both ends by bend L²/4."""
+    ways = np.array(ways)
+    found = pushover._resolve_peak(3.0 - bend * ways**2, list(np.diff(ways)))
+    assert found == pytest.approx(longest, rel=1e-9)
 
 
 def test_a_rule_ends_the_creep(slides, monkeypatch):
@@ -327,3 +358,16 @@ def test_sliding_joints_are_named_where_nothing_more_is_found(slides, control, g
     assert said == "no equilibrium was found past a factor of 0.4"
     with pytest.raises(af.DidNotConverge, match="just after the dead load"):
         pushover.failure_message(RelaxedPath([], states=1), control, af.Criteria())
+
+
+def test_hinges_of_one_step_are_in_the_order_of_their_eccentricities(stack):
+    """Joint 0 hinges first by less than joint 1 in a case, and a step before it in the other."""
+    for first, expected in ((0.0, ((1, "intrados"), (0, "extrados"))),
+                            (0.47, ((0, "extrados"), (1, "intrados")))):  # fmt: skip
+        rows = np.zeros((3, 2, 3))
+        rows[..., 0] = 1e3  # a joint is 1 m deep
+        rows[1, 0, 2], rows[2, :, 2] = 1e3 * first, (470.0, -490.0)
+        joints = af.joints.joint_dataset(stack, rows, np.arange(3.0)).rename(time="step")
+        hinges, steps = pushover.hinge_order(joints)
+        assert hinges == expected
+        assert steps == ((2, 2) if first == 0.0 else (1, 2))

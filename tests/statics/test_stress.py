@@ -127,7 +127,7 @@ def of_eccentricity(structure, e, normal=2.0e5):
     return af.joints.joint_dataset(structure, rows)
 
 
-@pytest.mark.parametrize("e", [0.0, 0.05, -0.1, 1.0 / 6.0, 0.2, -0.3, 0.45])
+@pytest.mark.parametrize("e", [0.0, 0.05, -0.1, 0.16, 1.0 / 6.0, -0.175, 0.2, -0.3, 0.45])
 def test_edge_stress_is_that_of_a_linear_traction_with_the_same_resultant(stack, e):
     """Integrate the trapezium or triangle with this edge stress: N and N e h must come back."""
     edge = float(joint_stress(stack, of_eccentricity(stack, e))[0])
@@ -142,6 +142,8 @@ def test_edge_stress_is_that_of_a_linear_traction_with_the_same_resultant(stack,
 def test_an_open_joint_has_no_stress_and_a_line_contact_no_bound(stack):
     assert joint_stress(stack, of_eccentricity(stack, 0.0, normal=0.0)).values.tolist() == [0.0] * 2
     assert np.isinf(joint_stress(stack, of_eccentricity(stack, 0.5)).values).all()
+    light = joint_stress(stack, of_eccentricity(stack, 0.0, normal=0.05))
+    assert light.values == pytest.approx(0.05)
 
 
 def test_utilisation_follows_time_and_the_weaker_block(stack):
@@ -168,6 +170,16 @@ def test_the_most_loaded_joint_of_a_run_is_named_but_not_a_hinge(stack):
     )
     still = af.joints.joint_dataset(stack, 0.0 * rows, np.array([0.0, 0.5, 1.0]))
     assert utilisation_text(stack, still).startswith("no use of strength is known")
+
+
+@pytest.mark.parametrize(("step", "again"), [(0, 8300), (8300, 0)])
+def test_the_most_loaded_joint_of_a_long_run_is_found(stack, step, again):
+    """Records are looked at 8192 at a time; joint 1 is pressed hardest once, and joint 0 is not."""
+    rows = np.zeros((8301, 2, 3))
+    rows[..., 0] = 1e5
+    rows[again, 0, 0], rows[step, 1, 0] = 4e5, 5.6e5
+    text = utilisation_text(stack, af.joints.joint_dataset(stack, rows, 0.01 * np.arange(8301)))
+    assert text.endswith(f"0.560 MPa, 1.00% of strength, in joint 1 at {0.01 * step:.3f} s")
 
 
 def pushed_sideways(structure, cells, eccentricity):
@@ -204,6 +216,17 @@ def test_the_use_of_an_unknown_strength_is_no_number(stack):
     assert np.isnan(use["use"].values).all()
     assert "strength" not in strength_use_text(use)
     assert "-" in strength_use_table(use).splitlines()[1]
+
+
+@pytest.mark.parametrize(
+    ("part", "label"), [("", "block 1"), ("block", "block 1"), ("pier", "pier, block 1")]
+)
+def test_a_block_is_named_with_its_part(stack, part, label):
+    """Unless its name begins with that."""
+    use = strength_use(one_cell(stack, [-3e6, 2e4, 0.0]), np.ones(1))
+    text = strength_use_text(use.assign_coords(part=("block", [part, part])))
+    assert text.startswith(f"largest compression 3.000 MPa in {label} (")
+    assert text.endswith(f"largest tension 0.020 MPa in {label}")
 
 
 def test_tension_and_compression_are_reported_by_part(stack):

@@ -87,6 +87,9 @@ BLOCKS = {
     "models.export.write_state": {"magnification": 1.0},
     "models.linear_blocks.build_rigid_model": {"cells": 4},
     "models.model.Prediction": {"small_displacement_error": 0.0},
+    "statics.mechanism_assessment.kinematic_assessment": {
+        **{"direction": 1.0, "q": 2.0, "confidence_factor": 1.35}
+    },
     "statics.pushover.Stop": {"slope": 1e-6, "displacement": 0.1, "steps": 400},
     "statics.newton.Newton": {"tolerance": 1e-10},
 }
@@ -130,8 +133,10 @@ VIEW = {
     "studies.draw_study": {"reduction": 1.0},
 }
 
+CASES = {"run.DeadLoadResult": {"seconds": 0.0}, "run.Run": {"seconds": 0.0}}
+
 TABLES = {"motion": MOTION, "masonry": MASONRY, "": BLOCKS, "dynamics": SHAKEN, "studies": STUDIES}
-TABLES |= {"view": VIEW}
+TABLES |= {"view": VIEW, "cases": CASES}
 DEFAULTS = [
     (f"{room}.{name}".lstrip("."), given)
     for room, table in TABLES.items()
