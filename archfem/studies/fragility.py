@@ -284,9 +284,8 @@ def _moments(low: Array, high: Array, mean: Array, deviation: Array) -> tuple[Ar
 
 def _bracket(samples: Array, ends: Array) -> Array:
     """Brackets of samples, of the median width of the data's brackets."""
-    finite = np.isfinite(ends).all(axis=0)
-    width = float(np.median((ends[1] - ends[0])[finite])) if finite.any() else 0.0
-    if width < 1e-9:
+    widths = (ends[1] - ends[0])[np.isfinite(ends).all(axis=0)]
+    if not len(widths) or (width := float(np.median(widths))) < 1e-9:
         return np.array([samples, samples])
     low = np.floor(samples / width) * width
     return np.array([low, low + width])
