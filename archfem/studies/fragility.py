@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from scipy import stats
-from scipy.special import ndtr
+from scipy.special import ndtr, rel_entr
 
 from archfem._typing import Array
 from archfem._validation import (
@@ -235,7 +235,7 @@ def stripe_fragility(
     drawn = random.binomial(count.astype(int), share, size=size)
     resampled = np.column_stack(_probit(x, drawn.astype(float), count))
     survived = count - failed
-    terms = _deviance(failed, count * share) + _deviance(survived, count * (1.0 - share))
+    terms = rel_entr(failed, count * share) + rel_entr(survived, count * (1.0 - share))
     deviance = 2.0 * float(np.sum(terms))
     goodness = float(stats.chi2.sf(deviance, max(len(x) - 2, 1)))
     misfit = float(np.abs(failed / count - share).max())
@@ -272,7 +272,7 @@ def _moments(low: Array, high: Array, mean: Array, deviation: Array) -> tuple[Ar
     a, b = (low - mean) / deviation, (high - mean) / deviation
     exact = high - low < 1e-9  # the formulas of a truncated normal would divide 0 by 0
     share = np.where(exact, 1.0, np.maximum(_between(a, b), 1e-300))
-    dense_a, dense_b = (np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi) for z in (a, b))
+    dense_a, dense_b = _density(a), _density(b)
     shift = (dense_a - dense_b) / share
     at_a = np.where(np.isfinite(a), a, 0.0) * dense_a
     at_b = np.where(np.isfinite(b), b, 0.0) * dense_b
@@ -284,12 +284,16 @@ def _moments(low: Array, high: Array, mean: Array, deviation: Array) -> tuple[Ar
 
 def _bracket(samples: Array, ends: Array) -> Array:
     """Brackets of samples, of the median width of the data's brackets."""
-    finite = np.isfinite(ends).all(axis=0)
-    width = float(np.median((ends[1] - ends[0])[finite])) if finite.any() else 0.0
-    if width < 1e-9:
+    widths = (ends[1] - ends[0])[np.isfinite(ends).all(axis=0)]
+    if not len(widths) or (width := float(np.median(widths))) < 1e-9:
         return np.array([samples, samples])
     low = np.floor(samples / width) * width
     return np.array([low, low + width])
+
+
+def _density(z: Array) -> Array:
+    """Density of the standard normal distribution."""
+    return np.asarray(np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi))
 
 
 def _between(a: Array, b: Array) -> Array:
@@ -322,8 +326,7 @@ def _probit(x: Array, failed: Array, count: Array) -> tuple[Array, Array]:
     smallest, largest = (width / dispersion for dispersion in reversed(DISPERSION_RANGE))
     for _ in range(200):
         z = np.clip(intercept[:, None] + slope[:, None] * s, -8.0, 8.0)
-        share = np.clip(ndtr(z), 1e-12, 1.0 - 1e-12)
-        density = np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi)
+        share, density = np.clip(ndtr(z), 1e-12, 1.0 - 1e-12), _density(z)
         # Fisher information (a, b; b, c) and score (u, v) of intercept and slope
         weight = count * density**2 / (share * (1.0 - share))
         score = (failed - count * share) * density / (share * (1.0 - share))
@@ -337,9 +340,3 @@ def _probit(x: Array, failed: Array, count: Array) -> tuple[Array, Array]:
         if max(np.abs(step).max(), np.abs(rise).max()) < 1e-9:
             break
     return np.exp(centre - width * intercept / slope), width / slope
-
-
-def _deviance(observed: Array, expected: Array) -> Array:
-    """Terms of half the deviance; 0 for no observation."""
-    ratio = np.where(observed > 0.0, observed / np.maximum(expected, 1e-300), 1.0)
-    return observed * np.log(ratio)

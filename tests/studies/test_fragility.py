@@ -25,21 +25,52 @@ def test_exact_capacities_give_mean_and_deviation_of_their_logarithms():
     assert found.misfit == pytest.approx(stats.kstest(capacities, fitted.cdf).statistic, rel=1e-6)
 
 
-def test_censored_capacities_give_the_curve_of_largest_likelihood():
+@pytest.mark.parametrize("width", [0.0, 0.1, 0.5])
+def test_censored_capacities_give_the_curve_of_largest_likelihood(width):
+    """Capacities up to 3.5, exact or in brackets, and larger ones of which no more is known."""
     capacities = drawn(60)
-    lower, upper = 0.9 * capacities, 1.1 * capacities
+    lower, upper = (1.0 - width) * capacities, (1.0 + width) * capacities
     beyond = capacities > 3.5
     lower[beyond], upper[beyond] = 3.5, np.inf
-    found = fragility(upper, lower)
+    found = fragility(upper, lower, resamples=1)
 
     def unlikely(parameters):
         mean, deviation = parameters[0], np.exp(parameters[1])
         low, high = (stats.norm.cdf(np.log(end), mean, deviation) for end in (lower, upper))
-        return -np.log(high - low).sum()
+        density = stats.norm.pdf(np.log(lower), mean, deviation)
+        return -np.log(np.where(lower == upper, density, high - low)).sum()
 
     best = optimize.minimize(unlikely, [0.5, -0.5], method="Nelder-Mead", tol=1e-10).x
     assert np.log(found.median) == pytest.approx(best[0], abs=1e-6)
     assert np.log(found.dispersion) == pytest.approx(best[1], abs=1e-6)
+    # of the empirical curve, up to where it is known
+    known = np.sort(0.5 * (np.log(lower) + np.log(upper)))
+    fitted = stats.norm.cdf(known[~np.isinf(known)], np.log(found.median), found.dispersion)
+    steps = np.arange(len(fitted) + 1) / len(capacities)
+    ends = np.abs(fitted - steps[:-1]), np.abs(fitted - steps[1:])
+    assert found.misfit == pytest.approx(np.max(ends), abs=1e-9)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_motion_far_from_all_others_keeps_its_weight(side):
+    """Fourteen deviations from 199 others, in a bracket too narrow to matter: of 1 in 10,000."""
+    logarithms = np.append(1e-3 * np.sin(np.arange(199.0)), side)
+    found = fragility(np.exp(logarithms + 5e-5), np.exp(logarithms - 5e-5), resamples=1)
+    assert np.log(found.median) == pytest.approx(logarithms.mean(), rel=1e-6)
+    assert found.dispersion == pytest.approx(logarithms.std(), rel=1e-6)
+
+
+def test_samples_of_the_bootstrap_are_fits_of_motions_that_are_drawn_again():
+    """All of them to the same digits, though some converge later than others."""
+    upper = drawn(20)
+    lower = np.array([0.2, 0.9] * 10) * upper
+    lower[-3:], upper[-3:] = 1.0, np.inf
+    found = fragility(upper, lower, resamples=9, seed=4)
+    again = np.random.default_rng(4).integers(20, size=(9, 20))
+    alone = [fragility(upper[k], lower[k], resamples=1) for k in again]
+    assert found.resampled == pytest.approx(
+        np.array([(each.median, each.dispersion) for each in alone]), rel=1e-7
+    )
 
 
 def test_many_samples_recover_their_curve():
@@ -86,6 +117,19 @@ def test_goodness_rejects_samples_that_are_not_lognormal():
     assert fragility(drawn(60)).goodness > 0.05
     uneven = stripe_fragility([1.0, 2.0, 3.0, 4.0], [1, 18, 3, 19], 20)
     assert uneven.goodness < 0.01
+
+
+@pytest.mark.parametrize(("width", "apart"), [(0.5, 0.0), (0.5, 3.0), (0.1, 3.0)])
+def test_goodness_does_not_judge_the_steps_of_brackets(width, apart):
+    """Brackets of a factor of 1.6 make steps of a curve which no exact samples have.
+
+    Two heaps are no lognormal, in coarse brackets and in fine ones.
+    """
+    logarithms = np.log(drawn(200)) + apart * np.sign(np.arange(200) - 99.5)
+    below = np.floor(logarithms / width) * width
+    found = fragility(np.exp(below + width), np.exp(below), resamples=200)
+    assert (found.goodness > 0.05) is (apart == 0.0)
+    assert fragility(np.exp(below + 0.5 * width), resamples=200).goodness < 0.05
 
 
 def test_a_curve_states_its_median_and_dispersion():
