@@ -35,6 +35,8 @@ def test_a_pier_stands_whatever_its_stones(stack):
 def test_a_straight_part_runs_to_the_right_and_points_upwards():
     way = Direction(np.zeros(2), None, upright=False)
     assert way.outward(np.array([3.0, 1.0])).tolist() == [0.0, 1.0]
+    pier = Direction(np.zeros(2), None, upright=True)
+    assert pier.outward(np.array([3.0, 1.0])).tolist() == [1.0, 0.0]
     assert way.along(np.array([3.0, 1.0])) == 3.0
     assert way.separates(np.array([[1.0, 0.0], [1.2, 0.5]]))
 
