@@ -334,9 +334,11 @@ def _probit(x: Array, failed: Array, count: Array) -> tuple[Array, Array]:
         u, v = score.sum(1), (score * s).sum(1)
         determinant = np.maximum(a * c - b**2, 1e-12)
         # steps are limited, since the likelihood is flat far from the optimum
-        step = np.clip((c * u - b * v) / determinant, -1.0, 1.0)
-        rise = np.clip((a * v - b * u) / determinant, -1.0, 1.0)
-        intercept, slope = intercept + step, np.clip(slope + rise, smallest, largest)
+        steeper = slope + np.clip((a * v - b * u) / determinant, -1.0, 1.0)
+        rise = np.clip(steeper, smallest, largest) - slope
+        # of the slope as it will be, which may be at its limit
+        step = np.clip((u - b * rise) / np.maximum(a, 1e-12), -1.0, 1.0)
+        intercept, slope = intercept + step, slope + rise
         if max(np.abs(step).max(), np.abs(rise).max()) < 1e-9:
             break
     return np.exp(centre - width * intercept / slope), width / slope

@@ -98,6 +98,24 @@ def test_stripes_give_the_curve_of_largest_likelihood():
     assert found.goodness > 0.05
 
 
+@pytest.mark.parametrize("failed", [[0, 2, 8, 10], [0, 1, 6, 10], [2, 3, 5, 7]])
+def test_samples_of_stripes_are_curves_of_largest_likelihood(failed):
+    """No curve of a grid is likelier, also where all motions of a sample fail from one level on."""
+    levels = np.array([1.0, 1.5, 2.0, 3.0])
+    found = stripe_fragility(levels, failed, 10, resamples=100, seed=1)
+    counts = np.random.default_rng(1).binomial(10, found.probability(levels), size=(100, 4))
+
+    def likelihood(medians, dispersions):
+        share = stats.norm.cdf(np.log(levels / medians[:, None]) / dispersions[:, None])
+        return stats.binom.logpmf(counts, 10, share).sum(axis=1)
+
+    own = likelihood(*found.resampled.T)
+    for median in np.geomspace(0.9, 3.3, 24):
+        for dispersion in np.geomspace(0.005, 2.0, 16):
+            other = likelihood(np.full(100, median), np.full(100, dispersion))
+            assert (own >= other - 1e-6).all()
+
+
 def test_confidence_bands_hold_the_truth_at_their_stated_rate():
     """47 or more of 60 intervals of 90 %, by 40 motions each, hold it but for one case in 500."""
     held = 0
