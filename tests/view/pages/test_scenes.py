@@ -61,7 +61,7 @@ def test_where_there_is_little_room_steps_are_left_out(rocked):
     assert np.abs(found["time"][0] - data["still"]).min() < 1e-5
 
 
-def test_frames_are_those_that_can_be_told_apart(stack):
+def test_frames_are_those_that_differ_for_the_eye(stack):
     """Of 200 fields a second 40 are kept, and the last."""
     model = af.build(stack, fidelity="rigid")
     motion = af.Motion.synthetic(seed=1, duration=0.32, pga=6.0)
