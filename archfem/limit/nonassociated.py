@@ -202,10 +202,11 @@ class NonassociatedBounds:
         text = "were not found"
         if np.isfinite(weakest):
             text = f"found from {weakest:.4g} to {strongest:.4g}"
-        return (
-            f"solutions without dilatancy {text} ({successful} of {tried} starts); all lie from "
-            f"{lower:.4g} to {upper:.4g}"
-        )
+        # a load that no associated factor limits has a lower bound alone
+        limits = f"all lie from {lower:.4g} to {upper:.4g}"
+        if np.isinf(upper):
+            limits = f"none is below {lower:.4g}"
+        return f"solutions without dilatancy {text} ({successful} of {tried} starts); {limits}"
 
 
 def search_nonassociated(

@@ -31,6 +31,9 @@ from archfem._validation import (
 )
 from archfem.errors import InvalidInput
 
+# Largest number of motions at a level [-]
+MAX_MOTIONS = 1e9
+
 # Smallest and largest dispersion of a fit [-]
 DISPERSION_RANGE = (0.005, 5.0)
 
@@ -223,6 +226,8 @@ def stripe_fragility(
             f"{failed.tolist()} of {count.tolist()} motions fail at levels {x.tolist()}: give "
             f"3 levels or more above 0, and at each no more failures than motions"
         )
+    if (count > MAX_MOTIONS).any() or (count % 1.0).any():
+        raise InvalidInput(f"{count.tolist()} motions: give whole numbers up to {MAX_MOTIONS:g}")
     if not ((failed > 0.0) & (failed < count)).any():
         raise InvalidInput(
             f"{failed.tolist()} of {count.tolist()} motions fail: at no level some do and some do "

@@ -354,6 +354,7 @@ def test_where_dilatancy_locks_a_strut_solutions_may_have_any_factor_above_a_bou
     found = af.collapse_factor(strut, live=af.PointLoad(0.0, (0.0, -1e4)), friction="nonassociated")
     assert found.factor == np.inf
     assert 0.0 < found.solutions.bracket[0] < found.solutions.bracket[1] == np.inf
+    assert f"none is below {found.solutions.bracket[0]:.4g}" in str(found.solutions)
 
 
 def programmed(structure):

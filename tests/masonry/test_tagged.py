@@ -10,7 +10,7 @@ from archfem.masonry.survey import outlines
 from archfem.masonry.survey.drawings import infer_part, read_physical_surfaces
 
 gmsh = pytest.importorskip("gmsh")
-pytest.importorskip("meshio")
+meshio = pytest.importorskip("meshio")
 
 LAYERS = {"ground": af.masonry.Layer(fixed=True), "pier": af.masonry.Layer()}
 
@@ -198,6 +198,18 @@ def test_a_damaged_mesh_is_refused_in_words(before, after, says, tmp_path):
     assert before in WORDS
     path.write_text(WORDS.replace(before, after))
     with pytest.raises(af.InvalidInput, match=says):
+        read_physical_surfaces(path)
+
+
+@pytest.mark.parametrize("left", [1, 2])
+def test_a_mesh_cut_off_in_its_cells_is_refused(left, tmp_path):
+    path = own(tmp_path / "own.msh", binary=True)
+    *_, last = meshio.gmsh.read(path).cells
+    whole = path.read_bytes()
+    # a triangle has four numbers of eight bytes: its own and three corners
+    cut = (4 - left) * 8 * len(last.data)
+    path.write_bytes(whole[: whole.index(b"\n$EndElements") - cut])
+    with pytest.raises(af.InvalidInput, match=r"\(triangle\) have no 3 nodes"):
         read_physical_surfaces(path)
 
 

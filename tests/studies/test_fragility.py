@@ -190,6 +190,9 @@ def test_invalid_capacities_are_refused(given, says):
         fragility(*given)
     with pytest.raises(af.InvalidInput, match="no more failures"):
         stripe_fragility([1.0, 2.0, 3.0], [0, 5, 21], 20)
+    for motions in (2**63, 20.5):
+        with pytest.raises(af.InvalidInput, match="give whole numbers up to 1e"):
+            stripe_fragility([1.0, 2.0, 3.0], [0, 5, 10], motions)
     with pytest.raises(af.InvalidInput, match="try levels between"):
         stripe_fragility([1.0, 2.0, 3.0], [0, 0, 20], 20)
 

@@ -358,6 +358,10 @@ def _load_msh(
                 f"cells ({kind}) have nodes that are not in the file: save the whole mesh"
             )
         if kind in corners:
+            if numbers.size == 0 or numbers.shape[1] < corners[kind]:
+                raise InvalidInput(
+                    f"cells ({kind}) have no {corners[kind]} nodes: save the whole mesh"
+                )
             for cell, tag in zip(numbers[:, : corners[kind]], of_group.tolist(), strict=True):
                 cells.setdefault(tag, []).append(cell)
     names = {tag: name for name, tag, size in groups if size == dimension}
