@@ -34,6 +34,22 @@ def test_two_spans_on_piers_of_different_height():
     assert af.stands(arcade)
 
 
+def test_clear_spans_are_between_the_faces_of_piers():
+    arcade = shapes.arcade(
+        spans=[4.0, 5.0],
+        embraces=170.0,
+        thicknesses=0.6,
+        voussoirs=[9, 11],
+        heights=2.0,
+        breadths=[1.4, 1.8, 1.5],
+    )
+    names = ["arch 1, joint 0", "arch 1, joint 9", "arch 2, joint 0", "arch 2, joint 11"]
+    feet = [arcade.joints[arcade.joint_number(name)].intrados[0] for name in names]
+    assert np.diff(feet) == pytest.approx([4.0, 1.8, 5.0], rel=1e-12)
+    polygons = [shapely.Polygon(block.points) for block in arcade.blocks]
+    assert sum(p.area for p in polygons) == pytest.approx(shapely.union_all(polygons).area)
+
+
 def test_an_arch_between_buttresses():
     """Its buttresses hold the thrust from some breadth on, and overturn below."""
     given = {"span": 5.0, "embrace": 150.0, "thickness": 0.5, "voussoirs": 15, "height": 3.0}

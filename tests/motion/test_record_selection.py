@@ -181,6 +181,26 @@ def test_each_bound_decides_where_it_is_tight(folder):
     assert nearest.shortfall == pytest.approx(nearest.bounds[1] - 1.2)
 
 
+def test_where_all_records_are_too_strong_the_set_nearest_to_the_upper_bound_is_given(folder):
+    """All have the least scale; the nearest of all sets has the smallest largest ratio."""
+    paths = sorted(folder.glob("*0.AT2"))
+    periods = np.geomspace(0.06, 0.6, 60)
+    spectra = np.array([response_spectrum(af.Motion.read(path), periods) for path in paths])
+    ratios = 20.0 * spectra / (CODE.horizontal(periods) * af.units.STANDARD_GRAVITY)
+    sets = [
+        numbers
+        for numbers in combinations(range(len(paths)), 3)
+        if len({paths[k].name[:4] for k in numbers}) == 3
+    ]
+    best = min(sets, key=lambda numbers: ratios[list(numbers)].mean(axis=0).max())
+    rule = replace(SELECTION_RULES["EC8"], upper=1.2)
+    with pytest.raises(af.DidNotConverge) as caught:
+        af.select_records(folder, CODE, 0.3, count=3, rule=rule, scales=(20.0, 30.0))
+    assert [record.motion.name for record in caught.value.last.records] == [
+        paths[k].stem for k in best
+    ]
+
+
 def test_pairs_are_selected_by_the_median_of_directions(tmp_path):
     for seed in range(3):
         for direction in (0, 90):
