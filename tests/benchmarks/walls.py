@@ -1,13 +1,14 @@
 """Walls of loose stones: time of a step, settling of impulses, and LMGC90 at equal displacement.
 
     python tests/benchmarks/walls.py [PYTHON] [--tolerances 1e-2 1e-3 1e-4] [--steps 50]
+    python tests/benchmarks/walls.py --sine 2 --steps 500
 
 PYTHON is an interpreter with compas_lmgc90, as prisms.py says; without it only archfem runs. Walls
-in running bond stand under a constant ground acceleration at a friction of 0.6. Given are the
-largest displacement of a stone relative to the ground, the processor time of a step, the sweeps
-over the contacts in the median step, and the share of steps whose impulses did not settle. Walls
-up to 405 stones under 0.8 g, which slide on their foundation and in their beds, are compared with
-LMGC90 at several of its tolerances, in the same run.
+in running bond stand under a constant ground acceleration, or a sine, at a friction of 0.6. Given
+are the largest displacement of a stone relative to the ground, the processor time of a step, the
+sweeps over the contacts in the median step, and the share of steps whose impulses did not settle.
+Walls up to 405 stones under a constant 0.8 g, which slide on their foundation and in their beds,
+are compared with LMGC90 at several of its tolerances, in the same run.
 """
 
 from collections.abc import Sequence
@@ -33,10 +34,11 @@ COMPARED = 405
 """Stones of the largest wall given to LMGC90."""
 
 
-def by_archfem(structure: af.Structure, peak: float, steps: int) -> list[float]:
+def by_archfem(structure: af.Structure, accelerations: np.ndarray) -> list[float]:
     """Return displacement [mm], time of a step [ms], sweeps of the median step, share unsettled."""
+    steps = len(accelerations) - 1
     simulation = af.dynamics.RigidBlockSimulation(structure, dt=DT)
-    ground = af.Motion(np.full(steps + 1, peak * G), DT)
+    ground = af.Motion(accelerations, DT)
     start = af.dynamics.LooseBlocks.as_built(structure)
     simulation.final_frame(start, 2.0 * DT, ground)  # compiles
     spent = []
@@ -44,11 +46,11 @@ def by_archfem(structure: af.Structure, peak: float, steps: int) -> list[float]:
         watch = stopwatch()
         end = simulation.final_frame(start, count * DT, ground)
         spent.append(1e3 * watch()[1])
-    frames = simulation.frames(start, steps * DT, ground, spacing=DT)
+    frames = list(simulation.frames(start, steps * DT, ground, spacing=DT))
     sweeps = np.diff([frame.settling.sweeps for frame in frames])
     # the first step has no impulses to begin with, and is left out for LMGC90 too
     return [
-        1e3 * float(np.abs(end.poses[:, 0]).max()),
+        1e3 * max(float(np.abs(frame.poses[:, 0]).max()) for frame in frames),
         (spent[1] - spent[0]) / (steps - 1),
         float(np.median(sweeps[1:])),
         end.settling.unsettled_share,
@@ -63,21 +65,25 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--steps", type=int, default=50)
     parser.add_argument("--walls", nargs="+", type=int, default=list(WALLS), choices=list(WALLS))
     parser.add_argument("--peaks", nargs="+", type=float, default=list(PEAKS))
+    parser.add_argument("--sine", type=float, default=None, help="frequency, else constant [Hz]")
     chosen = parser.parse_args(arguments)
     if chosen.python is None:
         print_left_out("LMGC90, as no Python interpreter with compas_lmgc90 is given")
     if chosen.quick:
         chosen.walls, chosen.steps, chosen.tolerances, chosen.peaks = [51], 5, [1e-2], [0.8]
+    shape = np.ones(chosen.steps + 1)
+    if chosen.sine is not None:
+        shape = np.sin(2.0 * np.pi * chosen.sine * DT * np.arange(chosen.steps + 1))
     rows = []
     for count in chosen.walls:
         structure = wall(*WALLS[count])
         assert len(structure.free) == count, len(structure.free)
         for peak in chosen.peaks:
-            moved, spent, sweeps, unsettled = by_archfem(structure, peak, chosen.steps)
+            moved, spent, sweeps, unsettled = by_archfem(structure, peak * G * shape)
             row = [f"{count}", f"{peak:g}", "archfem", f"{moved:.2f}", f"{spent:.2f}", ""]
             rows.append([*row, f"{sweeps:.0f}", f"{unsettled:.3f}"])
             print(*rows[-1], flush=True)
-        if chosen.python is None or count > COMPARED or peak < 0.8:
+        if chosen.python is None or chosen.sine or count > COMPARED or peak < 0.8:
             continue
         times = DT * np.arange(chosen.steps + 2)
         for tolerance in chosen.tolerances:
