@@ -31,7 +31,7 @@ from archfem._validation import (
 )
 from archfem.errors import InvalidInput
 
-# Largest number of motions at a level [-]
+# Largest number of motions at a level, far below where integers of the bootstrap overflow [-]
 MAX_MOTIONS = 1e9
 
 # Smallest and largest dispersion of a fit [-]
@@ -204,7 +204,7 @@ def stripe_fragility(
     Args:
         levels: intensities above 0 (n,).
         failures: number of motions that fail at each level (n,).
-        motions: number of motions at each level (n,), or one number for all.
+        motions: whole number of motions at each level (n,), or one number for all.
         resamples: number of bootstrap samples.
         seed: seed of the bootstrap.
 
@@ -212,8 +212,9 @@ def stripe_fragility(
         The curve of maximum likelihood for binomial counts.
 
     Raises:
-        InvalidInput: there are fewer than three levels, counts are out of range, or they do not
-            determine the dispersion: no motion fails up to one level, and all from the next.
+        InvalidInput: there are fewer than three levels, counts are out of range, motions are not
+            whole numbers, or the dispersion is undetermined: no motion fails up to one level, and
+            all from the next.
     """
     x = np.array(check_numbers(levels, "levels"))
     count = check_array(motions, "motions")

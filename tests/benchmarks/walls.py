@@ -65,14 +65,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--steps", type=int, default=50)
     parser.add_argument("--walls", nargs="+", type=int, default=list(WALLS), choices=list(WALLS))
     parser.add_argument("--peaks", nargs="+", type=float, default=list(PEAKS))
-    parser.add_argument("--sine", type=float, default=None, help="frequency, else constant [Hz]")
+    parser.add_argument("--sine", type=float, help="frequency, else constant [Hz]")
     chosen = parser.parse_args(arguments)
     if chosen.python is None:
         print_left_out("LMGC90, as no Python interpreter with compas_lmgc90 is given")
     if chosen.quick:
         chosen.walls, chosen.steps, chosen.tolerances, chosen.peaks = [51], 5, [1e-2], [0.8]
     shape = np.ones(chosen.steps + 1)
-    if chosen.sine is not None:
+    if chosen.sine:
         shape = np.sin(2.0 * np.pi * chosen.sine * DT * np.arange(chosen.steps + 1))
     rows = []
     for count in chosen.walls:
