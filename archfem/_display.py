@@ -12,6 +12,13 @@ from typing import Any, Self
 
 # "Class.method": "module:function" below archfem; the function takes the instance first.
 LATE_BOUND_METHODS: Mapping[str, str] = {
+    "Analysis.accuracy": "dynamics.accuracy:accuracy",
+    "Analysis.ida": "studies.ida:ida",
+    "Analysis.mesh_sensitivity": "studies.convergence:mesh_sensitivity",
+    "Analysis.run": "dynamics.time_history:time_history",
+    "Analysis.scale": "dynamics.motion_scaling:collapse_scale",
+    "Analysis.verdict_range": "studies.variations:verdict_range",
+    "Analysis.write": "cases.case:write_analysis",
     "CaseResult.player": "cases.report.report:player_of_case",
     "CaseResult.report": "cases.report.report:write_report_of_case",
     "Collapse.plot": "view.collapse:draw_collapse_result",

@@ -13,9 +13,11 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import fields, is_dataclass
 from glob import escape
+from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -262,6 +264,29 @@ def read_sealed_json(path: Path, what: str) -> Any:
 def hash_json(content: Any) -> str:
     """Return the SHA-256 of what JSON can represent."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def hash_value(value: Any) -> str:
+    """Return the SHA-256 of dataclasses, tables, rows, numbers and texts within each other."""
+    return hash_json(_reduce_to_json(value))
+
+
+def _reduce_to_json(value: Any) -> Any:
+    """Return a value as JSON: numbers as floats, files by content, functions by name."""
+    if is_dataclass(value) and not isinstance(value, type):
+        own = {each.name: getattr(value, each.name) for each in fields(value) if each.compare}
+        return {type(value).__qualname__: _reduce_to_json(own)}
+    if isinstance(value, Mapping):
+        return {str(key): _reduce_to_json(each) for key, each in value.items()}
+    if isinstance(value, Path):
+        return hash_content(value) if value.is_file() else "missing"
+    if value is None or isinstance(value, str | bool):
+        return value
+    if isinstance(value, Real):
+        return float(value)
+    if isinstance(value, Iterable):
+        return [_reduce_to_json(each) for each in value]
+    return f"{getattr(value, '__module__', '')}:{getattr(value, '__qualname__', repr(value))}"
 
 
 def read_file_list(folder: Path) -> dict[str, FileGroup]:

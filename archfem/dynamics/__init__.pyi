@@ -27,7 +27,7 @@ from .solvers.integrator import Stepper as Stepper
 from .solvers.snes import SnesSolver as SnesSolver
 from .state import Batch as Batch
 from .state import State as State
-from .time_history import Record as Record
+from .recorder import Record as Record
 from .time_history import last_state as last_state
 from .verdict import MECHANISM_DEFINITIONS as MECHANISM_DEFINITIONS
 from .verdict import DetectedMechanism as DetectedMechanism

@@ -23,11 +23,11 @@ from scipy.sparse.linalg import eigsh
 from archfem._threads import single_threaded
 from archfem._typing import Array
 from archfem.dynamics.monitor import RunMonitor
+from archfem.dynamics.recorder import start_batch
 from archfem.dynamics.schemes import StiffnessDamping, Viscous
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.selection import stepper_for
 from archfem.dynamics.state import State
-from archfem.dynamics.time_history import start_batch
 from archfem.errors import DidNotConverge
 from archfem.joints.criteria import assessed_joints
 from archfem.joints.resultants import eccentricity_and_friction

@@ -15,6 +15,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from archfem._validation import check_number, check_type
+from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.error_estimation import (
     RunPeaks,
     default_damping,
@@ -24,7 +25,7 @@ from archfem.dynamics.error_estimation import (
     severe_motion,
     strongest_window,
 )
-from archfem.dynamics.schemes import Viscous
+from archfem.dynamics.schemes import EffectiveDamping, Viscous, interpret_damping
 from archfem.errors import InvalidInput
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.stiffness_ratio import find_soft_blocks
@@ -36,9 +37,6 @@ from archfem.models.model import Doubt, Model, Prediction
 from archfem.motion.motion import Motion
 
 logger = logging.getLogger("archfem")
-
-# Damping of the run, or a function that returns it for the first model
-DampingChoice = Viscous | Callable[[Model], Viscous | None] | None
 
 Builder = Callable[[Structure, Discretisation], Model]
 
@@ -64,7 +62,7 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
     points: int | None = None,
     tolerance: float = 0.005,
     motion: Motion | None = None,
-    damping: DampingChoice = None,
+    damping: Viscous | EffectiveDamping | str | None = None,
     dt: float | None = None,
     displacements: str = "small",
     file: str | Path | None = None,
@@ -96,8 +94,8 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
         tolerance: for "auto", tolerance on the largest |e| of every joint [-].
         motion: for "auto", ground motion of the analysis; without it the prediction is less
             reliable, from a synthetic motion that brings |e| to 0.4.
-        damping: for "auto", damping of the analysis, or a function that returns it for a model; it
-            is called once, for the first model tried.
+        damping: for "auto", damping of the analysis, as for `time_history`; effective modes are
+            those of the first model tried.
         dt: for "auto", time step of the analysis [s]; without it a time step is selected too. Its
             error counts either way.
         displacements: "small", or "large" for finite rotations, sliding and falls; not with
@@ -122,7 +120,14 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
             raise InvalidInput(
                 f"file = {str(file)!r} is one mesh, and 'auto' chooses: name a fidelity"
             )
-        return select_model(structure, tolerance, motion, damping, dt, displacements=displacements)
+        return select_model(
+            structure,
+            tolerance,
+            motion,
+            interpret_damping(damping),
+            dt,
+            displacements=displacements,
+        )
     settings = Discretisation(
         fidelity, cells, cell, coarse, degree, quadrature, points, displacements, file
     )
@@ -154,7 +159,7 @@ def select_model(
     structure: Structure,
     tolerance: float,
     motion: Motion | None = None,
-    damping: DampingChoice = None,
+    damping: Viscous | EffectiveDamping | None = None,
     dt: float | None = None,
     *,
     displacements: str = "small",
@@ -214,7 +219,7 @@ def _try_settings(
     settings: Sequence[tuple[Discretisation, float]],
     tolerance: float,
     motion: Motion | None,
-    damping: DampingChoice,
+    damping: Viscous | EffectiveDamping | None,
     builder: Builder,
 ) -> tuple[list[_Trial], list[list[float]]]:
     """Return settings tried until one is accurate enough, and all errors after each trial."""
@@ -259,10 +264,10 @@ def _select_trial(
 
 
 def _resolve_excitation(
-    model: Model, motion: Motion | None, damping: DampingChoice
+    model: Model, motion: Motion | None, damping: Viscous | EffectiveDamping | None
 ) -> tuple[Motion, Viscous | None, float]:
     """Return the strongest part of a motion, the damping, and this part's share of the duration."""
-    structure, viscous = model.structure, resolve_damping(model, damping)
+    structure, (viscous, _) = model.structure, resolve_effective_damping(damping, model, None)
     if motion is None or viscous is None:
         soil = bool(find_soft_blocks(structure))
         probe = model if soil else build_rigid_model(structure, rule=Quadrature("exact"))
@@ -270,11 +275,6 @@ def _resolve_excitation(
         viscous = viscous or default_damping(probe)
     window = strongest_window(motion)
     return window, viscous, window.duration / motion.duration
-
-
-def resolve_damping(model: Model, damping: DampingChoice) -> Viscous | None:
-    """Return the damping, evaluated for the model if it is given as a function."""
-    return damping(model) if callable(damping) else damping
 
 
 def _stagnates(history: Sequence[Sequence[float]]) -> bool:

@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
+from archfem._validation import check_integer
 from archfem.dynamics.fall import list_stones
 from archfem.dynamics.history import (
     COORDINATES_VERSION,
@@ -20,11 +21,45 @@ from archfem.dynamics.history import (
     corner_displacements,
 )
 from archfem.dynamics.monitor import RunMonitor
+from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.state import Batch, State
 from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_dataset
 from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """Which steps of a run are recorded.
+
+    Attributes:
+        every: interval of steps at which joint resultants are recorded.
+        fields_every: interval of steps at which coordinates q are recorded, for pictures of the
+            whole structure and for stress; None for none.
+    """
+
+    every: int = 1
+    fields_every: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse intervals below one."""
+        check_integer(self.every, "record every")
+        if self.fields_every is not None:
+            check_integer(self.fields_every, "record fields_every")
+
+
+def start_batch(stepper: Stepper, start: State, dt: float) -> Batch:
+    """Return the start of a run as a batch of one step."""
+    equation = stepper.equation
+    return Batch(
+        np.array([start.time]),
+        equation.with_memory(start).resultants(equation.contact(start))[None],
+        np.zeros(1, dtype=np.int64),
+        np.array([dt]),
+        equation.energy(start)[None],
+        lambda _: start,
+    )
 
 
 class GrowingArray:

@@ -10,7 +10,7 @@ from math import pi
 
 import numpy as np
 
-from archfem._validation import check_number, check_numbers, is_one_of
+from archfem._validation import check_number, check_numbers, is_one_of, short_repr
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 
@@ -119,12 +119,21 @@ Viscous = Rayleigh | StiffnessDamping
 
 @dataclass(frozen=True)
 class EffectiveDamping:
-    """Damping settings of a case; the frequencies follow from the effective modes of its model."""
+    """Damping whose frequencies are those of modes about the dead load, as `effective_damping`.
 
-    ratio: float  # at the first mode effective along x, and with kind "rayleigh" at the last [-]
-    kind: str = "stiffness"  # "stiffness" or "rayleigh", as in `effective_damping`
-    joints: str = "closed"  # joints that the stiffness part acts on, as in `Rayleigh`
-    mass_share: float = EFFECTIVE_MASS_SHARE  # of the modes up to the last effective one [-]
+    Attributes:
+        ratio: damping ratio at the first mode effective along x, and with kind "rayleigh" at the
+            last one too [-].
+        kind: "stiffness", or "rayleigh" for a mass part too.
+        joints: what the stiffness part acts on, as in `Rayleigh`.
+        mass_share: with "rayleigh", share of the mass that can move along x of the modes up to the
+            last effective one [-].
+    """
+
+    ratio: float = 0.05
+    kind: str = "stiffness"
+    joints: str = "closed"
+    mass_share: float = EFFECTIVE_MASS_SHARE
 
     def __post_init__(self) -> None:
         """Refuse values out of range and unknown options."""
@@ -135,6 +144,25 @@ class EffectiveDamping:
             raise InvalidInput(f"damping kind = {self.kind!r}: use one of {kinds}")
         if not 0.0 < check_number(self.mass_share, "damping share [-]") < 1.0:
             raise InvalidInput(f"share {self.mass_share} of the mass is not between 0 and 1")
+
+
+def interpret_damping(damping: object) -> Viscous | EffectiveDamping | None:
+    """Return damping, of which the word "effective" stands for that by effective modes."""
+    if damping is None or isinstance(damping, Viscous | EffectiveDamping):
+        return damping
+    if is_one_of(damping, ("effective",)):
+        return EffectiveDamping()
+    raise InvalidInput(
+        f"damping = {short_repr(damping)}: give 'effective', EffectiveDamping(0.05), "
+        "StiffnessDamping(0.05, 8.0), Rayleigh(0.05, (8.0, 16.0)), or None"
+    )
+
+
+def check_time_step(dt: object) -> float:
+    """Return a time step [s]; refuse those that are slips of the unit."""
+    if not MIN_TIME_STEP <= check_number(dt, "dt [s]") <= 0.1:
+        raise InvalidInput(f"dt {dt!r} s is not between {MIN_TIME_STEP:g} and 0.1 s")
+    return float(dt)  # type: ignore[arg-type]
 
 
 def _check_ratio(ratio: float) -> None:

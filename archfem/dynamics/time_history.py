@@ -6,14 +6,15 @@ blocks until they rest (`dynamics.fall`).
 """
 
 import logging
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
 from archfem._threads import single_threaded
-from archfem._validation import check_integer, check_number, check_type, validate_arguments
+from archfem._validation import check_number, check_type, validate_arguments
+from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.events import (
     EventMonitor,
     StopCondition,
@@ -33,17 +34,18 @@ from archfem.dynamics.fall import (
 )
 from archfem.dynamics.history import Ending, History, with_fall
 from archfem.dynamics.monitor import RunMonitor
-from archfem.dynamics.recorder import Recorder
+from archfem.dynamics.recorder import Record, Recorder, start_batch
 from archfem.dynamics.schemes import (
     HHT,
-    MIN_TIME_STEP,
     Conserving,
+    EffectiveDamping,
     Newmark,
-    Rayleigh,
     Scheme,
     StiffnessDamping,
     Viscous,
     check_large_displacement_scheme,
+    check_time_step,
+    interpret_damping,
 )
 from archfem.dynamics.solvers.adaptive import AdaptiveStepper
 from archfem.dynamics.solvers.equation import Equation
@@ -60,35 +62,15 @@ from archfem.statics.newton import Newton
 logger = logging.getLogger("archfem")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Record:
-    """Which steps of a run are recorded.
-
-    Attributes:
-        every: interval of steps at which joint resultants are recorded.
-        fields_every: interval of steps at which coordinates q are recorded, for pictures of the
-            whole structure and for stress; None for none.
-    """
-
-    every: int = 1
-    fields_every: int | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse intervals below one."""
-        check_integer(self.every, "record every")
-        if self.fields_every is not None:
-            check_integer(self.fields_every, "record fields_every")
-
-
 @single_threaded
 def time_history(  # noqa: PLR0913  (one call, one object for each thing that may vary)
-    model: Model,
+    model: Model | Analysis,
     motion: Motion,
     *,
     dt: float | None = None,
     tolerance: float | None = None,
     start: Equilibrium | State | None = None,
-    damping: Viscous | None = None,
+    damping: Viscous | EffectiveDamping | str | None = None,
     scheme: Scheme | None = None,
     record: Record | None = None,
     until: StopCondition | None = None,
@@ -104,7 +86,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     the run and returns the steps computed so far.
 
     Args:
-        model: model of any fidelity.
+        model: model of any fidelity, or an `Analysis`, whose settings are then the defaults of all
+            other arguments.
         motion: ground acceleration.
         dt: time step [s]; by default the step for which the model was selected, or else steps of
             varying length by `tolerance`. Accelerations between samples are interpolated.
@@ -113,8 +96,10 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
             the history is the share of the shortest steps in which the error was larger.
         start: dead load, computed if not given, or the `last_state` of an earlier run, which is
             then continued.
-        damping: `StiffnessDamping`, also from `effective_damping` or `restitution_damping`;
-            `Rayleigh`, whose mass part also drags loose blocks; None is undamped.
+        damping: "effective", 5 % at the first mode effective along x about the dead load, or
+            `EffectiveDamping` with other values; `StiffnessDamping`, also from
+            `restitution_damping`; `Rayleigh`, whose mass part also drags loose blocks; None is
+            undamped.
         scheme: `Conserving` (the default), `Newmark` (average acceleration) or `HHT`; the last two
             for joints that never slide.
         record: which steps are recorded; by default the resultants of every step.
@@ -139,18 +124,24 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         InvalidInput: an argument is out of range, or run and event have different criteria.
         DidNotConverge: a step failed; `history` is the record up to it, `last` the state.
     """
-    check_model(model)
     check_type(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
-    _check_types(start=start, damping=damping, scheme=scheme, record=record)
-    _check_types(criteria=criteria, newton=newton)
+    _check_types(start=start, scheme=scheme, record=record, criteria=criteria, newton=newton)
+    if isinstance(model, Analysis):
+        given = {"dt": dt, "tolerance": tolerance, "damping": damping, "scheme": scheme}
+        given |= {"record": record, "until": until, "criteria": criteria, "newton": newton}
+        given |= {"method": None if method == "auto" else method}
+        return _run_analysis(model, motion, start, given)
+    check_model(model)
     dt, tolerance = _resolve_steps(model, dt, tolerance)
     criteria = resolve_criteria(criteria, until)
     event = None if until is None else start_monitor(until, model.structure, criteria)
+    rest = start if isinstance(start, Equilibrium) else None
+    viscous, _ = resolve_effective_damping(interpret_damping(damping), model, rest)
     if isinstance(start, Equilibrium):
         model = start.transfer_memory(model)
     if model.large_displacements and scheme is not None:
         check_large_displacement_scheme(scheme)
-    equation = Equation(model, motion, damping, scheme or Conserving())
+    equation = Equation(model, motion, viscous, scheme or Conserving())
     if not isinstance(start, State):
         rest = start or dead_load(model, newton)
         start = equation.at_rest(rest.q, memory=rest.model.memory)
@@ -177,8 +168,24 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         history = history.with_doubts((*history.doubts, *_doubt_tolerance(history)))
     if not model.large_displacements or ending is Ending.INTERRUPTED:
         return history
-    ratio = damping.restitution if isinstance(damping, StiffnessDamping) else None
+    ratio = viscous.restitution if isinstance(viscous, StiffnessDamping) else None
     return _follow_fall(history, model, (start, recorder.state), motion, ratio)
+
+
+def _run_analysis(
+    analysis: Analysis, motion: Motion, start: Equilibrium | State | None, given: dict[str, Any]
+) -> History:
+    """Run an analysis, some of whose settings are given anew."""
+    settings = {name: getattr(analysis, name) for name in given}
+    settings |= {name: value for name, value in given.items() if value is not None}
+    # a step, also that of a selected model, takes the place of a tolerance
+    if given["tolerance"] is not None and given["dt"] is None:
+        settings["dt"] = None
+    elif given["tolerance"] is None and (settings["dt"] is not None or analysis.selects_model):
+        settings["tolerance"] = None
+    start = start or analysis.dead_load(motion)
+    model = start.model if isinstance(start, Equilibrium) else analysis.model
+    return time_history(model, motion, start=start, **settings)
 
 
 def _follow_fall(
@@ -244,9 +251,7 @@ def _resolve_steps(
         return None, tolerance
     if dt is None and model.prediction:
         return model.prediction.dt, default
-    if dt is not None and not MIN_TIME_STEP <= check_number(dt, "dt [s]") <= 0.1:
-        raise InvalidInput(f"dt {dt!r} s is not between {MIN_TIME_STEP:g} and 0.1 s")
-    return dt, default
+    return None if dt is None else check_time_step(dt), default
 
 
 def _check_types(**arguments: Any) -> None:
@@ -254,11 +259,6 @@ def _check_types(**arguments: Any) -> None:
     # classes of optional arguments, their names in messages, and valid examples
     kinds: dict[str, tuple[tuple[type, ...], str, str]] = {
         "start": ((Equilibrium, State), "start", "give dead_load(model), or last_state(run)"),
-        "damping": (
-            (Rayleigh, StiffnessDamping),
-            "damping",
-            "give Rayleigh(0.05, (8.0, 16.0)), StiffnessDamping(0.05, 8.0), or None",
-        ),
         "scheme": ((Conserving, Newmark, HHT), "scheme", "give Conserving(), Newmark() or HHT()"),
         "record": ((Record,), "record", "give Record(every=…, fields_every=…)"),
         "criteria": ((Criteria,), "criteria", "give Criteria(hinge=…, failures=…)"),
@@ -267,19 +267,6 @@ def _check_types(**arguments: Any) -> None:
     for name, value in arguments.items():
         if value is not None:
             check_type(value, *kinds[name])
-
-
-def start_batch(stepper: Stepper, start: State, dt: float) -> Batch:
-    """Return the start of a run as a batch of one step."""
-    equation = stepper.equation
-    return Batch(
-        np.array([start.time]),
-        equation.with_memory(start).resultants(equation.contact(start))[None],
-        np.zeros(1, dtype=np.int64),
-        np.array([dt]),
-        equation.energy(start)[None],
-        lambda _: start,
-    )
 
 
 def _make_recorder(

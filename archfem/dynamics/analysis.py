@@ -1,0 +1,319 @@
+"""An analysis as one value: structure, discretisation, damping, time steps, criteria and records.
+
+It holds all but the ground motion. Each method calls the function of the same words, which takes an
+analysis where it takes a structure or a model.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from archfem._display import call_late_bound
+from archfem._files import hash_value
+from archfem._validation import check_fields, check_number, validate_methods
+from archfem.dynamics.events import StopCondition, resolve_criteria
+from archfem.dynamics.model_selection import build
+from archfem.dynamics.recorder import Record
+from archfem.dynamics.schemes import (
+    Conserving,
+    EffectiveDamping,
+    Scheme,
+    Viscous,
+    check_friction_scheme,
+    check_large_displacement_scheme,
+    check_time_step,
+    interpret_damping,
+)
+from archfem.errors import InvalidInput
+from archfem.joints.criteria import Criteria
+from archfem.masonry.construction import Stage, resolve_stages
+from archfem.masonry.structure import Structure
+from archfem.models.discretisation import Discretisation
+from archfem.models.model import Model
+from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.statics.modes import Modes, modes
+from archfem.statics.newton import Newton
+
+if TYPE_CHECKING:
+    from archfem.dynamics.accuracy import Accuracy
+    from archfem.dynamics.history import History
+    from archfem.dynamics.motion_scaling import CollapseScale
+    from archfem.dynamics.verdict_range import VerdictRange
+    from archfem.studies.convergence import MeshSensitivity
+    from archfem.studies.ida import Ida
+
+# Settings that `build` takes besides those of a discretisation
+_SELECTION_KEYWORDS = ("tolerance", "dt", "damping")
+
+
+@validate_methods
+@dataclass(frozen=True, kw_only=True)
+class Analysis:
+    """All that determines a response, but for the ground motion.
+
+    The same value is a case file: `archfem.Case.read(path).analysis` and `write` are inverse.
+    Models and dead load are computed at first use and kept.
+
+    Attributes:
+        structure: blocks and joints.
+        fidelity: as for `archfem.build`; with "auto" each motion selects model and time step.
+        cells: as for `archfem.build`.
+        cell: as for `archfem.build`.
+        max_cell_size: as for `archfem.build` [m].
+        degree: as for `archfem.build`.
+        quadrature: as for `archfem.build`.
+        quadrature_points: as for `archfem.build`.
+        displacements: "small", or "large" for finite rotations, sliding and falls.
+        mesh_file: as for `archfem.build`.
+        tolerance: admissible error of |e|: of the selection with fidelity "auto", and without `dt`
+            of steps of varying length [-].
+        dt: time step [s]; None for steps of varying length.
+        damping: `StiffnessDamping`, `Rayleigh`, or `EffectiveDamping`, whose frequencies are those
+            of modes about the dead load; "effective" is the last with its defaults; None is
+            undamped.
+        scheme: `Conserving`, `Newmark` or `HHT`.
+        method: solver of the time steps, as for `archfem.time_history`.
+        newton: settings of Newton's method.
+        until: event that ends a run before its motion does.
+        criteria: failure criteria of joints; None for those of `until`, or the default ones.
+        record: which steps are recorded.
+        stages: construction stages; None builds the structure in one go.
+
+    Raises:
+        InvalidInput: a value is out of range, or values exclude each other.
+
+    Example:
+        >>> ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=7)
+        >>> analysis = af.Analysis(ring, fidelity="rigid", damping="effective", dt=0.005)
+        >>> analysis.run(af.Motion.synthetic(duration=1.0, pga=1.0)).ending.value
+        'finished'
+    """
+
+    structure: Structure = field(kw_only=False)
+    fidelity: str | Mapping[str, str] = "full"
+    cells: tuple[int, int] = (4, 4)
+    cell: str = "quadrilateral"
+    max_cell_size: float | None = None
+    degree: int = 1
+    quadrature: str | None = None
+    quadrature_points: int | None = None
+    displacements: str = "small"
+    mesh_file: str | Path | None = None
+    tolerance: float = 0.005
+    dt: float | None = None
+    damping: Viscous | EffectiveDamping | Literal["effective"] | None = None
+    scheme: Scheme = Conserving()
+    method: str = "auto"
+    newton: Newton = Newton()
+    until: StopCondition | None = None
+    criteria: Criteria | None = None
+    record: Record = Record()
+    stages: Sequence[Stage] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the values, and that they do not exclude each other."""
+        object.__setattr__(self, "damping", interpret_damping(self.damping))
+        check_fields(self)
+        object.__setattr__(self, "cells", self.discretisation.cells)
+        if not 0.0 < check_number(self.tolerance, "tolerance on |e| [-]") < 1.0:
+            raise InvalidInput(f"tolerance {self.tolerance:g} on |e| is not between 0 and 1")
+        if self.dt is not None:
+            check_time_step(self.dt)
+        if self.selects_model and self.mesh_file is not None:
+            raise InvalidInput(
+                f"mesh_file = {str(self.mesh_file)!r} is one mesh, and fidelity 'auto' chooses: "
+                "name a fidelity"
+            )
+        if self.displacements == "large":
+            check_large_displacement_scheme(self.scheme)
+        check_friction_scheme(self.scheme, self.structure)
+        resolve_criteria(self.criteria, self.until)
+        if self.stages is not None:
+            object.__setattr__(self, "stages", tuple(self.stages))
+            resolve_stages(self.structure, self.stages)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields alone: models are large, and built anew in other processes."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    def __repr__(self) -> str:
+        """Structure, and the fields that differ from their defaults."""
+        given = [
+            f"{each.name}={value!r}"
+            for each in fields(self)[1:]
+            if (value := getattr(self, each.name)) != each.default
+        ]
+        return f"Analysis({', '.join([self.structure.name, *given])})"
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Digest of all values, to the last bit; equal for a case file and what it describes."""
+        return hash_value({each.name: getattr(self, each.name) for each in fields(self)})
+
+    @property
+    def selects_model(self) -> bool:
+        """Whether the model is selected by its predicted error, fidelity "auto"."""
+        return self.fidelity == "auto"
+
+    @property
+    def discretisation(self) -> Discretisation:
+        """Fidelity, mesh and quadrature; with fidelity "auto" the default fidelity."""
+        values = {each.name: getattr(self, each.name) for each in fields(Discretisation)}
+        return Discretisation(**values | ({"fidelity": "full"} if self.selects_model else {}))
+
+    @property
+    def failure_criteria(self) -> Criteria:
+        """The criteria by which joints are assessed."""
+        return resolve_criteria(self.criteria, self.until)
+
+    @property
+    def model(self) -> Model:
+        """The model; with fidelity "auto" that for a synthetic motion (`archfem.build`)."""
+        return self.dead_load().model
+
+    def dead_load(self, motion: Motion | None = None) -> Equilibrium:
+        """Find the equilibrium under dead load, built in the stages of the analysis.
+
+        Args:
+            motion: motion for which fidelity "auto" selects the model.
+
+        Returns:
+            The equilibrium, with its model.
+
+        Raises:
+            DidNotConverge: the structure has no equilibrium.
+        """
+        if self.selects_model and motion is not None:
+            return self._compute_dead_load(motion)
+        return self._dead_load
+
+    @cached_property
+    def _dead_load(self) -> Equilibrium:
+        """Equilibrium of the model that no motion has selected."""
+        return self._compute_dead_load(None)
+
+    def _compute_dead_load(self, motion: Motion | None) -> Equilibrium:
+        """Build the model, and find its equilibrium."""
+        names = [*(each.name for each in fields(Discretisation)), *_SELECTION_KEYWORDS]
+        settings = {name: getattr(self, name) for name in names}
+        model = build(self.structure, motion=motion, **settings)
+        return dead_load(model, self.newton, stages=self.stages)
+
+    def modes(self, count: int = 6) -> Modes:
+        """Find the lowest modes of vibration about the dead load.
+
+        Args:
+            count: number of modes; at most the number of coordinates are found.
+
+        Returns:
+            The modes, the lowest first.
+
+        Raises:
+            DidNotConverge: the structure is a mechanism, and does not vibrate.
+        """
+        rest = self.dead_load()
+        return modes(rest.model, min(count, rest.model.size), rest)
+
+    def run(self, motion: Motion) -> "History":
+        """Compute the time history under a motion, as `archfem.time_history`.
+
+        Args:
+            motion: ground acceleration.
+
+        Returns:
+            The history.
+
+        Raises:
+            DidNotConverge: there is no equilibrium, or a step failed.
+        """
+        history: History = call_late_bound("Analysis.run", self, motion)
+        return history
+
+    def scale(self, motion: Motion, **options: Any) -> "CollapseScale":
+        """Find the smallest scale of a motion at which the structure falls.
+
+        Args:
+            motion: motion to scale.
+            options: as for `archfem.collapse_scale`, such as `precision`.
+
+        Returns:
+            The scales between which it falls.
+
+        Raises:
+            InvalidInput: displacements are small.
+        """
+        found: CollapseScale = call_late_bound("Analysis.scale", self, motion, **options)
+        return found
+
+    def ida(self, motions: Any, **options: Any) -> "Ida":
+        """Scale motions up until limit states are reached (incremental dynamic analysis).
+
+        Args:
+            motions: as for `archfem.ida`.
+            options: as for `archfem.ida`, such as `limits` and `workers`.
+
+        Returns:
+            Capacities, curves and fragility.
+        """
+        found: Ida = call_late_bound("Analysis.ida", self, motions, **options)
+        return found
+
+    def verdict_range(self, motion: Motion, **options: Any) -> "VerdictRange":
+        """Compute how often the structure falls over uncertain properties.
+
+        Args:
+            motion: ground acceleration.
+            options: as for `archfem.verdict_range`, such as `vary` and `samples`.
+
+        Returns:
+            All runs, and their share of falls.
+        """
+        found: VerdictRange = call_late_bound("Analysis.verdict_range", self, motion, **options)
+        return found
+
+    def accuracy(self, motion: Motion | None = None, **options: Any) -> "Accuracy":
+        """Compare processor time and error over fidelities, meshes, quadratures and time steps.
+
+        Args:
+            motion: ground acceleration; by default a synthetic one that brings |e| to 0.4.
+            options: as for `archfem.accuracy`.
+
+        Returns:
+            All settings with times and errors.
+        """
+        found: Accuracy = call_late_bound("Analysis.accuracy", self, motion, **options)
+        return found
+
+    def mesh_sensitivity(self, motion: Motion | None = None, **options: Any) -> "MeshSensitivity":
+        """Compute how findings depend on mesh, time step, joint quadrature and fidelity.
+
+        Args:
+            motion: ground acceleration; None for findings of the dead load.
+            options: as for `archfem.mesh_sensitivity`, such as `quantity`.
+
+        Returns:
+            Observed order, extrapolated value and error bar, and values by setting.
+        """
+        found: MeshSensitivity = call_late_bound(
+            "Analysis.mesh_sensitivity", self, motion=motion, **options
+        )
+        return found
+
+    def write(self, path: str | Path) -> Path:
+        """Write the analysis as a case file, which `archfem.Case.read` reads.
+
+        Args:
+            path: file to write, .toml; folders are created.
+
+        Returns:
+            The file.
+
+        Raises:
+            InvalidInput: a law, an event or a criterion is not registered, so that no file can
+                name it.
+        """
+        written: Path = call_late_bound("Analysis.write", self, path)
+        return written
