@@ -201,7 +201,7 @@ def test_cells_are_two_whole_numbers(fidelity, cells):
 
 @pytest.mark.parametrize("coarse", [5e-324, 1.7e308])
 def test_the_cell_size_is_ignored_where_no_block_is_unstructured(coarse):
-    assert af.build(RING, fidelity="faces", coarse=coarse).size == 6 * 7
+    assert af.build(RING, fidelity="faces", max_cell_size=coarse).size == 6 * 7
 
 
 def test_a_step_beyond_the_range_of_numbers_is_refused(tmp_path):
@@ -246,8 +246,8 @@ def test_time_history(model, given, says):
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        ({"load": 0.1}, "load 0.1 is none: give BodyForce"),
-        ({"load": [af.BodyForce(0.1), 3]}, "is none: give BodyForce"),
+        ({"live": 0.1}, "load 0.1 is none: give BodyForce"),
+        ({"live": [af.BodyForce(0.1), 3]}, "is none: give BodyForce"),
         ({"model": RING}, "model is a Structure"),
         ({"start": 3}, "equilibrium is a int"),
         ({"stop": 3}, "stop is a int: give a Stop"),
@@ -256,7 +256,7 @@ def test_time_history(model, given, says):
 )
 def test_pushover(model, given, says):
     with pytest.raises(af.InvalidInput, match=says):
-        af.pushover(**{"model": model, "load": af.BodyForce(0.1)} | given)
+        af.pushover(**{"model": model, "live": af.BodyForce(0.1)} | given)
 
 
 def test_a_start_of_another_structure_is_refused(model, tmp_path):

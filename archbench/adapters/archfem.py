@@ -184,9 +184,9 @@ def model_of(scene: dict[str, Any], joints: str) -> Any:
     """Return the model of elastic joints: exact, at the points of the scene, or at two points."""
     laws = [law.get("points") for law in scene["laws"].values()]
     rules: dict[str, dict[str, Any]] = {
-        "points": {"quadrature": "trapezoidal", "points": laws[0] or 2},
+        "points": {"quadrature": "trapezoidal", "quadrature_points": laws[0] or 2},
         "exact": {"quadrature": "exact"},
-        "lobatto": {"quadrature": "lobatto", "points": 2},
+        "lobatto": {"quadrature": "lobatto", "quadrature_points": 2},
     }
     return af.build(
         structure(scene), fidelity="rigid", displacements="large", cells=(1, 1), **rules[joints]

@@ -34,8 +34,6 @@ MODEL_KEYS = {
     **{"quadrature": str, "quadrature_points": int, "tolerance": "1", "displacements": str},
     "mesh_file": str,
 }
-# Keywords of `build` which have another name in a case file.
-BUILD_KEYWORDS = {"max_cell_size": "coarse", "quadrature_points": "points", "mesh_file": "file"}
 
 
 @dataclass(frozen=True)
@@ -142,7 +140,7 @@ class Case:
         case = cls(
             title=settings.get("title", "case"),
             structure=cached_structure(settings, folder),
-            model={BUILD_KEYWORDS.get(key, key): value for key, value in model.items()},
+            model=model,
             motion=None if motion is None else motion_keys.parse_motion(motion),
             suite=None if suite is None else motion_keys.parse_suite(suite),
             analysis=analysis_keys.parse_analysis(settings.get("analysis", {})),
@@ -191,12 +189,12 @@ class Case:
         """Fidelity, mesh and quadrature; with fidelity = "auto" the default ones."""
         unused = {"tolerance", "fidelity"} if self.selects_model else {"tolerance"}
         keywords = {key: value for key, value in self.model.items() if key not in unused}
-        if "file" in keywords:
+        if "mesh_file" in keywords:
             if self.selects_model:
                 raise InvalidInput(
                     "model.mesh_file is one mesh, and fidelity = 'auto' chooses: name a fidelity"
                 )
-            keywords["file"] = self.folder / keywords["file"]
+            keywords["mesh_file"] = self.folder / keywords["mesh_file"]
         return Discretisation(**keywords)
 
     @property

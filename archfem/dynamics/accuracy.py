@@ -175,11 +175,11 @@ def candidate_settings(
     """Yield settings of all combinations of fidelity, quadrature, mesh and step, none twice."""
     for name in fidelities:
         fidelity = stone_fidelity(structure, name)
-        for rule, points in quadratures:
+        for rule, count in quadratures:
             # rigid joints with exact facets have no mesh
             meshless = fidelity == "rigid" and rule == "exact"
             for cells in [(1, 1)] if meshless else meshes:
-                settings = Discretisation(fidelity, cells, quadrature=rule, points=points)
+                settings = Discretisation(fidelity, cells, quadrature=rule, quadrature_points=count)
                 yield from (Setting(settings, dt) for dt in steps)
 
 

@@ -56,16 +56,16 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
     fidelity: str | Mapping[str, str] = "full",
     cells: tuple[int, int] = (4, 4),
     cell: str = "quadrilateral",
-    coarse: float | None = None,
+    max_cell_size: float | None = None,
     degree: int = 1,
     quadrature: str | None = None,
-    points: int | None = None,
+    quadrature_points: int | None = None,
     tolerance: float = 0.005,
     motion: Motion | None = None,
     damping: Viscous | EffectiveDamping | str | None = None,
     dt: float | None = None,
     displacements: str = "small",
-    file: str | Path | None = None,
+    mesh_file: str | Path | None = None,
 ) -> Model:
     """Build a model of a structure, of a given fidelity or of one selected by predicted error.
 
@@ -83,13 +83,13 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
         cells: minimum number of cells through the thickness (facets on a joint) and along each
             block.
         cell: "quadrilateral" or "triangle".
-        coarse: largest cell inside blocks without corners, such as backfill [m]; by default half of
-            the block's mean thickness.
+        max_cell_size: of cells inside blocks without corners, such as backfill [m]; by default half
+            of the block's mean thickness.
         degree: degree of the elements, 1 or 2.
         quadrature: rule on each joint facet, "exact", "lobatto", "trapezoidal", "nodal" (springs at
             mesh nodes) or "gauss"; by default "exact", or "lobatto" with a number of points or
             where there is no exact rule (degree 2, "monolithic").
-        points: quadrature points on each facet, 3 by default, with "trapezoidal" 2; with
+        quadrature_points: number on each facet, 3 by default, with "trapezoidal" 2; with
             "trapezoidal" and fidelity "rigid" those of each whole joint.
         tolerance: for "auto", tolerance on the largest |e| of every joint [-].
         motion: for "auto", ground motion of the analysis; without it the prediction is less
@@ -101,7 +101,7 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
         displacements: "small", or "large" for finite rotations, sliding and falls; not with
             fidelity "monolithic". With "auto" the selection uses small displacements, and is valid
             until blocks separate.
-        file: mesh file, as for `read_mesh`, in place of `cells`, `cell` and `coarse`; not with
+        mesh_file: as for `read_mesh`, in place of `cells`, `cell` and `max_cell_size`; not with
             "rigid" and "auto".
 
     Returns:
@@ -116,9 +116,9 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
     if not 0.0 < check_number(tolerance, "tolerance on |e| [-]") < 1.0:
         raise InvalidInput(f"tolerance {tolerance:g} on |e| is not between 0 and 1: try 0.005")
     if isinstance(fidelity, str) and fidelity == "auto":
-        if file is not None:
+        if mesh_file is not None:
             raise InvalidInput(
-                f"file = {str(file)!r} is one mesh, and 'auto' chooses: name a fidelity"
+                f"mesh_file = {str(mesh_file)!r} is one mesh, and 'auto' chooses: name a fidelity"
             )
         return select_model(
             structure,
@@ -129,7 +129,8 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
             displacements=displacements,
         )
     settings = Discretisation(
-        fidelity, cells, cell, coarse, degree, quadrature, points, displacements, file
+        *(fidelity, cells, cell, max_cell_size, degree, quadrature, quadrature_points),
+        *(displacements, mesh_file),
     )
     return plain.build(structure, settings)
 
@@ -151,8 +152,8 @@ def discretisation_label(settings: Discretisation) -> str:
     """Return fidelity, mesh and quadrature as short text."""
     fidelity = settings.fidelity
     name = fidelity if isinstance(fidelity, str) else fidelity["rest"] + " + soil"
-    rule = settings.rule.rule + (f" {settings.points}" if settings.points else "")
-    return f"{name} {settings.through}×{settings.along} {rule}"
+    points = f" {settings.quadrature_points}" if settings.quadrature_points else ""
+    return f"{name} {settings.through}×{settings.along} {settings.rule.rule}{points}"
 
 
 def select_model(

@@ -46,10 +46,10 @@ def _build_small(structure: Structure, settings: Discretisation) -> Model:
     from archfem.models.fem.space import build_broken_space
     from archfem.models.reference import MonolithicModel, build_full_model
 
-    if settings.file is None:
+    if settings.mesh_file is None:
         mesh = get_mesh(structure, settings)
     else:
-        mesh = read_mesh(structure, settings.file)
+        mesh = read_mesh(structure, settings.mesh_file)
     space = build_broken_space(mesh, settings.degree)
     if settings.fidelity == "monolithic":
         return MonolithicModel(space, settings.rule)

@@ -26,17 +26,17 @@ class Discretisation:
         cells: numbers through the thickness (facets on a joint) and along each block (chords of
             the faces of a sector).
         cell: shape of the cells, "quadrilateral" or "triangle".
-        coarse: largest cell inside blocks without corners, such as backfill [m]; None for half of
-            the block's mean thickness 2 A / P, A its area and P its perimeter.
+        max_cell_size: of cells inside blocks without corners, such as backfill [m]; None for half
+            of the block's mean thickness 2 A / P, A its area and P its perimeter.
         degree: polynomial degree of the elements, 1 or 2.
         quadrature: rule on each joint facet, "exact", "lobatto", "trapezoidal", "nodal" or "gauss";
             None for "exact", or "lobatto" with degree 2 or "monolithic", which have no exact rule.
-        points: number on each facet, by default 3, with "trapezoidal" 2; with "trapezoidal" and
-            fidelity "rigid" on each whole joint: three are the rule of 3DEC, weights 1/4, 1/2,
-            1/4, five the springs of Demirel and Aldemir (2021).
+        quadrature_points: number on each facet, by default 3, with "trapezoidal" 2; with
+            "trapezoidal" and fidelity "rigid" on each whole joint: three are the rule of 3DEC,
+            weights 1/4, 1/2, 1/4, five the springs of Demirel and Aldemir (2021).
         displacements: "small", or "large" where blocks may rotate and slide as far as they like,
             with every fidelity but "monolithic"; those of a fill with nodes stay small.
-        file: mesh file for `read_mesh`, in place of `cells`, `cell` and `coarse`; not with
+        mesh_file: for `read_mesh`, in place of `cells`, `cell` and `max_cell_size`; not with
             "rigid", which has no mesh.
 
     Raises:
@@ -46,12 +46,12 @@ class Discretisation:
     fidelity: str | Mapping[str, str] = "full"
     cells: tuple[int, int] = (4, 4)
     cell: str = "quadrilateral"
-    coarse: float | None = None
+    max_cell_size: float | None = None
     degree: int = 1
     quadrature: str | None = None
-    points: int | None = None
+    quadrature_points: int | None = None
     displacements: str = "small"
-    file: str | Path | None = None
+    mesh_file: str | Path | None = None
 
     def __post_init__(self) -> None:
         """Check the values, and that they do not exclude each other."""
@@ -60,10 +60,9 @@ class Discretisation:
         shapes, displacements = ("quadrilateral", "triangle"), ("small", "large")
         if not is_one_of(self.cell, shapes):
             raise InvalidInput(f"cell {short_repr(self.cell)} is not known: use one of {shapes}")
-        if self.coarse is not None and not check_number(self.coarse, "coarse [m]") > 0.0:
-            raise InvalidInput(
-                f"coarse = {self.coarse!r} m: give a largest cell size above 0, e.g. 0.5"
-            )
+        size, points = self.max_cell_size, self.quadrature_points
+        if size is not None and not check_number(size, "max_cell_size [m]") > 0.0:
+            raise InvalidInput(f"max_cell_size = {size!r} m: give a size above 0, e.g. 0.5")
         if not is_one_of(self.displacements, displacements):
             given = short_repr(self.displacements)
             raise InvalidInput(f"displacements {given} are not known: use one of {displacements}")
@@ -72,14 +71,16 @@ class Discretisation:
                 "large displacements do not exist with fidelity 'monolithic': use 'full', which is "
                 "the same model, or displacements = 'small'"
             )
-        if self.file is not None and self.fidelity == "rigid":
-            raise InvalidInput(f"file = {str(self.file)!r}: fidelity 'rigid' has no mesh to read")
+        if self.mesh_file is not None and self.fidelity == "rigid":
+            raise InvalidInput(
+                f"mesh_file = {str(self.mesh_file)!r}: fidelity 'rigid' has no mesh to read"
+            )
         if not is_one_of(self.degree, (1, 2)):
             raise InvalidInput(f"degree {short_repr(self.degree)}: elements are of degree 1 or 2")
-        if self.rule.rule == "trapezoidal" and self.fidelity == "monolithic" and self.points:
+        if self.rule.rule == "trapezoidal" and self.fidelity == "monolithic" and points:
             raise InvalidInput(
-                f"trapezoidal quadrature with {self.points} points is not written in UFL: leave "
-                "points out, or use a fidelity other than monolithic"
+                f"trapezoidal quadrature with {points} points is not written in UFL: leave "
+                "quadrature_points out, or use a fidelity other than monolithic"
             )
         if self.rule.rule == "exact" and (self.degree != 1 or self.fidelity == "monolithic"):
             raise InvalidInput(
@@ -100,10 +101,11 @@ class Discretisation:
     @property
     def rule(self) -> Quadrature:
         """Quadrature rule on each joint facet."""
+        points = self.quadrature_points
         if self.quadrature is not None:
-            return Quadrature(self.quadrature, self.points)
-        exact = self.degree == 1 and self.fidelity != "monolithic" and self.points is None
-        return Quadrature("exact" if exact else "lobatto", self.points)
+            return Quadrature(self.quadrature, points)
+        exact = self.degree == 1 and self.fidelity != "monolithic" and points is None
+        return Quadrature("exact" if exact else "lobatto", points)
 
     @property
     def name(self) -> str:

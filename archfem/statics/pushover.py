@@ -121,7 +121,7 @@ class Pushover(ResultDisplay):
 @single_threaded
 def pushover(
     model: Model,
-    load: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
+    live: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
     *,
     control: str = "displacement",
     start: Equilibrium | None = None,
@@ -155,7 +155,7 @@ def pushover(
 
     Args:
         model: of any fidelity.
-        load: one action, or several that grow together; a `Settlement` stands alone.
+        live: one action, or several that grow together; a `Settlement` stands alone.
         control: "displacement", "arc length", "path" or "force"; "path" continues normal to the
             last step in all coordinates, and so follows snap-back where displacements are large.
         start: the dead load's equilibrium, computed first if not given.
@@ -182,12 +182,12 @@ def pushover(
     begin = start or dead_load(model)
     model = begin.transfer_memory(model)
     path: Path
-    if isinstance(load, Settlement):
+    if isinstance(live, Settlement):
         if control != "displacement":
             raise InvalidInput(f"a settlement is a displacement: control {control!r} has no force")
-        path = SupportPath.of(model, load, begin)
+        path = SupportPath.of(model, live, begin)
     else:
-        path = LoadPath.of(model, list_loads(load), begin)
+        path = LoadPath.of(model, list_loads(live), begin)
     criteria = criteria or Criteria()
     return _label_result(path, criteria, follow(path, control, stop or Stop(), criteria))
 

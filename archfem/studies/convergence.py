@@ -287,7 +287,8 @@ def _case_keys(setting: Setting) -> dict[str, Any]:
         "model.quadrature": model.quadrature,
         "analysis.dt": setting.dt,
     }
-    return keys if model.points is None else keys | {"model.quadrature_points": model.points}
+    points = model.quadrature_points
+    return keys if points is None else keys | {"model.quadrature_points": points}
 
 
 def evaluate_time(case: Case, damping: Viscous | None) -> Findings:

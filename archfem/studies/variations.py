@@ -303,7 +303,7 @@ def _run_elastic_joints(
 ) -> CollapseState:
     """Run a model with elastic joints, and return its state of collapse."""
     three = changes["joint_rule"] == "three points"
-    rule: dict[str, Any] = {"quadrature": "trapezoidal", "points": 3} if three else {}
+    rule: dict[str, Any] = {"quadrature": "trapezoidal", "quadrature_points": 3} if three else {}
     model = build(structure, fidelity=base.fidelity, displacements="large", **rule)
     kind = changes.get("damping_kind") or _damping_kind(base.damping)
     damping = _vary_damping(model, base.damping, kind, changes["damping_ratio"])

@@ -173,7 +173,10 @@ def test_soil_keeps_its_nodes_and_is_never_rigid():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"fidelity": "full", "cells": (3, 5), "quadrature": "gauss", "points": 4}, "3×5 gauss 4"),
+        (
+            {"fidelity": "full", "cells": (3, 5), "quadrature": "gauss", "quadrature_points": 4},
+            "3×5 gauss 4",
+        ),
         ({"fidelity": "faces", "cells": (2, 1), "quadrature": "nodal"}, "faces 2×1 nodal"),
     ],
 )

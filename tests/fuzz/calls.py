@@ -93,10 +93,19 @@ def ready() -> None:
         (af.response_spectrum, {"motion": quake, "periods": [0.1, 1.0], "damping": 0.05}),
         (af.matched, {"motion": wave, "spectrum": target, "band": (0.1, 1.0), "damping": 0.05}),
         (af.build, {**at, "fidelity": "rigid", "cells": (2, 1), "degree": 1, "quadrature": None}),
-        (af.build, {**at, "fidelity": "faces", "cells": (2, 1), "points": 3, "coarse": 0.5}),
+        (
+            af.build,
+            {
+                **at,
+                "fidelity": "faces",
+                "cells": (2, 1),
+                "quadrature_points": 3,
+                "max_cell_size": 0.5,
+            },
+        ),
         (af.dead_load, {"model": model, "newton": None}),
         (af.modes, {"model": model, "count": 2, "about": dead}),
-        (af.pushover, {"model": _column_model(), "load": af.BodyForce(0.1), "start": None}),
+        (af.pushover, {"model": _column_model(), "live": af.BodyForce(0.1), "start": None}),
         (af.collapse_factor, {**at, "live": af.BodyForce(0.1), "friction": None, "fill": None}),
         (af.stands, {**at, "friction": "coulomb"}),
         (af.moving_load, {**at, "axles": [1e4, 1e4], "spacings": [0.5], "positions": [0.0, 0.3]}),
@@ -158,7 +167,10 @@ def ready() -> None:
         (af.joints.joint_table, {"joints": dead.joints}),
         (af.statics.forces_on, {**at, "joints": dead.joints, "block": 1}),
         (af.statics.Stop, {"slope": 1e-6, "displacement": 0.1, "hinges": None, "steps": 10}),
-        (af.models.Discretisation, {"fidelity": "rigid", "cells": (2, 1), "points": None}),
+        (
+            af.models.Discretisation,
+            {"fidelity": "rigid", "cells": (2, 1), "quadrature_points": None},
+        ),
         (af.effective_damping, {"model": model, "ratio": 0.05, "about": dead}),
         (af.studies.converged, {"sizes": [4.0, 2.0, 1.0], "values": [1.0, 1.1, 1.12]}),
         (

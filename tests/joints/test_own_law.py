@@ -44,7 +44,7 @@ def ring(law):
 
 
 def shaken(law, *, damped=True, pga=8.0, steps=24):
-    model = af.build(ring(law), fidelity="rigid", quadrature="trapezoidal", points=3)
+    model = af.build(ring(law), fidelity="rigid", quadrature="trapezoidal", quadrature_points=3)
     motion = af.Motion(pga * np.sin(0.35 * np.arange(steps + 1)), dt=0.005)  # 11 Hz
     damping = af.StiffnessDamping(0.05, 20.0) if damped else None
     return af.time_history(model, motion, damping=damping, dt=0.005, method="snes").dataset
@@ -66,7 +66,7 @@ def test_a_block_slides_by_friction_with_history():
     block = af.column(breadth=2.0, heights=[0.2], contact=contact)
     push, dt, end, friction = 5.0, 0.00125, 0.05, 0.3 * 9.80665
     motion = af.Motion(np.full(round(end / dt) + 1, push), dt=dt)
-    model = af.build(block, fidelity="rigid", quadrature="gauss", points=2)
+    model = af.build(block, fidelity="rigid", quadrature="gauss", quadrature_points=2)
     own = af.time_history(model, motion, dt=dt, method="snes").dataset
     # the ground runs away under the block: on its shear springs at first, then on friction
     frequency = np.sqrt(STIFF[1] * 9.80665 / (0.2 * 20e3))  # k_s / (density times height)

@@ -77,7 +77,7 @@ def test_a_model_on_that_mesh(tmp_path, curve):
     """Its own cells carry it: the weight above each joint, from triangles of the file."""
     path = own(tmp_path / "own.msh", curve=curve)
     structure = af.masonry.surveyed(path, layers=LAYERS)
-    model = af.build(structure, file=path)
+    model = af.build(structure, mesh_file=path)
     dead = af.dead_load(model).joints
     assert sorted(dead["N"].values) == pytest.approx([16e3, 36e3], rel=1e-6)  # of the solver
     triangles = sum(len(cell) == 3 for cell in model.cells.polygons)
@@ -88,7 +88,7 @@ def test_a_model_on_that_mesh(tmp_path, curve):
         '[model]\nmesh_file = "own.msh"\n'
     )
     case = af.Case.read(tmp_path / "case.toml")
-    assert af.build(case.structure, file=case.discretisation.file).size == model.size
+    assert af.build(case.structure, mesh_file=case.discretisation.mesh_file).size == model.size
 
 
 def test_a_surface_in_pieces_is_refused(tmp_path):
@@ -100,11 +100,11 @@ def test_a_surface_in_pieces_is_refused(tmp_path):
 def test_a_mesh_of_another_structure_is_refused(tmp_path):
     path = own(tmp_path / "own.msh")
     with pytest.raises(af.errors.MeshError, match="3 physical surfaces, of which"):
-        af.build(af.column(breadth=1.0, heights=[1.0, 0.8]), file=path)
+        af.build(af.column(breadth=1.0, heights=[1.0, 0.8]), mesh_file=path)
     with pytest.raises(af.InvalidInput, match="'rigid' has no mesh"):
-        af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid", file=path)
+        af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid", mesh_file=path)
     with pytest.raises(af.InvalidInput, match="'auto' chooses"):
-        af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="auto", file=path)
+        af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="auto", mesh_file=path)
     (tmp_path / "words.msh").write_text("words")
     with pytest.raises(af.InvalidInput, match="no mesh of gmsh"):
         af.masonry.read_outlines(tmp_path / "words.msh")

@@ -29,14 +29,17 @@ BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
         ({"cells": (4, 2.5)}, "cells along = 2.5"),
         ({"cells": (4, 1001)}, "cells along = 1001"),
         ({"cell": "hexagon"}, "cell 'hexagon' is not known"),
-        ({"coarse": 0.0}, "coarse = 0.0 m: give a largest cell size above 0"),
-        ({"coarse": float("nan")}, "coarse \\[m\\] = nan"),
+        ({"max_cell_size": 0.0}, "max_cell_size = 0.0 m: give a size above 0"),
+        ({"max_cell_size": float("nan")}, "max_cell_size \\[m\\] = nan"),
         ({"degree": 3}, "degree 3: elements are of degree 1 or 2"),
         ({"quadrature": "simpson"}, "quadrature 'simpson' is not known"),
-        ({"quadrature": "gauss", "points": 0}, "quadrature points = 0 is not a whole number"),
-        ({"quadrature": "nodal", "points": 3}, "nodal quadrature has points of its own"),
         (
-            {"quadrature": "trapezoidal", "points": 3, "fidelity": "monolithic"},
+            {"quadrature": "gauss", "quadrature_points": 0},
+            "quadrature points = 0 is not a whole number",
+        ),
+        ({"quadrature": "nodal", "quadrature_points": 3}, "nodal quadrature has points of its own"),
+        (
+            {"quadrature": "trapezoidal", "quadrature_points": 3, "fidelity": "monolithic"},
             "trapezoidal quadrature with 3 points is not written in UFL",
         ),
         ({"quadrature": "exact", "degree": 2}, "linear along a facet"),
@@ -57,10 +60,14 @@ def test_refusals(ring, given, says):
 
 
 def test_given_settings_are_kept():
-    discretisation = Discretisation("faces", [2, np.int64(3)], quadrature="gauss", points=2)
+    discretisation = Discretisation(
+        "faces", [2, np.int64(3)], quadrature="gauss", quadrature_points=2
+    )
     assert discretisation.cells == (discretisation.through, discretisation.along) == (2, 3)
     assert discretisation.rule == af.joints.Quadrature("gauss", 2)
-    assert discretisation == Discretisation("faces", (2, 3), quadrature="gauss", points=2)
+    assert discretisation == Discretisation(
+        "faces", (2, 3), quadrature="gauss", quadrature_points=2
+    )
     for fidelity in ("rigid", "faces", "condensed", "full", "monolithic"):
         assert Discretisation(fidelity).name == fidelity
     mixed = Discretisation({"backfill": "full", "rest": "faces"})
@@ -72,7 +79,7 @@ def test_a_case_has_its_discretisation():
         "model={ fidelity = 'faces', cells = [2, 3], max_cell_size = '50 cm', tolerance = 0.01 }"
     ]
     discretisation = af.Case.read(BRIDGE, changes).discretisation
-    assert discretisation == Discretisation("faces", (2, 3), coarse=0.5)
+    assert discretisation == Discretisation("faces", (2, 3), max_cell_size=0.5)
 
 
 def test_a_case_without_a_fidelity_may_state_its_mesh():

@@ -98,7 +98,7 @@ def test_a_mesh_has_a_million_cells_at_most():
         _check_cell_count(edges, af.models.Discretisation(cells=(1000, 1000)))
     free = find_edges(slab(2.0, corners=None), [1, 1])
     for size, fits in ((0.0014144, True), (0.0014140, False)):
-        discretisation = af.models.Discretisation(cells=(1, 1), coarse=size)
+        discretisation = af.models.Discretisation(cells=(1, 1), max_cell_size=size)
         if fits:
             _check_cell_count(free, discretisation)
         else:

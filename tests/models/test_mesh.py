@@ -288,7 +288,7 @@ def test_soil_has_the_cells_that_its_stones_impose():
     assert len(extrados) == 20
     counts = []
     for coarse in (None, 0.3, 0.15):
-        made = generate_mesh(structure, af.models.Discretisation(coarse=coarse))
+        made = generate_mesh(structure, af.models.Discretisation(max_cell_size=coarse))
         assert set(np.bincount(made.joints[1])[extrados]) == {4}
         counts.append(np.sum(made.blocks == soil))
     area = structure.blocks[soil].area

@@ -173,7 +173,8 @@ def test_curve_starts_at_the_dead_load_and_never_falls():
 
 
 @pytest.mark.parametrize(
-    ("rule", "reach"), each_once(({}, {"quadrature": "gauss", "points": 4}), (3e-3, 1e-2))
+    ("rule", "reach"),
+    each_once(({}, {"quadrature": "gauss", "quadrature_points": 4}), (3e-3, 1e-2)),
 )
 def test_limit_lies_between_the_largest_factor_and_the_extrapolation(reach, rule):
     model = rigid(RING, cells=(32, 1), **rule)

@@ -94,7 +94,7 @@ def test_joint_rules_select_the_method(column, motion, monkeypatch):
     exact = evaluate(column, motion)
     springs = evaluate(column, motion, joint_rule="three points")
     plain = {"fidelity": "rigid", "displacements": "large"}
-    assert built == [plain, plain | {"quadrature": "trapezoidal", "points": 3}]
+    assert built == [plain, plain | {"quadrature": "trapezoidal", "quadrature_points": 3}]
     assert not rigid
     blocks = evaluate(column, motion, joint_rule="rigid")
     assert len(rigid) == 1

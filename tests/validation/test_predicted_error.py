@@ -234,7 +234,7 @@ def test_a_setting_that_fails_is_reported_as_such(ring, monkeypatch):
 
 
 def test_labels_name_the_setting():
-    faces = af.models.Discretisation("faces", (4, 2), quadrature="gauss", points=3)
+    faces = af.models.Discretisation("faces", (4, 2), quadrature="gauss", quadrature_points=3)
     assert Setting(faces, 0.005).label == "faces 4×2 gauss 3 5 ms"
     mixed = af.models.Discretisation({"backfill": "full", "rest": "faces"}, quadrature="exact")
     assert Setting(mixed, 0.001).label == "faces + soil 4×4 exact 1 ms"

@@ -31,7 +31,7 @@ TRIAL = {  # cells, rule, points: crown eccentricity as found in a trial of join
 @pytest.mark.parametrize("setting", TRIAL, ids=str)
 def test_crown_eccentricity(ring, setting):
     cells, rule, points = setting
-    model = af.build(glued(ring), cells=(cells, cells), quadrature=rule, points=points)
+    model = af.build(glued(ring), cells=(cells, cells), quadrature=rule, quadrature_points=points)
     found = af.dead_load(model).joints
     assert float(found["eccentricity"][8]) == pytest.approx(TRIAL[setting], abs=6e-5)
 

@@ -257,7 +257,7 @@ def test_exact_facets_are_the_limit_of_quadrature(ring):
         return af.dead_load(model).joints["eccentricity"].values
 
     exact = dead(quadrature="exact")
-    off = [np.abs(dead(points=n, cells=(8, 1)) - exact).max() for n in (2, 4, 8)]
+    off = [np.abs(dead(quadrature_points=n, cells=(8, 1)) - exact).max() for n in (2, 4, 8)]
     assert off[2] < off[1] < off[0]
     assert off[2] < 1e-4
 

@@ -195,15 +195,14 @@ def _check_cell_count(edges: Edges, settings: Discretisation, max_cells: int = 1
     count = sum(
         prod(map(float, _side_cells(edges, number, settings))) for number in edges.structured
     )
-    if settings.coarse is not None:
+    if (largest := settings.max_cell_size) is not None:
         blocks = [edges.structure.blocks[number] for number in edges.unstructured]
         area = sum(block.area for block in blocks if not block.fixed)
-        count += area / settings.coarse / settings.coarse
+        count += area / largest / largest
     if not count <= max_cells:
         raise MeshError(
             f"a mesh of {count:.3g} cells, and there is room for {max_cells}: use fewer cells, "
-            "larger ones (coarse, max_cell_size in a case file), or fidelity 'rigid', which has "
-            "none"
+            "larger ones (max_cell_size), or fidelity 'rigid', which has none"
         )
 
 
@@ -305,7 +304,7 @@ def _block_cell_sizes(
         for (start, end), count in zip(ends, counts[small], strict=True)
     ]
     lengths = np.repeat(edges.lengths[small] / counts[small], counts[small])
-    max_size = settings.coarse or block.area / float(edges.lengths[around].sum())
+    max_size = settings.max_cell_size or block.area / float(edges.lengths[around].sum())
     return CellSizes(np.concatenate(middles), lengths, np.inf if block.fixed else max_size)
 
 

@@ -267,7 +267,7 @@ _recent_meshes: OrderedDict[Hashable, Mesh] = OrderedDict()
 
 def get_mesh(structure: Structure, settings: Discretisation, max_meshes: int = 4) -> Mesh:
     """Return the mesh of a structure, or a recent one of a structure of the same shapes."""
-    cells = (settings.through, settings.along, settings.cell, settings.coarse, settings.degree)
+    cells = (*settings.cells, settings.cell, settings.max_cell_size, settings.degree)
     key = (*map(_shape_key, (*structure.blocks, *structure.joints)), cells)
     try:
         hash(key)
