@@ -1,0 +1,224 @@
+"""An analysis as tables of a case file: [model], [analysis], [criteria], [record], [dead_load].
+
+The keys are the keywords of `archfem.Analysis` and of the objects that it holds, and each table is
+read and written by the same declaration. A value that equals its default is not written.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+from archfem._validation import declared_keys
+from archfem.cases.toml_file import Table, check_choice, check_table
+from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.events import (
+    CountedMechanism,
+    EveryMechanism,
+    MovingMechanism,
+    StopCondition,
+    registered_criteria,
+)
+from archfem.dynamics.recorder import Record
+from archfem.dynamics.schemes import (
+    HHT,
+    Conserving,
+    EffectiveDamping,
+    Newmark,
+    Rayleigh,
+    StiffnessDamping,
+    Viscous,
+)
+from archfem.errors import InvalidInput
+from archfem.joints.criteria import Criteria
+from archfem.masonry.construction import Stage, usual_stages
+from archfem.masonry.structure import Structure
+from archfem.statics.newton import Newton
+
+# Fields of `Analysis` by the section of a case file that has them as keys
+SECTION_FIELDS: Mapping[str, tuple[str, ...]] = {
+    "model": (
+        *("fidelity", "cells", "cell", "max_cell_size", "degree", "quadrature"),
+        *("quadrature_points", "displacements", "mesh_file", "tolerance"),
+    ),
+    "analysis": ("dt", "damping", "scheme", "method", "newton", "until"),
+}
+
+# Objects that a word stands for, or a table with this word as `name` and the object's fields
+_SCHEMES: Mapping[str, type] = {"conserving": Conserving, "newmark": Newmark, "hht": HHT}
+_EVENTS: Mapping[str, type] = {
+    "counted mechanism": CountedMechanism,
+    "moving mechanism": MovingMechanism,
+    "every mechanism": EveryMechanism,
+}
+
+
+def find_section(keyword: str) -> str:
+    """Return the section of a keyword of `Analysis`, or "" if it is none."""
+    return next((name for name, keys in SECTION_FIELDS.items() if keyword in keys), "")
+
+
+def read_analysis(settings: Table, structure: Structure, folder: Path) -> Analysis:
+    """Return the analysis of a structure that the tables of a case describe."""
+    declared = declared_keys(Analysis) | {"scheme": (str, dict), "until": (str, dict)}
+    values: dict[str, Any] = {}
+    for section, names in SECTION_FIELDS.items():
+        keys = {name: declared[name] for name in names}
+        values |= check_table(settings.get(section, {}), keys, section)
+    if "mesh_file" in values:
+        values["mesh_file"] = folder / values["mesh_file"]
+    if "damping" in values:
+        values["damping"] = _read_damping(values["damping"])
+    if "scheme" in values:
+        values["scheme"] = _read_named(values["scheme"], _SCHEMES, "analysis.scheme")
+    if "until" in values:
+        values["until"] = _read_event(values["until"])
+    if "newton" in values:
+        values["newton"] = read_object(Newton, values["newton"], "analysis.newton")
+    for name, cls in (("criteria", Criteria), ("record", Record)):
+        if name in settings:
+            values[name] = read_object(cls, settings[name], name)
+    values["stages"] = _read_stages(settings.get("dead_load", {}), structure)
+    return Analysis(structure, **values)
+
+
+def write_analysis_tables(analysis: Analysis, folder: Path) -> dict[str, Any]:
+    """Return the tables of an analysis, but for its structure, for a file in a folder."""
+    tables: dict[str, Any] = {}
+    given = {
+        each.name: value
+        for each in fields(analysis)[1:]
+        if (value := getattr(analysis, each.name)) is not None and value != each.default
+    }
+    writers: Mapping[str, Callable[[Any], Any]] = {
+        "cells": list,
+        "mesh_file": lambda file: _relative_name(file, folder),
+        "damping": _write_damping,
+        "scheme": lambda scheme: _write_named(scheme, _SCHEMES),
+        "until": _write_event,
+        "newton": write_fields,
+        "criteria": write_fields,
+        "record": write_fields,
+    }
+    for name, value in given.items():
+        written = writers[name](value) if name in writers else value
+        if name == "stages":
+            tables["dead_load"] = {"stages": [write_fields(stage) for stage in value]}
+        elif section := find_section(name):
+            tables.setdefault(section, {})[name] = written
+        else:
+            tables[name] = written
+    return tables
+
+
+def read_object(cls: Callable[..., Any], table: Any, section: str) -> Any:
+    """Return an object whose fields are the keys of a table."""
+    values = check_table(table, declared_keys(cls), section)
+    return cls(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
+
+
+def write_fields(value: Any) -> dict[str, Any]:
+    """Return the fields of an object, but for those that equal their default, as a table."""
+    table = {
+        each.name: own
+        for each in fields(value)
+        if (own := getattr(value, each.name)) is not None and own != each.default
+    }
+    return {name: list(own) if isinstance(own, tuple) else own for name, own in table.items()}
+
+
+def _read_damping(given: str | Table) -> Viscous | EffectiveDamping:
+    """Return damping, whose kind follows from the keys of its table."""
+    if isinstance(given, str):
+        check_choice(given, ("effective",), "analysis.damping")
+        return EffectiveDamping()
+    kinds: Table = {"frequency": StiffnessDamping, "frequencies": Rayleigh}
+    cls = next((kind for key, kind in kinds.items() if key in given), EffectiveDamping)
+    table = dict(given)
+    effective = cls is EffectiveDamping and table.pop("modes", "") == "effective"
+    # the share of mass selects the second mode, which stiffness damping has not
+    unused = effective and "mass_share" in table and table.get("kind") != "rayleigh"
+    if (cls is EffectiveDamping) != effective or unused or "ratio" not in table:
+        raise InvalidInput(
+            f"analysis.damping = {given}: write "
+            '{ ratio = 0.05, modes = "effective" }, or a frequency = 8.0 in place of modes; for '
+            'Rayleigh damping frequencies = [8.0, 16.0], or kind = "rayleigh" (and a mass_share) '
+            'beside modes = "effective"'
+        )
+    damping: Viscous | EffectiveDamping = read_object(cls, table, "analysis.damping")
+    return damping
+
+
+def _write_damping(damping: Viscous | EffectiveDamping) -> dict[str, Any]:
+    """Return the table of damping."""
+    table = {"ratio": damping.ratio, **write_fields(damping)}
+    return table | ({"modes": "effective"} if isinstance(damping, EffectiveDamping) else {})
+
+
+def _read_named(given: str | Table, known: Mapping[str, type], section: str) -> Any:
+    """Return the object of a word, or of a table with this word as `name`."""
+    table = {"name": given} if isinstance(given, str) else dict(given)
+    name = check_choice(table.pop("name", None), known, section)
+    return read_object(known[name], table, section)
+
+
+def _write_named(value: Any, known: Mapping[str, type]) -> Any:
+    """Return the word of an object, with its fields if some differ from their defaults."""
+    name = next(word for word, cls in known.items() if type(value) is cls)
+    own = write_fields(value)
+    return {"name": name, **own} if own else name
+
+
+def _read_event(given: str | Table) -> StopCondition:
+    """Return an event, or a criterion that a module of the user has registered."""
+    if isinstance(given, str) and given in registered_criteria:
+        return registered_criteria[given]
+    table = {"name": given} if isinstance(given, str) else dict(given)
+    criteria = table.pop("criteria", None)
+    if isinstance(given, str):
+        check_choice(given, (*_EVENTS, *registered_criteria), "analysis.until")
+    event: Any = _read_named(table, _EVENTS, "analysis.until")
+    if criteria is None:
+        return event  # type: ignore[no-any-return]
+    criteria = read_object(Criteria, criteria, "analysis.until.criteria")
+    return replace(event, criteria=criteria)  # type: ignore[no-any-return]
+
+
+def _write_event(event: StopCondition) -> Any:
+    """Return the word or table of an event, or the name of a registered criterion."""
+    if name := next((name for name, own in registered_criteria.items() if own is event), ""):
+        return name
+    if type(event) not in _EVENTS.values():
+        raise InvalidInput(
+            f"until = {event!r} has no name in a file: register it by "
+            "archfem.dynamics.register_criterion, and give what is registered"
+        )
+    plain: Any = replace(event, criteria=None)  # type: ignore[type-var]
+    written = _write_named(plain, _EVENTS)
+    if (criteria := getattr(event, "criteria", None)) is None:
+        return written
+    table = {"name": written} if isinstance(written, str) else written
+    return {**table, "criteria": write_fields(criteria)}
+
+
+def _relative_name(file: str | Path, folder: Path) -> str:
+    """Return the name of a file as seen from a folder."""
+    # a walk upwards is possible where both are of one tree
+    return Path(file).resolve().relative_to(folder.resolve(), walk_up=True).as_posix()
+
+
+def _read_stages(table: Any, structure: Structure) -> Sequence[Stage] | None:
+    """Return the construction stages of [dead_load]; None if the structure is built at once."""
+    values = check_table(table, {"stages": (str, list), "layers": int}, "dead_load")
+    given = values.get("stages", "none")
+    if isinstance(given, list):
+        if "layers" in values:
+            raise InvalidInput("dead_load has stages of its own: take out layers, or the stages")
+        return [
+            read_object(Stage, {"name": f"stage {k}", **stage}, f"dead_load.stages[{k}]")
+            for k, stage in enumerate(check_list_of_tables(given, "dead_load.stages"))
+        ]
+    usual = check_choice(given, ("none", "usual"), "dead_load.stages") == "usual"
+    if "layers" in values and not usual:
+        raise InvalidInput("dead_load.layers needs stages = 'usual': add that, or take layers out")
+    return usual_stages(structure, values.get("layers", 4)) if usual else None
