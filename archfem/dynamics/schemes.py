@@ -10,6 +10,7 @@ from math import pi
 
 import numpy as np
 
+from archfem._typing import Hertz
 from archfem._validation import check_number, check_numbers, is_one_of
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
@@ -40,7 +41,7 @@ class Rayleigh:
     """
 
     ratio: float
-    frequencies: tuple[float, float]
+    frequencies: tuple[Hertz, Hertz]
     joints: str = "closed"
 
     def __post_init__(self) -> None:
@@ -88,7 +89,7 @@ class StiffnessDamping:
     """
 
     ratio: float
-    frequency: float
+    frequency: Hertz
     joints: str = "closed"
     restitution: float | None = None
 
