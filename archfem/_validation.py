@@ -12,7 +12,7 @@ from math import inf, isfinite
 from numbers import Integral
 from pathlib import Path
 from types import NoneType, SimpleNamespace, UnionType
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -42,19 +42,64 @@ def report_user_errors(what: str) -> Iterator[None]:
 
 
 def read_field_kinds(what: str, cls: type) -> dict[str, Any]:
-    """Return the kinds of the keys of a case that are fields of a dataclass of the user."""
-    # numbers are without unit, or have that of `field(metadata={"unit": …})`
+    """Return the keys that a dataclass of the user declares, single numbers and words."""
     if not is_dataclass(cls):
         raise InvalidInput(f"{what}: {cls!r} is no dataclass: write @dataclass(frozen=True)")
     with report_user_errors(what):
-        hints = get_type_hints(cls)
-    kinds: dict[str, Any] = {}
+        kinds, hints = declared_keys(cls), get_type_hints(cls)
     for each in fields(cls):
-        kind = hints[each.name]
-        if kind not in (float, int, str):
-            raise InvalidInput(f"{what}, {each.name}: {kind!r} is none of float, int and str")
-        kinds[each.name] = each.metadata.get("unit", "1") if kind is float else kind
+        # a row would make a law that has no hash
+        if each.init and not isinstance(kinds.get(each.name), str | type):
+            hint = hints[each.name]
+            raise InvalidInput(f"{what}, {each.name}: {hint!r} is none of float, int and str")
     return kinds
+
+
+def declared_keys(declaration: Callable[..., Any], named: tuple[type, ...] = ()) -> dict[str, Any]:
+    """Return the keys of a case that a dataclass declares by its fields, a function by arguments.
+
+    Each has the kind of its value for `check_table`: an annotation such as `Metres` its unit, or
+    the field's `metadata={"unit": …}`; a dataclass or mapping a table; and objects of the classes
+    `named` the name of a table. What no file can hold is left out.
+    """
+    declaration = inspect.unwrap(declaration)
+    if isinstance(declaration, type):
+        units = {each.name: each.metadata.get("unit") for each in fields(declaration) if each.init}
+    else:
+        units = dict.fromkeys(inspect.signature(declaration).parameters)
+    hints = _hints(declaration, include_extras=True)
+    kinds = {name: units[name] or _kind_of(hints.get(name), named) for name in units}
+    return {name: kind for name, kind in kinds.items() if kind is not None}
+
+
+def _kind_of(hint: Any, named: tuple[type, ...]) -> Any:
+    """Return the kind of a key with an annotation; None for what no file can hold."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin is Annotated:  # with a unit, or the kind itself
+        return [inner[1]] if get_origin(inner[0]) is np.ndarray else inner[1]
+    if origin in (Union, UnionType):
+        kinds = [kind for each in inner if (kind := _kind_of(each, named)) is not None]
+        # of several rows, such as points and an array of points, the first counts
+        rows = [kind for kind in kinds if isinstance(kind, list)]
+        single = [kind for kind in kinds if not isinstance(kind, list)]
+        kinds = [*dict.fromkeys(single), *rows[:1]]
+        return tuple(kinds) if len(kinds) > 1 else next(iter(kinds), None)
+    if origin is Literal:
+        return type(inner[0])
+    if origin is np.ndarray:
+        return ["1"]
+    if hint is float:
+        return "1"
+    if hint in (int, str, bool):
+        return hint
+    if hint in named:
+        return str
+    kind = origin or hint
+    if is_dataclass(kind) or (isinstance(kind, type) and issubclass(kind, Mapping)):
+        return dict
+    row = isinstance(kind, type) and issubclass(kind, Iterable) and inner
+    each = _kind_of(inner[0], named) if row else None
+    return None if each is None else [each]
 
 
 def short_repr(value: Any, max_length: int = 200) -> str:
@@ -226,13 +271,14 @@ def _check_values(values: Mapping[str, Any], hints: Mapping[str, Any]) -> None:
 
 
 @cache
-def _hints(annotated: Any) -> dict[str, Any]:
+def _hints(annotated: Any, include_extras: bool = False) -> dict[str, Any]:
     """Evaluate the annotations of a function's arguments or a class's fields, once."""
     if isinstance(annotated, type):
-        return get_type_hints(annotated)
+        return get_type_hints(annotated, include_extras=include_extras)
     # what is returned may be of a package that is imported late
     arguments = {key: hint for key, hint in annotated.__annotations__.items() if key != "return"}
-    return get_type_hints(SimpleNamespace(__annotations__=arguments), annotated.__globals__)
+    carrier = SimpleNamespace(__annotations__=arguments)
+    return get_type_hints(carrier, annotated.__globals__, include_extras=include_extras)
 
 
 def matches_annotation(value: Any, hint: Any) -> bool:

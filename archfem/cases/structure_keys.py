@@ -12,8 +12,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from archfem._typing import NumberOrWord
 from archfem.cases.provenance import hash_file, list_input_files
-from archfem.cases.toml_file import NumberOrWord, Table, check_choice, check_table
+from archfem.cases.toml_file import Table, check_choice, check_table
 from archfem.errors import InvalidInput
 from archfem.joints.own_law import JointLaw, build_registered_law, registered_laws
 from archfem.masonry.backfill import jointed_fill
@@ -111,7 +112,7 @@ def _keys_of(function: Callable[..., Any]) -> dict[str, Any]:
         **dict.fromkeys(("poisson", "dilatancy"), "1"),
         "unit_weight": "N/m**3",
         **dict.fromkeys(("normal_stiffness", "shear_stiffness"), "Pa/m"),
-        "friction": NumberOrWord("1", {"none": None}),  # "none": a joint that never slides
+        "friction": NumberOrWord("1", "none"),  # "none": a joint that never slides
     }
     return {k: kinds[k] for k in inspect.signature(function).parameters if k in kinds}
 

@@ -4,31 +4,24 @@ A file is refused before it is parsed if it is too large or too deeply nested, s
 the standard library would take hours or exhaust the memory.
 
 A table of keys gives for each key the kind of its value: a unit such as "m" for a number or a
-quantity, `NumberOrWord`, a Python type or several, or a list of one kind for a list of values.
+quantity, `NumberOrWord`, a Python type, a list of one kind for a list of values, or a tuple of
+several of these. `declared_keys` reads it from a dataclass or function.
 """
 
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from archfem._files import read_text
+from archfem._typing import NumberOrWord
 from archfem._validation import is_one_of, short_repr
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import suggest_name
 from archfem.units import in_degrees, in_unit
 
 Table = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class NumberOrWord:
-    """Kind of a key that takes a number, or one of some words."""
-
-    unit: str  # of the number
-    words: Mapping[str, Any]  # value that each word stands for
 
 
 def read_with_base(path: Path, above: Sequence[Path] = ()) -> dict[str, Any]:
@@ -196,21 +189,25 @@ def _convert(value: Any, kind: Any, key: str) -> Any:
         if not isinstance(value, list):
             raise InvalidInput(f"{key} = {value!r} is not a list: write [a, b, …]")
         return [_convert(item, kind[0], f"{key}[{n}]") for n, item in enumerate(value)]
-    kinds = kind if isinstance(kind, tuple) else (kind,)
+    several = kind if isinstance(kind, tuple) else (kind,)
+    kinds = tuple(each for each in several if isinstance(each, type))
     # bool is a subclass of int, and `voussoirs = true` is an error.
     if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
+        # A value or a row of them, such as one height for all piers or one for each
+        for each in several:
+            if each not in kinds and isinstance(each, list) == isinstance(value, list):
+                return _convert(value, each, key)
         table = f"a table, as in {key.rpartition('.')[2]} = {{ … }}"
         words = {int: "a whole number", str: "a word", bool: "true or false", dict: table}
         raise InvalidInput(f"{key} = {value!r} is not {' or '.join(words[each] for each in kinds)}")
     return value
 
 
-def _convert_number_or_word(value: Any, kind: NumberOrWord, key: str) -> Any:
-    """Convert a value to a number, or to the value of its word."""
-    if isinstance(value, str) and value in kind.words:
-        return kind.words[value]
+def _convert_number_or_word(value: Any, kind: NumberOrWord, key: str) -> float | None:
+    """Convert a value to a number, or its word to None."""
+    if value == kind.word:
+        return None
     try:
         return in_unit(value, kind.unit, key)
     except InvalidInput as error:
-        words = " or ".join(f'"{word}"' for word in kind.words)
-        raise InvalidInput(f"{error}, or {words}") from error
+        raise InvalidInput(f'{error}, or "{kind.word}"') from error

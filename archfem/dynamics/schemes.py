@@ -10,7 +10,12 @@ from math import pi
 
 import numpy as np
 
+<<<<<<< HEAD
 from archfem._validation import check_number, check_numbers, is_one_of, short_repr
+=======
+from archfem._typing import Hertz
+from archfem._validation import check_number, check_numbers, is_one_of
+>>>>>>> 4c6f7bc8
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 
@@ -40,7 +45,7 @@ class Rayleigh:
     """
 
     ratio: float
-    frequencies: tuple[float, float]
+    frequencies: tuple[Hertz, Hertz]
     joints: str = "closed"
 
     def __post_init__(self) -> None:
@@ -88,7 +93,7 @@ class StiffnessDamping:
     """
 
     ratio: float
-    frequency: float
+    frequency: Hertz
     joints: str = "closed"
     restitution: float | None = None
 

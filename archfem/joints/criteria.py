@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from archfem._typing import Array
+from archfem._typing import Array, Seconds
 from archfem._validation import check_integer, check_number, check_type, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.parts import select_assessed_parts
@@ -92,7 +92,7 @@ class Criteria:
     # A stone without support falls by 5 µm in 1 ms, less than the elastic deformation of joints.
     # Adaptive steps are down to a tenth as long, and would otherwise matter; among steps of this
     # length or more, each one counts.
-    duration: float = 1e-3
+    duration: Seconds = 1e-3
 
     def __post_init__(self) -> None:
         """Refuse limits that no joint, or every joint, would pass."""

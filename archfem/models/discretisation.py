@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from archfem._typing import Metres
 from archfem._validation import check_integer, check_number, check_sequence, is_one_of, short_repr
 from archfem.errors import InvalidInput
 from archfem.joints.quadrature import Quadrature
@@ -46,7 +47,7 @@ class Discretisation:
     fidelity: str | Mapping[str, str] = "full"
     cells: tuple[int, int] = (4, 4)
     cell: str = "quadrilateral"
-    max_cell_size: float | None = None
+    max_cell_size: Metres | None = None
     degree: int = 1
     quadrature: str | None = None
     quadrature_points: int | None = None
