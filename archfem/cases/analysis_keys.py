@@ -1,4 +1,4 @@
-"""Sections [analysis], [limit], [rating] and [assessment]: time stepping, capacity, assessment."""
+"""Sections [limit], [rating] and [assessment]: capacity and kinematic assessment."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,19 +7,6 @@ from typing import Any
 from archfem._validation import validate_methods
 from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.toml_file import Table, check_choice, check_table
-from archfem.dynamics.events import registered_criteria
-from archfem.dynamics.schemes import (
-    HHT,
-    Conserving,
-    EffectiveDamping,
-    Newmark,
-    Rayleigh,
-    Scheme,
-    StiffnessDamping,
-    Viscous,
-    check_friction_scheme,
-    check_large_displacement_scheme,
-)
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import Fill
 from archfem.limit.collapse import Collapse, collapse_factor
@@ -37,14 +24,6 @@ from archfem.statics.mechanism_assessment import (
 
 # Keys of the tables by section, and the kind of each value
 SECTION_KEYS: Mapping[str, Table] = {
-    "analysis": {
-        **{"dt": "s", "scheme": str, "alpha": "1", "damping": dict},
-        **{"stop_at_mechanism": bool, "stop_at": str},
-    },
-    "analysis.damping": {
-        **{"ratio": "1", "frequency": "Hz", "frequencies": ["Hz"], "modes": str, "kind": str},
-        **{"mass_share": "1", "joints": str},
-    },
     "limit": {"horizontal": "1", "vertical": "1", "point": dict, "friction": str, "fill": dict},
     "limit.point": {"x": "m", "force": ["N"]},
     "limit.fill": {
@@ -66,71 +45,9 @@ SECTION_KEYS: Mapping[str, Table] = {
 }
 
 
-def parse_analysis(table: Any) -> dict[str, Any]:
-    """Return the checked keys of [analysis]."""
-    analysis = _check_section(table, "analysis")
-    if "damping" in analysis:
-        analysis["damping"] = _check_section(analysis["damping"], "analysis.damping")
-    if "stop_at" in analysis:
-        check_choice(analysis["stop_at"], registered_criteria, "analysis.stop_at")
-        if analysis.get("stop_at_mechanism", False):
-            raise InvalidInput("analysis.stop_at and stop_at_mechanism: one condition ends a run")
-    return analysis
-
-
 def _check_section(table: Any, section: str) -> dict[str, Any]:
     """Check the keys of the table of a section, and convert its values to their kinds."""
     return check_table(table, SECTION_KEYS[section], section)
-
-
-def parse_damping(analysis: Table) -> Viscous | EffectiveDamping | None:
-    """Return the damping of a case; that of effective modes has no frequencies yet."""
-    if "damping" not in analysis:
-        return None
-    damping = dict(analysis["damping"])
-    keys = set(damping) - {"joints"}
-    if {"ratio", "modes"} <= keys <= {"ratio", "modes", "kind", "mass_share"}:
-        # The share of mass selects the second mode, which stiffness damping has not.
-        rayleigh = damping.get("kind") == "rayleigh"
-        if damping.pop("modes") == "effective" and ("mass_share" not in keys or rayleigh):
-            return EffectiveDamping(**damping)
-    elif keys == {"ratio", "frequency"}:
-        return StiffnessDamping(**damping)
-    elif keys == {"ratio", "frequencies"} and len(damping["frequencies"]) == 2:
-        return Rayleigh(**{**damping, "frequencies": tuple(damping["frequencies"])})
-    raise InvalidInput(
-        f"analysis.damping = {analysis['damping']}: write "
-        '{ ratio = 0.05, modes = "effective" }, or a frequency = 8.0 in place of modes; for '
-        'Rayleigh damping frequencies = [8.0, 16.0], or kind = "rayleigh" (and a mass_share) '
-        'beside modes = "effective"'
-    )
-
-
-def parse_scheme(analysis: Table) -> Scheme:
-    """Return the time integration scheme of a case."""
-    name, alpha = analysis.get("scheme", "conserving"), analysis.get("alpha")
-    schemes = {"conserving": Conserving, "newmark": Newmark, "hht": HHT}
-    if name not in schemes or (alpha is not None and name != "hht"):
-        raise InvalidInput(
-            f"analysis.scheme = {name!r} with alpha {alpha}: use 'conserving', 'newmark', or "
-            "'hht' and alpha"
-        )
-    return schemes[name]() if alpha is None else HHT(alpha)
-
-
-def check_scheme(analysis: Table, structure: Structure, displacements: str = "small") -> None:
-    """Refuse a scheme that cannot integrate the case's contacts or displacements."""
-    # Friction is integrated over a step by the conserving scheme alone.
-    if displacements == "large":
-        check_large_displacement_scheme(parse_scheme(analysis))
-    try:
-        check_friction_scheme(parse_scheme(analysis), structure)
-    except InvalidInput as error:
-        name = analysis.get("scheme", "conserving")
-        raise InvalidInput(
-            f'analysis.scheme = {name!r}: {error}; in a case file, scheme = "conserving", or '
-            'friction = "none" and no tension in the table of each of its [contacts]'
-        ) from error
 
 
 @validate_methods

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from archfem._validation import declared_keys
-from archfem.cases.toml_file import Table, check_choice, check_table
+from archfem.cases.provenance import name_from
+from archfem.cases.toml_file import Table, check_choice, check_table, read_object
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.events import (
     CountedMechanism,
@@ -82,8 +83,8 @@ def read_analysis(settings: Table, structure: Structure, folder: Path) -> Analys
     return Analysis(structure, **values)
 
 
-def write_analysis_tables(analysis: Analysis, folder: Path) -> dict[str, Any]:
-    """Return the tables of an analysis, but for its structure, for a file in a folder."""
+def write_analysis_tables(analysis: Analysis, folder: Path | None) -> dict[str, Any]:
+    """Return the tables of an analysis, but for its structure; files are named from a folder."""
     tables: dict[str, Any] = {}
     given = {
         each.name: value
@@ -92,7 +93,7 @@ def write_analysis_tables(analysis: Analysis, folder: Path) -> dict[str, Any]:
     }
     writers: Mapping[str, Callable[[Any], Any]] = {
         "cells": list,
-        "mesh_file": lambda file: _relative_name(file, folder),
+        "mesh_file": lambda file: name_from(file, folder),
         "damping": _write_damping,
         "scheme": lambda scheme: _write_named(scheme, _SCHEMES),
         "until": _write_event,
@@ -109,12 +110,6 @@ def write_analysis_tables(analysis: Analysis, folder: Path) -> dict[str, Any]:
         else:
             tables[name] = written
     return tables
-
-
-def read_object(cls: Callable[..., Any], table: Any, section: str) -> Any:
-    """Return an object whose fields are the keys of a table."""
-    values = check_table(table, declared_keys(cls), section)
-    return cls(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
 
 
 def write_fields(value: Any) -> dict[str, Any]:
@@ -201,22 +196,18 @@ def _write_event(event: StopCondition) -> Any:
     return {**table, "criteria": write_fields(criteria)}
 
 
-def _relative_name(file: str | Path, folder: Path) -> str:
-    """Return the name of a file as seen from a folder."""
-    # a walk upwards is possible where both are of one tree
-    return Path(file).resolve().relative_to(folder.resolve(), walk_up=True).as_posix()
-
-
 def _read_stages(table: Any, structure: Structure) -> Sequence[Stage] | None:
     """Return the construction stages of [dead_load]; None if the structure is built at once."""
-    values = check_table(table, {"stages": (str, list), "layers": int}, "dead_load")
+    listed = isinstance(table, Mapping) and isinstance(table.get("stages"), list)
+    keys = {"stages": [dict] if listed else str, "layers": int}
+    values = check_table(table, keys, "dead_load")
     given = values.get("stages", "none")
-    if isinstance(given, list):
+    if listed:
         if "layers" in values:
             raise InvalidInput("dead_load has stages of its own: take out layers, or the stages")
         return [
             read_object(Stage, {"name": f"stage {k}", **stage}, f"dead_load.stages[{k}]")
-            for k, stage in enumerate(check_list_of_tables(given, "dead_load.stages"))
+            for k, stage in enumerate(given)
         ]
     usual = check_choice(given, ("none", "usual"), "dead_load.stages") == "usual"
     if "layers" in values and not usual:

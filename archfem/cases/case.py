@@ -6,34 +6,31 @@ a wrong unit or an impossible geometry is an error that names the key and the re
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import tomli_w
-
+from archfem._files import atomic_write
 from archfem._validation import check_words, validate_arguments
 from archfem.cases import analysis_keys, motion_keys
 from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis
-from archfem.cases.provenance import load_extensions_of
-from archfem.cases.structure_keys import cached_structure, parse_stages
-from archfem.cases.toml_file import Table, apply_change, check_table, read_with_base, refuse_unknown
-from archfem.dynamics.schemes import MIN_TIME_STEP, EffectiveDamping, Scheme, Viscous
+from archfem.cases.analysis_tables import read_analysis, write_analysis_tables
+from archfem.cases.provenance import find_extensions, load_extensions_of
+from archfem.cases.structure_keys import cached_structure
+from archfem.cases.structure_writer import write_structure
+from archfem.cases.toml_file import (
+    Table,
+    apply_change,
+    check_table,
+    format_tables,
+    read_with_base,
+    refuse_unknown,
+)
+from archfem.dynamics.analysis import Analysis
 from archfem.errors import ArchfemError, InvalidInput
-from archfem.joints.criteria import Criteria
-from archfem.masonry.construction import Stage
 from archfem.masonry.structure import Structure
-from archfem.models.discretisation import Discretisation
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-
-# Keywords of `build`, and the error tolerance of fidelity "auto".
-MODEL_KEYS = {
-    **{"fidelity": (str, dict), "cells": [int], "cell": str, "max_cell_size": "m", "degree": int},
-    **{"quadrature": str, "quadrature_points": int, "tolerance": "1", "displacements": str},
-    "mesh_file": str,
-}
 
 
 @dataclass(frozen=True)
@@ -42,28 +39,22 @@ class Case:
 
     Attributes:
         title: title of the case, which is also the name of the structure.
-        structure: blocks and joints.
-        model: keywords of `build`.
+        analysis: all but the ground motion.
         motion: checked keys of [motion], or None.
         suite: checked keys of [suite], or None; without motion and suite only the dead load is
             analysed.
-        analysis: checked keys of [analysis]: time step, scheme, damping, when to stop.
-        criteria: criteria of joint failure, and the number of failed joints of a mechanism.
         limit: limit analysis, or None.
         rating: arguments of `archfem.rate` from [rating].
         assessment: kinematic assessment; without [assessment] that of the case's motion or suite.
-        output: checked keys of [output]: records, pictures and films.
+        output: checked keys of [output]: pictures and films.
         settings: tables of the case as they were read, changes included.
         folder: folder that relative file names start from.
     """
 
     title: str
-    structure: Structure
-    model: dict[str, Any]
+    analysis: Analysis
     motion: dict[str, Any] | None
     suite: dict[str, Any] | None
-    analysis: dict[str, Any]
-    criteria: Criteria
     limit: LimitAnalysis | None
     rating: Table
     assessment: AssessmentSettings
@@ -121,7 +112,7 @@ class Case:
             raise InvalidInput("this is a study of cases: compute it by `archfem study`")
         sections = (
             *("structure", "materials", "contacts", "model", "motion", "suite", "analysis"),
-            *("criteria", "limit", "rating", "assessment", "dead_load", "output"),
+            *("criteria", "record", "limit", "rating", "assessment", "dead_load", "output"),
         )
         refuse_unknown(settings, ("title", "extensions", *sections))
         load_extensions_of(settings, folder)
@@ -129,50 +120,36 @@ class Case:
         for key in sections:
             if not isinstance(settings.get(key, {}), dict):
                 raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
-        model = check_table(settings.get("model", {}), MODEL_KEYS, "model")
-        keys: Table = {"hinge": "1", "failures": int, "friction": "1", "duration": "s"}
-        criteria = check_table(settings.get("criteria", {}), keys, "criteria")
-        keys = {"save_every": int, "save_fields_every": int, "joints": [(int, str)]}
-        keys |= {"animation": bool, "free_body": str}
+        keys = {"joints": [(int, str)], "animation": bool, "free_body": str}
+        output = check_table(settings.get("output", {}), keys, "output")
         motion, suite, limit = (settings.get(key) for key in ("motion", "suite", "limit"))
         if motion is not None and suite is not None:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
+        analysis = read_analysis(settings, cached_structure(settings, folder), folder)
+        if output.get("animation", False) and analysis.record.fields_every is None:
+            # a film of each tenth step
+            analysis = replace(analysis, record=replace(analysis.record, fields_every=10))
         case = cls(
             title=settings.get("title", "case"),
-            structure=cached_structure(settings, folder),
-            model=model,
+            analysis=analysis,
             motion=None if motion is None else motion_keys.parse_motion(motion),
             suite=None if suite is None else motion_keys.parse_suite(suite),
-            analysis=analysis_keys.parse_analysis(settings.get("analysis", {})),
-            criteria=Criteria(**criteria),
             limit=None if limit is None else analysis_keys.parse_limit(limit),
             rating=analysis_keys.parse_rating(settings.get("rating", {})),
             assessment=analysis_keys.parse_assessment(settings.get("assessment", {})),
-            output=check_table(settings.get("output", {}), keys, "output"),
+            output=output,
             settings=dict(settings),
             folder=folder,
         )
-        case._check()
+        _ = case.joints  # refuses names of no joint
+        if "free_body" in output:
+            case.structure.block_number(output["free_body"])
         return case
 
-    def _check(self) -> None:
-        """Refuse settings whose errors would otherwise appear after the dead load only."""
-        # These properties parse and check their settings.
-        _ = self.discretisation, self.tolerance, self.damping, self.scheme, self.joints
-        _ = self.stages
-        analysis_keys.check_scheme(self.analysis, self.structure, self.discretisation.displacements)
-        step = self.analysis.get("dt", MIN_TIME_STEP)
-        if not MIN_TIME_STEP <= step <= 0.1:
-            raise InvalidInput(
-                f"analysis.dt = {step:g} s is not between {MIN_TIME_STEP:g} and 0.1 s"
-            )
-        if "free_body" in self.output:
-            self.structure.block_number(self.output["free_body"])
-
-    @cached_property
-    def stages(self) -> Sequence[Stage] | None:
-        """Construction stages of the structure; None if it is built at once."""
-        return parse_stages(self.settings.get("dead_load", {}), self.structure)
+    @property
+    def structure(self) -> Structure:
+        """Blocks and joints of the analysis."""
+        return self.analysis.structure
 
     @property
     def has_motion(self) -> bool:
@@ -180,45 +157,9 @@ class Case:
         return self.motion is not None or self.suite is not None
 
     @property
-    def selects_model(self) -> bool:
-        """Whether the model is selected by its predicted error, fidelity = "auto"."""
-        return self.model.get("fidelity") == "auto"
-
-    @cached_property
-    def discretisation(self) -> Discretisation:
-        """Fidelity, mesh and quadrature; with fidelity = "auto" the default ones."""
-        unused = {"tolerance", "fidelity"} if self.selects_model else {"tolerance"}
-        keywords = {key: value for key, value in self.model.items() if key not in unused}
-        if "mesh_file" in keywords:
-            if self.selects_model:
-                raise InvalidInput(
-                    "model.mesh_file is one mesh, and fidelity = 'auto' chooses: name a fidelity"
-                )
-            keywords["mesh_file"] = self.folder / keywords["mesh_file"]
-        return Discretisation(**keywords)
-
-    @property
-    def tolerance(self) -> float:
-        """Permitted error of the largest |e| of every joint with fidelity = "auto" [-]."""
-        tolerance = float(self.model.get("tolerance", 0.005))
-        if not 0.0 < tolerance < 1.0:
-            raise InvalidInput(f"tolerance {tolerance:g} on |e| is not between 0 and 1: try 0.005")
-        return tolerance
-
-    @property
-    def damping(self) -> Viscous | EffectiveDamping | None:
-        """Damping of the time history; `EffectiveDamping` takes its frequencies from the modes."""
-        return analysis_keys.parse_damping(self.analysis)
-
-    @property
     def joints(self) -> tuple[int, ...]:
         """Numbers of the joints to draw over time; empty if the case names none."""
         return tuple(map(self.structure.joint_number, self.output.get("joints", ())))
-
-    @property
-    def scheme(self) -> Scheme:
-        """Time integration scheme."""
-        return analysis_keys.parse_scheme(self.analysis)
 
     def ground_motion(self) -> Motion:
         """Return the ground motion, read or synthetic.
@@ -287,4 +228,33 @@ class Case:
 
     def text(self) -> str:
         """Return the case as TOML, changes included."""
-        return tomli_w.dumps(self.settings)
+        return format_tables(self.settings)
+
+
+def case_of(subject: Case | Analysis, motion: Any = None, folder: Path | None = None) -> Case:
+    """Return a case, or the case of an analysis; with a motion, in place of its own."""
+    if isinstance(subject, Case):
+        settings, place = subject.settings, subject.folder
+        if motion is None:
+            return subject
+    else:
+        place = Path() if folder is None else folder
+        settings = write_structure(subject.structure) | write_analysis_tables(subject, folder)
+        laws = [joint.contact.law for joint in subject.structure.joints]
+        if own := find_extensions([subject.until, *map(type, laws)], folder):
+            settings = {"extensions": own, **settings}
+    if motion is not None:
+        others = {key: value for key, value in settings.items() if key not in ("motion", "suite")}
+        settings = {**others, "motion": motion_keys.write_motion(motion)}
+    return Case.of(settings, place)
+
+
+def write_analysis(analysis: Analysis, path: str | Path) -> Path:
+    """Write an analysis as a case file, which has every bit of it."""
+    path = Path(path)
+    case = case_of(analysis, folder=path.parent)
+    if case.analysis.fingerprint != analysis.fingerprint:
+        raise InvalidInput(f"{analysis!r} has values that no case file describes")
+    with atomic_write(path) as draft:
+        draft.write_text(case.text(), encoding="utf-8")
+    return path

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from archfem._typing import Array
-from archfem.cases.toml_file import Table, check_choice, check_table
+from archfem.cases.toml_file import Table, check_choice, check_table, format_tables
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import (
     Asce2022,
@@ -66,6 +65,23 @@ def build_motion(settings: Table, folder: Path = Path(), section: str = "motion"
         motion = motion.cut(settings.get("start", 0.0), settings.get("end"))
     motion = motion.reversed() if settings.get("reversed", False) else motion
     return motion.scaled(settings.get("scale", 1.0))
+
+
+def write_motion(motion: Any) -> dict[str, Any]:
+    """Return a motion, the file of a record, or a table, as [motion]."""
+    if isinstance(motion, str | Path):
+        return {"file": str(motion)}
+    if isinstance(motion, Mapping):
+        return dict(motion)
+    if isinstance(motion, Motion):
+        table = {"samples": motion.horizontal.tolist(), "dt": float(motion.dt)}
+        if motion.vertical is None:
+            return table
+        return table | {"vertical": table | {"samples": motion.vertical.tolist()}}
+    raise InvalidInput(
+        f"a motion is a {type(motion).__name__}: give a Motion, a record's file, or a table as "
+        "under [motion]"
+    )
 
 
 def parse_suite(table: Any) -> dict[str, Any]:
@@ -170,7 +186,7 @@ def write_selected_suite(selection: RecordSelection, folder: Path, target: Table
         }
         pairs[name] = pair.pop("horizontal") | pair | {"scale": record.scale}
     suite = {"name": selection.rule.name, "folder": str(folder), "target": target, "pairs": pairs}
-    return tomli_w.dumps({"suite": suite})
+    return format_tables({"suite": suite})
 
 
 def _locate_component(path: Path, samples: Array, folder: Path) -> dict[str, Any]:

@@ -106,11 +106,12 @@ def hash_sections(
 
 def remove_presentation(settings: Table) -> dict[str, Any]:
     """Return the settings without those that change no number: title, pictures and films."""
-    # the largest values of a run are those of its records, so that `output.save_every` stays
-    output = _as_table(settings.get("output"))
-    kept = {key: value for key, value in output.items() if key == "save_every"}
-    others = {key: value for key, value in settings.items() if key not in ("title", "output")}
-    return others | ({"output": kept} if kept else {})
+    # the largest values of a run are those of its records, so that `record.every` stays
+    record = _as_table(settings.get("record"))
+    kept = {key: value for key, value in record.items() if key == "every"}
+    presentation = ("title", "output", "record")
+    others = {key: value for key, value in settings.items() if key not in presentation}
+    return others | ({"record": kept} if kept else {})
 
 
 def _record_names(motion: Any) -> Iterator[str]:
@@ -206,6 +207,20 @@ def _load_package(name: str) -> ModuleType:
     with report_user_errors(f"extension '{name}'"):
         module: ModuleType = found[0].load()
     return module
+
+
+def find_extensions(objects: Iterable[Any], folder: Path | None) -> list[str]:
+    """Return the extensions that define some objects, as a case in a folder names them."""
+    modules = {getattr(each, "__module__", "") for each in objects}
+    packages = [entry.name for entry in _installed_extensions() if entry.module in modules]
+    files = [str(sys.modules[name].__file__) for name in sorted(modules & set(_loaded))]
+    return [*packages, *(name_from(file, folder) for file in files)]
+
+
+def name_from(file: str | Path, folder: Path | None) -> str:
+    """Return the name of a file as seen from a folder; without one, from the root."""
+    place = Path(file).resolve()
+    return place.as_posix() if folder is None else Path(os.path.relpath(place, folder)).as_posix()
 
 
 def permit_extensions() -> None:

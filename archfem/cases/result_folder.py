@@ -162,7 +162,7 @@ def dead_load_files(result: DeadLoadResult) -> Files:
     """Return thrust line, joint names, and, where available, stress and a free body."""
     case, dead, model = result.case, result.dead, result.dead.model
     files: Files = {
-        "dead.png": dead.plot(criteria=case.criteria),
+        "dead.png": dead.plot(criteria=case.analysis.failure_criteria),
         "names.png": draw_names(case.structure),
     }
     if result.strength_use is not None:

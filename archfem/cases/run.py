@@ -25,21 +25,19 @@ from archfem._netcdf import read_dataset
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs
-from archfem.dynamics.damping import effective_mode_range, first_effective_mode
-from archfem.dynamics.events import CountedMechanism, StopCondition, registered_criteria
+from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.history import Ending, History, partial_history
-from archfem.dynamics.model_selection import DampingChoice, select_model
-from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, StiffnessDamping, Viscous
+from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.solvers.integrator import Stepper
-from archfem.dynamics.time_history import Record, time_history
+from archfem.dynamics.time_history import time_history
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.limit.collapse import Collapse
-from archfem.models.builder import build
-from archfem.models.model import Doubt, Model
+from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-from archfem.statics.equilibrium import Equilibrium, dead_load, dead_load_doubts
+from archfem.statics.equilibrium import Equilibrium, dead_load_doubts
 from archfem.statics.stress import strength_use
 
 if TYPE_CHECKING:
@@ -123,27 +121,26 @@ class DeadLoadResult:
     @cached_property
     def doubts(self) -> tuple[Doubt, ...]:
         """Doubts about the model's fidelity and the equilibrium."""
-        friction = self.case.criteria.friction
+        friction = self.case.analysis.failure_criteria.friction
         return (*self.dead.model.doubts, *dead_load_doubts(self.dead, friction))
 
     @cached_property
-    def finer(self) -> tuple[Case, Equilibrium] | None:
-        """Case and dead load of the next finer fidelity; None if there is none to compare with."""
+    def finer(self) -> tuple[Analysis, Equilibrium] | None:
+        """Analysis and dead load of the next finer fidelity; None if there is none to compare with."""
         case, model = self.case, self.dead.model
         levels = {"rigid": "faces", "faces": "condensed", "condensed": "full"}
         if model.fidelity not in levels or model.prediction or find_spec("dolfinx") is None:
             return None
-        settings = {**case.settings.get("model", {}), "fidelity": levels[model.fidelity]}
+        other = replace(case.analysis, fidelity=levels[model.fidelity])
         try:
-            other = Case.of({**case.settings, "model": settings}, case.folder)
-            return other, dead_load_of_case(other)
+            return other, other.dead_load()
         except ArchfemError:  # that fidelity may not exist for this case
             return None
 
     @cached_property
     def damping(self) -> tuple[Viscous | None, str]:
-        """Damping of the runs and its description, as `damping_of` returns them."""
-        return damping_of(self.case, self.dead)
+        """Damping of the runs, and a sentence on its frequencies and where they are from."""
+        return resolve_effective_damping(self.case.analysis.damping, self.dead.model, self.dead)
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,65 +280,12 @@ def dead_load_of_case(case: Case) -> Equilibrium:
     Raises:
         DidNotConverge: the structure has no equilibrium.
     """
-    if case.selects_model:
-        model = _select_model_of(case)
-    else:
-        model = build(case.structure, case.discretisation)
-    return dead_load(model, stages=case.stages)
-
-
-def _select_model_of(case: Case) -> Model:
-    """Select a model by its predicted error under the motion of the case, if it has one."""
-    motion = None
-    if case.motion is not None:
-        motion = case.ground_motion()
-    elif case.suite is not None:
-        first = next(iter(case.suite["pairs"]))  # matching the other pairs would only take time
-        motion = case.alone(first).ground_suite().motions[0]
-    damping, dt = expected_damping(case), case.analysis.get("dt")
-    displacements = case.discretisation.displacements
-    return select_model(
-        case.structure, case.tolerance, motion, damping, dt, displacements=displacements
-    )
-
-
-def expected_damping(case: Case) -> DampingChoice:
-    """Return the damping of a case, or a function of the model if the modes determine it."""
-    if isinstance(case.damping, EffectiveDamping):
-        return lambda model: damping_of(case, dead_load(model))[0]
-    return case.damping
-
-
-@validate_arguments
-def damping_of(case: Case, dead: Equilibrium) -> tuple[Viscous | None, str]:
-    """Return the damping of a case, whose frequencies may be those of modes about the dead load.
-
-    Args:
-        case: the case.
-        dead: its equilibrium under dead load.
-
-    Returns:
-        The damping, and a sentence with ratio, frequencies, and how these were determined.
-
-    Raises:
-        InvalidInput: damping by effective modes, of which there are fewer than two.
-    """
-    damping, reason = case.damping, ""
-    if isinstance(damping, EffectiveDamping):
-        ratio, joints = damping.ratio, damping.joints
-        if damping.kind == "rayleigh":
-            modes = effective_mode_range(dead.model, dead, mass_share=damping.mass_share)
-            damping, reason = Rayleigh(ratio, modes.frequencies, joints), f"; {modes.text}"
-        else:
-            mode = first_effective_mode(dead.model, dead)
-            damping, reason = StiffnessDamping(ratio, mode.frequency, joints), f"; {mode.text}"
-    if damping is None:
-        return None, "damping: none"
-    text = f"damping: {100.0 * damping.ratio:g} % at"
-    if isinstance(damping, StiffnessDamping):
-        return damping, f"{text} {damping.frequency:.2f} Hz, proportional to stiffness{reason}"
-    low, high = damping.frequencies
-    return damping, f"{text} {low:.2f} and {high:.2f} Hz{reason}"
+    if not case.analysis.selects_model or not case.has_motion:
+        return case.analysis.dead_load()
+    if case.suite is None:
+        return case.analysis.dead_load(case.ground_motion())
+    first = next(iter(case.suite["pairs"]))  # matching the other pairs would only take time
+    return case.analysis.dead_load(case.alone(first).ground_suite().motions[0])
 
 
 @validate_arguments
@@ -356,10 +300,10 @@ def run_time_history(
     """Compute the time history of a case under a motion; the history contains the case.
 
     Args:
-        case: time step, scheme, damping, criteria, and quantities to record.
+        case: the case.
         motion: ground motion.
         dead: equilibrium that the run starts from.
-        damping: damping of the run; by default that of `damping_of`.
+        damping: damping of the run; by default that of the case.
         method: solver of the time steps, as for `archfem.time_history`.
 
     Returns:
@@ -368,24 +312,10 @@ def run_time_history(
     Raises:
         DidNotConverge: a step failed; `history` of the error is the record up to it.
     """
-    output = case.output
-    # Records of fields for a film, 10 steps apart unless the case says otherwise.
-    fields_every = output.get("save_fields_every", 10 if output.get("animation", False) else None)
     attrs = {"case": case.text(), "inputs": hash_inputs(case.settings, case.folder)}
     try:
         with log_prefix(case.title, motion.name):
-            run = time_history(
-                dead.model,
-                motion,
-                dt=case.analysis.get("dt"),
-                start=dead,
-                damping=damping or damping_of(case, dead)[0],
-                scheme=case.scheme,
-                record=Record(every=output.get("save_every", 1), fields_every=fields_every),
-                until=_stop_condition(case),
-                criteria=case.criteria,
-                method=method,
-            )
+            run = time_history(case.analysis, motion, start=dead, damping=damping, method=method)
     except DidNotConverge as error:
         # The partial history is saved like a complete one.
         if error.history is not None:
@@ -393,13 +323,6 @@ def run_time_history(
         raise
     run.dataset.attrs |= attrs
     return run
-
-
-def _stop_condition(case: Case) -> StopCondition | None:
-    """Return the event that ends a run before its motion does, if any."""
-    if "stop_at" in case.analysis:
-        return registered_criteria[case.analysis["stop_at"]]
-    return CountedMechanism() if case.analysis.get("stop_at_mechanism", False) else None
 
 
 @contextmanager
@@ -466,7 +389,8 @@ def doubt_fidelity(
         return []
     other, dead = finer
     try:
-        run = run_time_history(other, motion.cut(0.0, duration), dead, at_rest.damping[0])
+        cut = motion.cut(0.0, duration)
+        run = time_history(other, cut, start=dead, damping=at_rest.damping[0])
     except ArchfemError:  # it has no equilibrium at some step: no comparison
         return []
     # either run may have ended before, by an event or a failed step

@@ -13,21 +13,17 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from archfem._typing import NumberOrWord
+from archfem._validation import declared_keys
 from archfem.cases.provenance import hash_file, list_input_files
 from archfem.cases.toml_file import Table, check_choice, check_table
 from archfem.errors import InvalidInput
 from archfem.joints.own_law import JointLaw, build_registered_law, registered_laws
+from archfem.masonry.assembly import assembled
 from archfem.masonry.backfill import jointed_fill
-from archfem.masonry.construction import Stage, resolve_stages, usual_stages
-from archfem.masonry.materials import (
-    MATERIAL_PRESETS,
-    SOIL_TO_STONE,
-    STONE_TO_STONE,
-    Contact,
-    Material,
-)
+from archfem.masonry.block import Block
+from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, Contact, Material
 from archfem.masonry.shapes import bridge_parts, bridges, rings
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Joint, Structure
 from archfem.masonry.survey.outlines import Layer, surveyed
 
 Described = TypeVar("Described")
@@ -62,7 +58,9 @@ def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     )
     functions = {shape.__name__: shape for shape in shapes} | {"outlines": surveyed}
     table = settings.get("structure", {})
-    name = check_choice(table.get("shape"), functions, "structure.shape")
+    name = check_choice(table.get("shape"), (*functions, "blocks"), "structure.shape")
+    if name == "blocks":
+        return _read_blocks(settings)
     keys = {**_keys_of(functions[name]), "shape": str, "fill": dict}
     if name == "arcade":  # one number of voussoirs for each of its arches
         keys["voussoirs"] = [int]
@@ -115,6 +113,37 @@ def _keys_of(function: Callable[..., Any]) -> dict[str, Any]:
         "friction": NumberOrWord("1", "none"),  # "none": a joint that never slides
     }
     return {k: kinds[k] for k in inspect.signature(function).parameters if k in kinds}
+
+
+def _read_blocks(settings: Table) -> Structure:
+    """Return a structure whose blocks and joints are listed; without joints these are found."""
+    keys: Table = {"shape": str, "blocks": [dict], "joints": [dict], "contact": str}
+    table = settings["structure"]
+    own = declared_keys(assembled) | keys | {"material": str}
+    values = check_table(table, {key: own[key] for key in own if key != "name"}, "structure")
+    shared = {"material": values.pop("material", "stone")}
+    contact = values.pop("contact", "stone to stone")
+    del values["shape"]
+    blocks = [
+        _read_part(Block, {**shared, **part}, f"structure.blocks[{k}]", settings)
+        for k, part in enumerate(values.pop("blocks", ()))
+    ]
+    joints = [
+        _read_part(Joint, {"contact": contact, **part}, f"structure.joints[{k}]", settings)
+        for k, part in enumerate(values.pop("joints", ()))
+    ]
+    if joints:
+        return Structure(tuple(blocks), tuple(joints), **values)
+    return assembled(blocks, _contact(settings, contact), **values)
+
+
+def _read_part(cls: type[Described], table: Table, section: str, settings: Table) -> Described:
+    """Return a block or joint of a table."""
+    values = check_table(table, declared_keys(cls, (Material, Contact)), section)
+    for key, resolve in (("material", _material), ("contact", _contact)):
+        if key in values:
+            values[key] = resolve(settings, values[key])
+    return _call(cls, section, **values)
 
 
 def _divide_fill(structure: Structure, table: Table) -> Structure:
@@ -194,8 +223,7 @@ def _call(function: Callable[..., Described], section: str, **values: Any) -> De
     parameters = inspect.signature(function).parameters.values()
     required = [key.name for key in parameters if key.default is key.empty]
     if missing := [key for key in required if key not in values]:
-        contacts = [STONE_TO_STONE.name, SOIL_TO_STONE.name]
-        presets: Table = {"contacts": contacts, "materials": MATERIAL_PRESETS}
+        presets: Table = {"contacts": CONTACT_PRESETS, "materials": MATERIAL_PRESETS}
         known = sorted(presets.get(section.partition(".")[0], ()))
         names = f"; tables of these names change what is there: {known}" if known else ""
         raise InvalidInput(
@@ -212,8 +240,7 @@ def _material(settings: Table, name: str) -> Material:
 
 def _contact(settings: Table, name: str) -> Contact:
     """Return a contact: a preset, or described or changed by a table of the case."""
-    presets = {contact.name: contact for contact in (STONE_TO_STONE, SOIL_TO_STONE)}
-    return _resolve_preset(settings, "contacts", name, presets, Contact)
+    return _resolve_preset(settings, "contacts", name, CONTACT_PRESETS, Contact)
 
 
 def _resolve_preset(
@@ -227,12 +254,12 @@ def _resolve_preset(
             f'name one of them or write a table [{section}."{name}"]'
         )
     # A table changes a preset of its name key by key.
-    keys = _keys_of(cls)
+    keys = _keys_of(cls) | {"name": str}
     values = {key: getattr(presets[name], key) for key in keys} if name in presets else {}
     values |= check_table(tables.get(name, {}), keys, f"{section}.{name}")
     if values.get("law") is not None:
         values["law"] = _joint_law(values["law"], f"{section}.{name}.law")
-    return _call(cls, f"{section}.{name}", **values, name=name)
+    return _call(cls, f"{section}.{name}", **{"name": name, **values})
 
 
 def _joint_law(table: Table, section: str) -> JointLaw:
@@ -246,25 +273,3 @@ def _joint_law(table: Table, section: str) -> JointLaw:
             'class has none: write it there, as in field(metadata={"unit": "Pa/m"})'
         )
     return build_registered_law(name, check_table(values, keys, section))
-
-
-def parse_stages(table: Any, structure: Structure) -> Sequence[Stage] | None:
-    """Return the construction stages of [dead_load]; None if the structure is built at once."""
-    keys = {"stages": str, "layers": int, "stage": [dict]}
-    values = check_table(table, keys, "dead_load")
-    keys = {"name": str, "blocks": [(int, str)], "centring": bool, "strike": bool}
-    stages = [
-        Stage(**{"name": f"stage {k}", **check_table(stage, keys, f"dead_load.stage[{k}]")})
-        for k, stage in enumerate(values.get("stage", []))
-    ]
-    if stages and len(values) > 1:
-        raise InvalidInput("dead_load has stages of its own: take out stages and layers, or those")
-    if stages:
-        # refuses stages which leave a block out or place it twice
-        resolve_stages(structure, stages)
-        return stages
-    kind = check_choice(values.get("stages", "none"), ("none", "usual"), "dead_load.stages")
-    usual = kind == "usual"
-    if "layers" in values and not usual:
-        raise InvalidInput("dead_load.layers needs stages = 'usual': add that, or take layers out")
-    return usual_stages(structure, values.get("layers", 4)) if usual else None

@@ -8,15 +8,16 @@ quantity, `NumberOrWord`, a Python type, a list of one kind for a list of values
 several of these. `declared_keys` reads it from a dataclass or function.
 """
 
+import json
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from archfem._files import read_text
 from archfem._typing import NumberOrWord
-from archfem._validation import is_one_of, short_repr
+from archfem._validation import declared_keys, is_one_of, short_repr
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import suggest_name
 from archfem.units import in_degrees, in_unit
@@ -50,7 +51,7 @@ def read_with_base(path: Path, above: Sequence[Path] = ()) -> dict[str, Any]:
 
 def read_tables(path: Path, what: str) -> dict[str, Any]:
     """Return the tables of a file."""
-    text = read_text(path, what, max_bytes=2**20)  # a thousand times the size of a long case
+    text = read_text(path, what, max_bytes=2**24)  # ten times that of a wall of 1600 blocks
     try:
         return parse_tables(text)
     except InvalidInput as error:
@@ -157,6 +158,48 @@ def check_table(table: Any, keys: Table, section: str) -> dict[str, Any]:
         )
     refuse_unknown(table, keys, section)
     return {key: _convert(value, keys[key], f"{section}.{key}") for key, value in table.items()}
+
+
+def read_object(cls: Callable[..., Any], table: Any, section: str) -> Any:
+    """Return an object whose fields are the keys of a table."""
+    keys = declared_keys(cls)
+    values = check_table(table, keys, section)
+    try:
+        return cls(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
+    except TypeError as error:  # a key is missing
+        raise InvalidInput(f"{section} = {dict(table)}: {error}; its keys are {[*keys]}") from error
+
+
+def format_tables(tables: Table, path: tuple[str, ...] = ()) -> str:
+    """Return tables as TOML, one line for each value and for each table of a list."""
+    own = {key: value for key, value in tables.items() if not isinstance(value, Mapping)}
+    lines = [f"{_format_key(key)} = {_format_value(value, rows=True)}\n" for key, value in own.items()]
+    if path and (own or not tables):
+        lines.insert(0, f"[{'.'.join(map(_format_key, path))}]\n")
+    inner = [format_tables(tables[key], (*path, key)) for key in tables if key not in own]
+    return "\n".join(["".join(lines)] * bool(lines) + inner)
+
+
+def _format_key(key: str) -> str:
+    """Return a key, in quotes where it is not bare."""
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _format_value(key)
+
+
+def _format_value(value: Any, rows: bool = False) -> str:
+    """Return a value as TOML; rows of tables are on lines of their own."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, Mapping):
+        items = [f"{_format_key(key)} = {_format_value(each)}" for key, each in value.items()]
+        return f"{{ {', '.join(items)} }}" if items else "{}"
+    if isinstance(value, list | tuple):
+        items = [_format_value(each) for each in value]
+        if rows and any(isinstance(each, Mapping) for each in value):
+            return "".join(["[\n", *(f"    {item},\n" for item in items), "]"])
+        return f"[{', '.join(items)}]"
+    return repr(value) if isinstance(value, int | float) else str(value)
 
 
 def refuse_unknown(table: Table, keys: Iterable[str], section: str = "") -> None:

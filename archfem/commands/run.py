@@ -152,7 +152,7 @@ def mesh(options: argparse.Namespace) -> None:
     from archfem.models.fem.mesh import write_mesh
 
     case = Case.read(options.case, options.changes)
-    write_mesh(case.structure, options.out, case.discretisation)
+    write_mesh(case.structure, options.out, case.analysis.discretisation)
     print(f"wrote {options.out}")
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from archfem._display import call_late_bound
 from archfem._files import hash_value
+from archfem._typing import Metres, Seconds
 from archfem._validation import check_fields, check_number, validate_methods
 from archfem.dynamics.events import StopCondition, resolve_criteria
 from archfem.dynamics.model_selection import build
@@ -96,14 +97,14 @@ class Analysis:
     fidelity: str | Mapping[str, str] = "full"
     cells: tuple[int, int] = (4, 4)
     cell: str = "quadrilateral"
-    max_cell_size: float | None = None
+    max_cell_size: Metres | None = None
     degree: int = 1
     quadrature: str | None = None
     quadrature_points: int | None = None
     displacements: str = "small"
     mesh_file: str | Path | None = None
     tolerance: float = 0.005
-    dt: float | None = None
+    dt: Seconds | None = None
     damping: Viscous | EffectiveDamping | Literal["effective"] | None = None
     scheme: Scheme = Conserving()
     method: str = "auto"

@@ -10,7 +10,7 @@ evaluate the costly condition (mechanism count, rigid-block motion) once per dis
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import InitVar, dataclass
-from functools import partial
+from functools import partial, wraps
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -169,7 +169,7 @@ registered_criteria: dict[str, Callable[[Structure, Array], str | None]] = {}
 
 @validate_arguments
 def register_criterion(name: str, criterion: Callable[[Structure, Array], str | None]) -> None:
-    """Add a criterion that ends a run, which case files can name in `analysis.stop_at`.
+    """Add a criterion that ends a run, which case files can name in `analysis.until`.
 
     In Python `time_history(…, until=criterion)` needs no registration.
 
@@ -189,6 +189,7 @@ def register_criterion(name: str, criterion: Callable[[Structure, Array], str | 
             f"criterion '{name}' takes the structure, and N, V, M of its joints: {error}"
         ) from error
 
+    @wraps(criterion)
     def check(structure: Structure, resultants: Array) -> str | None:
         with report_user_errors(f"criterion '{name}'"):
             reason = criterion(structure, resultants)

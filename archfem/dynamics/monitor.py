@@ -222,8 +222,8 @@ class RunMonitor:
             raise DidNotConverge(
                 f"by t = {time:.4g} s blocks had moved {self.largest_displacement:.3g} m, more "
                 f"than the size of the structure, {size:.3g} m: it has fallen apart; end the run "
-                "at its mechanism, with until=CountedMechanism() (stop_at_mechanism in a case), or "
-                "let displacements be large",
+                "at its mechanism, with until=CountedMechanism() (in a case until = 'counted "
+                "mechanism'), or let displacements be large",
                 last=self._before,
             )
         self._check_facets(time)

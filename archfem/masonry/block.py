@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem._typing import Array
+from archfem._typing import Array, Metres
 from archfem._validation import check_fields, check_numbers, check_sequence, check_unmasked
 from archfem.errors import InvalidStructure
 from archfem.masonry.materials import Material
@@ -103,8 +103,14 @@ def find_side_of_line(points: Array, line: Array, near: float, arcs: Sequence[in
     return side if abs(covered - length) <= 4.0 * near else 0
 
 
-# Coordinates x and y [m]
-Point = tuple[float, float]
+# Coordinates x and y
+Point = tuple[Metres, Metres]
+
+
+def as_point(pair: Sequence[float] | Array) -> Point:
+    """Return coordinates as a pair of Python's floats, with -0.0 as 0.0."""
+    x, y = pair
+    return float(x) + 0.0, float(y) + 0.0
 
 
 def check_points(given: Any, name: str) -> list[tuple[float, ...]]:
@@ -153,6 +159,12 @@ class Block:
             raise InvalidStructure(
                 f"block '{self.name}' has outline {self.outline}: give at least 3 finite points"
             )
+        # equal values are equal blocks, whichever types of numbers and rows they were given as
+        object.__setattr__(self, "outline", tuple(map(as_point, self.outline)))
+        if self.centre is not None:
+            object.__setattr__(self, "centre", as_point(self.centre))
+        if self.corners is not None:
+            object.__setattr__(self, "corners", tuple(map(int, self.corners)))
         if self.area <= 0.0:
             raise InvalidStructure(
                 f"block '{self.name}' has area {self.area:.3g} m²: give its outline anticlockwise"

@@ -171,3 +171,4 @@ SOIL_TO_STONE = Contact(0.30e9, 0.24e9, 0.60, "soil to stone")
 
 # Named presets
 MATERIAL_PRESETS = {material.name: material for material in (STONE, BACKFILL)}
+CONTACT_PRESETS = {contact.name: contact for contact in (STONE_TO_STONE, SOIL_TO_STONE)}

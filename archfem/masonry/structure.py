@@ -5,21 +5,23 @@ A rigid motion of a block has three coordinates: two translations of its centroi
 
 import difflib
 import hashlib
+import inspect
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, wraps
 from numbers import Integral
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from archfem._display import ResultDisplay
-from archfem._typing import Array
+from archfem._typing import Array, Metres, MetresPerSecondSquared
 from archfem._validation import check_fields, check_number
 from archfem.errors import InvalidInput, InvalidStructure
-from archfem.masonry.block import Block, Point, check_overlaps
+from archfem.masonry.block import Block, Point, as_point, check_overlaps
 from archfem.masonry.materials import Contact
 from archfem.masonry.parts import assign_roles, select_assessed_parts
 from archfem.units import G
@@ -84,6 +86,8 @@ def _group_by_stem(names: Sequence[str]) -> str:
     return "; ".join(texts)
 
 
+Shape = TypeVar("Shape", bound=Callable[..., "Structure"])
+
 # Distance of two coincident points, relative to the size of the structure
 CONTACT_TOLERANCE = 1e-6
 
@@ -112,8 +116,11 @@ class Joint:
     role: str = ""
 
     def __post_init__(self) -> None:
-        """Check the types of the fields."""
+        """Check the types of the fields, and convert numbers to those of Python."""
         check_fields(self)
+        object.__setattr__(self, "blocks", tuple(map(int, self.blocks)))
+        object.__setattr__(self, "intrados", as_point(self.intrados))
+        object.__setattr__(self, "extrados", as_point(self.extrados))
 
     @property
     def lower(self) -> int:
@@ -157,13 +164,16 @@ class Structure(ResultDisplay):
         width: out-of-plane width w [m].
         gravity: acceleration of gravity, along -y [m/s²].
         name: in titles and files.
+        origin: name and arguments of the shape function that made it, or None; not compared, and
+            of a changed copy still that of the original.
     """
 
     blocks: tuple[Block, ...]
     joints: tuple[Joint, ...]
-    width: float = 1.0
-    gravity: float = G
+    width: Metres = 1.0
+    gravity: MetresPerSecondSquared = G
     name: str = "structure"
+    origin: tuple[str, Mapping[str, Any]] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         """Assign roles; check the values, supports and outlines."""
@@ -355,6 +365,19 @@ class Structure(ResultDisplay):
             InvalidInput: there is no such block; the nearest name is suggested.
         """
         return find_number("block", [each.name for each in self.blocks], block)
+
+
+def record_origin(shape: Shape) -> Shape:
+    """Decorate a shape function so that its structures record its name and their arguments."""
+
+    @wraps(shape)
+    def wrapper(*args: Any, **options: Any) -> Structure:
+        structure = shape(*args, **options)
+        arguments = inspect.signature(shape).bind(*args, **options).arguments
+        object.__setattr__(structure, "origin", (shape.__name__, arguments))
+        return structure
+
+    return wrapper  # type: ignore[return-value]
 
 
 def find_supported_blocks(structure: Structure, blocks: Iterable[int]) -> set[int]:

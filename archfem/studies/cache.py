@@ -110,7 +110,7 @@ def _match_once(case: Case, key: str) -> Suite:
 
 def _model_key(case: Case) -> str:
     """Key of the model of a case; it includes the motion if that selects the model."""
-    selection = ("motion", "suite", "analysis", "criteria") if case.selects_model else ()
+    selection = ("motion", "suite", "analysis", "criteria") if case.analysis.selects_model else ()
     return hash_sections(case.settings, case.folder, (*MODEL_SECTIONS, *selection))
 
 

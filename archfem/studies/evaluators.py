@@ -129,8 +129,8 @@ def scales_of(result: DeadLoadResult, motion: Motion, **options: Any) -> Finding
             motion,
             start=result.dead,
             damping=result.damping[0],
-            dt=result.case.analysis.get("dt"),
-            criteria=result.case.criteria,
+            dt=result.case.analysis.dt,
+            criteria=result.case.analysis.failure_criteria,
             **options,
         )
     if scales.interrupted:

@@ -122,8 +122,8 @@ def _run(result: DeadLoadResult, motion: Motion) -> dict[str, Any]:
 
 def _applicable_limits(result: DeadLoadResult, limits: Sequence[str] | None) -> tuple[str, ...]:
     """The limit states to search; by default all that the structure and model permit."""
-    large = result.case.discretisation.displacements == "large"
-    counts = applicable_definitions(result.case.structure, result.case.criteria)
+    large = result.case.analysis.displacements == "large"
+    counts = applicable_definitions(result.case.structure, result.case.analysis.failure_criteria)
     possible = {"first hinge", "verified"}
     possible |= {"four failures"} if "any joints at once" in counts else set()
     possible |= {COLLAPSE_DEFINITION} if large else set()

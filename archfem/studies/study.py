@@ -472,7 +472,7 @@ def run_pairs(
 
 def compute_pairs(case: Case, draft: Path, **options: Any) -> list[str]:
     """Run the pairs of a suite as `run_pairs` does, into the draft of a result folder."""
-    if case.suite is None or case.selects_model:
+    if case.suite is None or case.analysis.selects_model:
         raise InvalidInput(
             "pairs run in parallel only if a case has a [suite] and names its model: "
             "model.fidelity = 'auto' selects one by the first pair for all"

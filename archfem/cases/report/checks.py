@@ -75,7 +75,7 @@ def supported_weight_ratio(structure: Structure, joints: xr.Dataset) -> float:
 
 def _describe_model(data: ReportData) -> list[tuple[str, str]]:
     """Describe fidelity, mesh and quadrature."""
-    discretisation, rows = data.case.discretisation, []
+    discretisation, rows = data.case.analysis.discretisation, []
     for run in list(data.runs.values())[:1]:  # all runs have the same model
         attrs, unknown = run.dataset.attrs, "unknown"
         rows = [
@@ -83,7 +83,7 @@ def _describe_model(data: ReportData) -> list[tuple[str, str]]:
             ("coordinates", str(run.dataset.sizes.get("coordinate", unknown))),
             ("solver of the steps", str(attrs.get("method", unknown))),
         ]
-    if data.case.selects_model:
+    if data.case.analysis.selects_model:
         return [*rows, ("mesh", "selected with the fidelity, and not saved in the results")]
     rule = ("quadrature on joints", discretisation.rule.rule)
     if discretisation.fidelity == "rigid":

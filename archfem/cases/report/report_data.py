@@ -123,10 +123,10 @@ def _rebuild_model(case: Case, run: History) -> tuple[Model | None, str]:
 
 def _discretisation_of(case: Case, run: History) -> Discretisation:
     """Return the discretisation of a run; one selected by "auto" is read from its attributes."""
-    if not case.selects_model:
-        return case.discretisation
+    if not case.analysis.selects_model:
+        return case.analysis.discretisation
     fidelity = str(run.dataset.attrs["fidelity"])
-    displacements = case.discretisation.displacements
+    displacements = case.analysis.discretisation.displacements
     if fidelity in MODEL_FIDELITIES:
         return Discretisation(fidelity, displacements=displacements)
     # "backfill: full, rest: faces", as `Discretisation.name` writes it.

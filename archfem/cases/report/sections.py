@@ -47,10 +47,10 @@ def build_case_sections(data: ReportData) -> list[Section]:
 
 def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
     """List the assumptions of the analysis."""
-    case, criteria = data.case, data.case.criteria
+    case, criteria = data.case, data.case.analysis.failure_criteria
     # Runs record the fidelity that "auto" selected.
     recorded = {str(run.dataset.attrs.get("fidelity", "")) for run in data.runs.values()}
-    fidelity = ", ".join(sorted(recorded)) if recorded else case.discretisation.name
+    fidelity = ", ".join(sorted(recorded)) if recorded else case.analysis.discretisation.name
     blocks = {
         "rigid": "rigid; all compliance is in the joints",
         "faces": "elastic; each face of a joint moves as a plane, the rest is condensed statically",
@@ -58,14 +58,14 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
         "full": "elastic finite elements, all nodes kept",
         "monolithic": "elastic finite elements, all nodes kept, weak forms assembled each time",
     }
-    large = case.discretisation.displacements == "large"
+    large = case.analysis.discretisation.displacements == "large"
     own_limit = "its own limit, μ + c A / N"
     sliding = own_limit if criteria.friction is None else f"{criteria.friction:g}"
     count = (
         f"{criteria.failures} joints of rings and piers that hinge or slide at once, for "
         f"{criteria.duration:g} s at least"
     )
-    dt = case.analysis.get("dt")
+    dt = case.analysis.dt
     step = "steps of a length that the error chooses" if dt is None else f"steps of {1e3 * dt:g} ms"
     return [
         ("structure", "plane; forces are those of the whole width"),
@@ -74,7 +74,7 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
         ("displacements", "of any size" if large else "small: equilibrium where blocks stood"),
         ("ground", "rigid, moves as one; abutments and foundations are fixed to it"),
         ("damping", _describe_damping(case)),
-        ("time steps", f"{type(case.scheme).__name__.lower()} scheme, {step}"),
+        ("time steps", f"{type(case.analysis.scheme).__name__.lower()} scheme, {step}"),
         ("a joint hinges", f"where |e| ≥ {criteria.hinge:g}"),
         ("a joint slides", f"where |V| / N reaches {sliding}"),
         ("a mechanism by count", count),
@@ -83,7 +83,7 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
 
 def _describe_damping(case: Case) -> str:
     """Describe the damping of a case."""
-    damping = case.damping
+    damping = case.analysis.damping
     if damping is None:
         return "none but that of friction"
     ratio, joints = f"{100.0 * damping.ratio:g} % of critical", f"joints {damping.joints}"
@@ -186,7 +186,7 @@ def _build_dead_load(data: ReportData) -> list[Any]:
         "within the middle third the joint is closed over its whole depth."
     )
     if data.dead is not None:
-        figure = draw_structure(case.structure, data.dead, criteria=case.criteria)
+        figure = draw_structure(case.structure, data.dead, criteria=case.analysis.failure_criteria)
         blocks += [FigureBlock.of(figure, thrust), _tabulate_dead_load(assessed_joints(data.dead))]
     elif drawn := data.read_figure("dead.png", thrust):
         blocks += drawn
@@ -196,7 +196,7 @@ def _build_dead_load(data: ReportData) -> list[Any]:
     if (stress := data.read_text("dead_stress.txt")) is not None:
         blocks += data.read_figure("dead_stress.png", "Principal compression under dead load.")
         blocks.append(TextBlock(stress, "lines"))
-    elif case.model.get("fidelity") == "rigid":
+    elif case.analysis.fidelity == "rigid":
         remedy = 'A run with fidelity = "faces" or "full" has it.'
         blocks.append(missing_note("stress in the blocks, for they are rigid", remedy))
     else:

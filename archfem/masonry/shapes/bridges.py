@@ -17,10 +17,11 @@ from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.shapes.stonework import Face, StoneworkBuilder, fill_ledge
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, record_origin
 from archfem.units import G
 
 
+@record_origin
 @validate_arguments
 def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are made of)
     *,
@@ -130,6 +131,7 @@ def _check_cover(bottom: Sequence[Point], surface: Sequence[Point]) -> None:
 Numbers = float | Sequence[float]
 
 
+@record_origin
 @validate_arguments
 def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one structure)
     *,
@@ -178,6 +180,7 @@ def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one st
     return arcade(heights=height, breadths=breadth, **of_arch, **common)
 
 
+@record_origin
 @validate_arguments
 def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
     *,

@@ -16,9 +16,9 @@ import numpy as np
 from archfem._typing import Array
 from archfem._validation import check_integer, check_number, check_numbers, validate_arguments
 from archfem.errors import InvalidStructure
-from archfem.masonry.block import Block, Point, check_points
+from archfem.masonry.block import Block, Point, as_point, check_points
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
-from archfem.masonry.structure import Joint, Structure
+from archfem.masonry.structure import Joint, Structure, record_origin
 from archfem.units import G, in_degrees
 
 # Intrados and extrados of a stone, each from left to right (n, 2) [m]
@@ -66,12 +66,12 @@ class RingGeometry:
         abutment_depth: float | None = None,
     ) -> Structure:
         """Assemble stones, from left to right, between two fixed abutments."""
-        faces = [(_as_point(inner[0]), _as_point(outer[0])) for inner, outer in stones]
-        faces.append((_as_point(stones[-1][0][-1]), _as_point(stones[-1][1][-1])))
+        faces = [(as_point(inner[0]), as_point(outer[0])) for inner, outer in stones]
+        faces.append((as_point(stones[-1][0][-1]), as_point(stones[-1][1][-1])))
         blocks = [
             Block(
                 # anticlockwise: along the intrados, and back along the extrados
-                (*map(_as_point, inner), *map(_as_point, outer[::-1])),
+                (*map(as_point, inner), *map(as_point, outer[::-1])),
                 self.material,
                 f"voussoir {k}",
                 corners=(0, len(inner) - 1, len(inner), len(inner) + len(outer) - 1),
@@ -92,6 +92,7 @@ class RingGeometry:
         return Structure((left, *blocks, right), tuple(joints), self.width, self.gravity, name)
 
 
+@record_origin
 def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
     thickness: float,
@@ -168,6 +169,7 @@ def _check_division(embrace: float, voussoirs: int, pieces: int) -> tuple[int, i
     return int(voussoirs), int(pieces)
 
 
+@record_origin
 def column(
     *,
     breadth: float,
@@ -211,6 +213,7 @@ def column(
     return Structure(tuple(blocks), tuple(joints), width, gravity, "column")
 
 
+@record_origin
 def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one structure)
     *,
     radius: float,
@@ -334,6 +337,7 @@ def _build_abutment(
     return Block(outline, material, name, fixed=True, corners=(0, 1, 2, 3), part=name, role="other")
 
 
+@record_origin
 @validate_arguments
 def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
@@ -391,6 +395,7 @@ def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     return ring.assemble(_mirror_stones(left, voussoirs), "pointed arch")
 
 
+@record_origin
 @validate_arguments
 def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
@@ -440,6 +445,7 @@ def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ri
     return ring.assemble(ring.divide(section), "elliptical arch")
 
 
+@record_origin
 @validate_arguments
 def flat_arch(
     *,
@@ -484,6 +490,7 @@ def flat_arch(
     return ring.assemble(ring.divide(section), "flat arch")
 
 
+@record_origin
 def arch_along(
     intrados: Sequence[Point] | Array,
     *,
@@ -552,8 +559,3 @@ def _mirror_stones(left: list[Faces], count: int) -> list[Faces]:
     # The halves of the keystone share the point at the crown.
     inner, outer = (np.concatenate([a, b[1:]]) for a, b in zip(left[-1], right[0], strict=True))
     return [*left[:-1], (inner, outer), *right[1:]]
-
-
-def _as_point(place: Array) -> Point:
-    """Return coordinates as floats, with -0.0 as 0.0."""
-    return (float(place[0]) + 0.0, float(place[1]) + 0.0)
