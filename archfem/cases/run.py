@@ -25,11 +25,11 @@ from archfem._netcdf import read_dataset
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs
-from archfem.dynamics.damping import effective_mode_range, first_effective_mode
+from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.events import CountedMechanism, StopCondition, registered_criteria
 from archfem.dynamics.history import Ending, History, partial_history
 from archfem.dynamics.model_selection import DampingChoice, select_model
-from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, StiffnessDamping, Viscous
+from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import Record, time_history
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
@@ -326,22 +326,7 @@ def damping_of(case: Case, dead: Equilibrium) -> tuple[Viscous | None, str]:
     Raises:
         InvalidInput: damping by effective modes, of which there are fewer than two.
     """
-    damping, reason = case.damping, ""
-    if isinstance(damping, EffectiveDamping):
-        ratio, joints = damping.ratio, damping.joints
-        if damping.kind == "rayleigh":
-            modes = effective_mode_range(dead.model, dead, mass_share=damping.mass_share)
-            damping, reason = Rayleigh(ratio, modes.frequencies, joints), f"; {modes.text}"
-        else:
-            mode = first_effective_mode(dead.model, dead)
-            damping, reason = StiffnessDamping(ratio, mode.frequency, joints), f"; {mode.text}"
-    if damping is None:
-        return None, "damping: none"
-    text = f"damping: {100.0 * damping.ratio:g} % at"
-    if isinstance(damping, StiffnessDamping):
-        return damping, f"{text} {damping.frequency:.2f} Hz, proportional to stiffness{reason}"
-    low, high = damping.frequencies
-    return damping, f"{text} {low:.2f} and {high:.2f} Hz{reason}"
+    return resolve_effective_damping(case.damping, dead.model, dead)
 
 
 @validate_arguments
