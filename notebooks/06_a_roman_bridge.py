@@ -102,7 +102,7 @@ af.view.draw_free_body(existing, joints, stone, cells=model.cells)
 # instead. Damping is 5 % at the first and at the last effective mode along the bridge.
 
 # %%
-found = {name: af.modes(each.model, 6, about=each) for name, each in dead.items()}
+found = {name: af.modes(each.model, 6, start=each) for name, each in dead.items()}
 for name, shapes in found.items():
     print(f"{name}\n{shapes.table()}\n")
 damping = {}

@@ -266,7 +266,7 @@ assert af.Motion.synthetic(duration=2.0, seed=1).pga > 0
 ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=3)
 model = af.build(ring, fidelity="rigid")
 dead, motion = af.dead_load(model), af.Motion(np.full(4, 0.5), 0.005)
-assert 8.0 < af.modes(model, 2, about=dead).frequencies[0] < 200.0
+assert 8.0 < af.modes(model, 2, start=dead).frequencies[0] < 200.0
 given = {"start": dead, "dt": 0.005, "damping": af.StiffnessDamping(0.05, 9.0)}
 runs = [af.time_history(model, motion, method=method, **given) for method in ("snes", "compliance")]
 one, two = (run.joints["M"].values for run in runs)

@@ -338,7 +338,7 @@ def print_modes(at_rest: DeadLoadResult, count: int, folder: Path) -> Modes:
     """Print the first modes about dead load and the damping, and write table and shapes."""
     from archfem.statics.modes import modes as compute_modes
 
-    computed = compute_modes(at_rest.dead.model, count, about=at_rest.dead)
+    computed = compute_modes(at_rest.dead.model, count, start=at_rest.dead)
     text = f"{computed.table()}\n\n{at_rest.damping[1]}"
     print(text)
     write({"modes.txt": text, "modes.png": computed.plot()}, folder)

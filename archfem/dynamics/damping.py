@@ -39,8 +39,8 @@ from archfem.masonry.shapes.rings import column
 from archfem.models.linear_blocks import build_rigid_model
 from archfem.models.model import Model, check_model
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import Equilibrium, dead_load, self_weight
-from archfem.statics.modes import Modes, modes
+from archfem.statics.equilibrium import dead_load, self_weight
+from archfem.statics.modes import Modes, Start, modes, resolve_start
 from archfem.units import G
 
 logger = logging.getLogger("archfem")
@@ -101,17 +101,17 @@ class FirstEffectiveMode:
         return f"mode {self.number}, the first effective along x, has {share:.1f} % of the mass"
 
 
-def first_effective_mode(model: Model, about: Equilibrium | None = None) -> FirstEffectiveMode:
+def first_effective_mode(model: Model, start: Start = None) -> FirstEffectiveMode:
     """Find the first mode effective along x."""
     check_model(model)
-    computed, shares = _modes_with_share(model, about, FIRST_MASS_SHARE)
+    computed, shares = _modes_with_share(model, start, FIRST_MASS_SHARE)
     number = int(np.searchsorted(shares, FIRST_MASS_SHARE)) + 1
     return FirstEffectiveMode(computed, min(number, len(shares)))
 
 
 def effective_mode_range(
     model: Model,
-    about: Equilibrium | None = None,
+    start: Start = None,
     *,
     mass_share: float = EFFECTIVE_MASS_SHARE,
     initial_count: int = 32,
@@ -123,7 +123,7 @@ def effective_mode_range(
         raise InvalidInput(
             f"share {mass_share} of the mass is not between {FIRST_MASS_SHARE} and 1: 90 % is 0.9"
         )
-    computed, shares = _modes_with_share(model, about, mass_share, initial_count, max_count)
+    computed, shares = _modes_with_share(model, start, mass_share, initial_count, max_count)
     first = int(np.searchsorted(shares, FIRST_MASS_SHARE)) + 1
     last = min(int(np.searchsorted(shares, mass_share)) + 1, len(shares))
     if first >= last:
@@ -137,16 +137,17 @@ def effective_mode_range(
 
 def _modes_with_share(
     model: Model,
-    about: Equilibrium | None,
+    start: Start,
     mass_share: float,
     initial_count: int = 32,
     max_count: int = 1024,
 ) -> tuple[Modes, Array]:
     """Return modes that reach a share of the mass along x, and their cumulative shares (modes,)."""
+    state = resolve_start(model, start)
     count = 0
     while count < min(max_count, model.size):
         count = min(max(initial_count, 2 * count), max_count, model.size)
-        computed = modes(model, count, about)
+        computed = modes(model, count, state)
         shares = np.cumsum(computed.mass_ratios[:, 0])
         if shares[-1] >= mass_share:
             break
@@ -163,7 +164,7 @@ def _modes_with_share(
 def effective_damping(
     model: Model,
     ratio: float = 0.05,
-    about: Equilibrium | None = None,
+    start: Start = None,
     *,
     kind: str = "stiffness",
     joints: str = "closed",
@@ -186,7 +187,8 @@ def effective_damping(
     Args:
         model: model of any fidelity.
         ratio: damping ratio [-].
-        about: state to linearise at, such as the dead load of this model; None: all joints closed.
+        start: state to linearise at: an equilibrium of this model; None for its dead load, which
+            is computed first; "closed" for all joints closed.
         kind: "stiffness", or "rayleigh" for a mass part too.
         joints: what the stiffness part acts on, as in `Rayleigh`.
         mass_share: with "rayleigh", share of the mass that can move along x of the modes up to the
@@ -199,11 +201,32 @@ def effective_damping(
         InvalidInput: a value is out of range, or a single mode has the share.
         DidNotConverge: the structure is a mechanism in that state, or modes were not computed.
     """
-    EffectiveDamping(ratio, kind, joints)  # refuses values out of range
-    if kind == "rayleigh":
-        effective = effective_mode_range(model, about, mass_share=mass_share)
-        return Rayleigh(ratio, effective.frequencies, joints)
-    return StiffnessDamping(ratio, first_effective_mode(model, about).frequency, joints)
+    return _find_frequencies(EffectiveDamping(ratio, kind, joints, mass_share), model, start)[0]
+
+
+def resolve_effective_damping(
+    damping: Viscous | EffectiveDamping | None, model: Model, start: Start
+) -> tuple[Viscous | None, str]:
+    """Return damping with its frequencies, and a sentence on these and on where they are from."""
+    if damping is None:
+        return None, "damping: none"
+    origin = ""
+    if isinstance(damping, EffectiveDamping):
+        damping, origin = _find_frequencies(damping, model, start)
+    text = f"damping: {100.0 * damping.ratio:g} % at"
+    if isinstance(damping, StiffnessDamping):
+        return damping, f"{text} {damping.frequency:.2f} Hz, proportional to stiffness{origin}"
+    low, high = damping.frequencies
+    return damping, f"{text} {low:.2f} and {high:.2f} Hz{origin}"
+
+
+def _find_frequencies(damping: EffectiveDamping, model: Model, start: Start) -> tuple[Viscous, str]:
+    """Return damping at the effective modes about a state, and text on these modes."""
+    if damping.kind == "rayleigh":
+        both = effective_mode_range(model, start, mass_share=damping.mass_share)
+        return Rayleigh(damping.ratio, both.frequencies, damping.joints), f"; {both.text}"
+    first = first_effective_mode(model, start)
+    return StiffnessDamping(damping.ratio, first.frequency, damping.joints), f"; {first.text}"
 
 
 @dataclass(frozen=True)

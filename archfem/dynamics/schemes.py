@@ -10,12 +10,8 @@ from math import pi
 
 import numpy as np
 
-<<<<<<< HEAD
-from archfem._validation import check_number, check_numbers, is_one_of, short_repr
-=======
 from archfem._typing import Hertz
-from archfem._validation import check_number, check_numbers, is_one_of
->>>>>>> 4c6f7bc8
+from archfem._validation import check_number, check_numbers, is_one_of, short_repr
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 

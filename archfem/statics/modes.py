@@ -12,6 +12,7 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Integral
+from typing import Literal
 
 import numpy as np
 from scipy import sparse
@@ -25,7 +26,10 @@ from archfem._typing import Array
 from archfem._validation import check_type
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.model import Model, check_model
-from archfem.statics.equilibrium import Equilibrium
+from archfem.statics.equilibrium import Equilibrium, dead_load
+
+# State to linearise at: an equilibrium, all joints closed, or None for the dead load
+Start = Equilibrium | Literal["closed"] | None
 
 _mode_cache: OrderedDict[str, tuple[Array, Array]] = OrderedDict()
 
@@ -86,7 +90,7 @@ class Modes(ResultDisplay):
 
 
 @single_threaded
-def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
+def modes(model: Model, count: int, start: Start = "closed") -> Modes:
     """Find the lowest modes of small vibrations about a state, K φ = ω² M φ.
 
     K is the tangent of blocks and joints: a joint point that is open has no stiffness, and stays
@@ -97,7 +101,8 @@ def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
     Args:
         model: of any fidelity; its damping plays no part.
         count: number of modes, from 1 to the number of coordinates.
-        about: the state, such as the dead load of this model; None: all joints closed.
+        start: the state: an equilibrium of this model; None for its dead load, which is computed
+            first; or "closed", the default, for all joints closed, which needs no computation.
 
     Returns:
         The modes, the lowest first.
@@ -117,22 +122,33 @@ def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
         [10.56, 79.23, 87.53]
     """
     check_model(model)
-    if about is not None:
-        check_type(about, Equilibrium, "about", "give dead_load(model), or None")
     check_type(count, Integral, "number of modes", "give a whole number")
     if not 1 <= count <= model.size:
         raise InvalidInput(
             f"{count} modes of a model with {model.size} coordinates: ask for 1 to {model.size}"
         )
+    state = resolve_start(model, start)
     try:
-        squares, shapes = _find_cached_modes(_tangent_about(model, about), model.mass, count)
+        squares, shapes = _find_cached_modes(_tangent_at(model, state), model.mass, count)
     except DidNotConverge as error:
-        state = "with all joints closed" if about is None else "about the given state"
-        raise DidNotConverge(f"no modes {state}: {error}", last=about) from error
+        if not isinstance(state, Equilibrium):
+            raise DidNotConverge(f"no modes with all joints closed: {error}") from error
+        which = "the dead load" if start is None else "the given state"
+        raise DidNotConverge(f"no modes about {which}: {error}", last=state) from error
     influence = model.mass_influence
     masses = np.sum(influence * splu(model.mass.tocsc()).solve(influence), axis=0)
     signs = _shape_signs(shapes, shapes.T @ influence, masses)
     return Modes(model, np.sqrt(squares) / (2.0 * np.pi), shapes * signs, masses)
+
+
+def resolve_start(model: Model, start: Start) -> Equilibrium | Literal["closed"]:
+    """Return the state to linearise at; the dead load is computed where none is given."""
+    if isinstance(start, str) and start == "closed":
+        return "closed"
+    if start is None:
+        return dead_load(model)
+    check_type(start, Equilibrium, "start", 'give dead_load(model), "closed" or None')
+    return start
 
 
 def _find_cached_modes(
@@ -229,17 +245,17 @@ def _check_lowest(square: float, zero: float) -> None:
         )
 
 
-def _tangent_about(model: Model, about: Equilibrium | None) -> sparse.csr_matrix:
+def _tangent_at(model: Model, state: Equilibrium | Literal["closed"]) -> sparse.csr_matrix:
     """Return the stiffness with joints as in a state."""
-    if about is None:
+    if not isinstance(state, Equilibrium):
         return model.closed_tangent()
-    if about.model.fidelity != model.fidelity or len(about.q) != model.size:
+    if state.model.fidelity != model.fidelity or len(state.q) != model.size:
         raise InvalidInput(
-            f"the state is of a model '{about.model.fidelity}' with {len(about.q)} coordinates, "
+            f"the state is of a model '{state.model.fidelity}' with {len(state.q)} coordinates, "
             f"the modes of '{model.fidelity}' with {model.size}: give the same model's"
         )
     # With the memory updated, sliding points stick: they do as soon as they move back.
-    return about.model.with_memory(about.model.updated_memory(about.q)).tangent(about.q)
+    return state.model.with_memory(state.model.updated_memory(state.q)).tangent(state.q)
 
 
 def _shape_signs(

@@ -49,7 +49,7 @@ def dead_load_of(case: Case) -> DeadLoadResult:
 def first_mode(result: DeadLoadResult) -> Modes:
     """Compute the first mode about the dead load."""
     dead, key = result.dead, _model_key(result.case)
-    return _look_up("modes", key, lambda: modes(dead.model, 1, about=dead))
+    return _look_up("modes", key, lambda: modes(dead.model, 1, start=dead))
 
 
 @validate_arguments

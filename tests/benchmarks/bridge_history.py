@@ -88,7 +88,7 @@ def prepare(name: str, paper: bool) -> tuple[af.Case, af.statics.Equilibrium, di
         return case, dead, {"damping": damping, "scheme": case.scheme, "criteria": case.criteria}
     fidelity = {"backfill": "full", "rest": "rigid"}
     model = af.build(case.structure, fidelity=fidelity, displacements="large", cells=(2, 2))
-    return case, af.dead_load(model), {"damping": af.effective_damping(model, 0.05)}
+    return case, af.dead_load(model), {"damping": af.effective_damping(model, 0.05, "closed")}
 
 
 def shake(name: str, chosen: argparse.Namespace) -> None:

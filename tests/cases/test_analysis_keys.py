@@ -1,6 +1,7 @@
 """Limit analysis and damping of case files, against the functions of Python."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from archfem.cases.analysis_keys import parse_assessment, parse_limit, parse_rat
 from archfem.cases.run import expected_damping
 from archfem.dynamics.schemes import EffectiveDamping
 
+RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 POINT = {"x": "1.4 m", "force": ["0 kN", "-1 kN"]}
 
 
@@ -140,6 +142,17 @@ def test_a_case_takes_its_damping_from_the_modes(small):
     expected = expected_damping(case)(elastic).frequency
     assert expected == af.cases.damping_of(case, af.dead_load(elastic))[0].frequency
     assert expected == pytest.approx(damping.frequency, rel=0.05)
+
+
+@pytest.mark.parametrize("kind", ["stiffness", "rayleigh"])
+def test_the_same_words_give_the_same_damping(kind):
+    """A ring whose joints open under its weight: about closed joints its damping is another."""
+    change = [f"analysis.damping={{ ratio = 0.05, modes = 'effective', kind = '{kind}' }}"]
+    case = af.Case.read(RING, [*change, "model={ fidelity = 'rigid' }"])
+    model = af.build(case.structure, fidelity="rigid")
+    result = af.cases.DeadLoadResult.of(case)
+    assert af.effective_damping(model, 0.05, kind=kind) == result.damping[0]
+    assert af.effective_damping(model, 0.05, "closed", kind=kind) != result.damping[0]
 
 
 def test_rayleigh_damping_is_set_by_its_kind(small):

@@ -44,7 +44,7 @@ def test_run_command(tmp_path, capsys):
 
 
 def test_a_case_without_modes_is_shaken_with_usual_damping(tmp_path, undrawn, monkeypatch, capsys):
-    def none(model, count, about):
+    def none(model, count, start):
         raise af.DidNotConverge(f"none of {count}")
 
     monkeypatch.setattr("archfem.statics.modes.modes", none)

@@ -31,7 +31,7 @@ def block():
 def test_effective_modes_are_those_of_all_modes(ring):
     model = af.build(ring, fidelity="rigid")
     dead = af.dead_load(model)
-    everything = af.modes(model, 51, about=dead)
+    everything = af.modes(model, 51, start=dead)
     for share in (0.8, 0.9, 0.999):
         found = effective_mode_range(model, dead, mass_share=share)
         reached = [everything.mass_ratios[:number, 0].sum() for number in range(52)]
@@ -56,15 +56,15 @@ def test_the_last_effective_mode_barely_depends_on_the_mesh(ring, cells):
 
 def test_search_continues_until_the_share_is_reached(ring):
     model = af.build(ring, fidelity="rigid")
-    whole = effective_mode_range(model)
-    assert effective_mode_range(model, initial_count=1).frequencies == pytest.approx(
+    whole = effective_mode_range(model, "closed")
+    assert effective_mode_range(model, "closed", initial_count=1).frequencies == pytest.approx(
         whole.frequencies, rel=SAME
     )
 
 
 def test_a_search_that_is_cut_short_is_reported(ring, caplog):
     model = af.build(ring, fidelity="rigid")
-    found = effective_mode_range(model, mass_share=0.95, initial_count=2, max_count=4)
+    found = effective_mode_range(model, "closed", mass_share=0.95, initial_count=2, max_count=4)
     assert (found.first, found.last) == (1, 4)
     assert "4 modes, up to 29.7 Hz, have only 90.1 % of the mass along x, not 95 %" in caplog.text
 
@@ -72,8 +72,9 @@ def test_a_search_that_is_cut_short_is_reported(ring, caplog):
 def test_effective_damping_has_its_ratio_at_the_first_effective_mode(ring):
     """By the complex modes of the damped closed structure, not by the formula for the ratio."""
     model = af.build(ring, fidelity="rigid")
-    damping = effective_damping(model, 0.05)
-    assert damping == af.StiffnessDamping(0.05, effective_mode_range(model).frequencies[0])
+    damping = effective_damping(model, 0.05, "closed")
+    first, _ = effective_mode_range(model, "closed").frequencies
+    assert damping == af.StiffnessDamping(0.05, first)
     mass, stiffness = model.mass.toarray(), model.closed_tangent().toarray()
     lag = damping.mass * mass + damping.stiffness * stiffness
     none, one = np.zeros_like(mass), np.eye(len(mass))
@@ -179,14 +180,14 @@ def test_twice_as_many_modes_are_computed_until_they_have_the_share(
     """The modes of a model with 50 coordinates have the share from some number on."""
     computed = []
 
-    def modes(model, count, about):
+    def modes(model, count, start):
         computed.append(count)
         ratios = np.zeros((count, 2))
         ratios[min(reached, count) - 1, 0] = 0.91 if reached <= count else 0.5
         return SimpleNamespace(mass_ratios=ratios, frequencies=1.0 + np.arange(count))
 
     monkeypatch.setattr("archfem.dynamics.damping.modes", modes)
-    found, total = _modes_with_share(SimpleNamespace(size=50), None, 0.9, 3, 10)
+    found, total = _modes_with_share(SimpleNamespace(size=50), "closed", 0.9, 3, 10)
     assert computed == counts
     assert len(total) == len(found.frequencies) == counts[-1]
     assert bool(caplog.text) is (reached == 99)

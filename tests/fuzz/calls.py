@@ -104,7 +104,7 @@ def ready() -> None:
             },
         ),
         (af.dead_load, {"model": model, "newton": None}),
-        (af.modes, {"model": model, "count": 2, "about": dead}),
+        (af.modes, {"model": model, "count": 2, "start": dead}),
         (af.pushover, {"model": _column_model(), "live": af.BodyForce(0.1), "start": None}),
         (af.collapse_factor, {**at, "live": af.BodyForce(0.1), "friction": None, "fill": None}),
         (af.stands, {**at, "friction": "coulomb"}),
@@ -171,7 +171,7 @@ def ready() -> None:
             af.models.Discretisation,
             {"fidelity": "rigid", "cells": (2, 1), "quadrature_points": None},
         ),
-        (af.effective_damping, {"model": model, "ratio": 0.05, "about": dead}),
+        (af.effective_damping, {"model": model, "ratio": 0.05, "start": dead}),
         (af.studies.converged, {"sizes": [4.0, 2.0, 1.0], "values": [1.0, 1.1, 1.12]}),
         (
             af.studies.stripe_fragility,

@@ -72,7 +72,7 @@ def test_block_on_a_joint_half_of_which_is_open():
     model = af.build(glued(block().structure), fidelity="rigid", quadrature="exact")
     normal = 1e6
     pressed = af.statics.equilibrium_under(model, np.array([0.0, -normal, -normal * BREADTH / 3.0]))
-    found = modes(model, 3, about=pressed)
+    found = modes(model, 3, start=pressed)
     # The edge of contact is found to the tolerance of the equilibrium.
     assert found.frequencies == pytest.approx(hertz(squares_on_strip(0.0, 0.3)), rel=1e-7)
     assert found.frequencies[0] < 0.8 * modes(model, 1).frequencies[0]
@@ -113,7 +113,7 @@ def test_effective_masses_add_up_to_all_that_moves(fidelity, verified):
 def test_as_dense_lapack_about_dead_load(ring, fidelity, verified):
     model = af.build(ring, fidelity=fidelity, cells=(2, 2))
     dead = af.dead_load(model)
-    found = modes(model, 12, about=dead)
+    found = modes(model, 12, start=dead)
     stiffness, mass = dead.model.tangent(dead.q).toarray(), model.mass.toarray()
     assert stiffness == pytest.approx(stiffness.T, abs=1e-12 * stiffness.max())
     squares, shapes = eigh(stiffness, mass, subset_by_index=[0, 11])
@@ -131,8 +131,8 @@ def test_open_joints_lower_the_first_frequency(ring):
         model, af.statics.self_weight(model) + model.load(af.BodyForce(0.35))
     )
     closed = modes(model, 1).frequencies[0]
-    dead = modes(model, 1, about=af.dead_load(model)).frequencies[0]
-    hinging = modes(model, 1, about=pushed).frequencies[0]
+    dead = modes(model, 1, start=af.dead_load(model)).frequencies[0]
+    hinging = modes(model, 1, start=pushed).frequencies[0]
     assert hinging < 0.9 * dead
     assert dead < closed
 
@@ -142,7 +142,7 @@ def test_monolithic_as_full(ring):
         af.build(ring, fidelity=fidelity, cells=(2, 2), quadrature="lobatto")
         for fidelity in ("full", "monolithic")
     ]
-    full, slow = (modes(model, 6, about=af.dead_load(model)) for model in both)
+    full, slow = (modes(model, 6, start=af.dead_load(model)) for model in both)
     assert slow.frequencies == pytest.approx(full.frequencies, rel=SAME)
     assert slow.mass_ratios == pytest.approx(full.mass_ratios, abs=1e-7)
     assert slow.shapes == pytest.approx(full.shapes, abs=1e-6 * np.abs(full.shapes).max())
@@ -163,7 +163,7 @@ def test_a_mechanism_does_not_vibrate():
     model = block()
     lifted = af.statics.Equilibrium(model, np.array([0.0, 0.01, 0.0]), 0, 0)
     with pytest.raises(af.DidNotConverge, match=r"about the given state: .* a mechanism") as caught:
-        modes(model, 1, about=lifted)
+        modes(model, 1, start=lifted)
     assert caught.value.last is lifted
 
 
@@ -173,7 +173,7 @@ def test_invalid_requests_are_refused():
         with pytest.raises(af.InvalidInput, match=f"{count} modes of a model with 3 coordinates"):
             modes(model, count)
     with pytest.raises(af.InvalidInput, match="with 6 coordinates, the modes of 'rigid' with 3"):
-        modes(model, 1, about=af.dead_load(other))
+        modes(model, 1, start=af.dead_load(other))
 
 
 def test_table():

@@ -204,7 +204,7 @@ def test_up_to_four_runs_fill_the_widest_gaps_of_a_curve(small_ring, monkeypatch
         "between": (0.3, pytest.approx(5.0 * 9.81 / 3.0, rel=1e-3)),
     }
     dead = af.cases.dead_load_of_case(small_ring)
-    (frequency,) = af.modes(dead.model, 1, about=dead).frequencies
+    (frequency,) = af.modes(dead.model, 1, start=dead).frequencies
     assert found["period"] == pytest.approx(1.0 / frequency)
 
 

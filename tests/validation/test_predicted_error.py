@@ -113,12 +113,12 @@ def test_damping_found_of_the_first_model_is_that_of_the_choice(ring):
     """A function of the model, and its result, are the same to the last digit."""
     motion = af.Motion.synthetic(duration=1.0, pga=1.0, seed=1)
     first = plain(ring, exact_discretisation(ring, *TRIED_SETTINGS[0][:2]))
-    given = af.dynamics.effective_damping(first, about=af.dead_load(first))
+    given = af.dynamics.effective_damping(first, start=af.dead_load(first))
     found = [
         af.build(ring, fidelity="auto", tolerance=0.02, motion=motion, damping=damping).prediction
         for damping in (
             given,
-            lambda model: af.dynamics.effective_damping(model, about=af.dead_load(model)),
+            lambda model: af.dynamics.effective_damping(model, start=af.dead_load(model)),
         )
     ]
     assert found[0].candidates == found[1].candidates

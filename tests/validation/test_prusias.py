@@ -74,7 +74,7 @@ def test_modes_of_a_trial(verified):
         "structure.backfill.erosion=0 m",
     )
     state = af.cases.dead_load_of_case(held)
-    found = af.modes(state.model, 3, about=state)
+    found = af.modes(state.model, 3, start=state)
     assert found.frequencies == pytest.approx([3.03, 3.57, 4.22], rel=0.02)
     assert found.mass_ratios[:, 0] == pytest.approx([0.29, 0.26, 0.21], abs=0.01)
     label = "bridge, uneroded and held, first modes [Hz]"
@@ -84,7 +84,7 @@ def test_modes_of_a_trial(verified):
 @pytest.mark.slow
 def test_the_restored_bridge_is_stiffer_and_nearer_its_centre_lines(dead):
     restored = af.cases.dead_load_of_case(case("prusias_restored"))
-    first = [float(af.modes(each.model, 1, about=each).frequencies[0]) for each in (dead, restored)]
+    first = [float(af.modes(each.model, 1, start=each).frequencies[0]) for each in (dead, restored)]
     assert first[1] > 1.4 * first[0]
     largest = [
         float(abs(af.joints.assessed_joints(each.joints)["eccentricity"]).max())
@@ -175,7 +175,7 @@ def test_the_bridge_stands_at_the_peak_of_1999(verified):
     motion = own.ground_suite().motions[0].scaled_to_pga(0.299 * af.units.STANDARD_GRAVITY)
     fidelity = {"backfill": "full", "rest": "rigid"}
     model = af.build(own.structure, fidelity=fidelity, displacements="large", cells=(2, 2))
-    damping = af.effective_damping(model, 0.05)
+    damping = af.effective_damping(model, 0.05, "closed")
     run = af.time_history(model, motion, start=af.dead_load(model), damping=damping, dt=0.005)
     assert run.verdict.outcome == "stands"
     assert not any(run.verdict.mechanisms.values())
