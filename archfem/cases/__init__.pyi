@@ -6,6 +6,7 @@ from .result_folder import open_results as open_results
 from .run import DeadLoadResult as DeadLoadResult
 from .run import Result as Result
 from .run import Run as Run
+from .run import damping_of as damping_of
 from .run import dead_load_of_case as dead_load_of_case
 from .run import run_case as run_case
 from .run import run_time_history as run_time_history

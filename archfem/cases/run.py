@@ -139,8 +139,8 @@ class DeadLoadResult:
 
     @cached_property
     def damping(self) -> tuple[Viscous | None, str]:
-        """Damping of the runs, and a sentence on its frequencies and where they are from."""
-        return resolve_effective_damping(self.case.analysis.damping, self.dead.model, self.dead)
+        """Damping of the runs and its description, as `damping_of` returns them."""
+        return damping_of(self.case, self.dead)
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,6 +286,23 @@ def dead_load_of_case(case: Case) -> Equilibrium:
         return case.analysis.dead_load(case.ground_motion())
     first = next(iter(case.suite["pairs"]))  # matching the other pairs would only take time
     return case.analysis.dead_load(case.alone(first).ground_suite().motions[0])
+
+
+@validate_arguments
+def damping_of(case: Case, dead: Equilibrium) -> tuple[Viscous | None, str]:
+    """Return the damping of a case, whose frequencies may be those of modes about the dead load.
+
+    Args:
+        case: the case.
+        dead: its equilibrium under dead load.
+
+    Returns:
+        The damping, and a sentence with ratio, frequencies, and how these were determined.
+
+    Raises:
+        InvalidInput: damping by effective modes, of which there are fewer than two.
+    """
+    return resolve_effective_damping(case.analysis.damping, dead.model, dead)
 
 
 @validate_arguments

@@ -40,7 +40,7 @@ def dead_load_of(case: Case) -> DeadLoadResult:
     key = _model_key(case)
     dead: Equilibrium = _look_up("equilibria", key, lambda: dead_load_of_case(case))
     result = DeadLoadResult(case, dead)
-    damping_key = f"{key} {case.analysis.get('damping')!r}"
+    damping_key = f"{key} {case.analysis.damping!r}"
     # stored as the cached property `damping` of the result would store it
     result.__dict__["damping"] = _look_up("damping", damping_key, lambda: damping_of(case, dead))
     return result

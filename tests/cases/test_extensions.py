@@ -34,7 +34,7 @@ file = "record.txt"
 
 [analysis]
 dt = "10 ms"
-stop_at = "overloaded"
+until = "overloaded"
 
 [assessment]
 spectrum = { code = "plateau", level = 0.9, corner = 0.5 }

@@ -30,8 +30,8 @@ reduction = 2.0
 [suite.pairs]
 first = { synthetic = { seed = 1, duration = 1.0, pga = 1.0 } }
 second = { synthetic = { seed = 2, duration = 1.0, pga = 1.0, vertical_ratio = 0.0 } }
-[output]
-save_fields_every = 10
+[record]
+fields_every = 10
 """
 
 

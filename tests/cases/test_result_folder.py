@@ -34,7 +34,7 @@ second = { synthetic = { seed = 2, duration = 0.3, pga = 1.0 } }
 
 def run_into(folder, small, change):
     """Carry out a suite of two pairs as `archfem run` does; its figures are texts."""
-    case = af.Case.read(small, [change, "output.save_fields_every=10"])
+    case = af.Case.read(small, [change, "record.fields_every=10"])
     with replace_run(case, folder) as draft:
         for result in carry_out(case, draft):
             if isinstance(result, af.cases.Run):

@@ -241,7 +241,7 @@ def test_each_step_is_recorded_and_a_film_shows_every_tenth(small):
     run = af.cases.run_time_history(case, motion, af.cases.dead_load_of_case(case))
     assert run.time == pytest.approx(0.005 * np.arange(201))
     assert run.dataset["frame_time"].values == pytest.approx(0.05 * np.arange(21))
-    every = af.Case.read(small, ["output.save_every=4", "analysis.dt=0.005"])
+    every = af.Case.read(small, ["record.every=4", "analysis.dt=0.005"])
     run = af.cases.run_time_history(every, motion, af.cases.dead_load_of_case(every))
     assert run.time == pytest.approx(0.02 * np.arange(51))
     assert "q" not in run.dataset

@@ -73,7 +73,7 @@ def test_modes_are_tabulated_and_the_first_two_filmed(count, tmp_path, undrawn, 
 
 def test_criteria_of_a_case_are_obeyed(tmp_path, undrawn, capsys):
     """Four joints reach |e| = 0.38 at once, and never 0.46."""
-    changes = ["model.fidelity=rigid", "motion.end=4", "analysis.stop_at_mechanism=true"]
+    changes = ["model.fidelity=rigid", "motion.end=4", "analysis.until=counted mechanism"]
     changes += ["motion.scale=0.8", "output.animation=false"]
     changes += ["analysis.damping={ratio=0.05, frequency=8.0}"]
     given = [part for change in changes for part in ("--set", change)]
@@ -426,7 +426,7 @@ def test_each_file_of_a_folder_swapped_is_refused_and_made_anew(kind, small, tmp
     for scale in (1, 2):
         out = folders[scale] = tmp_path / f"out {scale}"
         changes = [f"{kind}.scale={scale}", "limit.horizontal=1", f"structure.breadth=1.{scale}"]
-        changes += ["output.save_fields_every=10", "output.animation=false"]
+        changes += ["record.fields_every=10", "output.animation=false"]
         given = [part for change in changes for part in ("--set", change)]
         for name in ("run", "verdict"):
             more = ["--samples", "2"] if name == "verdict" else []

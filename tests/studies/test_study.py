@@ -265,7 +265,7 @@ def test_a_changed_title_or_picture_recomputes_nothing(ring_file, tmp_path, monk
     over, folder = {"structure.thickness": [0.5, 0.6]}, tmp_path / "out"
 
     def table(*changes, find="dead load"):
-        case = af.Case.read(ring_file, ["output.save_every=1", *changes])
+        case = af.Case.read(ring_file, ["record.every=1", *changes])
         return af.Study.of(case, over, find, title="one").run(folder, workers=1)
 
     first = table()
@@ -279,7 +279,7 @@ def test_a_changed_title_or_picture_recomputes_nothing(ring_file, tmp_path, monk
     monkeypatch.setattr(process_pool, "evaluate_serially", counted)
     assert table("title=other", "output.animation=true", "output.joints=[1]").identical(first)
     assert not evaluated
-    table("output.save_every=2")  # the largest value of a run is that of its records
+    table("record.every=2")  # the largest value of a run is that of its records
     assert evaluated == [2]
     assert len({title(table(f"title={word}", find=title)) for word in "ab"}) == 2
 

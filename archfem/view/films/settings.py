@@ -43,7 +43,7 @@ def check_film(
         raise InvalidInput(
             "the run has no fields to draw: record them with "
             "time_history(..., record=Record(fields_every=10)), in a case with "
-            "save_fields_every = 10 in [output]"
+            "fields_every = 10 in [record]"
         )
     check_coordinate_count(model, run.dataset.sizes["coordinate"])
 

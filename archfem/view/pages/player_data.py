@@ -329,7 +329,7 @@ def _default_note(run: History) -> str:
     opening = ", with the openings of the joints between them" if "opening" in run.joints else ""
     return (
         f"The run contains no displacements: blocks are drawn undeformed{opening}. Set "
-        "save_fields_every = 8 in [output] of its case to record them."
+        "fields_every = 8 in [record] of its case to record them."
     )
 
 

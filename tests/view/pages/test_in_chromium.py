@@ -92,7 +92,7 @@ def test_a_click_on_a_joint_shows_it_and_play_moves_on(rocked, tmp_path):
 
 def test_a_report_prints_without_cutting_a_figure(small, tmp_path):
     """Each figure is on one page: it may not break, and none is higher than a page."""
-    case = af.Case.read(small, ["output.save_fields_every=10"])
+    case = af.Case.read(small, ["record.fields_every=10"])
     *_, run = af.cases.run_case(case, pairs=["first"])
     path = run.report(tmp_path / "report.html")
     with browser(wide=665) as driver:  # the width of the text on A4
