@@ -1,6 +1,7 @@
 """Places of a module that `make mutants` changes, places that it leaves, and the tests it runs."""
 
 import builtins
+import re
 import tomllib
 from pathlib import Path
 
@@ -21,6 +22,13 @@ def g(x):
     bar.update(x + 1)
     return x.reshape(-1, 2), np.reshape(x, (-1, 3))
 '''
+
+
+def test_the_next_seed_was_not_used():
+    lines = KNOWN.with_name("seeds.txt").read_text(encoding="utf-8").splitlines()
+    used = [int(line.split()[0]) for line in lines if not line.startswith("#")]
+    guide = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    assert int(re.search(r"the next is (\d+)", guide)[1]) == max(used) + 1
 
 
 def test_every_number_and_operator_of_the_physics_is_changed_once():

@@ -2,6 +2,7 @@
 
 import json
 import re
+import tomllib
 from functools import reduce
 from pathlib import Path
 
@@ -98,6 +99,17 @@ def test_names_in_the_text_are_there(name):
 def test_the_table_of_verification_names_tests_that_record_results():
     for row in json.loads((ROOT / "docs" / "verification.json").read_text(encoding="utf-8")):
         assert "verified(" in (ROOT / row["test"]).read_text(encoding="utf-8")
+
+
+def test_the_address_of_the_repository_is_stated_in_one_file():
+    """Whoever hosts the project fills it in there."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    address = project["urls"]["Homepage"].removeprefix("https://")
+    texts = [*ROOT.glob("*.*"), *(ROOT / ".github").rglob("*.*"), *(ROOT / "docs").glob("*.*")]
+    texts = [path for path in texts if path.suffix in (".md", ".cff", ".py", ".toml", ".yml")]
+    assert [path.name for path in texts if address in path.read_text(encoding="utf-8")] == [
+        "pyproject.toml"
+    ]
 
 
 def test_links_of_the_readme_lead_somewhere():

@@ -12,7 +12,8 @@ ROOT = Path(__file__).parents[1]
 PYTHON = sorted((ROOT / "archfem").rglob("*.py"))
 SCRIPTS = {path.parent for name in ("tests", "archbench") for path in (ROOT / name).rglob("*.py")}
 SCRIPTS = sorted({*SCRIPTS, ROOT / "docs", ROOT / "docs" / "extensions"})
-PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")]
+PAGES = ["README", "CONTRIBUTING", "SECURITY", "SUPPORT", "CODE_OF_CONDUCT"]
+PAGES = [ROOT / f"{name}.md" for name in PAGES]
 PAGES += sorted((ROOT / "docs").rglob("*.md"))
 PAGES += [*sorted((ROOT / "meshes").glob("*.toml")), *sorted((ROOT / "notebooks").glob("*.py"))]
 
