@@ -10,16 +10,16 @@ from tqdm import tqdm
 from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import validate_arguments
-from archfem.dynamics.error_estimation import largest_difference
+from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.damping import resolve_effective_damping
+from archfem.dynamics.error_estimation import largest_difference, severe_motion
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.model_selection import (
-    DampingChoice,
     discretisation_label,
     exact_discretisation,
-    resolve_damping,
     stone_fidelity,
 )
-from archfem.dynamics.schemes import Viscous
+from archfem.dynamics.schemes import EffectiveDamping, Viscous, interpret_damping
 from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
 from archfem.joints.criteria import assessed_joints, eccentricity_magnitude
@@ -116,15 +116,15 @@ class Accuracy:
 
 @validate_arguments
 def accuracy(
-    structure: Structure,
-    motion: Motion,
+    structure: Structure | Analysis,
+    motion: Motion | None = None,
     *,
-    damping: DampingChoice = None,
+    damping: Viscous | EffectiveDamping | str | None = None,
     rungs: Sequence[str] = TRIED_FIDELITIES,
     cells: Sequence[tuple[int, int]] = TRIED_MESHES,
     rules: Sequence[tuple[str, int | None]] = TRIED_QUADRATURES,
     steps: Sequence[float] = TRIED_TIME_STEPS,
-    tolerance: float = 0.005,
+    tolerance: float | None = None,
 ) -> Accuracy:
     """Compare processor time and error of fidelities, meshes, quadratures and time steps.
 
@@ -132,14 +132,16 @@ def accuracy(
     a converged reference.
 
     Args:
-        structure: structure of blocks and joints.
-        motion: ground motion.
-        damping: damping of all runs, or a function that returns it for the reference model.
+        structure: structure of blocks and joints; or an `Analysis`, whose damping and tolerance
+            are then the defaults.
+        motion: ground motion; by default a synthetic one that brings |e| to 0.4.
+        damping: damping of all runs, as for `time_history`; effective modes are those of the
+            reference model.
         rungs: fidelities to try.
         cells: meshes to try; "rigid" takes the first number as facets on a joint.
         rules: quadratures to try, each with its points on a facet (None: 3).
         steps: time steps to try [s].
-        tolerance: tolerance on the error, by which one setting is chosen [-].
+        tolerance: tolerance on the error, by which one setting is chosen [-]; by default 0.005.
 
     Returns:
         All settings with times and errors, the reference and the error of the reference.
@@ -148,14 +150,20 @@ def accuracy(
         InvalidInput: a fidelity, rule or step is out of range.
         DidNotConverge: the reference itself failed.
     """
+    if isinstance(structure, Analysis):
+        damping = structure.damping if damping is None else damping
+        tolerance = structure.tolerance if tolerance is None else tolerance
+        structure = structure.structure
     references = reference_settings(structure)
-    damping = resolve_damping(build(structure, references[0].discretisation), damping)
+    model = build(structure, references[0].discretisation)
+    viscous, _ = resolve_effective_damping(interpret_damping(damping), model, None)
+    motion = motion or severe_motion(model)
     settings = [*references, *candidate_settings(structure, rungs, cells, rules, steps)]
     runs = [
-        time_run(build(structure, setting.discretisation), motion, damping, setting.dt)
+        time_run(build(structure, setting.discretisation), motion, viscous, setting.dt)
         for setting in tqdm(settings, unit="setting", disable=None, leave=False)
     ]
-    return compare_runs(settings, runs, motion.duration, tolerance)
+    return compare_runs(settings, runs, motion.duration, 0.005 if tolerance is None else tolerance)
 
 
 def reference_settings(structure: Structure, dt: float = 0.00125) -> tuple[Setting, Setting]:

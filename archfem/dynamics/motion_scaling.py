@@ -17,10 +17,11 @@ from tqdm import tqdm
 from archfem._display import call_late_bound
 from archfem._files import align_columns
 from archfem._validation import validate_arguments, validate_methods
+from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.fall import FALLEN_STATES, CollapseState
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
-from archfem.dynamics.schemes import Viscous
+from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict import MECHANISM_DEFINITIONS
@@ -29,7 +30,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import Structure
-from archfem.models.model import Model, check_model
+from archfem.models.model import Model
 from archfem.motion.motion import Motion
 from archfem.motion.signal_processing import MAX_PEAK_ACCELERATION
 from archfem.statics.equilibrium import Equilibrium, dead_load
@@ -151,11 +152,11 @@ class MechanismScales:
 
 @validate_arguments
 def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the search)
-    model: Model,
+    model: Model | Analysis,
     motion: Motion,
     *,
     start: Equilibrium | None = None,
-    damping: Viscous | None = None,
+    damping: Viscous | EffectiveDamping | str | None = None,
     dt: float | None = None,
     criteria: Criteria | None = None,
     precision: float = 0.05,
@@ -170,7 +171,7 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
     returns the runs made so far.
 
     Args:
-        model: model of any fidelity.
+        model: model of any fidelity, or an `Analysis`, whose settings are then the defaults.
         motion: motion to scale, vertical component included.
         start: dead load, computed if not given.
         damping: as for `time_history`.
@@ -196,6 +197,7 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
             "above 0, the smaller first"
         )
     start = start or dead_load(model)
+    structure = start.model.structure
 
     def run_scaled(scale: float) -> ScaledRun:
         scaled = motion.scaled(scale)
@@ -204,11 +206,12 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
         run = _run_as_far(model, scaled, start=start, damping=damping, dt=dt, **options)
         return ScaledRun(scale, first_mechanisms(run), run.ending, run.outcome)
 
-    definitions = (*applicable_definitions(model.structure, criteria), "verified")
+    own = model.failure_criteria if isinstance(model, Analysis) else None
+    definitions = (*applicable_definitions(structure, criteria or own), "verified")
     return search_scales(run_scaled, definitions, precision, _admissible_range(between, motion))
 
 
-def _run_as_far(model: Model, motion: Motion, **options: Any) -> History:
+def _run_as_far(model: Model | Analysis, motion: Motion, **options: Any) -> History:
     """Return the history of a run, up to a step that has no equilibrium."""
     try:
         return time_history(model, motion, **options)
@@ -378,11 +381,11 @@ class CollapseScale:
 
 @validate_arguments
 def collapse_scale(
-    model: Model,
+    model: Model | Analysis,
     motion: Motion,
     *,
     start: Equilibrium | None = None,
-    damping: Viscous | None = None,
+    damping: Viscous | EffectiveDamping | str | None = None,
     dt: Sequence[float] = (0.005, 0.0025),
     precision: float = 0.05,
     between: tuple[float, float] = (0.1, 10.0),
@@ -393,7 +396,8 @@ def collapse_scale(
     sensitive to all parameters, and a result on which two steps disagree is not reliable.
 
     Args:
-        model: model of large displacements, `build(…, displacements="large")`.
+        model: model of large displacements, `build(…, displacements="large")`, or such an
+            `Analysis`, whose settings are then the defaults.
         motion: motion to scale, vertical component included.
         start: dead load, computed if not given.
         damping: as for `time_history`.
@@ -408,17 +412,17 @@ def collapse_scale(
         InvalidInput: displacements are small, or precision, steps or scales are out of range.
         DidNotConverge: the structure does not stand under dead load.
     """
-    check_model(model)
-    if not model.large_displacements:
+    begin = start or dead_load(model)
+    if not begin.model.large_displacements:
         raise InvalidInput(
-            f"model '{model.fidelity}' has small displacements: build it with displacements='large'"
+            f"model '{begin.model.fidelity}' has small displacements: build it with "
+            "displacements='large'"
         )
     if not _valid_search(precision, between) or not dt:
         raise InvalidInput(
             f"precision {precision:g} between scales {between} by steps {tuple(dt)}: give 0.0001 "
             "to 1, two scales above 0, the smaller first, and a step or two"
         )
-    begin = start or dead_load(model)
 
     def run_scaled(step: float, scale: float) -> ScaledRun:
         run = _run_as_far(model, motion.scaled(scale), start=begin, damping=damping, dt=step)

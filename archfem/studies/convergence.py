@@ -18,8 +18,7 @@ import xarray as xr
 from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import check_array, validate_arguments, validate_methods
-from archfem.cases.case import Case
-from archfem.cases.run import expected_damping
+from archfem.cases.case import Case, case_of
 from archfem.dynamics.accuracy import (
     Accuracy,
     Setting,
@@ -29,9 +28,12 @@ from archfem.dynamics.accuracy import (
     reference_settings,
     time_run,
 )
+from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.schemes import Viscous
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.builder import build
+from archfem.motion.motion import Motion
 from archfem.studies.cache import dead_load_of, ground_motion
 from archfem.studies.evaluators import Findings
 from archfem.studies.study import Study
@@ -156,10 +158,11 @@ class MeshSensitivity:
 
 @validate_arguments
 def mesh_sensitivity(  # noqa: PLR0913  (each varied setting is a keyword with its usual values)
-    case: Case,
+    subject: Analysis | Case,
     quantity: str = "eccentricity",
-    find: Any = None,
+    compute: Any = None,
     *,
+    motion: Motion | None = None,
     cells: Sequence[int] = (2, 4, 8),
     steps: Sequence[float] = (0.01, 0.005, 0.0025),
     rules: Sequence[str] = ("nodal", "lobatto", "gauss", "exact"),
@@ -173,10 +176,11 @@ def mesh_sensitivity(  # noqa: PLR0913  (each varied setting is a keyword with i
     fidelity of the case.
 
     Args:
-        case: case with or without a motion.
+        subject: analysis or case.
         quantity: name of the finding.
-        find: function to evaluate, as for `Study.of`; by default "history" for a case with a
-            motion, else "dead load".
+        compute: function to evaluate, as for a `Study`; by default "history" with a motion, else
+            "dead load".
+        motion: motion of an analysis, or in place of that of a case.
         cells: cells of a block in each direction, three or more numbers, the coarsest first.
         steps: time steps, three or more, the coarsest first [s].
         rules: joint quadratures.
@@ -191,17 +195,18 @@ def mesh_sensitivity(  # noqa: PLR0913  (each varied setting is a keyword with i
     Raises:
         InvalidInput: there is no such finding, or a point of the mesh or step failed.
     """
-    find = find or ("history" if case.has_motion else "dead load")
+    case = case_of(subject, motion)
+    compute = compute or ("history" if case.has_motion else "dead load")
     finest: dict[str, Any] = {"model.cells": [cells[-1], cells[-1]]}
     variations: list[tuple[str, str, dict[str, Any]]]
     variations = [("mesh", f"{1.0 / n:.17g}", {"model.cells": [n, n]}) for n in cells]
-    if find != "dead load":
+    if compute != "dead load":
         finest["analysis.dt"] = steps[-1]
         variations += [("step", f"{dt:.17g}", {"analysis.dt": dt}) for dt in steps]
     variations += [("quadrature", rule, {"model.quadrature": rule}) for rule in rules]
     variations += [("fidelity", name, {"model.fidelity": name}) for name in rungs]
     points = [finest | changes for *_, changes in variations]
-    study = Study.of(case, points, find, title=f"{case.title}: mesh and step")
+    study = Study(case, points, compute, title=f"{case.title}: mesh and step")
     table = study.run(folder, workers=workers)
     kinds, values = (np.array(c, dtype=object) for c in list(zip(*variations, strict=True))[:2])
     table = table.assign_coords(varied=("point", kinds), to=("point", values))
@@ -259,13 +264,13 @@ def case_accuracy(
     """
     motion = ground_motion(case)
     references = reference_settings(case.structure)
-    damping = expected_damping(case)
-    if callable(damping):  # damping from modes is that of the reference model in all runs
-        damping = damping(build(case.structure, references[0].discretisation))
+    # damping from modes is that of the reference model in all runs
+    reference = build(case.structure, references[0].discretisation)
+    damping, _ = resolve_effective_damping(case.analysis.damping, reference, None)
     settings = [*references, *candidate_settings(case.structure)]
     varied = ("fidelity", "cells", "quadrature", "quadrature_points", "tolerance")
     fixed = {key: v for key, v in case.settings.get("model", {}).items() if key not in varied}
-    study = Study.of(
+    study = Study(
         Case.of({**case.settings, "model": fixed}, case.folder),
         [_case_keys(setting) for setting in settings],
         {"name": evaluate_time, "damping": damping},
@@ -275,7 +280,7 @@ def case_accuracy(
     if "peaks" not in table:
         raise DidNotConverge(f"no setting ran: {table['error'].values[0] or 'each failed'}")
     runs = [_to_run(table.isel(point=k)) for k in range(len(settings))]
-    return compare_runs(settings, runs, motion.duration, case.tolerance)
+    return compare_runs(settings, runs, motion.duration, case.analysis.tolerance)
 
 
 def _case_keys(setting: Setting) -> dict[str, Any]:

@@ -124,15 +124,8 @@ def scales_of(result: DeadLoadResult, motion: Motion, **options: Any) -> Finding
     if "between" in options:  # a list in a study file
         options["between"] = tuple(options["between"])
     with log_prefix(result.case.title, motion.name):
-        scales = mechanism_scales(
-            result.dead.model,
-            motion,
-            start=result.dead,
-            damping=result.damping[0],
-            dt=result.case.analysis.dt,
-            criteria=result.case.analysis.failure_criteria,
-            **options,
-        )
+        settings = {"start": result.dead, "damping": result.damping[0]}
+        scales = mechanism_scales(result.case.analysis, motion, **settings, **options)
     if scales.interrupted:
         raise KeyboardInterrupt
     return {name: scales[name].upper for name in MECHANISM_DEFINITIONS} | {

@@ -18,10 +18,12 @@ import xarray as xr
 from archfem._display import ResultDisplay
 from archfem._typing import Array
 from archfem._validation import validate_arguments, validate_methods
-from archfem.cases.case import Case
+from archfem.cases.case import Case, case_of
+from archfem.cases.motion_keys import write_motion
 from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.run import DeadLoadResult
 from archfem.cases.toml_file import check_choice
+from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.events import applicable_definitions
 from archfem.dynamics.fall import CollapseState
 from archfem.dynamics.history import Ending, first_mechanisms, partial_history
@@ -130,7 +132,7 @@ def _applicable_limits(result: DeadLoadResult, limits: Sequence[str] | None) -> 
     chosen = tuple(limit for limit in LIMIT_STATES if limit in (limits or possible))
     if impossible := [limit for limit in chosen if limit not in possible]:
         raise InvalidInput(
-            f"limit state {impossible[0]!r} cannot be met: collapse needs model.displacements = "
+            f"limit state {impossible[0]!r} cannot be met: collapse needs displacements = "
             "'large', four failures as many joints in rings and piers"
         )
     return chosen
@@ -299,7 +301,7 @@ def draw_ida_result(found: Ida, measure: str = "pga", demand: str = "rotation") 
 
 @validate_arguments
 def ida(
-    case: Case,
+    subject: Analysis | Case,
     motions: Motion | str | Path | Sequence[Any] | Mapping[str, Any] | None = None,
     *,
     limits: Sequence[str] | None = None,
@@ -316,7 +318,8 @@ def ida(
     whole motion. A run without equilibrium counts as failed.
 
     Args:
-        case: case of the structure; with `model.displacements = "large"` collapse is a limit state.
+        subject: analysis, or case of the structure; with `displacements="large"` collapse is a
+            limit state.
         motions: motions by name or in a sequence, each a `Motion`, the file of a record, relative
             to the case's folder, or a table as [motion]; a single `Motion` or file; by default the
             pairs of the suite, scaled and reduced as the case says.
@@ -343,9 +346,11 @@ def ida(
         check_choice(limit, LIMIT_STATES, "limits")
     options: Findings = {"limits": None if limits is None else list(limits), "precision": precision}
     options["between"] = [float(scale) for scale in between]
+    case = case_of(subject)
     names, points = _points(case, motions)
     axis = Axis("motion", ("motion",), tuple((name,) for name in names))
-    study = Study(f"{case.title}: IDA", Evaluator(search_limit_states, options), (axis,), points)
+    evaluator = Evaluator(search_limit_states, options)
+    study = Study.of_points(f"{case.title}: IDA", evaluator, (axis,), points)
     return Ida(study.run(folder, workers=workers, client=client))
 
 
@@ -369,24 +374,7 @@ def _points(
         raise InvalidInput(f"{len(motions)} motions under {len(named)} names: give each its own")
     base = {key: value for key, value in case.settings.items() if key not in ("suite", "motion")}
     return list(named), tuple(
-        Point(base, case.folder, (("motion", _motion_table(motion)),)) for motion in named.values()
-    )
-
-
-def _motion_table(motion: Any) -> dict[str, Any]:
-    """A motion as the table [motion] of a case."""
-    if isinstance(motion, str | Path):
-        return {"file": str(motion)}
-    if isinstance(motion, Mapping):
-        return dict(motion)
-    if isinstance(motion, Motion):
-        table = {"samples": motion.horizontal.tolist(), "dt": float(motion.dt)}
-        if motion.vertical is None:
-            return table
-        return table | {"vertical": table | {"samples": motion.vertical.tolist()}}
-    raise InvalidInput(
-        f"a motion is a {type(motion).__name__}: give a Motion, a record's file, or a table as "
-        "under [motion]"
+        Point(base, case.folder, (("motion", write_motion(motion)),)) for motion in named.values()
     )
 
 
@@ -394,7 +382,7 @@ def _motion_name(motion: Any, number: int) -> str:
     """Name of a motion that was given without one."""
     if isinstance(motion, Motion):
         return motion.name or f"motion {number}"
-    table = _motion_table(motion)
+    table = write_motion(motion)
     if "file" in table:
         return Path(table["file"]).stem
     seed = table.get("synthetic", {}).get("seed")

@@ -165,7 +165,7 @@ def stiffness_report(
     Args:
         case: case of the structure.
         stiffness: range of the stiffness.
-        find: function to evaluate, as for `Study.of`.
+        find: function to evaluate, as `compute` of a `Study`.
         contact: name of the contact whose stiffness is varied.
         folder: folder for finished points, as for `Study.run`.
         workers: number of processes, as for `Study.run`.
@@ -183,7 +183,7 @@ def stiffness_report(
     }
     usual = {key: values[1] for key, values in ranges.items()}
     points = [usual, *(usual | {key: ranges[key][end]} for key in ranges for end in (0, 2))]
-    return Study.of(case, points, find).run(folder, workers=workers)
+    return Study(case, points, find).run(folder, workers=workers)
 
 
 def _normal(roughness: float, strength: float, faces: float, stress: float) -> float:

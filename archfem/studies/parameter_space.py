@@ -16,9 +16,16 @@ from scipy import stats
 from scipy.stats import qmc
 
 from archfem._validation import check_integer, short_repr
+from archfem.cases.analysis_tables import find_section
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_sections
-from archfem.cases.toml_file import check_choice, check_table, refuse_unknown, set_value
+from archfem.cases.toml_file import (
+    check_choice,
+    check_table,
+    refuse_unknown,
+    set_value,
+    split_key_path,
+)
 from archfem.errors import InvalidInput
 
 # Sections of a case that define its model
@@ -123,7 +130,13 @@ def _value_axis(key: str, values: Any) -> Axis:
     """The axis of a list of values."""
     if not len(values):
         raise InvalidInput(f"{key} is empty: a product over it has no points; give values")
-    return Axis(key, (key,), tuple((_to_python(value),) for value in values))
+    return Axis(_complete(key), (_complete(key),), tuple((_to_python(value),) for value in values))
+
+
+def _complete(path: str) -> str:
+    """Return the path of a value in a case; a keyword of an analysis has its section before it."""
+    section = find_section(split_key_path(path)[0])
+    return f"{section}.{path}" if section else path
 
 
 def _to_python(value: Any) -> Any:
@@ -137,7 +150,7 @@ def _point_axis(points: Sequence[Any]) -> Axis:
         raise InvalidInput("the list of points is empty: give a table of keys of the case for each")
     keys = tuple(dict.fromkeys(key for point in points for key in point))
     rows = tuple(tuple(_to_python(point.get(key)) for key in keys) for point in points)
-    return Axis("point", keys, rows)
+    return Axis("point", tuple(map(_complete, keys)), rows)
 
 
 def _sample_axis(random: Mapping[str, Any], samples: Mapping[str, Any] | None) -> Axis:
@@ -159,7 +172,7 @@ def _sample_axis(random: Mapping[str, Any], samples: Mapping[str, Any] | None) -
     seed = check_integer(settings.get("seed", 0), "samples.seed", minimum=0)
     shares = samplers[method](len(random), seed=seed).random(count)  # between 0 and 1
     columns = [_quantiles(key, random[key], shares[:, k]) for k, key in enumerate(random)]
-    return Axis("sample", tuple(random), tuple(zip(*columns, strict=True)))
+    return Axis("sample", tuple(map(_complete, random)), tuple(zip(*columns, strict=True)))
 
 
 def _quantiles(key: str, setting: Any, shares: Any) -> list[float]:

@@ -7,7 +7,7 @@ computed of each. `Comparison` is the study of cases under the pairs of their su
 import logging
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,12 +15,14 @@ import xarray as xr
 
 from archfem._files import hash_json, temporary_folder
 from archfem._validation import validate_arguments, validate_methods
-from archfem.cases.case import Case
+from archfem.cases.case import Case, case_of
 from archfem.cases.provenance import describe_version
 from archfem.cases.run import Run, carry_out, replace_run
 from archfem.cases.toml_file import check_table, read_tables, refuse_unknown
+from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import Ending
 from archfem.errors import ArchfemError, InvalidInput
+from archfem.motion.motion import Motion
 from archfem.studies.comparison import Finding, build_findings, file_name, parse_search
 from archfem.studies.evaluators import (
     Evaluator,
@@ -56,57 +58,98 @@ logger = logging.getLogger("archfem")
 
 
 @validate_methods
-@dataclass(frozen=True, eq=False)
 class Study:
-    """Points, each a case, and the function that is evaluated at each.
+    """Variations of an analysis or a case, and the function that is evaluated at each.
+
+    Args:
+        subject: analysis or case that is varied.
+        vary: paths of values, each with a list of values (all combinations) or a frozen
+            distribution of SciPy; or a list of such tables, one for each point. A path is that of a
+            key in a case file, "motion.scale"; a keyword of `archfem.Analysis` stands for itself,
+            "dt" for "analysis.dt". "suite.pair" varies the pair of the suite.
+        compute: "history", "scales", "dead load", "limit", a function of a case that returns a flat
+            table of numbers and texts, or a table of `name` and options; by default "history", or
+            "dead load" without a motion.
+        motion: motion of an analysis, or in place of that of a case.
+        samples: settings of the sampling, { "count": 64, "method": "sobol", "seed": 1 }.
+        title: title; by default that of the case.
 
     Attributes:
         title: title.
-        asked: evaluator, a function from a case to findings with its options.
+        evaluator: function from a case to findings, with its options.
         axes: axes of the table of findings.
         points: points in the order of the table; the last axis varies fastest.
         samples: settings of the sampling, with the seed; None without distributions.
+
+    Raises:
+        InvalidInput: there are no points, or the first case, or one at the end of an axis, is
+            invalid.
+
+    Example:
+        >>> column = af.Analysis(af.column(breadth=0.6, heights=[2.4]), fidelity="rigid")
+        >>> motion = af.Motion.synthetic(duration=1.0, pga=1.0)
+        >>> study = af.Study(column, vary={"dt": [0.005, 0.0025]}, motion=motion)
+        >>> study.run(workers=1)["outcome"].values.tolist()
+        ['stands', 'stands']
     """
 
     title: str
-    asked: Evaluator
+    evaluator: Evaluator
     axes: tuple[Axis, ...]
     points: tuple[Point, ...]
-    samples: Mapping[str, Any] | None = None
+    samples: Mapping[str, Any] | None
 
-    @classmethod
-    def of(
-        cls,
-        case: Case,
-        over: Any,
-        find: Any = "history",
+    @validate_arguments
+    def __init__(
+        self,
+        subject: Case | Analysis,
+        vary: Any,
+        compute: Any = None,
         *,
+        motion: Motion | str | Path | Mapping[str, Any] | None = None,
         samples: Mapping[str, Any] | None = None,
         title: str | None = None,
-    ) -> "Study":
-        """Return a study of one case and variations of it.
+    ) -> None:
+        case, axes = case_of(subject, motion), parameter_axes(vary, samples)
+        if compute is None:
+            compute = "history" if case.has_motion else "dead load"
+        points = tuple(Point(case.settings, case.folder, each) for each in changes_along(axes))
+        self._set(title or case.title, Evaluator.of(compute), axes, points, samples)
+        self._check()
+
+    @classmethod
+    def of_points(
+        cls,
+        title: str,
+        evaluator: Evaluator,
+        axes: tuple[Axis, ...],
+        points: tuple[Point, ...],
+        samples: Mapping[str, Any] | None = None,
+    ) -> Self:
+        """Return a study of points that need not be variations of one case.
 
         Args:
-            case: case that is varied.
-            over: keys of the case, "section.key", each with a list of values (all combinations) or
-                a frozen distribution of SciPy; or a list of such tables, one for each point.
-                "suite.pair" varies the pair of the suite.
-            find: "history", "scales", "dead load", "limit", a function of a case that returns a
-                flat table of numbers and texts, or a table of `name` and options.
-            samples: settings of the sampling, { "count": 64, "method": "sobol", "seed": 1 }.
-            title: title; by default that of the case.
-
-        Returns:
-            The study. The first case, and those at the ends of each axis, have been checked.
-
-        Raises:
-            InvalidInput: there are no points, or the case of a point is invalid.
+            title: title.
+            evaluator: function from a case to findings, with its options.
+            axes: axes of the table of findings.
+            points: points in the order of the table; the last axis varies fastest.
+            samples: settings of the sampling, with the seed; None without distributions.
         """
-        axes = parameter_axes(over, samples)
-        points = tuple(Point(case.settings, case.folder, each) for each in changes_along(axes))
-        study = cls(title or case.title, Evaluator.of(find), axes, points, samples)
-        study._check()
+        study = cls.__new__(cls)
+        study._set(title, evaluator, axes, points, samples)
         return study
+
+    def _set(
+        self,
+        title: str,
+        evaluator: Evaluator,
+        axes: tuple[Axis, ...],
+        points: tuple[Point, ...],
+        samples: Mapping[str, Any] | None,
+    ) -> None:
+        """Set the attributes."""
+        self.title, self.evaluator, self.axes = title, evaluator, axes
+        self.points, self.samples = points, samples
 
     @classmethod
     def read(cls, path: str | Path, changes: Sequence[str] = (), *, own_code: bool = False) -> Self:
@@ -115,8 +158,8 @@ class Study:
         Args:
             path: path of a file with `case`, the file of a case, or with tables [cases."name"] of
                 `case`, a file, and `set`, a list of "section.key=value"; `set` above the tables
-                changes all cases, before their own. `vary`, `samples` and `compute` are as `over`,
-                `samples` and `find` of `Study.of`; with [cases] nothing need vary, and `compute` is
+                changes all cases, before their own. `vary`, `samples` and `compute` are as for a
+                `Study`; with [cases] nothing need vary, and `compute` is
                 "comparison" by default. Histories, scales and comparisons of cases with a suite are
                 computed under each of its pairs, or those that `pairs` names. `scales` is the
                 search for scales in a comparison: true, or a table of `precision` and `range`.
@@ -174,7 +217,7 @@ class Study:
                 stack.enter_context(store.lock())
                 shared = store.shared.resolve()
             rows = self._collect_rows(store, shared, workers, client)
-            table = build_table(self.axes, rows, self.asked.units, self._attributes)
+            table = build_table(self.axes, rows, self.evaluator.units, self._attributes)
             if store is not None:
                 write_table(table, store.folder, hash_json(store.read_plan()["points"]))
         return table
@@ -194,7 +237,7 @@ class Study:
         rows: dict[str, Row] = {}
         digests = [str(number) for number in range(len(self.points))]
         if store is not None:
-            digests = [self.asked.digest(point) for point in self.points]
+            digests = [self.evaluator.digest(point) for point in self.points]
             store.write_plan({**self._attributes, "points": digests})
             rows = store.load_rows(digests)
             _log_stored(store, digests, rows)
@@ -219,7 +262,7 @@ class Study:
 
     def _store(self, store: Store, number: int, digest: str, row: Row) -> None:
         """Write the row of a point, unless one of its files has changed during the study."""
-        if self.asked.digest(self.points[number]) == digest:
+        if self.evaluator.digest(self.points[number]) == digest:
             store.write_row(digest, row)
         else:
             logger.warning("point %d: a file it reads was changed meanwhile: not kept", number)
@@ -242,10 +285,10 @@ class Study:
                 raise InvalidInput(
                     f"a scheduler needs {error.name}: pip install 'archfem[cluster]'"
                 ) from error
-            yield from evaluate_on_cluster(points, self.asked, client, shared)
+            yield from evaluate_on_cluster(points, self.evaluator, client, shared)
             return
         load = load_table_libraries
-        yield from evaluate_points(points, self.asked, workers, log, load, shared)
+        yield from evaluate_points(points, self.evaluator, workers, log, load, shared)
 
     def _check(self) -> None:
         """Make the cases at the ends of each axis, so that errors are raised before the study."""
@@ -260,7 +303,6 @@ class Study:
 
 
 @validate_methods
-@dataclass(frozen=True, eq=False)
 class Comparison(Study):
     """Study of cases under each pair of their suites; `study_table` is its table.
 
@@ -269,13 +311,13 @@ class Comparison(Study):
         pairs: pairs of the suites that are run; None for all.
     """
 
-    cases: Mapping[str, Case] = field(default_factory=dict)
-    pairs: tuple[str, ...] | None = None
+    cases: Mapping[str, Case]
+    pairs: tuple[str, ...] | None
 
     @property
     def scales(self) -> dict[str, Any] | None:
         """Options of `mechanism_scales`, which searches scales of whole motions; None for none."""
-        options: dict[str, Any] | None = self.asked.options["scales"]
+        options: dict[str, Any] | None = self.evaluator.options["scales"]
         return options
 
     @property
@@ -357,9 +399,11 @@ def _read_study(
     )
     title, axes = settings.get("title", path.stem), (*_case_axes(rows, settings), *varied)
     if asked.find is not evaluate_comparison:
-        return Study(title, asked, axes, points, samples)
-    pairs = tuple(settings["pairs"]) if "pairs" in settings else None
-    return Comparison(title, asked, axes, points, samples, cases, pairs)
+        return Study.of_points(title, asked, axes, points, samples)
+    comparison = Comparison.of_points(title, asked, axes, points, samples)
+    comparison.cases = cases
+    comparison.pairs = tuple(settings["pairs"]) if "pairs" in settings else None
+    return comparison
 
 
 def _parse_evaluator(settings: Mapping[str, Any], own_code: bool) -> Evaluator:
@@ -479,7 +523,7 @@ def compute_pairs(case: Case, draft: Path, **options: Any) -> list[str]:
         )
     pairs = list(case.suite["pairs"])
     find = {"name": save_pair, "folder": str(draft.resolve())}
-    table = Study.of(case, {PAIR_KEY: pairs}, find).run(**options)
+    table = Study(case, {PAIR_KEY: pairs}, find).run(**options)
     endings = table["ended"].values if "ended" in table else [""] * len(pairs)
     return [a or b for a, b in zip(table["error"].values.tolist(), endings, strict=True)]
 

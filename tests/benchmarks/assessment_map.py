@@ -183,7 +183,7 @@ def evaluate(case: af.Case, precision: float = 0.1) -> dict[str, Any]:
 def run_map(arches: int, motions: int, folder: Path, **options: Any) -> list[dict[str, Any]]:
     """Compute the brackets that are missing in a folder; return a line for each point."""
     points = list_points(arches, motions)
-    study = af.Study.of(
+    study = af.Study(
         base_case(motions),
         [point["changes"] for point in points],
         {"name": "assessment_map:evaluate", "precision": options.pop("precision", 0.1)},

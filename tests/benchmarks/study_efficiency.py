@@ -108,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             changes += ["motion.end=0.5"]
         case = af.Case.read(RING, changes)
         scales = [0.2 + 0.6 * k / given.points for k in range(given.points)]
-        study = af.Study.of(case, {"motion.scale": scales})
+        study = af.Study(case, {"motion.scale": scales})
     sums = {workers: np.zeros(2) for workers in given.workers}
     for _, workers in product(range(given.repeat), given.workers):
         wall, cpu, failed = timed(study, workers)

@@ -41,8 +41,9 @@ hinge = 0.46
 failures = 4
 friction = 0.6
 duration = 0.02
+[record]
+every = 1
 [output]
-save_every = 1
 joints = [0, "joint 1"]
 free_body = "block 1"
 """,

@@ -176,7 +176,7 @@ def matching_study(finders):
         case = af.Case.of({"structure": {**ring, "thickness": 0.5}, "suite": suite})
         over = {"structure.thickness": [0.5, 0.6], "suite.pair": list("abc")}
         find = {"name": "finders_of_tests:matches", "folder": str(folder)}
-        return af.Study.of(case, over, find), folder
+        return af.Study(case, over, find), folder
 
     return study
 

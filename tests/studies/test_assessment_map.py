@@ -148,7 +148,7 @@ def test_the_page_has_the_effects_of_the_settings(lines, brackets):
 @pytest.mark.slow
 def test_a_line_of_the_table_is_computed_again(lines, script):
     line, point = lines[40], script.list_points(50, 10)[40]
-    study = af.Study.of(script.base_case(10), [point["changes"]], script.evaluate)
+    study = af.Study(script.base_case(10), [point["changes"]], script.evaluate)
     table = study.run()
     for name in ("linear", "displacement", "stands", "falls", "runs"):
         assert float(table[name].values[0]) == pytest.approx(line[name], rel=5e-4)

@@ -114,7 +114,7 @@ def test_a_scheduler_that_dies_leaves_the_finished_rows(small_ring, finders, tmp
     monkeypatch.setattr("archfem.studies.cluster.SCHEDULER_TIMEOUT", 20.0)
     over = {"structure.thickness": [0.5 + 0.01 * k for k in range(12)]}
     find = {"name": "finders_of_tests:slowly", "seconds": 0.5}
-    study, folder = af.Study.of(small_ring, over, find), tmp_path / "out"
+    study, folder = af.Study(small_ring, over, find), tmp_path / "out"
     with cluster(tmp_path) as (address, processes):
         original = Store.write_row
 
@@ -135,7 +135,7 @@ def test_a_scheduler_that_dies_leaves_the_finished_rows(small_ring, finders, tmp
 def test_a_worker_that_ends_is_reported(small_ring, finders, tmp_path, monkeypatch, caplog):
     over = {"structure.thickness": [0.5 + 0.01 * k for k in range(12)]}
     find = {"name": "finders_of_tests:slowly", "seconds": 0.5}
-    study = af.Study.of(small_ring, over, find)
+    study = af.Study(small_ring, over, find)
     with cluster(tmp_path) as (address, processes):
         original = Store.write_row
 

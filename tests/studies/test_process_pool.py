@@ -41,12 +41,12 @@ def study_of(case, find, thicknesses, folder):
     """A study over thicknesses, by a finder of the tests."""
     over = {"structure.thickness": thicknesses}
     find = {"name": f"finders_of_tests:{find}", "folder": str(folder)}
-    return af.Study.of(case, over, find)
+    return af.Study(case, over, find)
 
 
 def test_the_driver_reports_once_that_workers_compile(small_ring, tmp_path, finders, capsys):
     over = {"structure.thickness": [0.5, 0.6, 0.7, 0.8]}
-    study = af.Study.of(small_ring, over, "finders_of_tests:compiling")
+    study = af.Study(small_ring, over, "finders_of_tests:compiling")
     study.run(tmp_path, workers=2)
     assert capsys.readouterr().err.count("compiling the time steps, which takes about") == 1
     assert "compiling" not in (tmp_path / "workers.log").read_text()
@@ -142,7 +142,7 @@ def test_a_script_without_a_main_guard_is_not_run_by_workers(small_ring, tmp_pat
         "import archfem as af\n"
         f"case = af.Case.read({str(small_ring.folder / 'ring.toml')!r})\n"
         "vary = {'structure.thickness': [0.5, 0.6]}\n"
-        "table = af.Study.of(case, vary, 'finders_of_tests:lengths').run(workers=2)\n"
+        "table = af.Study(case, vary, 'finders_of_tests:lengths').run(workers=2)\n"
         "print(table['twice'].values.tolist())\n"
     )
     ran = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True)
@@ -161,7 +161,7 @@ def test_no_worker_outlives_a_driver_that_is_ended(small_ring, tmp_path, finders
         "import archfem as af\n"
         f"case = af.Case.read({str(small_ring.folder / 'ring.toml')!r})\n"
         "find = {'name': 'finders_of_tests:slowly', 'seconds': 60.0}\n"
-        "af.Study.of(case, {'motion.scale': [1.0, 2.0, 3.0]}, find).run(workers=2)\n"
+        "af.Study(case, {'motion.scale': [1.0, 2.0, 3.0]}, find).run(workers=2)\n"
     )
     command = [sys.executable, "-c", code]
     driver = subprocess.Popen(command, stderr=subprocess.DEVNULL, start_new_session=True)

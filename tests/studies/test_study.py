@@ -35,7 +35,7 @@ def undo():
 
 def test_each_point_of_a_study_has_the_results_of_its_case_alone(small_ring, tmp_path):
     over = {"structure.thickness": [0.5, 0.6], "motion.scale": [0.5, 2.0]}
-    found = af.Study.of(small_ring, over).run(workers=1)
+    found = af.Study(small_ring, over).run(workers=1)
     assert dict(found.sizes) == {"structure.thickness": 2, "motion.scale": 2}
     changes = ["structure.thickness=0.5", "motion.scale=2.0"]
     case = af.Case.read(small_ring.folder / "ring.toml", changes)
@@ -65,7 +65,7 @@ def test_two_processes_and_one_give_the_same_bits(study_file, tmp_path):
 def test_keys_with_spaces_are_coordinates_too(small_ring, tmp_path):
     axis = "contacts.stone_to_stone.friction"
     over = {"contacts.stone to stone.friction": [0.5, 0.6], "title": ["2 m"]}
-    found = af.Study.of(small_ring, over, "dead load").run(tmp_path, workers=1)
+    found = af.Study(small_ring, over, "dead load").run(tmp_path, workers=1)
     assert found[axis].values.tolist() == [0.5, 0.6]
     assert found["title"].values.tolist() == ["2 m"]  # a name, whatever it looks like
     assert af.studies.read_table(tmp_path / "results.nc").identical(found)
@@ -138,7 +138,7 @@ def test_a_changed_case_is_computed_anew(
     else:
         monkeypatch.setattr(af, "__version__", "0.1.0")
     after = af.Study.read(study_file, own_code=True)
-    digests = [[study.asked.digest(point) for point in study.points]
+    digests = [[study.evaluator.digest(point) for point in study.points]
                for study in (before, after)]  # fmt: skip
     if what in ("case", "option"):
         assert not set(digests[0]) & set(digests[1])
@@ -266,7 +266,7 @@ def test_a_changed_title_or_picture_recomputes_nothing(ring_file, tmp_path, monk
 
     def table(*changes, find="dead load"):
         case = af.Case.read(ring_file, ["record.every=1", *changes])
-        return af.Study.of(case, over, find, title="one").run(folder, workers=1)
+        return af.Study(case, over, find, title="one").run(folder, workers=1)
 
     first = table()
     evaluated = []
@@ -297,7 +297,7 @@ def test_progress_is_reported_where_the_output_is_a_file(
 ):
     monkeypatch.setattr(result_store, "PROGRESS_INTERVAL", 0.05)
     find = {"name": "finders_of_tests:slowly", "seconds": 0.2}
-    af.Study.of(small_ring, {"structure.thickness": [0.5, 0.6, 0.7]}, find).run(workers=workers)
+    af.Study(small_ring, {"structure.thickness": [0.5, 0.6, 0.7]}, find).run(workers=workers)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) > 2
     assert all(line.startswith("study: ") and "of 3 points done" in line for line in lines)
@@ -307,7 +307,7 @@ def test_progress_is_reported_where_the_output_is_a_file(
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_repeated_warning_is_logged_once(small_ring, finders, caplog, workers):
     over = {"structure.thickness": [0.5, 0.6, 0.7]}
-    af.Study.of(small_ring, over, "finders_of_tests:noisy").run(workers=workers)
+    af.Study(small_ring, over, "finders_of_tests:noisy").run(workers=workers)
     said = [record.getMessage() for record in caplog.records]
     first = re.fullmatch(r"a joint had turned by (0\.[567]) rad", said[0])
     # either worker may be the first
@@ -349,7 +349,7 @@ def test_cases_and_findings_are_in_one_file(ring_file, tmp_path, capsys):
 
 def test_pairs_that_another_worker_matches_are_left_for_later(small):
     over = {"analysis.dt": [0.005], "suite.pair": ["first", "second"]}
-    points = list(enumerate(af.Study.of(af.Case.read(small), over, "dead load").points))
+    points = list(enumerate(af.Study(af.Case.read(small), over, "dead load").points))
     tasks = process_pool.TaskQueue(points, Evaluator.of("dead load"))
     assert tasks.pop(None, (), {"first"}).pair == "second"
     assert tasks.pop(None, (), {"first"}).pair == "first"  # better than to wait
@@ -362,7 +362,7 @@ def test_a_long_table_is_cut_and_equal_findings_are_stated_once(small_ring):
         depth = case.structure.joints[0].depth
         return {"a": 1.5, "b": case.structure.weight, "c": float(depth > 0.55)}
 
-    table = af.Study.of(small_ring, over, find).run(workers=1)
+    table = af.Study(small_ring, over, find).run(workers=1)
     lines = result_store.format_table(table, max_rows=2).splitlines()
     assert lines[0].split() == ["structure.thickness", "[m]", "b", "c"]
     assert [line.split()[::2] for line in lines[1:3]] == [["0.5", "0"], ["0.6", "1"]]
@@ -482,13 +482,13 @@ def test_samples_have_their_distribution_and_their_seed(small_ring, method):
     assert parameter_axes(over, samples | {"seed": 5})[1].rows != axes[1].rows
     left_out = {key: value for key, value in samples.items() if key != "seed"}
     assert parameter_axes(over, left_out)[1] == parameter_axes(over, left_out | {"seed": 0})[1]
-    study = af.Study.of(small_ring, over, "dead load", samples=samples)
+    study = af.Study(small_ring, over, "dead load", samples=samples)
     assert len(study.points) == 512
 
 
 def test_points_may_be_listed(small_ring):
     points = [{"structure.thickness": 0.5}, {"structure.thickness": 0.6, "title": "other"}]
-    study = af.Study.of(small_ring, points, "dead load")
+    study = af.Study(small_ring, points, "dead load")
     found = study.run(workers=1)
     assert found["structure.thickness"].dims == ("point",)
     assert found["title"].values.tolist() == ["", "other"]
@@ -497,7 +497,7 @@ def test_points_may_be_listed(small_ring):
 
 def test_a_study_varies_pairs_of_a_suite(small):
     case = af.Case.read(small)
-    found = af.Study.of(case, {"suite.pair": ["first", "second"]}).run(workers=1)
+    found = af.Study(case, {"suite.pair": ["first", "second"]}).run(workers=1)
     run = af.cases.run_time_history(
         case, case.alone("second").ground_suite().motions[0], af.cases.dead_load_of_case(case)
     )
@@ -506,7 +506,7 @@ def test_a_study_varies_pairs_of_a_suite(small):
         alone, rel=1e-6
     )
     assert (
-        af.Study.of(case, {"model.quadrature_points": [3]})
+        af.Study(case, {"model.quadrature_points": [3]})
         .run()["error"]
         .item()
         .startswith("InvalidInput: the suite has 2 pairs")
@@ -535,7 +535,7 @@ def test_pairs_that_all_fail_have_their_errors(small, tmp_path, monkeypatch):
 
 
 def test_values_may_be_an_array(small_ring):
-    study = af.Study.of(small_ring, {"structure.thickness": np.array([0.5, 0.6])}, "dead load")
+    study = af.Study(small_ring, {"structure.thickness": np.array([0.5, 0.6])}, "dead load")
     assert [dict(point.changes)["structure.thickness"] for point in study.points] == [0.5, 0.6]
 
 
@@ -595,11 +595,11 @@ def test_invalid_studies_are_refused(text, says, ring_file):
 
 def test_findings_that_cannot_be_kept(small_ring):
     over = {"structure.thickness": [0.5]}
-    found = af.Study.of(small_ring, over, lambda case: {"x": {"y": 1}}).run(workers=1)
+    found = af.Study(small_ring, over, lambda case: {"x": {"y": 1}}).run(workers=1)
     assert "finding 'x' is a dict" in found["error"].item()
     with pytest.raises(af.InvalidInput, match="does not take"):
-        af.Study.of(small_ring, over, {"name": "scales", "precisions": 0.1})
-    study = af.Study.of(small_ring, {"structure.thickness": [0.5, 0.6]}, lambda case: {})
+        af.Study(small_ring, over, {"name": "scales", "precisions": 0.1})
+    study = af.Study(small_ring, {"structure.thickness": [0.5, 0.6]}, lambda case: {})
     with pytest.raises(af.InvalidInput, match="cannot be handed to another process"):
         study.run(workers=2)
     with pytest.raises(af.InvalidInput, match="workers = 0 is not a whole number"):
@@ -631,7 +631,7 @@ def test_a_file_runs_no_code_without_permission(study_file, tmp_path, capsys):
 
 def test_no_spreadsheet_computes_a_cell_of_a_table(small_ring, tmp_path):
     over = {"title": ["=1+1", "@SUM(A1)", "plain"], "motion.scale": [-1.0]}
-    af.Study.of(small_ring, over, "dead load").run(tmp_path, workers=1)
+    af.Study(small_ring, over, "dead load").run(tmp_path, workers=1)
     frame = pd.read_csv(tmp_path / "results.csv")
     assert frame["title"].tolist() == ["'=1+1", "'@SUM(A1)", "plain"]
     assert frame["motion.scale"].tolist() == [-1.0, -1.0, -1.0]
@@ -639,7 +639,7 @@ def test_no_spreadsheet_computes_a_cell_of_a_table(small_ring, tmp_path):
 
 def test_points_of_one_model_are_taken_together(small_ring):
     over = {"motion.scale": [0.1, 0.2], "structure.thickness": [0.5, 0.6]}
-    points = list(enumerate(af.Study.of(small_ring, over, "dead load").points))
+    points = list(enumerate(af.Study(small_ring, over, "dead load").points))
     sorted_points = group_by_model(points)
     thick = [dict(point.changes)["structure.thickness"] for _, point in sorted_points]
     assert thick == [0.5, 0.5, 0.6, 0.6]
@@ -649,7 +649,7 @@ def test_points_of_one_model_are_taken_together(small_ring):
 
 def test_a_free_worker_continues_with_the_model_that_it_has(small_ring):
     over = {"motion.scale": [0.1, 0.2, 0.3], "structure.thickness": [0.5, 0.6, 0.7]}
-    points = list(enumerate(af.Study.of(small_ring, over, "dead load").points))
+    points = list(enumerate(af.Study(small_ring, over, "dead load").points))
     tasks = process_pool.TaskQueue(points, Evaluator.of("dead load"))
     first = tasks.pop(None, set())
     other = tasks.pop(None, {first.model})
