@@ -12,8 +12,8 @@ from . import studies as studies
 from . import units as units
 from . import view as view
 from .cases.case import Case as Case
-from .dynamics.analysis import Analysis as Analysis
 from .dynamics.accuracy import accuracy as accuracy
+from .dynamics.analysis import Analysis as Analysis
 from .dynamics.damping import effective_damping as effective_damping
 from .dynamics.events import CountedMechanism as CountedMechanism
 from .dynamics.history import History as History
@@ -21,10 +21,10 @@ from .dynamics.history import first_mechanisms as first_mechanisms
 from .dynamics.model_selection import build as build
 from .dynamics.motion_scaling import collapse_scale as collapse_scale
 from .dynamics.motion_scaling import mechanism_scales as mechanism_scales
+from .dynamics.recorder import Record as Record
 from .dynamics.schemes import HHT as HHT
 from .dynamics.schemes import Rayleigh as Rayleigh
 from .dynamics.schemes import StiffnessDamping as StiffnessDamping
-from .dynamics.recorder import Record as Record
 from .dynamics.time_history import time_history as time_history
 from .errors import ArchfemError as ArchfemError
 from .errors import DidNotConverge as DidNotConverge

@@ -174,9 +174,9 @@ def _read_event(given: str | Table) -> StopCondition:
         check_choice(given, (*_EVENTS, *registered_criteria), "analysis.until")
     event: Any = _read_named(table, _EVENTS, "analysis.until")
     if criteria is None:
-        return event  # type: ignore[no-any-return]
+        return event
     criteria = read_object(Criteria, criteria, "analysis.until.criteria")
-    return replace(event, criteria=criteria)  # type: ignore[no-any-return]
+    return replace(event, criteria=criteria)
 
 
 def _write_event(event: StopCondition) -> Any:

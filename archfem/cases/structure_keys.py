@@ -7,7 +7,7 @@ each keyword of `archfem.shapes` is a key of the same name.
 import inspect
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar

@@ -173,7 +173,9 @@ def read_object(cls: Callable[..., Any], table: Any, section: str) -> Any:
 def format_tables(tables: Table, path: tuple[str, ...] = ()) -> str:
     """Return tables as TOML, one line for each value and for each table of a list."""
     own = {key: value for key, value in tables.items() if not isinstance(value, Mapping)}
-    lines = [f"{_format_key(key)} = {_format_value(value, rows=True)}\n" for key, value in own.items()]
+    lines = [
+        f"{_format_key(key)} = {_format_value(value, rows=True)}\n" for key, value in own.items()
+    ]
     if path and (own or not tables):
         lines.insert(0, f"[{'.'.join(map(_format_key, path))}]\n")
     inner = [format_tables(tables[key], (*path, key)) for key in tables if key not in own]

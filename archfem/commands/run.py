@@ -171,13 +171,15 @@ def accuracy(options: argparse.Namespace) -> None:
 
 def verdict(options: argparse.Namespace) -> None:
     """Run a case over joint rules, stiffness, friction and damping: how often does it fall?"""
-    from archfem.studies.variations import verdict_range_of_case
+    from archfem.studies.cache import ground_motion
+    from archfem.studies.variations import verdict_range
 
     case = Case.read(options.case, options.changes)
     if options.out is not None:  # a folder that cannot be written is refused before the runs
         create_result_folder(options.out)
     print(case.title)
-    computed = verdict_range_of_case(case, workers=options.workers, samples=options.samples)
+    sampling = {"workers": options.workers, "samples": options.samples}
+    computed = verdict_range(case.analysis, ground_motion(case), fidelity="rigid", **sampling)
     print(computed)
 
     def draw() -> Files:

@@ -15,6 +15,7 @@ from .history import first_mechanisms as first_mechanisms
 from .history import partial_history as partial_history
 from .motion_scaling import CollapseScale as CollapseScale
 from .motion_scaling import mechanism_scales as mechanism_scales
+from .recorder import Record as Record
 from .rigid_body.bodies import LooseBlocks as LooseBlocks
 from .rigid_body.time_stepping import RigidBlockSimulation as RigidBlockSimulation
 from .schemes import HHT as HHT
@@ -27,7 +28,6 @@ from .solvers.integrator import Stepper as Stepper
 from .solvers.snes import SnesSolver as SnesSolver
 from .state import Batch as Batch
 from .state import State as State
-from .recorder import Record as Record
 from .time_history import last_state as last_state
 from .verdict import MECHANISM_DEFINITIONS as MECHANISM_DEFINITIONS
 from .verdict import DetectedMechanism as DetectedMechanism

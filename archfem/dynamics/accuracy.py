@@ -19,7 +19,7 @@ from archfem.dynamics.model_selection import (
     exact_discretisation,
     stone_fidelity,
 )
-from archfem.dynamics.schemes import EffectiveDamping, Viscous, interpret_damping
+from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
 from archfem.joints.criteria import assessed_joints, eccentricity_magnitude
@@ -156,7 +156,7 @@ def accuracy(
         structure = structure.structure
     references = reference_settings(structure)
     model = build(structure, references[0].discretisation)
-    viscous, _ = resolve_effective_damping(interpret_damping(damping), model, None)
+    viscous, _ = resolve_effective_damping(damping, model, None)
     motion = motion or severe_motion(model)
     settings = [*references, *candidate_settings(structure, rungs, cells, rules, steps)]
     runs = [

@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from archfem.studies.convergence import MeshSensitivity
     from archfem.studies.ida import Ida
 
+_DEFAULT_SCHEME, _DEFAULT_NEWTON, _DEFAULT_RECORD = Conserving(), Newton(), Record()
+
 # Settings that `build` takes besides those of a discretisation
 _SELECTION_KEYWORDS = ("tolerance", "dt", "damping")
 
@@ -106,12 +108,12 @@ class Analysis:
     tolerance: float = 0.005
     dt: Seconds | None = None
     damping: Viscous | EffectiveDamping | Literal["effective"] | None = None
-    scheme: Scheme = Conserving()
+    scheme: Scheme = _DEFAULT_SCHEME
     method: str = "auto"
-    newton: Newton = Newton()
+    newton: Newton = _DEFAULT_NEWTON
     until: StopCondition | None = None
     criteria: Criteria | None = None
-    record: Record = Record()
+    record: Record = _DEFAULT_RECORD
     stages: Sequence[Stage] | None = None
 
     def __post_init__(self) -> None:

@@ -29,6 +29,7 @@ from archfem.dynamics.schemes import (
     Rayleigh,
     StiffnessDamping,
     Viscous,
+    interpret_damping,
 )
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.selection import stepper_for
@@ -39,8 +40,8 @@ from archfem.masonry.shapes.rings import column
 from archfem.models.linear_blocks import build_rigid_model
 from archfem.models.model import Model, check_model
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import dead_load, self_weight
-from archfem.statics.modes import Modes, Start, modes, resolve_start
+from archfem.statics.equilibrium import Start, Subject, dead_load, resolve_start, self_weight
+from archfem.statics.modes import Modes, modes
 from archfem.units import G
 
 logger = logging.getLogger("archfem")
@@ -143,7 +144,7 @@ def _modes_with_share(
     max_count: int = 1024,
 ) -> tuple[Modes, Array]:
     """Return modes that reach a share of the mass along x, and their cumulative shares (modes,)."""
-    state = resolve_start(model, start)
+    model, state = resolve_start(model, start)
     count = 0
     while count < min(max_count, model.size):
         count = min(max(initial_count, 2 * count), max_count, model.size)
@@ -162,7 +163,7 @@ def _modes_with_share(
 
 @validate_arguments
 def effective_damping(
-    model: Model,
+    model: Model | Subject,
     ratio: float = 0.05,
     start: Start = None,
     *,
@@ -185,7 +186,7 @@ def effective_damping(
     loose blocks.
 
     Args:
-        model: model of any fidelity.
+        model: model of any fidelity, or an `archfem.Analysis`.
         ratio: damping ratio [-].
         start: state to linearise at: an equilibrium of this model; None for its dead load, which
             is computed first; "closed" for all joints closed.
@@ -201,13 +202,15 @@ def effective_damping(
         InvalidInput: a value is out of range, or a single mode has the share.
         DidNotConverge: the structure is a mechanism in that state, or modes were not computed.
     """
-    return _find_frequencies(EffectiveDamping(ratio, kind, joints, mass_share), model, start)[0]
+    settings = EffectiveDamping(ratio, kind, joints, mass_share)
+    return _find_frequencies(settings, *resolve_start(model, start))[0]
 
 
 def resolve_effective_damping(
-    damping: Viscous | EffectiveDamping | None, model: Model, start: Start
+    given: Viscous | EffectiveDamping | str | None, model: Model, start: Start
 ) -> tuple[Viscous | None, str]:
     """Return damping with its frequencies, and a sentence on these and on where they are from."""
+    damping = interpret_damping(given)
     if damping is None:
         return None, "damping: none"
     origin = ""

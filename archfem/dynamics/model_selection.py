@@ -25,7 +25,7 @@ from archfem.dynamics.error_estimation import (
     severe_motion,
     strongest_window,
 )
-from archfem.dynamics.schemes import EffectiveDamping, Viscous, interpret_damping
+from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.errors import InvalidInput
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.stiffness_ratio import find_soft_blocks
@@ -120,14 +120,7 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
             raise InvalidInput(
                 f"mesh_file = {str(mesh_file)!r} is one mesh, and 'auto' chooses: name a fidelity"
             )
-        return select_model(
-            structure,
-            tolerance,
-            motion,
-            interpret_damping(damping),
-            dt,
-            displacements=displacements,
-        )
+        return select_model(structure, tolerance, motion, damping, dt, displacements=displacements)
     settings = Discretisation(
         *(fidelity, cells, cell, max_cell_size, degree, quadrature, quadrature_points),
         *(displacements, mesh_file),
@@ -160,7 +153,7 @@ def select_model(
     structure: Structure,
     tolerance: float,
     motion: Motion | None = None,
-    damping: Viscous | EffectiveDamping | None = None,
+    damping: Viscous | EffectiveDamping | str | None = None,
     dt: float | None = None,
     *,
     displacements: str = "small",
@@ -220,7 +213,7 @@ def _try_settings(
     settings: Sequence[tuple[Discretisation, float]],
     tolerance: float,
     motion: Motion | None,
-    damping: Viscous | EffectiveDamping | None,
+    damping: Viscous | EffectiveDamping | str | None,
     builder: Builder,
 ) -> tuple[list[_Trial], list[list[float]]]:
     """Return settings tried until one is accurate enough, and all errors after each trial."""

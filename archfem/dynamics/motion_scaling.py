@@ -197,17 +197,17 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
             "above 0, the smaller first"
         )
     start = start or dead_load(model)
-    structure = start.model.structure
+    own = model.failure_criteria if isinstance(model, Analysis) else None
+    assessed = criteria or own
 
     def run_scaled(scale: float) -> ScaledRun:
         scaled = motion.scaled(scale)
         solver = method if isinstance(method, str) else method(scaled)
-        options = {"until": EveryMechanism(), "criteria": criteria, "method": solver}
+        options = {"until": EveryMechanism(), "criteria": assessed, "method": solver}
         run = _run_as_far(model, scaled, start=start, damping=damping, dt=dt, **options)
         return ScaledRun(scale, first_mechanisms(run), run.ending, run.outcome)
 
-    own = model.failure_criteria if isinstance(model, Analysis) else None
-    definitions = (*applicable_definitions(structure, criteria or own), "verified")
+    definitions = (*applicable_definitions(start.model.structure, assessed), "verified")
     return search_scales(run_scaled, definitions, precision, _admissible_range(between, motion))
 
 

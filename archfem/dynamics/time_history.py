@@ -45,7 +45,6 @@ from archfem.dynamics.schemes import (
     Viscous,
     check_large_displacement_scheme,
     check_time_step,
-    interpret_damping,
 )
 from archfem.dynamics.solvers.adaptive import AdaptiveStepper
 from archfem.dynamics.solvers.equation import Equation
@@ -127,16 +126,16 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     check_type(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
     _check_types(start=start, scheme=scheme, record=record, criteria=criteria, newton=newton)
     if isinstance(model, Analysis):
-        given = {"dt": dt, "tolerance": tolerance, "damping": damping, "scheme": scheme}
-        given |= {"record": record, "until": until, "criteria": criteria, "newton": newton}
-        given |= {"method": None if method == "auto" else method}
+        given: dict[str, Any] = {"dt": dt, "tolerance": tolerance, "damping": damping}
+        given |= {"scheme": scheme, "record": record, "until": until, "criteria": criteria}
+        given |= {"newton": newton, "method": None if method == "auto" else method}
         return _run_analysis(model, motion, start, given)
     check_model(model)
     dt, tolerance = _resolve_steps(model, dt, tolerance)
     criteria = resolve_criteria(criteria, until)
     event = None if until is None else start_monitor(until, model.structure, criteria)
     rest = start if isinstance(start, Equilibrium) else None
-    viscous, _ = resolve_effective_damping(interpret_damping(damping), model, rest)
+    viscous, _ = resolve_effective_damping(damping, model, rest)
     if isinstance(start, Equilibrium):
         model = start.transfer_memory(model)
     if model.large_displacements and scheme is not None:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import sqrt
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 import xarray as xr
@@ -21,7 +22,7 @@ import xarray as xr
 from archfem._display import ResultDisplay
 from archfem._threads import single_threaded
 from archfem._typing import Array
-from archfem._validation import check_type, validate_arguments
+from archfem._validation import check_type, is_one_of, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.joints.resultants import joint_dataset, select_joint
@@ -124,9 +125,36 @@ def self_weight(model: Model) -> Array:
     return model.load(BodyForce(0.0, -1.0))
 
 
+@runtime_checkable
+class Subject(Protocol):
+    """A value that a structure at rest follows from, such as an `archfem.Analysis`."""
+
+    def dead_load(self) -> Equilibrium:
+        """Find the equilibrium under dead load, with its model."""
+
+
+# State to linearise or to start at: an equilibrium, all joints closed, or None for the dead load
+Start = Equilibrium | Literal["closed"] | None
+
+
+def resolve_start(
+    model: Model | Subject, start: Start
+) -> tuple[Model, Equilibrium | Literal["closed"]]:
+    """Return the model and the state to start at; the dead load is computed where none is given."""
+    if isinstance(model, Subject):
+        rest = model.dead_load()
+        model, start = rest.model, rest if start is None else start
+    check_model(model)
+    if start is None:
+        start = dead_load(model)
+    elif not is_one_of(start, ("closed",)):
+        check_type(start, Equilibrium, "start", 'give dead_load(model), "closed" or None')
+    return model, start
+
+
 @single_threaded
 def dead_load(
-    model: Model, newton: Newton | None = None, *, stages: Sequence[Stage] | None = None
+    model: Model | Subject, newton: Newton | None = None, *, stages: Sequence[Stage] | None = None
 ) -> Equilibrium:
     """Find the equilibrium under self-weight.
 
@@ -144,7 +172,8 @@ def dead_load(
     as `start=` to continue from it; to continue from `last_state(run)`, use this model.
 
     Args:
-        model: of any fidelity; in stages not "monolithic".
+        model: of any fidelity; in stages not "monolithic"; or an `archfem.Analysis`, which has
+            settings and stages of its own.
         newton: settings of the solves.
         stages: stages of construction, e.g. `usual_stages(structure)`; by default in one go.
 
@@ -161,6 +190,8 @@ def dead_load(
         >>> af.dead_load(model).joints["N"].values.round(3).tolist()
         [28800.0, 14400.0]
     """
+    if isinstance(model, Subject):
+        return model.dead_load()
     check_model(model)
     if stages is None:
         try:

@@ -25,11 +25,8 @@ from archfem._threads import single_threaded
 from archfem._typing import Array
 from archfem._validation import check_type
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.models.model import Model, check_model
-from archfem.statics.equilibrium import Equilibrium, dead_load
-
-# State to linearise at: an equilibrium, all joints closed, or None for the dead load
-Start = Equilibrium | Literal["closed"] | None
+from archfem.models.model import Model
+from archfem.statics.equilibrium import Equilibrium, Start, Subject, resolve_start
 
 _mode_cache: OrderedDict[str, tuple[Array, Array]] = OrderedDict()
 
@@ -90,7 +87,7 @@ class Modes(ResultDisplay):
 
 
 @single_threaded
-def modes(model: Model, count: int, start: Start = "closed") -> Modes:
+def modes(model: Model | Subject, count: int, start: Start = None) -> Modes:
     """Find the lowest modes of small vibrations about a state, K φ = ω² M φ.
 
     K is the tangent of blocks and joints: a joint point that is open has no stiffness, and stays
@@ -99,10 +96,10 @@ def modes(model: Model, count: int, start: Start = "closed") -> Modes:
     component of at least half the largest one is positive.
 
     Args:
-        model: of any fidelity; its damping plays no part.
+        model: of any fidelity, or an `archfem.Analysis`; damping plays no part.
         count: number of modes, from 1 to the number of coordinates.
-        start: the state: an equilibrium of this model; None for its dead load, which is computed
-            first; or "closed", the default, for all joints closed, which needs no computation.
+        start: the state: an equilibrium of this model; by default its dead load; or "closed" for
+            all joints closed.
 
     Returns:
         The modes, the lowest first.
@@ -121,13 +118,12 @@ def modes(model: Model, count: int, start: Start = "closed") -> Modes:
         >>> af.modes(model, 3).frequencies.round(2).tolist()
         [10.56, 79.23, 87.53]
     """
-    check_model(model)
+    model, state = resolve_start(model, start)
     check_type(count, Integral, "number of modes", "give a whole number")
     if not 1 <= count <= model.size:
         raise InvalidInput(
             f"{count} modes of a model with {model.size} coordinates: ask for 1 to {model.size}"
         )
-    state = resolve_start(model, start)
     try:
         squares, shapes = _find_cached_modes(_tangent_at(model, state), model.mass, count)
     except DidNotConverge as error:
@@ -139,16 +135,6 @@ def modes(model: Model, count: int, start: Start = "closed") -> Modes:
     masses = np.sum(influence * splu(model.mass.tocsc()).solve(influence), axis=0)
     signs = _shape_signs(shapes, shapes.T @ influence, masses)
     return Modes(model, np.sqrt(squares) / (2.0 * np.pi), shapes * signs, masses)
-
-
-def resolve_start(model: Model, start: Start) -> Equilibrium | Literal["closed"]:
-    """Return the state to linearise at; the dead load is computed where none is given."""
-    if isinstance(start, str) and start == "closed":
-        return "closed"
-    if start is None:
-        return dead_load(model)
-    check_type(start, Equilibrium, "start", 'give dead_load(model), "closed" or None')
-    return start
 
 
 def _find_cached_modes(

@@ -19,9 +19,9 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria, with_failure_flags
 from archfem.joints.resultants import joint_dataset, select_joint
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement, list_loads
-from archfem.models.model import Model, check_model
+from archfem.models.model import Model
 from archfem.statics.continuation import LoadPath, SupportPath
-from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.statics.equilibrium import Equilibrium, Subject, resolve_start
 
 Path = LoadPath | SupportPath
 
@@ -120,7 +120,7 @@ class Pushover(ResultDisplay):
 
 @single_threaded
 def pushover(
-    model: Model,
+    model: Model | Subject,
     live: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
     *,
     control: str = "displacement",
@@ -154,7 +154,7 @@ def pushover(
     settlement least: spreading supports bring an arch to its least thrust.
 
     Args:
-        model: of any fidelity.
+        model: of any fidelity, or an `archfem.Analysis`.
         live: one action, or several that grow together; a `Settlement` stands alone.
         control: "displacement", "arc length", "path" or "force"; "path" continues normal to the
             last step in all coordinates, and so follows snap-back where displacements are large.
@@ -173,13 +173,13 @@ def pushover(
     References:
         Riks, Int. J. Solids Struct. 15 (1979) 529-551.
     """
-    check_model(model)
     if control not in (controls := ("displacement", "arc length", "path", "force")):
         raise InvalidInput(f"control {control!r} is not known: use one of {controls}")
     for value, kind in ((start, Equilibrium), (stop, Stop), (criteria, Criteria)):
         if value is not None:
             check_type(value, kind, kind.__name__.lower(), f"give a {kind.__name__}")
-    begin = start or dead_load(model)
+    model, begin = resolve_start(model, start)
+    assert isinstance(begin, Equilibrium)
     model = begin.transfer_memory(model)
     path: Path
     if isinstance(live, Settlement):

@@ -299,6 +299,7 @@ def _case_keys(setting: Setting) -> dict[str, Any]:
 def evaluate_time(case: Case, damping: Viscous | None) -> Findings:
     """Return the processor time of a run of a case, and the largest |e| of each joint."""
     result, motion = dead_load_of(case), ground_motion(case)
+    assert case.analysis.dt is not None  # each setting has a step
     run = time_run(result.dead.model, motion, damping, case.analysis.dt, start=result.dead)
     findings: Findings = {"coordinates": run.size, "seconds": run.seconds}
     return findings if run.peaks is None else findings | {"peaks": run.peaks}

@@ -124,8 +124,8 @@ def scales_of(result: DeadLoadResult, motion: Motion, **options: Any) -> Finding
     if "between" in options:  # a list in a study file
         options["between"] = tuple(options["between"])
     with log_prefix(result.case.title, motion.name):
-        settings = {"start": result.dead, "damping": result.damping[0]}
-        scales = mechanism_scales(result.case.analysis, motion, **settings, **options)
+        options |= {"start": result.dead, "damping": result.damping[0]}
+        scales = mechanism_scales(result.case.analysis, motion, **options)
     if scales.interrupted:
         raise KeyboardInterrupt
     return {name: scales[name].upper for name in MECHANISM_DEFINITIONS} | {

@@ -15,24 +15,27 @@ import xarray as xr
 from scipy.stats import qmc
 from tqdm import tqdm
 
-from archfem._validation import check_integer, check_number, check_type, validate_arguments
-from archfem.cases.case import Case
-from archfem.cases.run import expected_damping
-from archfem.dynamics.damping import effective_damping
+from archfem._validation import check_integer, check_number, validate_arguments
+from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.fall import CollapseState, classify_collapse
-from archfem.dynamics.model_selection import build
 from archfem.dynamics.motion_scaling import CollapseScale
+from archfem.dynamics.recorder import Record
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
-from archfem.dynamics.schemes import Rayleigh, StiffnessDamping, Viscous
+from archfem.dynamics.schemes import (
+    Conserving,
+    EffectiveDamping,
+    Rayleigh,
+    StiffnessDamping,
+    Viscous,
+)
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.structure import Structure
-from archfem.models.model import Model
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import dead_load
-from archfem.studies.cache import ground_motion
+from archfem.statics.equilibrium import Equilibrium
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.process_pool import evaluate_points
 
@@ -62,21 +65,18 @@ NEUTRAL: dict[str, Any] = {
 }
 
 
-class RunSettings(NamedTuple):
+class VariedRun(NamedTuple):
     """Run that is varied."""
 
-    structure: Structure
+    analysis: Analysis
     motion: Motion
-    damping: Viscous | None  # as given; None for effective damping of each model by 5 %
-    dt: float  # [s]
-    fidelity: str
 
 
 @dataclass(frozen=True, eq=False)
 class Variation:
     """One run of the range: the settings as given, and the changed values by name."""
 
-    base: RunSettings = field(repr=False)
+    base: VariedRun = field(repr=False)
     changes: tuple[tuple[str, Any], ...]
 
     @property
@@ -92,12 +92,12 @@ class Variation:
 
 @validate_arguments
 def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that may vary)
-    structure: Structure,
+    structure: Structure | Analysis,
     motion: Motion,
     *,
-    damping: Viscous | None = None,
-    dt: float = 0.005,
-    fidelity: str = "rigid",
+    damping: Viscous | EffectiveDamping | str | None = None,
+    dt: float | None = None,
+    fidelity: str | None = None,
     vary: Mapping[str, Any] | None = None,
     samples: int = 26,
     seed: int = 0,
@@ -117,11 +117,14 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     - "sign": the motion "as given" or "reversed" along x; "dt": the step "as given" or "half".
 
     Args:
-        structure: structure of free and fixed blocks.
+        structure: structure of free and fixed blocks, or an `Analysis`, whose settings are then
+            those of the run as given, but for large displacements.
         motion: ground acceleration.
-        damping: damping as given; by default `effective_damping` of the structure by 5 %.
-        dt: time step as given [s].
-        fidelity: fidelity of the blocks with elastic joints.
+        damping: damping as given, as for `time_history`; by default that of the analysis, or
+            "effective" for a structure. An undamped run has no damping to vary.
+        dt: time step as given [s]; by default that of the analysis, or 5 ms.
+        fidelity: fidelity of the blocks with elastic joints; by default that of the analysis, or
+            "rigid" for a structure and in place of "auto".
         vary: values by name, for those of the default ranges: numbers are the ends of a range, and
             a single value holds a property there. Also "scale", factors on the motion, and any
             other name with a mapping from labels to structures or to motions.
@@ -136,14 +139,23 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
         InvalidInput: an argument is out of range, or a name or value is unknown.
         DidNotConverge: the structure as given does not stand under dead load.
     """
-    check_type(structure, Structure, "structure", "give a Structure")
-    check_type(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
     check_integer(samples, "samples")
-    ranges = _check_ranges({**DEFAULT_RANGES, **(vary or {})})
-    model = build(structure, fidelity=fidelity, displacements="large")
-    base = RunSettings(structure, motion, damping, dt, fidelity)
-    dead_load(model)  # a structure that does not stand is refused before any run
-    changes = [*_single_changes(ranges, damping), *_sample_changes(ranges, samples, seed)]
+    if isinstance(structure, Structure):
+        structure = Analysis(structure, fidelity="rigid", damping="effective")
+    analysis = replace(
+        structure,
+        fidelity=fidelity or ("rigid" if structure.selects_model else structure.fidelity),
+        damping=damping or structure.damping,
+        dt=dt or structure.dt or 0.005,
+        # the whole motion, of which nothing but the outcome is kept
+        **{"displacements": "large", "scheme": Conserving(), "until": None, "record": Record()},
+    )
+    rest = analysis.dead_load(motion)  # a structure that does not stand is refused before any run
+    viscous, _ = resolve_effective_damping(analysis.damping, rest.model, rest)
+    defaults = {**DEFAULT_RANGES} if viscous else _without_damping(DEFAULT_RANGES)
+    ranges = _check_ranges({**defaults, **(vary or {})})
+    base = VariedRun(analysis, motion)
+    changes = [*_single_changes(ranges, viscous), *_sample_changes(ranges, samples, seed)]
     points = [(k, Variation(base, _resolve_labels(ranges, each))) for k, each in enumerate(changes)]
     evaluator = Evaluator(evaluate_variation)
     rows: dict[int, dict[str, Any]] = {}
@@ -151,21 +163,17 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
         for number, row in evaluate_points(points, evaluator, workers):
             rows[number] = row
             bar.update()
-    dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], damping)
+    dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], viscous)
     dataset["sampled"] = "run", np.arange(len(points)) >= len(points) - samples
-    contacts = [joint.contact for joint in structure.joints]
+    contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
     dataset.attrs["k_s"] = float(np.mean([contact.shear_stiffness for contact in contacts]))
     return VerdictRange(dataset)
 
 
-def verdict_range_of_case(case: Case, **options: Any) -> VerdictRange:
-    """Run a case over its uncertain properties, with rigid blocks."""
-    motion, damping = ground_motion(case), expected_damping(case)
-    if callable(damping):
-        damping = damping(build(case.structure, fidelity="rigid"))
-    options = {"damping": damping, "dt": case.analysis.get("dt") or 0.005, **options}
-    return verdict_range(case.structure, motion, **options)
+def _without_damping(ranges: Mapping[str, Any]) -> dict[str, Any]:
+    """Return ranges without those of damping."""
+    return {name: values for name, values in ranges.items() if not name.startswith("damping")}
 
 
 def verdict_range_of_bracket(
@@ -260,20 +268,21 @@ def _value_at(values: Any, share: float) -> Any:
 
 def evaluate_variation(variation: Variation) -> dict[str, Any]:
     """Return outcome, displacements and time of collapse of one run."""
-    base, changes = variation.base, {**NEUTRAL, **dict(variation.changes)}
-    structure, motion = base.structure, base.motion
+    (analysis, motion), changes = variation.base, {**NEUTRAL, **dict(variation.changes)}
+    structure = analysis.structure
     for value in changes.values():
         structure = value if isinstance(value, Structure) else structure
         motion = value if isinstance(value, Motion) else motion
-    structure = _vary_contacts(structure, changes)
     motion = motion.scaled(changes["scale"])
     if changes["sign"] == "reversed":
         motion = motion.reversed()
-    dt = base.dt * (0.5 if changes["dt"] == "half" else 1.0)
+    assert analysis.dt is not None
+    dt = analysis.dt * (0.5 if changes["dt"] == "half" else 1.0)
+    analysis = replace(analysis, structure=_vary_contacts(structure, changes), dt=dt)
     if changes["joint_rule"] == "rigid":
-        state = _run_rigid_blocks(structure, motion, dt)
+        state = _run_rigid_blocks(analysis.structure, motion, dt)
     else:
-        state = _run_elastic_joints(structure, motion, dt, base, changes)
+        state = _run_elastic_joints(analysis, motion, changes)
     return {
         "outcome": state.kind,
         "displacement": state.displacement,
@@ -299,28 +308,35 @@ def _vary_contacts(
 
 
 def _run_elastic_joints(
-    structure: Structure, motion: Motion, dt: float, base: RunSettings, changes: Mapping[str, Any]
+    analysis: Analysis, motion: Motion, changes: Mapping[str, Any]
 ) -> CollapseState:
     """Run a model with elastic joints, and return its state of collapse."""
     three = changes["joint_rule"] == "three points"
-    rule: dict[str, Any] = {"quadrature": "trapezoidal", "quadrature_points": 3} if three else {}
-    model = build(structure, fidelity=base.fidelity, displacements="large", **rule)
-    kind = changes.get("damping_kind") or _damping_kind(base.damping)
-    damping = _vary_damping(model, base.damping, kind, changes["damping_ratio"])
-    run = time_history(model, motion, dt=dt, damping=damping)
+    rule: Any = {"quadrature": "trapezoidal", "quadrature_points": 3} if three else {}
+    analysis = replace(analysis, **{"quadrature": "exact", "quadrature_points": None, **rule})
+    rest = analysis.dead_load(motion)
+    damping = _vary_damping(analysis, rest, changes.get("damping_kind"), changes["damping_ratio"])
+    run = time_history(analysis, motion, start=rest, damping=damping)
     if run.fall is None:
         raise DidNotConverge(f"the run {run.outcome}", last=None)
     return run.fall
 
 
-def _vary_damping(model: Model, damping: Viscous | None, kind: str, factor: float) -> Viscous:
+def _vary_damping(
+    analysis: Analysis, rest: Equilibrium, kind: str | None, factor: float
+) -> Viscous | None:
     """Return damping of a kind with a multiple of the ratio."""
+    damping, _ = resolve_effective_damping(analysis.damping, rest.model, rest)
     if damping is None:
-        word = "stiffness" if kind == "stiffness" else "rayleigh"
-        return effective_damping(model, 0.05 * factor, kind=word)
+        return None
     ratio = factor * damping.ratio
-    if kind == _damping_kind(damping):
+    if kind in (None, _damping_kind(damping)):
         return replace(damping, ratio=ratio)
+    # the other kind has its frequencies from the effective modes too, or from the one that is given
+    if isinstance(analysis.damping, EffectiveDamping):
+        other = "stiffness" if kind == "stiffness" else "rayleigh"
+        effective = replace(analysis.damping, ratio=ratio, kind=other)
+        return resolve_effective_damping(effective, rest.model, rest)[0]
     if isinstance(damping, Rayleigh):
         return StiffnessDamping(ratio, damping.frequencies[0], damping.joints)
     return Rayleigh(ratio, (damping.frequency, 2.0 * damping.frequency), damping.joints)

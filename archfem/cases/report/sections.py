@@ -13,7 +13,7 @@ from archfem.cases.case import Case
 from archfem.cases.report.report_data import ReportData, build_player, missing_note
 from archfem.dynamics.fall import CollapseState
 from archfem.dynamics.history import SIGN_CONVENTION, History
-from archfem.dynamics.schemes import EffectiveDamping, Rayleigh
+from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.dynamics.verdict import Verdict
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.structure import Structure
@@ -83,7 +83,7 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
 
 def _describe_damping(case: Case) -> str:
     """Describe the damping of a case."""
-    damping = case.analysis.damping
+    damping = interpret_damping(case.analysis.damping)
     if damping is None:
         return "none but that of friction"
     ratio, joints = f"{100.0 * damping.ratio:g} % of critical", f"joints {damping.joints}"
