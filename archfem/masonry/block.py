@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem._typing import Array
+from archfem._typing import Array, Metres
 from archfem._validation import check_fields, check_numbers, check_sequence, check_unmasked
 from archfem.errors import InvalidStructure
 from archfem.masonry.materials import Material
@@ -104,7 +104,7 @@ def find_side_of_line(points: Array, line: Array, near: float, arcs: Sequence[in
 
 
 # Coordinates x and y [m]
-Point = tuple[float, float]
+Point = tuple[Metres, Metres]
 
 
 def check_points(given: Any, name: str) -> list[tuple[float, ...]]:
