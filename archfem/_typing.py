@@ -1,6 +1,7 @@
 """Type aliases: arrays, and numbers with the unit that a key of a case file has.
 
-A field or argument with such an annotation declares its key: `Metres` reads 2.95 and "2.95 m".
+A field or argument with such an annotation declares its key: `Metres` reads 2.95 and "2.95 m"; with
+None in place of the unit it is no key.
 """
 
 from dataclasses import dataclass
@@ -23,6 +24,9 @@ Degrees = Annotated[float, "degree"]
 
 # Angle that may keep its unit, "5 degree", where a bare 5 could be radians
 Angle = Annotated[float | str, "degree"]
+
+# Name of a part, material or contact: that of its table, and so no key
+TableName = Annotated[str, None]
 
 
 @dataclass(frozen=True)

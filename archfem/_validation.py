@@ -41,18 +41,16 @@ def report_user_errors(what: str) -> Iterator[None]:
         raise InvalidInput(f"{what} failed{place}: {type(error).__name__}: {error}") from error
 
 
-def read_field_kinds(what: str, cls: type) -> dict[str, Any]:
-    """Return the keys that a dataclass of the user declares, single numbers and words."""
+def check_own_keys(what: str, cls: type) -> None:
+    """Refuse a class of the user that is no dataclass of single numbers and words."""
     if not is_dataclass(cls):
         raise InvalidInput(f"{what}: {cls!r} is no dataclass: write @dataclass(frozen=True)")
     with report_user_errors(what):
-        kinds, hints = declared_keys(cls), get_type_hints(cls)
+        kinds = declared_keys(cls)
     for each in fields(cls):
         # a row would make a law that has no hash
         if each.init and not isinstance(kinds.get(each.name), str | type):
-            hint = hints[each.name]
-            raise InvalidInput(f"{what}, {each.name}: {hint!r} is none of float, int and str")
-    return kinds
+            raise InvalidInput(f"{what}, {each.name}: {each.type!r} is none of float, int and str")
 
 
 def declared_keys(declaration: Callable[..., Any], named: tuple[type, ...] = ()) -> dict[str, Any]:
@@ -74,31 +72,22 @@ def declared_keys(declaration: Callable[..., Any], named: tuple[type, ...] = ())
 
 def _kind_of(hint: Any, named: tuple[type, ...]) -> Any:
     """Return the kind of a key with an annotation; None for what no file can hold."""
-    origin, inner = get_origin(hint), get_args(hint)
-    if origin is Annotated:  # with a unit, or the kind itself
+    kind, inner = get_origin(hint) or hint, get_args(hint)
+    plain = {float: "1", int: int, str: str, bool: bool, np.ndarray: ["1"]}
+    plain |= dict.fromkeys(named, str)
+    if kind is Annotated:  # with a unit, or the kind itself
         return [inner[1]] if get_origin(inner[0]) is np.ndarray else inner[1]
-    if origin in (Union, UnionType):
-        kinds = [kind for each in inner if (kind := _kind_of(each, named)) is not None]
+    if kind in (Union, UnionType):
+        kinds = [each for each in (_kind_of(each, named) for each in inner) if each is not None]
         # of several rows, such as points and an array of points, the first counts
-        rows = [kind for kind in kinds if isinstance(kind, list)]
-        single = [kind for kind in kinds if not isinstance(kind, list)]
-        kinds = [*dict.fromkeys(single), *rows[:1]]
+        rows = [each for each in kinds if isinstance(each, list)]
+        kinds = [*dict.fromkeys(each for each in kinds if each not in rows), *rows[:1]]
         return tuple(kinds) if len(kinds) > 1 else next(iter(kinds), None)
-    if origin is Literal:
-        return type(inner[0])
-    if origin is np.ndarray:
-        return ["1"]
-    if hint is float:
-        return "1"
-    if hint in (int, str, bool):
-        return hint
-    if hint in named:
-        return str
-    kind = origin or hint
-    if is_dataclass(kind) or (isinstance(kind, type) and issubclass(kind, Mapping)):
+    if kind in plain or not isinstance(kind, type):
+        return plain.get(kind)
+    if is_dataclass(kind) or issubclass(kind, Mapping):
         return dict
-    row = isinstance(kind, type) and issubclass(kind, Iterable) and inner
-    each = _kind_of(inner[0], named) if row else None
+    each = _kind_of(inner[0], named) if inner and issubclass(kind, Iterable) else None
     return None if each is None else [each]
 
 

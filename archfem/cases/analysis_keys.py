@@ -1,10 +1,10 @@
 """Sections [limit], [rating] and [assessment]: capacity and kinematic assessment."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from archfem._validation import validate_methods
+from archfem._validation import declared_keys, validate_methods
 from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.toml_file import Table, check_choice, check_table
 from archfem.errors import InvalidInput
@@ -22,49 +22,29 @@ from archfem.statics.mechanism_assessment import (
     kinematic_assessment,
 )
 
-# Keys of the tables by section, and the kind of each value
-SECTION_KEYS: Mapping[str, Table] = {
-    "limit": {"horizontal": "1", "vertical": "1", "point": dict, "friction": str, "fill": dict},
-    "limit.point": {"x": "m", "force": ["N"]},
-    "limit.fill": {
-        **{"friction_angle": "degree", "cohesion": "Pa", "mobilisation": "1", "active": "1"},
-        **{"dispersal": str, "spread": "degree"},
-    },
-    "rating": {"vehicle": (str, dict), "live": "1", "impact": "1", "dead": "1", "width": "m"},
-    "rating.vehicle": {"name": str, "axles": ["N"], "spacings": ["m"]},
-    "assessment": {
-        **{"spectrum": dict, "direction": "1", "friction": str, "part": str},
-        **{"blocks": [(int, str)], "loads": [dict], "limit_state": (str, dict), "q": "1"},
-        "confidence_factor": "1",
-    },
-    "assessment.loads": {"block": (int, str), "point": ["m"], "weight": "N", "force": ["N"]},
-    "assessment.limit_state": {
-        **{"name": str, "share": "1", "period_factor": "1", "secant_share": "1", "damping": "1"},
-        "source": str,
-    },
-}
-
-
-def _check_section(table: Any, section: str) -> dict[str, Any]:
-    """Check the keys of the table of a section, and convert its values to their kinds."""
-    return check_table(table, SECTION_KEYS[section], section)
-
 
 @validate_methods
 @dataclass(frozen=True)
 class LimitAnalysis:
-    """Limit analysis of a case: the live load, the friction law and the strength of a fill.
+    """Limit analysis of a case: the live load, and the strength of joints, stones and fill.
 
     Attributes:
         live: loads that grow together; the collapse factor multiplies them. Without any, friction
-            and fill are those of a rating.
+            and strengths are those of a rating.
         friction: friction law, "coulomb", "nonassociated", or None without sliding.
+        strength: compressive strength of the stones at the joints [Pa], or None.
         fill: strength of the fill, or None.
     """
 
     live: Sequence[Action]
     friction: str | None
+    strength: float | None = None
     fill: Fill | None = None
+
+    @property
+    def resistance(self) -> dict[str, Any]:
+        """Arguments of `collapse_factor` other than the load, which `rate` has too."""
+        return {"friction": self.friction, "strength": self.strength, "fill": self.fill}
 
     def solve(self, structure: Structure) -> Collapse:
         """Compute the load factor at which a structure of rigid blocks becomes a mechanism.
@@ -84,12 +64,14 @@ class LimitAnalysis:
                 "limit has no load: give horizontal = 1.0, a multiple of each block's weight, or "
                 'point = { x = "1.4 m", force = ["0 kN", "-1 kN"] }'
             )
-        return collapse_factor(structure, live=self.live, friction=self.friction, fill=self.fill)
+        return collapse_factor(structure, live=self.live, **self.resistance)
 
 
 def parse_limit(table: Any) -> LimitAnalysis:
     """Return the limit analysis of a case."""
-    values = _check_section(table, "limit")
+    # the live load: multiples of the weight, and a force at a point
+    keys = _keys_beside(collapse_factor, "live") | declared_keys(BodyForce) | {"point": dict}
+    values = check_table(table, keys, "limit")
     live: list[Action] = []
     if "horizontal" in values or "vertical" in values:
         live.append(BodyForce(values.get("horizontal", 0.0), values.get("vertical", 0.0)))
@@ -97,7 +79,7 @@ def parse_limit(table: Any) -> LimitAnalysis:
         live.append(_point_load(values["point"]))
     friction = _check_friction(values.get("friction", "coulomb"), "limit.friction")
     fill = _fill(values["fill"]) if "fill" in values else None
-    return LimitAnalysis(tuple(live), friction, fill)
+    return LimitAnalysis(tuple(live), friction, values.get("strength"), fill)
 
 
 def _check_friction(value: Any, key: str) -> str | None:
@@ -108,7 +90,7 @@ def _check_friction(value: Any, key: str) -> str | None:
 
 def _fill(table: Any) -> Fill:
     """Return the strength of the fill."""
-    fill = _check_section(table, "limit.fill")
+    fill = check_table(table, declared_keys(Fill), "limit.fill")
     if "friction_angle" not in fill:
         raise InvalidInput(
             f"limit.fill = {table} lacks its angle of friction: give friction_angle = "
@@ -119,7 +101,7 @@ def _fill(table: Any) -> Fill:
 
 def _point_load(table: Any) -> PointLoad:
     """Return a concentrated live load."""
-    point = _check_section(table, "limit.point")
+    point = check_table(table, declared_keys(PointLoad), "limit.point")
     if len(point) < 2 or len(point["force"]) != 2:
         raise InvalidInput(
             f"limit.point = {table}: give a place and the two components of a force, e.g. "
@@ -130,7 +112,9 @@ def _point_load(table: Any) -> PointLoad:
 
 def parse_rating(table: Any) -> Table:
     """Return the rating of a case: the arguments of `rate` that it gives."""
-    options = _check_section(table, "rating")
+    # joints and fill are those of [limit]
+    keys = _keys_beside(rate, "friction", "strength", "fill")
+    options = check_table(table, keys, "rating")
     if isinstance(vehicle := options.get("vehicle"), dict):
         options["vehicle"] = _build("rating.vehicle", Vehicle, vehicle)
     return options
@@ -146,7 +130,7 @@ def rate_case(
             'a rating needs a vehicle: write [rating] with vehicle = "LM1", or give --vehicle LM1'
         )
     if limit is not None:
-        options |= {"friction": limit.friction, "fill": limit.fill}
+        options |= limit.resistance
     return rate(structure, options.pop("vehicle"), **options)
 
 
@@ -182,7 +166,7 @@ class AssessmentSettings:
 
 def parse_assessment(table: Any) -> AssessmentSettings:
     """Return the kinematic assessment of a case."""
-    options = _check_section(table, "assessment")
+    options = check_table(table, _keys_beside(kinematic_assessment), "assessment")
     spectrum = None
     if "spectrum" in options:
         spectrum = build_spectrum(options.pop("spectrum"), "assessment.spectrum")
@@ -202,10 +186,17 @@ def parse_assessment(table: Any) -> AssessmentSettings:
     return AssessmentSettings(spectrum, directions, options)
 
 
+def _keys_beside(function: Callable[..., Any], *given: str) -> dict[str, Any]:
+    """Return the keys of the arguments of a function other than the structure and some."""
+    return {k: v for k, v in declared_keys(function).items() if k not in ("structure", *given)}
+
+
 def _build(section: str, kind: Callable[..., Any], table: Table) -> Any:
     """Return an object made of the keys of a table."""
+    keys = declared_keys(kind)
     try:
-        return kind(**_check_section(table, section))
+        return kind(**check_table(table, keys, section))
     except TypeError as error:
-        keys = list(SECTION_KEYS[section])
-        raise InvalidInput(f"{section} = {dict(table)}: {error}; its keys are {keys}") from error
+        raise InvalidInput(
+            f"{section} = {dict(table)}: {error}; its keys are {list(keys)}"
+        ) from error

@@ -1,24 +1,20 @@
 """Sections [motion] and [suite] of case files: ground motions, suites and target spectra."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from archfem._typing import Array
+from archfem._validation import declared_keys
 from archfem.cases.toml_file import Table, check_choice, check_table, format_tables
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import (
-    Asce2022,
     DesignSpectrum,
-    Eurocode8,
-    Eurocode2024,
-    Ntc2018,
-    TableSpectrum,
-    Tbec2018,
     build_registered_spectrum,
     registered_spectra,
 )
@@ -29,12 +25,13 @@ from archfem.motion.suite import Suite
 
 def parse_motion(table: Any, section: str = "motion") -> dict[str, Any]:
     """Return the checked keys of one motion."""
-    own = {"vertical": (str, dict), "resample": "s", "start": "s", "end": "s", "scale": "1"}
-    source: Table = {
-        **{"file": str, "column": int, "units": str, "dt": "s", "response": str},
-        **{"synthetic": dict, "samples": ["m/s**2"]},
-    }
-    settings = _parse_source(table, {**source, **own, "reversed": bool}, section)
+    source = declared_keys(Motion.read) | {"synthetic": dict, "samples": ["m/s**2"]}
+    source["file"] = source.pop("path")
+    for component in ("vertical", "transverse"):  # which has a source of its own, or is not felt
+        del source[component]
+    own = declared_keys(Motion.cut) | {"vertical": (str, dict), "resample": "s"}
+    own |= {"scale": "1", "reversed": bool}
+    settings = _parse_source(table, source | own, section)
     if isinstance(settings.get("vertical"), dict):
         vertical = _parse_source(settings["vertical"], source, f"{section}.vertical")
         if "vertical_ratio" in vertical.get("synthetic", {}):
@@ -86,10 +83,9 @@ def write_motion(motion: Any) -> dict[str, Any]:
 
 def parse_suite(table: Any) -> dict[str, Any]:
     """Return the checked keys of a suite."""
-    keys = {
-        **{"name": str, "folder": str, "reversed": bool, "target": dict, "matched": bool},
-        **{"scale": "1", "reduction": "1", "pairs": dict},
-    }
+    keys = declared_keys(Suite) | {"pairs": dict, "folder": str, "target": dict}
+    keys |= {"matched": bool, "reversed": bool}
+    del keys["matches"]  # results of matching
     settings = check_table(table, keys, "suite")
     pairs = settings.get("pairs", {})
     if not pairs:
@@ -121,33 +117,16 @@ def build_target_spectrum(settings: Table) -> DesignSpectrum | None:
 
 
 def build_spectrum(table: Table, section: str) -> DesignSpectrum:
-    """Return the design spectrum of a table with its code."""
-    # design spectra for 5 % damping by name, with their keys; accelerations are in g
-    spectra: Mapping[str, tuple[Callable[..., DesignSpectrum], Table]] = {
-        "TBEC-2018": (Tbec2018, {"ss": "1", "s1": "1", "site": str}),
-        "EC8": (Eurocode8, {"ag": "1", "ground": str, "type": int}),
-        "NTC-2018": (
-            Ntc2018,
-            {"ag": "1", "f0": "1", "tc_star": "s", "site": str, "topography": "1"},
-        ),
-        "ASCE-7-22": (Asce2022, {"sds": "1", "sd1": "1", "tl": "s"}),
-        "EC8-2024": (
-            Eurocode2024,
-            {"s_alpha": "1", "s_beta": "1", "f_alpha": "1", "f_beta": "1", "topography": "1"},
-        ),
-        "table": (TableSpectrum, {"periods": ["s"], "values": ["1"], "vertical_values": ["1"]}),
-    }
+    """Return the design spectrum of a table with its code, whose accelerations are in g."""
     values = dict(table)
-    known = [*spectra, *registered_spectra]
-    code = check_choice(values.pop("code", None), known, f"{section}.code")
-    if code not in spectra:
-        own = check_table(values, registered_spectra[code][1], section)
-        return build_registered_spectrum(code, own)
-    spectrum, keys = spectra[code]
+    code = check_choice(values.pop("code", None), registered_spectra, f"{section}.code")
+    spectrum = registered_spectra[code]
+    values = check_table(values, declared_keys(spectrum), section)
     try:
-        return spectrum(**check_table(values, keys, section))
+        signature(spectrum).bind(**values)
     except TypeError as error:
         raise InvalidInput(f"{section} of {code}: {error}") from error
+    return build_registered_spectrum(code, values)
 
 
 def build_pairs(settings: Table, folder: Path = Path()) -> tuple[Motion, ...]:
@@ -213,8 +192,8 @@ def _parse_source(table: Any, keys: Table, section: str) -> dict[str, Any]:
         )
     (source,) = sources
     if source == "synthetic":
-        own = {"duration": "s", "pga": "m/s**2", "seed": int, "dt": "s", "vertical_ratio": "1"}
-        settings[source] = check_table(settings[source], own, f"{section}.synthetic")
+        keys = declared_keys(Motion.synthetic)
+        settings[source] = check_table(settings[source], keys, f"{section}.synthetic")
     # Keys that describe a file are errors beside another source; samples have a step.
     of_files = {"file": set(), "synthetic": {"column", "units", "dt", "response"}}
     if unused := sorted(of_files.get(source, {"column", "units", "response"}) & set(settings)):

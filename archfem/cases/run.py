@@ -126,7 +126,7 @@ class DeadLoadResult:
 
     @cached_property
     def finer(self) -> tuple[Analysis, Equilibrium] | None:
-        """Analysis and dead load of the next finer fidelity; None if there is none to compare with."""
+        """Analysis and dead load of the next finer fidelity; None without one to compare with."""
         case, model = self.case, self.dead.model
         levels = {"rigid": "faces", "faces": "condensed", "condensed": "full"}
         if model.fidelity not in levels or model.prediction or find_spec("dolfinx") is None:

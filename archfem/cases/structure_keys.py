@@ -1,7 +1,7 @@
 """Structures of case files: [structure], [materials], [contacts] and [dead_load].
 
-The keys of a table are the arguments of the shape, part or material that it describes, so that
-each keyword of `archfem.shapes` is a key of the same name.
+The keys of a table are the arguments of the shape, part or material that it describes, with the
+units of their annotations (`declared_keys`).
 """
 
 import inspect
@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from archfem._typing import NumberOrWord
 from archfem._validation import declared_keys
 from archfem.cases.provenance import hash_file, list_input_files
 from archfem.cases.toml_file import Table, check_choice, check_table
@@ -22,11 +21,15 @@ from archfem.masonry.assembly import assembled
 from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.block import Block
 from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, Contact, Material
-from archfem.masonry.shapes import bridge_parts, bridges, rings
+from archfem.masonry.shapes import bridges, rings
+from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.structure import Joint, Structure
 from archfem.masonry.survey.outlines import Layer, surveyed
 
 Described = TypeVar("Described")
+
+# Parts of which a bridge has several, from left to right, each under its name
+BRIDGE_PARTS: Table = {"arches": Arch, "piers": Pier, "sidewalls": Sidewall}
 
 _recent_structures: OrderedDict[str, Structure] = OrderedDict()
 
@@ -62,15 +65,15 @@ def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     if name == "blocks":
         return _read_blocks(settings)
     keys = {**_keys_of(functions[name]), "shape": str, "fill": dict}
-    if name == "arcade":  # one number of voussoirs for each of its arches
-        keys["voussoirs"] = [int]
+    if name == "bridge":  # whose parts are tables by name
+        keys |= dict.fromkeys(BRIDGE_PARTS, dict)
     elif name == "outlines":
-        keys["file"] = str
+        keys["file"] = keys.pop("path")
+        del keys["materials"]  # which are those of the case
     values = check_table(table, keys, "structure")
     del values["shape"]
     fill = values.pop("fill", {})
-    stone = _material(settings, values.pop("material", "stone"))
-    contact = _contact(settings, values.pop("contact", "stone to stone"))
+    values = _resolve_names(functions[name], values, settings)
     # All tables are read, also unused ones: a misspelt name of a preset is an error then.
     for material in settings.get("materials", {}):
         _material(settings, material)
@@ -80,46 +83,20 @@ def build_structure(settings: Table, folder: Path = Path()) -> Structure:
         values = _bridge_parts(values, settings)
     elif name == "outlines":
         values = _outline_arguments(values, settings, folder)
-    section = f"structure of shape {name!r}"
-    structure = _call(functions[name], section, material=stone, contact=contact, **values)
+    structure = _call(functions[name], f"structure of shape {name!r}", **values)
     return _divide_fill(structure, fill)
 
 
-def _keys_of(function: Callable[..., Any]) -> dict[str, Any]:
-    """Return keys and kinds of the arguments of a shape, part or material."""
-    # kind of each argument of shapes, parts, materials and contacts that is a key of a case file
-    kinds: Table = {
-        **dict.fromkeys(("radius", "span", "rise", "thickness", "width", "breadth", "height"), "m"),
-        **dict.fromkeys(("course", "pier_breadth", "gap", "length", "above", "setback"), "m"),
-        **dict.fromkeys(("cover", "erosion", "hump", "spandrels", "snap"), "m"),
-        **{
-            key: ["m"]
-            for key in ("heights", "courses", "spans", "breadths", "thicknesses", "rises")
-        },
-        **dict.fromkeys(("voussoirs", "chords"), int),
-        **dict.fromkeys(("material", "contact", "state", "unit", "measured"), str),
-        **dict.fromkeys(("part", "role"), str),
-        **dict.fromkeys(("arches", "piers", "sidewalls", "backfill", "paving"), dict),
-        **dict.fromkeys(("layers", "contacts", "law"), dict),
-        **dict.fromkeys(("fixed", "ignore"), bool),
-        **dict.fromkeys(("embrace", "skewback"), "degree"),
-        "embraces": ["degree"],
-        "intrados": [["m"]],
-        "gravity": "m/s**2",
-        **dict.fromkeys(("young", "strength", "cohesion", "tension"), "Pa"),
-        **dict.fromkeys(("poisson", "dilatancy"), "1"),
-        "unit_weight": "N/m**3",
-        **dict.fromkeys(("normal_stiffness", "shear_stiffness"), "Pa/m"),
-        "friction": NumberOrWord("1", "none"),  # "none": a joint that never slides
-    }
-    return {k: kinds[k] for k in inspect.signature(function).parameters if k in kinds}
+def _keys_of(declaration: Callable[..., Any]) -> dict[str, Any]:
+    """Return the keys of a shape or part, where materials and contacts are names of tables."""
+    return declared_keys(declaration, named=(Material, Contact))
 
 
 def _read_blocks(settings: Table) -> Structure:
     """Return a structure whose blocks and joints are listed; without joints these are found."""
     keys: Table = {"shape": str, "blocks": [dict], "joints": [dict], "contact": str}
     table = settings["structure"]
-    own = declared_keys(assembled) | keys | {"material": str}
+    own = {**declared_keys(assembled), **keys} | {"material": str}
     values = check_table(table, {key: own[key] for key in own if key != "name"}, "structure")
     shared = {"material": values.pop("material", "stone")}
     contact = values.pop("contact", "stone to stone")
@@ -148,7 +125,8 @@ def _read_part(cls: type[Described], table: Table, section: str, settings: Table
 
 def _divide_fill(structure: Structure, table: Table) -> Structure:
     """Divide the backfill of a structure into pieces, if the case says so."""
-    keys = {"law": str, "piece_size": "m", "friction_angle": "degree", "cohesion": "Pa"}
+    keys = {**declared_keys(jointed_fill), "law": str}
+    del keys["structure"]
     fill = check_table(table, keys, "structure.fill")
     law = check_choice(fill.pop("law", "elastic"), ("elastic", "jointed"), "structure.fill.law")
     if law == "elastic":
@@ -157,28 +135,30 @@ def _divide_fill(structure: Structure, table: Table) -> Structure:
         return structure
     if missing := sorted({"piece_size", "friction_angle"} - set(fill)):
         raise InvalidInput(f"structure.fill lacks {missing}: a jointed fill needs both")
-    angle, cohesion = fill["friction_angle"], fill.get("cohesion", 0.0)
-    return jointed_fill(structure, fill["piece_size"], angle=angle, cohesion=cohesion)
+    return jointed_fill(structure, **fill)
 
 
 def _bridge_parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
     """Return the arguments of `bridge`, with the parts that its tables describe."""
     parts = dict(values)
-    # there may be several of these, from left to right, each under its name
-    several = {"arches": bridge_parts.Arch, "piers": bridge_parts.Pier}
-    several |= {"sidewalls": bridge_parts.Sidewall}
-    for key, part in several.items():
+    for key, part in BRIDGE_PARTS.items():
         if key in parts:
             parts[key] = _build_parts(part, parts[key], f"structure.{key}")
-    if "backfill" in parts:
-        fill = check_table(parts["backfill"], _keys_of(bridge_parts.Backfill), "structure.backfill")
-        fill["material"] = _material(settings, fill.pop("material", "backfill"))
-        fill["contact"] = _contact(settings, fill.pop("contact", "soil to stone"))
-        parts["backfill"] = _call(bridge_parts.Backfill, "structure.backfill", **fill)
-    if "paving" in parts:
-        paving = check_table(parts["paving"], _keys_of(bridge_parts.Paving), "structure.paving")
-        parts["paving"] = _call(bridge_parts.Paving, "structure.paving", **paving)
+    for key, single in {"backfill": Backfill, "paving": Paving}.items():
+        if key in parts:
+            given = check_table(parts[key], _keys_of(single), f"structure.{key}")
+            given = _resolve_names(single, given, settings)
+            parts[key] = _call(single, f"structure.{key}", **given)
     return parts
+
+
+def _resolve_names(function: Callable[..., Any], values: Table, settings: Table) -> dict[str, Any]:
+    """Return the arguments of a shape or part with the material and contact that they name."""
+    arguments, parameters = dict(values), inspect.signature(function).parameters
+    for key, find in (("material", _material), ("contact", _contact)):
+        if key in parameters:  # a table may change the default one
+            arguments[key] = find(settings, values.get(key, parameters[key].default.name))
+    return arguments
 
 
 def _outline_arguments(values: dict[str, Any], settings: Table, folder: Path) -> dict[str, Any]:
@@ -266,7 +246,7 @@ def _joint_law(table: Table, section: str) -> JointLaw:
     """Return a joint law that a module of the user has registered."""
     values = dict(table)
     name = check_choice(values.pop("name", None), registered_laws, f"{section}.name")
-    keys = registered_laws[name][1]
+    keys = declared_keys(registered_laws[name])
     if units := [k for k, v in values.items() if isinstance(v, str) and keys.get(k) == "1"]:
         raise InvalidInput(
             f"{section}.{units[0]} = {values[units[0]]!r} has a unit, and the field of the "

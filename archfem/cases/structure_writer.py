@@ -5,12 +5,13 @@ Either way the tables are read once and compared, so that a file has every bit o
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from math import inf
 from typing import Any
 
 import numpy as np
 
+from archfem._validation import declared_keys
 from archfem.cases.structure_keys import build_structure
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.own_law import registered_laws
@@ -31,7 +32,7 @@ def write_structure(structure: Structure) -> dict[str, Any]:
             continue
         tables = {"title": structure.name, "structure": section, **names.sections}
         try:
-            if build_structure(tables) == structure:
+            if replace(build_structure(tables), name=structure.name) == structure:
                 return tables
         except ArchfemError:  # lengths of one's own shape, or changed after it was made
             if write is _write_blocks:
@@ -89,9 +90,9 @@ def _list_fields(item: Material | Contact) -> dict[str, Any]:
 
 def _write_law(contact: Any) -> dict[str, Any]:
     """Return the table of a law of the user, which must be registered."""
-    for name, (cls, keys) in registered_laws.items():
+    for name, cls in registered_laws.items():
         if type(contact.law) is cls:
-            return {"name": name, **{key: getattr(contact.law, key) for key in keys}}
+            return {"name": name, **{key: getattr(contact.law, key) for key in declared_keys(cls)}}
     raise InvalidInput(
         f"law {contact.law!r} of '{contact.name}' has no name in a file: register its class by "
         "archfem.joints.register_joint_law"

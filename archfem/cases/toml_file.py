@@ -229,9 +229,12 @@ def _convert(value: Any, kind: Any, key: str) -> Any:
     if isinstance(kind, str):
         return in_unit(value, kind, key)
     if isinstance(kind, NumberOrWord):
-        return _convert_number_or_word(value, kind, key)
+        try:
+            return None if value == kind.word else in_unit(value, kind.unit, key)
+        except InvalidInput as error:
+            raise InvalidInput(f'{error}, or "{kind.word}"') from error
     if isinstance(kind, list):
-        if not isinstance(value, list):
+        if not isinstance(value, list | tuple):
             raise InvalidInput(f"{key} = {value!r} is not a list: write [a, b, …]")
         return [_convert(item, kind[0], f"{key}[{n}]") for n, item in enumerate(value)]
     several = kind if isinstance(kind, tuple) else (kind,)
@@ -246,13 +249,3 @@ def _convert(value: Any, kind: Any, key: str) -> Any:
         words = {int: "a whole number", str: "a word", bool: "true or false", dict: table}
         raise InvalidInput(f"{key} = {value!r} is not {' or '.join(words[each] for each in kinds)}")
     return value
-
-
-def _convert_number_or_word(value: Any, kind: NumberOrWord, key: str) -> float | None:
-    """Convert a value to a number, or its word to None."""
-    if value == kind.word:
-        return None
-    try:
-        return in_unit(value, kind.unit, key)
-    except InvalidInput as error:
-        raise InvalidInput(f'{error}, or "{kind.word}"') from error

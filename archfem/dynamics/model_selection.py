@@ -258,7 +258,7 @@ def _select_trial(
 
 
 def _resolve_excitation(
-    model: Model, motion: Motion | None, damping: Viscous | EffectiveDamping | None
+    model: Model, motion: Motion | None, damping: Viscous | EffectiveDamping | str | None
 ) -> tuple[Motion, Viscous | None, float]:
     """Return the strongest part of a motion, the damping, and this part's share of the duration."""
     structure, (viscous, _) = model.structure, resolve_effective_damping(damping, model, None)

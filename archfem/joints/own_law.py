@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from archfem._typing import Array
-from archfem._validation import read_field_kinds, report_user_errors, short_repr, validate_arguments
+from archfem._typing import Array, Pascals, PascalsPerMetre
+from archfem._validation import check_own_keys, report_user_errors, short_repr, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.contact_law import choose_law
 from archfem.joints.operator import JointOperator, Pattern
@@ -86,10 +86,10 @@ class DryJoint:
         cohesion: c, where the joint is closed [Pa].
     """
 
-    normal_stiffness: float = field(metadata={"unit": "Pa/m"})
-    shear_stiffness: float = field(metadata={"unit": "Pa/m"})
+    normal_stiffness: PascalsPerMetre
+    shear_stiffness: PascalsPerMetre
     friction: float = inf
-    cohesion: float = field(default=0.0, metadata={"unit": "Pa"})
+    cohesion: Pascals = 0.0
 
     memory_size: ClassVar[int] = 1
 
@@ -116,8 +116,8 @@ class DryJoint:
         return 0.5 * (across + self.shear_stiffness * (slip - memory[0]) ** 2)
 
 
-# Laws that case files can name, each with the kinds of its keys
-registered_laws: dict[str, tuple[Callable[..., JointLaw], dict[str, Any]]] = {}
+# Laws that case files can name
+registered_laws: dict[str, Callable[..., JointLaw]] = {}
 
 
 @validate_arguments
@@ -129,15 +129,15 @@ def register_joint_law(name: str, law: type) -> None:
     Args:
         name: of the law.
         law: frozen dataclass with the methods of `JointLaw`. Its fields are numbers, whole numbers
-            and texts, the keys of a case; a number with a unit has it in its metadata,
-            `field(metadata={"unit": "Pa/m"})`.
+            and texts, the keys of a case; a number with a unit has it in its annotation,
+            `Annotated[float, "Pa/m"]`, or its metadata, `field(metadata={"unit": "Pa/m"})`.
 
     Raises:
         InvalidInput: the class is no such dataclass.
     """
-    kinds = read_field_kinds(f"joint law '{name}'", law)
+    check_own_keys(f"joint law '{name}'", law)
     _check_methods(law, f"joint law '{name}'")
-    registered_laws[name] = law, kinds
+    registered_laws[name] = law
 
 
 def _check_methods(law: Any, what: str) -> None:
@@ -492,4 +492,4 @@ class OwnLawStep:
 def build_registered_law(name: str, values: dict[str, Any]) -> JointLaw:
     """Return a registered law from the values of its fields."""
     with report_user_errors(f"joint law '{name}'"):
-        return registered_laws[name][0](**values)
+        return registered_laws[name](**values)

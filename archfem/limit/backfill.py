@@ -18,7 +18,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem._typing import Array
+from archfem._typing import Array, Degrees, Pascals
 from archfem._validation import check_number, check_type, is_one_of, short_repr
 from archfem.errors import InvalidInput
 from archfem.joints.rigid_kinematics import jump_rates
@@ -77,12 +77,12 @@ class Fill:
         0.3333333333333333
     """
 
-    friction_angle: float
-    cohesion: float = 0.0
+    friction_angle: Degrees
+    cohesion: Pascals = 0.0
     mobilisation: float = 1.0 / 3.0
     active: float = 1.0
     dispersal: str = "boussinesq"
-    spread: float = 30.0
+    spread: Degrees = 30.0
 
     def __post_init__(self) -> None:
         """Refuse values outside their range, most of them wrong units."""

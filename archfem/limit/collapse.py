@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._display import ExplainedWord, ResultDisplay
-from archfem._typing import Array
+from archfem._typing import Array, Pascals
 from archfem._validation import validate_arguments
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
@@ -109,7 +109,7 @@ def collapse_factor(
     *,
     live: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
     friction: str | None = "coulomb",
-    strength: float | None = None,
+    strength: Pascals | None = None,
     fill: Fill | None = None,
 ) -> Collapse:
     """Find the factor at which live actions, over self-weight, make rigid blocks a mechanism.

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._display import ResultDisplay
-from archfem._typing import Array
+from archfem._typing import Array, Metres, Newtons, Pascals
 from archfem._validation import check_number, check_numbers, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
@@ -47,8 +47,8 @@ class Vehicle:
     """
 
     name: str
-    axles: tuple[float, ...]
-    spacings: tuple[float, ...] = ()
+    axles: tuple[Newtons, ...]
+    spacings: tuple[Metres, ...] = ()
     live: float = 1.0
     source: str = "given"
     grade: str = "given"
@@ -270,9 +270,9 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     live: float | None = None,
     impact: float | None = None,
     dead: float = 1.0,
-    width: float | None = None,
+    width: Metres | None = None,
     friction: str | None = "coulomb",
-    strength: float | None = None,
+    strength: Pascals | None = None,
     fill: Fill | None = None,
 ) -> Rating:
     """Rate a bridge for a vehicle: the multiple of it, with partial factors, at collapse.

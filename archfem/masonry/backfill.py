@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from archfem._typing import Array
+from archfem._typing import Angle, Array, Metres, Pascals
 from archfem._validation import check_number, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.assembly import assembled
@@ -42,7 +42,7 @@ class _Piece(NamedTuple):
 
 @validate_arguments
 def jointed_fill(
-    structure: Structure, size: float, *, angle: float | str, cohesion: float = 0.0
+    structure: Structure, piece_size: Metres, *, friction_angle: Angle, cohesion: Pascals = 0.0
 ) -> Structure:
     """Return a structure whose fill is cut into pieces with dry joints between them.
 
@@ -59,8 +59,8 @@ def jointed_fill(
 
     Args:
         structure: some of whose blocks are soft.
-        size: longest side of a piece; its other sides are 0.87 and 0.5 of it [m].
-        angle: of internal friction, φ [°].
+        piece_size: longest side of a piece; its other sides are 0.87 and 0.5 of it [m].
+        friction_angle: angle of internal friction φ [°].
         cohesion: c [Pa].
 
     Returns:
@@ -69,17 +69,16 @@ def jointed_fill(
     Raises:
         InvalidInput: no block is soft, or a value is not valid.
     """
-    law = _fill_contact(
-        in_degrees(angle, "angle of friction"), check_number(cohesion, "cohesion [Pa]", minimum=0.0)
-    )
+    angle = in_degrees(friction_angle, "angle of friction")
+    law = _fill_contact(angle, check_number(cohesion, "cohesion [Pa]", minimum=0.0))
     soft = find_yielding_blocks(structure)
-    _check_fill(structure, soft, check_number(size, "size of the pieces [m]"))
-    # radius of the inscribed circle of a whole piece, whose longest side is `size`
-    radius = (sqrt(3.0) - 1.0) / 4.0 * size
+    _check_fill(structure, soft, check_number(piece_size, "size of the pieces [m]"))
+    # radius of the inscribed circle of a whole piece
+    radius = (sqrt(3.0) - 1.0) / 4.0 * piece_size
     fill = _FillAssembly(structure, set(soft), law, radius)
     blocks: list[Block] = []
     for number, block in enumerate(structure.blocks):
-        pieces = _cut_block(block, size) if number in soft else []
+        pieces = _cut_block(block, piece_size) if number in soft else []
         blocks += _create_blocks(block, pieces) if pieces else [block]
         fill.origin += [number] * max(1, len(pieces))
         fill.centres += [piece.centre for piece in pieces] or [np.zeros(2)]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from archfem._typing import Array
+from archfem._typing import Array, Metres, Newtons
 from archfem._validation import check_integer, check_number, check_numbers
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
@@ -57,8 +57,8 @@ class PointLoad:
         InvalidInput: x is no number, or the force no two of up to 1e9 N.
     """
 
-    x: float
-    force: tuple[float, float]
+    x: Metres
+    force: tuple[Newtons, Newtons]
 
     def __post_init__(self) -> None:
         """Check position and force."""
@@ -156,9 +156,9 @@ class AttachedLoad:
     """
 
     block: int | str
-    point: tuple[float, float]
-    weight: float = 0.0
-    force: tuple[float, float] = (0.0, 0.0)
+    point: tuple[Metres, Metres]
+    weight: Newtons = 0.0
+    force: tuple[Newtons, Newtons] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Check that the values are metres and newtons."""

@@ -3,8 +3,9 @@
 from collections.abc import Hashable
 from dataclasses import dataclass
 from math import inf, nextafter
-from typing import Any
+from typing import Annotated, Any
 
+from archfem._typing import Friction, NewtonsPerCubicMetre, Pascals, PascalsPerMetre, TableName
 from archfem._validation import check_number, check_words, is_one_of
 from archfem.errors import InvalidInput
 from archfem.units import G, GPa, MPa, kN
@@ -33,11 +34,11 @@ class Material:
         name: in tables and files.
     """
 
-    young: float
+    young: Pascals
     poisson: float
-    unit_weight: float
-    strength: float | None = None
-    name: str = "material"
+    unit_weight: NewtonsPerCubicMetre
+    strength: Pascals | None = None
+    name: TableName = "material"
 
     def __post_init__(self) -> None:
         """Check that the values are possible, which detects wrong units."""
@@ -101,14 +102,14 @@ class Contact:
         True
     """
 
-    normal_stiffness: float
-    shear_stiffness: float
-    friction: float | None = 0.60
-    name: str = "contact"
-    cohesion: float = 0.0
+    normal_stiffness: PascalsPerMetre
+    shear_stiffness: PascalsPerMetre
+    friction: Friction = 0.60
+    name: TableName = "contact"
+    cohesion: Pascals = 0.0
     dilatancy: float = 0.0
-    tension: float = 0.0
-    law: Any = None
+    tension: Pascals = 0.0
+    law: Annotated[Any, dict] = None
 
     def __post_init__(self) -> None:
         """Check that the values are possible, which detects wrong units."""

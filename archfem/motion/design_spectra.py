@@ -2,17 +2,17 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 
-from archfem._typing import Array
+from archfem._typing import Array, Seconds
 from archfem._validation import (
     check_array,
     check_fields,
     check_number,
+    check_own_keys,
     is_one_of,
-    read_field_kinds,
     report_user_errors,
     validate_arguments,
 )
@@ -22,6 +22,9 @@ from archfem.units import STANDARD_GRAVITY
 
 # No code has a larger spectral acceleration [g]: the unit must be wrong.
 MAX_SPECTRAL_ACCELERATION = 10.0
+
+# Damping of a spectrum in Python; no key, as those of a case are matched and drawn for 5 %
+OtherDamping = Annotated[float, None]
 
 
 class DesignSpectrum(Protocol):
@@ -244,7 +247,7 @@ class Eurocode8(CodeSpectrum):
     ag: float
     ground: str
     type: int = 1
-    damping: float = 0.05
+    damping: OtherDamping = 0.05
 
     def __post_init__(self) -> None:
         ag = check_number(self.ag, "design ground acceleration [g]")
@@ -283,7 +286,7 @@ class TableSpectrum:
         InvalidInput: the rows do not fit, the periods do not grow, or a value is not positive.
     """
 
-    periods: Array
+    periods: Annotated[Array, "s"]
     values: Array
     vertical_values: Array | None = None
 
@@ -375,10 +378,10 @@ class Ntc2018(CodeSpectrum):
 
     ag: float
     f0: float
-    tc_star: float
+    tc_star: Seconds
     site: str
     topography: float = 1.0
-    damping: float = 0.05
+    damping: OtherDamping = 0.05
 
     def __post_init__(self) -> None:
         if not is_one_of(self.site, self._subsoil_factors):
@@ -444,7 +447,7 @@ class Asce2022(CodeSpectrum):
 
     sds: float
     sd1: float
-    tl: float
+    tl: Seconds
 
     def __post_init__(self) -> None:
         _check_positive(self.sds, "S_DS [g]")
@@ -520,8 +523,11 @@ def _check_positive(value: float, name: str) -> float:
     return value
 
 
-# Spectra of the user by name, each with its fields and their types
-registered_spectra: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {}
+# Spectra that case files can name, with those of the user
+registered_spectra: dict[str, Callable[..., DesignSpectrum]] = {
+    **{"TBEC-2018": Tbec2018, "EC8": Eurocode8, "NTC-2018": Ntc2018, "ASCE-7-22": Asce2022},
+    **{"EC8-2024": Eurocode2024, "table": TableSpectrum},
+}
 
 
 @validate_arguments
@@ -536,20 +542,24 @@ def register_spectrum(name: str, spectrum: type) -> None:
             with the methods of `DesignSpectrum`, in g.
 
     Raises:
-        InvalidInput: the class is no such dataclass.
+        InvalidInput: the class is no such dataclass, or the name is that of a code of archfem.
     """
-    kinds = read_field_kinds(f"spectrum '{name}'", spectrum)
+    check_own_keys(f"spectrum '{name}'", spectrum)
     for method in ("horizontal", "vertical"):
         if not callable(getattr(spectrum, method, None)):
             raise InvalidInput(f"spectrum '{name}' has no method {method}(periods)")
-    registered_spectra[name] = spectrum, kinds
+    if name in registered_spectra and registered_spectra[name].__module__ == __name__:
+        raise InvalidInput(f"spectrum '{name}' is one of archfem's: give another name")
+    registered_spectra[name] = spectrum
 
 
 def build_registered_spectrum(name: str, values: dict[str, Any]) -> DesignSpectrum:
-    """Return a spectrum of the user after a check of its values up to 4 s."""
-    periods = np.linspace(0.0, 4.0, 81)
+    """Return a spectrum by its name, one of the user after a check of its values up to 4 s."""
+    spectrum_class, periods = registered_spectra[name], np.linspace(0.0, 4.0, 81)
     with report_user_errors(f"spectrum '{name}'"):
-        spectrum: DesignSpectrum = registered_spectra[name][0](**values)
+        spectrum = spectrum_class(**values)
+    if spectrum_class.__module__ == __name__:
+        return spectrum
     for direction in ("horizontal", "vertical"):
         with report_user_errors(f"spectrum '{name}', {direction}"):
             found = np.asarray(getattr(spectrum, direction)(periods), dtype=float)

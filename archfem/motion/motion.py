@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from archfem._display import ResultDisplay
-from archfem._typing import Array
+from archfem._typing import Array, MetresPerSecondSquared, Seconds
 from archfem._validation import check_words, is_number, short_repr, validate_methods
 from archfem.errors import InvalidInput
 from archfem.motion import signal_processing
@@ -66,7 +66,7 @@ class Motion(ResultDisplay):
         transverse: str | PathLike[str] | None = None,
         column: int | None = None,
         units: str | None = None,
-        dt: float | None = None,
+        dt: Seconds | None = None,
         response: str | PathLike[str] | None = None,
     ) -> "Motion":
         """Return the motion of a record; the format is found by the content of the file.
@@ -105,10 +105,10 @@ class Motion(ResultDisplay):
     def synthetic(
         cls,
         *,
-        duration: float = 20.0,
-        pga: float = 0.3 * STANDARD_GRAVITY,
+        duration: Seconds = 20.0,
+        pga: MetresPerSecondSquared = 0.3 * STANDARD_GRAVITY,
         seed: int = 0,
-        dt: float = 0.005,
+        dt: Seconds = 0.005,
         vertical_ratio: float = 2.0 / 3.0,
     ) -> "Motion":
         """Return an artificial accelerogram without drift, generated from noise with an envelope.
@@ -219,7 +219,7 @@ class Motion(ResultDisplay):
             return self.scaled(pga / self.pga)
         raise InvalidInput(f"scaling a peak of {self.pga:g} to {pga:g} m/s²: both must be > 0")
 
-    def cut(self, start: float, end: float | None = None) -> "Motion":
+    def cut(self, start: Seconds, end: Seconds | None = None) -> "Motion":
         """Return the samples from start to end; a component that ended before keeps one zero.
 
         Args:

@@ -29,6 +29,7 @@ from archfem.dynamics.schemes import (
     Rayleigh,
     StiffnessDamping,
     Viscous,
+    interpret_damping,
 )
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict_range import VerdictRange
@@ -145,10 +146,13 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     analysis = replace(
         structure,
         fidelity=fidelity or ("rigid" if structure.selects_model else structure.fidelity),
-        damping=damping or structure.damping,
+        damping=interpret_damping(damping) or structure.damping,
         dt=dt or structure.dt or 0.005,
+        displacements="large",
+        scheme=Conserving(),
         # the whole motion, of which nothing but the outcome is kept
-        **{"displacements": "large", "scheme": Conserving(), "until": None, "record": Record()},
+        until=None,
+        record=Record(),
     )
     rest = analysis.dead_load(motion)  # a structure that does not stand is refused before any run
     viscous, _ = resolve_effective_damping(analysis.damping, rest.model, rest)

@@ -157,6 +157,24 @@ def plain(_app: Sphinx, kind: str, _name: str, value: Any, _options: Any, lines:
     lines[:] = output
 
 
+def without_units(
+    _app: Sphinx,
+    _kind: str,
+    _name: str,
+    _value: Any,
+    _options: Any,
+    signature: str | None,
+    returned: str | None,
+) -> tuple[str | None, str | None]:
+    """Return a signature without the units of its types, which the texts of arguments have."""
+    kind = r"'[^']*'|dict|None|~?[\w.]*NumberOrWord\([^)]*\)"
+    shown = [
+        text and re.sub(rf"~?[\w.]*Annotated\[(.+?), (?:{kind})\]", r"\1", text)
+        for text in (signature, returned)
+    ]
+    return shown[0], shown[1]
+
+
 def restored(
     _app: Sphinx, _kind: str, _name: str, _value: Any, _options: Any, lines: list[str]
 ) -> None:
@@ -241,6 +259,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Write the pages, and register the handlers of docstrings and names."""
     write_pages(Path(app.srcdir) / "api")
     app.archfem_names = aliases()  # type: ignore[attr-defined]
+    app.connect("autodoc-process-signature", without_units)
     app.connect("autodoc-process-docstring", plain, priority=400)
     app.connect("autodoc-process-docstring", restored, priority=600)
     app.connect("missing-reference", resolved, priority=400)

@@ -26,7 +26,7 @@ from archfem.units import mm
 
 MESHES = Path(__file__).parents[2] / "meshes"
 
-PIECES = {"size": 0.8, "angle": 35.0, "cohesion": 15e3}
+PIECES = {"piece_size": 0.8, "friction_angle": 35.0, "cohesion": 15e3}
 """Of the fill that is cut."""
 
 HEAD = ["fill", "scale", "the bridge", "at [s]", "stones lost", "opening [mm]", "slip [mm]"]

@@ -61,6 +61,14 @@ def test_a_limit_without_a_load_has_friction_and_fill_for_a_rating(ring):
         limit.solve(ring)
 
 
+def test_stones_crush_at_the_strength_of_a_limit(ring):
+    table = {"horizontal": 1.0, "strength": "0.5 MPa"}
+    factor = parse_limit(table).solve(ring).factor
+    live = af.BodyForce(1.0)
+    assert factor == af.collapse_factor(ring, live=live, strength=5e5).factor
+    assert factor < 0.99 * af.collapse_factor(ring, live=live).factor
+
+
 @pytest.mark.slow
 def test_a_case_is_rated_by_its_own_table(ring):
     lorry = {"name": "lorry", "axles": ["20 kN", "40 kN"], "spacings": ["3 m"]}
@@ -74,6 +82,11 @@ def test_a_case_is_rated_by_its_own_table(ring):
     assert heavier.live == 2.4
     with pytest.raises(af.InvalidInput, match="a rating needs a vehicle"):
         rate_case(ring, {}, None, {})
+    # a vehicle has the factors of its code, and stones the strength of the limit analysis
+    coded = parse_rating({"vehicle": {**lorry, "live": 1.2, "impact": 1.1}, "width": "0.5 m"})
+    limit = parse_limit({"friction": "none", "strength": "1 MPa"})
+    weaker = af.rate(ring, own, live=1.2, impact=1.1, width=0.5, friction=None, strength=1e6)
+    assert rate_case(ring, coded, limit, {}).factor == weaker.factor < expected.factor
     with pytest.raises(af.InvalidInput, match=r"rating.vehicle.axles.0. = '20 m'"):
         parse_rating({"vehicle": {**lorry, "axles": ["20 m"]}})
 

@@ -4,8 +4,9 @@ import os
 import re
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -261,6 +262,38 @@ def test_a_spectrum_is_checked(level, said):
     af.motion.register_spectrum("flat", dataclass(Flat))
     with pytest.raises(af.InvalidInput, match=said):
         build_spectrum({"code": "flat", "level": level}, "suite.target")
+
+
+@dataclass(frozen=True)
+class Corner:
+    level: float
+    corner: Annotated[float, "s"] = 1.0
+    long: float = field(default=2.0, metadata={"unit": "s"})
+    fixed: float = field(default=3.0, init=False)
+
+    def horizontal(self, periods):
+        return self.level * np.minimum(1.0, self.corner / np.maximum(periods, 1e-9))
+
+    def vertical(self, periods):
+        return self.level * (np.asarray(periods) < self.long)
+
+
+def test_units_of_fields_are_annotated_or_in_metadata():
+    af.motion.register_spectrum("corner", Corner)
+    table = {"code": "corner", "level": 0.5, "corner": "500 ms", "long": "4000 ms"}
+    assert build_spectrum(table, "suite.target") == Corner(0.5, 0.5, 4.0)
+    for wrong in ({"level": "0.5 s"}, {"corner": "1 m"}, {"fixed": 1.0}):
+        with pytest.raises(af.InvalidInput, match=rf"suite\.target\.{next(iter(wrong))}"):
+            build_spectrum({**table, **wrong}, "suite.target")
+
+
+def test_no_spectrum_replaces_one_of_a_code():
+    with pytest.raises(af.InvalidInput, match="'EC8' is one of archfem's"):
+        af.motion.register_spectrum("EC8", Corner)
+    assert build_spectrum({"code": "EC8", "ag": 0.3, "ground": "A"}, "x") == af.Eurocode8(0.3, "A")
+    # those of a case are for 5 % damping, as the motions that they are compared with
+    with pytest.raises(af.InvalidInput, match=r"unknown key 'x\.damping'"):
+        build_spectrum({"code": "EC8", "ag": 0.3, "ground": "A", "damping": 0.08}, "x")
 
 
 def test_fields_of_a_spectrum_are_keys_of_a_case():

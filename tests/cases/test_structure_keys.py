@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import archfem as af
+from archfem._validation import declared_keys
 from archfem.cases.structure_keys import build_structure
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
@@ -79,6 +80,28 @@ def test_a_table_of_parts_has_keys_that_hold_for_all_parts():
 )
 def test_shapes_by_name(keys, blocks):
     assert len(build_structure(tomllib.loads(f"structure = {{ {keys} }}")).blocks) == blocks
+
+
+SHAPES = [each for each in vars(af.shapes).values() if callable(each)]
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.__name__)
+def test_no_length_or_angle_of_a_shape_is_without_its_unit(shape):
+    assert len(SHAPES) == 15
+    kinds = declared_keys(shape, named=(af.Material, af.Contact))
+    assert [key for key, kind in kinds.items() if "'1'" in repr([kind])] == []
+
+
+def test_one_value_stands_for_all_parts_of_an_arcade():
+    lengths = {"rises": "1.2 m", "thicknesses": 0.5, "heights": "200 cm", "breadths": 1.6}
+    table = {"shape": "arcade", "spans": [4.0, 5.0], "voussoirs": 9, **lengths}
+    numbers = {"rises": 1.2, "thicknesses": 0.5, "heights": 2.0, "breadths": 1.6}
+    expected = af.shapes.arcade(spans=[4.0, 5.0], voussoirs=9, **numbers)
+    assert build_structure({"structure": table}) == expected
+    with pytest.raises(af.InvalidInput, match=r"structure.voussoirs\[0\] = True is not a whole"):
+        build_structure({"structure": {**table, "voussoirs": [True, 9]}})
+    with pytest.raises(af.InvalidInput, match=r"structure\.spans = 4\.0 is not a list"):
+        build_structure({"structure": {**table, "spans": 4.0}})
 
 
 BRIDGE = {

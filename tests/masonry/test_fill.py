@@ -48,7 +48,7 @@ def smooth_box(angle, rows, *, passive=False, shift=0.0):
     length = side * (2.0 * np.ceil((4.5 if passive else 2.5) / side / 2.0) + shift)
     floor = af.Contact(0.3e9, 0.24e9, tan(radians(angle)))
     whole = box(length, floor, af.Contact(0.3e9, 0.24e9, 0.0))
-    return jointed_fill(whole, size, angle=angle)
+    return jointed_fill(whole, size, friction_angle=angle)
 
 
 def on_wall(structure, joints):
@@ -86,7 +86,7 @@ def test_compliance_does_not_depend_on_the_size(size):
     push = 0.2
     length = 3.0 * sqrt(3.0)
     slick = af.Contact(1e13, 1e13, 0.0)
-    fill = jointed_fill(box(length, slick, slick), size, angle=45.0, cohesion=1e9)
+    fill = jointed_fill(box(length, slick, slick), size, friction_angle=45.0, cohesion=1e9)
     before, after = pressure(fill, 0.0), pressure(fill, -push)
     force = (after - before) * 0.5 * 18e3 * HEIGHT**2
     assert force == pytest.approx(6.25e6 * HEIGHT * push / length, rel=3e-3)
@@ -97,7 +97,9 @@ def test_an_oedometer_is_as_compliant_as_a_bar(rows):
     """Fill under its own weight settles by γ H² / 2E at its top, where there are few rows too."""
     slick, held = af.Contact(1e13, 1e13, 0.0), af.Contact(1e13, 1e13, None)
     size = HEIGHT / (1.5 * rows)
-    fill = jointed_fill(box(2.0 * size * sqrt(3.0), held, slick), size, angle=45.0, cohesion=1e9)
+    fill = jointed_fill(
+        box(2.0 * size * sqrt(3.0), held, slick), size, friction_angle=45.0, cohesion=1e9
+    )
     model = af.build(fill, fidelity="rigid", cells=(1, 1))
     q = af.dead_load(model).q.reshape(-1, 3)
     work = sum(fill.blocks[n].area * 18e3 * -q[k, 1] for k, n in enumerate(fill.free))
@@ -162,7 +164,7 @@ def test_limit_analysis_of_the_pieces_finds_the_same_wedges(angle, passive):
 def test_between_fixed_walls_pieces_that_dilate_bear_any_load():
     """They lock; round-off keeps the solver from saying so within its usual tolerance."""
     rough = af.Contact(0.3e9, 0.24e9, tan(radians(30.0)))
-    fill = jointed_fill(box(3.0, rough, rough), 0.7, angle=35.0)
+    fill = jointed_fill(box(3.0, rough, rough), 0.7, friction_angle=35.0)
     found = af.collapse_factor(fill, live=af.PointLoad(1.5, (0.0, -1e3)))
     assert found.outcome.sentence == "this load never overturns it"
 
@@ -184,8 +186,8 @@ def test_dry_pieces_do_not_stand_with_a_free_upright_end():
     open_end = af.masonry.assembled(
         [whole.blocks[number] for number in free], lambda a, b: af.Contact(1e9, 4e8, 0.6)
     )
-    assert not af.stands(jointed_fill(open_end, 0.5, angle=30.0))
-    assert af.stands(jointed_fill(open_end, 0.5, angle=30.0, cohesion=18e3 * HEIGHT / 4.0))
+    assert not af.stands(jointed_fill(open_end, 0.5, friction_angle=30.0))
+    assert af.stands(jointed_fill(open_end, 0.5, friction_angle=30.0, cohesion=18e3 * HEIGHT / 4.0))
 
 
 @pytest.mark.slow
@@ -203,7 +205,7 @@ def test_fill_bears_no_tension():
     """Elastic fill hangs between walls that part; pieces open, and rest on the floor."""
     glue = af.Contact(1e10, 1e10, None)
     whole = box(3.0, glue, glue)
-    torn = jointed_fill(whole, 0.5, angle=30.0)
+    torn = jointed_fill(whole, 0.5, friction_angle=30.0)
     model = af.build(torn, fidelity="rigid", cells=(1, 1))
     normal = af.dead_load(model.settled(af.Settlement("wall", (0.01, 0.0, 0.0)))).joints["N"]
     assert normal.values.min() >= 0.0
@@ -221,7 +223,7 @@ def test_pieces_fill_the_body_and_are_soil_still():
         arches=[af.shapes.Arch(measured="centre line", name="arch", **ring)],
         backfill=af.shapes.Backfill(cover=0.5),
     )
-    fill = jointed_fill(whole, 0.4, angle=35.0, cohesion=5e3)
+    fill = jointed_fill(whole, 0.4, friction_angle=35.0, cohesion=5e3)
     soil = find_yielding_blocks(fill)
     assert sum(fill.blocks[n].area for n in soil) == pytest.approx(whole.blocks[-1].area)
     assert {fill.blocks[n].part for n in soil} == {"backfill"}
@@ -250,18 +252,18 @@ def test_pieces_fill_the_body_and_are_soil_still():
 def test_invalid_input_is_refused(size, angle, words):
     whole = box(3.0, SOIL_TO_STONE, SOIL_TO_STONE)
     with pytest.raises(af.InvalidInput, match=words):
-        jointed_fill(whole, size, angle=angle)
+        jointed_fill(whole, size, friction_angle=angle)
 
 
 def test_a_structure_without_fill_is_refused(stack):
     with pytest.raises(af.InvalidInput, match="no fill to cut"):
-        jointed_fill(stack, 0.5, angle=30.0)
+        jointed_fill(stack, 0.5, friction_angle=30.0)
 
 
 def test_fill_is_cut_once():
     cut = smooth_box(30.0, 1)
     with pytest.raises(af.InvalidInput, match="into pieces already"):
-        jointed_fill(cut, 0.5, angle=30.0)
+        jointed_fill(cut, 0.5, friction_angle=30.0)
 
 
 def test_pieces_are_halves_of_equilateral_triangles():
@@ -300,7 +302,7 @@ def test_slivers_are_joined_to_their_neighbour(part, pieces):
 
 def test_pieces_are_a_thousand_times_as_stiff_as_their_fill():
     slick = af.Contact(1e13, 1e13, 0.0)
-    fill = jointed_fill(box(3.0, slick, slick), 1.0, angle=30.0)
+    fill = jointed_fill(box(3.0, slick, slick), 1.0, friction_angle=30.0)
     young = {block.material.young for block in fill.blocks if block.grain}
     assert [*young] == [pytest.approx(6.25e9)]
 
@@ -312,7 +314,7 @@ def test_pieces_are_counted_by_their_area():
 
     def cut(count):
         piece = 3.0 * HEIGHT / count
-        return jointed_fill(whole, sqrt(8.0 * piece / sqrt(3.0)), angle=30.0)
+        return jointed_fill(whole, sqrt(8.0 * piece / sqrt(3.0)), friction_angle=30.0)
 
     assert len(cut(2.1).blocks) > len(whole.blocks)
     with pytest.raises(af.InvalidInput, match=r"make 1\.9 of a fill"):
@@ -329,7 +331,7 @@ def test_the_tiling_goes_with_a_long_fill_wherever_it_lies():
             replace(each, outline=tuple(map(tuple, (each.points + place).tolist())))
             for each in box(6.0, smooth, smooth, height=0.3).blocks
         ]
-        cut = jointed_fill(af.masonry.assembled(blocks, smooth), 0.3, angle=30.0)
+        cut = jointed_fill(af.masonry.assembled(blocks, smooth), 0.3, friction_angle=30.0)
         found.append([each for each in cut.blocks if each.grain])
     assert sum(each.area for each in found[0]) == pytest.approx(6.0 * 0.3)
     for here, there in zip(*found, strict=True):
@@ -352,7 +354,7 @@ def test_joints_to_stone_are_in_series_with_the_fill_beside_them():
         body(left, "left wall", fixed=True),
         body([(-x, y) for x, y in left[::-1]], "right wall", fixed=True),
     ]
-    cut = jointed_fill(af.masonry.assembled(blocks, stone), size, angle=30.0)
+    cut = jointed_fill(af.masonry.assembled(blocks, stone), size, friction_angle=30.0)
     soil = (sqrt(3.0) - 1.0) / 4.0 * size / BACKFILL.young
     against = [j for j in cut.joints if not all(cut.blocks[n].grain for n in j.blocks)]
     assert len(against) == 4 + 2 + 2

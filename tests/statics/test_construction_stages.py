@@ -38,7 +38,7 @@ def bridge():
         paving=af.shapes.Paving(thickness=0.2),
         width=4.0,
     )
-    return af.masonry.jointed_fill(whole, 0.8, angle=35.0, cohesion=10e3)
+    return af.masonry.jointed_fill(whole, 0.8, friction_angle=35.0, cohesion=10e3)
 
 
 def upward(structure, motions):

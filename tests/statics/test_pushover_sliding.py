@@ -40,7 +40,9 @@ def boxed(length, size, angle=35.0):
         for name, (x, y, kind) in boxes.items()
     ]  # fmt: skip
     contact = af.Contact(0.3e9, 0.24e9, tan(radians(30.0)))
-    return af.masonry.jointed_fill(af.masonry.assembled(blocks, contact), size, angle=angle)
+    return af.masonry.jointed_fill(
+        af.masonry.assembled(blocks, contact), size, friction_angle=angle
+    )
 
 
 def filled_bridge(cohesion, above):
@@ -55,7 +57,7 @@ def filled_bridge(cohesion, above):
         backfill=af.shapes.Backfill(cover=0.5),
         width=4.0,
     )
-    return af.masonry.jointed_fill(whole, 0.8, angle=35.0, cohesion=cohesion)
+    return af.masonry.jointed_fill(whole, 0.8, friction_angle=35.0, cohesion=cohesion)
 
 
 def flat(structure):

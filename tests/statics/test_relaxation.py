@@ -85,7 +85,7 @@ def test_soil_joints_slide_and_newton_finds_the_dead_load(bridge, fidelity):
 
 def test_fill_in_pieces_creeps_to_rest(bridge):
     """Its free ends stand by cohesion; no joint bears more than Mohr and Coulomb."""
-    fill = af.masonry.jointed_fill(bridge, 0.8, angle=35.0, cohesion=10e3)
+    fill = af.masonry.jointed_fill(bridge, 0.8, friction_angle=35.0, cohesion=10e3)
     model = af.build(fill, fidelity="rigid", cells=(2, 1))
     found = af.dead_load(model)
     weight = self_weight(model)
@@ -96,7 +96,7 @@ def test_fill_in_pieces_creeps_to_rest(bridge):
 
 @pytest.mark.slow
 def test_upright_ends_of_dry_sand_flow(bridge):
-    fill = af.masonry.jointed_fill(bridge, 0.8, angle=20.0)
+    fill = af.masonry.jointed_fill(bridge, 0.8, friction_angle=20.0)
     with pytest.raises(
         af.DidNotConverge, match=r"joints slide .* it stands from a coefficient of friction"
     ):
@@ -109,7 +109,7 @@ def test_a_support_spreads_under_fill_in_pieces(bridge):
 
     The work of the weights is the thrust on the support, and falls as it gives way.
     """
-    fill = af.masonry.jointed_fill(bridge, 0.8, angle=35.0, cohesion=10e3)
+    fill = af.masonry.jointed_fill(bridge, 0.8, friction_angle=35.0, cohesion=10e3)
     model = af.build(fill, fidelity="rigid", cells=(2, 1))
     spread = af.Settlement("left wall, foundation", (-1.0, 0.0, 0.0))
     stop = af.statics.Stop(displacement=0.01)
@@ -121,7 +121,7 @@ def test_a_support_spreads_under_fill_in_pieces(bridge):
 
 def test_a_load_on_fill_in_pieces_continues_by_creep(bridge):
     """Each state is in balance and none beyond Coulomb; loads that cannot be borne add none."""
-    fill = af.masonry.jointed_fill(bridge, 0.8, angle=35.0, cohesion=10e3)
+    fill = af.masonry.jointed_fill(bridge, 0.8, friction_angle=35.0, cohesion=10e3)
     dead = af.dead_load(af.build(fill, fidelity="rigid", cells=(2, 1)))
     path = LoadPath.of(dead.model, [af.BodyForce(1.0)], dead)
     assert path.advance_by_relaxation(0.1, farthest=0.5)

@@ -83,7 +83,7 @@ def at_the_limit(away):
         found[f"{name}, hinges"] = [number for number, _ in each.hinges]
     axle = af.moving_load(bridge, 1e4, positions=x + np.array([3.0, 4.0]), fill=gravel)
     found["an axle"] = axle.factors["factor"].values
-    grains = af.masonry.jointed_fill(bridge, 1.0, angle=35.0)
+    grains = af.masonry.jointed_fill(bridge, 1.0, friction_angle=35.0)
     found["grains"] = [len(grains.blocks), sum(block.area for block in grains.blocks)]
     placed = af.masonry.usual_stages(bridge)
     found["stages"] = [len(stage.blocks) for stage in placed]

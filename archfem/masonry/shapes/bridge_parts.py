@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from archfem._typing import Angle, Metres, TableName
 from archfem._validation import check_type, is_number, short_repr
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Point
@@ -35,13 +36,13 @@ class Arch:
 
     role: ClassVar[str] = "ring"
 
-    span: float
-    thickness: float
+    span: Metres
+    thickness: Metres
     voussoirs: int
-    embrace: float | str | None = None
-    rise: float | None = None
+    embrace: Angle | None = None
+    rise: Metres | None = None
     measured: str = "intrados"
-    name: str = "arch"
+    name: TableName = "arch"
 
     def __post_init__(self) -> None:
         """Check the lengths, how they are measured, and the embrace."""
@@ -107,10 +108,10 @@ class Pier:
 
     role: ClassVar[str] = "pier"
 
-    gap: float
-    height: float
-    course: float = 0.40
-    name: str = "pier"
+    gap: Metres
+    height: Metres
+    course: Metres = 0.40
+    name: TableName = "pier"
 
     def __post_init__(self) -> None:
         """Check the lengths."""
@@ -133,13 +134,13 @@ class Sidewall:
 
     role: ClassVar[str] = "other"
 
-    length: float
-    height: float
-    course: float = 0.40
-    above: float = 0.0
-    setback: float = 0.40
+    length: Metres
+    height: Metres
+    course: Metres = 0.40
+    above: Metres = 0.0
+    setback: Metres = 0.40
     state: str = "free"
-    name: str = "sidewall"
+    name: TableName = "sidewall"
 
     def __post_init__(self) -> None:
         """Check the lengths, and that the courses are free, retained or fixed."""
@@ -165,10 +166,10 @@ class Backfill:
         contact: with stone.
     """
 
-    cover: float
-    erosion: float = 0.0
-    hump: float = 1.0
-    spandrels: float = 0.0
+    cover: Metres
+    erosion: Metres = 0.0
+    hump: Metres = 1.0
+    spandrels: Metres = 0.0
     material: Material = BACKFILL
     contact: Contact = SOIL_TO_STONE
     name: str = field(default="backfill", init=False)
@@ -222,8 +223,8 @@ class Paving:
         length: of a stone, about [m].
     """
 
-    thickness: float
-    length: float = 1.0
+    thickness: Metres
+    length: Metres = 1.0
     name: str = field(default="paving", init=False)
 
     def __post_init__(self) -> None:

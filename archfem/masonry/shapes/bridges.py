@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from archfem._typing import Angle, Metres, MetresPerSecondSquared
 from archfem._validation import check_numbers, validate_arguments
 from archfem.errors import InvalidStructure
 from archfem.masonry.assembly import assembled
@@ -30,11 +31,11 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
     sidewalls: Sequence[Sidewall] = (),
     backfill: Backfill | None = None,
     paving: Paving | None = None,
-    width: float = 1.0,
+    width: Metres = 1.0,
     material: Material = STONE,
     contact: Contact = STONE_TO_STONE,
     chords: int = 1,
-    gravity: float = G,
+    gravity: MetresPerSecondSquared = G,
 ) -> Structure:
     """Return a bridge built from its parts, from left to right.
 
@@ -127,28 +128,28 @@ def _check_cover(bottom: Sequence[Point], surface: Sequence[Point]) -> None:
         )
 
 
-# One number for all parts, or one for each, from left to right
-Numbers = float | Sequence[float]
+# One length for all parts, or one for each, from left to right
+Lengths = Metres | Sequence[Metres]
 
 
 @record_origin
 @validate_arguments
 def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one structure)
     *,
-    span: float,
-    thickness: float,
+    span: Metres,
+    thickness: Metres,
     voussoirs: int,
-    breadth: float,
-    height: float,
-    rise: float | None = None,
-    embrace: float | str | None = None,
+    breadth: Metres,
+    height: Metres,
+    rise: Metres | None = None,
+    embrace: Angle | None = None,
     measured: str = "intrados",
-    course: float = 0.40,
+    course: Metres = 0.40,
     chords: int = 1,
-    width: float = 1.0,
+    width: Metres = 1.0,
     material: Material = STONE,
     contact: Contact = STONE_TO_STONE,
-    gravity: float = G,
+    gravity: MetresPerSecondSquared = G,
 ) -> Structure:
     """Return a circular arch between two buttresses in courses, flush with its intrados.
 
@@ -184,20 +185,20 @@ def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one st
 @validate_arguments
 def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
     *,
-    spans: Sequence[float],
-    heights: Numbers,
-    breadths: Numbers,
-    thicknesses: Numbers,
+    spans: Sequence[Metres],
+    heights: Lengths,
+    breadths: Lengths,
+    thicknesses: Lengths,
     voussoirs: int | Sequence[int],
-    rises: Numbers | None = None,
-    embraces: float | str | Sequence[float | str] | None = None,
+    rises: Lengths | None = None,
+    embraces: Angle | Sequence[Angle] | None = None,
     measured: str = "intrados",
-    course: float = 0.40,
+    course: Metres = 0.40,
     chords: int = 1,
-    width: float = 1.0,
+    width: Metres = 1.0,
     material: Material = STONE,
     contact: Contact = STONE_TO_STONE,
-    gravity: float = G,
+    gravity: MetresPerSecondSquared = G,
 ) -> Structure:
     """Return circular arches in a row, on piers between them and under both ends.
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from archfem._typing import Array
+from archfem._typing import Angle, Array, Metres, MetresPerSecondSquared
 from archfem._validation import check_integer, check_number, check_numbers, validate_arguments
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_points
@@ -95,17 +95,17 @@ class RingGeometry:
 @record_origin
 def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
-    thickness: float,
+    thickness: Metres,
     voussoirs: int,
-    radius: float | None = None,
-    embrace: float | str | None = None,
-    span: float | None = None,
-    rise: float | None = None,
-    width: float = 1.0,
+    radius: Metres | None = None,
+    embrace: Angle | None = None,
+    span: Metres | None = None,
+    rise: Metres | None = None,
+    width: Metres = 1.0,
     material: Material = STONE,
     contact: Contact = STONE_TO_STONE,
     chords: int | None = None,
-    gravity: float = G,
+    gravity: MetresPerSecondSquared = G,
 ) -> Structure:
     """Return a ring of equal voussoirs with radial joints between two fixed abutments.
 
@@ -172,12 +172,12 @@ def _check_division(embrace: float, voussoirs: int, pieces: int) -> tuple[int, i
 @record_origin
 def column(
     *,
-    breadth: float,
-    heights: Sequence[float],
-    width: float = 1.0,
+    breadth: Metres,
+    heights: Sequence[Metres],
+    width: Metres = 1.0,
     material: Material = STONE,
     contact: Contact = STONE_TO_STONE,
-    gravity: float = G,
+    gravity: MetresPerSecondSquared = G,
 ) -> Structure:
     """Return rectangular blocks on a fixed base; one block is the classical rocking block.
 
@@ -216,16 +216,16 @@ def column(
 @record_origin
 def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one structure)
     *,
-    radius: float,
-    thickness: float,
+    radius: Metres,
+    thickness: Metres,
     voussoirs: int,
-    pier_breadth: float,
-    courses: Sequence[float],
-    width: float = 1.0,
+    pier_breadth: Metres,
+    courses: Sequence[Metres],
+    width: Metres = 1.0,
     material: Material = STONE,
     contact: Contact = STONE_TO_STONE,
     chords: int | None = None,
-    gravity: float = G,
+    gravity: MetresPerSecondSquared = G,
 ) -> Structure:
     """Return a semicircular ring on two piers, centred under its feet.
 
@@ -341,15 +341,15 @@ def _build_abutment(
 @validate_arguments
 def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
-    span: float,
-    rise: float,
-    thickness: float,
+    span: Metres,
+    rise: Metres,
+    thickness: Metres,
     voussoirs: int,
     chords: int = 4,
-    width: float = 1.0,
+    width: Metres = 1.0,
     material: Material = STONE,
     contact: Contact = STONE_TO_STONE,
-    gravity: float = G,
+    gravity: MetresPerSecondSquared = G,
 ) -> Structure:
     """Return a pointed arch of two circular arcs centred on the springing level.
 
@@ -399,15 +399,15 @@ def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
 @validate_arguments
 def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
-    span: float,
-    rise: float,
-    thickness: float,
+    span: Metres,
+    rise: Metres,
+    thickness: Metres,
     voussoirs: int,
     chords: int = 4,
-    width: float = 1.0,
+    width: Metres = 1.0,
     material: Material = STONE,
     contact: Contact = STONE_TO_STONE,
-    gravity: float = G,
+    gravity: MetresPerSecondSquared = G,
 ) -> Structure:
     """Return an arch whose intrados is half an ellipse, of stones of equal length along it.
 
@@ -449,14 +449,14 @@ def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ri
 @validate_arguments
 def flat_arch(
     *,
-    span: float,
-    thickness: float,
+    span: Metres,
+    thickness: Metres,
     voussoirs: int,
-    skewback: float | str,
-    width: float = 1.0,
+    skewback: Angle,
+    width: Metres = 1.0,
     material: Material = STONE,
     contact: Contact = STONE_TO_STONE,
-    gravity: float = G,
+    gravity: MetresPerSecondSquared = G,
 ) -> Structure:
     """Return a flat arch with horizontal faces, whose joints converge in one point below.
 
@@ -494,13 +494,13 @@ def flat_arch(
 def arch_along(
     intrados: Sequence[Point] | Array,
     *,
-    thickness: float,
+    thickness: Metres,
     voussoirs: int,
     chords: int = 4,
-    width: float = 1.0,
+    width: Metres = 1.0,
     material: Material = STONE,
     contact: Contact = STONE_TO_STONE,
-    gravity: float = G,
+    gravity: MetresPerSecondSquared = G,
 ) -> Structure:
     """Return an arch along any intrados, of stones of equal length along it.
 

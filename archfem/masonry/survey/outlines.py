@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from archfem._files import atomic_write
-from archfem._typing import Array
+from archfem._typing import Array, Metres, MetresPerSecondSquared
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.assembly import assembled, by_materials, touching
@@ -71,7 +71,7 @@ def read_outlines(
     path: str | Path,
     *,
     unit: str | None = None,
-    snap: float = 1e-3,
+    snap: Metres = 1e-3,
     layers: Mapping[str, Layer] | None = None,
     material: Material = STONE,
     materials: Materials = MATERIAL_PRESETS,
@@ -119,14 +119,14 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
     path: str | Path,
     *,
     unit: str | None = None,
-    snap: float = 1e-3,
+    snap: Metres = 1e-3,
     layers: Mapping[str, Layer] | None = None,
     material: Material = STONE,
     materials: Materials = MATERIAL_PRESETS,
     contact: Contact = STONE_TO_STONE,
     contacts: Mapping[str, Contact] = {"stone/backfill": SOIL_TO_STONE},
-    width: float = 1.0,
-    gravity: float = G,
+    width: Metres = 1.0,
+    gravity: MetresPerSecondSquared = G,
 ) -> Structure:
     """Assemble a structure from the outlines in a drawing.
 
