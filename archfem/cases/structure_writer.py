@@ -120,10 +120,9 @@ def _write_argument(value: Any, names: _PresetNames) -> Any:
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     if is_dataclass(value) and not isinstance(value, type):  # a part of a bridge
-        own = {
-            each.name: _write_argument(getattr(value, each.name), names) for each in fields(value)
-        }
-        return {key: each for key, each in own.items() if each is not None}
+        own = {each.name: getattr(value, each.name) for each in fields(value)}
+        defaults = {each.name: each.default for each in fields(value)}
+        return {k: _write_argument(v, names) for k, v in own.items() if v != defaults[k]}
     if isinstance(value, Sequence):
         items = [_write_argument(each, names) for each in value]
         named = items and all(isinstance(each, dict) for each in items)

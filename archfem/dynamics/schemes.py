@@ -271,13 +271,13 @@ def check_friction_scheme(scheme: Scheme, structure: Structure) -> None:
     if structure.has_own_laws:
         raise InvalidInput(
             f"{name} follows no history, and contacts have a law of their own: use "
-            "scheme=Conserving(), the default"
+            'scheme=Conserving(), the default, in a case "conserving"'
         )
     if np.isfinite(friction).any():
         raise InvalidInput(
             f"{name} follows no sliding, and joints slide at "
-            f"μ = {np.min(friction):g}: use scheme=Conserving(), the default, or joints that never "
-            "slide, Contact(friction=None)"
+            f"μ = {np.min(friction):g}: use scheme=Conserving(), the default, in a case "
+            '"conserving"; or joints that never slide, Contact(friction=None), in a case "none"'
         )
     if structure.tension.any():
         raise InvalidInput(
