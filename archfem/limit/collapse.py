@@ -25,7 +25,13 @@ from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weigh
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement, list_loads
-from archfem.masonry.structure import Structure, join_joint_names, join_names
+from archfem.masonry.structure import (
+    HasStructure,
+    Structure,
+    join_joint_names,
+    join_names,
+    structure_of,
+)
 
 logger = logging.getLogger("archfem")
 
@@ -105,7 +111,7 @@ class Collapse(ResultDisplay):
 
 
 def collapse_factor(
-    structure: Structure,
+    structure: Structure | HasStructure,
     *,
     live: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
     friction: str | None = "coulomb",
@@ -140,7 +146,7 @@ def collapse_factor(
     give the least thrust of an arch and closing supports the greatest.
 
     Args:
-        structure: supports are its fixed blocks.
+        structure: supports are its fixed blocks; or an `archfem.Analysis` of it.
         live: one action, or several that grow together; a `Settlement` stands alone.
         friction: "coulomb" holds |V| <= c A + μ N with sliding that dilates (associated), so that
             with sliding joints the factor is an upper estimate and a warning is logged;
@@ -171,6 +177,7 @@ def collapse_factor(
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279. Livesley, Int. J. Numer. Meth. Eng. 12
         (1978) 1853-1871. Ferris and Tin-Loi, Int. J. Mech. Sci. 43 (2001) 209-224.
     """
+    structure = structure_of(structure)
     actions = (live,) if isinstance(live, Settlement) else tuple(list_loads(live))
     stones, dead = self_weight_programme(structure, friction, strength, fill)
     result = _solve_collapse(structure, stones, dead, live, friction)
@@ -178,7 +185,7 @@ def collapse_factor(
 
 
 def stands(
-    structure: Structure,
+    structure: Structure | HasStructure,
     *,
     friction: str | None = "coulomb",
     strength: float | None = None,
@@ -193,7 +200,7 @@ def stands(
     and the structure stands where they vanish.
 
     Args:
-        structure: supports are its fixed blocks.
+        structure: supports are its fixed blocks; or an `archfem.Analysis` of it.
         friction: "coulomb" or "nonassociated", here the same, holds |V| <= c A + μ N; None
             forbids sliding.
         strength: compressive strength of the blocks [Pa], as for `collapse_factor`; None for no
@@ -214,7 +221,7 @@ def stands(
         >>> af.stands(af.circular_arch(radius=1.0, thickness=0.05, embrace=180.0, voussoirs=11))
         False
     """
-    _, dead = self_weight_programme(structure, friction, strength, fill)
+    _, dead = self_weight_programme(structure_of(structure), friction, strength, fill)
     return is_balanced(dead.minimise_residual(), dead)
 
 

@@ -21,7 +21,7 @@ from archfem.limit.instability import DeepenedBlocks
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
 from archfem.masonry.loads import PointLoad
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import HasStructure, Structure, structure_of
 
 DRIVING_DIRECTIONS = ("right", "left")
 
@@ -103,7 +103,7 @@ class MovingLoad(ResultDisplay):
 
 
 def moving_load(
-    structure: Structure,
+    structure: Structure | HasStructure,
     axles: float | Sequence[float],
     *,
     spacings: Sequence[float] = (),
@@ -122,7 +122,7 @@ def moving_load(
     `collapse_factor` follows at the worst place, and where that finds nothing.
 
     Args:
-        structure: the bridge.
+        structure: the bridge, or an `archfem.Analysis` of it.
         axles: weight of each axle over the bridge's whole width, from the front [N].
         spacings: distances between the axles, one fewer [m].
         positions: x of the vehicle's middle, halfway between first and last axle (n,) [m]; by
@@ -143,6 +143,7 @@ def moving_load(
     References:
         Gilbert, RING Theory and Modelling Guide, University of Sheffield (2005).
     """
+    structure = structure_of(structure)
     stones, dead = self_weight_programme(structure, friction, strength, fill)
     vehicle = _parse_axles(axles, spacings)
     places = _vehicle_positions(structure, vehicle, positions)
@@ -264,7 +265,7 @@ class Rating(ResultDisplay):
 
 @validate_arguments
 def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridge)
-    structure: Structure,
+    structure: Structure | HasStructure,
     vehicle: str | Vehicle,
     *,
     live: float | None = None,
@@ -284,7 +285,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     until it is carried no longer; or deepened until it is carried.
 
     Args:
-        structure: the bridge.
+        structure: the bridge, or an `archfem.Analysis` of it.
         vehicle: one of `archfem.limit.VEHICLES` by its name, or one's own.
         live: partial factor on its weight [-]; by default that of its code.
         impact: dynamic factor on its weight [-]; by default that of its code, but 1 for LM71, whose
@@ -308,7 +309,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     References:
         Heyman, The Masonry Arch, Ellis Horwood (1982).
     """
-    driven = _find_vehicle(vehicle)
+    structure, driven = structure_of(structure), _find_vehicle(vehicle)
     live = driven.live if live is None else _check_factor(live, "live, factor on the vehicle")
     impact = driven.impact if impact is None else _check_factor(impact, "impact, dynamic factor")
     _check_factor(dead, "dead, factor on the weights")

@@ -12,14 +12,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from numbers import Integral
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from archfem._display import ResultDisplay
 from archfem._typing import Array, Metres, MetresPerSecondSquared
-from archfem._validation import check_fields, check_number
+from archfem._validation import check_fields, check_number, check_type
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_overlaps
 from archfem.masonry.materials import Contact
@@ -365,6 +365,21 @@ class Structure(ResultDisplay):
             InvalidInput: there is no such block; the nearest name is suggested.
         """
         return find_number("block", [each.name for each in self.blocks], block)
+
+
+class HasStructure(Protocol):
+    """A value of which a structure is a part, such as an `archfem.Analysis`."""
+
+    @property
+    def structure(self) -> Structure:
+        """Blocks and joints."""
+
+
+def structure_of(subject: Structure | HasStructure) -> Structure:
+    """Return a structure, or that of an analysis."""
+    found: Any = subject if isinstance(subject, Structure) else getattr(subject, "structure", None)
+    check_type(found, Structure, "structure", "give a Structure, e.g. circular_arch(…)")
+    return found  # type: ignore[no-any-return]
 
 
 def record_origin(shape: Shape) -> Shape:

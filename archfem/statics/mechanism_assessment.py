@@ -38,7 +38,13 @@ from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
 from archfem.masonry.loads import AttachedLoad, BodyForce
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import Structure, join_joint_names, join_names
+from archfem.masonry.structure import (
+    HasStructure,
+    Structure,
+    join_joint_names,
+    join_names,
+    structure_of,
+)
 from archfem.motion.design_spectra import (
     DesignSpectrum,
     Eurocode8,
@@ -290,7 +296,7 @@ class KinematicAssessment(ResultDisplay):
 
 @validate_arguments
 def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are arguments)
-    structure: Structure,
+    structure: Structure | HasStructure,
     spectrum: DesignSpectrum | Motion,
     *,
     direction: float = 1.0,
@@ -318,7 +324,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     height of a building are not built here; give one as a `TableSpectrum`, or a `Motion`.
 
     Args:
-        structure: supports are its fixed blocks.
+        structure: supports are its fixed blocks; or an `archfem.Analysis` of it.
         spectrum: elastic design spectrum, 5 % damped unless it has a `damping`, corrected to that
             of the limit state by η = √(10/(5 + ξ)) >= 0.55; or a ground motion, whose response
             spectrum is the demand. Beyond 4 s the spectral displacement of European codes is held.
@@ -367,6 +373,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     for name, value, most in (("q", q, 10.0), ("confidence_factor", confidence_factor, 2.0)):
         if not 1.0 <= check_number(value, f"{name} [-]") <= most:
             raise InvalidInput(f"{name} {value:.4g} is not between 1 and {most:g}")
+    structure = structure_of(structure)
     _check_structure(structure, friction, loads)
     stones, fill = _take_fill_as_loads(structure)
     joints = _select_joints(stones, part, blocks)
