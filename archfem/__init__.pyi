@@ -23,6 +23,7 @@ from .dynamics.motion_scaling import collapse_scale as collapse_scale
 from .dynamics.motion_scaling import mechanism_scales as mechanism_scales
 from .dynamics.recorder import Record as Record
 from .dynamics.schemes import HHT as HHT
+from .dynamics.schemes import EffectiveDamping as EffectiveDamping
 from .dynamics.schemes import Rayleigh as Rayleigh
 from .dynamics.schemes import StiffnessDamping as StiffnessDamping
 from .dynamics.time_history import time_history as time_history

@@ -5,14 +5,14 @@ Either way the tables are read once and compared, so that a file has every bit o
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass
 from math import inf
 from typing import Any
 
 import numpy as np
 
 from archfem._validation import declared_keys
-from archfem.cases.structure_keys import build_structure
+from archfem.cases.structure_keys import cached_structure
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.own_law import registered_laws
 from archfem.masonry.block import Block
@@ -32,7 +32,7 @@ def write_structure(structure: Structure) -> dict[str, Any]:
             continue
         tables = {"title": structure.name, "structure": section, **names.sections}
         try:
-            if replace(build_structure(tables), name=structure.name) == structure:
+            if cached_structure(tables) == structure:  # which reading the file takes again
                 return tables
         except ArchfemError:  # lengths of one's own shape, or changed after it was made
             if write is _write_blocks:

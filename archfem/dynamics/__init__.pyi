@@ -20,6 +20,7 @@ from .rigid_body.bodies import LooseBlocks as LooseBlocks
 from .rigid_body.time_stepping import RigidBlockSimulation as RigidBlockSimulation
 from .schemes import HHT as HHT
 from .schemes import Conserving as Conserving
+from .schemes import EffectiveDamping as EffectiveDamping
 from .schemes import Newmark as Newmark
 from .schemes import Rayleigh as Rayleigh
 from .schemes import StiffnessDamping as StiffnessDamping

@@ -379,7 +379,7 @@ def structure_of(subject: Structure | HasStructure) -> Structure:
     """Return a structure, or that of an analysis."""
     found: Any = subject if isinstance(subject, Structure) else getattr(subject, "structure", None)
     check_type(found, Structure, "structure", "give a Structure, e.g. circular_arch(…)")
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def record_origin(shape: Shape) -> Shape:
