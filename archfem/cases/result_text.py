@@ -11,7 +11,7 @@ from archfem._files import align_columns
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import Ending, History
-from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION, DetectedMechanism
+from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
 from archfem.joints.criteria import (
     assessed_joints,
     envelope,
@@ -20,7 +20,7 @@ from archfem.joints.criteria import (
     with_failure_flags,
 )
 from archfem.limit.collapse import Collapse, Outcome
-from archfem.limit.mechanism_count import duration_text
+from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.masonry.structure import Structure, join_joint_names, join_names
 from archfem.motion.matching import Match
 from archfem.motion.motion import Motion
@@ -223,15 +223,16 @@ def format_ratio(value: float) -> str:
     return f"{value:.3f}" if value < 100.0 else "> 100"
 
 
-def _mechanism_cell(mechanisms: Mapping[str, DetectedMechanism | None], definition: str) -> str:
+def _mechanism_cell(mechanisms: Mapping[str, Mechanism | None], definition: str) -> str:
     """Return the cell of a mechanism: class, time, duration and opening."""
     if definition not in mechanisms:  # it does not apply, or the structure is unknown
         return "-"
     found = mechanisms[definition]
     if found is None:
         return "none"
+    assert found.duration is not None  # a run has a duration
     opening = "" if found.opening is None else f", {format_mm(found.opening)}"
-    return f"{found.mechanism.kind} {found.time:.2f} s, {duration_text(found.duration)}{opening}"
+    return f"{found.kind} {found.time:.2f} s, {duration_text(found.duration)}{opening}"
 
 
 def _seconds(value: float) -> str:

@@ -31,6 +31,5 @@ from .state import Batch as Batch
 from .state import State as State
 from .time_history import last_state as last_state
 from .verdict import MECHANISM_DEFINITIONS as MECHANISM_DEFINITIONS
-from .verdict import DetectedMechanism as DetectedMechanism
 from .verdict import Verdict as Verdict
 from .verdict_range import VerdictRange as VerdictRange

@@ -9,7 +9,7 @@ evaluate the costly condition (mechanism count, rigid-block motion) once per dis
 
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import InitVar, dataclass
+from dataclasses import dataclass
 from functools import partial, wraps
 from typing import Any, Protocol, runtime_checkable
 
@@ -23,8 +23,8 @@ from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     Criteria,
     DurationCounter,
+    check_criteria,
     judge_joints,
-    merge_criteria,
     sliding_ratio,
     tension_margin,
 )
@@ -215,13 +215,6 @@ class CountedMechanism:
         over: "instant" counts joints that have failed at once; "record" counts each joint from its
             first failure on, within one ring or one pier, see `limit.mechanism_over_record`.
 
-    Args:
-        criteria: as above.
-        kinds: as above.
-        over: as above.
-        limit: |e| of a hinge, instead of criteria [-].
-        failures: number of failures of a mechanism, instead of criteria.
-
     Raises:
         InvalidInput: unknown class, or a value out of range.
     """
@@ -229,12 +222,9 @@ class CountedMechanism:
     criteria: Criteria | None = None
     kinds: tuple[str, ...] = MECHANISM_KINDS
     over: str = "instant"
-    limit: InitVar[float | None] = None
-    failures: InitVar[int | None] = None
 
-    def __post_init__(self, limit: float | None, failures: int | None) -> None:
-        criteria = merge_criteria(self.criteria, hinge=limit, failures=failures)
-        object.__setattr__(self, "criteria", criteria)
+    def __post_init__(self) -> None:
+        check_criteria(self.criteria)
         _check_kinds(self.kinds)
         if not is_one_of(self.over, ("instant", "record")):
             raise InvalidInput(f"over = {self.over!r}: count failures over 'instant' or 'record'")
@@ -286,21 +276,15 @@ class MovingMechanism:
             become those of the run.
         kinds: classes that end the run, of "local", "semi-global" and "global".
 
-    Args:
-        criteria: as above.
-        kinds: as above.
-        limit: |e| of a hinge, instead of criteria [-].
-
     Raises:
         InvalidInput: unknown class, or a value out of range.
     """
 
     criteria: Criteria | None = None
     kinds: tuple[str, ...] = MECHANISM_KINDS
-    limit: InitVar[float | None] = None
 
-    def __post_init__(self, limit: float | None) -> None:
-        object.__setattr__(self, "criteria", merge_criteria(self.criteria, hinge=limit))
+    def __post_init__(self) -> None:
+        check_criteria(self.criteria)
         _check_kinds(self.kinds)
 
     def start_monitor(self, structure: Structure, criteria: Criteria) -> EventMonitor:
@@ -338,19 +322,14 @@ class EveryMechanism:
         criteria: failure criteria of joints and number of failures of a mechanism; None for those
             of the run. Criteria given here alone become those of the run.
 
-    Args:
-        criteria: as above.
-        limit: |e| of a hinge, instead of criteria [-].
-
     Raises:
         InvalidInput: a value is out of range.
     """
 
     criteria: Criteria | None = None
-    limit: InitVar[float | None] = None
 
-    def __post_init__(self, limit: float | None) -> None:
-        object.__setattr__(self, "criteria", merge_criteria(self.criteria, hinge=limit))
+    def __post_init__(self) -> None:
+        check_criteria(self.criteria)
 
     def start_monitor(self, structure: Structure, criteria: Criteria) -> EventMonitor:
         """Create the monitor of one run, which stores the definitions met so far.

@@ -186,7 +186,10 @@ class History(ResultDisplay):
         if counted is None or self.structure is None:
             return counted
         motion = verified_mechanism(self.structure, self.joints.sel(time=counted.time))
-        return counted if motion.kind == "none" else replace(counted, blocks=motion.moved.blocks)
+        if motion.kind == "none":
+            return counted
+        moved = motion.moved
+        return replace(counted, blocks=moved.blocks, block_names=moved.block_names)
 
     @cached_property
     def verified(self) -> VerifiedMechanism | None:
@@ -495,11 +498,8 @@ def first_mechanisms(run: History, criteria: Criteria | None = None) -> dict[str
             "History.read(path, structure)"
         )
     judged = run if criteria is None else run.with_criteria(criteria)
-    found = {name: judged.verdict.mechanisms.get(name) for name in MECHANISM_DEFINITIONS}
-    found[PUBLISHED_DEFINITION] = judged.verdict.mechanisms[PUBLISHED_DEFINITION]
-    return {
-        name: None if detected is None else detected.mechanism for name, detected in found.items()
-    }
+    definitions = (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
+    return {name: judged.verdict.mechanisms.get(name) for name in definitions}
 
 
 def corner_displacements(model: Model, fields: Array) -> xr.Dataset:

@@ -1,6 +1,6 @@
 """Verdict of a run: outcome, doubts, displacements, and the first mechanism by each definition."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,23 +10,20 @@ from archfem.dynamics.fall import CollapseState
 from archfem.joints.criteria import (
     Criteria,
     assessed_joints,
-    find_failed_joints,
     longest_duration,
     step_lengths,
     with_failure_flags,
 )
 from archfem.limit.mechanism_count import (
     OVER_RECORD,
-    Episode,
     Mechanism,
     counted_mechanisms,
     demirel_aldemir_mechanism,
     duration_text,
-    episode,
     has_counted_mechanism,
 )
 from archfem.limit.mechanism_kinematics import first_verified_mechanism
-from archfem.masonry.structure import Structure, join_joint_names, join_names
+from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt
 from archfem.units import format_mm, mm
 
@@ -41,44 +38,6 @@ MECHANISM_DEFINITIONS = (
 
 # Criterion of `demirel_aldemir_mechanism`
 PUBLISHED_DEFINITION = "Demirel and Aldemir"
-
-
-@dataclass(frozen=True)
-class DetectedMechanism:
-    """First mechanism of a run by one definition.
-
-    Attributes:
-        mechanism: the mechanism with its class, part, joints and time.
-        duration: time for which all its joints stay failed; of "one part over the record", time
-            from the first failure of its joints to the last one needed [s].
-        opening: largest opening of any of its joints meanwhile; of "one part over the record", at
-            any time of the run [m]. None where openings are not recorded.
-        words: description of the duration.
-    """
-
-    mechanism: Mechanism
-    duration: float
-    opening: float | None
-    words: str
-
-    @property
-    def time(self) -> float:
-        """Time at which it begins [s]."""
-        assert self.mechanism.time is not None
-        return self.mechanism.time
-
-    @property
-    def joints(self) -> tuple[int, ...]:
-        """Numbers of its joints."""
-        return self.mechanism.joints
-
-    def __str__(self) -> str:
-        """Class, part, time, joints, duration and opening."""
-        mechanism = self.mechanism
-        return (
-            f"{mechanism.kind} mechanism of {mechanism.part} at {self.time:.3f} s by "
-            f"{join_joint_names(mechanism.names)}; {self.words}"
-        )
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -107,7 +66,7 @@ class Verdict:
     doubts: tuple[Doubt, ...]
     displacement: float
     residual: float
-    mechanisms: Mapping[str, DetectedMechanism | None]
+    mechanisms: Mapping[str, Mechanism | None]
     fall: CollapseState | None = None
     incomplete: str = ""
     remarks: tuple[str, ...] = ()
@@ -158,7 +117,7 @@ class Verdict:
 
 def detect_mechanisms(
     joints: xr.Dataset, structure: Structure | None
-) -> dict[str, DetectedMechanism | None]:
+) -> dict[str, Mechanism | None]:
     """Find the first mechanism by each definition that applies.
 
     "Verified" needs the structure, and "ring and pier at once" needs both.
@@ -170,50 +129,24 @@ def detect_mechanisms(
         verified = first_verified_mechanism(structure, joints)
         first["verified"] = None if verified is None else verified.moved
     first[PUBLISHED_DEFINITION] = demirel_aldemir_mechanism(joints)
-    blocks = [block.name for block in structure.blocks] if structure else []
-    return {
-        name: None if mechanism is None else _follow(name, mechanism, joints, blocks)
-        for name, mechanism in first.items()
-    }
-
-
-def _follow(
-    definition: str, mechanism: Mechanism, joints: xr.Dataset, blocks: Sequence[str]
-) -> DetectedMechanism:
-    """Return a mechanism with its duration and opening; `blocks` are the names of all blocks."""
-    if definition != OVER_RECORD:
-        lasting: Episode = episode(joints, mechanism)
-        words = str(lasting)
-        if mechanism.blocks:
-            words += f"; moving: {join_names([blocks[k] for k in mechanism.blocks], '; ')}"
-        return DetectedMechanism(mechanism, lasting.duration, lasting.opening, words)
-    own = joints.isel(joint=np.isin(joints["joint"].values, mechanism.joints))
-    begin = float(joints["time"][find_failed_joints(own).any("joint").values.argmax()])
-    assert mechanism.time is not None
-    duration = mechanism.time - begin
-    opening = float(own["opening"].max()) if "opening" in own else None
-    words = f"they failed one after the other within {duration_text(duration)}"
-    words += "" if opening is None else f", and open by up to {format_mm(opening)}"
-    return DetectedMechanism(mechanism, duration, opening, words)
+    return first
 
 
 def brief_mechanism_remarks(
-    joints: xr.Dataset,
-    structure: Structure | None,
-    detected: Mapping[str, DetectedMechanism | None],
+    joints: xr.Dataset, structure: Structure | None, detected: Mapping[str, Mechanism | None]
 ) -> list[str]:
     """Return remarks on earlier mechanisms that are shorter than the criteria require."""
     criteria = Criteria.of(joints)
     if step_lengths(joints["time"].values).min() >= criteria.duration:
         return []
     loose = with_failure_flags(joints, replace(criteria, duration=0.0))
-    begins: dict[float, list[str]] = {}
+    begins: dict[float | None, list[str]] = {}
     for name, brief in detect_mechanisms(loose, structure).items():
         counted = detected[name]
         # over the record each joint counts only once its failure has lasted: it is never brief
         if name == OVER_RECORD or brief is None:
             continue
-        if counted is None or brief.time < counted.time:
+        if counted is None or brief.time != counted.time:
             begins.setdefault(brief.time, []).append(name)
     return [
         f"{join_names(names)}: what begins at {time:.4f} s lasts less than "

@@ -139,14 +139,10 @@ class Criteria:
         return own if self.friction is None else np.zeros_like(own)
 
 
-def merge_criteria(criteria: Criteria | None, **single: Any) -> Criteria | None:
-    """Return criteria given as a whole, or with single values changed from the default."""
+def check_criteria(criteria: object) -> None:
+    """Refuse what is neither criteria nor None."""
     if criteria is not None:
         check_type(criteria, Criteria, "criteria", "give Criteria(hinge=…, failures=…)")
-    given = {key: value for key, value in single.items() if value is not None}
-    if given and criteria is not None:
-        raise InvalidInput(f"give {given} in criteria=Criteria(…), or without criteria; not both")
-    return Criteria(**given) if given else criteria
 
 
 def sliding_ratio(
@@ -213,7 +209,8 @@ def with_failure_flags(joints: xr.Dataset, criteria: Criteria | None = None) -> 
     """Return joints with the failure flags and attributes of some criteria."""
     if criteria is None and "hinge" in joints:
         return joints
-    criteria = merge_criteria(criteria) or Criteria.of(joints)
+    check_criteria(criteria)
+    criteria = criteria or Criteria.of(joints)
     normal, e, friction = (
         joints[name].transpose(..., "joint", missing_dims="ignore")
         for name in ("N", "eccentricity", "friction")

@@ -4,12 +4,10 @@ from .collapse import Outcome as Outcome
 from .collapse import closed_cohesion as closed_cohesion
 from .collapse import collapse_factor as collapse_factor
 from .collapse import stands as stands
-from .mechanism_count import Episode as Episode
 from .mechanism_count import Mechanism as Mechanism
 from .mechanism_count import counted_mechanism as counted_mechanism
 from .mechanism_count import counted_mechanisms as counted_mechanisms
 from .mechanism_count import demirel_aldemir_mechanism as demirel_aldemir_mechanism
-from .mechanism_count import episode as episode
 from .mechanism_count import mechanism_over_record as mechanism_over_record
 from .mechanism_kinematics import VerifiedMechanism as VerifiedMechanism
 from .mechanism_kinematics import Verifier as Verifier

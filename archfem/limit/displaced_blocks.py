@@ -45,7 +45,7 @@ class Contact(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Mechanism:
+class KinematicChain:
     """A mechanism at a place: rigid bodies and the contacts between them that persist."""
 
     factor: float  # α of the horizontal forces that sets it in motion [-]
@@ -341,7 +341,7 @@ def largest_speed(blocks: PlacedBlocks, motion: Array) -> float:
 
 def find_mechanism(
     blocks: PlacedBlocks, joints: Sequence[int], friction: Array, *, flat: bool = False
-) -> Mechanism | None:
+) -> KinematicChain | None:
     """Find the mechanism of least factor at the present places; None where no factor moves them."""
     # Forces N >= 0 and |T| <= μ N act at the contacts of the joints that may move. The largest
     # factor at which they balance the loads is sought; its dual is the motion. Without dilatancy,
@@ -439,7 +439,7 @@ def classify_motion(
     coefficient: Array,
     contacts: Sequence[Contact],
     factor: float,
-) -> Mechanism:
+) -> KinematicChain:
     """Weld joints that do not move, and select the contacts that a motion keeps."""
     every = Bodies(blocks, np.arange(len(motion)))
     normal, along = (rates @ motion.ravel() for rates in every.sparse_rates(contacts))
@@ -455,7 +455,7 @@ def classify_motion(
         for contact, keep, sense in zip(contacts, keeps, slip, strict=True)
         if keep and body[contact.corner] != body[contact.face]
     )
-    return Mechanism(factor, motion, body, kept)
+    return KinematicChain(factor, motion, body, kept)
 
 
 def _moves_as_one(blocks: PlacedBlocks, joint: int, motion: Array) -> bool:

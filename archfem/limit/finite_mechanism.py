@@ -30,7 +30,7 @@ from archfem.limit.displaced_blocks import (
     TOUCHING,
     Bodies,
     Contact,
-    Mechanism,
+    KinematicChain,
     PlacedBlocks,
     find_mechanism,
     largest_speed,
@@ -57,7 +57,7 @@ class Linkage:
     """Bodies and contacts of a mechanism, which stay the same until an event."""
 
     start: PlacedBlocks
-    mechanism: Mechanism
+    mechanism: KinematicChain
 
     @cached_property
     def anchors(self) -> list[tuple[Array, Array, Array]]:
@@ -243,7 +243,7 @@ class MechanismPath:
     factors: Array  # α of the horizontal forces at each place (n,) [-]
     displacements: Array  # of centroids, and rotations (n, n_blocks, 3) [m, m, rad]
     velocity: Array  # at rest, the fastest corner at 1 m/s (n_blocks, 3)
-    mechanisms: tuple[Mechanism, ...]  # one after the other
+    mechanisms: tuple[KinematicChain, ...]  # one after the other
     events: tuple[PathEvent, ...]
     end: PathEnd
 
@@ -268,9 +268,9 @@ class PathFollower:
     events: list[PathEvent] = field(default_factory=list)
     travel: float = 0.0  # of the fastest corner, so far [m]
 
-    def follow(self, mechanism: Mechanism, max_events: int = 20) -> MechanismPath:
+    def follow(self, mechanism: KinematicChain, max_events: int = 20) -> MechanismPath:
         """Follow a mechanism until it falls, locks, collides, or the path is cut off."""
-        mechanisms: list[Mechanism] = [mechanism]
+        mechanisms: list[KinematicChain] = [mechanism]
         motion, stuck = np.zeros_like(self.blocks.displacement), 0
         try:
             mechanisms[0], state, velocity = self._start(self.blocks, mechanism)
@@ -296,8 +296,8 @@ class PathFollower:
         return MechanismPath(self.blocks, *places, motion, *changes, end)
 
     def _start(
-        self, blocks: PlacedBlocks, mechanism: Mechanism
-    ) -> tuple[Mechanism, LinkageState, Array]:
+        self, blocks: PlacedBlocks, mechanism: KinematicChain
+    ) -> tuple[KinematicChain, LinkageState, Array]:
         """Return a mechanism that slides without dilatancy, and the start of its path."""
         for trial in (mechanism, None):
             if trial is None:
@@ -314,7 +314,7 @@ class PathFollower:
         self._record(blocks, mechanism.factor)
         raise _Stop(PathEnd.LOCKS)
 
-    def _without_grazing(self, blocks: PlacedBlocks, mechanism: Mechanism) -> Mechanism:
+    def _without_grazing(self, blocks: PlacedBlocks, mechanism: KinematicChain) -> KinematicChain:
         """Return a mechanism without sliding contacts that open although their rate is zero."""
         # A corner that leaves a face along a circle keeps it to first order only: as a constraint,
         # redundant beside the others, it would lock the linkage.
@@ -361,7 +361,7 @@ class PathFollower:
         self.factors.append(factor)
         self.displacements.append(blocks.displacement)
 
-    def _renew(self, blocks: PlacedBlocks, *, flat: bool = False) -> Mechanism:
+    def _renew(self, blocks: PlacedBlocks, *, flat: bool = False) -> KinematicChain:
         """Return the mechanism of limit analysis at the present places."""
         try:
             mechanism = find_mechanism(blocks, self.joints, self.friction, flat=flat)

@@ -1,11 +1,11 @@
 """Mechanisms by counting failed joints, at once or over a record: classes, duration, opening.
 
-Most mechanisms by count close again before anything falls; `episode` follows one from its first
-instant. `mechanism_kinematics` checks whether the failed joints permit a motion.
+Most mechanisms by count close again before anything falls: those of a record have a duration.
+`mechanism_kinematics` checks whether the failed joints permit a motion.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -13,7 +13,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._validation import validate_arguments
-from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     Criteria,
     assessed_joints,
@@ -25,6 +24,7 @@ from archfem.joints.criteria import (
     with_failure_flags,
 )
 from archfem.masonry.parts import select_assessed_parts
+from archfem.masonry.structure import join_joint_names, join_names
 from archfem.units import format_mm
 
 # Classes of mechanisms, from narrow to wide
@@ -45,6 +45,8 @@ OVER_RECORD = "one part over the record"
 class Mechanism:
     """Parts of a structure that fail, or move, together.
 
+    Names and the course, by duration and opening, play no part in comparisons.
+
     Attributes:
         kind: class of the mechanism: "local" in one ring or one pier, "semi-global" in one ring
             and one pier, "global" in more; "none" where no ring and no pier moves.
@@ -53,7 +55,14 @@ class Mechanism:
         time: instant [s]; None for a static state.
         blocks: numbers of the blocks that can move; empty where rings and piers cannot, or for a
             mechanism by count.
-        names: names of `joints`, not used in comparisons.
+        names: names of `joints`.
+        block_names: names of `blocks`.
+        duration: unbroken time for which all its joints stay failed, where a record stands for the
+            step that ends with it; of "one part over the record", time from the first failure to
+            the last one needed [s]. None for a static state.
+        opening: largest opening of any of its joints meanwhile; of "one part over the record", at
+            any time of the run [m]. None for a static state, or where openings are not recorded.
+        closes: whether the duration ends before the record does; None over the record.
     """
 
     kind: str
@@ -62,28 +71,30 @@ class Mechanism:
     time: float | None = None
     blocks: tuple[int, ...] = ()
     names: tuple[str, ...] = field(default=(), compare=False)
+    block_names: tuple[str, ...] = field(default=(), compare=False)
+    duration: float | None = field(default=None, compare=False)
+    opening: float | None = field(default=None, compare=False)
+    closes: bool | None = field(default=None, compare=False)
 
-
-@dataclass(frozen=True)
-class Episode:
-    """Unbroken time for which all joints of a mechanism stay failed.
-
-    Attributes:
-        duration: duration [s]; a record stands for the step that ends with it.
-        opening: largest opening of any of its joints meanwhile [m]; None where openings are not
-            recorded.
-        closes: whether it ends before the record does.
-    """
-
-    duration: float
-    opening: float | None
-    closes: bool
+    @property
+    def course(self) -> str:
+        """Duration, opening, and whether it closes again, in words; "" for a static state."""
+        if self.duration is None:
+            return ""
+        wide = "" if self.opening is None else f"by up to {format_mm(self.opening)}"
+        if self.closes is None:
+            text = f"they failed one after the other within {duration_text(self.duration)}"
+            return f"{text}, and open {wide}" if wide else text
+        text = f"it lasts {duration_text(self.duration)}" + (f", opens {wide}" if wide else "")
+        end = "closes again" if self.closes else "has not closed when the record ends"
+        return f"{text} and {end}"
 
     def __str__(self) -> str:
-        """Describe duration, opening, and whether it closes again."""
-        wide = "" if self.opening is None else f", opens by up to {format_mm(self.opening)}"
-        end = "closes again" if self.closes else "has not closed when the record ends"
-        return f"it lasts {duration_text(self.duration)}{wide} and {end}"
+        """Class, part, time, joints and course, and the blocks that can move."""
+        time = "" if self.time is None else f" at {self.time:.3f} s"
+        words = f"{self.kind} mechanism of {self.part}{time} by {join_joint_names(self.names)}"
+        moving = f"moving: {join_names(self.block_names, '; ')}" if self.block_names else ""
+        return "; ".join(filter(None, [words, self.course, moving]))
 
 
 def duration_text(duration: float) -> str:
@@ -135,7 +146,8 @@ def counted_mechanism(
     if first is None:
         return None
     instant, group = first
-    return _mechanism(flags, instant, mechanism_kind([roles[name] for name in group]), group)
+    kind = mechanism_kind([roles[name] for name in group])
+    return follow_mechanism(joints, _mechanism(flags, instant, kind, group))
 
 
 @validate_arguments
@@ -178,7 +190,8 @@ def demirel_aldemir_mechanism(
     fallen = [name for name, down in zip(rings, collapsed[:, instant], strict=True) if down]
     piers = [name for name, role in roles.items() if role == "pier" and counts[name][instant]]
     group = [name for name in roles if name in (*fallen, *piers)]
-    return _mechanism(flags, instant, MECHANISM_KINDS[min(len(piers), 2)], group)
+    kind = MECHANISM_KINDS[min(len(piers), 2)]
+    return follow_mechanism(joints, _mechanism(flags, instant, kind, group))
 
 
 @validate_arguments
@@ -194,12 +207,13 @@ def mechanism_over_record(joints: xr.Dataset, criteria: Criteria | None = None) 
         criteria: by default those by which the joints were judged already.
 
     Returns:
-        The mechanism, "local", with the joints that have failed until its time, or None.
+        The mechanism, "local", with the joints that have failed until its time and its duration
+        from the first of these failures, or None.
     """
     joints = with_failure_flags(joints, criteria)
-    limits, flags = Criteria.of(joints), _flags_over_time(joints)
-    failed = np.logical_or.accumulate(_lasting_flags(flags, limits.duration), axis=0)
-    flags = flags.copy(data=failed)
+    limits, each = Criteria.of(joints), _flags_over_time(joints)
+    failed = np.logical_or.accumulate(_lasting_flags(each, limits.duration), axis=0)
+    flags = each.copy(data=failed)
     counts = _count_by_part(flags, select_assessed_parts(part_roles(joints)))
     instants = {
         part: int(np.argmax(count >= limits.failures))
@@ -209,7 +223,13 @@ def mechanism_over_record(joints: xr.Dataset, criteria: Criteria | None = None) 
     if not instants:
         return None
     part = min(instants, key=lambda name: instants[name])
-    return _mechanism(flags, instants[part], "local", [part])
+    found = _mechanism(flags, instants[part], "local", [part])
+    if found.time is None:
+        return found
+    own = np.isin(joints["joint"].values, found.joints)
+    begin = float(each["time"][each.values[:, own].any(axis=1).argmax()])
+    opening = float(joints["opening"].isel(joint=own).max()) if "opening" in joints else None
+    return replace(found, duration=found.time - begin, opening=opening)
 
 
 @validate_arguments
@@ -238,35 +258,19 @@ def counted_mechanisms(
     return {**found, OVER_RECORD: mechanism_over_record(joints)}
 
 
-@validate_arguments
-def episode(joints: xr.Dataset, found: Mechanism) -> Episode:
-    """Follow a mechanism from its instant on, for as long as its joints stay failed.
-
-    Args:
-        joints: over time and joint, as those of the mechanism, with their flags.
-        found: mechanism with a time, by count or by motion.
-
-    Returns:
-        Its duration and opening.
-
-    Raises:
-        InvalidInput: the mechanism has no time, or one that was not recorded.
-    """
+def follow_mechanism(joints: xr.Dataset, found: Mechanism) -> Mechanism:
+    """Return a mechanism with duration and opening, for as long as its joints stay failed."""
+    if "time" not in joints.dims:
+        return found
     times = joints["time"].values
-    start = np.flatnonzero(times == found.time)
-    if not len(start):
-        raise InvalidInput(
-            f"the mechanism's time {found.time} is none of those recorded: give the joints in "
-            "which it was found, over time"
-        )
-    begin = int(start[0])
-    in_mechanism = np.flatnonzero(joints["joint"].isin(list(found.joints)).values)
-    after = with_failure_flags(joints).isel(joint=in_mechanism, time=slice(begin, None))
+    begin = int(np.flatnonzero(times == found.time)[0])
+    own = np.isin(joints["joint"].values, found.joints)
+    after = joints.isel(joint=own, time=slice(begin, None))
     all_failed = find_failed_joints(after).all("joint").values
     count = len(all_failed) if all_failed.all() else int(all_failed.argmin())
     duration = float(step_lengths(times)[begin : begin + count].sum())
-    opening = float(after["opening"][:count].max()) if "opening" in after else None
-    return Episode(duration, opening, begin + count < len(times))
+    opening = float(after["opening"].isel(time=slice(count)).max()) if "opening" in after else None
+    return replace(found, duration=duration, opening=opening, closes=begin + count < len(times))
 
 
 def has_counted_mechanism(joints: xr.Dataset) -> xr.DataArray:

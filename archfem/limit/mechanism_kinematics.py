@@ -24,10 +24,15 @@ from scipy.sparse.csgraph import dijkstra
 
 from archfem._typing import Array
 from archfem._validation import check_type, validate_arguments
-from archfem.joints.criteria import Criteria, find_lasting, merge_criteria, with_failure_flags
+from archfem.joints.criteria import Criteria, find_lasting, with_failure_flags
 from archfem.joints.resultants import check_instant
 from archfem.limit.linear_programme import RigidBlocks, solve_linear
-from archfem.limit.mechanism_count import Mechanism, counted_mechanism, mechanism_kind
+from archfem.limit.mechanism_count import (
+    Mechanism,
+    counted_mechanism,
+    follow_mechanism,
+    mechanism_kind,
+)
 from archfem.masonry.parts import select_assessed_parts
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, find_supported_blocks
@@ -120,11 +125,7 @@ class VerifiedMechanism:
 
 
 def verified_mechanism(
-    structure: Structure,
-    joints: xr.Dataset,
-    criteria: Criteria | None = None,
-    *,
-    limit: float | None = None,
+    structure: Structure, joints: xr.Dataset, criteria: Criteria | None = None
 ) -> VerifiedMechanism:
     """Search for a rigid-block motion that the joints failed at one instant permit.
 
@@ -143,14 +144,12 @@ def verified_mechanism(
         structure: structure whose blocks move.
         joints: as made by `joint_dataset`, at one instant.
         criteria: conditions of failure; by default those by which the joints were judged already.
-        limit: of |e| for a hinge, beside the usual criteria [-].
 
     Returns:
         The motion and its class, beside the count.
 
     Raises:
-        InvalidInput: `joints` has several instants, or those of another structure; both criteria
-            and a limit were given.
+        InvalidInput: `joints` has several instants, or those of another structure.
 
     References:
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279: a mechanism needs hinges on alternating
@@ -164,7 +163,7 @@ def verified_mechanism(
     """
     check_type(structure, Structure, "structure", "give that whose joints these are")
     check_type(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
-    joints = with_failure_flags(joints, merge_criteria(criteria, hinge=limit))
+    joints = with_failure_flags(joints, criteria)
     return get_verifier(structure).verify(joints)
 
 
@@ -206,7 +205,10 @@ def first_verified_mechanism(
     instants = np.flatnonzero(freedoms.any(axis=1))
     duration = Criteria.of(joints).duration
     first = find_lasting(instants, joints["time"].values, duration, find_motion)
-    return None if first is None else verify(first)
+    if first is None:
+        return None
+    found = verify(first)
+    return replace(found, moved=follow_mechanism(joints, found.moved))
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,6 +273,7 @@ class Verifier:
             float(joints["time"]) if "time" in joints.coords else None,
             tuple(regions.blocks[k] for k in moving),
             tuple(self.structure.joints[number].name for number in numbers),
+            tuple(blocks[k].name for k in moving),
         )
         return VerifiedMechanism(moved, counted_mechanism(joints), regions.expand_motion(motion))
 

@@ -32,7 +32,12 @@ from archfem._validation import check_fields, check_number, is_one_of, validate_
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import FillProfile
 from archfem.limit.collapse import collapse_factor
-from archfem.limit.displaced_blocks import Mechanism, PlacedBlocks, classify_motion, find_mechanism
+from archfem.limit.displaced_blocks import (
+    KinematicChain,
+    PlacedBlocks,
+    classify_motion,
+    find_mechanism,
+)
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
@@ -495,7 +500,7 @@ def _select_joints(
 
 def _find_first_mechanism(
     placed: PlacedBlocks, joints: list[int], coefficient: Array, friction: str | None
-) -> Mechanism | None:
+) -> KinematicChain | None:
     """Return the mechanism of least factor at rest; None where there is none."""
     refusal = InvalidInput(
         f"{placed.structure.name} does not stand under its own weight and the attached loads: "

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 from math import sqrt
 from pathlib import Path
 
-import xarray as xr
 from setting import plain_options, quick_motion
 from timing import table
 
@@ -29,7 +28,7 @@ import archfem as af
 from archfem.dynamics import History
 from archfem.joints import assessed_joints
 from archfem.joints.criteria import find_failed_joints
-from archfem.limit import Mechanism, episode
+from archfem.limit import Mechanism
 from archfem.limit.mechanism_count import duration_text
 from archfem.models.builder import build
 from archfem.units import mm
@@ -139,13 +138,12 @@ def run_setting(
         yield motion.name, run, time.perf_counter() - begun
 
 
-def mechanism_text(joints: xr.Dataset, found: Mechanism | None) -> str:
+def mechanism_text(found: Mechanism | None) -> str:
     """Write a mechanism: class, time, duration and largest opening."""
     if found is None:
         return "none"
-    episode_of = episode(joints, found)
-    wide = f"{episode_of.opening / mm:.2g} mm"
-    return f"{found.kind}, {found.time:.3f} s, {duration_text(episode_of.duration)}, {wide}"
+    wide = f"{found.opening / mm:.2g} mm"
+    return f"{found.kind}, {found.time:.3f} s, {duration_text(found.duration)}, {wide}"
 
 
 def widest(run: History) -> float:
@@ -173,7 +171,7 @@ def row(name: str, pair: str, run: History, seconds: float) -> list[object]:
         f"{float(abs(joints['slip']).max()) / mm:.2f}",
         f"{float(dataset['residual_displacement'].where(stones, 0.0).max()) / mm:.2f}",
         *(
-            mechanism_text(run.joints, first[definition])
+            mechanism_text(first[definition])
             for definition in ("any joints at once", "Demirel and Aldemir", "verified")
         ),
         f"{seconds:.0f}",

@@ -7,11 +7,9 @@ from mechanisms import ALTERNATING, arch, failing, piers
 
 import archfem as af
 from archfem.limit import (
-    Episode,
     counted_mechanism,
     counted_mechanisms,
     demirel_aldemir_mechanism,
-    episode,
 )
 from archfem.limit.mechanism_count import (
     duration_text,
@@ -204,41 +202,39 @@ def test_an_episode_of_25_ms_and_2_5_mm_that_closes_is_stated_so():
     instants = [{}, {6: 0.5}, *[ALTERNATING] * 5, {6: 0.5}, ALTERNATING]
     joints = shaken(instants, [0.0, 9e-3, 1e-3, 2e-3, 2.5e-3, 1e-3, 1e-3, 8e-3, 7e-3])
     found = af.limit.counted_mechanism(joints)
-    met = episode(joints, found)
     assert found.time == 2 * STEP
-    assert (met.duration, met.opening, met.closes) == pytest.approx((0.025, 2.5e-3, True))
-    assert str(met) == "it lasts 25 ms, opens by up to 2.5 mm and closes again"
+    assert (found.duration, found.opening, found.closes) == pytest.approx((0.025, 2.5e-3, True))
+    assert found.course == "it lasts 25 ms, opens by up to 2.5 mm and closes again"
 
 
 def test_further_failures_do_not_end_an_episode():
     joints = shaken([ALTERNATING, ALTERNATING | {9: 0.5}, ALTERNATING, {}])
-    assert episode(joints, af.limit.counted_mechanism(joints)).duration == pytest.approx(0.015)
+    assert af.limit.counted_mechanism(joints).duration == pytest.approx(0.015)
 
 
 def test_a_mechanism_open_at_the_end_has_not_closed():
     joints = shaken([{}, ALTERNATING, ALTERNATING], [0.0, 1e-3, 3e-3])
-    found = af.limit.counted_mechanism(joints)
-    assert str(episode(joints, found)) == (
+    assert af.limit.counted_mechanism(joints).course == (
         "it lasts 10 ms, opens by up to 3 mm and has not closed when the record ends"
     )
     short = joints.isel(time=[0, 1])
-    assert str(episode(short, found)) == (
+    assert af.limit.counted_mechanism(short).course == (
         "it lasts 5 ms, opens by up to 1 mm and has not closed when the record ends"
     )
 
 
 def test_openings_that_were_not_kept_are_not_stated():
     joints = shaken([ALTERNATING, {}])
-    met = episode(joints, af.limit.counted_mechanism(joints))
-    assert met == Episode(STEP, None, True)
-    assert str(met) == "it lasts 5 ms and closes again"
-
-
-def test_a_mechanism_of_another_record_is_refused():
-    joints = shaken([{}, ALTERNATING])
     found = af.limit.counted_mechanism(joints)
-    with pytest.raises(af.InvalidInput, match="none of those recorded"):
-        episode(joints.isel(time=[0]), found)
+    assert (found.duration, found.opening, found.closes) == (STEP, None, True)
+    assert found.course == "it lasts 5 ms and closes again"
+
+
+def test_a_static_state_has_no_course():
+    joints = shaken([{}, ALTERNATING])
+    found = af.limit.counted_mechanism(joints.isel(time=1))
+    assert (found.time, found.duration, found.closes) == (STEP, None, None)
+    assert str(found) == "local mechanism of arch at 0.005 s by joints 0, 6, 12 and 17"
 
 
 def test_durations_are_written_in_fitting_units():

@@ -80,7 +80,7 @@ def test_a_hinge_short_of_the_edge_counts_from_the_limit_on():
     hinges = {joint: 0.93 * e for joint, e in ALTERNATING.items()}  # |e| = 0.465
     joints = failing(structure, hinges)
     assert verified_mechanism(structure, joints).kind == "local"
-    assert verified_mechanism(structure, joints, limit=0.48).kind == "none"
+    assert verified_mechanism(structure, joints, af.Criteria(hinge=0.48)).kind == "none"
 
 
 def test_a_sliding_block_moves_without_a_counted_mechanism():
@@ -113,7 +113,8 @@ def test_taller_piers_join_the_mechanism(courses, kind, part):
     found = verified_mechanism(structure, collapse.joints)
     assert (found.kind, found.moved.part) == (kind, part)
     assert found.agrees
-    sharp = verified_mechanism(structure, collapse.joints, limit=0.4999)  # none but its own hinges
+    own_hinges_alone = af.Criteria(hinge=0.4999)
+    sharp = verified_mechanism(structure, collapse.joints, own_hinges_alone)
     moving = [k for k, own in enumerate(collapse.motion) if np.abs(own).max() > 1e-6]
     assert list(sharp.moved.blocks) == moving
 

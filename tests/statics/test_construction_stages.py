@@ -113,7 +113,7 @@ def test_runs_and_modes_start_from_the_built_state(column):
     still = af.Motion.synthetic(duration=0.25, pga=1e-9, seed=1)
     run = af.time_history(model, still, start=dead, method="snes", dt=0.005)
     assert run.joints["N"].values[-1] == pytest.approx([60e3, 40e3, 20e3], rel=1e-6)
-    closed = af.modes(model, 3)
+    closed = af.modes(model, 3, "closed")
     assert af.modes(dead.model, 3, start=dead).frequencies == pytest.approx(closed.frequencies)
     sides = af.pushover(model, af.BodyForce(1.0), start=dead)
     assert sides.limit == pytest.approx(1.0 / 3.0, rel=2e-2)  # of breadth to height
