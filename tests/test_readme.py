@@ -52,7 +52,7 @@ def test_python_blocks_run_and_print_the_following_block(tmp_path, monkeypatch, 
     assert README.count("```python") == 1
     monkeypatch.chdir(tmp_path)
     run_blocks("README.md", capsys)
-    assert (tmp_path / "out" / "ring.nc").is_file()
+    assert af.Case.read(tmp_path / "out" / "ring.toml").analysis.displacements == "large"
 
 
 @pytest.mark.parametrize("page", list(with_python()))
