@@ -25,9 +25,6 @@ Degrees = Annotated[float, "degree"]
 # Angle that may keep its unit, "5 degree", where a bare 5 could be radians
 Angle = Annotated[float | str, "degree"]
 
-# Name of a part, material or contact: that of its table, and so no key
-TableName = Annotated[str, None]
-
 
 @dataclass(frozen=True)
 class NumberOrWord:

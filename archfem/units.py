@@ -195,7 +195,8 @@ def _convert(text: str, unit: str, key: str) -> float:
             raise InvalidInput(f"{key} = {text!r} has a unit, and this is a pure number") from error
         reason = f"is not in a unit like {target}: {error}"
         plain = f'has no unit: write a number, or "{text} {target}"'
-        words = plain if quantity.unitless else reason
+        # a sum such as "1- m" has no quantity yet
+        words = plain if str(error.units1) == "dimensionless" else reason
         raise InvalidInput(f"{key} = {text!r} {words}") from error
     except (pint.UndefinedUnitError, pint.PintError, ValueError, TypeError) as error:
         raise InvalidInput(

@@ -37,6 +37,8 @@ def test_a_comma_in_a_number_is_refused(text):
 def test_a_number_as_a_text_is_refused_with_its_remedy():
     with pytest.raises(af.InvalidInput, match=r"x = '2\.25' has no unit: .* or \"2\.25 m\""):
         af.units.in_unit("2.25", "m", "x")
+    with pytest.raises(af.InvalidInput, match=r"x = '1- m' is not in a unit like m: Cannot"):
+        af.units.in_unit("1- m", "m", "x")
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from typing import Any
 
 from archfem._validation import declared_keys, validate_methods
 from archfem.cases.motion_keys import build_spectrum
-from archfem.cases.toml_file import Table, check_choice, check_table
+from archfem.cases.toml_file import Table, check_choice, check_table, read_object
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import Fill
 from archfem.limit.collapse import Collapse, collapse_factor
@@ -116,7 +116,7 @@ def parse_rating(table: Any) -> Table:
     keys = _keys_beside(rate, "friction", "strength", "fill")
     options = check_table(table, keys, "rating")
     if isinstance(vehicle := options.get("vehicle"), dict):
-        options["vehicle"] = _build("rating.vehicle", Vehicle, vehicle)
+        options["vehicle"] = read_object(Vehicle, vehicle, "rating.vehicle")
     return options
 
 
@@ -179,24 +179,13 @@ def parse_assessment(table: Any) -> AssessmentSettings:
     if "friction" in options:
         options["friction"] = _check_friction(options["friction"], "assessment.friction")
     if isinstance(state := options.get("limit_state"), dict):
-        options["limit_state"] = _build("assessment.limit_state", LimitState, state)
+        options["limit_state"] = read_object(LimitState, state, "assessment.limit_state")
     if "loads" in options:
         loads = options["loads"]
-        options["loads"] = [_build("assessment.loads", AttachedLoad, load) for load in loads]
+        options["loads"] = [read_object(AttachedLoad, load, "assessment.loads") for load in loads]
     return AssessmentSettings(spectrum, directions, options)
 
 
 def _keys_beside(function: Callable[..., Any], *given: str) -> dict[str, Any]:
     """Return the keys of the arguments of a function other than the structure and some."""
     return {k: v for k, v in declared_keys(function).items() if k not in ("structure", *given)}
-
-
-def _build(section: str, kind: Callable[..., Any], table: Table) -> Any:
-    """Return an object made of the keys of a table."""
-    keys = declared_keys(kind)
-    try:
-        return kind(**check_table(table, keys, section))
-    except TypeError as error:
-        raise InvalidInput(
-            f"{section} = {dict(table)}: {error}; its keys are {list(keys)}"
-        ) from error

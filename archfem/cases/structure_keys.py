@@ -94,10 +94,9 @@ def _keys_of(declaration: Callable[..., Any]) -> dict[str, Any]:
 
 def _read_blocks(settings: Table) -> Structure:
     """Return a structure whose blocks and joints are listed; without joints these are found."""
-    keys: Table = {"shape": str, "blocks": [dict], "joints": [dict], "contact": str}
-    table = settings["structure"]
-    own = {**declared_keys(assembled), **keys} | {"material": str}
-    values = check_table(table, {key: own[key] for key in own if key != "name"}, "structure")
+    keys = _keys_of(assembled) | {"shape": str, "material": str}
+    del keys["name"]  # that of the case
+    values = check_table(settings["structure"], keys, "structure")
     shared = {"material": values.pop("material", "stone")}
     contact = values.pop("contact", "stone to stone")
     del values["shape"]
@@ -116,11 +115,8 @@ def _read_blocks(settings: Table) -> Structure:
 
 def _read_part(cls: type[Described], table: Table, section: str, settings: Table) -> Described:
     """Return a block or joint of a table."""
-    values = check_table(table, declared_keys(cls, (Material, Contact)), section)
-    for key, resolve in (("material", _material), ("contact", _contact)):
-        if key in values:
-            values[key] = resolve(settings, values[key])
-    return _call(cls, section, **values)
+    values = check_table(table, _keys_of(cls), section)
+    return _call(cls, section, **_resolve_names(cls, values, settings))
 
 
 def _divide_fill(structure: Structure, table: Table) -> Structure:
@@ -157,7 +153,8 @@ def _resolve_names(function: Callable[..., Any], values: Table, settings: Table)
     arguments, parameters = dict(values), inspect.signature(function).parameters
     for key, find in (("material", _material), ("contact", _contact)):
         if key in parameters:  # a table may change the default one
-            arguments[key] = find(settings, values.get(key, parameters[key].default.name))
+            name = values[key] if key in values else parameters[key].default.name
+            arguments[key] = find(settings, name)
     return arguments
 
 
@@ -190,6 +187,7 @@ def _build_parts(part: Callable[..., Described], table: Table, section: str) -> 
             f'{section} names no part: write a table [{section}."its name"] for each'
         )
     keys = _keys_of(part)
+    del keys["name"]  # that of its table
     common = check_table({k: v for k, v in table.items() if k not in subtables}, keys, section)
     parts = []
     for name, subtable in subtables.items():
@@ -234,7 +232,7 @@ def _resolve_preset(
             f'name one of them or write a table [{section}."{name}"]'
         )
     # A table changes a preset of its name key by key.
-    keys = _keys_of(cls) | {"name": str}
+    keys = declared_keys(cls)
     values = {key: getattr(presets[name], key) for key in keys} if name in presets else {}
     values |= check_table(tables.get(name, {}), keys, f"{section}.{name}")
     if values.get("law") is not None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from archfem._typing import Array
+from archfem._typing import Array, Metres, MetresPerSecondSquared
 from archfem._validation import check_type, validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block
@@ -27,8 +27,8 @@ def assembled(
     contact: Contact | ContactOf,
     *,
     joints: Sequence[Joint] = (),
-    width: float = 1.0,
-    gravity: float = G,
+    width: Metres = 1.0,
+    gravity: MetresPerSecondSquared = G,
     name: str = "structure",
 ) -> Structure:
     """Assemble blocks to a structure, with a joint along every common line of two blocks.

@@ -103,7 +103,7 @@ def find_side_of_line(points: Array, line: Array, near: float, arcs: Sequence[in
     return side if abs(covered - length) <= 4.0 * near else 0
 
 
-# Coordinates x and y
+# Coordinates x and y [m]
 Point = tuple[Metres, Metres]
 
 

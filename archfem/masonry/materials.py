@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import inf, nextafter
 from typing import Annotated, Any
 
-from archfem._typing import Friction, NewtonsPerCubicMetre, Pascals, PascalsPerMetre, TableName
+from archfem._typing import Friction, NewtonsPerCubicMetre, Pascals, PascalsPerMetre
 from archfem._validation import check_number, check_words, is_one_of
 from archfem.errors import InvalidInput
 from archfem.units import G, GPa, MPa, kN
@@ -38,7 +38,7 @@ class Material:
     poisson: float
     unit_weight: NewtonsPerCubicMetre
     strength: Pascals | None = None
-    name: TableName = "material"
+    name: str = "material"
 
     def __post_init__(self) -> None:
         """Check that the values are possible, which detects wrong units."""
@@ -105,7 +105,7 @@ class Contact:
     normal_stiffness: PascalsPerMetre
     shear_stiffness: PascalsPerMetre
     friction: Friction = 0.60
-    name: TableName = "contact"
+    name: str = "contact"
     cohesion: Pascals = 0.0
     dilatancy: float = 0.0
     tension: Pascals = 0.0

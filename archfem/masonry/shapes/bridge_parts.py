@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from archfem._typing import Angle, Metres, TableName
+from archfem._typing import Angle, Metres
 from archfem._validation import check_type, is_number, short_repr
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Point
@@ -42,7 +42,7 @@ class Arch:
     embrace: Angle | None = None
     rise: Metres | None = None
     measured: str = "intrados"
-    name: TableName = "arch"
+    name: str = "arch"
 
     def __post_init__(self) -> None:
         """Check the lengths, how they are measured, and the embrace."""
@@ -111,7 +111,7 @@ class Pier:
     gap: Metres
     height: Metres
     course: Metres = 0.40
-    name: TableName = "pier"
+    name: str = "pier"
 
     def __post_init__(self) -> None:
         """Check the lengths."""
@@ -140,7 +140,7 @@ class Sidewall:
     above: Metres = 0.0
     setback: Metres = 0.40
     state: str = "free"
-    name: TableName = "sidewall"
+    name: str = "sidewall"
 
     def __post_init__(self) -> None:
         """Check the lengths, and that the courses are free, retained or fixed."""
