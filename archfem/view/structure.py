@@ -157,11 +157,15 @@ class DisplacedBlocks:
 
 
 def draw_thrust(axes: Axes, marks: Marks) -> None:
-    """Draw the thrust lines."""
-    line: dict[str, Any] = {"lw": 1.7, "path_effects": white_halo(3.4), "gid": "links"}
-    line |= {"color": Colour.THRUST, "zorder": 5}
-    axes.plot(*_join_segments(marks.links).T, label="thrust line", **line)
-    axes.plot(*marks.thrust.T, "o", ms=3.0, color=Colour.THRUST, zorder=5, gid="thrust")
+    """Draw the thrust lines, and the points at which thrust crosses joints."""
+    style: dict[str, Any] = {"color": Colour.THRUST, "zorder": 5, "ms": 3.0, "lw": 1.7}
+    # where blocks have many joints, as in a wall, there are points alone
+    label = "thrust at a joint"
+    if len(marks.links):
+        halo, label = {"path_effects": white_halo(3.4)}, "_points"
+        axes.plot(*_join_segments(marks.links).T, label="thrust line", gid="links", **style, **halo)
+    if np.isfinite(marks.thrust).any():
+        axes.plot(*marks.thrust.T, "o", label=label, gid="thrust", **style)
 
 
 def draw_marks(axes: Axes, marks: Marks) -> None:
