@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import xarray as xr
+from portals import DRY, box, portal
 
 import archfem as af
 from archfem.view import (
@@ -146,22 +147,6 @@ def test_a_moving_load_shows_factors_over_its_middle_and_the_mechanism(ring):
     assert repr(found).startswith(f"MovingLoad: least factor {found.worst.factor:.4g}, ")
 
 
-def portal(role):
-    """Two posts, one stone each, and a lintel of a role."""
-
-    def box(left, low, right, high, name, **given):
-        corners = ((left, low), (right, low), (right, high), (left, high))
-        return af.Block(corners, af.STONE, name, **given)
-
-    posts = [
-        box(x, 0.0, x + 0.5, 2.0, f"{side} post", part=f"{side} pier", role="pier")
-        for x, side in ((0.0, "left"), (2.5, "right"))
-    ]
-    ground = box(-1.0, -0.5, 4.0, 0.0, "ground", fixed=True, role="other")
-    lintel = box(-0.2, 2.0, 3.2, 2.5, "lintel", part="lintel", role=role)
-    return af.masonry.assembled([ground, *posts, lintel], af.Contact(1e9, 4e8, friction=0.6))
-
-
 def side_by_side(pier, backfill=None):
     """Two arches over a pier, and fixed walls beside them."""
     arch = af.shapes.Arch(
@@ -176,12 +161,10 @@ def side_by_side(pier, backfill=None):
 def wall():
     """Three courses in running bond."""
     ends = [(0.0, 0.8, 1.6), (0.0, 0.4, 1.2, 1.6), (0.0, 0.8, 1.6)]
-    blocks = [af.Block(((0, -1), (2, -1), (2, 0), (0, 0)), af.STONE, "rock", True, part="wall")]
+    blocks = [box(0.0, -1.0, 2.0, 0.0, "rock", fixed=True, part="wall")]
     for y, places in enumerate(ends):
-        for a, b in pairwise(places):
-            corners = ((a, y), (b, y), (b, y + 1.0), (a, y + 1.0))
-            blocks.append(af.Block(corners, af.STONE, f"{a} {y}", part="wall"))
-    return af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.6))
+        blocks += [box(a, y, b, y + 1.0, f"{a} {y}", part="wall") for a, b in pairwise(places)]
+    return af.masonry.assembled(blocks, DRY)
 
 
 PIER = af.shapes.Pier(gap=0.8, height=0.5)
