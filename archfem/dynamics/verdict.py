@@ -196,25 +196,18 @@ def doubt_unassessed_joints(joints: xr.Dataset, structure: Structure) -> list[Do
     own = own.isel(joint=lasts & flags.any("time").values)
     if not own.sizes["joint"]:
         return []
-    cause = f"joints that are not assessed fail: {join_names(_failure_texts(own), '; ')}"
+    texts = [
+        f"{one['name'].item()} (|e| {float(abs(one['eccentricity']).max()):.3f}, "
+        f"V/N {float(one['friction'].max()):.3g}{', open' if one['open'].any() else ''})"
+        for one in (own.isel(joint=number) for number in range(own.sizes["joint"]))
+    ]
+    cause = f"joints that are not assessed fail: {join_names(texts, '; ')}"
     counted = joints.isel(joint=judged | np.isin(joints["joint"], own["joint"]))
     counted.coords["judged"] = ("joint", np.full(counted.sizes["joint"], True))
     if has_counted_mechanism(counted).any():
         cause += f"; with them counted, {total_duration_remark(counted)}"
     parts = join_names([f"'{part}'" for part in dict.fromkeys(own["part"].values.astype(str))])
     return [Doubt(cause, f"give the blocks of part {parts} role='pier' or 'ring', and they count")]
-
-
-def _failure_texts(joints: xr.Dataset) -> list[str]:
-    """Return how each joint fails, with its largest |e| or V / N."""
-    flags = {key: (joints[key] != 0).any("time").values for key in ("hinge", "slide", "open")}
-    sizes = [abs(joints[key]).max("time").values for key in ("eccentricity", "friction")]
-    texts = []
-    for k, name in enumerate(joints["name"].values.astype(str)):
-        values = [f"|e| {sizes[0][k]:.3f}", f"V/N {sizes[1][k]:.3g}", "open"]
-        failures = [text for text, flag in zip(values, flags.values(), strict=True) if flag[k]]
-        texts.append(f"{name} ({', '.join(failures)})")
-    return texts
 
 
 def extremes_remark(dataset: xr.Dataset) -> list[str]:

@@ -107,7 +107,7 @@ def infer_role(part: str) -> str:
             'Block(role="ring"), or in a survey role = "ring" as a property of its outlines or of '
             "their layer in [structure.layers]",
             part,
-            {"ring": "a ring", "pier": "a pier", "other": "neither ring nor pier, and not assessed"}[role],
+            {"ring": "a ring", "pier": "a pier", "other": "neither ring nor pier"}[role],
             why,
         )
     return role

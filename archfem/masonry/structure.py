@@ -95,14 +95,14 @@ def describe_assessment(
     """Describe which joints are assessed, and which are not; empty where all are."""
     if judged.all():
         return ""
-    counts = Counter(part for part, own in zip(parts, judged, strict=True) if not own)
-    left_out = join_names([f"{count} of {part or 'no part'}" for part, count in counts.items()])
-    if np.count_nonzero(~judged) <= 4:  # few enough to be named
-        left_out = join_joint_names([n for n, own in zip(names, judged, strict=True) if not own])
-    kept = dict.fromkeys(part for part, own in zip(parts, judged, strict=True) if own)
+    labels = np.array([part or "unnamed" for part in parts])
+    left_out = [str(name) for name, own in zip(names, judged, strict=True) if not own]
+    if len(left_out) > 4:  # too many to be named
+        left_out = [f"{count} of {part}" for part, count in Counter(labels[~judged]).items()]
     return (
         f"assessed: {np.count_nonzero(judged)} of {len(judged)} joints (rings and piers: "
-        f"{join_names([part or 'without a name' for part in kept])}); not assessed: {left_out}"
+        f"{join_names(list(dict.fromkeys(labels[judged])))}); not assessed: "
+        f"{join_names(left_out, '; ')}"
     )
 
 

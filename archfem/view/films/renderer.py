@@ -30,7 +30,7 @@ from archfem.view.films.settings import Scale, Setup
 from archfem.view.histories import draw_ground
 from archfem.view.joint_marks import joint_pairs
 from archfem.view.positions import ground_acceleration
-from archfem.view.style import Colour, annotate, style_colour_bar, text_width
+from archfem.view.style import Colour, annotate, style_colour_bar
 
 
 class Canvas:
@@ -192,11 +192,12 @@ class FrameLayout:
             name = f"{run.dataset.attrs['title']}: {run.verdict.outcome}"
         top = 1.0 - 0.5 * self.header / self._inches[1]
         self._write(0.02, top, name[:1].upper() + name[1:], fontsize=13.0, ha="left")
-        size = 0.75 * self.font_size
-        letters = int(0.96 * self._inches[0] / text_width(1, size))
-        note = shorten(describe_assessed_joints(joints), letters, placeholder=" …")
+        # 16 letters of this size take an inch
+        note = shorten(
+            describe_assessed_joints(joints), int(16.0 * self._inches[0]), placeholder=" …"
+        )
         low = 1.0 - 0.87 * self.header / self._inches[1]
-        self._write(0.02, low, note, fontsize=size, ha="left", color=Colour.EDGE)
+        self._write(0.02, low, note, fontsize=0.75 * self.font_size, ha="left", color=Colour.EDGE)
         self._state_text = self._write(0.985, top, "", fontsize=13.0, animated=True)
         self._draw_colour_bar(setup.scale, below)
         self._magnification = f"displacements × {setup.magnification:g}"
