@@ -112,6 +112,14 @@ def describe_verdicts(runs: Iterable[History]) -> str:
     return f"{text} of {len(verdicts)} runs; doubts in {doubtful or 'none'}"
 
 
+def describe_pairs(runs: Mapping[str, History]) -> str:
+    """Describe the runs of a suite: table, joints that are not assessed, and runs in doubt."""
+    lines = list(dict.fromkeys(run.verdict.assessed for run in runs.values()))
+    if doubtful := [name for name, run in runs.items() if run.doubts]:
+        lines.append(f"in doubt, as their summaries say: {', '.join(doubtful)}")
+    return "\n\n".join([tabulate_runs(runs).text, *filter(None, lines)])
+
+
 def tabulate_motions(motions: Sequence[Motion]) -> ResultTable:
     """Tabulate time step and intensity measures of each component of some motions."""
     head = ["motion", "component", "samples", "dt", "PGA", "PGV", "PGD", "Arias", "CAV"]
@@ -164,6 +172,7 @@ def describe_dead_load(result: DeadLoadResult) -> str:
         f"V/N ≤ {float(joints['friction'].max()):.3f}, "
         f"N ≥ {float(joints['N'].min()) / kN:.2f} kN"
     )
+    lines += [structure.assessment] if structure.assessment else []
     if result.strength_use is not None:
         lines.append(f"dead load: {strength_use_text(result.strength_use)}")
     return "\n".join([*lines, *(f"in doubt: {doubt}" for doubt in result.doubts)])

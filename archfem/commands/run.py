@@ -377,9 +377,7 @@ def _print_pairs(
     suite: Suite, runs: dict[str, History], at_rest: DeadLoadResult, folder: Path
 ) -> None:
     """Print the table of a suite; interrupted or failed runs end the command with an error."""
-    text = result_text.tabulate_runs(runs).text
-    if doubtful := [name for name, run in runs.items() if run.doubts]:
-        text += f"\n\nin doubt, as their summaries say: {', '.join(doubtful)}"
+    text = result_text.describe_pairs(runs)
     print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{text}")
     write(results.pair_files(runs, at_rest, text), folder)
     if any(run.ending is Ending.INTERRUPTED for run in runs.values()):

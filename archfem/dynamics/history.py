@@ -23,11 +23,12 @@ from archfem.dynamics.verdict import (
     Verdict,
     brief_mechanism_remarks,
     detect_mechanisms,
+    doubt_unassessed_joints,
     extremes_remark,
     total_duration_remark,
 )
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.criteria import Criteria, with_failure_flags
+from archfem.joints.criteria import Criteria, describe_assessed_joints, with_failure_flags
 from archfem.joints.resultants import select_joint, write_joint_table
 from archfem.limit.mechanism_count import Mechanism, counted_mechanism, demirel_aldemir_mechanism
 from archfem.limit.mechanism_kinematics import (
@@ -163,12 +164,18 @@ class History(ResultDisplay):
 
         They concern energy drift above 5 % at any step, rotations and displacements too large for
         a model of small displacements, damping that drags loose blocks, a missed tolerance of the
-        steps, a fidelity that does not suit a block, and a predicted error above its tolerance.
+        steps, a fidelity that does not suit a block, a predicted error above its tolerance, and
+        joints between stones that fail and are not assessed. The last need the structure.
         """
         lines = str(self.dataset.attrs.get("doubts", "")).splitlines()
-        return tuple(
-            Doubt(cause, remedy) for cause, _, remedy in (x.partition("\t") for x in lines)
-        )
+        stored = [Doubt(cause, remedy) for cause, _, remedy in (x.partition("\t") for x in lines)]
+        return (*stored, *self._unassessed_failures)
+
+    @cached_property
+    def _unassessed_failures(self) -> list[Doubt]:
+        """Doubt of joints that fail and are not assessed; it follows criteria and roles."""
+        joints, structure = self.joints, self.structure
+        return [] if structure is None else doubt_unassessed_joints(joints, structure)
 
     def with_doubts(self, doubts: Iterable[Doubt]) -> "History":
         """Return the same run with other doubts.
@@ -176,7 +183,8 @@ class History(ResultDisplay):
         Args:
             doubts: doubts in place of those of the run; repeated ones count once.
         """
-        text = "\n".join(f"{doubt.cause}\t{doubt.remedy}" for doubt in dict.fromkeys(doubts))
+        stored = [each for each in dict.fromkeys(doubts) if each not in self._unassessed_failures]
+        text = "\n".join(f"{doubt.cause}\t{doubt.remedy}" for doubt in stored)
         return History(self.dataset.assign_attrs(doubts=text), self.structure)
 
     @cached_property
@@ -251,6 +259,7 @@ class History(ResultDisplay):
             residual=float(attrs.get("residual", np.nan)),
             mechanisms=mechanisms,
             fall=self.fall,
+            assessed=describe_assessed_joints(joints),
             incomplete=self.outcome.partition(":")[0] if broken_off else "",
             remarks=tuple(remarks),
         )
@@ -317,7 +326,9 @@ class History(ResultDisplay):
         if structure is not None:
             _check_structure(path, dataset, structure)
             roles = [joint.role for joint in structure.joints]
-            dataset = dataset.assign_coords(role=("joint", roles))
+            dataset = dataset.assign_coords(
+                role=("joint", roles), judged=("joint", structure.judged)
+            )
         elif "role" not in dataset.coords:
             raise InvalidInput(
                 f"{path} does not say which parts are rings and piers, as files of earlier "

@@ -23,6 +23,7 @@ from archfem.limit.mechanism_count import (
     has_counted_mechanism,
 )
 from archfem.limit.mechanism_kinematics import first_verified_mechanism
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt
 from archfem.units import format_mm, mm
@@ -58,6 +59,7 @@ class Verdict:
             structure is known.
         fall: state of collapse with large displacements, or None.
         incomplete: how the run was broken off, such as "failed at 1.2 s"; "" otherwise.
+        assessed: which joints the verdict is based on, and which it leaves out; "" if none.
         remarks: further sentences on the run: ending, places of the largest values, mechanisms too
             short to count.
     """
@@ -69,6 +71,7 @@ class Verdict:
     mechanisms: Mapping[str, Mechanism | None]
     fall: CollapseState | None = None
     incomplete: str = ""
+    assessed: str = ""
     remarks: tuple[str, ...] = ()
 
     @property
@@ -95,6 +98,7 @@ class Verdict:
     def __str__(self) -> str:
         """Verdict in words: outcome, doubts, displacements, and a line for each mechanism."""
         lines = [self.headline, *(f"in doubt: {doubt}" for doubt in self.doubts)]
+        lines += [self.assessed] if self.assessed else []
         if not np.isnan(self.displacement):
             lines.append(
                 f"largest displacement of a corner {format_mm(self.displacement)}, residual "
@@ -162,9 +166,48 @@ def total_duration_remark(joints: xr.Dataset) -> str:
     total = float(steps[flags.transpose("joint", "time").values[0]].sum())
     longest = float(longest_duration(flags)[0])
     return (
-        f"{Criteria.of(joints).failures} joints and more fail at once for {duration_text(total)} "
-        f"in all, {duration_text(longest)} at the longest"
+        f"{Criteria.of(joints).failures}{_assessed_word(joints)} joints and more fail at once for "
+        f"{duration_text(total)} in all, {duration_text(longest)} at the longest"
     )
+
+
+def _assessed_word(joints: xr.Dataset) -> str:
+    """Return the adjective of joints that count, where others do not."""
+    return "" if joints["judged"].values.all() else " assessed"
+
+
+def doubt_unassessed_joints(joints: xr.Dataset, structure: Structure) -> list[Doubt]:
+    """Return a doubt where joints of stones fail, by the criteria of a run, and do not count."""
+    judged = joints["judged"].values
+    if judged.all():
+        return []
+    soft, carrying = set(find_yielding_blocks(structure)), set(joints["role"].values[judged])
+    # large displacements follow every stone: there only joints at rings and piers matter
+    is_large, blocks = joints.attrs.get("displacements") == "large", structure.blocks
+    left_out = [
+        number
+        for number, joint in enumerate(structure.joints)
+        if not (judged[number] or soft & set(joint.blocks))
+        and (not is_large or carrying & {blocks[k].role for k in joint.blocks})
+    ]
+    own = joints.isel(joint=left_out)
+    flags = find_failed_joints(own)
+    lasts = longest_duration(flags).values >= (1.0 - 1e-6) * Criteria.of(joints).duration
+    own = own.isel(joint=lasts & flags.any("time").values)
+    if not own.sizes["joint"]:
+        return []
+    texts = [
+        f"{one['name'].item()} (|e| {float(abs(one['eccentricity']).max()):.3f}, "
+        f"V/N {float(one['friction'].max()):.3g}{', open' if one['open'].any() else ''})"
+        for one in (own.isel(joint=number) for number in range(own.sizes["joint"]))
+    ]
+    cause = f"joints that are not assessed fail: {join_names(texts, '; ')}"
+    counted = joints.isel(joint=judged | np.isin(joints["joint"], own["joint"]))
+    counted.coords["judged"] = ("joint", np.full(counted.sizes["joint"], True))
+    if has_counted_mechanism(counted).any():
+        cause += f"; with them counted, {total_duration_remark(counted)}"
+    parts = join_names([f"'{part}'" for part in dict.fromkeys(own["part"].values.astype(str))])
+    return [Doubt(cause, f"give the blocks of part {parts} role='pier' or 'ring', and they count")]
 
 
 def extremes_remark(dataset: xr.Dataset) -> list[str]:
@@ -177,7 +220,7 @@ def extremes_remark(dataset: xr.Dataset) -> list[str]:
     if float(rotations.max()) > 0.0:
         rotation = f"largest hinge rotation {_peak_text(rotations, 1e-3, 'mrad')}"
     else:
-        rotation = "no joint hinges"
+        rotation = f"no{_assessed_word(dataset)} joint hinges"
     return [f"{rotation}, largest slip {_peak_text(abs(joints['slip']), mm, 'mm')}"]
 
 

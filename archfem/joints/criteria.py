@@ -16,6 +16,7 @@ from archfem._typing import Array, Seconds
 from archfem._validation import check_integer, check_number, check_type, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.parts import select_assessed_parts
+from archfem.masonry.structure import describe_assessment
 
 Found = TypeVar("Found")
 
@@ -312,3 +313,9 @@ def assessed_joints(joints: xr.Dataset) -> xr.Dataset:
     judged = joints["judged"].values
     # a selection is a copy, which is large of a long record
     return joints if judged.all() else joints.isel(joint=judged)
+
+
+def describe_assessed_joints(joints: xr.Dataset) -> str:
+    """Describe which joints are assessed, and which are not; empty where all are."""
+    names, parts, judged = (np.atleast_1d(joints[key].values) for key in ("name", "part", "judged"))
+    return describe_assessment(names.astype(str).tolist(), parts.astype(str).tolist(), judged)

@@ -85,8 +85,8 @@ def infer_role(part: str) -> str:
     """Infer the role of a part from the words of its name; warn where they are ambiguous."""
     # words of the name of a part, in the singular, that identify its role
     role_words = {
-        "ring": frozenset({"arch", "ring"}),
-        "pier": frozenset({"pier", "column"}),
+        "ring": frozenset({"arch", "ring", "architrave", "beam", "lintel"}),
+        "pier": frozenset({"pier", "column", "jamb", "pillar", "post"}),
         "other": frozenset({"abutment", "base", "foundation", "footing", "ground", "rock"})
         | {"backfill", "backing", "earth", "fill", "filling", "infill", "soil"}
         | {"parapet", "sidewall", "spandrel", "wall", "wingwall"}

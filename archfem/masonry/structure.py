@@ -88,6 +88,24 @@ def _group_by_stem(names: Sequence[str]) -> str:
 
 Shape = TypeVar("Shape", bound=Callable[..., "Structure"])
 
+
+def describe_assessment(
+    names: Sequence[str], parts: Sequence[str], judged: NDArray[np.bool_]
+) -> str:
+    """Describe which joints are assessed, and which are not; empty where all are."""
+    if judged.all():
+        return ""
+    labels = np.array([part or "unnamed" for part in parts])
+    left_out = [str(name) for name, own in zip(names, judged, strict=True) if not own]
+    if len(left_out) > 4:  # too many to be named
+        left_out = [f"{count} of {part}" for part, count in Counter(labels[~judged]).items()]
+    return (
+        f"assessed: {np.count_nonzero(judged)} of {len(judged)} joints (rings and piers: "
+        f"{join_names(list(dict.fromkeys(labels[judged])))}); not assessed: "
+        f"{join_names(left_out, '; ')}"
+    )
+
+
 # Distance of two coincident points, relative to the size of the structure
 CONTACT_TOLERANCE = 1e-6
 
@@ -320,6 +338,12 @@ class Structure(ResultDisplay):
         """Whether each joint belongs to an assessed part, a ring or pier (n_joints,)."""
         parts = select_assessed_parts({joint.part: joint.role for joint in self.joints})
         return np.array([joint.part in parts for joint in self.joints], dtype=bool)
+
+    @cached_property
+    def assessment(self) -> str:
+        """Which joints are assessed and which are not, in words; empty where all are."""
+        names, parts = zip(*((joint.name, joint.part) for joint in self.joints), strict=True)
+        return describe_assessment(names, parts, self.judged)
 
     @cached_property
     def weight(self) -> float:

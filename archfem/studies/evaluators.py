@@ -85,8 +85,8 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
         The `largest_displacement` and `residual_displacement` of a block [m]. By definition of a
         mechanism the time of the first one [s], infinite if there is none, and its class. How the
         run `ended`. `fall`, the state after a collapse, "" for small displacements. `energy_drift`,
-        the largest energy error at any step over the exchanged energy [-]. `doubts`, the number of
-        warnings.
+        the largest energy error at any step over the exchanged energy [-]. `assessed`, which
+        joints count, if not all do. `doubts`, the number of warnings.
     """
     verdict = run.verdict
     findings: Findings = {
@@ -101,6 +101,7 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
         findings[definition] = np.inf if first is None or first.time is None else first.time
         findings[f"{definition}, class"] = "" if first is None else str(first.kind)
     findings |= {"ended": str(run.ending), "fall": "" if run.fall is None else run.fall.kind}
+    findings |= {"assessed": verdict.assessed} if verdict.assessed else {}
     drift = float(run.dataset.attrs["energy_drift"])
     return findings | {"energy_drift": drift, "doubts": float(len(verdict.doubts))}
 

@@ -17,14 +17,14 @@ from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.joints.resultants import thrust_line
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.limit.vehicles import MovingLoad, Rating
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.statics.mechanism_assessment import KinematicAssessment
-from archfem.view.joint_marks import outline_moving_blocks, scale_motion
+from archfem.view.joint_marks import Marker, outline_moving_blocks, scale_motion
 from archfem.view.positions import FallingBlocks
-from archfem.view.structure import block_colours, draw_loads, draw_structure
+from archfem.view.structure import block_colours, draw_loads, draw_structure, draw_thrust
 from archfem.view.style import (
     COLOUR_MAP,
     COLUMN_WIDTH,
@@ -70,14 +70,10 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse) -> None:
         _draw_motion(axes, outline_moving_blocks(structure, motion), "mechanism")
         _mark_hinges(axes, structure, found, motion, {"label": "hinge", "ms": 7.5})
         _mark_sliding(axes, structure, found.sliding)
-    line = thrust_line(structure, found.joints).values
-    # arches and piers that share no block have lines of their own
-    pairs = [set(joint.blocks) for joint in structure.joints]
-    breaks = [k for k in range(1, len(pairs)) if not pairs[k - 1] & pairs[k]]
-    line = np.insert(line, breaks, np.nan, axis=0)
-    if np.isfinite(line).any():
-        style = {"color": Colour.THRUST, "lw": 1.5, "marker": ".", "ms": 3, "zorder": 4}
-        axes.plot(*line.T, label="thrust line", **style)
+    # limit analysis counts the joints of all stones
+    soft = set(find_yielding_blocks(structure))
+    stones = np.array([not soft & set(joint.blocks) for joint in structure.joints])
+    draw_thrust(axes, Marker(structure, stones).at(found.joints))
     factor = f"{found.factor:.3g} ×" if np.isfinite(found.factor) else ""
     if found.outcome is not Outcome.INFEASIBLE:  # else nothing was loaded: the weight is too much
         draw_loads(axes, structure, found.live, factor=factor)

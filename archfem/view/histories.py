@@ -22,6 +22,7 @@ from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     Criteria,
     assessed_joints,
+    describe_assessed_joints,
     envelope,
     part_roles,
     sliding_limits,
@@ -37,6 +38,7 @@ from archfem.view.style import (
     Colour,
     add_legend,
     add_legend_below,
+    add_note,
     annotate,
     new_figure,
     set_title,
@@ -95,7 +97,7 @@ def draw_envelope(
             e = _joints_of_part(dead, part)["eccentricity"]
             panel.plot(e.values, ":", color=Colour.TEXT, lw=1.4, label="dead load")
     first.set_ylim(-0.56, 0.56 + (row_height * len(runs) if openings else 0.0))
-    return _finish_panels(panels)
+    return _finish_panels(panels, joints_of_runs)
 
 
 def draw_envelopes(runs: Mapping[str, History], dead: xr.Dataset | None) -> list[Figure]:
@@ -133,7 +135,7 @@ def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[st
             e = _joints_of_part(joints, part)["eccentricity"]
             panel.plot(e.values, label=label, **style)
     next(iter(panels.values())).set_ylim(-0.56, 0.56)
-    return _finish_panels(panels)
+    return _finish_panels(panels, states)
 
 
 def _draw_band(axes: Axes, joints: xr.Dataset, label: str, colour: str, *, shade: float) -> None:
@@ -195,9 +197,9 @@ def _make_panels(states: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[st
 
 def _label_joints(axes: Axes, names: Sequence[str]) -> None:
     """Write the names of joints at 0, 1, …, as far as there is room."""
-    labels = dict(enumerate(names))
+    labels = {float(k): name for k, name in enumerate(names)}
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.xaxis.set_major_formatter(lambda place, _: labels.get(round(place), ""))
+    axes.xaxis.set_major_formatter(lambda place, _: labels.get(round(place, 6), ""))
 
 
 def _lay_out_panels(
@@ -227,8 +229,8 @@ def _lay_out_panels(
     return panels
 
 
-def _finish_panels(panels: Mapping[str, Axes]) -> Figure:
-    """Mark quarters of the depth, and add one legend for all panels."""
+def _finish_panels(panels: Mapping[str, Axes], states: Mapping[str, xr.Dataset]) -> Figure:
+    """Mark quarters of the depth; add one legend for all panels, and a note on their joints."""
     first = next(iter(panels.values()))
     first.set_yticks(np.linspace(-0.5, 0.5, 5))
     figure = cast(Figure, first.figure)
@@ -237,6 +239,7 @@ def _finish_panels(panels: Mapping[str, Axes]) -> Figure:
     else:
         handles = first.get_legend_handles_labels()[0]
         add_legend_below(figure, 2 + len(LINE_COLOURS), handles=handles)
+    add_note(figure, {label: describe_assessed_joints(joints) for label, joints in states.items()})
     return figure
 
 
@@ -278,6 +281,7 @@ def draw_joints(run: History, joints: Sequence[str | int] | None = None) -> Figu
             axes.set_xlabel("time [s]" if row == len(selected) else "", fontsize=LABEL_SIZE)
             axes.tick_params(labelbottom=row == len(selected))
     figure.align_ylabels([ground, *left_panels])
+    add_note(figure, {"": describe_assessed_joints(run.joints)})
     return figure
 
 
@@ -309,6 +313,7 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
         for axes in column:
             axes.set_xlim(run.time[0], run.time[-1])
             axes.label_outer()
+    add_note(figure, {label: describe_assessed_joints(run.joints) for label, run in runs.items()})
     return figure
 
 

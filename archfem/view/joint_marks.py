@@ -114,13 +114,16 @@ def joint_marks(structure: Structure, joints: xr.Dataset, *, shift: Array | None
 
 
 def joint_pairs(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return pairs of shown joints of free blocks that have exactly two of them (n_links, 2)."""
+    """Return pairs of shown joints between which the thrust line crosses a block (n_links, 2)."""
     touching: list[list[int]] = [[] for _ in structure.blocks]
     for number in np.flatnonzero(shown):
         for block in structure.joints[number].blocks:
             touching[block].append(int(number))
-    # no thrust line runs along the ground from one pier to the next
-    pairs = [touching[number] for number in structure.free if len(touching[number]) == 2]
+    # A block passes on a single thrust if it is free, since no line runs along the ground from one
+    # pier to the next, has two joints, and is of a part whose joints are shown.
+    roles = {structure.joints[number].role for number in np.flatnonzero(shown)}
+    passing = [number for number in structure.free if structure.blocks[number].role in roles]
+    pairs = [touching[number] for number in passing if len(touching[number]) == 2]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
 

@@ -30,6 +30,7 @@ from archfem.view.style import (
     CLIPPED_PERCENT,
     Colour,
     add_legend_below,
+    add_note,
     add_polygons,
     set_title,
     structure_axes,
@@ -111,6 +112,7 @@ def draw_stress(
     joints = joint_dataset(structure, model.resultants(q))
     draw_thrust(axes, joint_marks(structure, joints))
     set_title(axes, f"{structure.name}: principal compression")
+    add_note(figure, {"": structure.assessment})
     axes.autoscale_view()
     if has_own_figure:
         add_legend_below(figure)

@@ -13,7 +13,7 @@ from matplotlib.patheffects import withStroke
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
-from archfem.joints.criteria import Criteria, with_failure_flags
+from archfem.joints.criteria import Criteria, describe_assessed_joints, with_failure_flags
 from archfem.joints.resultants import check_instant
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement
 from archfem.masonry.structure import Joint, Structure
@@ -33,6 +33,7 @@ from archfem.view.style import (
     Colour,
     add_legend,
     add_legend_below,
+    add_note,
     add_polygons,
     annotate,
     drawing_scale,
@@ -77,8 +78,10 @@ def draw_structure(
     draw_blocks(axes, structure)
     if joints is not None:
         check_instant(structure, joints)
-        draw_marks(axes, joint_marks(structure, with_failure_flags(joints, criteria)))
+        joints = with_failure_flags(joints, criteria)
+        draw_marks(axes, joint_marks(structure, joints))
         add_legend(axes)
+        add_note(cast(Figure, axes.figure), {"": describe_assessed_joints(joints)})
     set_title(axes, title_at_instant(structure.name, joints))
     axes.autoscale_view()
     return cast(Figure, axes.figure)
@@ -98,6 +101,8 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
     # a panel among others needs less height than a figure of its own
     figure = new_figure(wide, 0.78 * high * len(states))
     panels = figure.subplots(len(states), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    drawn = {label: joints for label, (_, joints) in states.items() if joints is not None}
+    add_note(figure, {label: describe_assessed_joints(each) for label, each in drawn.items()})
     marks: dict[str, Any] = {}
     for axes, (label, (structure, joints)) in zip(panels, states.items(), strict=True):
         draw_structure(structure, joints, axes=axes)
@@ -157,11 +162,15 @@ class DisplacedBlocks:
 
 
 def draw_thrust(axes: Axes, marks: Marks) -> None:
-    """Draw the thrust lines."""
-    line: dict[str, Any] = {"lw": 1.7, "path_effects": white_halo(3.4), "gid": "links"}
-    line |= {"color": Colour.THRUST, "zorder": 5}
-    axes.plot(*_join_segments(marks.links).T, label="thrust line", **line)
-    axes.plot(*marks.thrust.T, "o", ms=3.0, color=Colour.THRUST, zorder=5, gid="thrust")
+    """Draw the thrust lines, and the points at which thrust crosses joints."""
+    style: dict[str, Any] = {"color": Colour.THRUST, "zorder": 5, "ms": 3.0, "lw": 1.7}
+    # where blocks have many joints, as in a wall, there are points alone
+    label = "thrust at a joint"
+    if len(marks.links):
+        halo, label = {"path_effects": white_halo(3.4)}, "_points"
+        axes.plot(*_join_segments(marks.links).T, label="thrust line", gid="links", **style, **halo)
+    if np.isfinite(marks.thrust).any():
+        axes.plot(*marks.thrust.T, "o", label=label, gid="thrust", **style)
 
 
 def draw_marks(axes: Axes, marks: Marks) -> None:
@@ -221,6 +230,7 @@ def draw_names(structure: Structure) -> Figure:
         _name_part(axes, [joint for joint in shown if joint.part == part], inch)
     example = shown[len(shown) // 2].name
     set_title(axes, f"{structure.name}: names of joints, such as '{example}'")
+    add_note(cast(Figure, axes.figure), {"": structure.assessment})
     return cast(Figure, axes.figure)
 
 
@@ -286,6 +296,7 @@ def draw_displaced(
     shift = magnification * model.observer().joint_ends(q)
     draw_marks(axes, joint_marks(structure, joints, shift=shift))
     add_legend(axes)
+    add_note(cast(Figure, axes.figure), {"": describe_assessed_joints(joints)})
     scale = "" if magnification == 1.0 else f", displacements × {magnification:g}"
     set_title(axes, title_at_instant(structure.name, joints) + scale)
     axes.autoscale_view()

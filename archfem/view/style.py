@@ -1,6 +1,6 @@
 """Common style of all figures: colours, type sizes, axes, titles, legends and annotations."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -22,7 +22,7 @@ from archfem._files import atomic_write
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, join_names
 
 
 class Colour:
@@ -96,6 +96,20 @@ def set_title(axes: Axes, text: str) -> None:
     letters = int(axes.figure.get_figwidth() / columns / text_width(1, TITLE_SIZE))
     lines = fill(" ".join(text.split()), max(letters, 12), break_long_words=False)
     axes.set_title(lines, fontsize=TITLE_SIZE, color=Colour.TEXT, parse_math=False)
+
+
+def add_note(figure: Figure, notes: Mapping[str, str]) -> None:
+    """Write notes above the panels of a figure; those that differ are preceded by their labels."""
+    labels: dict[str, list[str]] = {}
+    for label, note in notes.items():
+        labels.setdefault(note, []).append(label)
+    several = len(labels) > 1
+    texts = [f"{join_names(labels[note])}: {note}" if several else note for note in labels if note]
+    if texts and not figure.get_suptitle():  # a figure of the user may have a title
+        letters = int(figure.get_figwidth() / text_width(1))
+        text = "\n".join(fill(each, letters) for each in texts)
+        figure.suptitle(text, fontsize=LABEL_SIZE, color=Colour.EDGE, parse_math=False)
+        figure.set_figheight(figure.get_figheight() + 0.14 * (1 + text.count("\n")))
 
 
 def style_axes(axes: Axes, x: str = "", y: str = "", size: float = LABEL_SIZE) -> None:

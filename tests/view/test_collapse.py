@@ -1,10 +1,12 @@
 """Pictures of limit analysis: their content, not their looks."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 import xarray as xr
+from portals import DRY, box, portal
 
 import archfem as af
 from archfem.view import (
@@ -19,7 +21,14 @@ from archfem.view.structure import draw_loads
 
 
 def lines_of(axes):
-    return {line.get_label(): line.get_xydata() for line in axes.lines}
+    """Lines by their labels in the legend."""
+    lines = {line.get_label(): line.get_xydata() for line in axes.lines}
+    return {label: line for label, line in lines.items() if not label.startswith("_")}
+
+
+def pieces_of(axes):
+    """Pieces of the thrust line, each from one joint to another."""
+    return lines_of(axes)["thrust line"].reshape(-1, 3, 2)[:, :2]
 
 
 def test_collapse_shows_thrust_line_hinges_and_moved_blocks(ring, tmp_path):
@@ -27,7 +36,9 @@ def test_collapse_shows_thrust_line_hinges_and_moved_blocks(ring, tmp_path):
     figure = draw_collapse(ring, found)
     axes = figure.axes[0]
     lines = lines_of(axes)
-    assert len(lines["thrust line"]) == 18
+    points = af.joints.thrust_line(ring, found.joints).values
+    assert len(points) == 18
+    np.testing.assert_array_equal(pieces_of(axes), np.stack([points[:-1], points[1:]], axis=1))
     assert len(lines["hinge"]) == 4
     np.testing.assert_allclose(lines["hinge"][0], ring.joints[0].intrados)  # lower block stays
     stones, moved = axes.collections
@@ -136,20 +147,61 @@ def test_a_moving_load_shows_factors_over_its_middle_and_the_mechanism(ring):
     assert repr(found).startswith(f"MovingLoad: least factor {found.worst.factor:.4g}, ")
 
 
-def test_thrust_lines_of_parts_that_share_no_block_are_not_joined(ring):
-    shapes = af.shapes
-    arch = shapes.Arch(measured="centre line", span=2.0, rise=0.6, thickness=0.3, voussoirs=5)
-    pier = shapes.Pier(gap=0.8, height=0.5)
+def side_by_side(pier, backfill=None):
+    """Two arches over a pier, and fixed walls beside them."""
+    arch = af.shapes.Arch(
+        measured="centre line", span=2.0, rise=0.6, thickness=0.3, voussoirs=5, name="arch"
+    )
     names = ("left wall", "right wall")
-    walls = [shapes.Sidewall(length=1.0, height=0.5, state="fixed", name=name) for name in names]
+    walls = [af.shapes.Sidewall(length=1.0, height=0.5, state="fixed", name=name) for name in names]
     arches = [arch, replace(arch, name="second arch")]
-    bridge = af.bridge(arches=arches, piers=[pier], sidewalls=walls)
-    found = af.collapse_factor(bridge, live=af.BodyForce(1.0))
-    axes = draw_collapse(bridge, found).axes[0]
-    line = lines_of(axes)["thrust line"]
-    assert len(line) > len(bridge.joints)
-    for place in np.flatnonzero(np.isnan(line[:, 0])):
-        assert 0 < place < len(line) - 1
+    return af.bridge(arches=arches, piers=[pier], sidewalls=walls, backfill=backfill)
+
+
+def wall():
+    """Three courses in running bond."""
+    ends = [(0.0, 0.8, 1.6), (0.0, 0.4, 1.2, 1.6), (0.0, 0.8, 1.6)]
+    blocks = [box(0.0, -1.0, 2.0, 0.0, "rock", fixed=True, part="wall")]
+    for y, places in enumerate(ends):
+        blocks += [box(a, y, b, y + 1.0, f"{a} {y}", part="wall") for a, b in pairwise(places)]
+    return af.masonry.assembled(blocks, DRY)
+
+
+PIER = af.shapes.Pier(gap=0.8, height=0.5)
+BUTTRESSED = {"span": 4.0, "rise": 1.6, "thickness": 0.5, "breadth": 1.2, "height": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("structure", "count"),
+    [
+        # posts and lintel; a voussoir each; a voussoir and a course each, but for the pier's upper
+        # stone, which two arches press; none where blocks have more joints than two
+        (portal("ring"), 3),
+        (portal("other"), 3),
+        (side_by_side(PIER), 10),
+        (side_by_side(replace(PIER, height=1.2)), 10 + 2),
+        (side_by_side(PIER, af.shapes.Backfill(cover=0.3)), 10),
+        (af.shapes.buttressed_arch(voussoirs=7, **BUTTRESSED), 7 + 2 * 5),
+        (wall(), 0),
+    ],
+    ids=["portal", "lintel", "side by side", "on a pier", "below fill", "buttressed", "wall"],
+)
+def test_a_thrust_line_at_collapse_runs_through_stones_alone(structure, count):
+    """Each piece crosses one free stone between its two joints; none is in the air or ground."""
+    fill = af.limit.Fill(friction_angle=35.0) if "backfill" in str(structure.blocks) else None
+    found = af.collapse_factor(structure, live=af.BodyForce(1.0), fill=fill)
+    axes = draw_collapse(structure, found).axes[0]
+    if not count:
+        assert "thrust line" not in lines_of(axes)
+        assert len(lines_of(axes)["thrust at a joint"])
+        return
+    points = af.joints.thrust_line(structure, found.joints).values
+    for piece in pieces_of(axes):
+        ends = [np.flatnonzero((points == end).all(axis=1)) for end in piece]
+        blocks = [set(structure.joints[int(number)].blocks) for (number,) in ends]
+        (block,) = blocks[0] & blocks[1]
+        assert not structure.blocks[block].fixed
+    assert len(pieces_of(axes)) == count
 
 
 @pytest.mark.parametrize(

@@ -309,7 +309,8 @@ def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
     blocks.append(build_player(case, run, title, players))
     if case.suite is None:
         blocks += _build_envelopes(data)
-    blocks.append(_shorten_joint_table(result_text.tabulate_joints(run.joints, data.dead)))
+    table = result_text.tabulate_joints(run.joints, data.dead)
+    blocks.append(_shorten_joint_table(table, run.verdict.assessed))
     blocks.append(TextBlock(_sentence(utilisation_text(case.structure, run.joints))))
     return blocks
 
@@ -320,8 +321,8 @@ def _build_envelopes(data: ReportData) -> list[FigureBlock]:
     return [FigureBlock.of(figure, caption) for figure in draw_envelopes(data.runs, data.dead)]
 
 
-def _shorten_joint_table(table: result_text.ResultTable) -> Grid:
-    """Return the table of joints without empty columns, which the caption names."""
+def _shorten_joint_table(table: result_text.ResultTable, assessed: str) -> Grid:
+    """Return the table of joints without empty columns; the caption names these, and the joints."""
     head, rows = table
     # Most joints neither slide nor open in most runs.
     filled = [k for k in range(len(head)) if any(row[k] != "-" for row in rows)]
@@ -332,6 +333,7 @@ def _shorten_joint_table(table: result_text.ResultTable) -> Grid:
         "when and how long at most the joint hinged, slid and was open."
     )
     caption = " ".join([caption, *(note for flag, note in notes.items() if flag in empty)])
+    caption += f" {_sentence(assessed)}" if assessed else ""
     return Grid([head[k] for k in filled], [[row[k] for k in filled] for row in rows], caption)
 
 
@@ -370,10 +372,11 @@ def _build_suite_response(data: ReportData) -> list[Any]:
 def list_facts(data: ReportData) -> list[tuple[str, str]]:
     """List the principal results by name, which the report shows first."""
     runs, structure = list(data.runs.values()), data.case.structure
-    blocks = ("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")
+    blocks = [("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")]
+    blocks += [("joints", structure.assessment)] if structure.assessment else []
     if not runs:
-        return [blocks, ("runs", "none")]
-    facts = [*_verdict_facts(runs), blocks]
+        return [*blocks, ("runs", "none")]
+    facts = [*_verdict_facts(runs), *blocks]
     # Files of older versions have the acceleration at their steps alone.
     pga = max(
         run.dataset.attrs.get("pga", float(np.abs(run.dataset["ground"].values[:, 0]).max()))

@@ -5,6 +5,7 @@ matplotlib's Agg renderer, many shapes per call, or by a painter of another libr
 divided into triangles so fine that colours may vary linearly between their corners.
 """
 
+from textwrap import shorten
 from typing import Any
 
 import matplotlib
@@ -22,10 +23,12 @@ from matplotlib.transforms import Bbox, IdentityTransform
 
 from archfem._typing import Array
 from archfem.dynamics.history import History
+from archfem.joints.criteria import describe_assessed_joints
 from archfem.view.films.encoder import Image
 from archfem.view.films.frames import Frame, corner_values, frame_layers
 from archfem.view.films.settings import Scale, Setup
 from archfem.view.histories import draw_ground
+from archfem.view.joint_marks import joint_pairs
 from archfem.view.positions import ground_acceleration
 from archfem.view.style import Colour, annotate, style_colour_bar
 
@@ -189,11 +192,19 @@ class FrameLayout:
             name = f"{run.dataset.attrs['title']}: {run.verdict.outcome}"
         top = 1.0 - 0.5 * self.header / self._inches[1]
         self._write(0.02, top, name[:1].upper() + name[1:], fontsize=13.0, ha="left")
+        # 16 letters of this size take an inch
+        note = shorten(
+            describe_assessed_joints(joints), int(16.0 * self._inches[0]), placeholder=" …"
+        )
+        low = 1.0 - 0.87 * self.header / self._inches[1]
+        self._write(0.02, low, note, fontsize=0.75 * self.font_size, ha="left", color=Colour.EDGE)
         self._state_text = self._write(0.985, top, "", fontsize=13.0, animated=True)
         self._draw_colour_bar(setup.scale, below)
         self._magnification = f"displacements × {setup.magnification:g}"
         middle = (below - 0.5 * self.footer) / self._inches[1]
         handles = _legend_symbols(joints, run is not None, bool(setup.outlines))
+        if not len(joint_pairs(setup.model.structure, joints["judged"].values)):
+            handles = handles[1:]  # no block carries a single thrust
         style = {"columnspacing": 1.4, "handletextpad": 0.5, "bbox_to_anchor": (0.01, middle)}
         self._legend = self._figure.legend(handles=handles, loc="center left", ncols=6, **style)
         self._scale_text = self._write(0.985, middle, "")

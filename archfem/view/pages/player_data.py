@@ -19,7 +19,7 @@ from scipy import sparse
 from archfem._typing import Array
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import assessed_joints, sliding_limits
+from archfem.joints.criteria import assessed_joints, describe_assessed_joints, sliding_limits
 from archfem.masonry.block import Block
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.models.model import Model, check_coordinate_count, check_model
@@ -308,10 +308,17 @@ class Scene:
             "loose": None if falls is None else float(falls.times[0]),
             "level": None if falls is None else falls.level,
             "mechanism": None if mechanism is None else mechanism.time,
-            "note": "" if self.moved is not None else self.missing_reason or _default_note(run),
+            "note": self.note,
             "pack": pack.head,
             "bytes": pack.text,
         }
+
+    @property
+    def note(self) -> str:
+        """Sentences on joints that are not assessed, and on missing displacements."""
+        note = "" if self.moved is not None else self.missing_reason or _default_note(self.run)
+        assessed = describe_assessed_joints(self.run.joints)
+        return f"{assessed[:1].upper()}{assessed[1:]}. {note}" if assessed else note
 
     @property
     def text(self) -> str:
