@@ -1,11 +1,12 @@
 """Dynamic analyses: time histories, damping, events, motion scaling and falls.
 
     accuracy          processor time against error over settings
+    collapse_state    stands, dislocated, partly fallen or fallen, from positions
     damping           damping from effective modes or restitution
     error_estimation  a-posteriori error of model, time step and small displacements
     events            events that end a run
     export            VTU, PVD and XDMF series of a run
-    fall              fall of separated blocks, and the state of collapse
+    fall              fall of loose blocks, from their release to rest
     history           History, its file, first mechanisms
     model_selection   build, and selection of a model by predicted error
     monitor           energy balance and validity checks of a run
@@ -13,6 +14,7 @@
     recorder          recording of a run
     rigid_body        free rigid blocks with impacts and friction
     schemes           time integration schemes, Rayleigh and stiffness damping
+    separation        joints that let go, stones that meet, blocks that overturn
     solvers           solvers of a time step: newton, compliance, snes
     state             State, Step, Batch
     time_history      time_history, Record, last_state

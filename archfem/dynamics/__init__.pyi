@@ -1,3 +1,5 @@
+from .collapse_state import CollapseState as CollapseState
+from .collapse_state import classify_collapse as classify_collapse
 from .damping import effective_damping as effective_damping
 from .damping import restitution as restitution
 from .damping import restitution_damping as restitution_damping
@@ -6,8 +8,6 @@ from .events import Event as Event
 from .events import EveryMechanism as EveryMechanism
 from .events import MovingMechanism as MovingMechanism
 from .events import register_criterion as register_criterion
-from .fall import CollapseState as CollapseState
-from .fall import classify_collapse as classify_collapse
 from .fall import release_blocks as release_blocks
 from .history import Ending as Ending
 from .history import History as History

@@ -15,8 +15,8 @@ from archfem._display import ResultDisplay, call_late_bound
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._typing import Array
 from archfem._validation import check_type, validate_arguments, validate_methods
+from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.export import write_vtk, write_xdmf
-from archfem.dynamics.fall import CollapseState
 from archfem.dynamics.verdict import (
     MECHANISM_DEFINITIONS,
     PUBLISHED_DEFINITION,

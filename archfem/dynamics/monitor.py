@@ -23,7 +23,7 @@ from scipy import sparse
 from scipy.integrate import trapezoid
 
 from archfem._typing import Array
-from archfem.dynamics.fall import MeetingMonitor
+from archfem.dynamics.separation import MeetingMonitor
 from archfem.dynamics.state import Batch, State
 from archfem.errors import DidNotConverge
 from archfem.models.model import Doubt, Model, Observer

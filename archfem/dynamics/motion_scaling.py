@@ -18,8 +18,8 @@ from archfem._display import call_late_bound
 from archfem._files import align_columns
 from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
-from archfem.dynamics.fall import FALLEN_STATES, CollapseState
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem._validation import check_integer
-from archfem.dynamics.fall import list_stones
 from archfem.dynamics.history import (
     COORDINATES_VERSION,
     SIGN_CONVENTION,
@@ -25,6 +24,7 @@ from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.state import Batch, State
 from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_dataset
+from archfem.masonry.stiffness_ratio import list_stones
 from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 

@@ -22,17 +22,8 @@ from archfem.dynamics.events import (
     resolve_criteria,
     start_monitor,
 )
-from archfem.dynamics.fall import (
-    MeetingMonitor,
-    SeparationMonitor,
-    doubt_collapse,
-    doubt_loose_friction,
-    doubt_rocking_ratio,
-    is_overturning,
-    simulate_fall,
-    standing_state,
-)
-from archfem.dynamics.history import Ending, History, with_fall
+from archfem.dynamics.fall import follow_fall
+from archfem.dynamics.history import Ending, History
 from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.recorder import Record, Recorder, start_batch
 from archfem.dynamics.schemes import (
@@ -46,6 +37,7 @@ from archfem.dynamics.schemes import (
     check_large_displacement_scheme,
     check_time_step,
 )
+from archfem.dynamics.separation import LooseningMonitor
 from archfem.dynamics.solvers.adaptive import AdaptiveStepper
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.integrator import Stepper
@@ -151,8 +143,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     adaptive = None if dt else AdaptiveStepper(stepper, tolerance, first)
     try:
         recorder.add(first)
-        loosening = SeparationMonitor(model), MeetingMonitor(model, start)
-        monitors = event, loosening if model.large_displacements else None
+        monitors = event, LooseningMonitor.of(model, start) if model.large_displacements else None
         ending, outcome = _run_steps(adaptive or stepper, recorder, monitors, motion.duration)
     except KeyboardInterrupt:
         ending, outcome = Ending.INTERRUPTED, f"interrupted at {recorder.state.time:.4g} s"
@@ -168,7 +159,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     if not model.large_displacements or ending is Ending.INTERRUPTED:
         return history
     ratio = viscous.restitution if isinstance(viscous, StiffnessDamping) else None
-    return _follow_fall(history, model, (start, recorder.state), motion, ratio)
+    return follow_fall(history, model, (start, recorder.state), motion, ratio)
 
 
 def _run_analysis(
@@ -185,47 +176,6 @@ def _run_analysis(
     start = start or analysis.dead_load(motion)
     model = start.model if isinstance(start, Equilibrium) else analysis.model
     return time_history(model, motion, start=start, **settings)
-
-
-def _follow_fall(
-    history: History,
-    model: Model,
-    states: tuple[State, State],
-    motion: Motion,
-    rocking_ratio: float | None,
-) -> History:
-    """Add the fall of loose or overturning blocks, and the state of collapse, to a history."""
-    (start, state), doubts = states, []
-    tilts = history.ending is Ending.FINISHED and is_overturning(model, state)
-    if tilts or history.ending in (Ending.PARTED, Ending.MET):
-        try:
-            frames, fall = simulate_fall(model, start, state, motion, rocking_ratio)
-        except DidNotConverge as error:
-            error.history = history
-            raise
-        dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
-        history = History(dataset, history.structure)
-        doubts = [
-            *_doubt_impulses(history),
-            *doubt_rocking_ratio(model.structure, rocking_ratio),
-            *doubt_loose_friction(model.structure),
-        ]
-    else:
-        shaken = history.ending is not Ending.FINISHED
-        fall = standing_state(model, start, state, shaken)
-    doubts += doubt_collapse(model.structure, fall)
-    return with_fall(history, fall).with_doubts((*history.doubts, *doubts))
-
-
-def _doubt_impulses(history: History, admissible: float = 0.02) -> list[Doubt]:
-    """Return a doubt where impulses of a fall did not settle in more than a share of its steps."""
-    share, violation = (history.dataset.attrs[f"fall_{key}"] for key in ("unsettled", "violation"))
-    doubt = Doubt(
-        f"impulses of loose blocks did not settle in {share:.0%} of the steps of the fall, and "
-        f"violate contacts by up to {violation:.2g} of a step's weight impulse",
-        "compare with `dynamics.RigidBlockSimulation` at half the time step",
-    )
-    return [doubt] if share > admissible else []
 
 
 def _doubt_tolerance(history: History, admissible: float = 0.02) -> list[Doubt]:
@@ -290,8 +240,8 @@ def _make_recorder(
     )
 
 
-# What may end a run: an event, and separation and meeting of blocks where displacements are large
-Monitors = tuple[EventMonitor | None, tuple[SeparationMonitor, MeetingMonitor] | None]
+# What may end a run: an event, and blocks that become loose where displacements are large
+Monitors = tuple[EventMonitor | None, LooseningMonitor | None]
 
 
 def _run_steps(
@@ -319,28 +269,15 @@ def _run_steps(
 def _find_end(monitors: Monitors, batch: Batch, before: float) -> tuple[Ending, str | None, int]:
     """Return how and why a run ends within a batch, if it does, and after how many steps."""
     event, loosening = monitors
-    ending, reason, last = _find_loosening(loosening, batch)
+    ending, reason, last = Ending.FINISHED, None, len(batch.times)
+    if loosening is not None:
+        ending, reason, last = loosening.find_end(batch)
     # an event at that step or before has precedence
     if event is not None and last:
         steps = np.diff(batch.times[:last], prepend=before).tolist()
         if met := first_event(event, batch.resultants[:last], steps):
             return Ending.EVENT, met[1], met[0] + 1
     return ending, reason, last
-
-
-def _find_loosening(
-    monitors: tuple[SeparationMonitor, MeetingMonitor] | None, batch: Batch
-) -> tuple[Ending, str | None, int]:
-    """Return how and why blocks become loose within a batch, and after how many steps."""
-    if monitors is None:
-        return Ending.FINISHED, None, len(batch.times)
-    loose, met = (monitor.find_first(batch) for monitor in monitors)
-    # loose blocks start from before they meet: a joint does not know of the other stone
-    if met is not None and (loose is None or met[0] <= loose[0]):
-        return Ending.MET, f"stones meeting outside their joints: {met[1]}", met[0]
-    if loose is not None:
-        return Ending.PARTED, f"the blocks coming loose: {loose[1]}", loose[0] + 1
-    return Ending.FINISHED, None, len(batch.times)
 
 
 @validate_arguments

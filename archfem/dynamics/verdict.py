@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from archfem.dynamics.fall import CollapseState
+from archfem.dynamics.collapse_state import CollapseState
 from archfem.joints.criteria import (
     Criteria,
     assessed_joints,

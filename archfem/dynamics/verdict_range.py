@@ -15,7 +15,7 @@ from archfem._files import align_columns
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._typing import Array
 from archfem._validation import validate_methods
-from archfem.dynamics.fall import COLLAPSE_STATES, FALLEN_STATES
+from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 
 
 @validate_methods

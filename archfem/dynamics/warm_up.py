@@ -12,8 +12,9 @@ from time import perf_counter
 
 import numpy as np
 
-from archfem.dynamics.fall import MeetingMonitor, simulate_fall
+from archfem.dynamics.fall import simulate_fall
 from archfem.dynamics.schemes import HHT, Conserving, Newmark, StiffnessDamping
+from archfem.dynamics.separation import MeetingMonitor
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.solvers.newton import NewtonSolver
@@ -75,7 +76,7 @@ def _compile_large_displacements(max_half_width: int) -> None:
     run = time_history(model, _SHORT_MOTION, dt=_SHORT_MOTION.dt, method=stepper)
     end = last_state(run)
     model.observer().joint_ends(end.q)  # pose of a face, as films need it
-    simulate_fall(model, end, end, _SHORT_MOTION)
+    simulate_fall(model, end, _SHORT_MOTION)
     # a negative tolerance, so that even blocks that have not moved are tested
     batch = next(stepper.batches(end, _SHORT_MOTION.dt, end.time + _SHORT_MOTION.dt))
     MeetingMonitor(model, end, tolerance=-1.0).find_first(batch)

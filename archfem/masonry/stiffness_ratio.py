@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from math import sqrt
 
+import numpy as np
+from numpy.typing import NDArray
+
 from archfem.masonry.structure import Structure
 
 
@@ -47,6 +50,17 @@ def find_yielding_blocks(structure: Structure) -> tuple[int, ...]:
         for number in structure.free
         if structure.blocks[number].role == "other" and _is_yielding(structure, number)
     )
+
+
+def list_stones(structure: Structure) -> list[int]:
+    """Return the free blocks that do not yield, or all free blocks where there are no others."""
+    fill = find_yielding_blocks(structure)
+    return [number for number in structure.free if number not in fill] or list(structure.free)
+
+
+def mark_stone_joints(structure: Structure) -> NDArray[np.bool_]:
+    """Return whether joints have no yielding block on either side (j,)."""
+    return ~np.isin(structure.pairs, find_yielding_blocks(structure)).any(axis=1)
 
 
 def _is_yielding(structure: Structure, number: int, stiffest_fill: float = 1e9) -> bool:

@@ -16,7 +16,7 @@ from archfem._typing import Array
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.toml_file import check_table
-from archfem.dynamics.fall import FALLEN_STATES
+from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import Ending
 from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
 from archfem.errors import InvalidInput

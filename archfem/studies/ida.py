@@ -24,8 +24,8 @@ from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.run import DeadLoadResult
 from archfem.cases.toml_file import check_choice
 from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.events import applicable_definitions
-from archfem.dynamics.fall import CollapseState
 from archfem.dynamics.history import Ending, first_mechanisms, partial_history
 from archfem.dynamics.motion_scaling import (
     COLLAPSE_DEFINITION,

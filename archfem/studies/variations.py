@@ -17,8 +17,8 @@ from tqdm import tqdm
 
 from archfem._validation import check_integer, check_number, validate_arguments
 from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.collapse_state import CollapseState, classify_collapse
 from archfem.dynamics.damping import resolve_effective_damping
-from archfem.dynamics.fall import CollapseState, classify_collapse
 from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.rigid_body.bodies import LooseBlocks

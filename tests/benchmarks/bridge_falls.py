@@ -21,7 +21,7 @@ from timing import table
 
 import archfem as af
 from archfem.cases import damping_of
-from archfem.masonry.stiffness_ratio import find_yielding_blocks
+from archfem.masonry.stiffness_ratio import mark_stone_joints
 from archfem.units import mm
 
 MESHES = Path(__file__).parents[2] / "meshes"
@@ -93,7 +93,7 @@ def run_scales(chosen: argparse.Namespace) -> None:
         structure, model = built(case, fill, chosen.cells)
         dead = af.dead_load(model)
         damping = damping_of(case, dead)[0]
-        stones = ~np.isin(structure.pairs, find_yielding_blocks(structure)).any(axis=1)
+        stones = mark_stone_joints(structure)
         for scale in chosen.scales:
             begun = time.process_time()
             try:

@@ -1,131 +1,120 @@
-"""The dense problem in the active joint rows: its compliance, its equations, their solution."""
+"""The dense problem in the active joint rows: forces in balance as joints open, close and slide."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from kernels import from_python
+from glued import glued
 
-from archfem.dynamics.solvers import active_compliance, active_rows, joint_law
-from archfem.dynamics.solvers.active_compliance import ActiveRows
+import archfem as af
+from archfem.dynamics import Equation, SnesSolver, Stepper
+from archfem.dynamics.solvers.active_rows import MAX_DIRECT_ROWS
+from archfem.dynamics.solvers.compliance import ComplianceSolver
+from archfem.dynamics.solvers.joint_law import gap_rows
 
-add_columns = from_python(active_compliance.add_columns)
-add_gaps = from_python(active_compliance.add_gaps)
-begin_problem = from_python(active_compliance.begin_problem)
-update_columns = from_python(active_compliance.update_columns)
-prepare_equations = from_python(active_rows.prepare_equations)
-solve_equations = from_python(active_rows.solve_equations)
-hold_reversed = from_python(joint_law.hold_reversed)
+DT, STEPS = 0.005, 60
 
-FEW, MANY = 50, 200
-"""Rows that are solved for by a factor, as up to 100 are, and by minimal residuals."""
-
-RESIDUAL = 3e-4
-"""Of minimal residuals, relative to the first."""
-
-# kernels are compiled anew where tests call them from Python
-pytestmark = pytest.mark.slow
+CONSERVING, NEWMARK = af.dynamics.Conserving(), af.dynamics.Newmark()
 
 
-def compliance_of(full: np.ndarray) -> ActiveRows:
-    """The workspace of a compliance whose rows are all filled."""
-    active = ActiveRows.of(len(full), len(full), 4 * len(full))
-    active.full[:] = full
-    return active
+class RandomRun:
+    """Steps of a ring by the solver alone, the acceleration of the ground random in each."""
+
+    def __init__(self, fidelity, rule, scheme, stiffness):
+        contact = af.Contact(stiffness, 0.4 * stiffness, 0.5)
+        shape = af.circular_arch(
+            radius=3.0, thickness=0.5, embrace=150.0, voussoirs=13, contact=contact
+        )
+        structure = shape if scheme == CONSERVING else glued(shape)
+        model = af.build(structure, fidelity=fidelity, cells=(4, 2), quadrature=rule)
+        samples = np.random.default_rng(1).normal(0.0, 15.0, STEPS + 1)
+        motion, damping = af.Motion(samples, DT), af.StiffnessDamping(0.05, 9.0)
+        self.equation = Equation(model, motion, damping, scheme)
+        self.stepper = Stepper(self.equation, ComplianceSolver.of(self.equation))
+        rest = self.equation.at_rest(af.dead_load(model).q)
+        self.batch, states = self.continued(rest, STEPS)
+        self.states = [rest, *states]
+
+    def continued(self, start, count):
+        """Steps from a state, with the rows that were active before, and the states they reach."""
+        times = start.time + DT * np.arange(1, count + 1)
+        batch = self.stepper.advance_batch(start, DT, times)
+        return batch, [batch.state(k) for k in range(len(batch.times))]
+
+    @property
+    def opened(self):
+        """Whether each opening row of the gaps is open, from step to step (steps + 1, rows)."""
+        gaps = gap_rows(self.equation.joints)
+        openings = [gaps.rows @ state.q + gaps.offset for state in self.states]
+        return np.array(openings)[:, : gaps.openings] > 0.0
 
 
-def enter(active: ActiveRows, places: np.ndarray, values: np.ndarray) -> None:
-    """Write down derivatives of λ."""
-    active.derivatives[0][: len(places), :2] = places
-    active.derivatives[1][: len(values)] = values
+# models, whether more rows open at once than are solved for by a factor, and the iterations that
+# Newton's method takes in a step on average, rounded up
+RUNS = {
+    "few rows": ("rigid", "exact", CONSERVING, 1e9, False, 6.0),
+    "many rows": ("condensed", "lobatto", CONSERVING, 1e9, True, 8.0),
+    # the residual does not always fall fast, and a factor is used instead
+    "stiff joints": ("condensed", "exact", CONSERVING, 1e11, True, 16.0),
+    "at an instant": ("condensed", "exact", NEWMARK, 1e9, False, 7.0),
+}
 
 
-def symmetric(size: int) -> ActiveRows:
-    """A compliance of random entries."""
-    half = np.random.default_rng(0).random((size, size))
-    return compliance_of(half + half.T)
+@pytest.fixture(scope="module", params=RUNS)
+def case(request):
+    *model, many, iterations = RUNS[request.param]
+    return RandomRun(*model), many, iterations
 
 
-def test_rows_come_and_go_from_problem_to_problem():
-    """Gaps are those by all of F, after any other problem."""
-    size, rng = 250, np.random.default_rng(1)
-    active = symmetric(size)
-    for _ in range(60):
-        rows = np.flatnonzero(rng.random(size) < rng.random())
-        begin_problem(active, rows)
-        numbers = active.numbers[: active.sizes[0]]
-        assert sorted(numbers) == rows.tolist()
-        assert active.place[numbers].tolist() == list(range(len(rows)))
-        assert np.count_nonzero(active.place >= 0) == len(rows)
-        for _ in range(2):
-            some = rng.random(len(rows)) < rng.random()
-            force, gaps = np.where(some, rng.random(len(rows)), 0.0), np.ones(len(rows))
-            update_columns(active, np.zeros(len(rows)), force, 0)
-            add_gaps(active, force, gaps)
-            by_all = 1.0 + active.full[np.ix_(numbers, numbers)] @ force
-            assert np.allclose(gaps, by_all, rtol=1e-13)  # of at most 250 terms of one sign
-            columns = active.row_of[: active.sizes[1]]
-            assert set(np.flatnonzero(force)) == set(columns)
-            assert active.column_of[columns].tolist() == list(range(len(columns)))
+def test_joints_open_and_close_and_newton_converges_fast(case):
+    run, many, iterations = case
+    assert len(run.batch.times) == STEPS
+    changes = np.diff(run.opened.astype(int), axis=0)
+    assert min((changes > 0).sum(), (changes < 0).sum()) > 2 * run.opened.shape[1]
+    assert (run.opened.sum(axis=1).max() > MAX_DIRECT_ROWS) == many
+    assert run.batch.iterations.mean() < iterations
 
 
-def test_points_that_reverse_their_slip_are_held():
-    """They release nothing, and what they release has no derivative, until they slide again."""
-    released, last = np.array([-4.0, 3.0, 5.0, -6.0, 0.0]), np.array([2.0, 1.0, 0.0, -1.0, 7.0])
-    rows, values = np.array([[0, 0, 0], [0, 1, 1], [1, 0, 2], [4, 4, 3]]), np.ones(4)
-    hold_reversed(last, released, (rows, values), 4)
-    assert released.tolist() == [0.0, 3.0, 5.0, -6.0, 0.0]
-    assert values.tolist() == [0.0, 0.0, 1.0, 1.0]
+def test_forces_that_the_joint_operator_evaluates_balance(case):
+    """To 1e-10 of the forces of joints that would all be closed and stuck."""
+    run, *_ = case
+    equation = run.equation
+    for (before, after), found in zip(pairwise(run.states), run.batch.resultants, strict=True):
+        model, times = equation.with_memory(before), np.array([after.time])
+        if equation.conserving:
+            step = model.begin_step(before.q, equation.lag / DT)
+            force, resultants, memory = (
+                evaluate(after.q) for evaluate in (step.force, step.resultants, step.updated_memory)
+            )
+            assert after.memory == pytest.approx(memory, rel=1e-12, abs=1e-16)
+            acceleration = (after.velocity - before.velocity) / DT
+            velocity = 0.5 * (after.velocity + before.velocity)
+        else:
+            contact = equation.contact(after)
+            force, resultants = model.force(contact), model.resultants(contact)
+            acceleration, velocity = after.acceleration, after.velocity
+        assert found == pytest.approx(resultants, abs=1e-10 * np.abs(resultants).max())
+        load = equation.weight - model.mass_influence @ equation.ground(times, DT)[0, 0]
+        off = model.mass @ acceleration + equation.viscous @ velocity + force - load
+        assert np.abs(off).max() < 1e-10 * np.abs(model.closed_tangent() @ after.q).max()
 
 
-def ring_of_gaps(size: int, weight: float) -> tuple[ActiveRows, np.ndarray]:
-    """Equations in which each gap is moved by both its neighbours, and 1 - λ' F."""
-    shift = np.roll(np.eye(size), 1, axis=1)
-    active, rates = compliance_of(weight * (shift + shift.T)), np.linspace(0.5, 1.0, size)
-    begin_problem(active, np.arange(size))
-    enter(active, np.stack([np.arange(size)] * 2, axis=1), rates)
-    add_columns(active, np.zeros(size), size)
-    return active, np.eye(size) - rates[:, None] * active.full
+def test_steps_are_those_of_snes(case):
+    run, *_ = case
+    exact = SnesSolver(run.equation, af.statics.Newton(tolerance=1e-13))
+    for k in range(0, STEPS, 10):
+        expected, found = exact.whole(run.states[k], DT), run.states[k + 1]
+        moved = np.abs(found.q - run.states[k].q).max()
+        assert found.q == pytest.approx(expected.state.q, abs=1e-9 * moved)
+        largest = np.abs(expected.resultants).max()
+        assert run.batch.resultants[k] == pytest.approx(expected.resultants, abs=1e-9 * largest)
 
 
-@pytest.mark.parametrize(
-    ("size", "weight", "spread"),
-    [
-        (FEW, 1.3, 1e-12),
-        (MANY, 0.3, RESIDUAL),
-        (MANY, 1.3, 1e-12),
-    ],
-    ids=["few", "many", "many for which residuals do not fall"],
-)
-def test_equations_are_solved_however_many_there_are(size, weight, spread):
-    """Where residuals do not fall fast, a factor is used."""
-    active, matrix = ring_of_gaps(size, weight)
-    right = np.random.default_rng(1).random(size)
-    change = right.copy()
-    prepare_equations(active, size)
-    assert active.sizes[3] == size
-    solve_equations(change, active, size)
-    left = matrix @ change - right
-    assert np.linalg.norm(left) <= 10.0 * spread * np.linalg.norm(right)  # and rounding
-
-
-def test_rows_without_derivative_and_force_have_no_equation():
-    active = symmetric(FEW)
-    begin_problem(active, np.arange(FEW))
-    enter(active, np.array([[5, 6], [5, 7], [9, 9]]), np.array([0.01, 0.02, 0.03]))
-    add_columns(active, np.eye(FEW)[3], 3)
-    prepare_equations(active, 3)
-    assert active.row_of[: active.sizes[3]].tolist() == [3, 5, 9]
-    matrix, change = np.eye(FEW), np.zeros(FEW)
-    matrix[5] -= 0.01 * active.full[6] + 0.02 * active.full[7]
-    matrix[9] -= 0.03 * active.full[9]
-    change[[3, 5]] = 1.0, 2.0
-    exact = np.linalg.solve(matrix, change)
-    solve_equations(change, active, 3)
-    assert np.allclose(change, exact, rtol=1e-12)
-
-
-def test_zero_residual_changes_nothing():
-    active, _ = ring_of_gaps(MANY, 0.3)
-    change = np.zeros(MANY)
-    prepare_equations(active, MANY)
-    solve_equations(change, active, MANY)
-    assert (change == 0.0).all()
+def test_rows_that_were_active_before_do_not_matter(case):
+    """Steps are repeated from later ones to earlier ones, with the workspace of those."""
+    run, *_ = case
+    for k in (45, 30, 15, 0):
+        _, states = run.continued(run.states[k], 5)
+        assert len(states) == 5
+        for again, once in zip(states, run.states[k + 1 :], strict=False):
+            assert again.q == pytest.approx(once.q, abs=1e-10 * np.abs(once.q).max())

@@ -10,7 +10,7 @@ from scipy import sparse
 
 import archfem as af
 from archfem.dynamics import Stepper
-from archfem.dynamics.solvers import tangent_lu
+from archfem.dynamics.solvers import joint_law, tangent_lu
 from archfem.dynamics.solvers.newton import NewtonSolver
 from archfem.dynamics.solvers.selection import select_solver, stepper_for
 from archfem.dynamics.solvers.tangent_lu import (
@@ -153,3 +153,13 @@ def test_the_narrower_order_is_taken():
     for matrix in (chain, chain[shuffle][:, shuffle]):
         order, width = narrow_order(matrix.tocsr())
         assert width == half_width(matrix[order][:, order]) == 1
+
+
+@pytest.mark.slow  # the kernel is compiled anew where a test calls it from Python
+def test_points_that_reverse_their_slip_are_held():
+    """They release nothing, and what they release has no derivative, until they slide again."""
+    released, last = np.array([-4.0, 3.0, 5.0, -6.0, 0.0]), np.array([2.0, 1.0, 0.0, -1.0, 7.0])
+    rows, values = np.array([[0, 0, 0], [0, 1, 1], [1, 0, 2], [4, 4, 3]]), np.ones(4)
+    from_python(joint_law.hold_reversed)(last, released, (rows, values), 4)
+    assert released.tolist() == [0.0, 3.0, 5.0, -6.0, 0.0]
+    assert values.tolist() == [0.0, 0.0, 1.0, 1.0]

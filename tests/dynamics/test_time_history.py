@@ -6,11 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from glued import glued
 
 import archfem as af
 from archfem.dynamics import Ending, Record, last_state
-from archfem.dynamics.time_history import _find_end, _resolve_steps
+from archfem.dynamics.separation import LooseningMonitor
+from archfem.dynamics.time_history import _doubt_tolerance, _find_end, _resolve_steps
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 GIVEN = {"damping": DAMPING, "dt": 0.005}
@@ -185,10 +187,22 @@ def test_the_first_event_ends_a_run_within_a_batch(event, parting, meeting, said
         lengths.append(step)
         return "enough" if resultants == event else None
 
-    apart, together = (
-        SimpleNamespace(find_first=lambda batch, found=found: None if found[0] is None else found)
-        for found in ((parting, "apart"), (meeting, "together"))
+    loosening = LooseningMonitor(
+        *(
+            SimpleNamespace(
+                find_first=lambda batch, found=found: None if found[0] is None else found
+            )
+            for found in ((parting, "apart"), (meeting, "together"))
+        )
     )
     batch = SimpleNamespace(times=np.array([1.1, 1.2, 1.4, 1.5]), resultants=[0, 1, 2, 3])
-    assert _find_end((watch, (apart, together)), batch, 1.0) == said
+    assert _find_end((watch, loosening), batch, 1.0) == said
     assert lengths == pytest.approx([0.1, 0.1, 0.2, 0.1][: len(lengths)])
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.0199, 0), (0.0201, 1)])
+def test_steps_that_missed_their_tolerance_are_doubted(share, count):
+    attributes = {"tolerance": 1e-3, "tolerance_unmet": share}
+    doubts = _doubt_tolerance(SimpleNamespace(dataset=xr.Dataset(attrs=attributes)))
+    assert len(doubts) == count
+    assert all("more than 0.001 in |e| in 2% of the run" in doubt.cause for doubt in doubts)

@@ -10,6 +10,8 @@ from archfem.masonry.stiffness_ratio import (
     estimate_block_stiffness,
     find_soft_blocks,
     find_yielding_blocks,
+    list_stones,
+    mark_stone_joints,
 )
 
 
@@ -33,6 +35,9 @@ def test_a_block_is_as_large_as_a_square_and_held_by_its_stiffest_joint():
 def test_soil_is_soft_and_yields_and_stone_is_neither(viaduct):
     soil = viaduct.block_number("backfill")
     assert find_soft_blocks(viaduct) == find_yielding_blocks(viaduct) == (soil,)
+    assert set(viaduct.free) - set(list_stones(viaduct)) == {soil}
+    touches_soil = [soil in joint.blocks for joint in viaduct.joints]
+    assert (~mark_stone_joints(viaduct)).tolist() == touches_soil
 
 
 def test_bodies_yield_by_their_roles_and_not_their_names(viaduct):
@@ -70,3 +75,16 @@ def test_from_where_a_block_counts_as_soft(young, soft, yields):
         joints = tuple(replace(each, role="other", contact=contact) for each in shape.joints)
         other = replace(shape, blocks=blocks, joints=joints)
         assert find_yielding_blocks(other) == ((1,) if yields else ())
+
+
+def test_stones_of_no_role_count_whatever_their_joints_are():
+    """On joints of 40 GPa/m the large stone yields first, and is lost like the others."""
+    contact = af.Contact(4e10, 2e10, 0.6)
+    column = af.column(breadth=1.0, heights=[0.3, 2.0], contact=contact)
+    blocks = tuple(replace(block, role="other") for block in column.blocks)
+    joints = tuple(replace(joint, role="other") for joint in column.joints)
+    structure = replace(column, blocks=blocks, joints=joints)
+    ratios = [estimate_block_stiffness(structure, number).ratio for number in structure.free]
+    assert min(ratios) < 1.0 < max(ratios)
+    assert list_stones(structure) == list(structure.free)
+    assert mark_stone_joints(structure).all()

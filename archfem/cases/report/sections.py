@@ -11,7 +11,7 @@ import xarray as xr
 from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.report.report_data import ReportData, build_player, missing_note
-from archfem.dynamics.fall import CollapseState
+from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import SIGN_CONVENTION, History
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.dynamics.verdict import Verdict

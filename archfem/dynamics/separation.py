@@ -1,0 +1,283 @@
+"""Separation of blocks: joints let go, stones meet outside their joints, or blocks overturn.
+
+A model has contact forces in its joints alone. With large displacements, blocks are followed as
+loose rigid blocks (`dynamics.fall`) from the step at which these do not suffice any more.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from archfem._typing import Array
+from archfem.dynamics.collapse_state import shallowest_depth
+from archfem.dynamics.history import Ending
+from archfem.dynamics.rigid_body.bodies import Bodies, make_bodies
+from archfem.dynamics.rigid_body.contact_detection import (
+    PlacedPieces,
+    allocate_pieces,
+    find_meeting,
+    measure_gaps,
+)
+from archfem.dynamics.state import Batch, State
+from archfem.masonry.stiffness_ratio import find_yielding_blocks, mark_stone_joints
+from archfem.models.model import Model
+from archfem.units import G
+
+
+@dataclass(frozen=True, eq=False)
+class LooseningMonitor:
+    """Detection of the step from which blocks are followed as loose rigid blocks."""
+
+    separation: "SeparationMonitor"
+    meeting: "MeetingMonitor"
+
+    @classmethod
+    def of(cls, model: Model, start: State) -> Self:
+        """Return the monitor of a run."""
+        return cls(SeparationMonitor(model), MeetingMonitor(model, start))
+
+    def find_end(self, batch: Batch) -> tuple[Ending, str | None, int]:
+        """Return how and why blocks become loose within a batch, and after how many steps."""
+        loose, met = self.separation.find_first(batch), self.meeting.find_first(batch)
+        # loose blocks start from before they meet: a joint does not know of the other stone
+        if met is not None and (loose is None or met[0] <= loose[0]):
+            return Ending.MET, f"stones meeting outside their joints: {met[1]}", met[0]
+        if loose is not None:
+            return Ending.PARTED, f"the blocks coming loose: {loose[1]}", loose[0] + 1
+        return Ending.FINISHED, None, len(batch.times)
+
+
+@dataclass(frozen=True, eq=False)
+class SeparationMonitor:
+    """Detection of the step at which a joint between stones separates.
+
+    A joint separates at a large rotation or once it has slid off its face. Joints of fill do not
+    count: its pieces adapt to their support, tumble on the spot or crumble off its ends.
+    """
+
+    model: Model
+    max_rotation: float = 0.3  # a voussoir is about to tumble [rad]
+
+    def find_first(self, batch: Batch) -> tuple[int, str] | None:
+        """Return the first step of a batch with separated blocks and the reason, or None."""
+        observer, structure = self.model.observer(), self.model.structure
+        _, rotation, slip = np.moveaxis(observer.faces(batch.read(observer)), -2, 0)
+        rotation, slip = np.abs(rotation), np.abs(slip)
+        loose = (rotation > self.max_rotation) | (slip >= structure.depths)
+        # which blocks are fill takes long to find out, and matters once a joint is loose
+        if loose.any():
+            loose &= mark_stone_joints(structure)
+        if not loose.any():
+            return None
+        k = int(np.argmax(loose.any(axis=1)))
+        joint = int(np.argmax(loose[k]))
+        name = structure.joints[joint].name
+        if rotation[k, joint] > self.max_rotation:
+            return k, f"'{name}' had turned by {rotation[k, joint]:.2g} rad"
+        return k, f"'{name}' had slid by {slip[k, joint]:.2g} m, off its face"
+
+
+@dataclass(frozen=True, eq=False)
+class MeetingMonitor:
+    """Detection of the step at which stones meet outside their joints.
+
+    A model has contact forces in its joints alone. Once faces have slid these end with the overlap,
+    although one of the faces may be longer. Fill does not count, since it adapts.
+    """
+
+    model: Model
+    start: State  # overlaps at the start of the run do not count
+    # deepest overlap beyond that at the start and the compression of joints [m]: stones that touch
+    # as built press each other by less, and none may be deeper than 1 mm
+    tolerance: float = 5e-4
+
+    def find_first(self, batch: Batch) -> tuple[int, str] | None:
+        """Return the first step of a batch with stones in each other and their names, or None."""
+        observer = self.model.observer()
+        readings = batch.read(observer)
+        corners, faces = observer.corners(readings), observer.faces(readings)
+        overruns = self._may_overrun(faces)
+        if not overruns and not self._may_meet(corners):
+            return None
+        limits, pairs = self._limits.copy(), self.model.structure.pairs[self._joints]
+        if not overruns:
+            limits[tuple(pairs.T)] = limits[tuple(pairs.T[::-1])] = -np.inf
+        poses, depths = self._fit_motions(corners), self._compressions(faces)
+        k, *pair = find_meeting(self._bodies, self._world, poses, limits, pairs, depths)
+        if k < 0:
+            return None
+        names = [*(f"'{block.name}'" for block in self.model.structure.blocks), "the ground"]
+        return k, f"{names[min(pair)]} met {names[max(pair)]}"
+
+    def _may_overrun(self, faces: Array) -> bool:
+        """Return whether a face has slid over its end and turned, with large displacements."""
+        # beyond the overlap a joint is open, and slip × rotation is how deep a longer face is there
+        _, rotation, slip = np.abs(faces).max(axis=0)
+        return self.model.large_displacements and bool(np.any(rotation * slip > self.tolerance))
+
+    def _may_meet(self, corners: Array) -> bool:
+        """Return whether any blocks without a joint have moved by more than is between them."""
+        farthest = np.maximum(
+            corners.max(axis=0) - self._corners, self._corners - corners.min(axis=0)
+        )
+        distances = np.hypot(*farthest.T)
+        reach = np.zeros(len(self._room))
+        # displacements of a rigid block are linear, and arcs bulge by half of a chord at most
+        reach[self._owner[self._first]] = 2.0 * np.maximum.reduceat(distances, self._first)
+        return bool(np.any(reach[:, None] + reach > self._room))
+
+    def _compressions(self, faces: Array) -> Array:
+        """Return how deep stones are in each other at their joints (steps, joints) [m]."""
+        gap, rotation, slip = np.moveaxis(faces[..., self._joints], -2, 0)
+        overlap = np.maximum(self.model.structure.depths[self._joints] - np.abs(slip), 0.0)
+        depths: Array = np.maximum(0.5 * overlap * np.abs(rotation) - gap, 0.0)
+        return depths
+
+    @cached_property
+    def _joints(self) -> NDArray[np.intp]:
+        """Numbers of the joints between stones."""
+        return np.flatnonzero(mark_stone_joints(self.model.structure))
+
+    @cached_property
+    def _gaps(self) -> Array:
+        """Gaps at the start of blocks and the ground; infinite with fill (b + 1, b + 1) [m]."""
+        derived, start = self.model.derived, self.start.q.tobytes()
+        if derived.get("gaps", (b"",))[0] != start:
+            motions = self._fit_motions(self._corners[None])[0]
+            gaps = measure_gaps(self._bodies, self._world, motions)
+            fill = list(find_yielding_blocks(self.model.structure))
+            gaps[fill] = gaps[:, fill] = np.inf
+            derived["gaps"] = start, gaps
+        gaps = derived["gaps"][1]
+        return gaps
+
+    @cached_property
+    def _limits(self) -> Array:
+        """Gaps below which blocks have met, apart from compression in joints (b + 1, b + 1) [m]."""
+        # arcs are chords here, so that blocks may be in each other as built
+        return np.where(np.isinf(self._gaps), -np.inf, np.minimum(self._gaps, 0.0) - self.tolerance)
+
+    @cached_property
+    def _room(self) -> Array:
+        """Sum of displacements without which two blocks cannot meet (b + 1, b + 1) [m]."""
+        pairs, room = self.model.structure.pairs, np.maximum(self._gaps, 0.0) + self.tolerance
+        room[tuple(pairs.T)] = room[tuple(pairs.T[::-1])] = np.inf
+        return room
+
+    @cached_property
+    def _world(self) -> PlacedPieces:
+        """Workspace of the pieces."""
+        return allocate_pieces(self._bodies)
+
+    @cached_property
+    def _bodies(self) -> Bodies:
+        """Convex pieces of all blocks."""
+        structure = self.model.structure
+        if self.model.large_displacements:
+            return make_bodies(structure, 0.0)
+        # the level of the ground matters to loose stones alone
+        return make_bodies(
+            structure, 0.0, min(block.points[:, 1].min() for block in structure.blocks)
+        )
+
+    @cached_property
+    def _owner(self) -> NDArray[np.intp]:
+        """Number of the block of each corner, block by block (c,)."""
+        return self.model.observer().corner_blocks
+
+    @cached_property
+    def _first(self) -> NDArray[np.intp]:
+        """First corner of each free block."""
+        return np.flatnonzero(np.diff(self._owner, prepend=-1))
+
+    @cached_property
+    def _places(self) -> NDArray[np.complex128]:
+        """Corners as built, x + i y, so that a rotation is a product (c,) [m]."""
+        cells = self.model.cells
+        return _as_complex(cells.places[cells.corners(self.model.structure)])
+
+    @cached_property
+    def _corners(self) -> Array:
+        """Displacements of the corners at the start (c, 2) [m]."""
+        observer = self.model.observer()
+        return observer.corners(observer.read(self.start.q))
+
+    def _fit_motions(self, corners: Array) -> Array:
+        """Return the rigid motions of all blocks that fit displacements of corners best.
+
+        Args:
+            corners: displacements (steps, c, 2) [m].
+
+        Returns:
+            Poses (steps, n_blocks, 3) [m, m, rad].
+        """
+        structure, places = self.model.structure, self._places
+        first, counts = self._first, np.diff(self._first, append=len(self._owner))
+        free = self._owner[first]
+
+        def mean(values: NDArray[Any]) -> NDArray[Any]:
+            means: NDArray[Any] = np.add.reduceat(values, first, axis=-1) / counts
+            return means
+
+        middle, moved = mean(places), mean(_as_complex(corners))
+        arms = places - np.repeat(middle, counts)
+        after = arms + _as_complex(corners) - np.repeat(moved, counts, axis=-1)
+        # least squares: the angle of the sum of the products
+        turn = np.angle(mean(np.conj(arms) * after))
+        centroids = _as_complex(np.array([structure.blocks[k].centroid for k in free]))
+        motion = moved + (np.exp(1.0j * turn) - 1.0) * (centroids - middle)
+        poses = np.tile(self.model.support_motion, (len(corners), 1, 1))
+        poses[:, free] = np.stack([motion.real, motion.imag, turn], axis=-1)
+        return poses
+
+
+def _as_complex(points: Array) -> NDArray[np.complex128]:
+    """Return points (…, 2) as complex numbers x + i y (…,)."""
+    return points[..., 0] + 1.0j * points[..., 1]
+
+
+def is_overturning(model: Model, state: State, min_rotation: float = 0.05) -> bool:
+    """Return whether a joint has rotated by more than an angle [rad] and blocks still move."""
+    return _largest_rotation(model, state) > min_rotation and not _is_still(model, state)
+
+
+def is_resting(model: Model, state: State, shaken: bool) -> bool:
+    """Return whether blocks are still, or vibrate too weakly to overturn on a ground at rest.
+
+    `shaken`: the ground still moves.
+    """
+    return _is_still(model, state) or (not shaken and _only_vibrates(model, state))
+
+
+def _only_vibrates(
+    model: Model, state: State, max_rise: float = 2e-4, max_rotation: float = 0.02
+) -> bool:
+    """Return whether blocks move too weakly to overturn on a ground at rest.
+
+    The kinetic energy of each block suffices to raise it by less than `max_rise` of the depth of
+    the shallowest joint, and no joint is rotated by more than `max_rotation` [rad].
+    """
+    # A column of slenderness 20, tilted by 0.02 rad, has to rise by 4.5e-3 of its width to overturn
+    if _largest_rotation(model, state) > max_rotation:
+        return False
+    free = list(model.structure.free)
+    mass, inertia = make_bodies(model.structure, 0.0).mass[free].T
+    velocities = model.rigid_motions(state.q, state.velocity)[1][free]
+    squares = np.sum(velocities[:, :2] ** 2, axis=1) + inertia / mass * velocities[:, 2] ** 2
+    return bool(np.max(squares / (2.0 * G)) <= max_rise * shallowest_depth(model.structure))
+
+
+def _largest_rotation(model: Model, state: State) -> float:
+    """Return the largest rotation of a joint between stones [rad]."""
+    observer, stones = model.observer(), mark_stone_joints(model.structure)
+    rotations = observer.faces(observer.read(state.q))[1, stones]
+    return float(np.abs(rotations).max(initial=0.0))
+
+
+def _is_still(model: Model, state: State, rest_speed: float = 5e-4) -> bool:
+    """Return whether no block moves faster than a speed [m/s]."""
+    _, velocities = model.rigid_motions(state.q, state.velocity)
+    return bool(np.abs(velocities[:, :2]).max() <= rest_speed)

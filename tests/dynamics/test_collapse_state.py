@@ -1,0 +1,130 @@
+"""State of collapse from positions of blocks, and doubts of what was near another kind."""
+
+import numpy as np
+import pytest
+from loose_blocks import G, floor
+
+import archfem as af
+from archfem.dynamics import LooseBlocks, RigidBlockSimulation, classify_collapse, collapse_state
+
+
+def pulse(peak, duration=0.5):
+    return af.Motion(np.full(round(duration / 0.01), peak * G), 0.01)
+
+
+def shaken(structure, motion):
+    falling = RigidBlockSimulation(structure, dt=1e-3)
+    return classify_collapse(
+        structure, falling.frames(LooseBlocks.as_built(structure), 15.0, motion)
+    )
+
+
+def test_a_ring_that_hardly_moves_stands(ring):
+    found = shaken(ring, pulse(0.3))
+    assert (found.kind, found.time, found.blocks, found.resting) == ("stands", None, (), True)
+    assert found.residual < 1e-3
+
+
+def test_a_ring_shaken_hard_has_fallen(ring):
+    found = shaken(ring, pulse(0.7))
+    assert found.kind == "fallen"
+    assert found.resting
+    assert 0.5 < found.time < 2.0
+    assert "voussoir 9" in found.blocks
+    assert found.residual > 1.0
+
+
+def test_a_block_that_has_slid_is_dislocated():
+    """Newmark's block: ½ (a - μ g) t² a / (μ g) under 0.8 g for 0.3 s at μ = 0.5."""
+    structure = floor((-0.5, 0.0, 0.5, 0.5), friction=0.5)
+    found = shaken(structure, af.Motion(np.repeat([0.8 * G, 0.0], [301, 2]), 1e-3))
+    assert found.kind == "dislocated"
+    slid = 0.5 * (0.8 - 0.5) * G * 0.3**2 * 0.8 / 0.5
+    assert found.residual == pytest.approx(slid, rel=5e-3)  # the pulse ends 0.5 ms later
+
+
+def test_a_toppled_column_has_fallen():
+    column = af.column(breadth=0.6, heights=[2.4])
+    found = shaken(column, pulse(0.4, 1.0))
+    assert found.kind == "fallen"
+    assert found.blocks == ("block 1",)
+
+
+def arches(thin):
+    """Two rings apart from each other on feet of their own, the second thinner."""
+    rings = [
+        af.circular_arch(radius=3.0, thickness=t, embrace=150.0, voussoirs=9, chords=1)
+        for t in (0.9, thin)
+    ]
+    blocks, joints = [], []
+    for k, ring in enumerate(rings):
+        first = len(blocks)
+        for block in ring.blocks:
+            outline = tuple((x + 10.0 * k, y) for x, y in block.outline)
+            blocks.append(
+                af.Block(
+                    outline,
+                    block.material,
+                    f"{block.name} of {k}",
+                    fixed=block.fixed,
+                    part=f"{block.part} of {k}",
+                    role=block.role,
+                )
+            )
+        for joint in ring.joints:
+            ends = [(x + 10.0 * k, y) for x, y in joint.ends.tolist()]
+            pair = tuple(number + first for number in joint.blocks)
+            name, part = f"{joint.name} of {k}", f"{joint.part} of {k}"
+            joints.append(af.Joint(pair, *ends, joint.contact, name, part, "ring"))
+    return af.Structure(tuple(blocks), tuple(joints))
+
+
+def test_one_ring_of_two_has_partly_fallen():
+    found = shaken(arches(0.35), pulse(0.5))
+    assert found.kind == "partly fallen"
+    assert all(name.endswith(" of 1") for name in found.blocks)
+
+
+def test_a_block_is_lost_once_it_has_sunk_or_turned():
+    structure = floor((0.0, 0.0, 0.5, 2.0))
+    for pose, kind in (
+        ((0.04, 0.0, 0.0), "stands"),
+        ((0.06, 0.0, 0.0), "dislocated"),
+        ((0.0, -0.49, 0.0), "dislocated"),
+        ((0.0, -0.51, 0.0), "fallen"),
+        ((0.0, 0.0, 0.78), "dislocated"),
+        ((0.0, 0.0, -0.79), "fallen"),
+    ):
+        start = LooseBlocks.as_built(structure, 3.0)
+        start.poses[1] = pose
+        found = classify_collapse(structure, [start])
+        assert (found.kind, found.time) == (kind, 3.0 if kind == "fallen" else None)
+    start.poses[1] = 0.0, 0.0, np.pi / 2.0
+    assert classify_collapse(structure, [start]).residual == pytest.approx(
+        np.sqrt(2.0) * np.hypot(0.25, 1.0)
+    )
+
+
+def test_a_run_without_frames_is_refused():
+    with pytest.raises(af.errors.InvalidInput, match="no frames"):
+        classify_collapse(floor((0.0, 0.0, 0.5, 2.0)), [])
+
+
+@pytest.mark.parametrize(
+    ("kind", "displacement", "residual", "words"),
+    [
+        ("stands", 0.059, 0.006, []),
+        ("stands", 0.062, 0.006, ["displaced by 62 mm, 0.62 of the depth"]),
+        ("stands", 0.03, 0.0068, ["stands by little: residual displacement 6.8 mm, limit 10 mm"]),
+        ("dislocated", 0.03, 0.0148, ["is dislocated by little"]),
+        ("dislocated", 0.07, 0.0152, ["displaced by 70 mm"]),
+        ("fallen", 0.09, 0.012, []),
+    ],
+)
+def test_a_kind_of_collapse_near_another_is_doubted(kind, displacement, residual, words):
+    """Limits of a column 0.1 m deep: 60 mm on the way, and 10 mm × 1.5 and / 1.5 at the end."""
+    column = af.column(breadth=0.1, heights=[0.3])
+    state = collapse_state.CollapseState(kind, None, (), displacement, residual, resting=True)
+    doubts = list(collapse_state.doubt_collapse(column, state))
+    assert len(doubts) == len(words)
+    assert all(word in doubt.cause for word, doubt in zip(words, doubts, strict=True))
