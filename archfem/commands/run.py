@@ -366,7 +366,7 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
             f"{float(history.time[-1]):.2f} s in {run.seconds:.1f} s; {history.outcome}"
         )
         print(f"wrote {run.path}")
-    text = result_text.describe_run(run.case.structure, history, at_rest.dead.joints)
+    text = result_text.describe_run(run.case, history, at_rest.dead.joints)
     print(text)
     write(results.run_files(run, at_rest, text), run.path.parent)
     if history.ending is Ending.INTERRUPTED and run.case.suite is None:

@@ -10,12 +10,14 @@ import xarray as xr
 
 from archfem.cases import result_text
 from archfem.cases.case import Case
+from archfem.cases.defaults import describe_defaults, list_default_keys
 from archfem.cases.report.report_data import ReportData, build_player, missing_note
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import SIGN_CONVENTION, History
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.dynamics.verdict import Verdict
 from archfem.joints.criteria import assessed_joints
+from archfem.masonry.materials import Contact, Material
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
@@ -41,7 +43,7 @@ def build_case_sections(data: ReportData) -> list[Section]:
     return [
         Section("Case and assumptions", [assumptions]),
         Section("Units and signs", [Grid((), signs)]),
-        Section("Geometry and materials", _build_geometry(case.structure)),
+        Section("Geometry and materials", _build_geometry(case)),
     ]
 
 
@@ -78,6 +80,7 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
         ("a joint hinges", f"where |e| ≥ {criteria.hinge:g}"),
         ("a joint slides", f"where |V| / N reaches {sliding}"),
         ("a mechanism by count", count),
+        ("defaults", describe_defaults(case) or "none: the case gives all that decides"),
     ]
 
 
@@ -95,8 +98,9 @@ def _describe_damping(case: Case) -> str:
     return f"{ratio} at {damping.frequency:.3g} Hz, proportional to stiffness, {joints}"
 
 
-def _build_geometry(structure: Structure) -> list[Any]:
+def _build_geometry(case: Case) -> list[Any]:
     """Build extent, figure with joint names, and tables of parts, materials and contacts."""
+    structure = case.structure
     caption = "The structure, and the numbers of the joints that are judged."
     points = np.concatenate([block.drawn() for block in structure.blocks])
     length, height = np.ptp(points, axis=0)
@@ -106,7 +110,7 @@ def _build_geometry(structure: Structure) -> list[Any]:
         f"{len(structure.joints)} joints. Gravity is {structure.gravity:g} m/s²."
     )
     figure = FigureBlock.of(draw_names(structure), caption)
-    return [TextBlock(extent), figure, _tabulate_parts(structure), *_tabulate_materials(structure)]
+    return [TextBlock(extent), figure, _tabulate_parts(structure), *_tabulate_materials(case)]
 
 
 def _tabulate_parts(structure: Structure) -> Grid:
@@ -126,24 +130,33 @@ def _tabulate_parts(structure: Structure) -> Grid:
     return Grid(head, rows, "Parts; the last column is the depth of their joints")
 
 
-def _tabulate_materials(structure: Structure) -> list[Grid]:
-    """Tabulate the materials of blocks and the contacts of joints."""
+def _tabulate_materials(case: Case) -> list[Grid]:
+    """Tabulate the materials of blocks and the contacts of joints, with defaults marked."""
+    structure = case.structure
+
+    def mark(item: Material | Contact, key: str, text: str) -> str:
+        return f"{text} (default)" if key in list_default_keys(case, item) else text
+
     materials = [
         [
             material.name,
-            f"{material.young / MPa:.6g}",
+            mark(material, "young", f"{material.young / MPa:.6g}"),
             f"{material.poisson:g}",
-            f"{material.unit_weight / kN:g}",
-            "not known" if material.strength is None else f"{material.strength / MPa:g}",
+            mark(material, "unit_weight", f"{material.unit_weight / kN:g}"),
+            "not known"
+            if material.strength is None
+            else mark(material, "strength", f"{material.strength / MPa:g}"),
         ]
         for material in dict.fromkeys(block.material for block in structure.blocks)
     ]
     contacts = [
         [
             contact.name if contact.law is None else f"{contact.name}: {contact.law}",
-            f"{contact.normal_stiffness / 1e9:.3g}",
-            f"{contact.shear_stiffness / 1e9:.3g}",
-            f"{contact.coefficient:g}" if contact.slides else "never slides",
+            mark(contact, "normal_stiffness", f"{contact.normal_stiffness / 1e9:.3g}"),
+            mark(contact, "shear_stiffness", f"{contact.shear_stiffness / 1e9:.3g}"),
+            mark(contact, "friction", f"{contact.coefficient:g}")
+            if contact.slides
+            else "never slides",
             f"{contact.cohesion / 1e3:g}",
             f"{contact.tension / 1e3:g}",
             f"{contact.dilatancy:g}",

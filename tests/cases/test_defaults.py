@@ -1,0 +1,64 @@
+"""Deciding values that a case does not give are marked as defaults."""
+
+import archfem as af
+from archfem.cases.case import case_of
+from archfem.cases.defaults import describe_defaults, list_default_keys
+from archfem.cases.result_text import describe_dead_load
+
+COLUMN = {"shape": "column", "breadth": 0.6, "heights": [1.2, 1.2]}
+BARE = {"structure": COLUMN, "motion": {"synthetic": {"seed": 1, "duration": 1.0, "pga": 1.0}}}
+
+
+def test_every_deciding_value_that_is_left_out_is_named():
+    text = describe_defaults(af.Case.of(BARE))
+    assert text.partition(": ")[2].split("; ") == [
+        "'stone' E 30 GPa, weight 20 kN/m³, strength 56 MPa",
+        "'stone to stone' k_n 1.48 MPa/mm, k_s 0.3 MPa/mm, μ 0.6",
+        "vertical motion 2/3 of the horizontal",
+        "no damping",
+        "hinge at |e| 0.46",
+        "mechanism of 4 joints",
+        "fidelity 'full'",
+        "displacements 'small'",
+    ]
+
+
+def test_values_that_are_given_are_not():
+    contact = {"normal_stiffness": 1.48e9, "friction": 0.6}  # also where they equal the default
+    given = {
+        **BARE,
+        "contacts": {"stone to stone": contact},
+        "motion": {"synthetic": {"seed": 1, "vertical_ratio": 0.5}},
+        "criteria": {"hinge": 0.46, "failures": 4},
+        "model": {"fidelity": "rigid", "displacements": "large"},
+        "analysis": {"damping": "effective"},
+    }
+    case = af.Case.of(given)
+    joint, stone = case.structure.joints[0], case.structure.blocks[1]
+    assert list_default_keys(case, joint.contact) == ["shear_stiffness"]
+    assert list_default_keys(case, stone.material) == ["young", "unit_weight", "strength"]
+    text = describe_defaults(case)
+    assert "'stone to stone' k_s 0.3 MPa/mm;" not in text
+    assert text.endswith("'stone to stone' k_s 0.3 MPa/mm")
+    materials = {"stone": {"young": 1e10, "unit_weight": 2e4, "strength": 1e7}}
+    contacts = {"stone to stone": {**contact, "shear_stiffness": "0.3 MPa/mm"}}
+    assert describe_defaults(af.Case.of({**given, "materials": materials, "contacts": contacts})) == ""
+
+
+def test_python_and_files_have_the_same_defaults():
+    """A value of Python with nothing given has the defaults of a case with nothing given."""
+    analysis = af.Analysis(af.column(breadth=0.6, heights=[1.2, 1.2]))
+    motion = af.Motion.synthetic(seed=1, duration=1.0, pga=1.0)
+    case = af.Case.of({**BARE, "title": "column"})
+    assert case.analysis == analysis
+    assert case.ground_motion().vertical.tobytes() == motion.vertical.tobytes()
+    here = describe_defaults(case_of(analysis, motion)).split("; ")
+    # the samples of a motion have no ratio; all else is left out in both
+    assert set(describe_defaults(case).split("; ")) - set(here) == {
+        "vertical motion 2/3 of the horizontal"
+    }
+
+
+def test_results_name_them():
+    case = af.Case.of({**BARE, "model": {"fidelity": "rigid"}})
+    assert describe_defaults(case) in describe_dead_load(af.cases.DeadLoadResult.of(case))
