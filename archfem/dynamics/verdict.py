@@ -10,6 +10,7 @@ from archfem.dynamics.fall import CollapseState
 from archfem.joints.criteria import (
     Criteria,
     assessed_joints,
+    find_failed_joints,
     longest_duration,
     step_lengths,
     with_failure_flags,
