@@ -61,7 +61,7 @@ def find_section(keyword: str) -> str:
 
 def read_analysis(settings: Table, structure: Structure, folder: Path) -> Analysis:
     """Return the analysis of a structure that the tables of a case describe."""
-    declared = declared_keys(Analysis) | {"scheme": (str, dict), "until": (str, dict)}
+    declared = declared_keys(Analysis) | dict.fromkeys(("damping", "scheme", "until"), (str, dict))
     values: dict[str, Any] = {}
     for section, names in SECTION_FIELDS.items():
         keys = {name: declared[name] for name in names}

@@ -95,7 +95,9 @@ def test_its_searches_are_those_of_the_functions():
 def test_studies_take_it(tmp_path):
     ida = ROCKING.ida([MOTION], limits=["first hinge"], precision=0.3, workers=1)
     low, high = ida.capacities("first hinge")
-    assert 0.0 < low[0] < high[0] <= MOTION.pga  # the column hinges under the motion itself
+    # a steady push of 0.46 / 0.5 of breadth over height hinges the base, short pulses need more
+    assert 0.92 * 0.25 * 9.81 < high[0] < 6.0
+    assert high[0] <= 1.3 * low[0]
     study = af.Study(
         ROCKING, vary={"structure.breadth": [0.6, 0.9], "dt": [0.004, 0.002]}, motion=MOTION
     )
