@@ -61,15 +61,15 @@ def declared_keys(declaration: Callable[..., Any], named: tuple[type, ...] = ())
     `named` the name of a table. What no file can hold is left out.
     """
     declaration = inspect.unwrap(declaration)
+    hints = _hints(declaration, include_extras=True)
+    units = dict.fromkeys(hints)
     if isinstance(declaration, type):
         units = {each.name: each.metadata.get("unit") for each in fields(declaration) if each.init}
-    else:
-        units = dict.fromkeys(inspect.signature(declaration).parameters)
-    hints = _hints(declaration, include_extras=True)
-    kinds = {name: units[name] or _kind_of(hints.get(name), named) for name in units}
+    kinds = {name: unit or _kind_of(hints[name], named) for name, unit in units.items()}
     return {name: kind for name, kind in kinds.items() if kind is not None}
 
 
+@cache
 def _kind_of(hint: Any, named: tuple[type, ...]) -> Any:
     """Return the kind of a key with an annotation; None for what no file can hold."""
     kind, inner = get_origin(hint) or hint, get_args(hint)
