@@ -56,7 +56,7 @@ def describe_defaults(case: Case) -> str:
 
 
 def _has_default_vertical(case: Case) -> bool:
-    """Return whether a synthetic motion has a vertical component that no table asks for."""
+    """Return whether a synthetic motion has a vertical component that no table gives."""
     motions: list[Table] = [case.motion] if case.motion else [*(case.suite or {})["pairs"].values()]
     return any(
         "synthetic" in each and "vertical_ratio" not in each["synthetic"] and "vertical" not in each

@@ -1,6 +1,7 @@
 """Dynamic analyses: time histories, damping, events, motion scaling and falls.
 
     accuracy          processor time against error over settings
+    analysis          Analysis: all of an analysis but the ground motion
     collapse_state    stands, dislocated, partly fallen or fallen, from positions
     damping           damping from effective modes or restitution
     error_estimation  a-posteriori error of model, time step and small displacements
@@ -11,18 +12,18 @@
     model_selection   build, and selection of a model by predicted error
     monitor           energy balance and validity checks of a run
     motion_scaling    scale of a motion at first mechanism or collapse
-    recorder          recording of a run
+    recorder          Record, recording of a run
     rigid_body        free rigid blocks with impacts and friction
     schemes           time integration schemes, Rayleigh and stiffness damping
     separation        joints that let go, stones that meet, blocks that overturn
     solvers           solvers of a time step: newton, compliance, snes
     state             State, Step, Batch
-    time_history      time_history, Record, last_state
+    time_history      time_history, last_state
     verdict           outcome, doubts, displacements and mechanisms of a run
     verdict_range     verdicts over uncertain properties
     warm_up           compilation of all kernels ahead of time
 
-Imports `motion`, `statics` and the rooms before them. Start reading at `time_history`.
+Imports `motion`, `statics` and the rooms before them. Start reading at `analysis` and `time_history`.
 """
 
 import lazy_loader

@@ -8,13 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from archfem._display import call_late_bound
 from archfem._files import hash_value
 from archfem._typing import Metres, Seconds
 from archfem._validation import check_fields, check_number, validate_methods
 from archfem.dynamics.events import StopCondition, resolve_criteria
+from archfem.dynamics.history import History
 from archfem.dynamics.model_selection import build
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.schemes import (
@@ -27,6 +28,7 @@ from archfem.dynamics.schemes import (
     check_time_step,
     interpret_damping,
 )
+from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.masonry.construction import Stage, resolve_stages
@@ -37,14 +39,6 @@ from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.modes import Modes, modes
 from archfem.statics.newton import Newton
-
-if TYPE_CHECKING:
-    from archfem.dynamics.accuracy import Accuracy
-    from archfem.dynamics.history import History
-    from archfem.dynamics.motion_scaling import CollapseScale
-    from archfem.dynamics.verdict_range import VerdictRange
-    from archfem.studies.convergence import MeshSensitivity
-    from archfem.studies.ida import Ida
 
 _DEFAULT_SCHEME, _DEFAULT_NEWTON, _DEFAULT_RECORD = Conserving(), Newton(), Record()
 
@@ -220,7 +214,7 @@ class Analysis:
         rest = self.dead_load()
         return modes(rest.model, min(count, rest.model.size), rest)
 
-    def run(self, motion: Motion) -> "History":
+    def run(self, motion: Motion) -> History:
         """Compute the time history under a motion, as `archfem.time_history`.
 
         Args:
@@ -232,10 +226,9 @@ class Analysis:
         Raises:
             DidNotConverge: there is no equilibrium, or a step failed.
         """
-        history: History = call_late_bound("Analysis.run", self, motion)
-        return history
+        return call_late_bound("Analysis.run", self, motion)
 
-    def scale(self, motion: Motion, **options: Any) -> "CollapseScale":
+    def scale(self, motion: Motion, **options: Any) -> Any:
         """Find the smallest scale of a motion at which the structure falls.
 
         Args:
@@ -243,15 +236,14 @@ class Analysis:
             options: as for `archfem.collapse_scale`, such as `precision`.
 
         Returns:
-            The scales between which it falls.
+            The scales between which it falls, a `CollapseScale`.
 
         Raises:
             InvalidInput: displacements are small.
         """
-        found: CollapseScale = call_late_bound("Analysis.scale", self, motion, **options)
-        return found
+        return call_late_bound("Analysis.scale", self, motion, **options)
 
-    def ida(self, motions: Any, **options: Any) -> "Ida":
+    def ida(self, motions: Any, **options: Any) -> Any:
         """Scale motions up until limit states are reached (incremental dynamic analysis).
 
         Args:
@@ -259,12 +251,11 @@ class Analysis:
             options: as for `archfem.ida`, such as `limits` and `workers`.
 
         Returns:
-            Capacities, curves and fragility.
+            Capacities, curves and fragility, an `Ida`.
         """
-        found: Ida = call_late_bound("Analysis.ida", self, motions, **options)
-        return found
+        return call_late_bound("Analysis.ida", self, motions, **options)
 
-    def verdict_range(self, motion: Motion, **options: Any) -> "VerdictRange":
+    def verdict_range(self, motion: Motion, **options: Any) -> VerdictRange:
         """Compute how often the structure falls over uncertain properties.
 
         Args:
@@ -274,10 +265,9 @@ class Analysis:
         Returns:
             All runs, and their share of falls.
         """
-        found: VerdictRange = call_late_bound("Analysis.verdict_range", self, motion, **options)
-        return found
+        return call_late_bound("Analysis.verdict_range", self, motion, **options)
 
-    def accuracy(self, motion: Motion | None = None, **options: Any) -> "Accuracy":
+    def accuracy(self, motion: Motion | None = None, **options: Any) -> Any:
         """Compare processor time and error over fidelities, meshes, quadratures and time steps.
 
         Args:
@@ -285,12 +275,11 @@ class Analysis:
             options: as for `archfem.accuracy`.
 
         Returns:
-            All settings with times and errors.
+            All settings with times and errors, an `Accuracy`.
         """
-        found: Accuracy = call_late_bound("Analysis.accuracy", self, motion, **options)
-        return found
+        return call_late_bound("Analysis.accuracy", self, motion, **options)
 
-    def mesh_sensitivity(self, motion: Motion | None = None, **options: Any) -> "MeshSensitivity":
+    def mesh_sensitivity(self, motion: Motion | None = None, **options: Any) -> Any:
         """Compute how findings depend on mesh, time step, joint quadrature and fidelity.
 
         Args:
@@ -298,12 +287,9 @@ class Analysis:
             options: as for `archfem.mesh_sensitivity`, such as `quantity`.
 
         Returns:
-            Observed order, extrapolated value and error bar, and values by setting.
+            Observed order, extrapolated value and error bar, a `MeshSensitivity`.
         """
-        found: MeshSensitivity = call_late_bound(
-            "Analysis.mesh_sensitivity", self, motion=motion, **options
-        )
-        return found
+        return call_late_bound("Analysis.mesh_sensitivity", self, motion=motion, **options)
 
     def write(self, path: str | Path) -> Path:
         """Write the analysis as a case file, which `archfem.Case.read` reads.
@@ -318,5 +304,4 @@ class Analysis:
             InvalidInput: a law, an event or a criterion is not registered, so that no file can
                 name it.
         """
-        written: Path = call_late_bound("Analysis.write", self, path)
-        return written
+        return call_late_bound("Analysis.write", self, path)

@@ -359,9 +359,7 @@ class CollapseScale:
         Raises:
             InvalidInput: it fell at the smallest scale that was tried; or as `verdict_range`.
         """
-        name = "CollapseScale.verdict_range"
-        result: VerdictRange = call_late_bound(name, self, structure, motion, **options)
-        return result
+        return call_late_bound("CollapseScale.verdict_range", self, structure, motion, **options)
 
     def table(self) -> str:
         """Return a line per run: step, scale, state of collapse, time and residual displacement."""

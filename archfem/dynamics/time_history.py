@@ -118,24 +118,22 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     check_type(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
     _check_types(start=start, scheme=scheme, record=record, criteria=criteria, newton=newton)
     if isinstance(model, Analysis):
-        given: dict[str, Any] = {"dt": dt, "tolerance": tolerance, "damping": damping}
-        given |= {"scheme": scheme, "record": record, "until": until, "criteria": criteria}
-        given |= {"newton": newton, "method": None if method == "auto" else method}
-        return _run_analysis(model, motion, start, given)
+        given: Any = {"dt": dt, "tolerance": tolerance, "damping": damping, "scheme": scheme}
+        given |= {"record": record, "until": until, "criteria": criteria, "newton": newton}
+        return _run_analysis(model, motion, start, {**given, "method": method})
     check_model(model)
     dt, tolerance = _resolve_steps(model, dt, tolerance)
     criteria = resolve_criteria(criteria, until)
     event = None if until is None else start_monitor(until, model.structure, criteria)
-    rest = start if isinstance(start, Equilibrium) else None
-    viscous, _ = resolve_effective_damping(damping, model, rest)
-    if isinstance(start, Equilibrium):
-        model = start.transfer_memory(model)
     if model.large_displacements and scheme is not None:
         check_large_displacement_scheme(scheme)
+    start = start or dead_load(model, newton)
+    rest = start if isinstance(start, Equilibrium) else None
+    viscous, _ = resolve_effective_damping(damping, model, rest)
+    model = rest.transfer_memory(model) if rest else model
     equation = Equation(model, motion, viscous, scheme or Conserving())
-    if not isinstance(start, State):
-        rest = start or dead_load(model, newton)
-        start = equation.at_rest(rest.q, memory=rest.model.memory)
+    if isinstance(start, Equilibrium):
+        start = equation.at_rest(start.q, memory=start.model.memory)
     start.check(model)
     stepper = stepper_for(method, equation, newton)
     first = start_batch(stepper, start, dt or 0.005)  # typical where steps vary in length
@@ -154,8 +152,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         raise
     history = recorder.build_history(motion, ending, outcome)
     if adaptive is not None:
-        history.dataset.attrs |= {"tolerance": tolerance, "tolerance_unmet": adaptive.unmet_share}
-        history = history.with_doubts((*history.doubts, *_doubt_tolerance(history)))
+        history = _state_tolerance(history, tolerance, adaptive.unmet_share)
     if not model.large_displacements or ending is Ending.INTERRUPTED:
         return history
     ratio = viscous.restitution if isinstance(viscous, StiffnessDamping) else None
@@ -167,7 +164,7 @@ def _run_analysis(
 ) -> History:
     """Run an analysis, some of whose settings are given anew."""
     settings = {name: getattr(analysis, name) for name in given}
-    settings |= {name: value for name, value in given.items() if value is not None}
+    settings |= {name: value for name, value in given.items() if value not in (None, "auto")}
     # a step, also that of a selected model, takes the place of a tolerance
     if given["tolerance"] is not None and given["dt"] is None:
         settings["dt"] = None
@@ -178,14 +175,16 @@ def _run_analysis(
     return time_history(model, motion, start=start, **settings)
 
 
-def _doubt_tolerance(history: History, admissible: float = 0.02) -> list[Doubt]:
-    """Return a doubt where the tolerance of the steps was missed in more than a share of them."""
-    tolerance, share = (history.dataset.attrs[key] for key in ("tolerance", "tolerance_unmet"))
+def _state_tolerance(
+    history: History, tolerance: float, share: float, admissible: float = 0.02
+) -> History:
+    """State the tolerance of the steps in a history; doubt it where a share of them missed it."""
+    history.dataset.attrs |= {"tolerance": tolerance, "tolerance_unmet": share}
     doubt = Doubt(
         f"the shortest steps erred by more than {tolerance:g} in |e| in {share:.0%} of the run",
         "compare with a constant dt of 0.1 ms or less, or with more damping",
     )
-    return [doubt] if share > admissible else []
+    return history.with_doubts((*history.doubts, doubt)) if share > admissible else history
 
 
 def _resolve_steps(

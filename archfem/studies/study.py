@@ -90,7 +90,7 @@ class Study:
         >>> motion = af.Motion.synthetic(duration=1.0, pga=1.0)
         >>> study = af.Study(column, vary={"dt": [0.005, 0.0025]}, motion=motion)
         >>> study.run(workers=1)["outcome"].values.tolist()
-        ['stands', 'stands']
+        ['no mechanism', 'no mechanism']
     """
 
     title: str
