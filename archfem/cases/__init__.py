@@ -2,7 +2,7 @@
 
     analysis_keys     [limit], [rating] and [assessment]
     analysis_tables   [model], [analysis], [criteria], [record], [dead_load]: read and written
-    case              Case: an analysis, its motion, and what else a file asks for
+    case              Case: an analysis, its motion, outputs
     defaults          deciding values that a case does not give
     examples          shipped cases
     motion_keys       [motion] and [suite]

@@ -127,10 +127,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     event = None if until is None else start_monitor(until, model.structure, criteria)
     if model.large_displacements and scheme is not None:
         check_large_displacement_scheme(scheme)
-    start = start or dead_load(model, newton)
-    rest = start if isinstance(start, Equilibrium) else None
-    viscous, _ = resolve_effective_damping(damping, model, rest)
-    model = rest.transfer_memory(model) if rest else model
+    model, start, viscous = _resolve_start(model, start, damping, newton)
     equation = Equation(model, motion, viscous, scheme or Conserving())
     if isinstance(start, Equilibrium):
         start = equation.at_rest(start.q, memory=start.model.memory)
@@ -157,6 +154,19 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         return history
     ratio = viscous.restitution if isinstance(viscous, StiffnessDamping) else None
     return follow_fall(history, model, (start, recorder.state), motion, ratio)
+
+
+def _resolve_start(
+    model: Model,
+    start: Equilibrium | State | None,
+    damping: Viscous | EffectiveDamping | str | None,
+    newton: Newton | None,
+) -> tuple[Model, Equilibrium | State, Viscous | None]:
+    """Return the model with the joints of its start, the start, and the damping about it."""
+    if isinstance(start, State):
+        return model, start, resolve_effective_damping(damping, model, None)[0]
+    rest = start or dead_load(model, newton)
+    return rest.transfer_memory(model), rest, resolve_effective_damping(damping, model, rest)[0]
 
 
 def _run_analysis(
