@@ -1,5 +1,6 @@
 """Analyses written as case files and read again: every bit of the value, and of its history."""
 
+import itertools
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -97,7 +98,7 @@ def random_structure(seed):
     for course in range(random.integers(1, 4)):
         high = y + float(random.uniform(0.2, 0.5))
         edges = np.cumsum([0.0, *random.uniform(0.3, 0.9, random.integers(1, 3))]).tolist()
-        for k, (left, right) in enumerate(zip(edges, edges[1:], strict=False)):
+        for k, (left, right) in enumerate(itertools.pairwise(edges)):
             outline = ((left, y), (right, y), (right, high), (left, high))
             role = str(random.choice(["pier", "ring", "other"]))
             part = f'part "{course}.{k}"'
@@ -233,7 +234,10 @@ def test_blocks_of_a_file_are_joined_where_it_lists_no_joints(tmp_path):
         ('{ name = "a", outlines = [] }', r"'structure.blocks\[0\].outlines': did you mean"),
         ('{ name = "a", outline = [[0, 0], [1, 0]] }', "give at least 3 finite points"),
         ('{ name = "a", outline = [[0, 0, 1]] }', "outline"),
-        ('{ name = "a", outline = [[0, 0]], material = "jam" }', "'jam' is not among the materials"),
+        (
+            '{ name = "a", outline = [[0, 0]], material = "jam" }',
+            "'jam' is not among the materials",
+        ),
     ],
 )
 def test_invalid_blocks_are_refused(block, says, tmp_path):

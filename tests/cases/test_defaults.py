@@ -42,7 +42,9 @@ def test_values_that_are_given_are_not():
     assert text.endswith("'stone to stone' k_s 0.3 MPa/mm")
     materials = {"stone": {"young": 1e10, "unit_weight": 2e4, "strength": 1e7}}
     contacts = {"stone to stone": {**contact, "shear_stiffness": "0.3 MPa/mm"}}
-    assert describe_defaults(af.Case.of({**given, "materials": materials, "contacts": contacts})) == ""
+    assert (
+        describe_defaults(af.Case.of({**given, "materials": materials, "contacts": contacts})) == ""
+    )
 
 
 def test_python_and_files_have_the_same_defaults():

@@ -147,7 +147,10 @@ def test_the_range_of_its_verdict_is_of_large_displacements():
         ({"record": 3}, "record = 3 is a int: give Record"),
         ({"stages": [af.masonry.Stage(blocks=("stone",))]}, "no block or part 'stone'"),
         (
-            {"until": af.CountedMechanism(criteria=af.Criteria()), "criteria": af.Criteria(hinge=0.4)},
+            {
+                "until": af.CountedMechanism(criteria=af.Criteria()),
+                "criteria": af.Criteria(hinge=0.4),
+            },
             "the run is judged by",
         ),
     ],
@@ -173,7 +176,7 @@ def test_models_are_built_once_and_not_sent_to_other_processes(monkeypatch):
     assert built == [1]
     sent = pickle.loads(pickle.dumps(fresh))
     assert sent == fresh
-    assert set(vars(sent)) == {field for field in analysis.Analysis.__dataclass_fields__}
+    assert set(vars(sent)) == set(analysis.Analysis.__dataclass_fields__)
 
 
 def test_its_repr_has_what_differs_from_the_defaults():

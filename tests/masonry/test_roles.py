@@ -282,6 +282,15 @@ def test_a_survey_gives_roles_by_properties_or_layers(tmp_path, warnings):
     assert {said.split("'")[1] for said in warnings()} == set(NAMES["German"])
 
 
+def test_values_that_a_drawing_does_not_hold_are_named(tmp_path, warnings):
+    soft = af.Contact(1e9, 2e8, friction=0.5, name="pads")
+    path = tmp_path / "stack.geojson"
+    af.masonry.write_outlines(af.column(breadth=1.0, heights=[1.0], contact=soft), path)
+    assert [text.partition(" does not hold ")[2] for text in warnings()] == [
+        "the values of ['pads']: write an Analysis to keep them"
+    ]
+
+
 def test_invalid_roles_of_a_survey_are_refused(tmp_path):
     path = tmp_path / "stack.geojson"
     af.masonry.write_outlines(af.column(breadth=1.0, heights=[1.0]), path)

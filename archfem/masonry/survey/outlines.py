@@ -15,6 +15,7 @@ from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.assembly import assembled, by_materials, touching
 from archfem.masonry.block import Block
 from archfem.masonry.materials import (
+    CONTACT_PRESETS,
     MATERIAL_PRESETS,
     SOIL_TO_STONE,
     STONE,
@@ -247,12 +248,21 @@ def _find_corners(block: Block, direction: Direction | None) -> tuple[int, int, 
 def write_outlines(structure: Structure, path: str | Path) -> None:
     """Write the blocks of a structure as GeoJSON that `read_outlines` reads.
 
-    Arcs become chords. Coordinates are metres in the plane, not degrees.
+    Arcs become chords. Coordinates are metres in the plane, not degrees. A drawing holds no values
+    of materials and contacts: a warning names those that are lost. `archfem.Analysis.write` keeps
+    every value.
 
     Args:
         structure: structure whose blocks are written with part, role and name of the material.
         path: path of the file.
     """
+    used = {block.material for block in structure.blocks}
+    used |= {joint.contact for joint in structure.joints}
+    kept = {*MATERIAL_PRESETS.values(), *CONTACT_PRESETS.values()}
+    if lost := sorted({item.name for item in used - kept}):
+        logger.warning(
+            "%s does not hold the values of %s: write an Analysis to keep them", path, lost
+        )
     features = []
     for block in structure.blocks:
         ring = block.drawn().tolist()
