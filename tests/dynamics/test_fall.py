@@ -104,6 +104,23 @@ def test_a_fall_that_fails_is_repeated_with_shorter_steps(tower, monkeypatch, lo
     assert dataset.sizes["fall_frame"] == 1
 
 
+def test_a_fall_that_cannot_be_followed_keeps_the_history_up_to_it(monkeypatch):
+    """A column that topples under 0.4 g for 1 s comes loose before the motion ends."""
+
+    def refuse(model, state, motion, ratio):
+        raise af.DidNotConverge("made to fail")
+
+    monkeypatch.setattr(fall, "simulate_fall", refuse)
+    column = af.column(breadth=0.6, heights=[2.4], contact=af.Contact(1e9, 4e8, 0.6))
+    model = af.build(column, fidelity="rigid", displacements="large")
+    with pytest.raises(af.DidNotConverge, match="made to fail") as caught:
+        af.time_history(model, af.Motion(np.full(100, 0.4 * G), 0.01), dt=2e-3)
+    held = af.dynamics.partial_history(caught.value)
+    assert held.ending is af.dynamics.Ending.PARTED
+    assert held.fall is None
+    assert np.abs(held.joints["rotation"].values[-1]).max() > 0.3
+
+
 def test_loose_stones_rub_as_their_joints_did_or_by_six_tenths():
     for friction, rubs in ((0.45, 0.45), (None, 0.6)):
         contact = af.Contact(1e9, 4e8, friction, cohesion=1e4)
