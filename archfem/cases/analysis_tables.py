@@ -127,13 +127,14 @@ def _read_damping(given: str | Table) -> Viscous | EffectiveDamping:
     if isinstance(given, str):
         check_choice(given, ("effective",), "analysis.damping")
         return EffectiveDamping()
-    kinds: Table = {"frequency": StiffnessDamping, "frequencies": Rayleigh}
-    cls = next((kind for key, kind in kinds.items() if key in given), EffectiveDamping)
-    table = dict(given)
-    effective = cls is EffectiveDamping and table.pop("modes", "") == "effective"
+    kinds = {"modes": EffectiveDamping, "frequency": StiffnessDamping, "frequencies": Rayleigh}
+    table, cls = dict(given), next((kinds[key] for key in kinds if key in given), EffectiveDamping)
+    effective = table.pop("modes", "") == "effective"
+    misplaced = {*kinds}.union(*map(declared_keys, kinds.values())) - declared_keys(cls).keys()
     # the share of mass selects the second mode, which stiffness damping has not
-    unused = effective and "mass_share" in table and table.get("kind") != "rayleigh"
-    if (cls is EffectiveDamping) != effective or unused or "ratio" not in table:
+    misplaced |= set() if table.get("kind") == "rayleigh" else {"mass_share"}
+    known = "ratio" in table and misplaced.isdisjoint(table)
+    if (cls is EffectiveDamping) != effective or not known:
         raise InvalidInput(
             f"analysis.damping = {given}: write "
             '{ ratio = 0.05, modes = "effective" }, or a frequency = 8.0 in place of modes; for '

@@ -277,7 +277,8 @@ def check_friction_scheme(scheme: Scheme, structure: Structure) -> None:
         raise InvalidInput(
             f"{name} follows no sliding, and joints slide at "
             f"μ = {np.min(friction):g}: use scheme=Conserving(), the default, in a case "
-            '"conserving"; or joints that never slide, Contact(friction=None), in a case "none"'
+            '"conserving"; or joints that never slide, Contact(friction=None), in a case '
+            'friction = "none"'
         )
     if structure.tension.any():
         raise InvalidInput(

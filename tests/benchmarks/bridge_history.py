@@ -83,9 +83,10 @@ def prepare(name: str, paper: bool) -> tuple[af.Case, af.statics.Equilibrium, di
     """Build a bridge at rest, and the settings of its runs."""
     case = af.Case.read(MESHES / f"{name}.toml", ["suite.reduction=1", *(PAPER if paper else [])])
     if paper:
-        dead = af.dead_load(build(case.structure, case.discretisation))
+        dead = af.dead_load(build(case.structure, case.analysis.discretisation))
         damping = af.cases.damping_of(case, dead)[0]
-        return case, dead, {"damping": damping, "scheme": case.scheme, "criteria": case.criteria}
+        settings = {"scheme": case.analysis.scheme, "criteria": case.analysis.failure_criteria}
+        return case, dead, {"damping": damping, **settings}
     fidelity = {"backfill": "full", "rest": "rigid"}
     model = af.build(case.structure, fidelity=fidelity, displacements="large", cells=(2, 2))
     return case, af.dead_load(model), {"damping": af.effective_damping(model, 0.05, "closed")}

@@ -128,10 +128,12 @@ def run_setting(
     """Yield of each motion in a setting its name, its run and the seconds it took."""
     case = af.Case.read(path, [*options, *setting.changes])
     structure = rubbed(case.structure, setting.friction)
-    model = build(structure, case.discretisation)
+    model = build(structure, case.analysis.discretisation)
     dead = af.dead_load(model)
     damping = damped(af.cases.damping_of(case, dead)[0], setting.mass, setting.stiffness)
-    criteria = replace(case.criteria, friction=0.60 if setting.friction is None else None)
+    criteria = replace(
+        case.analysis.failure_criteria, friction=0.60 if setting.friction is None else None
+    )
     for motion in motions:
         begun = time.perf_counter()
         run = af.time_history(model, motion, dt=DT, start=dead, damping=damping, criteria=criteria)

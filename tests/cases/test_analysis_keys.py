@@ -9,7 +9,7 @@ from backfilled import arch_bridge
 
 import archfem as af
 from archfem.cases.analysis_keys import parse_assessment, parse_limit, parse_rating, rate_case
-from archfem.cases.run import expected_damping
+from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.schemes import EffectiveDamping
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
@@ -141,7 +141,7 @@ def small(tmp_path):
 
 def test_a_case_takes_its_damping_from_the_modes(small):
     case = af.Case.read(small)
-    assert case.damping == EffectiveDamping(0.05)
+    assert case.analysis.damping == EffectiveDamping(0.05)
     dead = af.dead_load(af.build(case.structure, fidelity="rigid"))
     damping, how = af.cases.damping_of(case, dead)
     assert damping == af.dynamics.effective_damping(dead.model, 0.05, dead)
@@ -152,7 +152,7 @@ def test_a_case_takes_its_damping_from_the_modes(small):
     )
     # Before a model is chosen it is of elastic blocks, and lower by their compliance.
     elastic = af.build(case.structure, fidelity="condensed")
-    expected = expected_damping(case)(elastic).frequency
+    expected = resolve_effective_damping(case.analysis.damping, elastic, None)[0].frequency
     assert expected == af.cases.damping_of(case, af.dead_load(elastic))[0].frequency
     assert expected == pytest.approx(damping.frequency, rel=0.05)
 
@@ -172,7 +172,7 @@ def test_rayleigh_damping_is_set_by_its_kind(small):
     case = af.Case.read(
         small, ["analysis.damping.kind=rayleigh", "analysis.damping.mass_share=0.95"]
     )
-    assert case.damping == EffectiveDamping(0.05, "rayleigh", mass_share=0.95)
+    assert case.analysis.damping == EffectiveDamping(0.05, "rayleigh", mass_share=0.95)
     dead = af.dead_load(af.build(case.structure, fidelity="rigid"))
     damping, how = af.cases.damping_of(case, dead)
     assert damping == af.dynamics.effective_damping(
@@ -183,7 +183,7 @@ def test_rayleigh_damping_is_set_by_its_kind(small):
 
 def test_damping_at_a_frequency(small):
     case = af.Case.read(small, ['analysis.damping={ ratio = 0.05, frequency = "8 Hz" }'])
-    assert case.damping == af.StiffnessDamping(0.05, 8.0)
+    assert case.analysis.damping == af.StiffnessDamping(0.05, 8.0)
     dead = af.dead_load(af.build(case.structure, fidelity="rigid"))
     assert (
         af.cases.damping_of(case, dead)[1] == "damping: 5 % at 8.00 Hz, proportional to stiffness"

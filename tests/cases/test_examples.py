@@ -54,5 +54,5 @@ def test_the_ring_of_the_paper_has_its_geometry_and_rayleigh_damping():
     case = af.Case.read(list_examples()["ring_paper"])
     ring = af.Case.read(list_examples()["ring"]).structure
     assert (case.structure.blocks, case.structure.joints) == (ring.blocks, ring.joints)
-    assert case.damping == af.Rayleigh(0.05, (8.0, 16.0))
-    assert (case.model["fidelity"], case.discretisation.displacements) == ("full", "small")
+    assert case.analysis.damping == af.Rayleigh(0.05, (8.0, 16.0))
+    assert (case.analysis.fidelity, case.analysis.discretisation.displacements) == ("full", "small")

@@ -35,8 +35,8 @@ def path(tmp_path):
 
 def test_displacements_reach_the_model(path):
     case = af.Case.read(path)
-    assert case.discretisation.displacements == "large"
-    assert af.Case.read(path, ["model.displacements=small"]).discretisation.displacements == "small"
+    assert case.analysis.discretisation.displacements == "large"
+    assert af.Case.read(path, ["model.displacements=small"]).analysis.displacements == "small"
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,8 @@ def test_displacements_reach_the_model(path):
 )
 def test_settings_without_large_displacements_are_refused(path, change, says):
     if says is None:
-        assert af.Case.read(path, [change]).discretisation.rule.rule == change.split("=")[1]
+        rule = af.Case.read(path, [change]).analysis.discretisation.rule
+        assert rule.rule == change.split("=")[1]
         return
     with pytest.raises(af.InvalidInput, match=says):
         af.Case.read(path, [change])

@@ -192,11 +192,11 @@ def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, mo
         return SimpleNamespace(time=time, joints=joints)
 
     def doubts(coarse, finer):
-        def run(case, motion, *_):
+        def run(analysis, motion, **_):
             begun.append(motion)
             return finer
 
-        monkeypatch.setattr(run_module, "run_time_history", run)
+        monkeypatch.setattr(run_module, "time_history", run)
         rigid, faces = (
             SimpleNamespace(model=SimpleNamespace(fidelity=name)) for name in ("rigid", "faces")
         )

@@ -187,7 +187,8 @@ def test_a_player_takes_the_model_that_was_selected(fidelity, expected, monkeypa
     run = SimpleNamespace(dataset=xr.Dataset({"q": ("coordinate", np.zeros(3))}))
     run.dataset.attrs["fidelity"] = fidelity
     for selects in (True, False):
-        case = SimpleNamespace(structure=None, discretisation=own, selects_model=selects)
+        analysis = SimpleNamespace(discretisation=own, selects_model=selects)
+        case = SimpleNamespace(structure=None, analysis=analysis)
         assert report_data.build_player(case, run, "a title")[2].size == 3
     assert seen == [af.models.Discretisation(expected), own]
 

@@ -153,17 +153,18 @@ def test_a_fill_is_elastic_unless_it_is_to_be_in_pieces():
 
 def test_a_case_is_built_in_stages():
     built = case(FILL, dead_load={"stages": "usual", "layers": 2})
-    assert [stage.name for stage in built.stages] == [
+    assert [stage.name for stage in built.analysis.stages] == [
         "piers and walls", "rings", "centring struck", "fill, layer 1", "fill, layer 2",
     ]  # fmt: skip
-    assert case().stages is None
+    assert case().analysis.stages is None
     assert af.cases.dead_load_of_case(built).model.initial_gaps is not None
 
 
 def test_usual_stages_have_four_layers_of_a_fill_without_cohesion():
     fill = {key: value for key, value in FILL.items() if key != "cohesion"}
     built = case(fill, dead_load={"stages": "usual"})
-    assert [stage.name for stage in built.stages][3:] == [f"fill, layer {k}" for k in (1, 2, 3, 4)]
+    names = [stage.name for stage in built.analysis.stages]
+    assert names[3:] == [f"fill, layer {k}" for k in (1, 2, 3, 4)]
     assert {j.contact.cohesion for j in built.structure.joints if j.contact.name == "fill"} == {0.0}
 
 
@@ -174,9 +175,9 @@ def test_stages_of_a_cases_own():
         {"name": "the fill", "blocks": ["backfill"]},
         {"strike": True},
     ]
-    stages = case(FILL, dead_load={"stage": own}).stages
+    stages = case(FILL, dead_load={"stages": own}).analysis.stages
     assert [stage.name for stage in stages] == ["stage 0", "stage 1", "the fill", "stage 3"]
-    found = af.cases.dead_load_of_case(case(FILL, dead_load={"stage": own}))
+    found = af.cases.dead_load_of_case(case(FILL, dead_load={"stages": own}))
     assert found.joints["N"].values.min() >= 0.0
 
 
@@ -188,8 +189,8 @@ def test_stages_of_a_cases_own():
         ({"law": "jointed", "piece_size": 0.5}, {}, "friction_angle"),
         (FILL, {"stages": "some"}, "dead_load.stages = 'some'"),
         (FILL, {"layers": 2}, "needs stages = 'usual'"),
-        (FILL, {"stages": "usual", "stage": [{"blocks": ["arch"]}]}, "stages of its own"),
-        (FILL, {"stage": [{"blocks": ["arch"]}]}, "no stage places"),
+        (FILL, {"stages": [{"blocks": ["arch"]}], "layers": 2}, "stages of its own"),
+        (FILL, {"stages": [{"blocks": ["arch"]}]}, "no stage places"),
         (FILL, {"steps": 2}, "unknown key 'dead_load.steps'"),
     ],
 )

@@ -151,7 +151,7 @@ def read(path, text):
         (COLUMN.replace("1 m", "9**9**9**9 m"), "a power no unit has"),
         (COLUMN.replace("1 m", "((9**9)**9)**9 m"), "a power no unit has"),
         (COLUMN.replace("1 m", "m**1e9"), "a power no unit has"),
-        (COLUMN + "#" * 2**20, "has 1048.* bytes, and a case file at most 1048576"),
+        (COLUMN + "#" * 2**24, "has 16777.* bytes, and a case file at most 16777216"),
         (b"\xff\xfe" + COLUMN.encode("utf-16-le"), "not UTF-8"),
         ('remove = 3\nbase = "base.toml"', 'write \\["section.key", …\\]'),
         (

@@ -91,8 +91,8 @@ def test_criteria_of_a_case_are_obeyed(tmp_path, undrawn, capsys):
         f"Demirel and Aldemir: local mechanism of arch at {run.mechanism.time:.3f}"
         in capsys.readouterr().out
     )
-    assert af.Case.read(tmp_path / "loose" / "case.toml").criteria == run.criteria
-    assert af.Case.read(RING).criteria == af.Criteria()
+    assert af.Case.read(tmp_path / "loose" / "case.toml").analysis.criteria == run.criteria
+    assert af.Case.read(RING).analysis.failure_criteria == af.Criteria()
 
 
 def test_mesh_command(tmp_path):

@@ -88,7 +88,8 @@ def test_a_model_on_that_mesh(tmp_path, curve):
         '[model]\nmesh_file = "own.msh"\n'
     )
     case = af.Case.read(tmp_path / "case.toml")
-    assert af.build(case.structure, mesh_file=case.discretisation.mesh_file).size == model.size
+    mesh_file = case.analysis.mesh_file
+    assert af.build(case.structure, mesh_file=mesh_file).size == model.size
 
 
 def test_a_surface_in_pieces_is_refused(tmp_path):

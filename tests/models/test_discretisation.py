@@ -78,14 +78,14 @@ def test_a_case_has_its_discretisation():
     changes = [
         "model={ fidelity = 'faces', cells = [2, 3], max_cell_size = '50 cm', tolerance = 0.01 }"
     ]
-    discretisation = af.Case.read(BRIDGE, changes).discretisation
+    discretisation = af.Case.read(BRIDGE, changes).analysis.discretisation
     assert discretisation == Discretisation("faces", (2, 3), max_cell_size=0.5)
 
 
 def test_a_case_without_a_fidelity_may_state_its_mesh():
     case = af.Case.read(BRIDGE, ["model.cells=[2, 2]"])
-    assert case.model["fidelity"] == "auto"
-    assert case.discretisation == Discretisation(cells=(2, 2))
+    assert case.analysis.fidelity == "auto"
+    assert case.analysis.discretisation == Discretisation(cells=(2, 2))
 
 
 def test_a_thousand_cells_are_allowed():

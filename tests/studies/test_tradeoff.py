@@ -40,7 +40,7 @@ def case(monkeypatch):
 def test_a_case_is_compared_as_its_structure_is(case, tmp_path):
     """The case's own fidelity, rule and step do not matter; its damping does."""
     found = case_accuracy(case, tmp_path)
-    given = {**GIVEN, "damping": case.damping, "steps": STEPS}
+    given = {**GIVEN, "damping": case.analysis.damping, "steps": STEPS}
     known = af.accuracy(case.structure, case.ground_motion(), **given)
     assert [trial.setting for trial in found.trials] == [trial.setting for trial in known.trials]
     errors = [[trial.error for trial in each.trials] for each in (found, known)]
