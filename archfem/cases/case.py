@@ -5,16 +5,17 @@ a wrong unit or an impossible geometry is an error that names the key and the re
 """
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
 from archfem._files import atomic_write
 from archfem._validation import check_words, validate_arguments
-from archfem.cases import analysis_keys, motion_keys
+from archfem.cases import analysis_keys, motion_keys, provenance
 from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis
 from archfem.cases.analysis_tables import read_analysis, write_analysis_tables
-from archfem.cases.provenance import find_extensions, load_extensions_of
 from archfem.cases.structure_keys import cached_structure
 from archfem.cases.structure_writer import write_structure
 from archfem.cases.toml_file import (
@@ -24,6 +25,7 @@ from archfem.cases.toml_file import (
     format_tables,
     read_with_base,
     refuse_unknown,
+    split_key_path,
 )
 from archfem.dynamics.analysis import Analysis
 from archfem.errors import ArchfemError, InvalidInput
@@ -115,7 +117,7 @@ class Case:
             *("criteria", "record", "limit", "rating", "assessment", "dead_load", "output"),
         )
         refuse_unknown(settings, ("title", "extensions", *sections))
-        load_extensions_of(settings, folder)
+        provenance.load_extensions_of(settings, folder)
         check_words(settings.get("title", ""), "title", 'write words in quotes: title = "…"')
         for key in sections:
             if not isinstance(settings.get(key, {}), dict):
@@ -226,9 +228,42 @@ class Case:
         )
         return replace(self, suite=suite, settings={**self.settings, "suite": table})
 
+    def without(self, *paths: str) -> "Case":
+        """Return the case without some sections or keys; it need not have them.
+
+        Args:
+            paths: "section", or "section.key".
+
+        Returns:
+            The changed copy.
+        """
+        settings = deepcopy(self.settings)
+        for path in paths:
+            *parents, last = split_key_path(path)
+            reduce(lambda table, name: table.get(name, {}), parents, settings).pop(last, None)
+        return Case.of(settings, self.folder)
+
     def text(self) -> str:
         """Return the case as TOML, changes included."""
         return format_tables(self.settings)
+
+    def hash_inputs(self, *, presentation: bool = True) -> str:
+        """Return the SHA-256 of the case, its input files and the program.
+
+        Args:
+            presentation: whether title, pictures and films count, which change no number.
+        """
+        settings = self.settings if presentation else provenance.remove_presentation(self.settings)
+        return provenance.hash_inputs(settings, self.folder)
+
+    def hash_sections(self, sections: Sequence[str], left_out: Sequence[str] = ()) -> str:
+        """Return the SHA-256 of sections of the case and their input files.
+
+        Args:
+            sections: names of sections.
+            left_out: keys of these that do not count.
+        """
+        return provenance.hash_sections(self.settings, self.folder, sections, left_out)
 
 
 def case_of(subject: Case | Analysis, motion: Any = None, folder: Path | None = None) -> Case:
@@ -241,7 +276,7 @@ def case_of(subject: Case | Analysis, motion: Any = None, folder: Path | None = 
         place = Path() if folder is None else folder
         settings = write_structure(subject.structure) | write_analysis_tables(subject, folder)
         laws = [joint.contact.law for joint in subject.structure.joints]
-        if own := find_extensions([subject.until, *map(type, laws)], folder):
+        if own := provenance.find_extensions([subject.until, *map(type, laws)], folder):
             settings = {"extensions": own, **settings}
     if motion is not None:
         others = {key: value for key, value in settings.items() if key not in ("motion", "suite")}

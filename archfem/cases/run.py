@@ -24,7 +24,6 @@ from archfem._display import call_late_bound
 from archfem._netcdf import read_dataset
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
-from archfem.cases.provenance import hash_inputs
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.history import Ending, History, partial_history
@@ -219,7 +218,7 @@ def run_case(
     if folder is None:
         yield from carry_out(case, None, pairs=pairs, run_motion=run_motion)
         return
-    folder, inputs = Path(folder), hash_inputs(case.settings, case.folder)
+    folder, inputs = Path(folder), case.hash_inputs()
     with _files.lock_folder(folder):
         draft, kept = _start_draft(case, folder, inputs), False
         try:
@@ -329,7 +328,7 @@ def run_time_history(
     Raises:
         DidNotConverge: a step failed; `history` of the error is the record up to it.
     """
-    attrs = {"case": case.text(), "inputs": hash_inputs(case.settings, case.folder)}
+    attrs = {"case": case.text(), "inputs": case.hash_inputs()}
     try:
         with log_prefix(case.title, motion.name):
             run = time_history(case.analysis, motion, start=dead, damping=damping, method=method)
@@ -434,7 +433,7 @@ def load_finished_run(path: Path, case: Case, motion: Motion) -> History | None:
         finished = run.ending.is_complete
     except InvalidInput:
         return None
-    if not finished or run.dataset.attrs.get("inputs") != hash_inputs(case.settings, case.folder):
+    if not finished or run.dataset.attrs.get("inputs") != case.hash_inputs():
         return None
     # Spectral matching reproduces accelerations up to round-off, far below 1e-6 m/s².
     saved, applied = run.dataset["ground"].values, motion.at(run.time)
@@ -446,7 +445,7 @@ def replace_run(case: Case, folder: Path) -> Iterator[Path]:
     """Yield a draft folder whose files replace those of an earlier run when the block ends."""
     # If the block fails, the folder keeps the results of an earlier run; without any it gets what
     # was computed. The draft of a suite has the histories of earlier calls.
-    inputs = hash_inputs(case.settings, case.folder)
+    inputs = case.hash_inputs()
     with _files.lock_folder(folder):
         draft = _start_draft(case, folder, inputs)
         try:
@@ -483,7 +482,7 @@ def _is_of(path: Path, case: Case) -> bool:
         stored = read_dataset(path, "history file").attrs.get("inputs")
     except InvalidInput:
         return False
-    return bool(stored == hash_inputs(case.settings, case.folder))
+    return bool(stored == case.hash_inputs())
 
 
 def _publish_run(run: Run, folder: Path, draft: Path, inputs: str) -> Run:

@@ -15,7 +15,6 @@ from archfem.cases import result_folder as results
 from archfem.cases import result_text
 from archfem.cases.analysis_keys import rate_case
 from archfem.cases.case import Case
-from archfem.cases.provenance import hash_inputs
 from archfem.cases.run import DeadLoadResult, Result, Run, carry_out, replace_run
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions
@@ -72,7 +71,7 @@ def _print_at_end(folder: Path, command: str, title: str = "") -> Iterator[list[
 @contextmanager
 def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
     """Yield the draft folder of a command; its output is printed when the results are in place."""
-    inputs = hash_inputs(case.settings, case.folder)
+    inputs = case.hash_inputs()
     with _print_at_end(folder, command), replace_results(folder, command, inputs) as draft:
         yield draft
 

@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
-from archfem.cases.provenance import hash_sections
 from archfem.cases.run import DeadLoadResult, damping_of, dead_load_of_case
 from archfem.errors import InvalidInput
 from archfem.motion.motion import Motion
@@ -74,7 +73,7 @@ def ground_motion(case: Case) -> Motion:
         return case.ground_motion()  # raises the error for a case without motion
     # The scale is applied last, so that scaled motions share one file and one matching.
     unscaled = replace(case, motion=_without(case.motion, ("scale",)))
-    key = hash_sections(case.settings, case.folder, ("motion",), ("scale",))
+    key = case.hash_sections(("motion",), ("scale",))
     return _look_up("motions", key, unscaled.ground_motion).scaled(case.motion.get("scale", 1.0))
 
 
@@ -84,7 +83,7 @@ def ground_suite(case: Case) -> Suite:
         return case.ground_suite()  # raises the error for a case without suite
     keys = ("scale", "reduction", "reversed")
     plain = replace(case, suite=_without(settings, keys))
-    key = hash_sections(case.settings, case.folder, ("suite",), keys)
+    key = case.hash_sections(("suite",), keys)
     suite = _look_up("suites", key, lambda: _match_once(plain, key))
     factors = {name: settings.get(name, 1.0) for name in ("scale", "reduction")}
     suite = replace(suite, **factors)
@@ -111,7 +110,7 @@ def _match_once(case: Case, key: str) -> Suite:
 def _model_key(case: Case) -> str:
     """Key of the model of a case; it includes the motion if that selects the model."""
     selection = ("motion", "suite", "analysis", "criteria") if case.analysis.selects_model else ()
-    return hash_sections(case.settings, case.folder, (*MODEL_SECTIONS, *selection))
+    return case.hash_sections((*MODEL_SECTIONS, *selection))
 
 
 def _without(table: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:

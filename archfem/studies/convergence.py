@@ -269,9 +269,8 @@ def case_accuracy(
     damping, _ = resolve_effective_damping(case.analysis.damping, reference, None)
     settings = [*references, *candidate_settings(case.structure)]
     varied = ("fidelity", "cells", "quadrature", "quadrature_points", "tolerance")
-    fixed = {key: v for key, v in case.settings.get("model", {}).items() if key not in varied}
     study = Study(
-        Case.of({**case.settings, "model": fixed}, case.folder),
+        case.without(*(f"model.{key}" for key in varied)),
         [_case_keys(setting) for setting in settings],
         {"name": evaluate_time, "damping": damping},
         title=f"{case.title}: speed against error",

@@ -20,7 +20,6 @@ from archfem._typing import Array
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case, case_of
 from archfem.cases.motion_keys import write_motion
-from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.run import DeadLoadResult
 from archfem.cases.toml_file import check_choice
 from archfem.dynamics.analysis import Analysis
@@ -63,7 +62,7 @@ def search_limit_states(
     limits = _applicable_limits(result, limits)
     demands: dict[float, Findings] = {}
 
-    inputs = hash_inputs(remove_presentation(case.settings), case.folder)
+    inputs = case.hash_inputs(presentation=False)
 
     def run_scaled(scale: float) -> ScaledRun:
         # kept one by one: a search that is ended loses the run that it is in
@@ -363,7 +362,7 @@ def _points(
         if not names:
             raise InvalidInput("no motions were given, and the case has no [suite] of them")
         changes = [((PAIR_KEY, name),) for name in names]
-        return names, tuple(Point(case.settings, case.folder, change) for change in changes)
+        return names, tuple(Point.of(case, change) for change in changes)
     if isinstance(motions, Motion | str | Path):
         motions = [motions]
     if isinstance(motions, Mapping):
@@ -372,10 +371,9 @@ def _points(
         named = {_motion_name(motion, k): motion for k, motion in enumerate(motions, start=1)}
     if not named or len(named) < len(motions):
         raise InvalidInput(f"{len(motions)} motions under {len(named)} names: give each its own")
-    base = {key: value for key, value in case.settings.items() if key not in ("suite", "motion")}
-    return list(named), tuple(
-        Point(base, case.folder, (("motion", write_motion(motion)),)) for motion in named.values()
-    )
+    tables = {name: write_motion(motion) for name, motion in named.items()}
+    still = case.without("suite", "motion")
+    return list(tables), tuple(Point.of(still, [("motion", table)]) for table in tables.values())
 
 
 def _motion_name(motion: Any, number: int) -> str:

@@ -214,6 +214,11 @@ class Point:
     # keys, "section.key" each, and their values; "suite.pair" selects one pair of the suite
     changes: tuple[tuple[str, Any], ...] = ()
 
+    @classmethod
+    def of(cls, case: Case, changes: Iterable[tuple[str, Any]] = ()) -> "Point":
+        """Return the point of a case and changes to it."""
+        return cls(case.settings, case.folder, tuple(changes))
+
     @property
     def settings(self) -> dict[str, Any]:
         """Sections of the changed case."""

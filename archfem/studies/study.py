@@ -113,7 +113,7 @@ class Study:
         case, axes = case_of(subject, motion), parameter_axes(vary, samples)
         if compute is None:
             compute = "history" if case.has_motion else "dead load"
-        points = tuple(Point(case.settings, case.folder, each) for each in changes_along(axes))
+        points = tuple(Point.of(case, each) for each in changes_along(axes))
         self._set(title or case.title, Evaluator.of(compute), axes, points, samples)
         self._check()
 
@@ -393,7 +393,7 @@ def _read_study(
     if any(axis.name == "point" for axis in varied):  # the name of the cases with their pairs
         varied = tuple(replace(axis, name="variation") for axis in varied) if rows[1:] else varied
     points = tuple(
-        Point(cases[name].settings, cases[name].folder, (*((PAIR_KEY, p) for p in pair), *changed))
+        Point.of(cases[name], [*((PAIR_KEY, p) for p in pair), *changed])
         for name, *pair in rows
         for changed in changes_along(varied)
     )

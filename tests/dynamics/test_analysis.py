@@ -88,7 +88,7 @@ def test_its_searches_are_those_of_the_functions():
     assert found.lower == af.collapse_scale(model, MOTION, damping="effective", **options).lower
     scales = af.mechanism_scales(replace(ROCKING, criteria=af.Criteria(failures=1)), MOTION)
     assert scales["any joints at once"].upper <= scales["verified"].upper
-    with pytest.raises(af.InvalidInput, match="small displacements.*displacements='large'"):
+    with pytest.raises(af.InvalidInput, match=r"small displacements.*displacements='large'"):
         replace(ROCKING, displacements="small").scale(MOTION)
 
 
