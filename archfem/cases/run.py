@@ -437,7 +437,7 @@ def _compare_start(
     history: History,
     duration: float = 0.5,  # from the start of the motion [s]
 ) -> tuple[float, float, str] | None:
-    """Return the difference of another analysis in the largest |e|, until when, and its fidelity."""
+    """Return the difference of another analysis in the largest |e|, its end, and the fidelity."""
     if other is None:
         return None
     analysis, dead = other

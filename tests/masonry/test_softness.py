@@ -32,7 +32,7 @@ def test_a_block_is_as_large_as_a_square_and_held_by_its_stiffest_joint():
 
 
 def test_joints_are_softened_by_the_halves_of_free_blocks(stack):
-    """In series with bars of 0.5 m: one below the lower joint's stone would belong to the ground."""
+    """In series with half a metre of each stone; the ground adds nothing."""
     below, above = (joint.contact for joint in soften_joints(stack).joints)
     one, two = 0.5 / 30e9, 1.0 / 30e9
     assert below.normal_stiffness == pytest.approx(1.0 / (1.0 / 1.48e9 + one))
