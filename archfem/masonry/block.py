@@ -40,11 +40,15 @@ def measure_sector(points: Array, centre: Array) -> tuple[float, Array, float]:
     return area, centre + reach * bisector, about_centre - area * reach**2
 
 
-def triangulate_polygon(points: Array) -> NDArray[np.intp]:
-    """Divide a polygon (n, 2), convex or not, into anticlockwise triangles of vertices (t, 3)."""
+def triangulate_polygon(points: Array, tolerance: float = 0.0) -> NDArray[np.intp]:
+    """Divide a polygon (n, 2), convex or not, into anticlockwise triangles of vertices (t, 3).
+
+    Vertices are left out that are nearer than a tolerance [m] to the outline of the others.
+    """
     import shapely
 
-    triangles = shapely.constrained_delaunay_triangles(shapely.Polygon(points))
+    outline = shapely.Polygon(points).simplify(tolerance)
+    triangles = shapely.constrained_delaunay_triangles(outline)
     # a ring of a triangle repeats its first vertex
     rings = shapely.get_coordinates(shapely.orient_polygons(triangles)).reshape(-1, 4, 2)
     # the coordinates are copies: the nearest vertex gives the number

@@ -1,12 +1,12 @@
 """Stiffness of blocks relative to their joints, and their lowest internal frequency."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Joint, Structure
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,26 @@ def estimate_block_stiffness(structure: Structure, number: int) -> BlockStiffnes
     shear_modulus = block.material.young / (2.0 * (1.0 + block.material.poisson))
     wave = sqrt(shear_modulus / structure.density(block))
     return BlockStiffness(wave / (2.0 * length), block.material.young / length / stiffest)
+
+
+def soften_joints(structure: Structure) -> Structure:
+    """Return a structure whose joints have the compliance of their blocks as well as their own."""
+    joints = tuple(_soften_joint(structure, joint) for joint in structure.joints)
+    return replace(structure, joints=joints)
+
+
+def _soften_joint(structure: Structure, joint: Joint) -> Joint:
+    """Return a joint in series with the halves of its blocks that it borders."""
+    contact = joint.contact
+    normal, shear = 1.0 / contact.normal_stiffness, 1.0 / contact.shear_stiffness
+    for block in (structure.blocks[number] for number in joint.blocks):
+        if not block.fixed:
+            # a bar of length L = area / depth: L / E in compression, L / G in shear
+            half = 0.5 * block.area / joint.depth / block.material.young
+            normal += half
+            shear += 2.0 * (1.0 + block.material.poisson) * half
+    softer = replace(contact, normal_stiffness=1.0 / normal, shear_stiffness=1.0 / shear)
+    return replace(joint, contact=softer)
 
 
 def find_soft_blocks(structure: Structure) -> tuple[int, ...]:

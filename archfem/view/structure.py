@@ -37,6 +37,7 @@ from archfem.view.style import (
     add_polygons,
     annotate,
     drawing_scale,
+    harpoons,
     new_figure,
     outline_bounds,
     set_title,
@@ -183,7 +184,7 @@ def draw_marks(axes: Axes, marks: Marks) -> None:
     if len(marks.slips):
         style = {"edge": "white", "width": 0.4, "zorder": 6, "gid": "slips"}
         add_polygons(axes, list(marks.slips), Colour.SLIDING, **style)
-        style = {"marker": r"$\rightleftharpoons$", "ms": 12, "mew": 0.5, "color": Colour.SLIDING}
+        style = {"marker": harpoons(), "ms": 13.6, "mew": 0.5, "color": Colour.SLIDING}
         axes.plot([], [], ls="", label="sliding joint", **style)
     if len(marks.gaps):
         edge = [withStroke(linewidth=3.8, foreground=Colour.EDGE)]

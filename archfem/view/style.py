@@ -14,8 +14,10 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation, Text
+from matplotlib.textpath import TextPath
 from matplotlib.ticker import LogFormatter, MaxNLocator
 
 from archfem._files import atomic_write
@@ -58,7 +60,8 @@ class Page(Figure):
 
     def draw(self, renderer: RendererBase) -> None:
         """Draw the figure."""
-        disable_math(self)
+        if self.stale:  # a file takes two drawings: one lays out the figure
+            disable_math(self)
         super().draw(renderer)
 
 
@@ -143,6 +146,13 @@ def style_colour_bar(bar: Colorbar, label: str, size: float = LABEL_SIZE) -> Non
     bar.set_label(label, fontsize=size)
     bar.ax.tick_params(labelsize=size, color=Colour.EDGE)
     bar.outline.set(edgecolor=Colour.EDGE, linewidth=0.8)
+
+
+def harpoons() -> Outline:
+    """Return two opposite harpoons as a marker, the symbol of a sliding joint in legends."""
+    # the same glyph as mathematical text would load its parser
+    glyph = TextPath((0.0, 0.0), "⇌")
+    return Outline(glyph.vertices - glyph.get_extents().get_points().mean(axis=0), glyph.codes)
 
 
 def white_halo(width: float) -> list[withStroke]:
@@ -247,8 +257,10 @@ def save(figure: Figure, path: str | Path) -> Path:
         disable_math(figure)
     # text stays text, which can be searched and edited
     fonts = {"pdf.fonttype": 42, "svg.fonttype": "none"}
+    # a tenth larger than by the default level, in two thirds of the time
+    options = {"pil_kwargs": {"compress_level": 3}} if kind == "png" else {}
     with atomic_write(target) as draft, matplotlib.rc_context(fonts):
-        figure.savefig(draft, format=kind, dpi=300)
+        figure.savefig(draft, format=kind, dpi=300, **options)
     return target
 
 

@@ -191,16 +191,19 @@ def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, mo
         joints = af.joints.joint_dataset(stack, resultants, time)
         return SimpleNamespace(time=time, joints=joints)
 
-    def doubts(coarse, finer):
+    def doubts(coarse, finer, softened=None):
         def run(analysis, motion, **_):
             begun.append(motion)
-            return finer
+            return {"faces": finer, "soft": softened}[analysis]
 
         monkeypatch.setattr(run_module, "time_history", run)
         rigid, faces = (
             SimpleNamespace(model=SimpleNamespace(fidelity=name)) for name in ("rigid", "faces")
         )
-        rest = SimpleNamespace(dead=rigid, finer=(None, faces), damping=(None, ""))
+        soft = softened and ("soft", rigid)
+        rest = SimpleNamespace(
+            dead=rigid, finer=("faces", faces), softened=soft, damping=(None, "")
+        )
         return [each.cause for each in run_module.doubt_fidelity(rest, motion, coarse)]
 
     motion = af.Motion(0.1 * np.arange(1.0, 101.0), 0.01)
@@ -217,6 +220,12 @@ def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, mo
     motion = af.Motion(np.arange(1.0, 4.0), 0.01)
     assert doubts(coarse, coarse) == []
     assert begun[-1].horizontal.tolist() == [1.0, 2.0, 3.0]
+    motion, begun[:] = af.Motion(0.1 * np.arange(1.0, 101.0), 0.01), []
+    far = history((0.0, 0.0), (0.4, -0.2))
+    # joints that the stones soften differ by less than a quarter of it: no finer run is made
+    assert doubts(coarse, far, softened=history((0.0, 0.0), (0.1, -0.2074))) == []
+    assert len(begun) == 1
+    assert len(doubts(coarse, far, softened=history((0.0, 0.0), (0.1, -0.2076)))) == 1
 
 
 def test_some_models_have_no_finer_one_to_compare_with(small, monkeypatch):

@@ -12,6 +12,7 @@ from archfem.masonry.stiffness_ratio import (
     find_yielding_blocks,
     list_stones,
     mark_stone_joints,
+    soften_joints,
 )
 
 
@@ -30,6 +31,17 @@ def test_a_block_is_as_large_as_a_square_and_held_by_its_stiffest_joint():
     found = estimate_block_stiffness(replace(tower, joints=(below, stiff)), 1)
     assert found.inner == pytest.approx(np.sqrt(30e9 / 2.4 / (20e3 / 9.81)) / 4.0)
     assert found.ratio == pytest.approx(30e9 / 2.0 / 5e9)
+
+
+def test_joints_are_softened_by_the_halves_of_free_blocks(stack):
+    """In series with half a metre of each stone; the ground adds nothing."""
+    below, above = (joint.contact for joint in soften_joints(stack).joints)
+    one, two = 0.5 / 30e9, 1.0 / 30e9
+    assert below.normal_stiffness == pytest.approx(1.0 / (1.0 / 1.48e9 + one))
+    assert above.normal_stiffness == pytest.approx(1.0 / (1.0 / 1.48e9 + two))
+    dry = stack.joints[1].contact
+    assert above.shear_stiffness == pytest.approx(1.0 / (1.0 / dry.shear_stiffness + 2.4 * two))
+    assert (above.friction, above.name) == (dry.friction, dry.name)
 
 
 def test_soil_is_soft_and_yields_and_stone_is_neither(viaduct):

@@ -30,7 +30,7 @@ from archfem.view.films.settings import Scale, Setup
 from archfem.view.histories import draw_ground
 from archfem.view.joint_marks import joint_pairs
 from archfem.view.positions import ground_acceleration
-from archfem.view.style import Colour, annotate, style_colour_bar
+from archfem.view.style import Colour, annotate, harpoons, style_colour_bar
 
 
 class Canvas:
@@ -264,7 +264,7 @@ def _legend_symbols(joints: xr.Dataset, film: bool, mechanism: bool) -> list[Lin
     """Return the legend's symbols of the marks that occur at joints, and of a mechanism."""
     hinges, slides = (bool(((joints[k] != 0) & joints["judged"]).any()) for k in ("hinge", "slide"))
     hinge = {"ls": "", "marker": "o", "ms": 9.0, "color": Colour.HINGE}
-    sliding = {"ls": "", "marker": r"$\rightleftharpoons$", "ms": 15.0, "color": Colour.SLIDING}
+    sliding = {"ls": "", "marker": harpoons(), "ms": 17.0, "color": Colour.SLIDING}
     symbols = {
         "thrust line": {"color": Colour.THRUST, "lw": 2.4},
         "hinge": hinge if hinges else None,
