@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from archfem._files import align_columns
-from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
@@ -206,11 +205,11 @@ def describe_accuracy(accuracy: Accuracy) -> str:
     )
 
 
-def describe_run(case: Case, run: History, dead: xr.Dataset) -> str:
-    """Describe a run: verdict, quality of the numbers, joints, use of strength, and defaults."""
-    texts = [str(run.verdict), describe_run_quality(run), tabulate_joints(run.joints, dead).text]
-    texts += [utilisation_text(case.structure, run.joints), describe_defaults(case)]
-    return "\n\n".join(filter(None, texts))
+def describe_run(structure: Structure, run: History, dead: xr.Dataset) -> str:
+    """Describe a run: verdict, quality of the numbers, joints, and use of strength."""
+    strength = utilisation_text(structure, run.joints)
+    table = tabulate_joints(run.joints, dead).text
+    return "\n\n".join([str(run.verdict), describe_run_quality(run), table, strength])
 
 
 def describe_run_quality(run: History) -> str:

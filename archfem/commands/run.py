@@ -15,6 +15,7 @@ from archfem.cases import result_folder as results
 from archfem.cases import result_text
 from archfem.cases.analysis_keys import rate_case
 from archfem.cases.case import Case
+from archfem.cases.defaults import describe_defaults
 from archfem.cases.run import DeadLoadResult, Result, Run, carry_out, replace_run
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions
@@ -365,7 +366,8 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
             f"{float(history.time[-1]):.2f} s in {run.seconds:.1f} s; {history.outcome}"
         )
         print(f"wrote {run.path}")
-    text = result_text.describe_run(run.case, history, at_rest.dead.joints)
+    text = result_text.describe_run(run.case.structure, history, at_rest.dead.joints)
+    text += f"\n\n{defaults}" if (defaults := describe_defaults(run.case)) else ""
     print(text)
     write(results.run_files(run, at_rest, text), run.path.parent)
     if history.ending is Ending.INTERRUPTED and run.case.suite is None:

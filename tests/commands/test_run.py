@@ -36,7 +36,7 @@ def test_run_command(tmp_path, capsys):
     }
     run = af.History.read(tmp_path / "out" / "history.nc")
     assert run.time[-1] == pytest.approx(2.0)
-    assert af.Case.of(tomllib.loads(run.dataset.attrs["case"])).model["fidelity"] == "rigid"
+    assert af.Case.of(tomllib.loads(run.dataset.attrs["case"])).analysis.fidelity == "rigid"
     said = capsys.readouterr().out
     assert "joint 17" in said
     assert (tmp_path / "out" / "modes.txt").read_text(encoding="utf-8") in said

@@ -48,7 +48,7 @@ def test_error_bar_of_a_ring_holds_its_converged_eccentricity():
 
 
 def test_findings_that_have_no_numbers(small_ring):
-    few = {"rules": ["exact"], "rungs": ["rigid"], "find": "dead load", "workers": 1}
+    few = {"rules": ["exact"], "rungs": ["rigid"], "compute": "dead load", "workers": 1}
     with pytest.raises(af.InvalidInput, match="'colour' is none of the numbers"):
         af.mesh_sensitivity(small_ring, "colour", **few)
     with pytest.raises(af.InvalidInput, match="the coarsest first"):
@@ -81,7 +81,7 @@ class StudyArguments(Exception):
 
 
 @pytest.mark.parametrize(
-    ("find", "shaken", "computed"),
+    ("compute", "shaken", "computed"),
     [
         (None, True, "history"),
         (None, False, "dead load"),
@@ -90,18 +90,18 @@ class StudyArguments(Exception):
     ],
 )
 def test_a_given_quantity_is_computed_or_else_the_history_or_the_dead_load(
-    small_ring, monkeypatch, find, shaken, computed
+    small_ring, monkeypatch, compute, shaken, computed
 ):
     """Over three meshes, four rules, three fidelities, and time steps of what moves."""
 
-    def of(case, points, find, **given):
-        raise StudyArguments(find, len(points), points[0])
+    def study(case, points, compute, **given):
+        raise StudyArguments(compute, len(points), points[0])
 
-    monkeypatch.setattr(convergence.Study, "of", of)
+    monkeypatch.setattr(convergence, "Study", study)
     case = small_ring if shaken else af.Case.of({"structure": small_ring.settings["structure"]})
     assert case.has_motion is shaken
     with pytest.raises(StudyArguments) as caught:
-        af.mesh_sensitivity(case, find=find)
+        af.mesh_sensitivity(case, compute=compute)
     still = computed == "dead load"
     finest = {"model.cells": [2, 2]} | ({} if still else {"analysis.dt": 0.0025})
     assert caught.value.args == (computed, 10 if still else 13, finest)

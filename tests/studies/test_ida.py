@@ -242,4 +242,4 @@ def test_invalid_analyses_are_refused(small_ring):
     with pytest.raises(af.InvalidInput, match="a motion is a int"):
         ida(small_ring, [3])
     found = ida(small_ring, made(1), limits=["collapse"], workers=1)
-    assert "collapse needs displacements" in found.table["error"].item()
+    assert "collapse needs displacements = 'large'" in found.table["error"].item()

@@ -2,6 +2,7 @@
 
 from copy import copy, deepcopy
 from dataclasses import replace
+from functools import wraps
 from pathlib import Path
 
 import numpy as np
@@ -81,9 +82,13 @@ def test_runs_of_one_model_are_those_of_new_models_whatever_ran_before(displacem
 def test_motions_are_read_once_at_any_scale_and_scaled_as_by_the_case(monkeypatch):
     made, synthetic = [], af.Motion.synthetic
     monkeypatch.setattr(cache, "_cache", {})
-    monkeypatch.setattr(
-        af.Motion, "synthetic", lambda **given: made.append(given) or synthetic(**given)
-    )
+
+    @wraps(synthetic)  # its arguments are the keys of a case
+    def noted(**given):
+        made.append(given)
+        return synthetic(**given)
+
+    monkeypatch.setattr(af.Motion, "synthetic", noted)
     cases = [case(motion__scale=scale) for scale in (0.3, 1.7)]
     found = [cache.ground_motion(each) for each in cases]
     assert len(made) == 1

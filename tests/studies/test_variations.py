@@ -8,14 +8,13 @@ import pytest
 from pages import read_page
 
 import archfem as af
-from archfem.dynamics import CollapseState
+from archfem.dynamics import CollapseState, analysis
 from archfem.studies import variations
 from archfem.studies.variations import (
     DEFAULT_RANGES,
-    RunSettings,
     Variation,
+    VariedRun,
     evaluate_variation,
-    verdict_range_of_case,
 )
 
 HELD = {name: values[0] for name, values in DEFAULT_RANGES.items()} | {
@@ -36,20 +35,25 @@ def motion():
 
 @pytest.fixture
 def calls(monkeypatch):
-    """The cases of runs, which are not computed."""
-    calls = []
+    """Structure, motion, step and analysis of the runs, which are not computed."""
+    calls, stands = [], CollapseState("stands", None, (), 0.02, 0.01, True)
 
-    def state(*given):
-        calls.append(given)
-        return CollapseState("stands", None, (), 0.02, 0.01, True)
+    def elastic(analysis, motion, changes):
+        calls.append((analysis.structure, motion, analysis.dt, analysis))
+        return stands
 
-    monkeypatch.setattr(variations, "_run_elastic_joints", state)
-    monkeypatch.setattr(variations, "_run_rigid_blocks", state)
+    def rigid(structure, motion, dt):
+        calls.append((structure, motion, dt, None))
+        return stands
+
+    monkeypatch.setattr(variations, "_run_elastic_joints", elastic)
+    monkeypatch.setattr(variations, "_run_rigid_blocks", rigid)
     return calls
 
 
-def evaluate(column, motion, damping=None, **changes):
-    base = RunSettings(column, motion, damping, 0.005, "rigid")
+def evaluate(column, motion, damping="effective", **changes):
+    settings = {"fidelity": "rigid", "displacements": "large", "damping": damping, "dt": 0.005}
+    base = VariedRun(af.Analysis(column, **settings), motion)
     return evaluate_variation(Variation(base, tuple(changes.items())))
 
 
@@ -81,20 +85,21 @@ def test_contacts_motion_and_step_reach_the_run(column, motion, calls):
 
 def test_joint_rules_select_the_method(column, motion, monkeypatch):
     built, rigid = [], []
-    build, run = variations.build, variations._run_rigid_blocks
+    build, run = analysis.build, variations._run_rigid_blocks
 
     def note(structure, **given):
-        built.append(given)
+        names = ("fidelity", "displacements", "quadrature", "quadrature_points")
+        built.append(tuple(given[name] for name in names))
         return build(structure, **given)
 
-    monkeypatch.setattr(variations, "build", note)
+    monkeypatch.setattr(analysis, "build", note)
     monkeypatch.setattr(
         variations, "_run_rigid_blocks", lambda *given: rigid.append(given) or run(*given)
     )
     exact = evaluate(column, motion)
     springs = evaluate(column, motion, joint_rule="three points")
-    plain = {"fidelity": "rigid", "displacements": "large"}
-    assert built == [plain, plain | {"quadrature": "trapezoidal", "quadrature_points": 3}]
+    plain = ("rigid", "large")
+    assert built == [(*plain, "exact", None), (*plain, "trapezoidal", 3)]
     assert not rigid
     blocks = evaluate(column, motion, joint_rule="rigid")
     assert len(rigid) == 1
@@ -147,10 +152,11 @@ def test_damping_that_is_given_is_varied(column, motion, monkeypatch, given, kin
 
 
 def test_by_default_damping_is_that_of_effective_modes(column):
-    model = af.build(column, fidelity="rigid", displacements="large")
+    given = af.Analysis(column, fidelity="rigid", displacements="large", damping="effective")
+    model, rest = given.model, given.dead_load()
     for kind, name in (("stiffness", "stiffness"), ("mass and stiffness", "rayleigh")):
         expected = af.effective_damping(model, 0.025, kind=name)
-        assert variations._vary_damping(model, None, kind, 0.5) == expected
+        assert variations._vary_damping(given, rest, kind, 0.5) == expected
 
 
 def test_the_run_as_given_comes_first_then_each_change_alone(column, motion, calls):
@@ -332,14 +338,16 @@ def test_a_case_gives_its_damping_and_its_step(tmp_path, calls):
     path = tmp_path / "column.toml"
     path.write_text(CASE)
     case = af.Case.read(path)
-    verdict_range_of_case(case, samples=1)
-    (_, motion, dt, base, _) = calls[0]
-    model = af.build(case.structure, fidelity="rigid")
-    assert base.damping == af.effective_damping(model, 0.03)
+    motion = case.ground_motion()
+    af.verdict_range(case.analysis, motion, samples=1)
+    (_, moved, dt, given) = calls[0]
+    model = af.build(case.structure, fidelity="rigid", displacements="large")
+    damping = variations._vary_damping(given, given.dead_load(), None, 1.0)
+    assert damping == af.effective_damping(model, 0.03)
     assert dt == 0.004
-    assert np.array_equal(motion.horizontal, case.ground_motion().horizontal)
+    assert np.array_equal(moved.horizontal, motion.horizontal)
     path.write_text(CASE.replace('dt = "4 ms"', ""))
-    verdict_range_of_case(af.Case.read(path), samples=1)
+    af.Case.read(path).analysis.verdict_range(motion, samples=1)
     assert calls[-1][2] == 0.005  # without one
 
 
