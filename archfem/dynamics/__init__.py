@@ -23,7 +23,7 @@
     verdict_range     verdicts over uncertain properties
     warm_up           compilation of all kernels ahead of time
 
-Imports `motion`, `statics` and the rooms before them. Start reading at `analysis` and `time_history`.
+Imports `motion`, `statics` and the rooms before them. Start reading at `analysis`, `time_history`.
 """
 
 import lazy_loader
