@@ -146,17 +146,6 @@ def test_a_choice_may_be_of_large_displacements(chosen):
         chosen.of(0.3, 0.3, displacements="huge")
 
 
-def test_damping_is_computed_of_a_model_where_it_is_a_function():
-    damping = af.StiffnessDamping(0.03, 8.0)
-    found = SimpleNamespace(size=3)
-    assert model_selection.resolve_damping(found, lambda model: (model.size, damping)) == (
-        3,
-        damping,
-    )
-    assert model_selection.resolve_damping(found, damping) is damping
-    assert model_selection.resolve_damping(found, None) is None
-
-
 def test_soil_keeps_its_nodes_and_is_never_rigid():
     stack = af.column(breadth=1.0, heights=[1.0])
     soft = af.Block(
