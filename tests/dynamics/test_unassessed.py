@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -171,12 +172,36 @@ def test_tables_state_what_is_assessed(other, ring):
         table = result_text.describe_pairs({"one": run, "two": run})
         assert (SENTENCE in table.splitlines()) == said
         assert (of_history(run).get("assessed") == SENTENCE) == said
-        summary = result_text.describe_run(model.structure, run, af.dead_load(model).joints)
-        assert (SENTENCE in summary.splitlines()) == said
+        case = SimpleNamespace(structure=model.structure)
+        facts = sections.list_facts(SimpleNamespace(runs={"one": run}, case=case))
+        assert (("joints", SENTENCE) in facts) == said
         grid = sections._shorten_joint_table(
             result_text.tabulate_joints(run.joints), run.verdict.assessed
         )
         assert grid.caption.endswith(f" A{SENTENCE[1:]}.") == said
+
+
+@pytest.mark.slow
+def test_a_case_that_is_run_states_it_everywhere(tmp_path, capsys):
+    """Printed at check and run, in summary and report; the doubt sets the exit code."""
+    af.masonry.write_outlines(portal("other"), tmp_path / "portal.geojson")
+    case = tmp_path / "portal.toml"
+    case.write_text(
+        'title = "Portal"\n[structure]\nshape = "outlines"\nfile = "portal.geojson"\n'
+        '[model]\nfidelity = "rigid"\n[motion]\nsynthetic = { duration = 2.0, pga = 4.0 }\n'
+        "[analysis]\ndt = 0.005\n"
+    )
+    assert af.commands.main(["check", str(case)]) == 0
+    assert SENTENCE in capsys.readouterr().out.splitlines()
+    out = tmp_path / "out"
+    assert af.commands.main(["run", str(case), "--out", str(out)]) == 3
+    assert capsys.readouterr().out.splitlines().count(SENTENCE) >= 2
+    summary = (out / "summary.txt").read_text()
+    assert SENTENCE in summary.splitlines()
+    assert "in doubt: joints that are not assessed fail: left post to lintel (|e| " in summary
+    assert af.commands.main(["report", str(out), "--inputs", str(tmp_path)]) == 0
+    page = (out / "report.html").read_text()
+    assert page.count(SENTENCE[1:]) >= 3  # principal results, table of joints, player
 
 
 def test_pictures_state_what_is_assessed(other, ring):
