@@ -227,7 +227,7 @@ def test_cells_of_any_integer_and_row():
         ({"dt": "0.005"}, r"dt \[s\] = '0.005' is not a finite number"),
         ({"dt": 5}, "dt 5 s is not between 1e-06 and 0.1 s"),
         ({"start": "rest"}, "start is a str: give dead_load"),
-        ({"damping": 0.05}, r"damping is a float: give Rayleigh\(0.05"),
+        ({"damping": 0.05}, r"damping = 0.05: give 'effective', .*Rayleigh\(0.05"),
         ({"scheme": "hht"}, r"scheme is a str: give Conserving\(\), Newmark\(\) or HHT"),
         ({"record": 10}, "record is a int: give Record"),
         ({"newton": 1e-8}, "newton is a float: give Newton"),

@@ -401,7 +401,7 @@ class HasStructure(Protocol):
 
 def structure_of(subject: Structure | HasStructure) -> Structure:
     """Return a structure, or that of an analysis."""
-    found: Any = subject if isinstance(subject, Structure) else getattr(subject, "structure", None)
+    found: Any = getattr(subject, "structure", subject)
     check_type(found, Structure, "structure", "give a Structure, e.g. circular_arch(…)")
     return found
 

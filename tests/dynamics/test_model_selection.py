@@ -146,6 +146,15 @@ def test_a_choice_may_be_of_large_displacements(chosen):
         chosen.of(0.3, 0.3, displacements="huge")
 
 
+def test_effective_damping_is_that_of_the_model_tried_about_its_dead_load(ring):
+    model, motion = af.build(ring, fidelity="rigid"), af.Motion.synthetic(duration=1.0, pga=1.0)
+    (_, found, _) = model_selection._resolve_excitation(model, motion, "effective")
+    assert found == af.effective_damping(model, 0.05, af.dead_load(model))
+    assert found != af.effective_damping(model, 0.05, "closed")
+    given = af.StiffnessDamping(0.03, 8.0)
+    assert model_selection._resolve_excitation(model, motion, given)[1] == given
+
+
 def test_soil_keeps_its_nodes_and_is_never_rigid():
     stack = af.column(breadth=1.0, heights=[1.0])
     soft = af.Block(

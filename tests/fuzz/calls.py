@@ -70,7 +70,7 @@ def ready() -> None:
         (af.PointLoad, {"x": 0.1, "force": (0.0, -1.0)}),
         (af.Settlement, {"block": 0, "motion": (0.0, 0.0, 0.0)}),
         (af.Criteria, {"hinge": 0.46, "failures": 4, "friction": 0.6, "duration": 0.0}),
-        (af.CountedMechanism, {"limit": 0.46, "failures": 4, "kinds": ("local",)}),
+        (af.CountedMechanism, {"criteria": af.Criteria(failures=4), "kinds": ("local",)}),
         (af.Rayleigh, {"ratio": 0.05, "frequencies": (8.0, 16.0), "joints": "closed"}),
         (af.StiffnessDamping, {"ratio": 0.05, "frequency": 8.0, "joints": "closed"}),
         (af.HHT, {"alpha": -0.1}),
