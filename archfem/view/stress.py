@@ -44,12 +44,9 @@ class Triangles:
     """Triangulation of the cells of a model; `cell` is the cell of each triangle (t,)."""
 
     def __init__(self, cells: Cells) -> None:
-        cut = []
-        for polygon in cells.polygons:
-            points = cells.places[polygon]
-            # 0.001 of a stone's size cannot be seen; each point of an arc costs a sliver a frame
-            tolerance = 0.001 * float(np.ptp(points, axis=0).max())
-            cut.append(polygon[triangulate_polygon(points, tolerance)])
+        # below half of a pixel; each point of an arc makes a sliver, which is slow to draw
+        tolerance = 0.0003 * float(np.ptp(cells.places, axis=0).max())
+        cut = [c[triangulate_polygon(cells.places[c], tolerance)] for c in cells.polygons]
         corners = np.concatenate(cut)
         # each refinement divides a triangle into four; in about 200 triangles the linear variation
         # of colours cannot be seen

@@ -14,6 +14,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import PlaceHolderLayoutEngine
 from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation, Text
@@ -60,7 +61,8 @@ class Page(Figure):
 
     def draw(self, renderer: RendererBase) -> None:
         """Draw the figure."""
-        if self.stale:  # a file takes two drawings: one lays out the figure
+        # a file is drawn twice, and laid out by the first drawing alone
+        if not isinstance(self.get_layout_engine(), PlaceHolderLayoutEngine):
             disable_math(self)
         super().draw(renderer)
 
