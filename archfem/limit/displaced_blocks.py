@@ -14,12 +14,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import linprog
 from scipy.sparse import csgraph, csr_matrix
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.errors import DidNotConverge
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.masonry.block import Block
@@ -51,7 +50,7 @@ class KinematicChain:
     factor: float  # α of the horizontal forces that sets it in motion [-]
     # velocities of centroids and rotations, the fastest corner at 1 m/s (n_blocks, 3)
     motion: Array
-    body: NDArray[np.intp]  # number of the body of each block; -1 at rest (n_blocks,)
+    body: Numbers  # number of the body of each block; -1 at rest (n_blocks,)
     contacts: tuple[Contact, ...]  # those that persist
     is_flat: bool = False  # whether contacts were found to slide without dilatancy
 
@@ -238,7 +237,7 @@ def tangent(normal: Array) -> Array:
     return np.array([normal[1], -normal[0]])
 
 
-def merge_blocks(structure: Structure, welded: Sequence[int]) -> NDArray[np.intp]:
+def merge_blocks(structure: Structure, welded: Sequence[int]) -> Numbers:
     """Return the number of the body of each block, -1 for those welded to fixed ones."""
     count = len(structure.blocks)
     fixed = [number for number, block in enumerate(structure.blocks) if block.fixed]
@@ -258,7 +257,7 @@ class Bodies:
     """Rigid bodies at a place, and the rates of their contacts."""
 
     blocks: PlacedBlocks
-    body: NDArray[np.intp]  # number of the body of each block, -1 at rest (n_blocks,)
+    body: Numbers  # number of the body of each block, -1 at rest (n_blocks,)
 
     @cached_property
     def count(self) -> int:
@@ -273,7 +272,7 @@ class Bodies:
         return total / np.bincount(body, minlength=self.count)[:, None]
 
     @cached_property
-    def moving(self) -> NDArray[np.intp]:
+    def moving(self) -> Numbers:
         """Numbers of the blocks that move."""
         return np.flatnonzero(self.body >= 0)
 

@@ -19,11 +19,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from archfem._display import ExplainedWord
-from archfem._typing import Array
+from archfem._typing import Array, Flags
 from archfem.errors import DidNotConverge
 from archfem.limit.displaced_blocks import (
     STILL,
@@ -133,7 +132,7 @@ class LinkageState:
         return normal, along
 
     @cached_property
-    def sticks(self) -> NDArray[np.bool_]:
+    def sticks(self) -> Flags:
         """Whether each contact sticks (n_contacts,)."""
         return np.array([not contact.slip for contact in self.contacts], dtype=bool)
 

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.dynamics.history import History
 from archfem.dynamics.rigid_body.bodies import make_bodies
 from archfem.joints.criteria import assessed_joints
@@ -105,7 +104,7 @@ class FallingBlocks:
         """Return the poses of all blocks at a time (n_blocks, 3)."""
         return _interpolate(self.times, self.poses, np.array([time]))[0]
 
-    def places(self, points: Array, block: int | NDArray[np.intp], time: float) -> Array:
+    def places(self, points: Array, block: int | Numbers, time: float) -> Array:
         """Return the positions at a time (m, 2) [m] of points of a block, or of one block each."""
         poses = self.pose(time)[block]
         centres = np.array([each.centroid for each in self.structure.blocks])[block]

@@ -18,17 +18,14 @@ from itertools import pairwise
 from math import prod
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.spatial import cKDTree
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.errors import MeshError
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 from archfem.models.discretisation import Discretisation
-
-Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

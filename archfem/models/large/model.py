@@ -11,11 +11,10 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.joints.large.face_kinematics import face_pose
 from archfem.joints.large.forces import (
     JointStepForces,
@@ -315,7 +314,7 @@ class LargeObserver(Observer):
     """Observer of a model of large displacements."""
 
     joint_count: int
-    corner_blocks: NDArray[np.intp]
+    corner_blocks: Numbers
     model: LargeDisplacementModel
     corner_cells: RotatingCells
 
