@@ -40,6 +40,13 @@ def measure_sector(points: Array, centre: Array) -> tuple[float, Array, float]:
     return area, centre + reach * bisector, about_centre - area * reach**2
 
 
+def rotate(points: Array, angle: float | Array) -> Array:
+    """Rotate points about the origin, anticlockwise (…, 2)."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = np.moveaxis(points, -1, 0)
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
 def triangulate_polygon(points: Array) -> Numbers:
     """Divide a polygon (n, 2), convex or not, into anticlockwise triangles of vertices (t, 3)."""
     import shapely

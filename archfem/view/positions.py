@@ -9,6 +9,7 @@ from archfem._typing import Array, Numbers
 from archfem.dynamics.history import History
 from archfem.dynamics.rigid_body.bodies import make_bodies
 from archfem.joints.criteria import assessed_joints
+from archfem.masonry.block import rotate
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 
@@ -20,13 +21,6 @@ def block_kinds(structure: Structure) -> list[str]:
         "support" if block.fixed else "soil" if number in soil else "stone"
         for number, block in enumerate(structure.blocks)
     ]
-
-
-def rotate(points: Array, angle: Array) -> Array:
-    """Rotate points about the origin (…, 2)."""
-    c, s = np.cos(angle), np.sin(angle)
-    x, y = np.moveaxis(points, -1, 0)
-    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
 def decisive_instant(run: History) -> float:

@@ -273,7 +273,7 @@ def write_outlines(structure: Structure, path: str | Path) -> None:
         structure: structure whose blocks are written with part, role and name of the material.
         path: path of the file.
     """
-    used = {block.material for block in structure.blocks}
+    used: set[Material | Contact] = {block.material for block in structure.blocks}
     used |= {joint.contact for joint in structure.joints}
     kept = {*MATERIAL_PRESETS.values(), *CONTACT_PRESETS.values()}
     if lost := sorted({item.name for item in used - kept}):

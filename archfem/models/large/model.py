@@ -28,6 +28,7 @@ from archfem.joints.large.forces import (
 )
 from archfem.joints.large.rates import assemble_rates, find_rate_pairs
 from archfem.joints.operator import Pattern
+from archfem.masonry.block import rotate
 from archfem.masonry.loads import Action, BodyForce, PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import rigid_motion_matrix
@@ -476,8 +477,7 @@ class LargeDisplacementModel(Model):
                 motion, speed = mean @ motion, mean @ speed
             # from the centre of mass of the mesh to the centroid of the outline
             arm = structure.blocks[block].centroid - self.centres[block]
-            c, s = np.cos(motion[2]), np.sin(motion[2])
-            rotated = np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
+            rotated = rotate(arm, motion[2])
             poses[block] = *(motion[:2] + rotated - arm), motion[2]
             spin = speed[2] * np.array([-rotated[1], rotated[0]])
             velocities[block] = *(speed[:2] + spin), speed[2]
@@ -573,8 +573,7 @@ class LargeObserver(Observer):
                 )
         mean, apart = poses.mean(axis=1), poses[:, 1] - poses[:, 0]
         # mean direction of both faces: their tangent, rotated
-        (tx, ty), c, s = structure.tangents.T, np.cos(mean[:, 2]), np.sin(mean[:, 2])
-        along = np.stack([c * tx - s * ty, s * tx + c * ty], axis=-1)
+        along = rotate(structure.tangents, mean[:, 2])
         slip = np.sum(along * apart[:, :2], axis=1)
         half = 0.5 * np.maximum(structure.depths - np.abs(slip), 0.0) * np.cos(0.5 * apart[:, 2])
         middles = structure.middles + mean[:, :2]
