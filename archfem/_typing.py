@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.intp]  # of blocks, joints, points and the like
+Flags = NDArray[np.bool_]
 
 Metres = Annotated[float, "m"]
 Seconds = Annotated[float, "s"]

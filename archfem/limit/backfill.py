@@ -15,10 +15,9 @@ from math import radians, sqrt, tan
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem._typing import Array, Degrees, Pascals
+from archfem._typing import Array, Degrees, Flags, Numbers, Pascals
 from archfem._validation import check_number, check_type, is_one_of, short_repr
 from archfem.errors import InvalidInput
 from archfem.joints.rigid_kinematics import jump_rates
@@ -162,8 +161,8 @@ def _flamant(slope: Array) -> Array:
 class BlockSlices:
     """Trapezia of blocks cut along the verticals through all corners, strip by strip upwards."""
 
-    block: NDArray[np.intp]  # number of the block of each slice (n,)
-    strip: NDArray[np.intp]  # number of its strip, from the left (n,)
+    block: Numbers  # number of the block of each slice (n,)
+    strip: Numbers  # number of its strip, from the left (n,)
     side: Array  # x of its left and right side (n, 2) [m]
     bottom: Array  # y of its lower edge at both sides (n, 2) [m]
     top: Array  # y of its upper edge at both sides (n, 2) [m]
@@ -230,7 +229,7 @@ class FillProfile:
     """Stones of a structure, and the fill and paving that rest on them, in vertical strips."""
 
     structure: Structure
-    stones: NDArray[np.bool_]  # whether each block is a stone (n_blocks,)
+    stones: Flags  # whether each block is a stone (n_blocks,)
 
     @cached_property
     def slices(self) -> BlockSlices:
@@ -249,7 +248,7 @@ class FillProfile:
         return np.asarray(weights[self.slices.block])
 
     @cached_property
-    def columns(self) -> tuple[NDArray[np.intp], Array, Array]:
+    def columns(self) -> tuple[Numbers, Array, Array]:
         """Return stone, foot and weight of every column of fill (n,), (n, 2) [m], (n,) [N]."""
         cut, rests = self.slices, ~self.stones[self.slices.block]
         # the stone below each slice of fill, through any fill between them
@@ -278,7 +277,7 @@ class FillProfile:
         return stress
 
     @cached_property
-    def _skyline(self) -> tuple[NDArray[np.intp], Array, Array]:
+    def _skyline(self) -> tuple[Numbers, Array, Array]:
         """Top surface of the stones, in narrow pieces: block or -1, and x and y of both sides."""
         cut, stone = self.slices, self.stones[self.slices.block]
         blocks, sides, levels = [], [], []
@@ -298,15 +297,13 @@ class FillProfile:
             levels.append(np.stack([y[:-1], y[1:]], axis=1))
         return np.concatenate(blocks), np.concatenate(sides), np.concatenate(levels)
 
-    def fan(self, point: Array, fill: Fill) -> tuple[NDArray[np.intp], Array, Array]:
+    def fan(self, point: Array, fill: Fill) -> tuple[Numbers, Array, Array]:
         """Return the stones that a load reaches through the fill, points there, and its shares."""
         halves = (self._half_fan(point, fill, sense) for sense in (1, -1))
         block, points, part = map(np.concatenate, zip(*halves, strict=True))
         return block, points, part
 
-    def _half_fan(
-        self, point: Array, fill: Fill, sense: int
-    ) -> tuple[NDArray[np.intp], Array, Array]:
+    def _half_fan(self, point: Array, fill: Fill, sense: int) -> tuple[Numbers, Array, Array]:
         """Return `fan` for the rays on one side of the load: right if sense is 1, left if -1."""
         block, side, level = self._skyline
         distance = sense * (side[:, ::sense] - point[0])
@@ -340,7 +337,7 @@ def _interpolate_edge(side: Array, edge: Array, x: Array) -> Array:
 class FillContacts:
     """Pieces of stones' faces in contact with the fill beside or above them."""
 
-    block: NDArray[np.intp]  # number of the stone of each piece in the rigid regions (n,)
+    block: Numbers  # number of the stone of each piece in the rigid regions (n,)
     ends: Array  # of each piece (n, 2, 2) [m]
     toward: Array  # sense of the pressure along x, 1 or -1 (n,)
     least: Array  # active pressure at both ends (n, 2) [Pa]
@@ -365,7 +362,7 @@ class BlocksWithFill:
     rigid_regions: RigidRegions  # the stones that stand by themselves
 
     @cached_property
-    def _place(self) -> NDArray[np.intp]:
+    def _place(self) -> Numbers:
         """Index of each block of `whole` in the rigid regions, -1 for the fill (n_blocks,)."""
         place = np.full(self.rigid_regions.size, -1)
         place[list(self.rigid_regions.blocks)] = np.arange(len(self.rigid_regions.blocks))
@@ -483,9 +480,7 @@ class BlocksWithFill:
         }
         return xr.Dataset(variables, coordinates)
 
-    def _apply_forces(
-        self, block: NDArray[np.intp], points: Array, forces: Array
-    ) -> sparse.csr_matrix:
+    def _apply_forces(self, block: Numbers, points: Array, forces: Array) -> sparse.csr_matrix:
         """Return the generalised forces of forces at points of the stones (n, 3 n_free)."""
         structure = self.rigid_regions.structure
         # supports have no coordinates
@@ -493,7 +488,7 @@ class BlocksWithFill:
         pairs = np.stack([np.full_like(free, -1), free], axis=1)
         return jump_rates(forces, points, pairs, structure.centroids[list(structure.free)])
 
-    def _sum_forces(self, block: NDArray[np.intp], points: Array, forces: Array) -> Array:
+    def _sum_forces(self, block: Numbers, points: Array, forces: Array) -> Array:
         """Return the sum of the generalised forces of forces at points (3 n_free,)."""
         return np.asarray(self._apply_forces(block, points, forces).sum(axis=0)).ravel()
 

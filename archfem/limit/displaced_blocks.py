@@ -14,17 +14,16 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
-from scipy.optimize import linprog
 from scipy.sparse import csgraph, csr_matrix
 
-from archfem._typing import Array
+from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge
-from archfem.limit.linear_programme import NoEquilibrium
-from archfem.masonry.block import Block
+from archfem.joints.rigid_kinematics import jump_rates
+from archfem.limit.linear_programme import NoEquilibrium, solve_linear
+from archfem.masonry.block import Block, rotate
 from archfem.masonry.loads import AttachedLoad
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, largest_displacement
 
 # Distance of points that touch, relative to the size of the structure [-]
 TOUCHING = 1e-6
@@ -51,7 +50,7 @@ class KinematicChain:
     factor: float  # α of the horizontal forces that sets it in motion [-]
     # velocities of centroids and rotations, the fastest corner at 1 m/s (n_blocks, 3)
     motion: Array
-    body: NDArray[np.intp]  # number of the body of each block; -1 at rest (n_blocks,)
+    body: Numbers  # number of the body of each block; -1 at rest (n_blocks,)
     contacts: tuple[Contact, ...]  # those that persist
     is_flat: bool = False  # whether contacts were found to slide without dilatancy
 
@@ -83,26 +82,25 @@ class PlacedBlocks:
         """Return the blocks at other displacements from rest."""
         return replace(self, displacement=displacement)
 
-    @property
-    def rest(self) -> Array:
-        """Centroids at rest (n_blocks, 2) [m]."""
-        return self.structure.centroids
-
     @cached_property
     def centroids(self) -> Array:
         """Present centroids (n_blocks, 2) [m]."""
-        return self.rest + self.displacement[:, :2]
+        return self.structure.centroids + self.displacement[:, :2]
 
     def places(self, points: Array, block: int) -> Array:
         """Return the present places of points of a block, given at rest (p, 2) [m]."""
-        turned = (points - self.rest[block]) @ rotation(self.displacement[block, 2]).T
-        return turned + self.centroids[block]
+        turn = rotation(self.displacement[block, 2])
+        return (points - self.structure.centroids[block]) @ turn.T + self.centroids[block]
 
     @cached_property
     def outlines(self) -> list[Array]:
         """Present outlines of the blocks, arcs as chords."""
         drawn = (block.drawn() for block in self.structure.blocks)
         return [self.places(points, number) for number, points in enumerate(drawn)]
+
+    def largest_speed(self, motion: Array) -> float:
+        """Return the largest speed of a corner of any block [m/s]."""
+        return largest_displacement(self.outlines, self.centroids, motion)
 
     @cached_property
     def masses(self) -> list[tuple[int, Array, float]]:
@@ -146,20 +144,15 @@ class PlacedBlocks:
     def faces(self) -> Array:
         """Present corners of the faces of lower and higher blocks (2, n_joints, 2, 2) [m]."""
         block = self.structure.pairs.T
-        turns = self.displacement[block, 2, None]
-        arm = self.corners - self.rest[block][:, :, None]
-        x = np.cos(turns) * arm[..., 0] - np.sin(turns) * arm[..., 1]
-        y = np.sin(turns) * arm[..., 0] + np.cos(turns) * arm[..., 1]
-        return np.stack([x, y], axis=-1) + self.centroids[block][:, :, None]
+        arm = self.corners - self.structure.centroids[block][:, :, None]
+        turned = rotate(arm, self.displacement[block, 2, None])
+        return turned + self.centroids[block][:, :, None]
 
     @cached_property
     def normals(self) -> Array:
         """Normals of the faces, towards the other block (2, n_joints, 2)."""
         turns = self.displacement[self.structure.pairs.T, 2]
-        sign = np.array([1.0, -1.0])[:, None]
-        cos, sin = sign * np.cos(turns), sign * np.sin(turns)
-        x, y = self.structure.normals.T
-        return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+        return np.array([1.0, -1.0])[:, None, None] * rotate(self.structure.normals, turns)
 
     @cached_property
     def gaps(self) -> Array:
@@ -238,13 +231,12 @@ def tangent(normal: Array) -> Array:
     return np.array([normal[1], -normal[0]])
 
 
-def merge_blocks(structure: Structure, welded: Sequence[int]) -> NDArray[np.intp]:
+def merge_blocks(structure: Structure, welded: Sequence[int]) -> Numbers:
     """Return the number of the body of each block, -1 for those welded to fixed ones."""
     count = len(structure.blocks)
     fixed = [number for number, block in enumerate(structure.blocks) if block.fixed]
     # supports are one body, the ground
-    pairs = [tuple(structure.pairs[joint]) for joint in welded]
-    pairs += [(fixed[0], number) for number in fixed]
+    pairs = [*structure.pairs[list(welded)], *((fixed[0], number) for number in fixed)]
     rows, columns = np.array(pairs).T
     graph = csr_matrix((np.ones(len(pairs)), (rows, columns)), (count, count))
     labels = csgraph.connected_components(graph, directed=False)[1]
@@ -258,7 +250,7 @@ class Bodies:
     """Rigid bodies at a place, and the rates of their contacts."""
 
     blocks: PlacedBlocks
-    body: NDArray[np.intp]  # number of the body of each block, -1 at rest (n_blocks,)
+    body: Numbers  # number of the body of each block, -1 at rest (n_blocks,)
 
     @cached_property
     def count(self) -> int:
@@ -273,7 +265,7 @@ class Bodies:
         return total / np.bincount(body, minlength=self.count)[:, None]
 
     @cached_property
-    def moving(self) -> NDArray[np.intp]:
+    def moving(self) -> Numbers:
         """Numbers of the blocks that move."""
         return np.flatnonzero(self.body >= 0)
 
@@ -314,29 +306,11 @@ class Bodies:
         points = np.array([contact.point for contact in contacts]).reshape(-1, 2)
         normal = np.array([contact.normal for contact in contacts]).reshape(-1, 2)
         along = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
-        pairs = np.array([(c.corner, c.face) for c in contacts], dtype=np.intp).reshape(-1, 2)
-        body = self.body[pairs]
-        # first the corners' blocks, then the faces'
-        number, side = np.nonzero((body >= 0) & (body[:, :1] != body[:, 1:]))
-        own, sign = body[number, side], np.where(side == 0, 1.0, -1.0)
-        x, y = (points[number] - self.references[own]).T
-        place = np.repeat(number, 3), (3 * own[:, None] + np.arange(3)).ravel()
-        rates = []
-        for axis in (normal[number], along[number]):
-            turn = x * axis[:, 1] - y * axis[:, 0]
-            values = (sign * np.stack([axis[:, 0], axis[:, 1], turn])).T.ravel()
-            # the bodies of a contact differ, or the contact has no rate: no entry is met twice
-            rates.append(csr_matrix((values, place), (len(contacts), 3 * self.count)))
-        return rates[0], rates[1]
-
-
-def largest_speed(blocks: PlacedBlocks, motion: Array) -> float:
-    """Return the largest speed of a corner of any block [m/s]."""
-    speeds = []
-    for number, (u, v, turn) in enumerate(motion):
-        x, y = (blocks.outlines[number] - blocks.centroids[number]).T
-        speeds.append(np.hypot(u - turn * y, v + turn * x).max())
-    return float(max(speeds))
+        # a jump is the motion of the corner's block less that of the face's
+        pairs = np.array([(c.face, c.corner) for c in contacts], dtype=np.intp).reshape(-1, 2)
+        bodies = self.body[pairs]
+        gaps = jump_rates(normal, points, bodies, self.references)
+        return gaps, jump_rates(along, points, bodies, self.references)
 
 
 def find_mechanism(
@@ -360,7 +334,7 @@ def find_mechanism(
     if flat:
         factor, velocity = _solve_flat(bodies, contacts, coefficient, forces)
     motion = bodies.spread(velocity)
-    speed = largest_speed(blocks, motion)
+    speed = blocks.largest_speed(motion)
     found = classify_motion(blocks, joints, motion / speed, coefficient, contacts, factor)
     return replace(found, is_flat=flat)
 
@@ -409,25 +383,12 @@ def _solve_static(
         slope = 0.0 * slope
     none = csr_matrix((slope.shape[0], 1))
     limits = sparse.bmat([[-slope, one, none], [-slope, -one, none]], format="csr")
-    for presolve in (False, True):  # where round-off stops the solver presolve changes its path
-        result = linprog(
-            np.append(np.zeros(2 * count), -1.0),
-            A_ub=limits,
-            b_ub=strength,
-            A_eq=balance,
-            b_eq=-lengths * dead / unit,
-            bounds=[(0.0, None)] * count + [(None, None)] * (count + 1),
-            method="highs-ds",
-            options={"presolve": presolve},
-        )
-        if result.status in (0, 2, 3):  # optimal, infeasible, unbounded
-            break
-    if result.status == 3:
+    # forces across joints, along them, and the factor, which is maximised
+    bounds = np.repeat([[0.0, np.inf], [-np.inf, np.inf]], [count, count + 1], axis=0)
+    cost = np.append(np.zeros(2 * count), -1.0)
+    equations = balance, -lengths * dead / unit
+    if (result := solve_linear(cost, bounds, equations, (limits, strength))) is None:
         return None
-    if result.status == 2:
-        raise NoEquilibrium("the blocks cannot rest here under any horizontal force")
-    if result.status != 0:
-        raise DidNotConverge(f"the linear programme found no mechanism: {result.message}")
     velocity = -lengths * np.array(result.eqlin.marginals)
     return float(result.x[-1]), velocity, result.x[:count]
 
@@ -447,9 +408,9 @@ def classify_motion(
     # associated flow opens a sliding contact by μ |slip|; flat sliding by nothing
     dilation = np.where(np.isfinite(coefficient), coefficient, 0.0) * np.abs(along)
     keeps = (np.abs(normal) <= STILL) | (np.abs(normal - dilation) <= STILL)
-    every_joint, among = range(len(blocks.structure.joints)), set(joints)
-    still = [k for k in every_joint if k not in among or _moves_as_one(blocks, k, motion)]
-    body = merge_blocks(blocks.structure, still)
+    opens = _find_opening_joints(blocks, motion)
+    opens &= np.isin(np.arange(len(opens)), joints)
+    body = merge_blocks(blocks.structure, np.flatnonzero(~opens))
     kept = tuple(
         _sliding_contact(blocks, contact, int(sense))
         for contact, keep, sense in zip(contacts, keeps, slip, strict=True)
@@ -458,17 +419,14 @@ def classify_motion(
     return KinematicChain(factor, motion, body, kept)
 
 
-def _moves_as_one(blocks: PlacedBlocks, joint: int, motion: Array) -> bool:
-    """Return whether both blocks of a joint have the same rigid motion."""
-    lower, higher = blocks.structure.pairs[joint]
-    middle = blocks.faces[:, joint].mean(axis=(0, 1))
-    jump = np.zeros(2)
-    for block, sign in ((higher, 1.0), (lower, -1.0)):
-        x, y = middle - blocks.centroids[block]
-        u, v, turn = motion[block]
-        jump += sign * np.array([u - turn * y, v + turn * x])
-    turn = (motion[higher, 2] - motion[lower, 2]) * blocks.structure.depths[joint]
-    return bool(max(np.abs(jump).max(), abs(turn)) <= STILL)
+def _find_opening_joints(blocks: PlacedBlocks, motion: Array) -> Flags:
+    """Return whether the blocks of each joint have different rigid motions (n_joints,)."""
+    pairs = blocks.structure.pairs
+    arm = blocks.faces.mean(axis=(0, 2))[:, None] - blocks.centroids[pairs]
+    u, v, turn = np.moveaxis(motion[pairs], -1, 0)
+    depths = blocks.structure.depths[:, None]
+    jumps = np.diff([u - turn * arm[..., 1], v + turn * arm[..., 0], turn * depths])
+    return np.abs(jumps).max(axis=(0, 2)) > STILL
 
 
 def _sliding_contact(blocks: PlacedBlocks, contact: Contact, slip: int) -> Contact:

@@ -19,11 +19,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from archfem._display import ExplainedWord
-from archfem._typing import Array
+from archfem._typing import Array, Flags
 from archfem.errors import DidNotConverge
 from archfem.limit.displaced_blocks import (
     STILL,
@@ -33,7 +32,6 @@ from archfem.limit.displaced_blocks import (
     KinematicChain,
     PlacedBlocks,
     find_mechanism,
-    largest_speed,
     rotation,
     tangent,
 )
@@ -73,7 +71,7 @@ class Linkage:
     def _at_rest(self, point: Array, block: int) -> Array:
         """Return the place at rest of a point that moves with a block (2,) [m]."""
         turn = rotation(self.start.displacement[block, 2])
-        return (point - self.start.centroids[block]) @ turn + self.start.rest[block]
+        return (point - self.start.centroids[block]) @ turn + self.start.structure.centroids[block]
 
     @cached_property
     def first_velocity(self) -> Array:
@@ -127,13 +125,12 @@ class LinkageState:
         return np.array(gaps + slips)
 
     @cached_property
-    def rates(self) -> tuple[Array, Array]:
-        """Rates of gaps and slips of all contacts (n_contacts, 3 n_bodies)."""
-        normal, along = self.bodies.rates(self.contacts)
-        return normal, along
+    def rates(self) -> Array:
+        """Rates of gaps and slips of all contacts (2, n_contacts, 3 n_bodies)."""
+        return self.bodies.rates(self.contacts)
 
     @cached_property
-    def sticks(self) -> NDArray[np.bool_]:
+    def sticks(self) -> Flags:
         """Whether each contact sticks (n_contacts,)."""
         return np.array([not contact.slip for contact in self.contacts], dtype=bool)
 
@@ -156,8 +153,8 @@ class LinkageState:
         free = basis[rank:]
         velocity = self.units * (free.T @ (free @ (previous / self.units)))
         motion = self.bodies.spread(velocity)
-        speed = largest_speed(self.blocks, motion)
-        if speed <= STILL * largest_speed(self.blocks, self.bodies.spread(previous)):
+        speed = self.blocks.largest_speed(motion)
+        if speed <= STILL * self.blocks.largest_speed(self.bodies.spread(previous)):
             return None
         return velocity / speed
 

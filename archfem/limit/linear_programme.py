@@ -19,13 +19,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import OptimizeResult, linprog
 from scipy.sparse import csgraph
 from scipy.sparse.linalg import splu
 
-from archfem._typing import Array
+from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge
 from archfem.joints.rigid_kinematics import jump_rates
 from archfem.masonry.loads import BodyForce, PointLoad
@@ -138,7 +137,7 @@ class RigidBlocks:
         return {}
 
     def reduce(
-        self, columns: sparse.csr_matrix, friction: Array, coheres: NDArray[np.bool_]
+        self, columns: sparse.csr_matrix, friction: Array, coheres: Flags
     ) -> "ReducedBalance":
         """Return the balance in few unknowns, kept for programmes of other loads and costs."""
         parts = columns.indptr, columns.indices, columns.data, friction, coheres
@@ -195,7 +194,7 @@ def no_limits(joint_count: int) -> Limits:
     return Limits(sparse.csr_matrix((0, 3 * joint_count)), np.zeros(0))
 
 
-def crushing_cuts(joints: NDArray[np.intp], at: Array, crushing: Array) -> Limits:
+def crushing_cuts(joints: Numbers, at: Array, crushing: Array) -> Limits:
     """Return tangents at N_0 = `at` of the crushing limit |M| <= N h/2 - N²/(2 σ w)."""
     # A rectangular stress block of the full strength σ demands F >= N²/(2 N_c) at each end, with
     # N_c = σ w h; the tangent at N_0 is F >= N_0/N_c N - N_0²/(2 N_c).
@@ -309,9 +308,7 @@ class Chains:
     length, as a ring, has the unknowns of a single joint.
     """
 
-    def __init__(
-        self, balance: sparse.csr_matrix, links: NDArray[np.intp], pivots: NDArray[np.intp]
-    ) -> None:
+    def __init__(self, balance: sparse.csr_matrix, links: Numbers, pivots: Numbers) -> None:
         """Factorise the balance of the links for the forces of their pivots."""
         self.pivots = pivots
         self.is_pivot = np.zeros(balance.shape[1], dtype=bool)
@@ -336,7 +333,7 @@ class ReducedBalance:
         chains: Chains,
         columns: sparse.csr_matrix,
         friction: Array,
-        coheres: NDArray[np.bool_],
+        coheres: Flags,
     ) -> None:
         """Eliminate chains, and express the other forces by generators."""
         self._chains, used = chains, ~chains.is_pivot[: len(friction)]
@@ -422,7 +419,7 @@ class ReducedBalance:
         return every
 
 
-def _find_single_blocks(columns: sparse.csr_matrix) -> NDArray[np.intp]:
+def _find_single_blocks(columns: sparse.csr_matrix) -> Numbers:
     """Return the free blocks on which an unknown acts alone (n,)."""
     # It would enter the rows of its whole chain.
     single = np.bincount(columns.indices, minlength=columns.shape[1]) <= 3
@@ -430,9 +427,7 @@ def _find_single_blocks(columns: sparse.csr_matrix) -> NDArray[np.intp]:
     return np.unique(row[single[columns.indices]] // 3)
 
 
-def _find_chains(
-    structure: Structure, excluded: NDArray[np.intp]
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _find_chains(structure: Structure, excluded: Numbers) -> tuple[Numbers, Numbers]:
     """Return the free blocks that link two joints, and a joint of each for a pivot (n,)."""
     place = np.full(len(structure.blocks), -1)
     place[list(structure.free)] = np.arange(len(structure.free))
@@ -448,9 +443,7 @@ def _find_chains(
     return links, np.asarray(pivots, dtype=np.intp)
 
 
-def _cone_generators(
-    friction: Array, used: NDArray[np.bool_], alone: NDArray[np.intp], extra: int
-) -> sparse.csr_matrix:
+def _cone_generators(friction: Array, used: Flags, alone: Numbers, extra: int) -> sparse.csr_matrix:
     """Return generators of the forces of some joints, followed by zeros (3 n_joints, m + extra)."""
     count = len(used)
     cone = np.isfinite(friction) & (friction > 0.0)
@@ -466,9 +459,7 @@ def _cone_generators(
     return sparse.csr_matrix((entries, place), (3 * count, len(columns)))
 
 
-def _pivot_limits(
-    friction: Array, pivots: NDArray[np.intp], slides: NDArray[np.intp]
-) -> sparse.csr_matrix:
+def _pivot_limits(friction: Array, pivots: Numbers, slides: Numbers) -> sparse.csr_matrix:
     """Return the rows of F_i, F_e >= 0 for pivots, and of ±V - μ N <= r for those that slide."""
     count = len(friction)
     first = 2 * len(pivots) + np.arange(2 * len(slides)).reshape(2, -1)  # of V, of -V

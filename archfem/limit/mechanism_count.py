@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from archfem._typing import Flags
 from archfem._validation import validate_arguments
 from archfem.joints.criteria import (
     Criteria,
@@ -299,7 +300,7 @@ def _flags_over_time(joints: xr.Dataset) -> xr.DataArray:
     return flags if flags.dims == ("time", "joint") else flags.transpose("time", "joint")
 
 
-def _lasting_flags(flags: xr.DataArray, duration: float) -> NDArray[np.bool_]:
+def _lasting_flags(flags: xr.DataArray, duration: float) -> Flags:
     """Return whether each joint has by then failed for a duration [s] unbroken (steps, joints)."""
     failed = flags.values
     if len(failed) == 1:

@@ -22,7 +22,7 @@ from scipy import sparse
 from scipy.optimize import nnls
 from scipy.sparse.csgraph import dijkstra
 
-from archfem._typing import Array
+from archfem._typing import Array, Flags
 from archfem._validation import check_type, validate_arguments
 from archfem.joints.criteria import Criteria, find_lasting, with_failure_flags
 from archfem.joints.resultants import check_instant
@@ -310,9 +310,7 @@ class Verifier:
         return joint_freedoms(side, slides, apart, np.sign(shear))
 
 
-def joint_freedoms(
-    side: NDArray[Any], slides: NDArray[np.bool_], apart: NDArray[np.bool_], sense: NDArray[Any]
-) -> Array:
+def joint_freedoms(side: NDArray[Any], slides: Flags, apart: Flags, sense: NDArray[Any]) -> Array:
     """Return the permitted openings and slips of joints, as `Verifier.freedoms` (…, 3 n_joints)."""
     either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
     slips = np.where(either, 2.0, np.where(slides, sense, 0.0))
@@ -354,7 +352,7 @@ class LoopCheck:
         return np.where(np.abs(basis) > 1e-12, basis, 0.0)  # round-off: the joint is in no loop
 
     @cached_property
-    def loop_joints(self) -> NDArray[np.bool_]:
+    def loop_joints(self) -> Flags:
         """Joints on a path from the ground to each block of the parts (n_joints,)."""
         # A block whose path neither opens nor slips anywhere does not move. Weights make paths
         # avoid joints between blocks of other parts, whose own motion does not count.

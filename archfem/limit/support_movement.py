@@ -30,7 +30,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.backfill import SELF_WEIGHT
 from archfem.limit.collapse import stands
-from archfem.limit.displaced_blocks import PlacedBlocks, rotation
+from archfem.limit.displaced_blocks import PlacedBlocks
 from archfem.limit.linear_programme import (
     NoEquilibrium,
     Optimum,
@@ -38,6 +38,7 @@ from archfem.limit.linear_programme import (
     RigidBlocks,
     rigid_load,
 )
+from archfem.masonry.block import rotate
 from archfem.masonry.loads import Settlement
 from archfem.masonry.structure import Structure, join_names
 
@@ -207,9 +208,8 @@ class DisplacedBlocks(RigidBlocks):
     @cached_property
     def axes(self) -> Array:
         """Normals and tangents of the lower blocks' faces (2, n_joints, 2)."""
-        rotations = np.array([rotation(turn) for turn in self.displacement[:, 2]])
         initial = np.stack([self.structure.normals, self.structure.tangents])
-        return np.einsum("jab,kjb->kja", rotations[self.structure.pairs[:, 0]], initial)
+        return rotate(initial, self.displacement[self.structure.pairs[:, 0], 2])
 
     @cached_property
     def current_gaps(self) -> Array:

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from archfem._display import ResultDisplay
-from archfem._typing import Array, Metres, Newtons, Pascals
+from archfem._typing import Array, Metres, Newtons, Numbers, Pascals
 from archfem._validation import check_number, check_numbers, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
@@ -496,7 +495,7 @@ def _search_nonassociated(
     return states
 
 
-def _find_worst(factors: Array, count: NDArray[np.intp]) -> tuple[int, int]:
+def _find_worst(factors: Array, count: Numbers) -> tuple[int, int]:
     """Return direction and position of the least factor; if none is finite, of the most axles."""
     finite, flat = np.isfinite(factors), count.argmax()
     if finite.any():
@@ -506,7 +505,7 @@ def _find_worst(factors: Array, count: NDArray[np.intp]) -> tuple[int, int]:
     return int(direction), int(place)
 
 
-def _label_factors(places: Array, factors: Array, count: NDArray[np.intp]) -> xr.Dataset:
+def _label_factors(places: Array, factors: Array, count: Numbers) -> xr.Dataset:
     """Return factors and numbers of axles over direction and position."""
     dims = ("direction", "position")
     variables = {

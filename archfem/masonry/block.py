@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem._typing import Array, Metres
+from archfem._typing import Array, Metres, Numbers
 from archfem._validation import check_fields, check_numbers, check_sequence, check_unmasked
 from archfem.errors import InvalidStructure
 from archfem.masonry.materials import Material
@@ -40,7 +40,14 @@ def measure_sector(points: Array, centre: Array) -> tuple[float, Array, float]:
     return area, centre + reach * bisector, about_centre - area * reach**2
 
 
-def triangulate_polygon(points: Array, tolerance: float = 0.0) -> NDArray[np.intp]:
+def rotate(points: Array, angle: float | Array) -> Array:
+    """Rotate points about the origin, anticlockwise (…, 2)."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = np.moveaxis(points, -1, 0)
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+def triangulate_polygon(points: Array, tolerance: float = 0.0) -> Numbers:
     """Divide a polygon (n, 2), convex or not, into anticlockwise triangles of vertices (t, 3).
 
     Vertices are left out that are nearer than a tolerance [m] to the outline of the others.
@@ -280,7 +287,7 @@ def check_overlaps(
     outlines: Sequence[Array],
     names: Sequence[str],
     slight: float = 0.0,
-    body: NDArray[np.intp] | None = None,
+    body: Numbers | None = None,
 ) -> None:
     """Refuse outlines that cross themselves, are the same or overlap; those of a body may do."""
     for outline, name in zip(outlines, names, strict=True):
@@ -303,14 +310,14 @@ def check_overlaps(
     )
 
 
-def largest_overlap(outlines: Sequence[Array], body: NDArray[np.intp]) -> float:
+def largest_overlap(outlines: Sequence[Array], body: Numbers) -> float:
     """Return the largest depth by which outlines of different bodies overlap [m]."""
     return float(_find_overlaps(outlines, body)[2].max(initial=0.0))
 
 
 def _find_overlaps(
-    outlines: Sequence[Array], body: NDArray[np.intp] | None
-) -> tuple[NDArray[np.intp], NDArray[np.object_], Array]:
+    outlines: Sequence[Array], body: Numbers | None
+) -> tuple[Numbers, NDArray[np.object_], Array]:
     """Return pairs (n, 2) of different bodies that meet, their overlaps, and mean depths [m]."""
     import shapely
 

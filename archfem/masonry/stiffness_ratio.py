@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from archfem._typing import Flags
 from archfem.masonry.structure import Joint, Structure
 
 
@@ -78,7 +78,7 @@ def list_stones(structure: Structure) -> list[int]:
     return [number for number in structure.free if number not in fill] or list(structure.free)
 
 
-def mark_stone_joints(structure: Structure) -> NDArray[np.bool_]:
+def mark_stone_joints(structure: Structure) -> Flags:
     """Return whether joints have no yielding block on either side (j,)."""
     return ~np.isin(structure.pairs, find_yielding_blocks(structure)).any(axis=1)
 

@@ -15,17 +15,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.joints.contact_law import Facets
 from archfem.joints.operator import JointOperator
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.models.linear_blocks import LinearBlockModel
-
-Numbers = NDArray[np.intp]
 
 
 def project_model(

@@ -3,14 +3,11 @@
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem._typing import Array
+from archfem._typing import Array, Flags
 from archfem.masonry.loads import Action
 from archfem.models.linear_blocks import LinearBlockModel
-
-Flags = NDArray[np.bool_]
 
 
 class PartialStructure(LinearBlockModel):

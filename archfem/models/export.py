@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archfem._files import atomic_write
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import rigid_motion_matrix
@@ -85,7 +85,7 @@ class Solids:
         return np.array([[*joint.ends, *joint.ends[::-1]] for joint in joints])
 
     @cached_property
-    def _anchors(self) -> tuple[NDArray[np.intp], Array]:
+    def _anchors(self) -> tuple[Numbers, Array]:
         """Ends of the polygon edge nearest to each corner (4 j, 2), and place on it (4 j,)."""
         joints = self.model.structure.joints
         blocks = np.repeat([n for joint in joints for n in (joint.lower, joint.higher)], 2)
@@ -109,7 +109,7 @@ class Solids:
 def write_vtu(
     path: Path,
     points: Array,
-    polygons: Sequence[NDArray[np.intp]],
+    polygons: Sequence[Numbers],
     point_data: Mapping[str, Array],
     cell_data: Mapping[str, NDArray[Any]],
 ) -> None:

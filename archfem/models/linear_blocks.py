@@ -12,10 +12,9 @@ from itertools import pairwise
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.joints.operator import JointOperator, Pattern
 from archfem.joints.own_law import OwnLawOperator, OwnLawStep
 from archfem.joints.quadrature import Quadrature
@@ -228,7 +227,7 @@ class LinearObserver(Observer):
     matrix: sparse.csr_matrix  # D, from coordinates to readings (r, n)
     offset: Array  # d, readings at q = 0, due to moved supports and construction (r,)
     joint_count: int
-    corner_blocks: NDArray[np.intp]
+    corner_blocks: Numbers
     structure: Structure
     cells: Cells
     support_motion: Array  # (n_blocks, 3) [m, m, rad]

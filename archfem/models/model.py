@@ -10,10 +10,9 @@ from functools import cached_property
 from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.errors import InvalidInput
 from archfem.joints.operator import JointOperator
 from archfem.masonry.loads import Action, BodyForce, Settlement
@@ -34,17 +33,17 @@ class Cells:
     """
 
     places: Array
-    block: NDArray[np.intp]
-    polygons: tuple[NDArray[np.intp], ...]
+    block: Numbers
+    polygons: tuple[Numbers, ...]
     shape_functions: sparse.csr_matrix
     stress: sparse.csr_matrix | None = None
 
     @cached_property
-    def owner(self) -> NDArray[np.intp]:
+    def owner(self) -> Numbers:
         """Number of the block of each polygon (n_polygons,)."""
         return self.block[[polygon[0] for polygon in self.polygons]]
 
-    def corners(self, structure: Structure) -> NDArray[np.intp]:
+    def corners(self, structure: Structure) -> Numbers:
         """Return the points nearest to the corners of the free blocks, block by block (c,).
 
         Args:
@@ -67,13 +66,13 @@ class Cells:
         return (self.shape_functions @ q).reshape(-1, 2)
 
     @cached_property
-    def _edges(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def _edges(self) -> tuple[Numbers, Numbers]:
         """Edges of all polygons (e, 2) and their blocks (e,)."""
         edges = np.concatenate([np.column_stack([p, np.roll(p, -1)]) for p in self.polygons])
         return edges, np.repeat(self.owner, [len(polygon) for polygon in self.polygons])
 
     @cached_property
-    def outline_edges(self) -> NDArray[np.intp]:
+    def outline_edges(self) -> Numbers:
         """Edges along the outlines of the blocks, in the sense of their polygon (e, 2)."""
         # an edge on the outline belongs to one polygon, an inner one to two
         edges, _ = self._edges
@@ -104,7 +103,7 @@ class Cells:
         rotation = across @ (ends[1] - ends[0]) / (along @ along)
         return (on_edge + sparse.csr_matrix([[-beside[1]], [beside[0]]]) @ rotation).tocsr()
 
-    def nearest_edge(self, block: int, point: Array) -> tuple[NDArray[np.intp], float, Array]:
+    def nearest_edge(self, block: int, point: Array) -> tuple[Numbers, float, Array]:
         """Return the edge of a block nearest to a point, and the point's position relative to it.
 
         Args:
@@ -211,7 +210,7 @@ class Observer(Protocol):
     """
 
     joint_count: int
-    corner_blocks: NDArray[np.intp]
+    corner_blocks: Numbers
 
     def read(self, q: Array) -> Array:
         """Return gaps, rotations and slips of joints, then corner displacements, in a row (r,)."""

@@ -19,10 +19,9 @@ from typing import Any, Self
 import numpy as np
 import ufl
 from dolfinx import fem
-from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.errors import InvalidInput
 from archfem.joints.operator import JointOperator, Pattern
 from archfem.joints.quadrature import Quadrature
@@ -53,7 +52,7 @@ def build_full_model(space: BrokenSpace, rule: Quadrature) -> LinearBlockModel:
     )
 
 
-def _build_cells(space: BrokenSpace, forms: Forms, free: NDArray[np.intp]) -> Cells:
+def _build_cells(space: BrokenSpace, forms: Forms, free: Numbers) -> Cells:
     """Return the cells of the free blocks as polygons."""
     moving = np.isin(space.mesh.blocks, space.mesh.structure.free)
     nodes = free[0::2] // 2

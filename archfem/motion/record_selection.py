@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem._validation import (
     check_fields,
     check_integer,
@@ -489,7 +488,7 @@ def _name_events(
     return tuple(named)
 
 
-def _number_events(candidates: Sequence[_Candidate]) -> NDArray[np.intp]:
+def _number_events(candidates: Sequence[_Candidate]) -> Numbers:
     """Return a number of the event of each candidate (n,); files of an unknown one share it."""
     keys = [each.event or min(each.sources.values()) for each in candidates]
     return np.array([keys.index(key) for key in keys])
@@ -537,7 +536,7 @@ class _Search:
         self,
         rule: SelectionRule,
         ratios: Array,  # spectra over the design spectrum, period zero first (n, 1 + m) [-]
-        events: NDArray[np.intp],  # number of the event of each record (n,)
+        events: Numbers,  # number of the event of each record (n,)
         scales: tuple[float, float],  # the least and the largest [-]
     ) -> None:
         self.rule, self.events, self.limits = rule, events, scales

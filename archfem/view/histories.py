@@ -13,9 +13,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
-from archfem._typing import Array
+from archfem._typing import Array, Flags
 from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
@@ -379,7 +378,7 @@ def _draw_friction_limits(axes: Axes, times: Array, ratio: Array, limits: Array)
         annotate(axes, text, (0.0, 0.0), (3, 2), fontsize=LABEL_SIZE - 1.0, **style)
 
 
-def _mirror_images(structure: Structure | None, numbers: Array, first: int) -> NDArray[np.bool_]:
+def _mirror_images(structure: Structure | None, numbers: Array, first: int) -> Flags:
     """Return which of the numbered joints are the mirror image of one of them (n,)."""
     if structure is None:
         return np.zeros(len(numbers), dtype=bool)

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.dynamics.history import History
 from archfem.dynamics.rigid_body.bodies import make_bodies
 from archfem.joints.criteria import assessed_joints
+from archfem.masonry.block import rotate
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 
@@ -21,13 +21,6 @@ def block_kinds(structure: Structure) -> list[str]:
         "support" if block.fixed else "soil" if number in soil else "stone"
         for number, block in enumerate(structure.blocks)
     ]
-
-
-def rotate(points: Array, angle: Array) -> Array:
-    """Rotate points about the origin (…, 2)."""
-    c, s = np.cos(angle), np.sin(angle)
-    x, y = np.moveaxis(points, -1, 0)
-    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
 def decisive_instant(run: History) -> float:
@@ -105,7 +98,7 @@ class FallingBlocks:
         """Return the poses of all blocks at a time (n_blocks, 3)."""
         return _interpolate(self.times, self.poses, np.array([time]))[0]
 
-    def places(self, points: Array, block: int | NDArray[np.intp], time: float) -> Array:
+    def places(self, points: Array, block: int | Numbers, time: float) -> Array:
         """Return the positions at a time (m, 2) [m] of points of a block, or of one block each."""
         poses = self.pose(time)[block]
         centres = np.array([each.centroid for each in self.structure.blocks])[block]

@@ -10,10 +10,9 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation, UniformTriRefiner
-from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.resultants import joint_dataset
@@ -36,8 +35,6 @@ from archfem.view.style import (
     structure_axes,
     style_colour_bar,
 )
-
-Numbers = NDArray[np.intp]
 
 
 class Triangles:
@@ -63,7 +60,7 @@ class Triangles:
         first = count * np.arange(len(corners))
         self._corners = (first[:, None, None] + fine.triangles).reshape(-1, 3)
         owner = np.repeat(np.arange(len(cut)), [len(triangles) for triangles in cut])
-        self.cell: NDArray[np.intp] = np.repeat(owner, len(fine.triangles))
+        self.cell: Numbers = np.repeat(owner, len(fine.triangles))
 
     def corners(self, values: Array) -> Array:
         """Interpolate values at the points of the cells to the corners (t, 3, …)."""

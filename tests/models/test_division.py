@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 import archfem as af
-from archfem.models.fem.edge_division import (
+from archfem.models.fem.mesh import (
     CellSizes,
     _check_cell_count,
     _grade_edges,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.models.fem.edge_division import _insert_points_on_edges, find_edges
+from archfem.models.fem.mesh import _insert_points_on_edges, find_edges
 
 NEAR = 1e-6
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import eigh
 
 import archfem as af
-from archfem.models.large.blocks import CorotationalCoordinates
+from archfem.models.large.model import CorotationalCoordinates
 
 SOFT = af.Material(young=1e8, poisson=0.2, unit_weight=25e3)
 """Stones that bend by as much as joints give."""

@@ -5,7 +5,7 @@ import pytest
 from scipy import sparse
 
 import archfem as af
-from archfem.models.large.blocks import FramelessPoint, RotatingPoint
+from archfem.models.large.model import FramelessPoint, RotatingPoint
 from archfem.models.large.joints import JointSegments
 
 STEP = 1e-6

@@ -1,9 +1,8 @@
 """Parametric structures: arches, columns, arcades and bridges from a few lengths.
 
 bridge_parts  Arch, Pier, Sidewall, Backfill, Paving
-bridges       bridges and arcades
+bridges       bridges and arcades, and their stonework
 rings         rings, columns, arch on piers, polycentric curves
-stonework     blocks of piers, sidewalls, paving
 """
 
 from archfem.masonry.shapes.bridge_parts import Arch as Arch

@@ -5,21 +5,39 @@ on them.
 """
 
 from collections.abc import Sequence
-from itertools import chain
+from dataclasses import replace
+from itertools import chain, pairwise
+from math import cos
 from typing import Any
 
 import numpy as np
 
 from archfem._typing import Angle, Metres, MetresPerSecondSquared
-from archfem._validation import check_numbers, validate_arguments
+from archfem._validation import check_numbers, count_pieces, validate_arguments
 from archfem.errors import InvalidStructure
 from archfem.masonry.assembly import assembled
-from archfem.masonry.block import Block, Point
+from archfem.masonry.block import Block, Point, check_overlaps
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
-from archfem.masonry.shapes.stonework import Face, StoneworkBuilder, fill_ledge
-from archfem.masonry.structure import Structure, record_origin
+from archfem.masonry.shapes.rings import circular_arch
+from archfem.masonry.structure import Joint, Structure, record_origin
 from archfem.units import G
+
+# Depth of the fixed blocks under piers and behind walls [m]; they do not deform.
+FOUNDATION_DEPTH = 0.2
+
+# One length for all parts, or one for each, from left to right
+Lengths = Metres | Sequence[Metres]
+
+# A springing joint: its intrados and its extrados
+Face = tuple[Point, Point]
+
+# A part with stones and joints of its own, and one that consists of courses
+Part = Arch | Pier | Sidewall
+Courses = Pier | Sidewall
+
+# Levels [m], or distances along the bridge [m]
+Pair = tuple[float, float]
 
 
 @record_origin
@@ -126,10 +144,6 @@ def _check_cover(bottom: Sequence[Point], surface: Sequence[Point]) -> None:
             f"the fill is {cover[place]:.3f} m above the stones at x = {x[place]:.2f} m, and it "
             f"must be at least {min_cover} m: give more cover, less erosion or lower sidewalls"
         )
-
-
-# One length for all parts, or one for each, from left to right
-Lengths = Metres | Sequence[Metres]
 
 
 @record_origin
@@ -256,3 +270,263 @@ def _expand_values(count: int, **values: Any) -> list[list[Any]]:
             raise InvalidStructure(f"{len(row)} {name}: give one for all, or {count}")
         rows.append(row)
     return rows
+
+
+def build_ring(
+    arch: Arch, left: float, material: Material, contact: Contact, chords: int
+) -> Structure:
+    """Build a ring at its position in a bridge, between abutments that are dropped later."""
+    ring = circular_arch(
+        radius=arch.radius,
+        thickness=arch.thickness,
+        # with its unit, so that no small angle is taken for radians
+        embrace=f"{np.degrees(2.0 * arch.half):.17g} degree",
+        voussoirs=arch.voussoirs,
+        material=material,
+        contact=contact,
+        chords=chords,
+    )
+    # from the centre of the circle to the left end of the deck and the springing level
+    right, up = left + arch.centre_line_span / 2.0, -arch.radius * cos(arch.half)
+
+    def at(point: Point) -> Point:
+        return (float(point[0] + right), float(point[1] + up))
+
+    part: dict[str, Any] = {"part": arch.name, "role": arch.role}
+    blocks = [
+        replace(
+            each, outline=tuple(map(at, each.outline)), name=f"{arch.name}, {each.name}", **part
+        )
+        for each in ring.blocks
+    ]
+    joints = [
+        replace(each, intrados=at(each.intrados), extrados=at(each.extrados), part=arch.name)
+        for each in ring.joints
+    ]
+    return replace(ring, blocks=tuple(blocks), joints=tuple(joints), name=arch.name)
+
+
+def extrados_points(ring: Structure) -> list[Point]:
+    """Return the points along the extrados of a ring, from left to right [m]."""
+    points = [ring.joints[0].extrados]
+    for block in ring.blocks[1:-1]:
+        # the extrados is the second half, from the right
+        points += reversed(block.outline[len(block.outline) // 2 : -1])
+    return points
+
+
+def fill_ledge(face: Face, inward: float, walls: Sequence[Sidewall]) -> list[Point]:
+    """Return the base of the fill outside an outer springing, from the end of the deck inwards."""
+    x, y = face[1]
+    if not walls:
+        return []
+    wall = walls[0]
+    centre = 0.5 * (face[0][0] + x)
+    outer, step = centre - inward * wall.length, x - inward * wall.setback
+    if wall.above <= 0.0:
+        return [(outer, y)]
+    return [(outer, y + wall.above), (step, y + wall.above), (step, y)]
+
+
+class StoneworkBuilder:
+    """Builder of the blocks and joints of a bridge."""
+
+    def __init__(self, material: Material, contact: Contact, chords: int) -> None:
+        self.material, self.contact, self.chords = material, contact, chords
+        self.blocks: list[Block] = []
+        self.joints: list[Joint] = []
+
+    def build(
+        self, arches: Sequence[Arch], piers: Sequence[Pier], sidewalls: Sequence[Sidewall]
+    ) -> tuple[list[tuple[Face, Face]], list[list[Point]]]:
+        """Build all stonework below the fill, from left to right."""
+        rings, x = [], sidewalls[0].length if sidewalls else 0.0
+        ends: Sequence[Courses] = sidewalls
+        if len(piers) > len(arches):
+            ends, piers = (piers[0], piers[-1]), piers[1:-1]
+        for number, arch in enumerate(arches):
+            rings.append(build_ring(arch, x, self.material, self.contact, self.chords))
+            x += arch.centre_line_span + (piers[number].gap if number < len(piers) else 0.0)
+        joints = [[(joint.intrados, joint.extrados) for joint in ring.joints] for ring in rings]
+        springings = [(faces[0], faces[-1]) for faces in joints]
+        support = self._build_end(springings[0][0], 1.0, ends[:1], "left abutment")
+        for number, (arch, ring) in enumerate(zip(arches, rings, strict=True)):
+            stones = [support, *range(len(self.blocks), len(self.blocks) + len(ring.blocks) - 2)]
+            self.blocks += ring.blocks[1:-1]  # its abutments are the supports of this bridge
+            right = springings[number][1]
+            if number < len(piers):
+                support = self._build_pier(piers[number], right, springings[number + 1][0])
+            else:
+                support = self._build_end(right, -1.0, ends[1:], "right abutment")
+            pairs = pairwise([*stones, support])
+            for k, (pair, face) in enumerate(zip(pairs, joints[number], strict=True)):
+                self._add_joint(pair, face, f"joint {k}", arch)
+        return springings, [extrados_points(ring) for ring in rings]
+
+    def add(
+        self,
+        outline: Sequence[Point],
+        name: str,
+        material: Material | None = None,
+        *,
+        part: str | None = None,
+        role: str = "other",
+        fixed: bool = False,
+        structured: bool = False,
+    ) -> int:
+        """Add a block and return its number."""
+        points = [(float(px), float(py)) for px, py in outline]
+        # Parts of no height or setback leave equal points one after the other.
+        points = [point for k, point in enumerate(points) if point != points[k - 1]]
+        x, y = np.array(points).T
+        # On the right side outlines come out clockwise, and blocks must be anticlockwise.
+        if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) < 0.0:
+            points = [points[0], *reversed(points[1:])]
+        corners = (0, 1, 2, 3) if structured else None
+        given = tuple(points), material or self.material, name, fixed, corners, part or name
+        self.blocks.append(Block(*given, role=role))
+        return len(self.blocks) - 1
+
+    def pave(self, surface: Sequence[Point], paving: Paving) -> None:
+        """Lay paving stones on a surface."""
+        # Stones end where the slope of the surface changes.
+        breaks, levels = np.array(surface).T
+        x: list[float] = []
+        for a, b in pairwise(breaks):
+            count = count_pieces(b - a, paving.length, "paving stones")
+            x.extend(np.linspace(a, b, count + 1)[:-1])
+        x.append(breaks[-1])
+        points = zip(x, np.interp(x, breaks, levels), strict=True)
+        for k, low in enumerate(pairwise(points), 1):
+            high = [(px, py + paving.thickness) for px, py in reversed(low)]
+            self.add([*low, *high], f"paving stone {k}", part="paving", structured=True)
+
+    def check(self) -> None:
+        """Check that no blocks cross themselves or overlap."""
+        names = [block.name for block in self.blocks]
+        check_overlaps([block.points for block in self.blocks], names)
+
+    def _add_joint(self, pair: tuple[int, int], ends: Face, words: str, part: Part) -> None:
+        """Add a joint."""
+        name = f"{part.name}, {words}"
+        self.joints.append(Joint(pair, *ends, self.contact, name, part.name, part.role))
+
+    def _add_stone(self, outline: Sequence[Point], words: str, part: Part, **options: Any) -> int:
+        """Add a block of a pier or sidewall and return its number."""
+        name = f"{part.name}, {words}"
+        return self.add(outline, name, part=part.name, role=part.role, **options)
+
+    def _build_pier(self, pier: Pier, left: Face, right: Face) -> int:
+        """Build a pier under two springings; return the number of its skewback."""
+        (x0, y0), (x1, y1) = left[0], right[0]
+        step = pier.height / count_pieces(pier.height, pier.course, f"courses of '{pier.name}'")
+        if not left[1][0] < right[1][0] or min(y0, y1) <= -step:
+            raise InvalidStructure(
+                f"'{pier.name}': rings do not stand side by side on a gap of {pier.gap:.3g} m "
+                f"and a course of {step:.3g} m: give a wider gap or higher courses"
+            )
+        # flush with the intrados below, along both springing joints above
+        top = [right[0], right[1], left[1], left[0]]
+        return self._build_skewback(pier, (x0, x1), step, top)
+
+    def _build_skewback(self, pier: Pier, sides: Pair, step: float, top: Sequence[Point]) -> int:
+        """Build the courses of a pier and the skewback on them; return the number of the latter."""
+        below = self._build_courses(sides, (-pier.height, -step), pier)
+        skewback = self._add_stone([(x, -step) for x in sides] + list(top), "skewback", pier)
+        self._add_bed((below, skewback), sides, -step, pier)
+        return skewback
+
+    def _build_courses(self, sides: Pair, levels: Pair, part: Courses) -> int:
+        """Build a foundation and courses between two levels; return the number of the top one."""
+        (left, right), low = sides, levels[0]
+        base = low - FOUNDATION_DEPTH
+        under = [(left, base), (right, base), (right, low), (left, low)]
+        below = self._add_stone(under, "foundation", part, fixed=True)
+        return self._stack_courses(below, sides, levels, part)
+
+    def _stack_courses(self, below: int, sides: Pair, levels: Pair, part: Courses) -> int:
+        """Build courses on a block, between two levels; return the number of the top one."""
+        low, high = levels
+        if high - low < 1e-9:  # round-off of nothing to build
+            return below
+        count = count_pieces(high - low, part.course, f"courses of '{part.name}'")
+        for y, top in pairwise(np.linspace(low, high, count + 1)):
+            number = self._add_course(sides, (y, top), part)
+            self._add_bed((below, number), sides, y, part)
+            below = number
+        return below
+
+    def _add_course(self, sides: Pair, levels: Pair, part: Courses) -> int:
+        """Add a rectangular course and return its number."""
+        (left, right), (low, top) = sorted(sides), levels
+        # Courses are numbered on above the skewback of a wall.
+        count = sum(block.part == part.name and not block.fixed for block in self.blocks)
+        outline = [(left, top), (left, low), (right, low), (right, top)]
+        return self._add_stone(outline, f"course {count + 1}", part, structured=True)
+
+    def _add_bed(self, pair: tuple[int, int], sides: Pair, level: float, part: Courses) -> None:
+        """Add a horizontal joint between two courses."""
+        left, right = ((float(x), float(level)) for x in sorted(sides))
+        count = sum(joint.part == part.name for joint in self.joints)
+        self._add_joint(pair, (left, right), f"joint {count}" if count else "base", part)
+
+    def _build_end(self, face: Face, inward: float, walls: Sequence[Courses], bare: str) -> int:
+        """Build the support of an outer springing; return the number of the block at the joint."""
+        if not walls:
+            outer, inner = face[1], face[0]
+            radial = np.subtract(outer, inner)
+            # a fixed block, half as deep as the springing joint is long, behind it
+            back = inward * 0.5 * np.array([-radial[1], radial[0]])
+            far = [tuple(np.add(point, back)) for point in (outer, inner)]
+            return self.add([inner, outer, *far], bare, fixed=True, structured=True)
+        if isinstance(walls[0], Pier):
+            return self._build_end_pier(walls[0], face, inward)
+        return self._build_wall(walls[0], face, inward)
+
+    def _build_end_pier(self, pier: Pier, face: Face, inward: float) -> int:
+        """Build a pier under a single springing at an end; return the number of its skewback."""
+        (x, y), (edge, level) = face
+        outer = 0.5 * (x + edge) - inward * pier.gap
+        step = pier.height / max(1, round(pier.height / pier.course))
+        if not inward * (edge - outer) >= 0.0 or y <= -step:
+            raise InvalidStructure(
+                f"'{pier.name}': a ring does not stand on a gap of {pier.gap:.3g} m and a course "
+                f"of {step:.3g} m: give a wider gap or higher courses"
+            )
+        # Behind the only springing joint the skewback is level, out to its outer face.
+        top = [(x, y), (edge, level), (outer, level)]
+        return self._build_skewback(pier, (outer, x), step, top)
+
+    def _build_wall(self, wall: Sidewall, face: Face, inward: float) -> int:
+        """Build a sidewall; return the number of its skewback."""
+        (x, y), (edge, level) = face
+        steps = fill_ledge(face, inward, [wall])
+        outer = steps[0][0]
+        back = edge - inward * wall.setback
+        room = inward * (back - outer)
+        if room <= 0.0:
+            raise InvalidStructure(
+                f"'{wall.name}': nothing is left of its length {wall.length:.3g} m behind the ring "
+                f"and the setback of {wall.setback:.3g} m: give it more length or less setback"
+            )
+        if wall.state == "fixed":
+            outline = [(outer, -wall.height), (x, -wall.height), (x, y), (edge, level)]
+            return self.add([*outline, *reversed(steps)], wall.name, role=wall.role, fixed=True)
+        step = wall.height / count_pieces(wall.height, wall.course, f"courses of '{wall.name}'")
+        below = self._build_courses((outer, x), (-wall.height, -step), wall)
+        # The skewback reaches from the springing to the setback; courses stand behind it.
+        corner = [(back, level)] if wall.setback > 0.0 else []
+        outline = [(back, -step), (x, -step), (x, y), (edge, level), *corner]
+        skewback = self._add_stone(outline, "skewback", wall)
+        self._add_bed((below, skewback), (back, x), -step, wall)
+        # the course behind the skewback, as high as both, and those above the springing on it
+        behind = self._add_course((outer, back), (-step, level), wall)
+        self._add_bed((below, behind), (outer, back), -step, wall)
+        high = level + wall.above
+        self._stack_courses(behind, (outer, back), (level, high), wall)
+        if wall.state == "retained":
+            # a fixed wall behind all courses, which touches but does not bond with them
+            far = outer - inward * FOUNDATION_DEPTH
+            corners = [(outer, -wall.height), (outer, high), (far, high), (far, -wall.height)]
+            self._add_stone(corners, "retaining wall", wall, fixed=True)
+        return skewback

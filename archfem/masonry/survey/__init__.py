@@ -2,6 +2,5 @@
 
 circle_fit  least-squares circle through surveyed points
 drawings    outlines in GeoJSON, DXF and tagged gmsh files
-outlines    blocks and structure from surveyed outlines
-snapping    closing of small gaps between outlines
+outlines    blocks and structure from surveyed outlines, with small gaps closed
 """

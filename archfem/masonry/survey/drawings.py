@@ -16,10 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from archfem._files import atomic_write, check_file, read_text
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem._validation import short_repr
 from archfem.errors import InvalidInput
 from archfem.masonry.block import measure_polygon
@@ -333,7 +332,7 @@ def infer_part(name: str) -> str:
 
 def _load_msh(
     path: Path, factor: float, dimension: int, corners: Mapping[str, int]
-) -> tuple[Array, dict[int, str], dict[int, list[NDArray[np.intp]]]]:
+) -> tuple[Array, dict[int, str], dict[int, list[Numbers]]]:
     """Load points [m], and names and corners of cells of physical groups by tag, with meshio."""
     try:
         import meshio
@@ -350,7 +349,7 @@ def _load_msh(
         ]
         groups = [(name, int(tag), int(size)) for name, (tag, size) in read.field_data.items()]
         points = np.array(read.points, dtype=float)
-    cells: dict[int, list[NDArray[np.intp]]] = {}
+    cells: dict[int, list[Numbers]] = {}
     for kind, numbers, of_group in blocks:
         # a negative number would silently count from the end
         if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(points):
@@ -378,7 +377,7 @@ def _check_plane(
     return points[:, :2]
 
 
-def trace_boundary(cells: Sequence[NDArray[np.intp]]) -> list[int]:
+def trace_boundary(cells: Sequence[Numbers]) -> list[int]:
     """Return the points around anticlockwise cells in order; none where the boundary is no loop."""
     ends = Counter(
         (int(a), int(b)) for cell in cells for a, b in zip(cell, np.roll(cell, -1), strict=True)
@@ -394,7 +393,7 @@ def trace_boundary(cells: Sequence[NDArray[np.intp]]) -> list[int]:
     return loop if is_loop else []
 
 
-def _trace_outline(cells: list[NDArray[np.intp]], points: Array, name: str) -> list[int]:
+def _trace_outline(cells: list[Numbers], points: Array, name: str) -> list[int]:
     """Trace the points around cells in order, without points on straight edges."""
     areas = (measure_polygon(points[cell])[0] for cell in cells)
     loop = trace_boundary([c if a > 0.0 else c[::-1] for c, a in zip(cells, areas, strict=True)])

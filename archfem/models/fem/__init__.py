@@ -1,11 +1,10 @@
 """Finite elements: gmsh meshes, function spaces and UFL forms.
 
-    _fenicsx       DOLFINx version differences
-    edge_division  edges and cells along them
-    forms          UFL forms of blocks and joints
-    joint_facets   facets of joints and their two sides
-    mesh           conforming gmsh mesh
-    space          space broken across joints
+    _fenicsx      DOLFINx version differences
+    forms         UFL forms of blocks and joints
+    joint_facets  facets of joints and their two sides
+    mesh          cells along edges, conforming gmsh mesh
+    space         space broken across joints
 
 Only this package imports gmsh and FEniCSx.
 """

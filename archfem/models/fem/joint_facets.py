@@ -13,15 +13,12 @@ from typing import Any
 import numpy as np
 import ufl
 from dolfinx import fem
-from numpy.typing import NDArray
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.materials import Contact
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.space import BrokenSpace
-
-Numbers = NDArray[np.intp]
 
 # Values that describe a facet before those of its points: x and y of its beginning, direction over
 # length (x, y), and the sign of its tangent

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.joints.operator import JointOperator
 from archfem.joints.own_law import make_operator
 from archfem.joints.quadrature import JointPoints, Quadrature
@@ -38,7 +38,7 @@ class BrokenSpace:
     cells: Nodes  # nodes of each cell (n_cells, nodes a cell)
 
     @property
-    def free(self) -> NDArray[np.intp]:
+    def free(self) -> Numbers:
         """Degrees of freedom of the free blocks."""
         moves = ~np.array([block.fixed for block in self.mesh.structure.blocks])
         nodes = np.flatnonzero(moves[self.owner])

@@ -1,8 +1,7 @@
 """Models with large displacements, in corotational coordinates.
 
-    blocks  corotational coordinates of blocks and points
-    joints  faces of joints in those coordinates
-    model   large-displacement model
+    joints  faces of joints in corotational coordinates
+    model   corotational coordinates of blocks and points, large-displacement model
 
 Start reading at `model`.
 """
