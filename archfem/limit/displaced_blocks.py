@@ -410,7 +410,7 @@ def classify_motion(
     keeps = (np.abs(normal) <= STILL) | (np.abs(normal - dilation) <= STILL)
     opens = _find_opening_joints(blocks, motion)
     opens &= np.isin(np.arange(len(opens)), joints)
-    body = merge_blocks(blocks.structure, np.flatnonzero(~opens))
+    body = merge_blocks(blocks.structure, np.flatnonzero(~opens).tolist())
     kept = tuple(
         _sliding_contact(blocks, contact, int(sense))
         for contact, keep, sense in zip(contacts, keeps, slip, strict=True)

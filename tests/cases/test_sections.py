@@ -8,6 +8,7 @@ import xarray as xr
 
 import archfem as af
 from archfem._files import replace_results
+from archfem.cases.case import case_of
 from archfem.cases.report import report_data, sections
 from archfem.cases.report.checks import _check_row, supported_weight_ratio
 from archfem.cases.result_text import tabulate_joints, tabulate_motions, tabulate_runs
@@ -59,7 +60,7 @@ def test_a_part_without_a_name_has_a_dash():
     structure = af.masonry.assembled(bare, stack.joints[0].contact)
     (row,) = sections._tabulate_parts(structure).rows
     assert row[:4] == ["–", "ring", "2", "1"]
-    text, *_ = sections._build_geometry(structure)
+    text, *_ = sections._build_geometry(case_of(af.Analysis(structure, fidelity="rigid")))
     points = np.concatenate([block.points for block in structure.blocks])
     length, height = np.ptp(points, axis=0)
     assert f"{length:.3g} m long, {height:.3g} m high and 1 m wide; 1 blocks" in text.text

@@ -5,8 +5,8 @@ import pytest
 from scipy import sparse
 
 import archfem as af
-from archfem.models.large.model import FramelessPoint, RotatingPoint
 from archfem.models.large.joints import JointSegments
+from archfem.models.large.model import FramelessPoint, RotatingPoint
 
 STEP = 1e-6
 """Of central differences: they err by STEP², and by rounding of 1e-16 / STEP."""
