@@ -49,7 +49,6 @@ ALLOWED_IN = {
     "ezdxf": "masonry",
     "netCDF4": "_netcdf",
     "tomllib": ("cases", "limit.vehicles", "studies"),
-    "tomli_w": "cases",
     "argparse": "commands",
     "obspy": "motion.records.waveforms",
     "distributed": "studies.cluster",

@@ -27,7 +27,7 @@ AVOIDED = re.compile(
 
 # Phrases in which such a word has its plain sense.
 PLAIN_SENSE = (
-    "rungs: fidelities", "asked: evaluator", "comes to rest", "come to rest", "came to rest",
+    "rungs: fidelities", "comes to rest", "come to rest", "came to rest",
 )  # fmt: skip
 
 
@@ -169,7 +169,7 @@ def test_an_avoided_word_of_a_test_is_found(source):
     "source",
     [
         "mesh_sensitivity(case, rungs=[])",
-        "study.asked.digest(found.rungs)",
+        "study.told.digest(found.rungs)",
         'given = {"rungs": 1}',
         "from archfem import rungs",
         "def test_a_block_comes_to_rest(): pass",

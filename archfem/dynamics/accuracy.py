@@ -150,20 +150,19 @@ def accuracy(
         InvalidInput: a fidelity, rule or step is out of range.
         DidNotConverge: the reference itself failed.
     """
-    if isinstance(structure, Analysis):
-        damping = structure.damping if damping is None else damping
-        tolerance = structure.tolerance if tolerance is None else tolerance
-        structure = structure.structure
+    given = structure if isinstance(structure, Analysis) else Analysis(structure)
+    structure = given.structure
     references = reference_settings(structure)
     model = build(structure, references[0].discretisation)
-    viscous, _ = resolve_effective_damping(damping, model, None)
+    viscous, _ = resolve_effective_damping(damping or given.damping, model, None)
     motion = motion or severe_motion(model)
     settings = [*references, *candidate_settings(structure, rungs, cells, rules, steps)]
     runs = [
         time_run(build(structure, setting.discretisation), motion, viscous, setting.dt)
         for setting in tqdm(settings, unit="setting", disable=None, leave=False)
     ]
-    return compare_runs(settings, runs, motion.duration, 0.005 if tolerance is None else tolerance)
+    tolerance = given.tolerance if tolerance is None else tolerance
+    return compare_runs(settings, runs, motion.duration, tolerance)
 
 
 def reference_settings(structure: Structure, dt: float = 0.00125) -> tuple[Setting, Setting]:

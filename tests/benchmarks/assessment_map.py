@@ -154,7 +154,7 @@ def evaluate(case: af.Case, precision: float = 0.1) -> dict[str, Any]:
     result, motion = af.studies.dead_load_of(case), af.studies.ground_motion(case)
     # The search begins at the acceleration of the linear check, scale 1.
     unit = allowed["linear"] / SPECTRUM["ag"]
-    step = case.analysis["dt"]
+    step = case.analysis.dt
     search = af.collapse_scale(
         result.dead.model,
         motion.scaled(unit),

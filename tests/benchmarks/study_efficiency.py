@@ -26,10 +26,10 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-import tomli_w
 from setting import plain_options
 
 import archfem as af
+from archfem.cases.toml_file import format_tables
 from archfem.studies import process_pool
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import Point
@@ -59,7 +59,7 @@ def bridge() -> af.Study:
     }
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "study.toml"
-        path.write_text(tomli_w.dumps(table | {"pairs": ["pair-1"]}))
+        path.write_text(format_tables(table | {"pairs": ["pair-1"]}))
         return af.Study.read(path)
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 import archfem as af
+from archfem.cases.toml_file import format_tables
 from archfem.commands import tools
 from fuzz import odd
 from fuzz.trial import Came, judged
@@ -183,7 +183,7 @@ def trial(seed: int, number: int, folder: Path) -> Came:
     try:
         for _ in range(rng.choice([1, 1, 2, 3])):
             mutate(settings, rng)
-        content = tomli_w.dumps(settings).encode()
+        content = format_tables(settings).encode()
     except (TypeError, ValueError, OverflowError, RecursionError):
         content = BASES[0].encode()
     if rng.random() < 0.25:

@@ -19,7 +19,7 @@ import pytest
 BEFOREHAND = (
     *("numpy", "scipy.optimize", "scipy.sparse.linalg", "scipy.interpolate", "scipy.integrate"),
     *("scipy.signal", "xarray", "pandas", "netCDF4", "matplotlib.pyplot", "matplotlib.collections"),
-    *("numba", "shapely", "ezdxf", "pint", "tqdm", "threadpoolctl", "tomli_w"),
+    *("numba", "shapely", "ezdxf", "pint", "tqdm", "threadpoolctl"),
 )
 """Packages that tests need, imported once: each run of tests is a fork of this process."""
 

@@ -105,7 +105,8 @@ SHAKEN = {
     "schemes.Newmark": {"beta": 0.25, "gamma": 0.5},
     "schemes.HHT": {"alpha": -0.1},
     "time_history.Record": {"every": 1},
-    "accuracy.accuracy": {"tolerance": 0.005, **STEPS},
+    "accuracy.accuracy": STEPS,
+    "analysis.Analysis": {"cells": (4, 4), "degree": 1, "tolerance": 0.005},
     "accuracy.candidate_settings": {"meshes": STEPS["cells"], "steps": STEPS["steps"]},
 }
 
@@ -121,7 +122,7 @@ STUDIES = {
     "evaluators.evaluate_scales": {"precision": 0.05, "between": (0.05, 5.0)},
     "result_store.format_table": {"max_rows": 50},
     "ida.ida": {"precision": 0.05, "between": (0.05, 10.0)},
-    "variations.verdict_range": {"dt": 0.005, "samples": 26, "seed": 0, "workers": 1},
+    "variations.verdict_range": {"samples": 26, "seed": 0, "workers": 1},
 }
 
 VIEW = {

@@ -14,7 +14,7 @@ def drawn(axes):
 
 
 def test_picture_of_shapes(ring_model):
-    found = af.modes(ring_model, 3)
+    found = af.modes(ring_model, 3, start="closed")
     axes = draw_modes(found, [1, 3]).axes
     assert axes[0].get_title() == "mode 1: 8.08 Hz\neffective mass: x 72 %, y 0 %"
     assert axes[1].get_title().startswith("mode 3: 27.75 Hz")
