@@ -78,6 +78,10 @@ class RigidBlocks:
     """Rigid blocks of a structure, with forces at the two ends of each joint."""
 
     structure: Structure
+    # chains that were found, by the blocks left out of them
+    _chains: dict[bytes, "Chains"] = field(default_factory=dict, init=False)
+    # last balances that were reduced, by what they depend on
+    _reductions: dict[tuple[bytes, ...], "ReducedBalance"] = field(default_factory=dict, init=False)
 
     @property
     def force_unit(self) -> float:
@@ -125,16 +129,6 @@ class RigidBlocks:
         """Equilibrium matrix of free blocks in the programme's units (3 n_free, 3 n_joints)."""
         sign = np.repeat([-1.0, -1.0, 1.0], len(self.structure.depths))
         return sparse.diags(self.coordinate_units) @ self.kinematics.T @ sparse.diags(sign)
-
-    @cached_property
-    def _chains(self) -> dict[bytes, "Chains"]:
-        """Chains that were found, by the blocks left out of them."""
-        return {}
-
-    @cached_property
-    def _reductions(self) -> dict[tuple[bytes, ...], "ReducedBalance"]:
-        """Last balances that were reduced, by what they depend on."""
-        return {}
 
     def reduce(
         self, columns: sparse.csr_matrix, friction: Array, coheres: Flags
