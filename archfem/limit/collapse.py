@@ -297,9 +297,14 @@ def _solve_collapse(
         optimum, solutions = search_nonassociated(programme, associated, scale)
     if optimum is None:
         at_rest = replace(fall, multipliers=np.zeros_like(fall.multipliers))
-        if solutions is not None and associated is not None:
-            return _read_bound(stones, dead, at_rest, solutions, support is None)
-        result = _read_result(stones, dead, unbounded, np.inf, at_rest)
+        if solutions is None or associated is None:
+            result = _read_result(stones, dead, unbounded, np.inf, at_rest)
+            return replace(result, solutions=solutions)
+        logger.warning(
+            "no state without dilatancy was found; the factor is only a bound: %s", solutions
+        )
+        bound = solutions.bracket[0 if support is None else 1]
+        result = _read_result(stones, dead, Outcome.BRACKETED, bound, _without_forces(at_rest))
         return replace(result, solutions=solutions)
     result = _read_result(stones, programme, bounded, scale * optimum.value, optimum, support)
     result = replace(result, solutions=solutions)
@@ -317,22 +322,6 @@ def _without_forces(optimum: Optimum) -> Optimum:
     """Return the same mechanism with undefined forces (NaN)."""
     forces, unknowns = (np.full_like(each, np.nan) for each in (optimum.forces, optimum.unknowns))
     return replace(optimum, forces=forces, unknowns=unknowns)
-
-
-def _read_bound(
-    stones: BlocksWithFill,
-    dead: Programme,
-    at_rest: Optimum,
-    solutions: NonassociatedBounds,
-    lower: bool,
-) -> Collapse:
-    """Return the safe bound of the factor, where no state without dilatancy was found."""
-    logger.warning(
-        "no state without dilatancy was found; the factor is only a bound: %s", solutions
-    )
-    bound = solutions.bracket[0 if lower else 1]
-    result = _read_result(stones, dead, Outcome.BRACKETED, bound, _without_forces(at_rest))
-    return replace(result, solutions=solutions)
 
 
 def _read_result(

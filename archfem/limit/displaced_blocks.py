@@ -258,6 +258,11 @@ class Bodies:
         return int(self.body.max()) + 1
 
     @cached_property
+    def units(self) -> Array:
+        """Units of the coordinates, rotations over the size (3 n_bodies,) [m, m, rad]."""
+        return np.tile([1.0, 1.0, 1.0 / self.blocks.structure.size], self.count)
+
+    @cached_property
     def references(self) -> Array:
         """Reference point of each body, the mean of its centroids (n_bodies, 2) [m]."""
         body, total = self.body[self.moving], np.zeros((self.count, 2))
@@ -372,10 +377,9 @@ def _solve_static(
     dead, live = (bodies.generalised(load) for load in (bodies.blocks.dead, bodies.blocks.live))
     # forces in mean body weights and lengths in metres over the size keep coefficients near one
     unit = np.abs(bodies.blocks.dead[:, 1]).sum() / bodies.count
-    lengths = np.tile([1.0, 1.0, 1.0 / bodies.blocks.structure.size], bodies.count)
     count, slides = len(contacts), np.isfinite(coefficient)
     coefficient_or_zero = np.where(slides, coefficient, 0.0)
-    balance = sparse.diags(lengths) @ sparse.hstack([normal.T, along.T, (live / unit)[:, None]])
+    balance = sparse.hstack([normal.T, along.T, (live / unit)[:, None]])
     slope, one = (sparse.diags(v).tocsr()[slides] for v in (coefficient_or_zero, np.ones(count)))
     strength = np.zeros(2 * int(slides.sum()))
     if held is not None:
@@ -386,10 +390,10 @@ def _solve_static(
     # forces across joints, along them, and the factor, which is maximised
     bounds = np.repeat([[0.0, np.inf], [-np.inf, np.inf]], [count, count + 1], axis=0)
     cost = np.append(np.zeros(2 * count), -1.0)
-    equations = balance, -lengths * dead / unit
+    equations = sparse.diags(bodies.units) @ balance, -bodies.units * dead / unit
     if (result := solve_linear(cost, bounds, equations, (limits, strength))) is None:
         return None
-    velocity = -lengths * np.array(result.eqlin.marginals)
+    velocity = -bodies.units * np.array(result.eqlin.marginals)
     return float(result.x[-1]), velocity, result.x[:count]
 
 

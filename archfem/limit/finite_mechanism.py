@@ -135,15 +135,10 @@ class LinkageState:
         return np.array([not contact.slip for contact in self.contacts], dtype=bool)
 
     @cached_property
-    def units(self) -> Array:
-        """Units of the bodies' coordinates, rotations over the size (3 n_bodies,) [m, m, rad]."""
-        return np.tile([1.0, 1.0, 1.0 / self.blocks.structure.size], self.bodies.count)
-
-    @cached_property
     def jacobian(self) -> Array:
         """Rates of the constraints with scaled velocities (n_constraints, 3 n_bodies)."""
         normal, along = self.rates
-        return np.vstack([normal, along[self.sticks]]) * self.units
+        return np.vstack([normal, along[self.sticks]]) * self.bodies.units
 
     def velocity(self, previous: Array) -> Array | None:
         """Return the velocities of the bodies that are nearest to previous ones, or None."""
@@ -151,7 +146,7 @@ class LinkageState:
         _, singular, basis = np.linalg.svd(self.jacobian)
         rank = int(np.sum(singular > 1e-9 * max(singular.max(initial=0.0), 1.0)))
         free = basis[rank:]
-        velocity = self.units * (free.T @ (free @ (previous / self.units)))
+        velocity = self.bodies.units * (free.T @ (free @ (previous / self.bodies.units)))
         motion = self.bodies.spread(velocity)
         speed = self.blocks.largest_speed(motion)
         if speed <= STILL * self.blocks.largest_speed(self.bodies.spread(previous)):
@@ -160,18 +155,14 @@ class LinkageState:
 
     def corrected(self, iterations: int = 12) -> "LinkageState | None":
         """Return the nearest state that fulfils the constraints, by Newton's method."""
-        state = self
+        state, size = self, self.blocks.structure.size
         for _ in range(iterations):
-            if not len(state.misfits) or np.abs(state.misfits).max() <= 1e-13 * state._size:
+            if np.abs(state.misfits).max(initial=0.0) <= 1e-13 * size:
                 return state
             step = np.linalg.lstsq(state.jacobian, -state.misfits, rcond=1e-10)[0]
-            state = state.linkage.place(state.blocks, state.units * step)
+            state = state.linkage.place(state.blocks, self.bodies.units * step)
         # redundant constraints that contradict each other: the linkage locks
-        return state if np.abs(state.misfits).max() <= 1e-9 * state._size else None
-
-    @property
-    def _size(self) -> float:
-        return self.blocks.structure.size
+        return state if np.abs(state.misfits).max() <= 1e-9 * size else None
 
     def advanced(self, velocity: Array, step: float) -> "tuple[LinkageState, Array] | None":
         """Return state and velocities after a step along the path, by the mid-point rule."""
@@ -198,11 +189,11 @@ class LinkageState:
         # friction opposes the slip
         forces[slipping] -= (coefficient[slipping] * senses)[:, None] * along[slipping]
         # unknown: normal forces, shear of sticking contacts, factor
-        columns = np.vstack([forces, along[self.sticks], live]).T * self.units[:, None]
-        solution, _, rank, _ = np.linalg.lstsq(columns, -self.units * dead, rcond=1e-10)
+        columns = np.vstack([forces, along[self.sticks], live]).T * self.bodies.units[:, None]
+        solution, _, rank, _ = np.linalg.lstsq(columns, -self.bodies.units * dead, rcond=1e-10)
         determined = rank == columns.shape[1]
         if not determined and len(slipping):
-            solution = self._least_factor(columns, -self.units * dead, solution)
+            solution = self._least_factor(columns, -self.bodies.units * dead, solution)
         # Virtual work on the velocity, with the work of friction.
         normal_forces = solution[: len(forces)]
         work = dead @ velocity + normal_forces @ (forces @ velocity)

@@ -78,6 +78,10 @@ class RigidBlocks:
     """Rigid blocks of a structure, with forces at the two ends of each joint."""
 
     structure: Structure
+    # chains that were found, by the blocks left out of them
+    _chains: dict[bytes, "Chains"] = field(default_factory=dict, init=False)
+    # last balances that were reduced, by what they depend on
+    _reductions: dict[tuple[bytes, ...], "ReducedBalance"] = field(default_factory=dict, init=False)
 
     @property
     def force_unit(self) -> float:
@@ -125,16 +129,6 @@ class RigidBlocks:
         """Equilibrium matrix of free blocks in the programme's units (3 n_free, 3 n_joints)."""
         sign = np.repeat([-1.0, -1.0, 1.0], len(self.structure.depths))
         return sparse.diags(self.coordinate_units) @ self.kinematics.T @ sparse.diags(sign)
-
-    @cached_property
-    def _chains(self) -> dict[bytes, "Chains"]:
-        """Chains that were found, by the blocks left out of them."""
-        return {}
-
-    @cached_property
-    def _reductions(self) -> dict[tuple[bytes, ...], "ReducedBalance"]:
-        """Last balances that were reduced, by what they depend on."""
-        return {}
 
     def reduce(
         self, columns: sparse.csr_matrix, friction: Array, coheres: Flags
@@ -198,11 +192,9 @@ def crushing_cuts(joints: Numbers, at: Array, crushing: Array) -> Limits:
     """Return tangents at N_0 = `at` of the crushing limit |M| <= N h/2 - N²/(2 σ w)."""
     # A rectangular stress block of the full strength σ demands F >= N²/(2 N_c) at each end, with
     # N_c = σ w h; the tangent at N_0 is F >= N_0/N_c N - N_0²/(2 N_c).
-    slope, row, count = at / crushing[joints], np.arange(len(joints)), len(crushing)
-    shape = (len(joints), count)
-    tangent = sparse.csr_matrix((slope, (row, joints)), shape)
-    end = sparse.csr_matrix((np.ones(len(joints)), (row, joints)), shape)
-    shear = sparse.csr_matrix(shape)
+    slope = at / crushing[joints]
+    end = sparse.identity(len(crushing), format="csr")[joints]
+    tangent, shear = sparse.diags(slope) @ end, sparse.csr_matrix(end.shape)
     rows = sparse.bmat([[tangent - end, tangent, None], [tangent, tangent - end, shear]])
     return Limits(rows.tocsr(), np.tile(slope * at / 2.0, 2))
 
@@ -329,11 +321,7 @@ class ReducedBalance:
     """
 
     def __init__(
-        self,
-        chains: Chains,
-        columns: sparse.csr_matrix,
-        friction: Array,
-        coheres: Flags,
+        self, chains: Chains, columns: sparse.csr_matrix, friction: Array, coheres: Flags
     ) -> None:
         """Eliminate chains, and express the other forces by generators."""
         self._chains, used = chains, ~chains.is_pivot[: len(friction)]
@@ -445,29 +433,24 @@ def _find_chains(structure: Structure, excluded: Numbers) -> tuple[Numbers, Numb
 
 def _cone_generators(friction: Array, used: Flags, alone: Numbers, extra: int) -> sparse.csr_matrix:
     """Return generators of the forces of some joints, followed by zeros (3 n_joints, m + extra)."""
-    count = len(used)
     cone = np.isfinite(friction) & (friction > 0.0)
-    slides, plain = np.flatnonzero(used & cone), np.flatnonzero(used & ~cone)
+    every = sparse.identity(len(used), format="csc")
+    slides, plain = every[:, used & cone], every[:, used & ~cone]
+    shear = slides @ sparse.diags(friction[used & cone])
     # both ends with a shear of μ, both with -μ, both without shear, shear alone
-    both, ends = np.tile(slides, 2), np.concatenate([slides, slides + count])
-    rows = np.concatenate([ends, ends, plain, plain + count, alone + 2 * count])
-    columns = np.arange(len(rows) + extra)
-    shear, slope = np.tile(both + 2 * count, 2), np.repeat([1.0, -1.0], len(both))
-    entries = np.concatenate([np.ones(len(rows)), slope * np.tile(friction[both], 2)])
-    across = np.concatenate([columns[: len(rows)], columns[: len(shear)]])
-    place = np.concatenate([rows, shear]), across
-    return sparse.csr_matrix((entries, place), (3 * count, len(columns)))
+    rows = [
+        [slides, None, slides, None, plain, None, None],
+        [None, slides, None, slides, None, plain, None],
+        [shear, shear, -shear, -shear, None, None, every[:, alone]],
+    ]
+    zeros = sparse.csr_matrix((3 * len(used), extra))
+    return sparse.hstack([sparse.bmat(rows), zeros], format="csr")
 
 
 def _pivot_limits(friction: Array, pivots: Numbers, slides: Numbers) -> sparse.csr_matrix:
     """Return the rows of F_i, F_e >= 0 for pivots, and of ±V - μ N <= r for those that slide."""
-    count = len(friction)
-    first = 2 * len(pivots) + np.arange(2 * len(slides)).reshape(2, -1)  # of V, of -V
-    row = [np.arange(2 * len(pivots)), *(first.ravel() for _ in range(3))]
-    column = [np.concatenate([pivots, pivots + count])]
-    column += [np.tile(slides + side * count, 2) for side in range(3)]
-    slope = -np.tile(friction[slides], 2)
-    entries = [-np.ones(2 * len(pivots)), slope, slope, np.repeat([1.0, -1.0], len(slides))]
-    shape = (2 * len(pivots) + 2 * len(slides), 3 * count)
-    place = np.concatenate(row), np.concatenate(column)
-    return sparse.csr_matrix((np.concatenate(entries), place), shape)
+    every = sparse.identity(len(friction), format="csr")
+    end, shear = -every[pivots], every[slides]
+    slope = sparse.diags(-friction[slides]) @ shear
+    rows = [[end, None, None], [None, end, None], [slope, slope, shear], [slope, slope, -shear]]
+    return sparse.bmat(rows, format="csr")

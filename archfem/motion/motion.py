@@ -261,9 +261,7 @@ class Motion(ResultDisplay):
         Raises:
             InvalidInput: dt is not positive and finite.
         """
-        return self._map_components(
-            lambda row: signal_processing.resample_peaks(row, self.dt, dt), dt=dt
-        )
+        return replace(self._map_components(signal_processing.resample_peaks, self.dt, dt), dt=dt)
 
     def baseline_corrected(self, degree: int = 6) -> "Motion":
         """Return the motion without drift, as by `signal_processing.correct_baseline`.
@@ -274,9 +272,7 @@ class Motion(ResultDisplay):
         Raises:
             InvalidInput: the degree is below 3, or not below the number of samples.
         """
-        return self._map_components(
-            lambda samples: signal_processing.correct_baseline(samples, self.dt, degree)
-        )
+        return self._map_components(signal_processing.correct_baseline, self.dt, degree)
 
     def band_passed(self, low: float, high: float, *, order: int = 4) -> "Motion":
         """Return the motion with its frequencies in a band, as by `signal_processing.filter_band`.
@@ -289,9 +285,7 @@ class Motion(ResultDisplay):
         Raises:
             InvalidInput: not 0 < low < high < half the sampling frequency, or the order below 1.
         """
-        return self._map_components(
-            lambda row: signal_processing.filter_band(row, self.dt, low, high, order=order)
-        )
+        return self._map_components(signal_processing.filter_band, self.dt, low, high, order=order)
 
     def rotated(self, angle: float) -> "Motion":
         """Return the motion in horizontal axes rotated by an angle, from horizontal to transverse.
@@ -339,6 +333,6 @@ class Motion(ResultDisplay):
             steps = f"a step of {other.dt:g} s ({other.name!r}) and one of {self.dt:g} s"
             raise InvalidInput(f"{steps}: bring one to the other's with resampled")
 
-    def _map_components(self, change: Callable[[Array], Array], **fields: Any) -> "Motion":
-        rows: dict[str, Any] = {name: change(self.component(name)) for name in self.components}
-        return replace(self, **rows, **fields)
+    def _map_components(self, change: Callable[..., Array], *args: Any, **options: Any) -> "Motion":
+        rows = {name: change(self.component(name), *args, **options) for name in self.components}
+        return replace(self, **rows)

@@ -149,8 +149,7 @@ def response_spectrum(
     natural = as_periods(periods)
     samples = motion.component(component)
     peaks = find_peak_responses(samples, motion.dt, natural.ravel(), damping)[0]
-    spectrum: Array = np.abs(peaks)
-    return spectrum.reshape(natural.shape)
+    return np.abs(peaks).reshape(natural.shape)
 
 
 @validate_arguments

@@ -160,7 +160,7 @@ def integrate_arias(samples: Array, dt: float) -> Array:
     References:
         Arias, A measure of earthquake intensity (1970).
     """
-    energy: Array = integrate.cumulative_trapezoid(samples**2, dx=dt, initial=0.0)
+    energy = integrate.cumulative_trapezoid(samples**2, dx=dt, initial=0.0)
     return np.pi / (2.0 * STANDARD_GRAVITY) * energy
 
 

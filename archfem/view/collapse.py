@@ -36,6 +36,7 @@ from archfem.view.style import (
     add_legend_below,
     add_polygons,
     annotate,
+    new_axes,
     new_figure,
     outline_bounds,
     set_title,
@@ -77,7 +78,9 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse) -> None:
     factor = f"{found.factor:.3g} ×" if np.isfinite(found.factor) else ""
     if found.outcome is not Outcome.INFEASIBLE:  # else nothing was loaded: the weight is too much
         draw_loads(axes, structure, found.live, factor=factor)
-    set_title(axes, f"{structure.name}: {_outcome_text(found)}")
+    has_factor = found.outcome in (Outcome.COLLAPSES, Outcome.BRACKETED)
+    reached = f" at a factor of {found.factor:.4g}" if has_factor else ""
+    set_title(axes, f"{structure.name}: {found.outcome.sentence}{reached}")
     add_legend(axes)
 
 
@@ -252,8 +255,7 @@ def draw_capacity(
     Returns:
         The figure, with a colour bar beside the map.
     """
-    figure = new_figure(COLUMN_WIDTH, 4.4)
-    axes = figure.add_subplot()
+    figure, axes = new_axes(COLUMN_WIDTH, 4.4, "embrace [°]", "thickness / radius, t/R [-]")
     embraces, ratios = capacity["embrace"].values, capacity["ratio"].values
     # rings that no acceleration overturns are drawn in the colour of the largest values
     values = np.nan_to_num(capacity.values.T, nan=0.0, posinf=1e3)
@@ -264,7 +266,6 @@ def draw_capacity(
     axes.fill_between(edge[:, 0], 0.0, edge[:, 1], color="white", zorder=2)
     axes.plot(*edge.T, color=Colour.TEXT, lw=1.6, zorder=3, label="least thickness")
     _mark_reference_values(axes, known)
-    style_axes(axes, "embrace [°]", "thickness / radius, t/R [-]")
     axes.set(xlim=(embraces[0], embraces[-1]), ylim=(0.0, ratios[-1]))
     add_legend(axes)
     style_colour_bar(figure.colorbar(filled), "horizontal acceleration at collapse [g]")
@@ -303,14 +304,6 @@ def _mark_sliding(axes: Axes, structure: Structure, joints: Sequence[int]) -> No
         style = {"colors": Colour.SLIDING, "linewidths": 2.4, "zorder": 4}
         lines = structure.ends[list(joints)]
         axes.add_collection(LineCollection(lines, label="sliding joint", **style))
-
-
-def _outcome_text(found: Collapse) -> str:
-    """Return the outcome, with the collapse factor if there is one."""
-    sentence = found.outcome.sentence
-    if found.outcome in (Outcome.COLLAPSES, Outcome.BRACKETED):
-        sentence += f" at a factor of {found.factor:.4g}"
-    return sentence
 
 
 def _mark_reference_values(axes: Axes, known: Mapping[tuple[float, float], float]) -> None:

@@ -23,6 +23,7 @@ from archfem.view.style import (
     Colour,
     add_legend_below,
     annotate,
+    new_axes,
     new_figure,
     set_title,
     style_axes,
@@ -162,9 +163,8 @@ def draw_study(
     definitions = list(next(iter(factors.values())))
     scales = {d: np.array([case[d] for case in factors.values()]) for d in definitions}
     scales = {d: values for d, values in scales.items() if np.isfinite(values).any()}
-    figure = new_figure(0.75 * PAGE_WIDTH, 1.6 + 0.42 * len(names))
-    axes = figure.add_subplot()
-    style_axes(axes, "scale of the motions at the first mechanism [-]")
+    label = "scale of the motions at the first mechanism [-]"
+    figure, axes = new_axes(0.75 * PAGE_WIDTH, 1.6 + 0.42 * len(names), label)
     finite = np.concatenate([[1.0], *(each[np.isfinite(each)] for each in scales.values())])
     end = 1.3 * finite.max()
     _draw_ranges(axes, scales, end)
@@ -323,9 +323,8 @@ def draw_fragility(
             raise InvalidInput("probabilities have no intensities: give intensity, or a Fragility")
         largest = max(curve.median for curve in named.values())
         intensity = np.linspace(0.0, 3.0 * largest, 301)[1:]
-    figure = new_figure(COLUMN_WIDTH, 0.7 * COLUMN_WIDTH)
-    axes = figure.add_subplot()
-    style_axes(axes, measure, "probability of the limit state [-]")
+    size = COLUMN_WIDTH, 0.7 * COLUMN_WIDTH
+    figure, axes = new_axes(*size, measure, "probability of the limit state [-]")
     for (name, curve), colour in zip(named.items(), LINE_COLOURS, strict=False):
         if isinstance(curve, tuple):
             middle, low, high = curve
@@ -359,9 +358,7 @@ def draw_tornado(
         The figure, with the most influential parameter at the top.
     """
     order = sorted(ranges, key=lambda name: float(np.ptp([*ranges[name], usual])))
-    figure = new_figure(COLUMN_WIDTH, 0.9 + 0.42 * len(order))
-    axes = figure.add_subplot()
-    style_axes(axes, quantity)
+    figure, axes = new_axes(COLUMN_WIDTH, 0.9 + 0.42 * len(order), quantity)
     for row, name in enumerate(order):
         ends = zip(ranges[name], LINE_COLOURS, ("low", "high"), strict=False)
         # where both ends lie on one side, the nearer is drawn on top
@@ -483,9 +480,8 @@ def draw_accuracy(found: Accuracy) -> Figure:
     Returns:
         The figure.
     """
-    figure = new_figure(7.2, 5.0)
-    axes = figure.add_subplot()
-    style_axes(axes, "computing time [s]", "error of the largest |e| of a joint [-]")
+    labels = "computing time [s]", "error of the largest |e| of a joint [-]"
+    figure, axes = new_axes(7.2, 5.0, *labels)
     axes.set(xscale="log", yscale="log")
     axes.tick_params(which="both", labelsize=LABEL_SIZE)
     # smaller errors are drawn at this one: they are uncertain, or exactly zero

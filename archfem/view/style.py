@@ -132,6 +132,14 @@ def style_length_axes(axes: Axes) -> None:
     axes.set_aspect("equal")
 
 
+def new_axes(width: float, height: float, x: str = "", y: str = "") -> tuple[Figure, Axes]:
+    """Return an empty figure of a size [inch] and its only axes, with their labels."""
+    figure = new_figure(width, height)
+    axes = figure.add_subplot()
+    style_axes(axes, x, y)
+    return figure, axes
+
+
 def structure_axes(structure: Structure, axes: Axes | None = None) -> Axes:
     """Return styled axes that show a structure true to scale, by default those of a new figure."""
     axes = structure_figure(structure).add_subplot() if axes is None else axes

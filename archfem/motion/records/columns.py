@@ -41,8 +41,7 @@ def read(
             )
         chosen, directions = [column - 1], []
     named = directions if len(directions) == len(chosen) else [""] * len(chosen)
-    pairs = zip(chosen, named, strict=True)
-    return [Channel.from_direction(rows[:, index] * unit, step, name) for index, name in pairs]
+    return Channel.from_table(rows[:, chosen] * unit, step, named)
 
 
 def _read_table(text: RecordText) -> tuple[Array, list[int], str]:

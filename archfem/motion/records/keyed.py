@@ -1,7 +1,6 @@
 """Text files with named values above the samples: AFAD, CWB, ESM, K-NET, PEER and UNAM."""
 
 import re
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -21,7 +20,7 @@ def read_afad(text: RecordText) -> list[Channel]:
     stated = [float(peak) * unit for peak in re.findall(rf"\)\s*({NUMBER_PATTERN})", peaks[2])]
     # the header has the peaks before the correction of the offset
     _check_peaks(text, table, stated, tolerance=0.5)
-    return _create_channels(table, text.check_step(float(step[1]), step_line), names.groups())
+    return Channel.from_table(table, text.check_step(float(step[1]), step_line), names.groups())
 
 
 def read_unam(text: RecordText) -> list[Channel]:
@@ -41,7 +40,7 @@ def read_unam(text: RecordText) -> list[Channel]:
     stated = [_parse_number(text, peak) for peak in peaks]
     _check_peaks(text, table * (unit / 0.01), stated, rounding=0.005)
     dt = text.check_step(_parse_number(text, steps[0]))
-    return _create_channels(table * unit, dt, names)
+    return Channel.from_table(table * unit, dt, names)
 
 
 def _list_unam_values(text: RecordText, key: str) -> list[str]:
@@ -68,7 +67,7 @@ def read_cwb(text: RecordText) -> list[Channel]:
     extremes = rf"^#AmplitudeMAX\.\s*%s:\s*({NUMBER_PATTERN})\s*~\s*({NUMBER_PATTERN})"
     stated = [max(map(float, text.find(extremes % name)[1].groups()), key=abs) for name in names]
     _check_peaks(text, table[:, 1:], stated, rounding=0.0005)
-    return _create_channels(table[:, 1:] * unit, dt, names)
+    return Channel.from_table(table[:, 1:] * unit, dt, names)
 
 
 def _read_table(text: RecordText, first: int, count: int, width: int) -> Array:
@@ -79,25 +78,10 @@ def _read_table(text: RecordText, first: int, count: int, width: int) -> Array:
     return np.reshape(numbers, (-1, width))
 
 
-def _check_peaks(
-    text: RecordText,
-    table: Array,
-    stated: Sequence[float],
-    *,
-    tolerance: float = 0.02,
-    rounding: float = 0.0,
-) -> None:
+def _check_peaks(text: RecordText, table: Array, stated: list[float], **limits: float) -> None:
     """Compare the columns of a table with the peaks of the header."""
     for column, peak in zip(table.T, stated, strict=False):
-        text.check_peak(column, peak, tolerance, rounding)
-
-
-def _create_channels(table: Array, dt: float, names: Sequence[str]) -> list[Channel]:
-    """Create a channel of each column."""
-    return [
-        Channel.from_direction(column, dt, name)
-        for column, name in zip(table.T, names, strict=True)
-    ]
+        text.check_peak(column, peak, **limits)
 
 
 def read_esm(text: RecordText) -> list[Channel]:

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from os import PathLike
@@ -237,6 +237,12 @@ class Channel:
             return cls(-samples, dt, f"{name}, turned up", True)
         upward = r"\b(UP|UPDO|VERT|VERTICAL|V|VER|U-D|UD|U|Z|[A-Z]{2}Z)\b|UP$"
         return cls(samples, dt, name, bool(re.search(upward, name, re.IGNORECASE)))
+
+    @classmethod
+    def from_table(cls, table: Array, dt: float, names: Sequence[str]) -> "list[Channel]":
+        """Create a channel of each column of a table (n, columns)."""
+        columns = zip(table.T, names, strict=True)
+        return [cls.from_direction(column, dt, name) for column, name in columns]
 
 
 class RecordFormat(NamedTuple):

@@ -21,7 +21,6 @@ from archfem.statics.modes import Modes
 from archfem.view.films.encoder import Image, film_path, write_film
 from archfem.view.films.frames import (
     Frame,
-    FrameTiming,
     Window,
     frame_of_state,
     frame_timing,
@@ -111,15 +110,19 @@ def film(  # noqa: PLR0913  (a film has many settings)
 
         frames = _frames(setup, run, _thin(timing.times, setup))
         return write_scenes(target, setup, run, frames)
-    return write_film(target, _draw_frames(setup, run, timing, size, painter), timing.fps)
+    layout = FrameLayout(setup, size, run.joints, run, painter)
+    frames = _frames(setup, run, timing.times)
+    bar = tqdm(frames, total=len(timing.times), unit="frame", disable=None, leave=False)
+    pairs = zip(bar, timing.speeds, strict=True)
+    images = (layout.compose(frame, float(speed)) for frame, speed in pairs)
+    return write_film(target, images, timing.fps)
 
 
 def _thin(times: Array, setup: Setup) -> Array:
     """Return at most 60 of the times: a page holds the blocks of each, and has some 10 MB."""
     most = int(np.clip(100_000 / len(setup.triangles.cell), 5, 60))
     chosen = np.linspace(0, len(times) - 1, min(len(times), most))
-    thinned: Array = times[chosen.round().astype(int)]
-    return thinned
+    return times[chosen.round().astype(int)]
 
 
 def _times_before_fall(times: Array, falls: FallingBlocks | None) -> Array:
@@ -168,9 +171,8 @@ def picture(
     model, q = model_and_coordinates(model, q)
     joints = joints_of_state(model, q, joints, criteria)
     setup = Setup.of(model, q[None], colour, magnification)
-    return (
-        FrameLayout(setup, size, joints).compose(frame_of_state(setup, q, joints))[..., :3].copy()
-    )
+    image = FrameLayout(setup, size, joints).compose(frame_of_state(setup, q, joints))
+    return image[..., :3].copy()
 
 
 def _choose_painter(renderer: str) -> type[FramePainter]:
@@ -182,21 +184,6 @@ def _choose_painter(renderer: str) -> type[FramePainter]:
     from archfem.view.films.viewer import ScenePainter
 
     return ScenePainter
-
-
-def _draw_frames(
-    setup: Setup,
-    run: History,
-    timing: FrameTiming,
-    size: tuple[int, int],
-    painter: type[FramePainter],
-) -> Iterator[Image]:
-    """Yield the images of a film, with a progress bar."""
-    layout = FrameLayout(setup, size, run.joints, run, painter)
-    frames = _frames(setup, run, timing.times)
-    bar = tqdm(frames, total=len(timing.times), unit="frame", disable=None, leave=False)
-    for frame, speed in zip(bar, timing.speeds, strict=True):
-        yield layout.compose(frame, float(speed))
 
 
 @validate_arguments

@@ -72,8 +72,7 @@ def check_options(
 def colour_values(cells: Cells, q: Array, colour: str) -> Array:
     """Return displacements of points [mm], or least principal stresses of cells [MPa]."""
     if colour == "displacement":
-        lengths: Array = np.linalg.norm(cells.displacement(q), axis=1)
-        return lengths / mm
+        return np.linalg.norm(cells.displacement(q), axis=1) / mm
     assert cells.stress is not None, "checked by check_options"
     xx, yy, xy = (cells.stress @ q).reshape(-1, 3).T / MPa
     return 0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy)
