@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -66,6 +67,19 @@ def test_a_client_gives_the_rows_that_processes_give(study_file, tmp_path, clien
     found = study.run(tmp_path / "out", client=client)
     assert found.identical(study.run(tmp_path / "serial", workers=1))
     assert equal_tables(tmp_path / "out", tmp_path / "serial")
+
+
+def test_an_analysis_of_blocks_is_varied_on_a_cluster_and_on_processes(tmp_path, client):
+    """A structure of Python, whose joints are not those of any preset, travels whole."""
+    wall = af.column(breadth=0.6, heights=[1.0, 1.0], contact=af.Contact(3e9, 1e9, friction=0.4))
+    moved = replace(wall, joints=(replace(wall.joints[0], name="foot"), *wall.joints[1:]))
+    analysis = af.Analysis(moved, fidelity="rigid")
+    study = af.Study(analysis, vary={"structure.width": [1.0, 2.0]})
+    found = study.run(tmp_path / "out", client=client)
+    assert found.identical(study.run(workers=2))
+    assert found["frequency"].values[0] == analysis.modes(1).frequencies[0]
+    # the weight of the upper stone, for the whole width
+    assert found["N"].values == pytest.approx([12e3, 24e3], rel=1e-9)
 
 
 def test_a_pair_is_matched_once_on_a_cluster(matching_study, tmp_path, client):
