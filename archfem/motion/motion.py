@@ -334,5 +334,7 @@ class Motion(ResultDisplay):
             raise InvalidInput(f"{steps}: bring one to the other's with resampled")
 
     def _map_components(self, change: Callable[..., Array], *args: Any, **options: Any) -> "Motion":
-        rows = {name: change(self.component(name), *args, **options) for name in self.components}
+        rows: dict[str, Any] = {
+            name: change(self.component(name), *args, **options) for name in self.components
+        }
         return replace(self, **rows)
