@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 
 from archfem._typing import Array, Numbers
 from archfem.errors import InvalidInput
-from archfem.joints.large.face_kinematics import FaceKinematics, face_pose
+from archfem.joints.large.face_kinematics import face_pose
 from archfem.joints.large.forces import (
     JointStepForces,
     allocate_step_forces,
@@ -123,23 +123,6 @@ def _mean_axis_motions(small: LinearBlockModel, columns: Any, momentum: Array) -
     basis[own, np.arange(len(own))] = 1.0
     basis[common] = -np.linalg.solve(momentum[:, common], momentum[:, own])
     return basis
-
-
-@dataclass(frozen=True, eq=False)
-class Slots:
-    """Places of the joint forces and their rates among the model's coordinates."""
-
-    rows: tuple[Any, Any]  # coordinates, and entries of `JointStepForces.force` for them
-    pairs: tuple[Any, Any]  # rows and columns of the blocks of their derivatives
-
-
-def find_slots(sides: FaceKinematics, size: int) -> tuple[Slots, sparse.csr_matrix]:
-    """Return slots of all joints, and a matrix with entries where joints couple coordinates."""
-    used = np.arange(sides.index.shape[-1]) < sides.size[:, :, None]
-    rows, columns = find_rate_pairs(sides)
-    coupling = sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), (size, size))
-    entries = np.flatnonzero(used)
-    return Slots((sides.index.ravel()[entries], entries), (rows, columns)), coupling
 
 
 def check_small_model(small: Model) -> LinearBlockModel:
@@ -284,12 +267,18 @@ class LargeDisplacementModel(Model):
         self.centres = blocks.centres  # about which blocks rotate (n_blocks, 2) [m]
         self.segments = JointSegments.of(self.small)
         self.joints = build_large_joints(self.small, self.segments, blocks.blocks, blocks.centres)
-        self._slots, coupled = find_slots(self.joints.kinematics, self.size)
+        sides = self.joints.kinematics
+        # entries of `JointStepForces.force` that act on a coordinate, and these coordinates
+        used = np.arange(sides.index.shape[-1]) < sides.size[:, :, None]
+        self._forces = np.flatnonzero(used)
+        self._rows = sides.index.ravel()[self._forces]
+        pairs = find_rate_pairs(sides)
+        coupled = sparse.csr_matrix((np.ones(len(pairs[0])), pairs), (self.size, self.size))
         pattern = Pattern.of(self.small.mass, self.small.block_stiffness, coupled)
         self.mass = pattern.spread(self.small.mass)
         self.block_stiffness = pattern.spread(self.small.block_stiffness)
         self._pattern = pattern
-        self._entries = pattern.find_entries(*self._slots.pairs).astype(np.uint32)
+        self._entries = pattern.find_entries(*pairs).astype(np.uint32)
         self.mass_influence = self.small.mass_influence
         self.cells: RotatingCells = RotatingCells.of(self.small.cells, blocks.blocks)
         self.support_motion = self.small.support_motion
@@ -360,8 +349,7 @@ class LargeDisplacementModel(Model):
 
     def gather_forces(self, force: Array) -> Array:
         """Return generalised forces from those on the coordinates of each face (n,)."""
-        rows, places = self._slots.rows
-        return np.asarray(np.bincount(rows, force.ravel()[places], self.size), dtype=float)
+        return np.bincount(self._rows, force.ravel()[self._forces], self.size)
 
     def assemble_tangent(
         self, block_factor: float, joint_factor: float, forces: JointStepForces
