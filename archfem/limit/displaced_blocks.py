@@ -231,7 +231,7 @@ def tangent(normal: Array) -> Array:
     return np.array([normal[1], -normal[0]])
 
 
-def merge_blocks(structure: Structure, welded: Sequence[int]) -> Numbers:
+def merge_blocks(structure: Structure, welded: Sequence[int] | Numbers) -> Numbers:
     """Return the number of the body of each block, -1 for those welded to fixed ones."""
     count = len(structure.blocks)
     fixed = [number for number, block in enumerate(structure.blocks) if block.fixed]

@@ -25,11 +25,6 @@ class PartialStructure(LinearBlockModel):
         self.standing: Flags = np.array([block.fixed for block in whole.structure.blocks])
         self.centred: Flags = np.zeros_like(self.standing)
         self._last = None
-        # block of each coordinate: the one whose points it displaces
-        shapes = whole.cells.shape_functions.tocoo()
-        moving = shapes.data != 0.0
-        self._owner = np.zeros(whole.size, dtype=np.intp)
-        self._owner[shapes.col[moving]] = whole.cells.block[shapes.row[moving] // 2]
         self._rows = np.repeat(np.arange(whole.size), np.diff(whole.mass.indptr))
         # stiffness of held coordinates, of the order of the others' for the condition of matrices
         self._held_stiffness = float(np.mean(whole.closed_tangent().diagonal()))
@@ -66,7 +61,7 @@ class PartialStructure(LinearBlockModel):
     @property
     def _free(self) -> Flags:
         """Which coordinates belong to blocks that stand without centring (n,)."""
-        return (self.standing & ~self.centred)[self._owner]
+        return (self.standing & ~self.centred)[self.cells.coordinate_owner]
 
     def assemble_tangent(self, block_factor: float, stiffness: Array) -> sparse.csr_matrix:
         """Return the tangent of what stands; held coordinates have a stiffness of their own."""

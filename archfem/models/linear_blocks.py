@@ -272,12 +272,17 @@ class LinearObserver(Observer):
         return shift
 
 
+def joint_orientation(structure: Structure) -> Array:
+    """Return 1 where the extrados is on the left of a joint's normal, -1 on the right (j,)."""
+    (nx, ny), (tx, ty) = structure.normals.T, structure.tangents.T
+    return np.where(nx * ty - ny * tx > 0.0, 1.0, -1.0)
+
+
 def linear_observer(model: Model, operator: JointOperator) -> LinearObserver:
     """Return the observer of a model of small displacements, built once for each model."""
     if "observer" not in model.derived:
         model.derived["observer"] = _build_observer(model, operator)
-    observer: LinearObserver = model.derived["observer"]
-    return observer
+    return model.derived["observer"]
 
 
 def _build_observer(model: Model, operator: JointOperator) -> LinearObserver:
@@ -285,9 +290,8 @@ def _build_observer(model: Model, operator: JointOperator) -> LinearObserver:
     structure, cells = model.structure, model.cells
     of_faces, face_offset = face_matrix(operator)
     corners = cells.corners(structure)
-    of_corners = cells.shape_functions[np.add.outer(2 * corners, (0, 1)).ravel()]
     return LinearObserver(
-        sparse.vstack([of_faces, of_corners], "csr"),
+        sparse.vstack([of_faces, cells.shapes_at(corners)], "csr"),
         # corners are read from zero on
         np.concatenate([face_offset, np.zeros(2 * len(corners))]),
         len(structure.joints),

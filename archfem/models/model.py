@@ -43,6 +43,19 @@ class Cells:
         """Number of the block of each polygon (n_polygons,)."""
         return self.block[[polygon[0] for polygon in self.polygons]]
 
+    @cached_property
+    def coordinate_owner(self) -> Numbers:
+        """Number of the block of each coordinate: the one whose points it displaces (n,)."""
+        shapes = self.shape_functions.tocoo()
+        moving = shapes.data != 0.0
+        owner = np.zeros(shapes.shape[1], dtype=np.intp)
+        owner[shapes.col[moving]] = self.block[shapes.row[moving] // 2]
+        return owner
+
+    def shapes_at(self, points: Numbers) -> sparse.csr_matrix:
+        """Return the matrix from coordinates to the displacements of some points (2 k, n)."""
+        return self.shape_functions[np.add.outer(2 * points, (0, 1)).ravel()]
+
     def corners(self, structure: Structure) -> Numbers:
         """Return the points nearest to the corners of the free blocks, block by block (c,).
 
@@ -192,7 +205,8 @@ class ModelStep(Protocol):
         """Return the joint memory at the end of the step, as `Model.memory`."""
 
     def with_dilatancy(self, q: Array) -> "ModelStep":
-        """Return the step with the dilatancy opening due to the slip on the way to q."""
+        """Return the step with the dilatancy opening due to the slip on the way to q, if any."""
+        return self
 
     def dissipation(self, q: Array) -> float:
         """Return the energy lost to friction, broken bonds and damping [J]; never negative."""
@@ -394,8 +408,7 @@ class Model(Protocol):
 
         Copies with another memory share them, and no others do.
         """
-        results: dict[str, Any] = vars(self).setdefault("_derived", {})
-        return results
+        return vars(self).setdefault("_derived", {})
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the attributes of a copy, to which what was derived may not apply."""

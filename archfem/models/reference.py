@@ -254,7 +254,7 @@ class MonolithicModel(Model):
 
 
 @dataclass(frozen=True, eq=False)
-class MonolithicStep:
+class MonolithicStep(ModelStep):
     """A time step of the reference model."""
 
     model: MonolithicModel  # with the joint memory at the start
@@ -282,10 +282,6 @@ class MonolithicStep:
     def updated_memory(self, q: Array) -> Array:
         """Return the irreversible slip of each joint point at the end (p,) [m]."""
         return self.model.facets.gather(self._tractions(q)[2])
-
-    def with_dilatancy(self, q: Array) -> "MonolithicStep":
-        """Return the step itself: the weak forms exclude dilatancy."""
-        return self
 
     def dissipation(self, q: Array) -> float:
         """Return the energy lost to friction and damping [J]."""

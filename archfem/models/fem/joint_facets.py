@@ -19,6 +19,7 @@ from archfem.joints.quadrature import Quadrature
 from archfem.masonry.materials import Contact
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.space import BrokenSpace
+from archfem.models.linear_blocks import joint_orientation
 
 # Values that describe a facet before those of its points: x and y of its beginning, direction over
 # length (x, y), and the sign of its tangent
@@ -117,13 +118,6 @@ class JointFacets:
         """Number p of joint points."""
         return int(self.points.max()) + 1
 
-    @property
-    def _tangent_signs(self) -> Array:
-        """1 where the normal, rotated to the left, points to the extrados, else -1 (f,)."""
-        structure = self.space.mesh.structure
-        x, y = structure.normals.T
-        return np.sign(np.sum(np.stack([-y, x], 1) * structure.tangents, 1))[self.joint]
-
     @cached_property
     def patches(self) -> list[Patch]:
         """The facets, by contact and colour."""
@@ -160,7 +154,8 @@ class JointFacets:
         start, length = self._ends[:, :1], np.diff(self._ends, axis=1)
         along = structure.tangents[self.joint]
         begin = structure.middles[self.joint] + start * along
-        place = np.hstack([begin, along / length, self._tangent_signs[:, None]])
+        signs = joint_orientation(structure)[self.joint]
+        place = np.hstack([begin, along / length, signs[:, None]])
         function = fem.Function(functions)
         function.x.array[entries[..., :FACET_VALUE_COUNT]] = place[:, None]
         return function, entries[..., FACET_VALUE_COUNT:]

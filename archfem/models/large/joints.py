@@ -23,7 +23,7 @@ from archfem.joints.large.forces import LargeDisplacementJoints
 from archfem.joints.large.overlap_law import FaceLaw
 from archfem.joints.large.rates import find_block_starts
 from archfem.masonry.structure import Structure
-from archfem.models.linear_blocks import LinearBlockModel
+from archfem.models.linear_blocks import LinearBlockModel, joint_orientation
 
 # Deviation of a face from its nearest plane, relative to its motion, that counts as round-off [-]
 PLANE_FACE_TOLERANCE = 1e-9
@@ -112,12 +112,6 @@ def _check_exact(model: LinearBlockModel, number: int) -> None:
         )
 
 
-def joint_orientation(structure: Structure) -> Array:
-    """Return 1 where the extrados is on the left of a joint's normal, -1 on the right (j,)."""
-    (nx, ny), (tx, ty) = structure.normals.T, structure.tangents.T
-    return np.where(nx * ty - ny * tx > 0.0, 1.0, -1.0)
-
-
 def build_large_joints(
     model: LinearBlockModel, segments: JointSegments, blocks: Blocks, centres: Array
 ) -> LargeDisplacementJoints:
@@ -135,14 +129,7 @@ def build_large_joints(
     )
 
 
-def initial_segment_measures(
-    model: LinearBlockModel, segments: JointSegments, gaps: Array
-) -> Array:
-    """Return opening, slip, rotation and elongation of segments from initial gaps (j, 4)."""
-    return np.column_stack(_measure_segments(model, segments, *gaps))
-
-
-def _measure_segments(
+def measure_segments(
     model: LinearBlockModel, segments: JointSegments, opening: Any, slip: Any
 ) -> list[Any]:
     """Return opening, slip, rotation, elongation of segments from those at points (j, …)."""
@@ -166,7 +153,7 @@ def _build_kinematics(
     """Build the kinematics of the faces on both sides of the segments."""
     structure, count = model.structure, len(segments.joint)
     operator = model.operator
-    measures = _measure_segments(model, segments, operator.opening, operator.slip)
+    measures = measure_segments(model, segments, operator.opening, operator.slip)
     measures = [matrix.tocsr() for matrix in measures]
     columns, has_frame = _face_coordinates(structure, segments, blocks, measures)
     most = max(3, *(len(numbers) for numbers in columns.values()))

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 
 from archfem._typing import Array, Numbers
 from archfem.errors import InvalidInput
-from archfem.joints.large.face_kinematics import FaceKinematics, face_pose
+from archfem.joints.large.face_kinematics import face_pose
 from archfem.joints.large.forces import (
     JointStepForces,
     allocate_step_forces,
@@ -33,13 +33,8 @@ from archfem.masonry.loads import Action, BodyForce, PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import rigid_motion_matrix
 from archfem.models.condensed import project_model
-from archfem.models.large.joints import (
-    JointSegments,
-    build_large_joints,
-    initial_segment_measures,
-    joint_orientation,
-)
-from archfem.models.linear_blocks import LinearBlockModel
+from archfem.models.large.joints import JointSegments, build_large_joints, measure_segments
+from archfem.models.linear_blocks import LinearBlockModel, joint_orientation
 from archfem.models.model import Cells, Model, ModelStep, Observer
 
 
@@ -58,15 +53,10 @@ class CorotationalCoordinates:
     @classmethod
     def of(cls, small: LinearBlockModel) -> "CorotationalCoordinates":
         """Return the coordinates of the blocks of a model."""
-        # block of each coordinate: the one whose points it displaces
-        entries = small.cells.shape_functions.tocoo()
-        moving = entries.data != 0.0
-        owner = np.zeros(small.size, dtype=np.intp)
-        owner[entries.col[moving]] = small.cells.block[entries.row[moving] // 2]
         fill, bases, order, blocks, count = set(_find_fill(small)), [], [], {}, 0
         centres = np.array([block.centroid for block in small.structure.blocks], float)
         for number in small.structure.free:
-            columns = np.flatnonzero(owner == number)
+            columns = np.flatnonzero(small.cells.coordinate_owner == number)
             has_frame = number not in fill or len(columns) == 3
             basis: Any = sparse.identity(len(columns))
             if has_frame:
@@ -95,8 +85,7 @@ def _corotational_basis(small: LinearBlockModel, columns: Any, number: int) -> t
     mass = small.mass[columns][:, columns].toarray()
     cells = small.cells
     nodes = np.flatnonzero(cells.block == number)
-    rows = (2 * nodes[:, None] + np.arange(2)).ravel()
-    shapes = cells.shape_functions[rows][:, columns].toarray()
+    shapes = cells.shapes_at(nodes)[:, columns].toarray()
 
     def rigid_motions(centre: Array) -> Array:
         motion = rigid_motion_matrix(cells.places[nodes], centre).reshape(-1, 3)
@@ -134,23 +123,6 @@ def _mean_axis_motions(small: LinearBlockModel, columns: Any, momentum: Array) -
     basis[own, np.arange(len(own))] = 1.0
     basis[common] = -np.linalg.solve(momentum[:, common], momentum[:, own])
     return basis
-
-
-@dataclass(frozen=True, eq=False)
-class Slots:
-    """Places of the joint forces and their rates among the model's coordinates."""
-
-    rows: tuple[Any, Any]  # coordinates, and entries of `JointStepForces.force` for them
-    pairs: tuple[Any, Any]  # rows and columns of the blocks of their derivatives
-
-
-def find_slots(sides: FaceKinematics, size: int) -> tuple[Slots, sparse.csr_matrix]:
-    """Return slots of all joints, and a matrix with entries where joints couple coordinates."""
-    used = np.arange(sides.index.shape[-1]) < sides.size[:, :, None]
-    rows, columns = find_rate_pairs(sides)
-    coupling = sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), (size, size))
-    entries = np.flatnonzero(used)
-    return Slots((sides.index.ravel()[entries], entries), (rows, columns)), coupling
 
 
 def check_small_model(small: Model) -> LinearBlockModel:
@@ -202,9 +174,8 @@ class RotatingCells(Cells):
 
     def select(self, points: Any) -> "RotatingCells":
         """Return some of the points alone, without polygons."""
-        shapes = self.shape_functions[np.add.outer(2 * points, (0, 1)).ravel()]
         places, block, turns = self.places[points], self.block[points], self.turns[points]
-        return RotatingCells(places, block, (), shapes, None, turns)
+        return RotatingCells(places, block, (), self.shapes_at(points), None, turns)
 
     def displacement(self, q: Array) -> Array:
         """Return the displacements of all points (…, m, 2) [m]."""
@@ -296,12 +267,18 @@ class LargeDisplacementModel(Model):
         self.centres = blocks.centres  # about which blocks rotate (n_blocks, 2) [m]
         self.segments = JointSegments.of(self.small)
         self.joints = build_large_joints(self.small, self.segments, blocks.blocks, blocks.centres)
-        self._slots, coupled = find_slots(self.joints.kinematics, self.size)
+        sides = self.joints.kinematics
+        # entries of `JointStepForces.force` that act on a coordinate, and these coordinates
+        used = np.arange(sides.index.shape[-1]) < sides.size[:, :, None]
+        self._forces = np.flatnonzero(used)
+        self._rows = sides.index.ravel()[self._forces]
+        pairs = find_rate_pairs(sides)
+        coupled = sparse.csr_matrix((np.ones(len(pairs[0])), pairs), (self.size, self.size))
         pattern = Pattern.of(self.small.mass, self.small.block_stiffness, coupled)
         self.mass = pattern.spread(self.small.mass)
         self.block_stiffness = pattern.spread(self.small.block_stiffness)
         self._pattern = pattern
-        self._entries = pattern.find_entries(*self._slots.pairs).astype(np.uint32)
+        self._entries = pattern.find_entries(*pairs).astype(np.uint32)
         self.mass_influence = self.small.mass_influence
         self.cells: RotatingCells = RotatingCells.of(self.small.cells, blocks.blocks)
         self.support_motion = self.small.support_motion
@@ -316,7 +293,7 @@ class LargeDisplacementModel(Model):
 
     def with_initial_gaps(self, gaps: Array) -> Self:
         """Return the model with gaps and slips of its joints at q = 0, due to construction."""
-        measures = initial_segment_measures(self.small, self.segments, gaps)
+        measures = np.column_stack(measure_segments(self.small, self.segments, *gaps))
         joints = self.joints._replace(initial_measures=np.ascontiguousarray(measures))
         return self.copy_with(initial_gaps=gaps, joints=joints)
 
@@ -372,8 +349,7 @@ class LargeDisplacementModel(Model):
 
     def gather_forces(self, force: Array) -> Array:
         """Return generalised forces from those on the coordinates of each face (n,)."""
-        rows, places = self._slots.rows
-        return np.asarray(np.bincount(rows, force.ravel()[places], self.size), dtype=float)
+        return np.bincount(self._rows, force.ravel()[self._forces], self.size)
 
     def assemble_tangent(
         self, block_factor: float, joint_factor: float, forces: JointStepForces
@@ -487,8 +463,7 @@ class LargeDisplacementModel(Model):
         """Return the matrix from fill coordinates to a rigid motion of equal momentum (3, s)."""
         cells = self.small.cells
         nodes = np.flatnonzero(cells.block == block)
-        rows = (2 * nodes[:, None] + np.arange(2)).ravel()
-        shapes = cells.shape_functions[rows][:, own]
+        shapes = cells.shapes_at(nodes)[:, own]
         motion = rigid_motion_matrix(cells.places[nodes], self.centres[block]).reshape(-1, 3)
         # sparse normal equations: a fill has thousands of coordinates, of unit shapes
         rigid = splu((shapes.T @ shapes).tocsc()).solve(shapes.T @ motion)
@@ -497,7 +472,7 @@ class LargeDisplacementModel(Model):
 
 
 @dataclass(frozen=True, eq=False)
-class LargeDisplacementStep:
+class LargeDisplacementStep(ModelStep):
     """A time step of a model of large displacements."""
 
     model: LargeDisplacementModel  # with the joint memory at the start
@@ -531,10 +506,6 @@ class LargeDisplacementStep:
         change = q - self.start
         in_blocks = self.damping_lag * float(change @ (self.model.block_stiffness @ change))
         return float(self._joints(q).dissipation.sum()) + in_blocks
-
-    def with_dilatancy(self, q: Array) -> "LargeDisplacementStep":
-        """Return the step itself: large displacements exclude dilatancy."""
-        return self
 
 
 @dataclass(frozen=True, eq=False)
