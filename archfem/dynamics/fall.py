@@ -27,7 +27,7 @@ from archfem.dynamics.state import State
 from archfem.errors import DidNotConverge
 from archfem.masonry.stiffness_ratio import mark_stone_joints
 from archfem.masonry.structure import Structure, join_names
-from archfem.models.model import Doubt, Model, check_model
+from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 
 logger = logging.getLogger("archfem")
@@ -56,7 +56,6 @@ def release_blocks(model: Model, state: State) -> ReleasedBlocks:
     Raises:
         InvalidInput: the model's displacements are small.
     """
-    check_model(model)
     poses, velocities = model.rigid_motions(state.q, state.velocity)
     loaded = model if state.memory is None else model.with_memory(state.memory)
     mass = make_bodies(model.structure, 0.0).mass

@@ -133,8 +133,7 @@ class MeetingMonitor:
         """Return how deep stones are in each other at their joints (steps, joints) [m]."""
         gap, rotation, slip = np.moveaxis(faces[..., self._joints], -2, 0)
         overlap = np.maximum(self.model.structure.depths[self._joints] - np.abs(slip), 0.0)
-        depths: Array = np.maximum(0.5 * overlap * np.abs(rotation) - gap, 0.0)
-        return depths
+        return np.maximum(0.5 * overlap * np.abs(rotation) - gap, 0.0)
 
     @cached_property
     def _joints(self) -> NDArray[np.intp]:
@@ -151,8 +150,7 @@ class MeetingMonitor:
             fill = list(find_yielding_blocks(self.model.structure))
             gaps[fill] = gaps[:, fill] = np.inf
             derived["gaps"] = start, gaps
-        gaps = derived["gaps"][1]
-        return gaps
+        return derived["gaps"][1]
 
     @cached_property
     def _limits(self) -> Array:
@@ -219,8 +217,7 @@ class MeetingMonitor:
         free = self._owner[first]
 
         def mean(values: NDArray[Any]) -> NDArray[Any]:
-            means: NDArray[Any] = np.add.reduceat(values, first, axis=-1) / counts
-            return means
+            return np.add.reduceat(values, first, axis=-1) / counts
 
         middle, moved = mean(places), mean(_as_complex(corners))
         arms = places - np.repeat(middle, counts)

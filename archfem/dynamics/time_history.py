@@ -231,22 +231,10 @@ def _make_recorder(
     stepper: Stepper, first: Batch, dt: float | None, record: Record, criteria: Criteria
 ) -> Recorder:
     """Return the recorder of a run, with its validity checks."""
-    model = stepper.equation.model
-    return Recorder(
-        model=model,
-        method=stepper.name,
-        dt=dt,
-        every=record.every,
-        fields_every=record.fields_every,
-        criteria=criteria,
-        monitor=RunMonitor(
-            model,
-            first,
-            damps=isinstance(stepper.equation.scheme, HHT),
-            mass_damping=stepper.equation.drag,
-        ),
-        state=first.state(0),
-    )
+    equation = stepper.equation
+    damps, drag = isinstance(equation.scheme, HHT), equation.drag
+    monitor = RunMonitor(equation.model, first, damps=damps, mass_damping=drag)
+    return Recorder(monitor, first.state(0), stepper.name, dt, record, criteria)
 
 
 # What may end a run: an event, and blocks that become loose where displacements are large

@@ -29,7 +29,7 @@ from archfem.dynamics.history import Ending, first_mechanisms, partial_history
 from archfem.dynamics.motion_scaling import (
     COLLAPSE_DEFINITION,
     ScaledRun,
-    largest_allowed_scale,
+    admissible_range,
     search_scales,
 )
 from archfem.errors import DidNotConverge, InvalidInput
@@ -75,8 +75,7 @@ def search_limit_states(
         fall = CollapseState(run["fall"], None, (), nan, nan, True) if run["fall"] else None
         return ScaledRun(scale, reached, Ending(run["ending"]), run["outcome"], fall)
 
-    least, largest = between
-    reach = (least, max(least, min(largest, largest_allowed_scale(motion))))
+    reach = admissible_range(between, motion)
     brackets = search_scales(run_scaled, limits, precision, reach)
     if brackets.interrupted:
         raise KeyboardInterrupt
