@@ -249,22 +249,20 @@ def is_resting(model: Model, state: State, shaken: bool) -> bool:
     return _is_still(model, state) or (not shaken and _only_vibrates(model, state))
 
 
-def _only_vibrates(
-    model: Model, state: State, max_rise: float = 2e-4, max_rotation: float = 0.02
-) -> bool:
+def _only_vibrates(model: Model, state: State) -> bool:
     """Return whether blocks move too weakly to overturn on a ground at rest.
 
-    The kinetic energy of each block suffices to raise it by less than `max_rise` of the depth of
-    the shallowest joint, and no joint is rotated by more than `max_rotation` [rad].
+    The kinetic energy of each block suffices to raise it by less than 2e-4 of the depth of the
+    shallowest joint, and no joint is rotated by more than 0.02 rad.
     """
     # A column of slenderness 20, tilted by 0.02 rad, has to rise by 4.5e-3 of its width to overturn
-    if _largest_rotation(model, state) > max_rotation:
+    if _largest_rotation(model, state) > 0.02:
         return False
     free = list(model.structure.free)
     mass, inertia = make_bodies(model.structure, 0.0).mass[free].T
     velocities = model.rigid_motions(state.q, state.velocity)[1][free]
     squares = np.sum(velocities[:, :2] ** 2, axis=1) + inertia / mass * velocities[:, 2] ** 2
-    return bool(np.max(squares / (2.0 * G)) <= max_rise * shallowest_depth(model.structure))
+    return bool(np.max(squares / (2.0 * G)) <= 2e-4 * shallowest_depth(model.structure))
 
 
 def _largest_rotation(model: Model, state: State) -> float:
