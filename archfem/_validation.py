@@ -69,6 +69,13 @@ def declared_keys(declaration: Callable[..., Any], named: tuple[type, ...] = ())
     return {name: kind for name, kind in kinds.items() if kind is not None}
 
 
+def given_fields(instance: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass that are not None and differ from their defaults."""
+    values = {each.name: getattr(instance, each.name) for each in fields(instance)}
+    defaults = {each.name: each.default for each in fields(instance)}
+    return {name: v for name, v in values.items() if v is not None and v != defaults[name]}
+
+
 @cache
 def _kind_of(hint: Any, named: tuple[type, ...]) -> Any:
     """Return the kind of a key with an annotation; None for what no file can hold."""

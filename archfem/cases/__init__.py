@@ -1,19 +1,18 @@
 """Analyses as TOML files, and folders of their results.
 
-    analysis_keys     [limit], [rating] and [assessment]
-    analysis_tables   [model], [analysis], [criteria], [record], [dead_load]: read and written
-    case              Case: an analysis, its motion, outputs
-    defaults          deciding values that a case does not give
-    examples          shipped cases
-    motion_keys       [motion] and [suite]
-    provenance        digests of inputs and program, modules of the user
-    report            HTML report of the results of a case
-    result_folder     result folders written and opened again
-    result_text       results as text
-    run               carry out a case, resume, result classes
-    structure_keys    [structure], [materials] and [contacts]
-    structure_writer  structures as tables
-    toml_file         reading, writing, merging, overriding TOML tables
+    analysis_keys    [limit], [rating] and [assessment]
+    analysis_tables  [model], [analysis], [criteria], [record], [dead_load]: read and written
+    case             Case: an analysis, its motion, outputs
+    defaults         deciding values that a case does not give
+    examples         shipped cases
+    motion_keys      [motion] and [suite]
+    provenance       digests of inputs and program, modules of the user
+    report           HTML report of the results of a case
+    result_folder    result folders written and opened again
+    result_text      results as text
+    run              carry out a case, resume, result classes
+    structure_keys   [structure], [materials] and [contacts]: read and written
+    toml_file        reading, writing, merging, overriding TOML tables
 
 Imports all rooms before it. Start reading at `case`, then at `run`.
 """

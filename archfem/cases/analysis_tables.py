@@ -5,11 +5,11 @@ read and written by the same declaration. A value that equals its default is not
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from archfem._validation import declared_keys
+from archfem._validation import declared_keys, given_fields
 from archfem.cases.provenance import name_from
 from archfem.cases.toml_file import Table, check_choice, check_table, read_object
 from archfem.dynamics.analysis import Analysis
@@ -85,12 +85,8 @@ def read_analysis(settings: Table, structure: Structure, folder: Path) -> Analys
 
 def write_analysis_tables(analysis: Analysis, folder: Path | None) -> dict[str, Any]:
     """Return the tables of an analysis, but for its structure; files are named from a folder."""
-    tables: dict[str, Any] = {}
-    given = {
-        each.name: value
-        for each in fields(analysis)[1:]
-        if (value := getattr(analysis, each.name)) is not None and value != each.default
-    }
+    tables, given = dict[str, Any](), given_fields(analysis)
+    del given["structure"]
     writers: Mapping[str, Callable[[Any], Any]] = {
         "cells": list,
         "mesh_file": lambda file: name_from(file, folder),
@@ -114,12 +110,8 @@ def write_analysis_tables(analysis: Analysis, folder: Path | None) -> dict[str, 
 
 def write_fields(value: Any) -> dict[str, Any]:
     """Return the fields of an object, but for those that equal their default, as a table."""
-    table = {
-        each.name: own
-        for each in fields(value)
-        if (own := getattr(value, each.name)) is not None and own != each.default
-    }
-    return {name: list(own) if isinstance(own, tuple) else own for name, own in table.items()}
+    given = given_fields(value)
+    return {name: list(own) if isinstance(own, tuple) else own for name, own in given.items()}
 
 
 def _read_damping(given: str | Table) -> Viscous | EffectiveDamping:

@@ -16,8 +16,7 @@ from archfem._validation import check_words, validate_arguments
 from archfem.cases import analysis_keys, motion_keys, provenance
 from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis
 from archfem.cases.analysis_tables import read_analysis, write_analysis_tables
-from archfem.cases.structure_keys import cached_structure
-from archfem.cases.structure_writer import write_structure
+from archfem.cases.structure_keys import cached_structure, write_structure
 from archfem.cases.toml_file import (
     Table,
     apply_change,

@@ -405,14 +405,10 @@ def _run_motion(
     return Run(case, motion, history, path, seconds=seconds, error=failure)
 
 
-def doubt_fidelity(
-    at_rest: DeadLoadResult,
-    motion: Motion,
-    history: History,
-    # of the largest |e| [-]; rigid stones of ordinary stiffness differ by 0.02 where joints slide
-    tolerance: float = 0.03,
-) -> list[Doubt]:
+def doubt_fidelity(at_rest: DeadLoadResult, motion: Motion, history: History) -> list[Doubt]:
     """Return a doubt where the next finer fidelity disagrees in |e| at the start of a run."""
+    # of the largest |e| [-]; rigid stones of ordinary stiffness differ by 0.02 where joints slide
+    tolerance = 0.03
     # Softened joints differ as a finer fidelity does, by a factor of 0.35 at least in 180 random
     # runs, and without a mesh, whose libraries take longer to load than the run.
     screened = _compare_start(at_rest, at_rest.softened, motion, history)

@@ -1,21 +1,27 @@
-"""Structures of case files: [structure], [materials], [contacts] and [dead_load].
+"""Structures of case files: [structure], [materials] and [contacts], read and written.
 
 The keys of a table are the arguments of the shape, part or material that it describes, with the
 units of their annotations (`declared_keys`).
+
+A structure is written by shape and lengths where these are known, or by its blocks. Either way the
+tables are read once and compared, so that a file has every bit of it.
 """
 
 import inspect
 import json
-from collections import OrderedDict
-from collections.abc import Callable
-from dataclasses import replace
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
-from archfem._validation import declared_keys
+import numpy as np
+
+from archfem._validation import declared_keys, given_fields
 from archfem.cases.provenance import hash_file, list_input_files
 from archfem.cases.toml_file import Table, check_choice, check_table
-from archfem.errors import InvalidInput
+from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.own_law import JointLaw, build_registered_law, registered_laws
 from archfem.masonry.assembly import assembled
 from archfem.masonry.backfill import jointed_fill
@@ -30,6 +36,15 @@ Described = TypeVar("Described")
 
 # Parts of which a bridge has several, from left to right, each under its name
 BRIDGE_PARTS: Table = {"arches": Arch, "piers": Pier, "sidewalls": Sidewall}
+
+# Materials and contacts that no table need describe, by section
+_PRESETS: Mapping[str, Mapping[str, Any]] = {
+    "materials": MATERIAL_PRESETS,
+    "contacts": CONTACT_PRESETS,
+}
+
+# Joint.contact and Block.material of most parts stand once, above the lists
+_SHARED = ("material", "contact")
 
 _recent_structures: OrderedDict[str, Structure] = OrderedDict()
 
@@ -113,8 +128,10 @@ def _read_blocks(settings: Table) -> Structure:
     return assembled(blocks, _contact(settings, contact), **values)
 
 
-def _read_part(cls: type[Described], table: Table, section: str, settings: Table) -> Described:
-    """Return a block or joint of a table."""
+def _read_part(
+    cls: Callable[..., Described], table: Table, section: str, settings: Table
+) -> Described:
+    """Return a block, joint or part of a bridge of a table."""
     values = check_table(table, _keys_of(cls), section)
     return _call(cls, section, **_resolve_names(cls, values, settings))
 
@@ -142,9 +159,7 @@ def _bridge_parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
             parts[key] = _build_parts(part, parts[key], f"structure.{key}")
     for key, single in {"backfill": Backfill, "paving": Paving}.items():
         if key in parts:
-            given = check_table(parts[key], _keys_of(single), f"structure.{key}")
-            given = _resolve_names(single, given, settings)
-            parts[key] = _call(single, f"structure.{key}", **given)
+            parts[key] = _read_part(single, parts[key], f"structure.{key}", settings)
     return parts
 
 
@@ -201,8 +216,7 @@ def _call(function: Callable[..., Described], section: str, **values: Any) -> De
     parameters = inspect.signature(function).parameters.values()
     required = [key.name for key in parameters if key.default is key.empty]
     if missing := [key for key in required if key not in values]:
-        presets: Table = {"contacts": CONTACT_PRESETS, "materials": MATERIAL_PRESETS}
-        known = sorted(presets.get(section.partition(".")[0], ()))
+        known = sorted(_PRESETS.get(section.partition(".")[0], ()))
         names = f"; tables of these names change what is there: {known}" if known else ""
         raise InvalidInput(
             f"{section} lacks {', '.join(missing)}: give them, or correct the name of the "
@@ -213,19 +227,19 @@ def _call(function: Callable[..., Described], section: str, **values: Any) -> De
 
 def _material(settings: Table, name: str) -> Material:
     """Return a material: a preset, or described or changed by a table of the case."""
-    return _resolve_preset(settings, "materials", name, MATERIAL_PRESETS, Material)
+    return _resolve_preset(settings, "materials", name, Material)
 
 
 def _contact(settings: Table, name: str) -> Contact:
     """Return a contact: a preset, or described or changed by a table of the case."""
-    return _resolve_preset(settings, "contacts", name, CONTACT_PRESETS, Contact)
+    return _resolve_preset(settings, "contacts", name, Contact)
 
 
 def _resolve_preset(
-    settings: Table, section: str, name: str, presets: Table, cls: Callable[..., Described]
+    settings: Table, section: str, name: str, cls: Callable[..., Described]
 ) -> Described:
     """Return a named preset with the changes of its table, or the object of the table alone."""
-    tables = settings.get(section, {})
+    tables, presets = settings.get(section, {}), _PRESETS[section]
     if name not in presets and name not in tables:
         raise InvalidInput(
             f"'{name}' is not among the {section} {sorted(set(presets) | set(tables))}: "
@@ -251,3 +265,121 @@ def _joint_law(table: Table, section: str) -> JointLaw:
             'class has none: write it there, as in field(metadata={"unit": "Pa/m"})'
         )
     return build_registered_law(name, check_table(values, keys, section))
+
+
+def write_structure(structure: Structure) -> dict[str, Any]:
+    """Return the sections of a case file that describe a structure to the last bit."""
+    for write in (_write_shape, _write_blocks):
+        names = _PresetNames()
+        section = write(structure, names)
+        if section is None:
+            continue
+        tables = {"title": structure.name, "structure": section, **names.sections}
+        try:
+            if cached_structure(tables) == structure:  # which reading the file takes again
+                return tables
+        except ArchfemError:  # lengths of one's own shape, or changed after it was made
+            if write is _write_blocks:
+                raise
+    raise InvalidInput(f"structure '{structure.name}' has values that no case file describes")
+
+
+@dataclass
+class _PresetNames:
+    """Materials and contacts of a structure by the names of their tables."""
+
+    objects: dict[tuple[str, str], Material | Contact] = field(default_factory=dict)
+
+    def name_of(self, item: Material | Contact) -> str:
+        """Return the name of the table of a material or contact, which is added if it is new."""
+        section = "materials" if isinstance(item, Material) else "contacts"
+        presets, number, name = _PRESETS[section], 1, item.name
+        # a table changes a preset of its name key by key: what it leaves out would be the preset's
+        while self.objects.get((section, name), item) != item or (
+            name in presets and set(_list_fields(presets[name])) - set(_list_fields(item))
+        ):
+            number += 1
+            name = f"{item.name} {number}"
+        self.objects[section, name] = item
+        return name
+
+    @property
+    def sections(self) -> dict[str, Any]:
+        """Sections [materials] and [contacts]; presets as they are need no table."""
+        sections: dict[str, Any] = {}
+        for (section, name), item in self.objects.items():
+            if _PRESETS[section].get(name) != item:
+                table = _list_fields(item)
+                if table.pop("name") != name:
+                    table["name"] = item.name
+                sections.setdefault(section, {})[name] = table
+        return sections
+
+
+def _list_fields(item: Material | Contact) -> dict[str, Any]:
+    """Return the fields of a material or contact that are not None, as a table."""
+    table = {each.name: getattr(item, each.name) for each in fields(item)}
+    table = {name: value for name, value in table.items() if value is not None}
+    if table.get("friction") == inf:
+        table["friction"] = "none"
+    if "law" in table:
+        table["law"] = _write_law(item)
+    return table
+
+
+def _write_law(contact: Any) -> dict[str, Any]:
+    """Return the table of a law of the user, which must be registered."""
+    for name, cls in registered_laws.items():
+        if type(contact.law) is cls:
+            return {"name": name, **{key: getattr(contact.law, key) for key in declared_keys(cls)}}
+    raise InvalidInput(
+        f"law {contact.law!r} of '{contact.name}' has no name in a file: register its class by "
+        "archfem.joints.register_joint_law"
+    )
+
+
+def _write_shape(structure: Structure, names: _PresetNames) -> dict[str, Any] | None:
+    """Return shape and lengths by which a structure was made; None where these are not known."""
+    if structure.origin is None:
+        return None
+    shape, arguments = structure.origin
+    try:
+        section = {key: _write_argument(value, names) for key, value in arguments.items()}
+    except TypeError:  # a function, which no file holds
+        return None
+    return {"shape": shape, **{key: v for key, v in section.items() if v is not None}}
+
+
+def _write_argument(value: Any, names: _PresetNames) -> Any:
+    """Return an argument of a shape, or a block or joint, as a value of a table."""
+    if isinstance(value, Material | Contact):
+        return names.name_of(value)
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if is_dataclass(value) and not isinstance(value, type):
+        return {key: _write_argument(own, names) for key, own in given_fields(value).items()}
+    if isinstance(value, Sequence):
+        items = [_write_argument(each, names) for each in value]
+        named = items and all(isinstance(each, dict) for each in items)
+        return {each.pop("name"): each for each in items} if named else items
+    raise TypeError(value)
+
+
+def _write_blocks(structure: Structure, names: _PresetNames) -> dict[str, Any]:
+    """Return all blocks and joints; the most frequent material and contact stand once."""
+    section: dict[str, Any] = {"shape": "blocks"}
+    section |= {"width": structure.width, "gravity": structure.gravity}
+    rows: dict[str, list[dict[str, Any]]] = {
+        "blocks": [_write_argument(block, names) for block in structure.blocks],
+        "joints": [_write_argument(joint, names) for joint in structure.joints],
+    }
+    for key, parts in zip(_SHARED, rows.values(), strict=True):
+        ((usual, _),) = Counter(part[key] for part in parts).most_common(1) or ((None, 0),)
+        if usual is not None:
+            section[key] = usual
+        for part in parts:
+            if part[key] == usual:
+                del part[key]
+    return section | rows

@@ -13,7 +13,7 @@ from typing import Any, Literal
 from archfem._display import call_late_bound
 from archfem._files import hash_value
 from archfem._typing import Metres, Seconds
-from archfem._validation import check_fields, check_number, validate_methods
+from archfem._validation import check_fields, check_number, given_fields, validate_methods
 from archfem.dynamics.events import StopCondition, resolve_criteria
 from archfem.dynamics.history import History
 from archfem.dynamics.model_selection import build
@@ -138,12 +138,10 @@ class Analysis:
 
     def __repr__(self) -> str:
         """Structure, and the fields that differ from their defaults."""
-        given = [
-            f"{each.name}={value!r}"
-            for each in fields(self)[1:]
-            if (value := getattr(self, each.name)) != each.default
-        ]
-        return f"Analysis({', '.join([self.structure.name, *given])})"
+        given = given_fields(self)
+        del given["structure"]
+        words = [self.structure.name, *(f"{name}={value!r}" for name, value in given.items())]
+        return f"Analysis({', '.join(words)})"
 
     @cached_property
     def fingerprint(self) -> str:

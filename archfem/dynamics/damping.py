@@ -38,7 +38,7 @@ from archfem.joints.quadrature import Quadrature
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.shapes.rings import column
 from archfem.models.linear_blocks import build_rigid_model
-from archfem.models.model import Model, check_model
+from archfem.models.model import Model
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Start, Subject, dead_load, resolve_start, self_weight
 from archfem.statics.modes import Modes, modes
@@ -91,11 +91,6 @@ class FirstEffectiveMode:
     number: int  # of the mode, counted from 1
 
     @property
-    def frequency(self) -> float:
-        """Frequency of the mode [Hz]."""
-        return float(self.modes.frequencies[self.number - 1])
-
-    @property
     def text(self) -> str:
         """Number of the mode and its share of the mass."""
         share = 100.0 * self.modes.mass_ratios[self.number - 1, 0]
@@ -104,7 +99,6 @@ class FirstEffectiveMode:
 
 def first_effective_mode(model: Model, start: Start = None) -> FirstEffectiveMode:
     """Find the first mode effective along x."""
-    check_model(model)
     computed, shares = _modes_with_share(model, start, FIRST_MASS_SHARE)
     number = int(np.searchsorted(shares, FIRST_MASS_SHARE)) + 1
     return FirstEffectiveMode(computed, min(number, len(shares)))
@@ -119,7 +113,6 @@ def effective_mode_range(
     max_count: int = 1024,
 ) -> EffectiveModeRange:
     """Find the first and the last mode effective along x; the number of modes doubles as needed."""
-    check_model(model)
     if not FIRST_MASS_SHARE < check_number(mass_share, "share of the mass [-]") < 1.0:
         raise InvalidInput(
             f"share {mass_share} of the mass is not between {FIRST_MASS_SHARE} and 1: 90 % is 0.9"
@@ -229,7 +222,8 @@ def _find_frequencies(damping: EffectiveDamping, model: Model, start: Start) -> 
         both = effective_mode_range(model, start, mass_share=damping.mass_share)
         return Rayleigh(damping.ratio, both.frequencies, damping.joints), f"; {both.text}"
     first = first_effective_mode(model, start)
-    return StiffnessDamping(damping.ratio, first.frequency, damping.joints), f"; {first.text}"
+    frequency = float(first.modes.frequencies[first.number - 1])
+    return StiffnessDamping(damping.ratio, frequency, damping.joints), f"; {first.text}"
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from archfem.dynamics.state import State
 from archfem.errors import DidNotConverge
 from archfem.masonry.stiffness_ratio import mark_stone_joints
 from archfem.masonry.structure import Structure, join_names
-from archfem.models.model import Doubt, Model, check_model
+from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 
 logger = logging.getLogger("archfem")
@@ -56,7 +56,6 @@ def release_blocks(model: Model, state: State) -> ReleasedBlocks:
     Raises:
         InvalidInput: the model's displacements are small.
     """
-    check_model(model)
     poses, velocities = model.rigid_motions(state.q, state.velocity)
     loaded = model if state.memory is None else model.with_memory(state.memory)
     mass = make_bodies(model.structure, 0.0).mass
@@ -102,19 +101,15 @@ def follow_fall(
 
 
 def simulate_fall(
-    model: Model,
-    state: State,
-    motion: Motion,
-    rocking_ratio: float | None = None,
-    settling_time: float = 20.0,
+    model: Model, state: State, motion: Motion, rocking_ratio: float | None = None
 ) -> tuple[xr.Dataset, list[FallFrame]]:
-    """Follow loose blocks until they rest, or until `settling_time` after the motion has ended [s].
+    """Follow loose blocks until they rest, or until 20 s after the motion has ended.
 
     Steps are shortened where they fail. The ratio is that of `RigidBlockSimulation`, for the joints
     where it has an effect.
     """
     released = release_blocks(model, state)
-    end = max(motion.duration, state.time) + settling_time
+    end = max(motion.duration, state.time) + 20.0
     loose = _with_sliding_joints(model.structure)
     ratios: float | dict[str, float] | None = rocking_ratio
     if rocking_ratio is not None and (unkept := find_unkept_ratios(loose, rocking_ratio)):
@@ -174,15 +169,13 @@ def _with_sliding_joints(structure: Structure) -> Structure:
     return replace(structure, joints=tuple(joints))
 
 
-def _doubt_fall(
-    structure: Structure, dataset: xr.Dataset, ratio: float | None, admissible: float = 0.02
-) -> Iterator[Doubt]:
+def _doubt_fall(structure: Structure, dataset: xr.Dataset, ratio: float | None) -> Iterator[Doubt]:
     """Yield doubts of a fall: impulses not settled in a share of its steps, and other properties.
 
     Loose blocks may keep more at impacts, and slide otherwise, than the joints of the model.
     """
     share, violation = (dataset.attrs[f"fall_{key}"] for key in ("unsettled", "violation"))
-    if share > admissible:
+    if share > 0.02:
         yield Doubt(
             f"impulses of loose blocks did not settle in {share:.0%} of the steps of the fall, and "
             f"violate contacts by up to {violation:.2g} of a step's weight impulse",

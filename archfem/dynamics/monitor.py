@@ -16,7 +16,7 @@ step of a batch.
 """
 
 import logging
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -31,16 +31,14 @@ from archfem.models.model import Doubt, Model, Observer
 logger = logging.getLogger("archfem")
 
 
+@dataclass(frozen=True, eq=False)
 class EnergyMeter:
     """Kinetic and potential energy, work and loss of the steps of a model."""
 
-    def __init__(
-        self, model: Model, weight: Array, damping: sparse.csr_matrix, damping_lag: float
-    ) -> None:
-        self.model = model
-        self.weight = weight
-        self.damping = damping
-        self.damping_lag = damping_lag
+    model: Model
+    weight: Array
+    damping: sparse.csr_matrix
+    damping_lag: float
 
     def measure_step(
         self, before: tuple[Array, Array], after: tuple[Array, Array], ground: Array

@@ -208,7 +208,7 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
         return ScaledRun(scale, first_mechanisms(run), run.ending, run.outcome)
 
     definitions = (*applicable_definitions(start.model.structure, assessed), "verified")
-    return search_scales(run_scaled, definitions, precision, _admissible_range(between, motion))
+    return search_scales(run_scaled, definitions, precision, admissible_range(between, motion))
 
 
 def _run_as_far(model: Model | Analysis, motion: Motion, **options: Any) -> History:
@@ -223,16 +223,12 @@ def _valid_search(precision: float, between: tuple[float, float]) -> bool:
     return 1e-4 <= precision <= 1.0 and 0.0 < between[0] <= between[1]
 
 
-def _admissible_range(between: tuple[float, float], motion: Motion) -> tuple[float, float]:
-    """Return a range of scales cut off at the largest admissible scale of a motion."""
+def admissible_range(between: Sequence[float], motion: Motion) -> tuple[float, float]:
+    """Return a range of scales cut off at the scale at which a motion has a peak of 5 g."""
     smallest, largest = between
-    return smallest, max(smallest, min(largest, largest_allowed_scale(motion)))
-
-
-def largest_allowed_scale(motion: Motion) -> float:
-    """Return the scale at which the peak acceleration of a motion is 5 g [-]."""
     peak = max(float(np.abs(motion.component(name)).max()) for name in motion.components)
-    return MAX_PEAK_ACCELERATION / peak if peak > 0.0 else inf
+    allowed = MAX_PEAK_ACCELERATION / peak if peak > 0.0 else inf
+    return smallest, max(smallest, min(largest, allowed))
 
 
 def search_scales(
@@ -257,14 +253,11 @@ def search_scales(
 
 
 def _next_scale(
-    scales: MechanismScales,
-    precision: float,
-    between: tuple[float, float],
-    ratio: float = sqrt(2.0),
-    max_runs: int = 40,
+    scales: MechanismScales, precision: float, between: tuple[float, float]
 ) -> float | None:
-    """Return the scale of the next run, or None; before bisection, scales change by `ratio`."""
+    """Return the scale of the next run, or None."""
     runs, (smallest, largest) = scales.runs, between
+    ratio, max_runs = sqrt(2.0), 40  # ratio of scales before bisection
     if not runs:
         return min(max(1.0, smallest), largest)
     # four definitions to five per cent take about fifteen runs
@@ -426,7 +419,7 @@ def collapse_scale(
         run = _run_as_far(model, motion.scaled(scale), start=begin, damping=damping, dt=step)
         return ScaledRun(scale, {}, run.ending, run.outcome, run.fall)
 
-    limits = _admissible_range(between, motion)
+    limits = admissible_range(between, motion)
     searches = {}
     for step in dt:
         run_at = partial(run_scaled, step)

@@ -25,7 +25,7 @@ from archfem.dynamics.state import Batch, State
 from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_dataset
 from archfem.masonry.stiffness_ratio import list_stones
-from archfem.models.model import Doubt, Model
+from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 
 
@@ -88,23 +88,22 @@ class GrowingArray:
         return self._memory[: self._count]
 
 
-@dataclass(kw_only=True)
+@dataclass
 class Recorder:
     """Record of a run from its start, with its validity checks."""
 
-    model: Model
-    method: str  # name of the solver
-    dt: float | None  # constant time step [s]; None for steps of varying length
-    every: int  # interval of steps at which joint resultants are recorded
-    fields_every: int | None  # interval at which coordinates are recorded; None for none
-    criteria: Criteria  # for the failure flags of joints
     monitor: RunMonitor
     state: State  # at the end of the steps added last
+    method: str  # name of the solver
+    dt: float | None  # constant time step [s]; None for steps of varying length
+    record: Record  # which steps are recorded
+    criteria: Criteria  # for the failure flags of joints
     fallback: int = 0  # number of steps at which a compiled solver fell back to SNES
     count: int = 0  # number of steps added, the start of the run among them
     _rows: dict[str, "GrowingArray"] = field(default_factory=lambda: defaultdict(GrowingArray))
 
     def __post_init__(self) -> None:
+        self.model = self.monitor.model
         self._observer = self.model.observer()
 
     def add(self, batch: Batch, *, last: bool = False) -> None:
@@ -113,7 +112,7 @@ class Recorder:
         readings = batch.read(self._observer)
         drift = self.monitor.add(batch, readings)
         numbers = self.count + np.arange(len(batch.times))
-        due = numbers % self.every == 0
+        due = numbers % self.record.every == 0
         due[-1] |= last
         # Ctrl-C may come between any two: the number of resultants, filled last, counts
         rows = {
@@ -129,8 +128,8 @@ class Recorder:
             self._rows[name].add(values)
         self.count += len(batch.times)
         self.fallback += batch.fallback * len(batch.times)
-        if self.fields_every:
-            for k in np.flatnonzero(numbers % self.fields_every == 0).tolist():
+        if fields_every := self.record.fields_every:
+            for k in np.flatnonzero(numbers % fields_every == 0).tolist():
                 self._rows["frames"].add(batch.times[k : k + 1])
                 self._rows["fields"].add(batch.state(k).q[None])
         self.monitor.check_run()
@@ -141,12 +140,6 @@ class Recorder:
 
     def build_history(self, motion: Motion, ending: Ending, outcome: str) -> History:
         """Return the record as a history."""
-        since = "since the last record"
-        effort_attributes = {
-            "iterations": {"long_name": f"Newton iterations, or passes, {since}"},
-            "smallest_step": {"units": "s", "long_name": f"smallest step taken {since}"},
-            "energy_drift": {"units": "J", "long_name": "energy from nowhere since the start"},
-        }
         structure, resultants = self.model.structure, self._recorded("resultants")
         times, faces = (self._recorded(name)[: len(resultants)] for name in ("times", "faces"))
         moved = self.model.large_displacements
@@ -156,10 +149,7 @@ class Recorder:
         attributes = {"units": "m/s2", "long_name": "acceleration of the ground"}
         variables: dict[str, Any] = self._block_displacements()
         variables["ground"] = ("time", "axis"), motion.at(times), attributes
-        for (name, attrs), values in zip(
-            effort_attributes.items(), self._effort(len(resultants)), strict=True
-        ):
-            variables[name] = "time", values, attrs
+        variables |= self._effort(len(resultants))
         coordinates: dict[str, Any] = {
             "block": [block.name for block in structure.blocks],
             "axis": ["x", "y"],
@@ -228,15 +218,21 @@ class Recorder:
             attributes["predicted_error"] = self.model.prediction.error
         return attributes
 
-    def _effort(self, records: int) -> tuple[NDArray[np.int64], Array, Array]:
+    def _effort(self, records: int) -> dict[str, Any]:
         """Return iterations and smallest step since the previous record, and drift, by record."""
         ends = self._recorded("numbers")[:records]
         starts, recorded = np.append(0, ends[:-1] + 1), ends[-1] + 1
-        return (
-            np.add.reduceat(self._recorded("iterations")[:recorded], starts),
-            np.minimum.reduceat(self._recorded("smallest_step")[:recorded], starts),
-            self._recorded("drift")[ends],
-        )
+        iterations = np.add.reduceat(self._recorded("iterations")[:recorded], starts)
+        smallest = np.minimum.reduceat(self._recorded("smallest_step")[:recorded], starts)
+        since = "since the last record"
+        passes = {"long_name": f"Newton iterations, or passes, {since}"}
+        shortest = {"units": "s", "long_name": f"smallest step taken {since}"}
+        energy = {"units": "J", "long_name": "energy from nowhere since the start"}
+        return {
+            "iterations": ("time", iterations, passes),
+            "smallest_step": ("time", smallest, shortest),
+            "energy_drift": ("time", self._recorded("drift")[ends], energy),
+        }
 
     def _add_coordinates(self, variables: dict[str, Any], coordinates: dict[str, Any]) -> None:
         """Add the recorded coordinates of the model and the state at the end to variables."""

@@ -133,8 +133,7 @@ class MeetingMonitor:
         """Return how deep stones are in each other at their joints (steps, joints) [m]."""
         gap, rotation, slip = np.moveaxis(faces[..., self._joints], -2, 0)
         overlap = np.maximum(self.model.structure.depths[self._joints] - np.abs(slip), 0.0)
-        depths: Array = np.maximum(0.5 * overlap * np.abs(rotation) - gap, 0.0)
-        return depths
+        return np.maximum(0.5 * overlap * np.abs(rotation) - gap, 0.0)
 
     @cached_property
     def _joints(self) -> NDArray[np.intp]:
@@ -151,8 +150,7 @@ class MeetingMonitor:
             fill = list(find_yielding_blocks(self.model.structure))
             gaps[fill] = gaps[:, fill] = np.inf
             derived["gaps"] = start, gaps
-        gaps = derived["gaps"][1]
-        return gaps
+        return derived["gaps"][1]
 
     @cached_property
     def _limits(self) -> Array:
@@ -219,8 +217,7 @@ class MeetingMonitor:
         free = self._owner[first]
 
         def mean(values: NDArray[Any]) -> NDArray[Any]:
-            means: NDArray[Any] = np.add.reduceat(values, first, axis=-1) / counts
-            return means
+            return np.add.reduceat(values, first, axis=-1) / counts
 
         middle, moved = mean(places), mean(_as_complex(corners))
         arms = places - np.repeat(middle, counts)
@@ -252,22 +249,20 @@ def is_resting(model: Model, state: State, shaken: bool) -> bool:
     return _is_still(model, state) or (not shaken and _only_vibrates(model, state))
 
 
-def _only_vibrates(
-    model: Model, state: State, max_rise: float = 2e-4, max_rotation: float = 0.02
-) -> bool:
+def _only_vibrates(model: Model, state: State) -> bool:
     """Return whether blocks move too weakly to overturn on a ground at rest.
 
-    The kinetic energy of each block suffices to raise it by less than `max_rise` of the depth of
-    the shallowest joint, and no joint is rotated by more than `max_rotation` [rad].
+    The kinetic energy of each block suffices to raise it by less than 2e-4 of the depth of the
+    shallowest joint, and no joint is rotated by more than 0.02 rad.
     """
     # A column of slenderness 20, tilted by 0.02 rad, has to rise by 4.5e-3 of its width to overturn
-    if _largest_rotation(model, state) > max_rotation:
+    if _largest_rotation(model, state) > 0.02:
         return False
     free = list(model.structure.free)
     mass, inertia = make_bodies(model.structure, 0.0).mass[free].T
     velocities = model.rigid_motions(state.q, state.velocity)[1][free]
     squares = np.sum(velocities[:, :2] ** 2, axis=1) + inertia / mass * velocities[:, 2] ** 2
-    return bool(np.max(squares / (2.0 * G)) <= max_rise * shallowest_depth(model.structure))
+    return bool(np.max(squares / (2.0 * G)) <= 2e-4 * shallowest_depth(model.structure))
 
 
 def _largest_rotation(model: Model, state: State) -> float:

@@ -185,16 +185,14 @@ def _run_analysis(
     return time_history(model, motion, start=start, **settings)
 
 
-def _state_tolerance(
-    history: History, tolerance: float, share: float, admissible: float = 0.02
-) -> History:
-    """State the tolerance of the steps in a history; doubt it where a share of them missed it."""
+def _state_tolerance(history: History, tolerance: float, share: float) -> History:
+    """State the tolerance of the steps in a history; doubt it where over 2 % of them missed it."""
     history.dataset.attrs |= {"tolerance": tolerance, "tolerance_unmet": share}
     doubt = Doubt(
         f"the shortest steps erred by more than {tolerance:g} in |e| in {share:.0%} of the run",
         "compare with a constant dt of 0.1 ms or less, or with more damping",
     )
-    return history.with_doubts((*history.doubts, doubt)) if share > admissible else history
+    return history.with_doubts((*history.doubts, doubt)) if share > 0.02 else history
 
 
 def _resolve_steps(
@@ -231,22 +229,10 @@ def _make_recorder(
     stepper: Stepper, first: Batch, dt: float | None, record: Record, criteria: Criteria
 ) -> Recorder:
     """Return the recorder of a run, with its validity checks."""
-    model = stepper.equation.model
-    return Recorder(
-        model=model,
-        method=stepper.name,
-        dt=dt,
-        every=record.every,
-        fields_every=record.fields_every,
-        criteria=criteria,
-        monitor=RunMonitor(
-            model,
-            first,
-            damps=isinstance(stepper.equation.scheme, HHT),
-            mass_damping=stepper.equation.drag,
-        ),
-        state=first.state(0),
-    )
+    equation = stepper.equation
+    damps, drag = isinstance(equation.scheme, HHT), equation.drag
+    monitor = RunMonitor(equation.model, first, damps=damps, mass_damping=drag)
+    return Recorder(monitor, first.state(0), stepper.name, dt, record, criteria)
 
 
 # What may end a run: an event, and blocks that become loose where displacements are large

@@ -5,7 +5,6 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -269,10 +268,8 @@ class Evaluator:
         """Text that identifies function and options: the name, and the source of its module."""
         name = f"{self.find.__module__}:{getattr(self.find, '__qualname__', repr(self.find))}"
         try:
-            file = inspect.getsourcefile(self.find)
-            # The whole module, since the function may call others of it.
-            in_file = file is not None and Path(file).is_file()
-            source = Path(str(file)).read_text("utf-8") if in_file else inspect.getsource(self.find)
+            # the whole module, since the function may call others of it
+            source = "".join(inspect.findsource(self.find)[0])
         except (OSError, TypeError):
             source = ""
         return f"{name} {sorted(self.options.items())!r}\n{source}"

@@ -29,7 +29,7 @@ from archfem.dynamics.history import Ending, first_mechanisms, partial_history
 from archfem.dynamics.motion_scaling import (
     COLLAPSE_DEFINITION,
     ScaledRun,
-    largest_allowed_scale,
+    admissible_range,
     search_scales,
 )
 from archfem.errors import DidNotConverge, InvalidInput
@@ -48,10 +48,22 @@ from archfem.studies.study import Study
 # the blocks; blocks fall, for large displacements
 LIMIT_STATES = ("first hinge", "four failures", "verified", COLLAPSE_DEFINITION)
 
-# Findings of a run that are stored for the curves
-DEMAND_NAMES = (
-    "eccentricity", "rotation", "slip", "largest_displacement", "residual_displacement",
-)  # fmt: skip
+# Intensity measures, with their names on an axis
+MEASURE_LABELS = {
+    "pga": "peak ground acceleration [m/s²]",
+    "pgv": "peak ground velocity [m/s]",
+    "sa": "spectral acceleration at the first mode, 5 % [m/s²]",
+    "arias": "Arias intensity [m/s]",
+}
+
+# Findings of a run that are stored for the curves, with their names on an axis
+DEMAND_LABELS = {
+    "eccentricity": "largest |e| of a joint [-]",
+    "rotation": "largest rotation of a joint [rad]",
+    "slip": "largest slip of a joint [m]",
+    "largest_displacement": "largest displacement of a corner [m]",
+    "residual_displacement": "residual displacement of a corner [m]",
+}
 
 
 def search_limit_states(
@@ -75,8 +87,7 @@ def search_limit_states(
         fall = CollapseState(run["fall"], None, (), nan, nan, True) if run["fall"] else None
         return ScaledRun(scale, reached, Ending(run["ending"]), run["outcome"], fall)
 
-    least, largest = between
-    reach = (least, max(least, min(largest, largest_allowed_scale(motion))))
+    reach = admissible_range(between, motion)
     brackets = search_scales(run_scaled, limits, precision, reach)
     if brackets.interrupted:
         raise KeyboardInterrupt
@@ -96,7 +107,7 @@ def search_limit_states(
         findings |= {limit: bracket.upper, f"{limit}, survives": bracket.lower}
         findings[f"{limit}, survives above"] = len(bracket.above)
     findings["scale"] = scales = sorted(demands)
-    return findings | {name: [demands[scale][name] for scale in scales] for name in DEMAND_NAMES}
+    return findings | {name: [demands[scale][name] for scale in scales] for name in DEMAND_LABELS}
 
 
 def _run(result: DeadLoadResult, motion: Motion) -> dict[str, Any]:
@@ -106,10 +117,10 @@ def _run(result: DeadLoadResult, motion: Motion) -> dict[str, Any]:
         complete = run.ending not in (Ending.PARTED, Ending.MET)
     except DidNotConverge as error:
         run, complete = partial_history(error), False
-    mechanisms, demands = first_mechanisms(run), dict.fromkeys(DEMAND_NAMES, inf)
+    mechanisms, demands = first_mechanisms(run), dict.fromkeys(DEMAND_LABELS, inf)
     if complete:
         findings = of_history(run, mechanisms)
-        demands = {name: findings[name] for name in DEMAND_NAMES}
+        demands = {name: findings[name] for name in DEMAND_LABELS}
     hinges = assessed_joints(with_failure_flags(run.joints))["hinge"] != 0
     reached = {
         "first hinge": bool(hinges.any()),
@@ -219,7 +230,7 @@ class Ida(ResultDisplay):
             InvalidInput: measure or demand are unknown.
         """
         unscaled, power = self._measure(measure)
-        check_choice(demand, DEMAND_NAMES, "demand")
+        check_choice(demand, DEMAND_LABELS, "demand")
         for k, name in enumerate(self.table["motion"].values):
             scale = self.table["scale"].values[k]
             valid = np.isfinite(scale)  # shorter rows are padded
@@ -228,8 +239,8 @@ class Ida(ResultDisplay):
 
     def _measure(self, measure: str) -> tuple[Array, int]:
         """A measure of the unscaled motions, and the power of the scale with which it grows."""
-        powers = {"pga": 1, "pgv": 1, "sa": 1, "arias": 2}
-        return self.table[measure].values, powers[check_choice(measure, powers, "measure")]
+        check_choice(measure, MEASURE_LABELS, "measure")
+        return self.table[measure].values, 2 if measure == "arias" else 1
 
     def fractiles(self, intensity: Array, measure: str = "pga", demand: str = "rotation") -> Array:
         """Return the 16, 50 and 84 % fractiles of the demand at intensities.
@@ -274,27 +285,14 @@ def draw_ida_result(found: Ida, measure: str = "pga", demand: str = "rotation") 
     """Draw the curves, fractiles and limit states of an IDA."""
     from archfem.view.studies import draw_ida  # matplotlib is slow to import
 
-    measures = {
-        "pga": "peak ground acceleration [m/s²]",
-        "pgv": "peak ground velocity [m/s]",
-        "sa": "spectral acceleration at the first mode, 5 % [m/s²]",
-        "arias": "Arias intensity [m/s]",
-    }
-    demands = {
-        "rotation": "largest rotation of a joint [rad]",
-        "eccentricity": "largest |e| of a joint [-]",
-        "slip": "largest slip of a joint [m]",
-        "largest_displacement": "largest displacement of a corner [m]",
-        "residual_displacement": "residual displacement of a corner [m]",
-    }
     curves = list(found.curves(measure, demand))  # which refuse other words
     intensity = np.linspace(0.0, max(float(x.max(initial=0.0)) for _, x, _ in curves), 301)[1:]
     return draw_ida(
         curves,
         {limit: found.capacities(limit, measure) for limit in found.limits},
         fractiles=(intensity, found.fractiles(intensity, measure, demand)),
-        measure=measures[measure],
-        demand=demands[demand],
+        measure=MEASURE_LABELS[measure],
+        demand=DEMAND_LABELS[demand],
     )
 
 

@@ -85,13 +85,22 @@ def evaluate_points(
     meanwhile: Callable[[], object] | None = None,
     shared: Path | None = None,
 ) -> Iterator[tuple[int, Row]]:
-    """Evaluate points on a number of processes, by default one a core; on this one if it is 1."""
+    """Evaluate points on a number of processes, by default one a core; on this one if it is 1.
+
+    `meanwhile` runs while the processes start.
+    """
     workers = len(os.sched_getaffinity(0)) if workers is None else workers
-    if check_integer(workers, "workers") > 1 and len(points) > 1:
-        yield from evaluate_on_processes(points, evaluator, workers, log, meanwhile, shared)
+    if check_integer(workers, "workers") == 1 or len(points) < 2:
+        with threadpool_limits(limits=1), share_results(shared):
+            yield from evaluate_serially(points, evaluator)
         return
-    with threadpool_limits(limits=1), share_results(shared):
-        yield from evaluate_serially(points, evaluator)
+    pool = WorkerPool(TaskQueue(points, evaluator), workers, str(log or os.devnull), shared)
+    try:
+        if meanwhile is not None:
+            meanwhile()
+        yield from pool.rows()
+    finally:
+        pool.close()
 
 
 def evaluate_serially(
@@ -144,24 +153,6 @@ class RepeatedWarnings:
             said = "1 more warning" if repeated == 1 else f"{repeated} more warnings"
             verb = "is" if repeated == 1 else "are"
             logger.warning("%s as above, of other runs, %s not repeated", said, verb)
-
-
-def evaluate_on_processes(
-    points: Sequence[tuple[int, StudyPoint]],
-    evaluator: Evaluator,
-    workers: int,
-    log: Path | None = None,
-    meanwhile: Callable[[], object] | None = None,
-    shared: Path | None = None,
-) -> Iterator[tuple[int, Row]]:
-    """Evaluate points on processes of this machine; `meanwhile` runs while they start."""
-    pool = WorkerPool(TaskQueue(points, evaluator), workers, str(log or os.devnull), shared)
-    try:
-        if meanwhile is not None:
-            meanwhile()
-        yield from pool.rows()
-    finally:
-        pool.close()
 
 
 class Task(NamedTuple):

@@ -113,8 +113,9 @@ class Study:
         case, axes = case_of(subject, motion), parameter_axes(vary, samples)
         if compute is None:
             compute = "history" if case.has_motion else "dead load"
-        points = tuple(Point.of(case, each) for each in changes_along(axes))
-        self._set(title or case.title, Evaluator.of(compute), axes, points, samples)
+        self.title, self.evaluator, self.axes = title or case.title, Evaluator.of(compute), axes
+        self.points = tuple(Point.of(case, each) for each in changes_along(axes))
+        self.samples = samples
         self._check()
 
     @classmethod
@@ -136,20 +137,9 @@ class Study:
             samples: settings of the sampling, with the seed; None without distributions.
         """
         study = cls.__new__(cls)
-        study._set(title, evaluator, axes, points, samples)
+        study.title, study.evaluator, study.axes = title, evaluator, axes
+        study.points, study.samples = points, samples
         return study
-
-    def _set(
-        self,
-        title: str,
-        evaluator: Evaluator,
-        axes: tuple[Axis, ...],
-        points: tuple[Point, ...],
-        samples: Mapping[str, Any] | None,
-    ) -> None:
-        """Set the attributes."""
-        self.title, self.evaluator, self.axes = title, evaluator, axes
-        self.points, self.samples = points, samples
 
     @classmethod
     def read(cls, path: str | Path, changes: Sequence[str] = (), *, own_code: bool = False) -> Self:
@@ -317,8 +307,7 @@ class Comparison(Study):
     @property
     def scales(self) -> dict[str, Any] | None:
         """Options of `mechanism_scales`, which searches scales of whole motions; None for none."""
-        options: dict[str, Any] | None = self.evaluator.options["scales"]
-        return options
+        return self.evaluator.options["scales"]
 
     @property
     def reduction(self) -> float:

@@ -8,7 +8,7 @@ falls, and the properties that decide it.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -66,18 +66,12 @@ NEUTRAL: dict[str, Any] = {
 }
 
 
-class VariedRun(NamedTuple):
-    """Run that is varied."""
-
-    analysis: Analysis
-    motion: Motion
-
-
 @dataclass(frozen=True, eq=False)
 class Variation:
     """One run of the range: the settings as given, and the changed values by name."""
 
-    base: VariedRun = field(repr=False)
+    analysis: Analysis = field(repr=False)
+    motion: Motion = field(repr=False)
     changes: tuple[tuple[str, Any], ...]
 
     @property
@@ -156,28 +150,21 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     )
     rest = analysis.dead_load(motion)  # a structure that does not stand is refused before any run
     viscous, _ = resolve_effective_damping(analysis.damping, rest.model, rest)
-    defaults = {**DEFAULT_RANGES} if viscous else _without_damping(DEFAULT_RANGES)
+    defaults = DEFAULT_RANGES
+    if viscous is None:
+        defaults = {name: defaults[name] for name in defaults if not name.startswith("damping")}
     ranges = _check_ranges({**defaults, **(vary or {})})
-    base = VariedRun(analysis, motion)
     changes = [*_single_changes(ranges, viscous), *_sample_changes(ranges, samples, seed)]
-    points = [(k, Variation(base, _resolve_labels(ranges, each))) for k, each in enumerate(changes)]
-    evaluator = Evaluator(evaluate_variation)
-    rows: dict[int, dict[str, Any]] = {}
-    with tqdm(total=len(points), unit="run", disable=None, leave=False) as bar:
-        for number, row in evaluate_points(points, evaluator, workers):
-            rows[number] = row
-            bar.update()
+    variations = [Variation(analysis, motion, _resolve_labels(ranges, each)) for each in changes]
+    points, evaluator = list(enumerate(variations)), Evaluator(evaluate_variation)
+    finished = evaluate_points(points, evaluator, workers)
+    rows = dict(tqdm(finished, total=len(points), unit="run", disable=None, leave=False))
     dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], viscous)
     dataset["sampled"] = "run", np.arange(len(points)) >= len(points) - samples
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
     dataset.attrs["k_s"] = float(np.mean([contact.shear_stiffness for contact in contacts]))
     return VerdictRange(dataset)
-
-
-def _without_damping(ranges: Mapping[str, Any]) -> dict[str, Any]:
-    """Return ranges without those of damping."""
-    return {name: values for name, values in ranges.items() if not name.startswith("damping")}
 
 
 def verdict_range_of_bracket(
@@ -272,8 +259,8 @@ def _value_at(values: Any, share: float) -> Any:
 
 def evaluate_variation(variation: Variation) -> dict[str, Any]:
     """Return outcome, displacements and time of collapse of one run."""
-    (analysis, motion), changes = variation.base, {**NEUTRAL, **dict(variation.changes)}
-    structure = analysis.structure
+    analysis, motion = variation.analysis, variation.motion
+    structure, changes = analysis.structure, {**NEUTRAL, **dict(variation.changes)}
     for value in changes.values():
         structure = value if isinstance(value, Structure) else structure
         motion = value if isinstance(value, Motion) else motion
@@ -295,9 +282,7 @@ def evaluate_variation(variation: Variation) -> dict[str, Any]:
     }
 
 
-def _vary_contacts(
-    structure: Structure, changes: Mapping[str, Any], min_friction: float = 0.05
-) -> Structure:
+def _vary_contacts(structure: Structure, changes: Mapping[str, Any]) -> Structure:
     """Return the structure with other stiffness and friction of its joints."""
     joints = []
     for joint in structure.joints:
@@ -305,7 +290,7 @@ def _vary_contacts(
             joint.contact,
             normal_stiffness=changes["k_n"] * joint.contact.normal_stiffness,
             shear_stiffness=changes["k_s"] * joint.contact.shear_stiffness,
-            friction=max(joint.contact.coefficient + changes["friction"], min_friction),
+            friction=max(joint.contact.coefficient + changes["friction"], 0.05),
         )
         joints.append(replace(joint, contact=contact))
     return replace(structure, joints=tuple(joints))
@@ -346,13 +331,11 @@ def _vary_damping(
     return Rayleigh(ratio, (damping.frequency, 2.0 * damping.frequency), damping.joints)
 
 
-def _run_rigid_blocks(
-    structure: Structure, motion: Motion, dt: float, settling_time: float = 20.0
-) -> CollapseState:
+def _run_rigid_blocks(structure: Structure, motion: Motion, dt: float) -> CollapseState:
     """Run rigid blocks in contact, and return their state of collapse."""
     # impulses need shorter steps than elastic joints
     simulation = RigidBlockSimulation(structure, dt=min(dt / 2.5, 2e-3))
-    end = motion.duration + settling_time
+    end = motion.duration + 20.0  # time in which blocks settle [s]
     frames = simulation.frames(LooseBlocks.as_built(structure), end, motion, spacing=0.05)
     return classify_collapse(structure, frames)
 

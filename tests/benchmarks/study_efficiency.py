@@ -15,11 +15,13 @@ PYTHONDONTWRITEBYTECODE each run compiles our modules anew, which no installed c
 unset, and let a first run write them.
 """
 
+import os
 import resource
 import tempfile
 import time
 import tomllib
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from itertools import islice, product
 from multiprocessing import forkserver
 from pathlib import Path
@@ -75,7 +77,10 @@ def suite() -> af.Study:
 
 def alone(points: Sequence[tuple[int, Point]], evaluator: Evaluator) -> Iterator[tuple[int, Row]]:
     """Evaluate points on one process that is not this one."""
-    return process_pool.evaluate_on_processes(points, evaluator, 1, meanwhile=load_table_libraries)
+    tasks = process_pool.TaskQueue(points, evaluator)
+    with closing(process_pool.WorkerPool(tasks, 1, os.devnull)) as pool:
+        load_table_libraries()
+        yield from pool.rows()
 
 
 def timed(study: af.Study, workers: int) -> tuple[float, float, int]:

@@ -12,7 +12,7 @@ from archfem.dynamics import CollapseScale, mechanism_scales
 from archfem.dynamics.motion_scaling import (
     MechanismScales,
     ScaledRun,
-    largest_allowed_scale,
+    admissible_range,
     search_scales,
 )
 
@@ -283,10 +283,10 @@ def test_collapse_is_not_sought_beyond_five_g(between, limits, monkeypatch):
 def test_motions_are_scaled_to_five_g_at_most_by_their_strongest_component():
     """However weak they are; one that is none may be multiplied by anything."""
     weak, strong = np.array([0.0, 0.01, -0.02]), np.array([0.0, 0.03, -0.05])
-    five_g = 5.0 * 9.80665
-    assert largest_allowed_scale(af.Motion(weak, 0.01)) == pytest.approx(five_g / 0.02)
+    five_g, between = 5.0 * 9.80665, (0.1, inf)
+    allowed = pytest.approx((0.1, five_g / 0.02))
+    assert admissible_range(between, af.Motion(weak, 0.01)) == allowed
     for others in ({"vertical": strong}, {"transverse": strong}):
-        assert largest_allowed_scale(af.Motion(weak, 0.01, **others)) == pytest.approx(
-            five_g / 0.05
-        )
-    assert largest_allowed_scale(af.Motion(0.0 * weak, 0.01)) == inf
+        allowed = pytest.approx((0.1, five_g / 0.05))
+        assert admissible_range(between, af.Motion(weak, 0.01, **others)) == allowed
+    assert admissible_range(between, af.Motion(0.0 * weak, 0.01)) == between

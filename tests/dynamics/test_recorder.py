@@ -104,7 +104,7 @@ def test_effort_between_records_is_kept(model):
 def test_ctrl_c_amid_a_batch_leaves_whole_records(model, motion):
     """It arrives when the coordinates of the third step are read."""
     start = af.dynamics.Equation(model, motion).at_rest(af.dead_load(model).q)
-    given = {"method": "by hand", "dt": 0.005, "every": 1, "fields_every": 1}
+    record = af.Record(fields_every=1)
 
     def batch(times, state):
         resultants = np.ones((len(times), len(model.structure.joints), 3))
@@ -122,7 +122,7 @@ def test_ctrl_c_amid_a_batch_leaves_whole_records(model, motion):
 
     first = batch(np.zeros(1), lambda _: start)
     guard = RunMonitor(model, first)
-    recorder = Recorder(model=model, criteria=af.Criteria(), monitor=guard, state=start, **given)
+    recorder = Recorder(guard, start, "by hand", 0.005, record, af.Criteria())
     recorder.add(first)
     with pytest.raises(KeyboardInterrupt):
         recorder.add(batch(0.005 * np.arange(1.0, 5.0), pressed))

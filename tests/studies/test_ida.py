@@ -192,7 +192,11 @@ def test_up_to_four_runs_fill_the_widest_gaps_of_a_curve(small_ring, monkeypatch
         return scales
 
     reached = dict.fromkeys(ida_module.LIMIT_STATES, False)
-    run = {"demands": dict.fromkeys(ida_module.DEMAND_NAMES, 1.0), "reached": reached, "fall": None}
+    run = {
+        "demands": dict.fromkeys(ida_module.DEMAND_LABELS, 1.0),
+        "reached": reached,
+        "fall": None,
+    }
     ended = {"ending": "finished", "outcome": "reached the end"}
     monkeypatch.setattr(ida_module, "search_scales", search)
     monkeypatch.setattr(ida_module, "_run", lambda result, motion: run | ended)

@@ -13,7 +13,6 @@ from archfem.studies import variations
 from archfem.studies.variations import (
     DEFAULT_RANGES,
     Variation,
-    VariedRun,
     evaluate_variation,
 )
 
@@ -53,8 +52,8 @@ def calls(monkeypatch):
 
 def evaluate(column, motion, damping="effective", **changes):
     settings = {"fidelity": "rigid", "displacements": "large", "damping": damping, "dt": 0.005}
-    base = VariedRun(af.Analysis(column, **settings), motion)
-    return evaluate_variation(Variation(base, tuple(changes.items())))
+    analysis = af.Analysis(column, **settings)
+    return evaluate_variation(Variation(analysis, motion, tuple(changes.items())))
 
 
 def test_contacts_motion_and_step_reach_the_run(column, motion, calls):

@@ -93,13 +93,11 @@ def missing_note(what: str, remedy: str) -> TextBlock:
     return TextBlock(f"Not among the results: {what}. {remedy}", "missing")
 
 
-def build_player(
-    case: Case, run: History, title: str, players: int = 1, *, min_bytes: int = 800_000
-) -> Player:
+def build_player(case: Case, run: History, title: str, players: int = 1) -> Player:
     """Return the player of a run; blocks stand still if it has no recorded displacements."""
     model, reason = _rebuild_model(case, run)
     # Players of one page share its size, but each stays legible.
-    max_bytes = max(MAX_PACKED_BYTES // players, min_bytes)
+    max_bytes = max(MAX_PACKED_BYTES // players, 800_000)
     return Player(Scene(case.structure, run, model, title, max_bytes, reason))
 
 
