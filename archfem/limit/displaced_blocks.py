@@ -54,11 +54,6 @@ class KinematicChain:
     contacts: tuple[Contact, ...]  # those that persist
     is_flat: bool = False  # whether contacts were found to slide without dilatancy
 
-    @property
-    def sliding_joints(self) -> frozenset[int]:
-        """Numbers of the joints that slide."""
-        return frozenset(contact.joint for contact in self.contacts if contact.slip)
-
 
 @dataclass(frozen=True, eq=False)
 class PlacedBlocks:
