@@ -166,14 +166,9 @@ def _section(name: str, arrays: Mapping[str, NDArray[Any]]) -> list[str]:
 
 def _array(name: str, values: NDArray[Any]) -> str:
     """Return an array as XML: the number of bytes and the bytes, base64-encoded."""
-    # VTK's and NumPy's names of number types, by NumPy's kind; flags are bytes
-    vtk_number_types = {
-        "f": ("Float64", "<f8"),
-        "i": ("Int64", "<i8"),
-        "u": ("UInt8", "u1"),
-        "b": ("UInt8", "u1"),
-    }
-    kind, number_type = vtk_number_types[values.dtype.kind]
+    # VTK's and NumPy's names of number types, by NumPy's kind; other kinds are bytes or flags
+    number_types = {"f": ("Float64", "<f8"), "i": ("Int64", "<i8")}
+    kind, number_type = number_types.get(values.dtype.kind, ("UInt8", "u1"))
     data = np.ascontiguousarray(values, dtype=number_type).tobytes()
     size = np.array([len(data)], dtype="<u8").tobytes()
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
@@ -223,9 +218,8 @@ def _write_drawing(solids: Solids, displacement: Array, path: Path, magnificatio
     places = solids.cells.places + magnification * displacement
     outlines: dict[str, list[tuple[str, Array]]] = {}
     for number, block in enumerate(structure.blocks):
-        loop = trace_boundary(
-            [cell for cell in solids.cells.polygons if solids.cells.block[cell[0]] == number]
-        )
+        own = np.flatnonzero(solids.cells.owner == number)
+        loop = trace_boundary([solids.cells.polygons[k] for k in own])
         outlines.setdefault(block.part or "blocks", []).append((block.name, places[loop]))
     drawn = [(block.name, block.drawn()) for block in structure.blocks]
     built = [(name, np.vstack([points, points[:1]])) for name, points in drawn]

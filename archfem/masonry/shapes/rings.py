@@ -205,7 +205,7 @@ def column(
             f"a column of breadth {breadth} m and heights {list(heights)} m: give lengths above 0"
         )
     half, levels = breadth / 2.0, _bed_levels(heights)
-    blocks = _stack_blocks(0.0, breadth, levels, material, "column")
+    blocks = _stack_blocks(0.0, breadth, levels, material)
     joints = [
         Joint((k, k + 1), (-half, y), (half, y), contact, f"joint {k}", "column", "pier")
         for k, y in enumerate(levels[1:-1])
@@ -262,8 +262,8 @@ def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one stru
     levels = _bed_levels(heights)
     # The springings are at y = 0, at the level of the centre of the ring.
     levels = [level - levels[-1] for level in levels]
-    left = _stack_blocks(-radius, pier_breadth, levels, material, "left pier", "left pier ")
-    right = _stack_blocks(radius, pier_breadth, levels, material, "right pier", "right pier ")
+    left = _stack_blocks(-radius, pier_breadth, levels, material, "left pier")
+    right = _stack_blocks(radius, pier_breadth, levels, material, "right pier")
     # The top courses of the piers take the place of the abutments.
     blocks = (*left, *ring.blocks[1:-1], *reversed(right))
     inner, outer = radius - pier_breadth / 2.0, radius + pier_breadth / 2.0
@@ -284,19 +284,14 @@ def _bed_levels(heights: Sequence[float]) -> list[float]:
 
 
 def _stack_blocks(
-    middle: float,
-    breadth: float,
-    levels: Sequence[float],
-    material: Material,
-    part: str,
-    prefix: str = "",
+    middle: float, breadth: float, levels: Sequence[float], material: Material, pier: str = ""
 ) -> list[Block]:
-    """Build rectangular blocks between levels; the lowest is fixed and has its own name."""
-    base, course = ("foundation", "course") if prefix else ("base", "block")
+    """Build rectangular blocks of a pier or a column; the lowest is fixed and has its own name."""
+    base, course = (f"{pier} foundation", f"{pier} course") if pier else ("base", "block")
     left, right, blocks = middle - breadth / 2.0, middle + breadth / 2.0, []
     for k, (low, top) in enumerate(pairwise(levels)):
         outline = (left, top), (left, low), (right, low), (right, top)
-        name = prefix + (f"{course} {k}" if k else base)
+        name, part = f"{course} {k}" if k else base, pier or "column"
         blocks.append(Block(outline, material, name, k == 0, (0, 1, 2, 3), part, role="pier"))
     return blocks
 

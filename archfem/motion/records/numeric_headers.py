@@ -7,6 +7,7 @@ import numpy as np
 from archfem._typing import Array
 from archfem.motion.records.record_file import COUNT_PATTERN, Channel, RecordText
 
+COSMOS_PATTERN = r"\(Format v\d|^\s*\d+\s+Integer-header values follow"
 _HEADER_PATTERN = rf"^\s*({COUNT_PATTERN})\s+%s-header values follow"
 
 

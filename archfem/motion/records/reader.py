@@ -4,44 +4,45 @@ import re
 from collections.abc import Callable, Mapping
 from numbers import Real
 from os import PathLike
-from typing import Any
+from typing import Any, NamedTuple
 
 from archfem._files import read_bytes
 from archfem._validation import report_user_errors, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.motion import signal_processing
 from archfem.motion.records import columns, keyed, numeric_headers, volumes, waveforms
-from archfem.motion.records.record_file import Channel, RecordFormat, RecordText, parse_unit
+from archfem.motion.records.record_file import Channel, RecordText, parse_unit
+
+
+class RecordFormat(NamedTuple):
+    """A format of record files: how it is recognised, and its reader."""
+
+    name: str
+    read: Callable[[RecordText], list[Channel]]  # components in the order of the file
+    marks: Mapping[str, int]  # patterns, each with the number of lines it may stand in
+
+    def recognises(self, text: RecordText) -> bool:
+        """Return whether a file has all marks of the format."""
+        return all(text.contains(pattern, lines) for pattern, lines in self.marks.items())
+
 
 # Each format with patterns, and the number of lines from the first in which they must be found.
 # Old formats with unspecific headers come last.
 _RECORD_FORMATS = tuple(
     RecordFormat(*form)
     for form in (
-        ("SMC", ((r"^\s*\d\s+[A-Z ]+$", 1), (r"^\s*\*\s*$", 11)), numeric_headers.read_smc),
-        (
-            "COSMOS",
-            ((r"\(Format v\d|^\s*\d+\s+Integer-header values follow", 40),),
-            numeric_headers.read_cosmos,
-        ),
-        ("GeoNet", ((r"CORRECTED ACCELEROGRAM .*GNS Science", 1),), volumes.read_geonet),
-        ("BHRC", ((r"^\W*VOL1DS FILE", 3),), volumes.read_bhrc),
-        (
-            "CSMIP",
-            ((f"{volumes.SPACED_PATTERN}|{volumes.SPECTRA_PATTERN}", 120),),
-            volumes.read_spaced,
-        ),
-        (
-            "volume 1 (CDMG, USC, RENADIC)",
-            ((volumes.VOLUME_1_PATTERN, 120),),
-            volumes.read_volume_1,
-        ),
-        ("AFAD", ((r"^\s*NUMBER OF DATA\s*:", 40), (r"SAMPLING INTERVAL", 40)), keyed.read_afad),
-        ("UNAM", (("^ARCHIVO ESTANDAR DE ACELERACION", 20),), keyed.read_unam),
-        ("CWB", ((r"^#DataSequence:\s*Time", 30),), keyed.read_cwb),
-        ("ESM", ((r"^\s*NDATA\s*:|^\s*SAMPLING_INTERVAL_S\s*:", 80),), keyed.read_esm),
-        ("K-NET", ((r"^\s*Scale Factor\s|^\s*Sampling Freq\(Hz\)", 20),), keyed.read_knet),
-        ("PEER", ((r"\bNPTS\b", 12), (r"\bDT\b", 12)), keyed.read_peer),
+        ("SMC", numeric_headers.read_smc, {r"^\s*\d\s+[A-Z ]+$": 1, r"^\s*\*\s*$": 11}),
+        ("COSMOS", numeric_headers.read_cosmos, {numeric_headers.COSMOS_PATTERN: 40}),
+        ("GeoNet", volumes.read_geonet, {r"CORRECTED ACCELEROGRAM .*GNS Science": 1}),
+        ("BHRC", volumes.read_bhrc, {r"^\W*VOL1DS FILE": 3}),
+        ("CSMIP", volumes.read_spaced, {volumes.CSMIP_PATTERN: 120}),
+        ("volume 1 (CDMG, USC, RENADIC)", volumes.read_volume_1, {volumes.VOLUME_1_PATTERN: 120}),
+        ("AFAD", keyed.read_afad, {r"^\s*NUMBER OF DATA\s*:": 40, r"SAMPLING INTERVAL": 40}),
+        ("UNAM", keyed.read_unam, {"^ARCHIVO ESTANDAR DE ACELERACION": 20}),
+        ("CWB", keyed.read_cwb, {r"^#DataSequence:\s*Time": 30}),
+        ("ESM", keyed.read_esm, {r"^\s*NDATA\s*:|^\s*SAMPLING_INTERVAL_S\s*:": 80}),
+        ("K-NET", keyed.read_knet, {r"^\s*Scale Factor\s|^\s*Sampling Freq\(Hz\)": 20}),
+        ("PEER", keyed.read_peer, {r"\bNPTS\b": 12, r"\bDT\b": 12}),
     )
 )
 
@@ -81,7 +82,7 @@ def register_record_format(
             text.check_step(channel.dt)
         return channels
 
-    _registered_formats[name] = RecordFormat(name, tuple(marks.items()), read_checked)
+    _registered_formats[name] = RecordFormat(name, read_checked, marks)
 
 
 def read_components(path: str | PathLike[str], **options: Any) -> dict[str, Channel]:

@@ -2,12 +2,11 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -260,18 +259,6 @@ class Channel:
         """Create a channel of each column of a table (n, columns)."""
         columns = zip(table.T, names, strict=True)
         return [cls.from_direction(column, dt, name) for column, name in columns]
-
-
-class RecordFormat(NamedTuple):
-    """A format of record files: how it is recognised, and its reader."""
-
-    name: str
-    marks: tuple[tuple[str, int], ...]  # patterns, each with the number of lines it may stand in
-    read: Callable[[RecordText], list[Channel]]  # components in the order of the file
-
-    def recognises(self, text: RecordText) -> bool:
-        """Return whether a file has all marks of the format."""
-        return all(text.contains(pattern, lines) for pattern, lines in self.marks)
 
 
 def parse_unit(name: str) -> float:

@@ -31,11 +31,7 @@ class Scale:
 
 
 def check_film(
-    model: Model,
-    run: History,
-    colour: str,
-    magnification: float | None,
-    size: tuple[int, int] = (1280, 720),
+    model: Model, run: History, colour: str, magnification: float | None, size: tuple[int, int]
 ) -> None:
     """Refuse invalid options, a run without fields, and a run of another model."""
     check_options(model, colour, magnification, size)

@@ -276,5 +276,5 @@ def viewer(
         InvalidInput: the run has no fields or belongs to another model, or an option is invalid.
         NotInstalled: pyvista cannot be used.
     """
-    check_film(model, run, colour, magnification)
+    check_film(model, run, colour, magnification, (1280, 720))
     return Viewer(Setup.of(model, recorded_fields(run)[1], colour, magnification), run)
