@@ -396,8 +396,8 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
                 "(friction=None)"
             )
         holds = follower.last_equilibrium(path)
-    oscillator = _Oscillator(placed, path, holds, bool(fill))
-    return _check(oscillator, spectrum, rules, q, confidence_factor)
+    given = spectrum, rules, confidence_factor
+    return _Oscillator(placed, path, holds, bool(fill), *given).assess(q)
 
 
 @validate_arguments
@@ -537,12 +537,15 @@ def _find_first_mechanism(
 
 @dataclass(frozen=True, eq=False)
 class _Oscillator:
-    """Equivalent oscillator of a mechanism."""
+    """Equivalent oscillator of a mechanism, and the demand on it."""
 
     placed: PlacedBlocks
     path: MechanismPath | None
     holds: int  # last place at which the joints that do not move hold
     fill: bool  # whether some of the loads are the weight of a fill
+    spectrum: DesignSpectrum | Motion
+    rules: LimitState
+    confidence_factor: float
 
     @cached_property
     def weights(self) -> tuple[Array, Array]:
@@ -626,74 +629,61 @@ class _Oscillator:
             )
         return found
 
+    def assess(self, q: float) -> KinematicAssessment:
+        """Return the assessment, the linear check with a behaviour factor q."""
+        curve, path, structure = self.curve, self.path, self.placed.structure
+        ground = float(spectral_acceleration(self.spectrum, np.zeros(1), 0.05)[0])
+        alpha_0, a_0, d_0, secant = np.inf, np.inf, np.inf, np.nan
+        mass, control, displacement = 0.0, "", None
+        if path is not None:
+            alpha_0, a_0 = float(curve["alpha"][0]), float(curve["a"][0])
+            mass = self.e_star * (self.weights[0].sum() / structure.gravity)
+            control = structure.blocks[self.control].name
+            starts = a_0 / self.confidence_factor / ground  # ratio at which it is set in motion
+            displacement = self._check_displacement(starts)
+            if path.end is PathEnd.FALLS:
+                d_0 = float(curve["d"][-1])
+                secant = self._secant_period(0.16 * d_0)
+        name = f"linear, q = {q:g}, FC = {self.confidence_factor:g}"
+        capacity = q * a_0 / self.confidence_factor
+        source = "Circolare 7/2019, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8"
+        return KinematicAssessment(
+            structure,
+            self.spectrum,
+            self.placed.direction,
+            alpha_0,
+            mass,
+            self.e_star,
+            a_0,
+            d_0,
+            secant,
+            curve,
+            AssessmentCheck(name, capacity, ground, "m/s²", capacity / ground, np.nan, source),
+            displacement,
+            self.rules,
+            self.confidence_factor,
+            control,
+            path,
+            tuple(self.notes(alpha_0)),
+        )
 
-def _check(
-    oscillator: _Oscillator,
-    spectrum: DesignSpectrum | Motion,
-    rules: LimitState,
-    q: float,
-    confidence_factor: float,
-) -> KinematicAssessment:
-    """Return the assessment of an oscillator under a spectrum."""
-    curve, path, structure = oscillator.curve, oscillator.path, oscillator.placed.structure
-    ground = float(spectral_acceleration(spectrum, np.zeros(1), 0.05)[0])
-    alpha_0, a_0, d_0, secant = np.inf, np.inf, np.inf, np.nan
-    mass, control, displacement = 0.0, "", None
-    if path is not None:
-        alpha_0, a_0 = float(curve["alpha"][0]), float(curve["a"][0])
-        mass = oscillator.e_star * (oscillator.weights[0].sum() / structure.gravity)
-        control = structure.blocks[oscillator.control].name
-        starts = a_0 / confidence_factor / ground  # ratio at which the mechanism sets in motion
-        displacement = _check_displacement(curve, spectrum, rules, confidence_factor, starts)
-        if path.end is PathEnd.FALLS:
-            d_0 = float(curve["d"][-1])
-            secant = secant_period(curve, 0.16 * d_0)
-    name = f"linear, q = {q:g}, FC = {confidence_factor:g}"
-    capacity = q * a_0 / confidence_factor
-    source = "Circolare 7/2019, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8"
-    return KinematicAssessment(
-        structure,
-        spectrum,
-        oscillator.placed.direction,
-        alpha_0,
-        mass,
-        oscillator.e_star,
-        a_0,
-        d_0,
-        secant,
-        curve,
-        AssessmentCheck(name, capacity, ground, "m/s²", capacity / ground, np.nan, source),
-        displacement,
-        rules,
-        confidence_factor,
-        control,
-        path,
-        tuple(oscillator.notes(alpha_0)),
-    )
+    def _secant_period(self, displacement: float) -> float:
+        """Return the secant period of the capacity curve at a displacement [s]."""
+        growing = np.maximum.accumulate(self.curve["d"].values)
+        acceleration = float(np.interp(displacement, growing, self.curve["a"].values))
+        return float(2.0 * np.pi * np.sqrt(displacement / acceleration)) if acceleration else np.inf
 
-
-def secant_period(curve: xr.Dataset, displacement: float) -> float:
-    """Return the secant period of a capacity curve at a displacement [s]."""
-    growing = np.maximum.accumulate(curve["d"].values)
-    acceleration = float(np.interp(displacement, growing, curve["a"].values))
-    return float(2.0 * np.pi * np.sqrt(displacement / acceleration)) if acceleration else np.inf
-
-
-def _check_displacement(
-    curve: xr.Dataset,
-    spectrum: DesignSpectrum | Motion,
-    rules: LimitState,
-    confidence_factor: float,
-    starts: float,
-) -> AssessmentCheck:
-    """Check the displacement of a capacity curve against the spectrum."""
-    capacity = rules.share * float(curve["d"][-1])
-    secant = secant_period(curve, rules.secant_share * capacity)
-    # FC reduces the accelerations of the curve
-    period = rules.period_factor / 2.0 * np.sqrt(confidence_factor) * secant
-    # The largest spectral displacement up to the period; code spectra grow with it.
-    periods = period * np.linspace(0.0, 1.0, 41)[1:]
-    acceleration = spectral_acceleration(spectrum, periods, rules.damping)
-    demand = float((acceleration * (periods / (2.0 * np.pi)) ** 2).max())
-    ratio = max(capacity / demand, starts)
-    return AssessmentCheck(rules.name, capacity, demand, "m", ratio, float(period), rules.source)
+    def _check_displacement(self, starts: float) -> AssessmentCheck:
+        """Check the displacement of the capacity curve against the spectrum."""
+        rules = self.rules
+        capacity = rules.share * float(self.curve["d"][-1])
+        secant = self._secant_period(rules.secant_share * capacity)
+        # FC reduces the accelerations of the curve
+        period = rules.period_factor / 2.0 * np.sqrt(self.confidence_factor) * secant
+        # The largest spectral displacement up to the period; code spectra grow with it.
+        periods = period * np.linspace(0.0, 1.0, 41)[1:]
+        acceleration = spectral_acceleration(self.spectrum, periods, rules.damping)
+        demand = float((acceleration * (periods / (2.0 * np.pi)) ** 2).max())
+        ratio = max(capacity / demand, starts)
+        period = float(period)
+        return AssessmentCheck(rules.name, capacity, demand, "m", ratio, period, rules.source)

@@ -448,6 +448,7 @@ def test_notes_tell_where_the_curve_is_an_upper_bound(ring):
         (last - 1, 0.9995, ["beyond d* = "]),
         (last, 0.99895, ["sliding that dilates"]),
     ):
-        oscillator = mechanism_assessment._Oscillator(placed, ring.path, holds, False)
+        given = ring.spectrum, ring.limit_state, ring.confidence_factor
+        oscillator = mechanism_assessment._Oscillator(placed, ring.path, holds, False, *given)
         notes = oscillator.notes(share * factor)
         assert all(note.startswith(start) for note, start in zip(notes, said, strict=True))
