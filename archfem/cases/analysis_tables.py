@@ -11,7 +11,13 @@ from typing import Any
 
 from archfem._validation import declared_keys, given_fields
 from archfem.cases.provenance import name_from
-from archfem.cases.toml_file import Table, check_choice, check_table, read_object
+from archfem.cases.toml_file import (
+    Table,
+    check_choice,
+    check_table,
+    read_object,
+    split_key_path,
+)
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.events import (
     CountedMechanism,
@@ -57,6 +63,12 @@ _EVENTS: Mapping[str, type] = {
 def find_section(keyword: str) -> str:
     """Return the section of a keyword of `Analysis`, or "" if it is none."""
     return next((name for name, keys in SECTION_FIELDS.items() if keyword in keys), "")
+
+
+def complete_path(path: str) -> str:
+    """Return the path of a value in a case; a keyword of an analysis has its section before it."""
+    section = find_section(split_key_path(path)[0])
+    return f"{section}.{path}" if section else path
 
 
 def read_analysis(settings: Table, structure: Structure, folder: Path) -> Analysis:
