@@ -26,12 +26,8 @@ from archfem.view.joint_marks import Marker, outline_moving_blocks, scale_motion
 from archfem.view.positions import FallingBlocks
 from archfem.view.structure import block_colours, draw_loads, draw_structure, draw_thrust
 from archfem.view.style import (
-    COLOUR_MAP,
-    COLUMN_WIDTH,
-    LABEL_SIZE,
-    PAGE_WIDTH,
-    TITLE_SIZE,
     Colour,
+    Size,
     add_legend,
     add_legend_below,
     add_polygons,
@@ -158,7 +154,7 @@ def _draw_factors(
         upper.set_ylim(0.0, 4.0 * max(least, required))
     style_axes(upper, label, "factor [-]")
     set_title(upper, title)
-    upper.legend(frameon=False, fontsize=LABEL_SIZE)
+    upper.legend(frameon=False, fontsize=Size.LABEL)
     draw_structure(structure, axes=lower)
     _draw_mechanism(lower, structure, found.worst)
     low, high = outline_bounds(structure)
@@ -184,8 +180,8 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
     if found.path is None or found.displacement is None:
         raise InvalidInput("there is no motion to draw: no mechanism moves under horizontal forces")
     wide, high = structure_figure(found.structure).get_size_inches()
-    figure = new_figure(max(wide, 0.75 * COLUMN_WIDTH) + 0.8 * COLUMN_WIDTH, max(high, 4.2))
-    widths = [max(wide, 0.75 * COLUMN_WIDTH), 0.8 * COLUMN_WIDTH]
+    figure = new_figure(max(wide, 0.75 * Size.COLUMN) + 0.8 * Size.COLUMN, max(high, 4.2))
+    widths = [max(wide, 0.75 * Size.COLUMN), 0.8 * Size.COLUMN]
     left, right = figure.subplots(1, 2, width_ratios=widths)
     _draw_displaced_mechanism(left, found)
     _draw_capacity_curve(right, found)
@@ -235,7 +231,7 @@ def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
     outcome = "passes" if check.passes else "fails"
     rest = ", up to which nothing moves" if check.at_rest else ""
     set_title(axes, f"{check.name}: {outcome}, ratio {check.ratio:.2f}{rest}")
-    axes.legend(frameon=False, fontsize=LABEL_SIZE)
+    axes.legend(frameon=False, fontsize=Size.LABEL)
 
 
 def draw_capacity(
@@ -255,12 +251,12 @@ def draw_capacity(
     Returns:
         The figure, with a colour bar beside the map.
     """
-    figure, axes = new_axes(COLUMN_WIDTH, 4.4, "embrace [°]", "thickness / radius, t/R [-]")
+    figure, axes = new_axes(Size.COLUMN, 4.4, "embrace [°]", "thickness / radius, t/R [-]")
     embraces, ratios = capacity["embrace"].values, capacity["ratio"].values
     # rings that no acceleration overturns are drawn in the colour of the largest values
     values = np.nan_to_num(capacity.values.T, nan=0.0, posinf=1e3)
     levels = [0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0]  # [g]
-    filled = axes.contourf(embraces, ratios, values, levels, cmap=COLOUR_MAP, extend="max")
+    filled = axes.contourf(embraces, ratios, values, levels, cmap=Colour.MAP, extend="max")
     axes.contour(embraces, ratios, values, levels[1:], colors="white", linewidths=0.5)
     edge = np.array(sorted(thinnest.items()))
     axes.fill_between(edge[:, 0], 0.0, edge[:, 1], color="white", zorder=2)
@@ -346,8 +342,8 @@ def draw_fall(run: History) -> Figure:
     drawn = np.concatenate([*built, *(each for time in instants for each in falls.outlines(time))])
     size, margin = np.ptp(drawn, axis=0), 0.4  # [m], [inch]
     # panels have the shape of what is drawn: else they would leave much of the page white
-    scale = ((np.array([PAGE_WIDTH, 6.8]) / 2.0 - margin) / size).min()
-    figure = new_figure(*np.maximum(2.0 * (scale * size + margin), 0.5 * COLUMN_WIDTH))
+    scale = ((np.array([Size.PAGE, 6.8]) / 2.0 - margin) / size).min()
+    figure = new_figure(*np.maximum(2.0 * (scale * size + margin), 0.5 * Size.COLUMN))
     panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
     for axes, time in zip(panels, instants, strict=True):
         _draw_instant(axes, falls, time)
@@ -373,6 +369,6 @@ def _draw_instant(axes: Axes, falls: FallingBlocks, time: float) -> None:
     built = [block.drawn() for block in structure.blocks]
     add_polygons(axes, built, "none", edge=Colour.UNDEFORMED, width=0.6)
     add_polygons(axes, falls.outlines(time), block_colours(structure), zorder=2, gid="blocks")
-    axes.set_title(f"t = {time:.2f} s", fontsize=TITLE_SIZE, color=Colour.TEXT)
+    axes.set_title(f"t = {time:.2f} s", fontsize=Size.TITLE, color=Colour.TEXT)
     axes.autoscale_view()
     axes.label_outer()

@@ -30,11 +30,8 @@ from archfem.joints.criteria import (
 from archfem.masonry.structure import Structure
 from archfem.view.structure import short_name
 from archfem.view.style import (
-    COLUMN_WIDTH,
-    LABEL_SIZE,
-    LINE_COLOURS,
-    PAGE_WIDTH,
     Colour,
+    Size,
     add_legend,
     add_legend_below,
     add_note,
@@ -77,7 +74,7 @@ def draw_envelope(
     panels, openings = _make_panels(joints_of_runs, axes), 0
     row_height = 0.05  # of the crosses of a run, in units of e
     for row, ((label, joints), colour) in enumerate(
-        zip(joints_of_runs.items(), LINE_COLOURS, strict=False)
+        zip(joints_of_runs.items(), Colour.LINES, strict=False)
     ):
         # shades of several runs add up where they overlap
         shade = 0.0 if label in dotted else 0.15 / len(runs)
@@ -101,7 +98,7 @@ def draw_envelope(
 
 def draw_envelopes(runs: Mapping[str, History], dead: xr.Dataset | None) -> list[Figure]:
     """Draw the envelopes of any number of runs, in as many figures as line styles require."""
-    pairs, count = list(runs.items()), len(LINE_COLOURS)
+    pairs, count = list(runs.items()), len(Colour.LINES)
     groups = [dict(pairs[first : first + count]) for first in range(0, len(pairs), count)]
     return [draw_envelope(group, dead=dead) for group in groups]
 
@@ -127,7 +124,7 @@ def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[st
     if several:
         raise InvalidInput(f"{several} have several instants: give one, e.g. joints.isel(time=-1)")
     panels = _make_panels(states, None)
-    for (label, joints), colour in zip(states.items(), LINE_COLOURS, strict=False):
+    for (label, joints), colour in zip(states.items(), Colour.LINES, strict=False):
         style: dict[str, Any] = {"color": colour, "lw": 1.4, "marker": "o", "ms": 2.8}
         style["ls"] = ":" if label in dotted else "-"
         for part, panel in panels.items():
@@ -167,8 +164,8 @@ def _joints_of_part(joints: xr.Dataset, part: str) -> xr.Dataset:
 
 def _make_panels(states: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[str, Axes]:
     """Return a panel for each ring and pier, the rings first, with the faces of its joints."""
-    if not 1 <= len(states) <= len(LINE_COLOURS):
-        raise InvalidInput(f"{len(states)} runs in one picture: give 1 to {len(LINE_COLOURS)}")
+    if not 1 <= len(states) <= len(Colour.LINES):
+        raise InvalidInput(f"{len(states)} runs in one picture: give 1 to {len(Colour.LINES)}")
     names: dict[str, list[str]] = {}
     roles: dict[str, str] = {}
     for joints in states.values():
@@ -211,7 +208,7 @@ def _lay_out_panels(
         if rows[-1] and sum(rows[-1].values()) + width > joints_per_row:
             rows.append({})
         rows[-1][part] = width
-    inches = (COLUMN_WIDTH, 3.4) if len(sizes) == 1 else (PAGE_WIDTH, 0.6 + 2.8 * len(rows))
+    inches = (Size.COLUMN, 3.4) if len(sizes) == 1 else (Size.PAGE, 0.6 + 2.8 * len(rows))
     figure, panels = new_figure(*inches), dict[str, Axes]()
     longest = max(sum(row.values()) for row in rows)
     first: Axes | None = None
@@ -237,7 +234,7 @@ def _finish_panels(panels: Mapping[str, Axes], states: Mapping[str, xr.Dataset])
         add_legend(first)
     else:
         handles = first.get_legend_handles_labels()[0]
-        add_legend_below(figure, 2 + len(LINE_COLOURS), handles=handles)
+        add_legend_below(figure, 2 + len(Colour.LINES), handles=handles)
     add_note(figure, {label: describe_assessed_joints(joints) for label, joints in states.items()})
     return figure
 
@@ -263,7 +260,7 @@ def draw_joints(run: History, joints: Sequence[str | int] | None = None) -> Figu
     if not len(joints):
         raise InvalidInput("no joints to draw: give their names, e.g. ['main arch, joint 5']")
     selected, rows = [run.joint(joint) for joint in joints], 1 + len(joints)
-    figure = new_figure(COLUMN_WIDTH, 0.9 + 1.15 * rows)
+    figure = new_figure(Size.COLUMN, 0.9 + 1.15 * rows)
     grid = figure.add_gridspec(rows, 2)
     ground = figure.add_subplot(grid[0, :])
     draw_ground(ground, run.time, run.dataset["ground"].values)
@@ -277,7 +274,7 @@ def draw_joints(run: History, joints: Sequence[str | int] | None = None) -> Figu
         _draw_friction(right, joint)
         left_panels.append(left)
         for axes in (left, right):
-            axes.set_xlabel("time [s]" if row == len(selected) else "", fontsize=LABEL_SIZE)
+            axes.set_xlabel("time [s]" if row == len(selected) else "", fontsize=Size.LABEL)
             axes.tick_params(labelbottom=row == len(selected))
     figure.align_ylabels([ground, *left_panels])
     add_note(figure, {"": describe_assessed_joints(run.joints)})
@@ -301,13 +298,13 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     Raises:
         InvalidInput: a run has no such joint.
     """
-    figure = new_figure(0.8 * PAGE_WIDTH, 4.2)
+    figure = new_figure(0.8 * Size.PAGE, 4.2)
     panels = figure.subplots(2, len(runs), sharex=True, sharey="row", squeeze=False)
     for column, (label, run) in zip(panels.T, runs.items(), strict=True):
         own = run.joint(joint)
         _draw_friction(column[0], own)
         _draw_eccentricity(column[1], own, "eccentricity M / (N h) [-]")
-        column[1].set_xlabel("time [s]", fontsize=LABEL_SIZE)
+        column[1].set_xlabel("time [s]", fontsize=Size.LABEL)
         set_title(column[0], f"{label}: {own['name'].values!s}")
         for axes in column:
             axes.set_xlim(run.time[0], run.time[-1])
@@ -317,13 +314,13 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
 
 
 def draw_ground(
-    axes: Axes, times: Array, ground: Array, *, size: float = LABEL_SIZE, width: float = 0.6
+    axes: Axes, times: Array, ground: Array, *, size: float = Size.LABEL, width: float = 0.6
 ) -> None:
     """Draw the ground acceleration (n, 2) over time, in a font size and a line width [points]."""
     style_axes(axes, "", "ground [m/s²]", size)
     axes.plot(times, ground[:, 0], color=Colour.TEXT, lw=width, label="horizontal", zorder=3)
     if ground[:, 1].any():
-        axes.plot(times, ground[:, 1], color=LINE_COLOURS[4], lw=0.85 * width, label="vertical")
+        axes.plot(times, ground[:, 1], color=Colour.LINES[4], lw=0.85 * width, label="vertical")
         # above the axes' right end: inside it would cover the lines
         style: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
         axes.legend(ncols=2, frameon=False, fontsize=size, **style)
@@ -339,7 +336,7 @@ def _draw_eccentricity(axes: Axes, joint: xr.Dataset, label: str) -> None:
     style: dict[str, Any] = {"xycoords": "axes fraction", "color": Colour.HINGE}
     style |= {"ha": "right", "va": "bottom"}
     annotate(axes, f"hinge from |e| = {hinge:.3g}", (1.0, 1.0), (-3, 1), **style)
-    axes.plot(joint["time"], joint["eccentricity"], color=LINE_COLOURS[0], lw=0.6)
+    axes.plot(joint["time"], joint["eccentricity"], color=Colour.LINES[0], lw=0.6)
     axes.set_ylim(-0.56, 0.56)
 
 
@@ -356,7 +353,7 @@ def _draw_friction(axes: Axes, joint: xr.Dataset) -> None:
         style: dict[str, Any] = {"va": "bottom", "xycoords": ("axes fraction", "data")}
         style |= {"ha": "right", "color": Colour.SLIDING}
         annotate(axes, f"μ = {limit:g}", (1.0, limit), (-3, 1), **style)
-    axes.plot(joint["time"], ratio, color=LINE_COLOURS[0], lw=0.6)
+    axes.plot(joint["time"], ratio, color=Colour.LINES[0], lw=0.6)
 
 
 def _draw_friction_limits(axes: Axes, times: Array, ratio: Array, limits: Array) -> None:
@@ -375,7 +372,7 @@ def _draw_friction_limits(axes: Axes, times: Array, ratio: Array, limits: Array)
         axes.scatter(times[beyond], edge, marker="d", s=6, color=Colour.HINGE, zorder=4)
         style = {"xycoords": "axes fraction", "color": Colour.HINGE}
         text = f"◆ beyond, up to {largest:.3g}"
-        annotate(axes, text, (0.0, 0.0), (3, 2), fontsize=LABEL_SIZE - 1.0, **style)
+        annotate(axes, text, (0.0, 0.0), (3, 2), fontsize=Size.LABEL - 1.0, **style)
 
 
 def _mirror_images(structure: Structure | None, numbers: Array, first: int) -> Flags:

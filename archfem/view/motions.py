@@ -15,16 +15,7 @@ from archfem.motion.record_selection import RecordSelection
 from archfem.motion.response_spectra import response_spectrum
 from archfem.motion.suite import Suite
 from archfem.units import STANDARD_GRAVITY
-from archfem.view.style import (
-    COLUMN_WIDTH,
-    LINE_COLOURS,
-    TITLE_SIZE,
-    Colour,
-    add_legend_below,
-    annotate,
-    new_figure,
-    style_axes,
-)
+from archfem.view.style import Colour, Size, add_legend_below, annotate, new_figure, style_axes
 
 # Periods at which spectra are drawn [s]
 SPECTRUM_PERIODS = np.geomspace(0.02, 3.0, 150)
@@ -41,7 +32,7 @@ def draw_motion(motion: Motion) -> Figure:
         The figure, with a column for each component.
     """
     names = motion.components
-    figure = new_figure(COLUMN_WIDTH * (0.4 + 0.6 * len(names)), 5.5)
+    figure = new_figure(Size.COLUMN * (0.4 + 0.6 * len(names)), 5.5)
     axes = figure.subplots(3, len(names), sharex=True, squeeze=False)
     for column, name in zip(axes.T, names, strict=True):
         rows = (
@@ -53,8 +44,8 @@ def draw_motion(motion: Motion) -> Figure:
             _draw_history(axis, motion.times(name), values)
             style_axes(axis, "time [s]" if axis is column[-1] else "", label)
         if len(names) > 1:  # a single component may have any direction
-            column[0].set_title(name, fontsize=TITLE_SIZE)
-    figure.suptitle(motion.name, fontsize=TITLE_SIZE, wrap=True)
+            column[0].set_title(name, fontsize=Size.TITLE)
+    figure.suptitle(motion.name, fontsize=Size.TITLE, wrap=True)
     return figure
 
 
@@ -118,7 +109,7 @@ def draw_suite(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
             axis.plot(*_tabulate(function), Colour.HINGE, ls="--", lw=1.8, label="target")
         _label_panel(axis, name)
         _mark_matched_periods(axis, suite)
-    figure.suptitle(suite.name, fontsize=TITLE_SIZE, wrap=True)
+    figure.suptitle(suite.name, fontsize=Size.TITLE, wrap=True)
     _add_common_legend(figure, axes)
     return figure
 
@@ -136,7 +127,7 @@ def draw_selection(found: RecordSelection) -> Figure:
     rule, (first, last) = found.rule, found.band
     periods = np.geomspace(0.5 * first, 1.5 * last, 120)
     spectra = found.spectra_at(periods) / STANDARD_GRAVITY
-    figure = new_figure(1.3 * COLUMN_WIDTH, 4.2)
+    figure = new_figure(1.3 * Size.COLUMN, 4.2)
     axes = figure.subplots()
     shade = {"color": Colour.HINGE, "alpha": 0.06, "lw": 0.0, "zorder": 0}
     axes.axvspan(first, last, label=f"checked, {first:.3g} to {last:.3g} s", **shade)
@@ -152,7 +143,7 @@ def draw_selection(found: RecordSelection) -> Figure:
             axes.plot(found.periods, bound * target, Colour.HINGE, ls=":", lw=1.0, label=label)
     style_axes(axes, "period [s]", f"spectral acceleration, {found.measure} [g]")
     state = "met" if found.meets else f"missed by {found.shortfall:.2g}"
-    axes.set_title(f"{rule.name}: {state}", fontsize=TITLE_SIZE)
+    axes.set_title(f"{rule.name}: {state}", fontsize=Size.TITLE)
     axes.set_ylim(bottom=0.0)
     add_legend_below(figure, 3)
     return figure
@@ -161,7 +152,7 @@ def draw_selection(found: RecordSelection) -> Figure:
 def _draw_spectrum(axes: Axes, values: Array, index: int, name: str, *, width: float) -> None:
     """Draw one of several spectra [m/s²], with its own colour and dashes."""
     # colours repeat after a cycle, with other dashes; the last one, black, is that of the mean
-    colours = LINE_COLOURS[:-1]
+    colours = Colour.LINES[:-1]
     cycle, place = divmod(index, len(colours))
     style = {"color": colours[place], "ls": ("-", "--", ":", "-.")[cycle % 4], "lw": width}
     axes.plot(SPECTRUM_PERIODS, values / STANDARD_GRAVITY, label=name, **style)
@@ -196,13 +187,13 @@ def _add_common_legend(figure: Figure, axes: Sequence[Axes]) -> None:
 
 def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:
     """Return a figure and its panels side by side."""
-    figure = new_figure(0.75 * COLUMN_WIDTH * max(count, 1.3), 4.2)
+    figure = new_figure(0.75 * Size.COLUMN * max(count, 1.3), 4.2)
     return figure, figure.subplots(1, count, squeeze=False)[0]
 
 
 def _draw_history(axis: Axes, times: Array, values: Array) -> None:
     """Draw a time history and mark its peak."""
-    axis.plot(times, values, LINE_COLOURS[0], lw=0.7)
+    axis.plot(times, values, Colour.LINES[0], lw=0.7)
     peak = int(np.argmax(np.abs(values)))
     axis.plot(times[peak], values[peak], "o", ms=3.5, color=Colour.HINGE)
     annotate(axis, f"{values[peak]:.3g}", (times[peak], values[peak]), (5, 0), va="center")
@@ -211,5 +202,5 @@ def _draw_history(axis: Axes, times: Array, values: Array) -> None:
 def _label_panel(axis: Axes, component: str) -> None:
     """Label a panel of spectra."""
     style_axes(axis, "period [s]", "spectral acceleration [g]")
-    axis.set_title(component, fontsize=TITLE_SIZE)
+    axis.set_title(component, fontsize=Size.TITLE)
     axis.set_ylim(bottom=0.0)

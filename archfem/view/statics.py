@@ -24,11 +24,8 @@ from archfem.statics.pushover import Pushover
 from archfem.units import kN, mm
 from archfem.view.structure import DisplacedBlocks, draw_structure
 from archfem.view.style import (
-    COLUMN_WIDTH,
-    LABEL_SIZE,
-    LINE_COLOURS,
-    TITLE_SIZE,
     Colour,
+    Size,
     add_legend,
     add_legend_below,
     add_polygons,
@@ -71,7 +68,7 @@ def draw_dead_load(dead: Equilibrium, *, criteria: Criteria | None = None) -> Fi
         style = {"ha": "center", "va": "center", "fontweight": "bold", "zorder": 8}
         # 9 points beyond the extrados
         offset = 9.0 * np.array(joint.tangent)
-        annotate(axes, letter, joint.ends[1], offset, fontsize=TITLE_SIZE, **style)
+        annotate(axes, letter, joint.ends[1], offset, fontsize=Size.TITLE, **style)
         # the symbol of an entry takes 0.6 inch
         letters = int((figure.get_figwidth() - 0.6) / text_width(1))
         label = fill(f"{joint.name}: {', '.join(texts)}", letters)
@@ -153,7 +150,7 @@ def mode_panels(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, li
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         panels.append(ModePanel(axes, modes, number))
     text = f"mode shapes are normalised to a largest displacement of {amplitude:.2g} m"
-    figure.supxlabel(text, fontsize=LABEL_SIZE, color=Colour.EDGE)
+    figure.supxlabel(text, fontsize=Size.LABEL, color=Colour.EDGE)
     return figure, panels
 
 
@@ -170,7 +167,7 @@ class ModePanel:
         self._places, self._blocks = cells.places, DisplacedBlocks(axes, modes.model)
         frequency, (x, y) = modes.frequencies[number - 1], 100.0 * modes.mass_ratios[number - 1]
         title = f"mode {number}: {frequency:.2f} Hz\neffective mass: x {x:.0f} %, y {y:.0f} %"
-        axes.set_title(title, fontsize=LABEL_SIZE, color=Colour.TEXT)
+        axes.set_title(title, fontsize=Size.LABEL, color=Colour.TEXT)
 
     def show_phase(self, factor: float) -> None:
         """Displace the blocks by the mode shape times a factor."""
@@ -210,7 +207,7 @@ def draw_free_body(
         )
     figure = new_figure(9.6, 5.0 + 0.18 * len(body.names))
     left, right = figure.subplots(1, 2)
-    colours = [LINE_COLOURS[k % len(LINE_COLOURS)] for k in range(len(body.joints))]
+    colours = [Colour.LINES[k % len(Colour.LINES)] for k in range(len(body.joints))]
     colours.append(Colour.GREY)
     _draw_block_forces(left, structure, body, colours)
     _draw_force_polygon(right, body, colours)
@@ -308,7 +305,7 @@ def _draw_force(axes: Axes, tail: Array, head: Array, colour: str) -> None:
 
 def _number_force(axes: Axes, index: int, place: Array, colour: str) -> None:
     """Write the number of a force, counted from 1."""
-    style = {"fontsize": TITLE_SIZE, "ha": "center", "va": "center", "zorder": 7}
+    style = {"fontsize": Size.TITLE, "ha": "center", "va": "center", "zorder": 7}
     x, y = place
     axes.text(x, y, str(index + 1), color=colour, **style)
 
@@ -339,14 +336,14 @@ def draw_pushover(
         InvalidInput: there is no pushover, or more than there are colours.
     """
     pushes = {"pushover": pushes} if isinstance(pushes, Pushover) else pushes
-    if not 1 <= len(pushes) <= len(LINE_COLOURS):
-        raise InvalidInput(f"{len(pushes)} pushovers in one picture: give 1 to {len(LINE_COLOURS)}")
-    axes = new_figure(COLUMN_WIDTH, 3.8).add_subplot() if axes is None else axes
+    if not 1 <= len(pushes) <= len(Colour.LINES):
+        raise InvalidInput(f"{len(pushes)} pushovers in one picture: give 1 to {len(Colour.LINES)}")
+    axes = new_figure(Size.COLUMN, 3.8).add_subplot() if axes is None else axes
     units = {push.curve["factor"].attrs["units"] for push in pushes.values()}
     load = "load factor λ [-]" if units == {"1"} else "work per unit of settlement [N m]"
     style_axes(axes, "displacement [mm]", load)
     reach = reach or max(_displacement_shown(push) for push in pushes.values())
-    for (label, push), colour in zip(pushes.items(), LINE_COLOURS, strict=False):
+    for (label, push), colour in zip(pushes.items(), Colour.LINES, strict=False):
         axes.plot(push.curve["displacement"] / mm, push.curve["factor"], color=colour, label=label)
         hinges = _mark_first_hinges(axes, push, reach)
     style = {"color": Colour.HINGE, "ms": 6.0, "mec": "white"}

@@ -29,8 +29,8 @@ from archfem.view.joint_marks import (
 )
 from archfem.view.positions import block_kinds, fields_at
 from archfem.view.style import (
-    LABEL_SIZE,
     Colour,
+    Size,
     add_legend,
     add_legend_below,
     add_note,
@@ -241,7 +241,7 @@ def _name_part(axes: Axes, joints: Sequence[Joint], inch: float) -> None:
     ends = np.array([joint.ends[0] for joint in joints])
     apart = np.linalg.norm(np.diff(ends, axis=0), axis=1).min() if len(ends) > 1 else np.inf
     # a line of type takes 0.65 of the spacing; type below 4.5 points cannot be read on paper
-    size = float(np.clip(0.65 * 72.0 * apart / inch, 4.5, LABEL_SIZE))
+    size = float(np.clip(0.65 * 72.0 * apart / inch, 4.5, Size.LABEL))
     for joint in joints:
         outward = -np.array(joint.tangent)
         angle = float(np.degrees(np.arctan2(outward[1], outward[0])))
@@ -257,7 +257,7 @@ def _name_part(axes: Axes, joints: Sequence[Joint], inch: float) -> None:
     if joints[0].role != "ring":
         place, style["va"] = min((j.middle for j in joints), key=lambda middle: middle[1]), "top"
     style |= {"rotation": 0.0, "ha": "center"}
-    annotate(axes, joints[0].part, place, (0.0, -1.4 * LABEL_SIZE), **style)
+    annotate(axes, joints[0].part, place, (0.0, -1.4 * Size.LABEL), **style)
 
 
 @validate_arguments

@@ -15,12 +15,8 @@ from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import InvalidInput
 from archfem.view.style import (
-    COLUMN_WIDTH,
-    LABEL_SIZE,
-    LINE_COLOURS,
-    PAGE_WIDTH,
-    TITLE_SIZE,
     Colour,
+    Size,
     add_legend_below,
     annotate,
     new_axes,
@@ -85,7 +81,7 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
     names = names[: max(max_panels // len(keys), 1)]
     columns = len(keys) if len(keys) > 1 else min(len(names), 3)
     rows = -(-len(names) * len(keys) // columns)
-    figure = new_figure(max(0.6 + 2.6 * columns, COLUMN_WIDTH), 0.9 + 1.5 * rows)
+    figure = new_figure(max(0.6 + 2.6 * columns, Size.COLUMN), 0.9 + 1.5 * rows)
     same: Literal["row", "none"] = "row" if len(keys) > 1 else "none"
     panels = figure.subplots(rows, columns, sharex="col", sharey=same, squeeze=False).ravel()
     for number, (axes, (name, key)) in enumerate(zip(panels, product(names, keys), strict=False)):
@@ -95,13 +91,13 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
         style_axes(axes, _label_key(flat, key) if is_lowest else "", label)
         others = [each for each in keys if each != key]
         # words first: a case says more than a number
-        few = [each for each in others if frame[each].nunique() <= len(LINE_COLOURS)]
+        few = [each for each in others if frame[each].nunique() <= len(Colour.LINES)]
         coloured = next((each for each in few if frame[each].dtype.kind not in "fi"), None)
         coloured = coloured or next(iter(few), None)
         _draw_over_key(axes, frame.rename(columns={name: "value"}), key, others, coloured)
         if number < columns and coloured is not None:
             place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 3}
-            style = {"fontsize": LABEL_SIZE, "title_fontsize": LABEL_SIZE, "frameon": False}
+            style = {"fontsize": Size.LABEL, "title_fontsize": Size.LABEL, "frameon": False}
             axes.legend(title=_label_key(flat, coloured), **place, **style)
     for axes in panels[len(names) * len(keys) :]:
         axes.remove()
@@ -132,7 +128,7 @@ def _draw_over_key(
         words = None if coloured is None else group[coloured].iloc[0]
         text = f"{words:.6g}" if isinstance(words, float) else f"{words}"
         label = None if words is None or words in colours else text
-        colour = colours.setdefault(words, LINE_COLOURS[len(colours)])
+        colour = colours.setdefault(words, Colour.LINES[len(colours)])
         known = group[np.isfinite(group["value"])].sort_values(key)
         style = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
         axes.plot(known[key], known["value"], "o-" if joined else "o", **style)
@@ -164,7 +160,7 @@ def draw_study(
     scales = {d: np.array([case[d] for case in factors.values()]) for d in definitions}
     scales = {d: values for d, values in scales.items() if np.isfinite(values).any()}
     label = "scale of the motions at the first mechanism [-]"
-    figure, axes = new_axes(0.75 * PAGE_WIDTH, 1.6 + 0.42 * len(names), label)
+    figure, axes = new_axes(0.75 * Size.PAGE, 1.6 + 0.42 * len(names), label)
     finite = np.concatenate([[1.0], *(each[np.isfinite(each)] for each in scales.values())])
     end = 1.3 * finite.max()
     _draw_ranges(axes, scales, end)
@@ -184,9 +180,9 @@ def draw_study(
     if any(~np.isfinite(each).all() for each in scales.values()):
         axes.plot([], [], ">", label="above the scales tried", **style)
     if title:
-        figure.suptitle(title, fontsize=TITLE_SIZE, color=Colour.TEXT, wrap=True)
+        figure.suptitle(title, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
     head = "first mechanism: the first instant in which …"
-    add_legend_below(figure, 3, title=head, title_fontsize=LABEL_SIZE)
+    add_legend_below(figure, 3, title=head, title_fontsize=Size.LABEL)
     return figure
 
 
@@ -200,11 +196,11 @@ def _draw_ranges(axes: Axes, scales: Mapping[str, Array], end: float) -> None:
         "verified": "blocks can move (verified)",
     }
     for number, (definition, least) in enumerate(scales.items()):
-        style = {"color": LINE_COLOURS[number], "ms": 5}
+        style = {"color": Colour.LINES[number], "ms": 5}
         # rows of one case lie around its tick, whose distance to the next is 1
         rows = np.arange(len(least)) + 0.16 * (number - 0.5 * (len(scales) - 1))
         low, middle, high = np.quantile(least, [0.0, 0.5, 1.0], axis=1, method="nearest")
-        colour = LINE_COLOURS[number]
+        colour = Colour.LINES[number]
         axes.hlines(rows, np.minimum(low, end), np.minimum(high, end), color=colour, lw=1.4)
         known = np.isfinite(middle)
         axes.plot([], [], "o", label=explanations.get(definition, definition), **style)
@@ -235,7 +231,7 @@ def draw_ida(
     Returns:
         The figure: curves at the left, limit states at the right, with a common intensity axis.
     """
-    figure = new_figure(1.35 * COLUMN_WIDTH, 0.75 * COLUMN_WIDTH)
+    figure = new_figure(1.35 * Size.COLUMN, 0.75 * Size.COLUMN)
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2.2, 1.0))
     style_axes(left, demand, measure)
     style_axes(right)
@@ -254,9 +250,9 @@ def draw_ida(
         for (name, dashes), values in zip(names.items(), fractiles[1], strict=True):
             known = np.isfinite(values)
             x, y = values[known], fractiles[0][known]
-            left.plot(x, y, dashes, color=LINE_COLOURS[0], lw=1.8, label=name)
+            left.plot(x, y, dashes, color=Colour.LINES[0], lw=1.8, label=name)
     left.set_xlim(0.0, 1.1 * end or 1.0)
-    left.legend(frameon=False, fontsize=LABEL_SIZE, loc="lower right")
+    left.legend(frameon=False, fontsize=Size.LABEL, loc="lower right")
     _draw_capacities(right, capacities)
     left.set_ylim(bottom=0.0)  # last, since it fixes the upper end as well
     add_legend_below(figure, handles=right.get_legend_handles_labels()[0])
@@ -268,7 +264,7 @@ def _draw_capacities(axes: Axes, capacities: Mapping[str, tuple[Array, Array]]) 
     for place, (low, high) in enumerate(capacities.values()):
         spread = place + np.linspace(-0.25, 0.25, len(low))
         met = np.isfinite(high)
-        colour = LINE_COLOURS[place % len(LINE_COLOURS)]
+        colour = Colour.LINES[place % len(Colour.LINES)]
         axes.vlines(spread[met], low[met], high[met], color=colour, lw=2.0)
         # a bracket may be too narrow to be seen: its middle is marked
         axes.plot(spread[met], 0.5 * (low + high)[met], ".", color=colour, ms=5)
@@ -323,9 +319,9 @@ def draw_fragility(
             raise InvalidInput("probabilities have no intensities: give intensity, or a Fragility")
         largest = max(curve.median for curve in named.values())
         intensity = np.linspace(0.0, 3.0 * largest, 301)[1:]
-    size = COLUMN_WIDTH, 0.7 * COLUMN_WIDTH
+    size = Size.COLUMN, 0.7 * Size.COLUMN
     figure, axes = new_axes(*size, measure, "probability of the limit state [-]")
-    for (name, curve), colour in zip(named.items(), LINE_COLOURS, strict=False):
+    for (name, curve), colour in zip(named.items(), Colour.LINES, strict=False):
         if isinstance(curve, tuple):
             middle, low, high = curve
         else:
@@ -340,7 +336,7 @@ def draw_fragility(
         style = {"color": Colour.GREY, "ms": 3.5, "mfc": "white"}
         axes.plot([], [], "o", label="data of the fit", **style)
     axes.set(xlim=(0.0, float(intensity.max())), ylim=(0.0, 1.0))
-    axes.legend(frameon=False, fontsize=LABEL_SIZE, loc="lower right")
+    axes.legend(frameon=False, fontsize=Size.LABEL, loc="lower right")
     return figure
 
 
@@ -358,9 +354,9 @@ def draw_tornado(
         The figure, with the most influential parameter at the top.
     """
     order = sorted(ranges, key=lambda name: float(np.ptp([*ranges[name], usual])))
-    figure, axes = new_axes(COLUMN_WIDTH, 0.9 + 0.42 * len(order), quantity)
+    figure, axes = new_axes(Size.COLUMN, 0.9 + 0.42 * len(order), quantity)
     for row, name in enumerate(order):
-        ends = zip(ranges[name], LINE_COLOURS, ("low", "high"), strict=False)
+        ends = zip(ranges[name], Colour.LINES, ("low", "high"), strict=False)
         # where both ends lie on one side, the nearer is drawn on top
         for value, colour, end in sorted(ends, key=lambda end: -abs(end[0] - usual)):
             style = {"height": 0.62, "color": colour, "label": None if row else end}
@@ -399,7 +395,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     }
     columns = min(4, len(shares))
     lines = -(-len(shares) // columns)
-    figure = new_figure(PAGE_WIDTH, 0.7 + 2.1 * lines)
+    figure = new_figure(Size.PAGE, 0.7 + 2.1 * lines)
     panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()
     for axes in panels[len(shares) :]:
         axes.set_visible(False)
@@ -413,7 +409,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         axes.set_yscale("log")
         axes.set_ylim(0.7e-3 * top, 4.0 * top)
     add_legend_below(figure, 2, handles=panels[0].get_legend_handles_labels()[0])
-    figure.suptitle(verdicts.sentence, fontsize=TITLE_SIZE, color=Colour.TEXT, wrap=True)
+    figure.suptitle(verdicts.sentence, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
     return figure
 
 
@@ -429,7 +425,7 @@ def _draw_property(axes: Axes, values: Array, heights: Array, falls: Array) -> N
         words = [str(label).replace(" and ", "\nand ") for label in labels]
         axes.set_xticks(range(len(labels)), words)
         axes.set_xlim(-0.5, len(labels) - 0.5)
-    groups = ((~falls, LINE_COLOURS[0], "stands"), (falls, Colour.HINGE, "falls, above the line"))
+    groups = ((~falls, Colour.LINES[0], "stands"), (falls, Colour.HINGE, "falls, above the line"))
     for chosen, colour, label in groups:
         style = {"ms": 4, "alpha": 0.8, "label": label}
         axes.plot(places[chosen], heights[chosen], "o", color=colour, **style)
@@ -452,18 +448,18 @@ def draw_convergence(
     if not isinstance(paths, Mapping):
         quantity, paths = quantity or paths.quantity, paths.paths
     quantity = quantity or "finding"
-    wide = 0.25 * COLUMN_WIDTH + 0.55 * COLUMN_WIDTH * len(paths)
-    figure = new_figure(wide, 0.55 * COLUMN_WIDTH)
+    wide = 0.25 * Size.COLUMN + 0.55 * Size.COLUMN * len(paths)
+    figure = new_figure(wide, 0.55 * Size.COLUMN)
     panels = figure.subplots(1, len(paths), sharey=True, squeeze=False)[0]
     for axes, (name, (sizes, values, limit, error)) in zip(panels, paths.items(), strict=True):
         style_axes(axes, f"{name}: size over the finest [-]", quantity if axes is panels[0] else "")
-        axes.plot(sizes, values, "o-", color=LINE_COLOURS[0], lw=1.4, ms=5)
-        axes.errorbar(sizes[-1:], values[-1:], [error], color=LINE_COLOURS[1], capsize=4, lw=1.6)
-        axes.plot([0.0], [limit], "D", color=LINE_COLOURS[2], ms=6, label="limit", clip_on=False)
+        axes.plot(sizes, values, "o-", color=Colour.LINES[0], lw=1.4, ms=5)
+        axes.errorbar(sizes[-1:], values[-1:], [error], color=Colour.LINES[1], capsize=4, lw=1.6)
+        axes.plot([0.0], [limit], "D", color=Colour.LINES[2], ms=6, label="limit", clip_on=False)
         axes.plot([0.0, sizes[-1]], [limit, values[-1]], ":", color=Colour.GREY)
         axes.set_xlim(0.0, 1.08 * float(np.max(sizes)))
         axes.set_xticks(sizes, [f"{size:.3g}" for size in sizes])
-    panels[0].legend(frameon=False, fontsize=LABEL_SIZE)
+    panels[0].legend(frameon=False, fontsize=Size.LABEL)
     return figure
 
 
@@ -483,7 +479,7 @@ def draw_accuracy(found: Accuracy) -> Figure:
     labels = "computing time [s]", "error of the largest |e| of a joint [-]"
     figure, axes = new_axes(7.2, 5.0, *labels)
     axes.set(xscale="log", yscale="log")
-    axes.tick_params(which="both", labelsize=LABEL_SIZE)
+    axes.tick_params(which="both", labelsize=Size.LABEL)
     # smaller errors are drawn at this one: they are uncertain, or exactly zero
     floor = max(found.reference_error / 10.0, 1e-7)
     reached = [trial for trial in found.front if np.isfinite(trial.error)]
@@ -500,14 +496,14 @@ def draw_accuracy(found: Accuracy) -> Figure:
         style = {"path_effects": white_halo(3.0), "zorder": 6}
         annotate(axes, chosen.setting.label, place, (10, -14), **style)
     _draw_settings(axes, found, floor)
-    axes.legend(fontsize=LABEL_SIZE, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    axes.legend(fontsize=Size.LABEL, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 
 def _draw_settings(axes: Axes, found: Accuracy, floor: float) -> None:
     """Mark each setting by fidelity and quadrature, and explain those that occur."""
     shapes = {"rigid": "o", "faces": "s", "condensed": "D", "full": "^"}
-    colours = dict(zip(("nodal", "lobatto", "gauss", "exact"), LINE_COLOURS, strict=False))
+    colours = dict(zip(("nodal", "lobatto", "gauss", "exact"), Colour.LINES, strict=False))
     tried = [trial.setting.discretisation for trial in found.trials]
     for trial, setting in zip(found.trials, tried, strict=True):
         if np.isfinite(trial.error):

@@ -37,23 +37,25 @@ class Colour:
     THRUST, HINGE, SLIDING = "#0b4f8a", "#d7261e", "#e08a00"
     MECHANISM, LOAD = "#009e73", "#7b3294"
 
+    # lines that share axes; distinguishable with all common kinds of colour blindness
+    LINES = ("#0b4f8a", "#e08a00", "#009e73", "#cc6fa4", "#56b4e9", "#1b1b1b")
 
-# Lines that share axes; distinguishable with all common kinds of colour blindness
-LINE_COLOURS = ("#0b4f8a", "#e08a00", "#009e73", "#cc6fa4", "#56b4e9", "#1b1b1b")
+    # scale of values, from low to high
+    MAP = LinearSegmentedColormap.from_list(
+        "archfem", (STONE, "#bcd9d3", "#7fb8b8", "#4690a3", "#2f6485")
+    )
 
-COLOUR_MAP = LinearSegmentedColormap.from_list(
-    "archfem", (Colour.STONE, "#bcd9d3", "#7fb8b8", "#4690a3", "#2f6485")
-)
+
+class Size:
+    """Font sizes [points], and widths of figures [inch]."""
+
+    LABEL, TITLE = 8.0, 9.5  # LABEL also of ticks and legends
+    COLUMN, PAGE = 6.4, 11.0  # PAGE for a long structure, or many panels
+
 
 # Percentage of stresses beyond the end of a colour scale: peaks at the corners about which blocks
 # rotate would otherwise set the scale
 CLIPPED_PERCENT = 0.5
-
-# Font sizes [points]: ticks, legends and labels; titles
-LABEL_SIZE, TITLE_SIZE = 8.0, 9.5
-
-# Width of a figure, and of one of a long structure or of many panels [inch]
-COLUMN_WIDTH, PAGE_WIDTH = 6.4, 11.0
 
 
 class Page(Figure):
@@ -89,7 +91,7 @@ def disable_math(drawing: Artist) -> None:
             text.set_parse_math(False)
 
 
-def text_width(letters: float, size: float = LABEL_SIZE) -> float:
+def text_width(letters: float, size: float = Size.LABEL) -> float:
     """Return the approximate width of a text [inch]; a letter is 0.56 of the font size wide."""
     return letters * 0.56 * size / 72.0
 
@@ -98,9 +100,9 @@ def set_title(axes: Axes, text: str) -> None:
     """Set the title of axes, wrapped to the width of their part of the figure."""
     place = axes.get_subplotspec()
     columns = 1 if place is None else place.get_gridspec().ncols
-    letters = int(axes.figure.get_figwidth() / columns / text_width(1, TITLE_SIZE))
+    letters = int(axes.figure.get_figwidth() / columns / text_width(1, Size.TITLE))
     lines = fill(" ".join(text.split()), max(letters, 12), break_long_words=False)
-    axes.set_title(lines, fontsize=TITLE_SIZE, color=Colour.TEXT, parse_math=False)
+    axes.set_title(lines, fontsize=Size.TITLE, color=Colour.TEXT, parse_math=False)
 
 
 def add_note(figure: Figure, notes: Mapping[str, str]) -> None:
@@ -113,11 +115,11 @@ def add_note(figure: Figure, notes: Mapping[str, str]) -> None:
     if texts and not figure.get_suptitle():  # a figure of the user may have a title
         letters = int(figure.get_figwidth() / text_width(1))
         text = "\n".join(fill(each, letters) for each in texts)
-        figure.suptitle(text, fontsize=LABEL_SIZE, color=Colour.EDGE, parse_math=False)
+        figure.suptitle(text, fontsize=Size.LABEL, color=Colour.EDGE, parse_math=False)
         figure.set_figheight(figure.get_figheight() + 0.14 * (1 + text.count("\n")))
 
 
-def style_axes(axes: Axes, x: str = "", y: str = "", size: float = LABEL_SIZE) -> None:
+def style_axes(axes: Axes, x: str = "", y: str = "", size: float = Size.LABEL) -> None:
     """Label the axes in a font size [points] and apply the common style."""
     axes.set_xlabel(x, fontsize=size)
     axes.set_ylabel(y, fontsize=size)
@@ -151,7 +153,7 @@ def structure_axes(structure: Structure, axes: Axes | None = None) -> Axes:
     return axes
 
 
-def style_colour_bar(bar: Colorbar, label: str, size: float = LABEL_SIZE) -> None:
+def style_colour_bar(bar: Colorbar, label: str, size: float = Size.LABEL) -> None:
     """Label a colour bar and apply the common style."""
     bar.set_label(label, fontsize=size)
     bar.ax.tick_params(labelsize=size, color=Colour.EDGE)
@@ -178,7 +180,7 @@ def annotate(
     **style: Any,
 ) -> Annotation:
     """Write a text at an offset [points] from a point."""
-    default = {"textcoords": "offset points", "fontsize": LABEL_SIZE, "color": Colour.TEXT}
+    default = {"textcoords": "offset points", "fontsize": Size.LABEL, "color": Colour.TEXT}
     return axes.annotate(text, tuple(point), tuple(offset), **(default | style))
 
 
@@ -199,7 +201,7 @@ def add_polygons(
 
 def add_legend_below(figure: Figure, columns: int = 4, **options: Any) -> None:
     """Add a legend below all panels of a figure."""
-    options = {"frameon": False, "fontsize": LABEL_SIZE} | options
+    options = {"frameon": False, "fontsize": Size.LABEL} | options
     figure.legend(loc="outside lower center", ncols=columns, **options)
 
 
@@ -213,7 +215,7 @@ def add_legend(axes: Axes) -> None:
         fitting = int(page.get_figwidth() / (0.6 + text_width(longest)))
         add_legend_below(page, max(1, min(4, fitting)))
     else:
-        axes.legend(frameon=False, fontsize=LABEL_SIZE)
+        axes.legend(frameon=False, fontsize=Size.LABEL)
     disable_math(page)
 
 
@@ -226,7 +228,7 @@ def outline_bounds(structure: Structure) -> tuple[Array, Array]:
 def fitting_width(width: float, height: float) -> float:
     """Return the figure width [inch] for a drawing with these proportions."""
     # a ring has at most about 3, a bridge more than 4
-    return COLUMN_WIDTH if width < 4.0 * height else PAGE_WIDTH
+    return Size.COLUMN if width < 4.0 * height else Size.PAGE
 
 
 def drawing_scale(structure: Structure) -> float:
@@ -241,7 +243,7 @@ def structure_figure(structure: Structure) -> Figure:
     """Return an empty figure that fits a structure."""
     low, high = outline_bounds(structure)
     width, height = drawing_scale(structure) * (high - low) + [0.8, 1.2]
-    return new_figure(max(0.5 * COLUMN_WIDTH, width), max(0.35 * COLUMN_WIDTH, height))
+    return new_figure(max(0.5 * Size.COLUMN, width), max(0.35 * Size.COLUMN, height))
 
 
 @validate_arguments

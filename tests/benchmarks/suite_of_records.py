@@ -21,7 +21,7 @@ import archfem as af
 from archfem.cases.result_text import tabulate_matches
 from archfem.units import STANDARD_GRAVITY
 from archfem.view import draw_suite, save
-from archfem.view.style import COLUMN_WIDTH, LABEL_SIZE, LINE_COLOURS, TITLE_SIZE, style_axes
+from archfem.view.style import Colour, Size, style_axes
 
 TARGET = af.Tbec2018(ss=1.140, s1=0.315, site="ZD")
 STEP = 0.005  # s, that of most of the records
@@ -46,25 +46,25 @@ def records(folder):
 
 def draw_accelerograms(suite):
     """Draw the matched accelerograms, divided by R: six horizontals, three verticals."""
-    figure = Figure(figsize=(1.5 * COLUMN_WIDTH, 9.0), layout="constrained")
+    figure = Figure(figsize=(1.5 * Size.COLUMN, 9.0), layout="constrained")
     axes = figure.subplots(5, 2, sharex=True)
     motions = suite.motions
     panels = [(motion, "horizontal") for motion in motions]
     panels += [(motion, "vertical") for motion in motions[::2]]
     for axis, (motion, component) in zip(axes.flat, panels, strict=False):
         values = motion.component(component) / STANDARD_GRAVITY
-        axis.plot(motion.times(component), values, LINE_COLOURS[component == "vertical"], lw=0.5)
+        axis.plot(motion.times(component), values, Colour.LINES[component == "vertical"], lw=0.5)
         name = motion.name if component == "horizontal" else motion.name.rpartition(" ")[0]
-        axis.set_title(f"{name}, {component}", fontsize=TITLE_SIZE)
+        axis.set_title(f"{name}, {component}", fontsize=Size.TITLE)
         style_axes(axis, "", "acceleration [g]")
         top = values[np.argmax(np.abs(values))]
         axis.text(
-            0.98, 0.9, f"{top:.3f} g", transform=axis.transAxes, ha="right", fontsize=LABEL_SIZE
+            0.98, 0.9, f"{top:.3f} g", transform=axis.transAxes, ha="right", fontsize=Size.LABEL
         )
         axis.set_ylim(-0.25, 0.25)
     axes[-1, -1].set_visible(False)
     for axis in (axes[-1, 0], axes[-2, 1]):
-        axis.set_xlabel("time [s]", fontsize=LABEL_SIZE)
+        axis.set_xlabel("time [s]", fontsize=Size.LABEL)
         axis.tick_params(labelbottom=True)
     return figure
 

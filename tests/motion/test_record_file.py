@@ -7,7 +7,7 @@ import pytest
 
 import archfem as af
 from archfem.motion import RecordText
-from archfem.motion.records.record_file import find_column_width, find_units, parse_unit
+from archfem.motion.records.record_file import parse_unit
 
 PLACE = Path("record.txt")
 
@@ -41,7 +41,7 @@ def test_columns_of_a_stated_width_separate_numbers_without_signs():
     [("Format=(8F10.3)", 10), ("( 5e15.6 )", 15), ("(10I8)", None), ("no format", None)],
 )
 def test_the_width_of_columns_is_read_off_their_format(line, width):
-    assert find_column_width(line) == width
+    assert RecordText.find_column_width(line) == width
 
 
 def test_a_block_ends_where_its_count_is_reached():
@@ -124,5 +124,5 @@ def test_units_by_name_and_in_headers(name, unit):
     """The standard acceleration of gravity is 9.80665 m/s² by definition."""
     written = {"g": "units of g", "gal": "in gal", "m/s2": "acc. m/s^2"}.get(name, f"({name})")
     assert parse_unit(name) == pytest.approx(unit, rel=1e-15)
-    assert list(find_units(written)) == [pytest.approx(unit, rel=1e-15)]
-    assert find_units("nothing of the kind") == set()
+    assert list(RecordText.find_units(written)) == [pytest.approx(unit, rel=1e-15)]
+    assert RecordText.find_units("nothing of the kind") == set()

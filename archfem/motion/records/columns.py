@@ -6,14 +6,7 @@ import numpy as np
 
 from archfem._typing import Array
 from archfem._validation import check_number
-from archfem.motion.records.record_file import (
-    NUMBER_PATTERN,
-    Channel,
-    RecordText,
-    find_units,
-    fit_step,
-    parse_unit,
-)
+from archfem.motion.records.record_file import NUMBER_PATTERN, Channel, RecordText, parse_unit
 
 
 def read(
@@ -91,7 +84,7 @@ def _is_time(rows: Array) -> bool:
 
 def _find_unit(text: RecordText, comments: str, units: str | None) -> float:
     """Return the unit of the columns [m/s²]."""
-    written = find_units(comments)
+    written = text.find_units(comments)
     if units is not None:
         unit = parse_unit(units)
         if written and unit not in written:
@@ -130,7 +123,7 @@ def _find_step(text: RecordText, rows: Array, lines: list[int], stated: list[flo
 
 def _time_column_step(text: RecordText, times: Array, lines: list[int]) -> float:
     """Return the constant step of a time column [s]."""
-    step, apart = fit_step(times)
+    step, apart = text.fit_step(times)
     steps = np.diff(times)
     usual = np.median(steps)
     # printed times are rounded, by up to a quarter of a step

@@ -5,13 +5,7 @@ import re
 import numpy as np
 
 from archfem._typing import Array
-from archfem.motion.records.record_file import (
-    COUNT_PATTERN,
-    Channel,
-    RecordText,
-    find_column_width,
-    space_evenly,
-)
+from archfem.motion.records.record_file import COUNT_PATTERN, Channel, RecordText
 
 _HEADER_PATTERN = rf"^\s*({COUNT_PATTERN})\s+%s-header values follow"
 
@@ -45,7 +39,7 @@ def _read_channel(text: RecordText, start: int) -> tuple[Channel, int]:
     length = re.search(r"approx\s+(\d+)\s+secs", rest)
     if length and abs(count * dt - float(length[1])) > 1.0 + dt:
         raise text.error(f"{count} samples at {dt:g} s do not last {length[1]} s", line)
-    numbers, after = text.read_block(line + 1, count, find_column_width(rest))
+    numbers, after = text.read_block(line + 1, count, text.find_column_width(rest))
     if peak != -999.0:  # unknown
         text.check_peak(numbers, peak)
     end, code = text.find(end_pattern, after)
@@ -104,4 +98,4 @@ def _read_samples(
     if sum(bool(line.strip()) for line in text.lines[after:]) > 1:
         # one line may be left over in the last block of a tape
         raise text.error(f"more follows after the {count} numbers of the header", after)
-    return space_evenly(text, numbers, start)
+    return text.space_evenly(numbers, start)

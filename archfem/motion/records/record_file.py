@@ -127,7 +127,7 @@ class RecordText:
 
     def find_unit(self, header: str, problem: str, line: int | None = None) -> float:
         """Return the unit of acceleration in a header [m/s²], or refuse none and several."""
-        units = find_units(header)
+        units = self.find_units(header)
         if len(units) != 1:
             raise self.error(problem, line)
         return units.pop()
@@ -190,34 +190,51 @@ class RecordText:
                 "one of them is damaged"
             )
 
+    @staticmethod
+    def fit_step(times: Array) -> tuple[float, float]:
+        """Fit a constant step to times; return it and the largest distance from it [s]."""
+        count = np.arange(len(times))
+        step, begin = np.polyfit(count, times, 1)
+        return step, np.abs(times - begin - step * count).max()
 
-def fit_step(times: Array) -> tuple[float, float]:
-    """Fit a constant step to times; return it and the largest distance of a time from it [s]."""
-    count = np.arange(len(times))
-    step, begin = np.polyfit(count, times, 1)
-    return step, np.abs(times - begin - step * count).max()
+    def space_evenly(self, pairs: Array, line: int) -> tuple[Array, float]:
+        """Return samples at a constant step, and the step [s], of pairs of time and sample."""
+        times, samples = np.reshape(pairs, (-1, 2)).T
+        if len(times) < 2 or not np.all(np.diff(times) >= 0.0):
+            raise self.error("pairs of a time and a sample are expected, but times decrease", line)
+        mean, apart = self.fit_step(times)
+        step = self.check_step(float(f"{mean:.6g}"), line)
+        # printed times are rounded; a film is digitised at uneven ones
+        if apart <= 0.25 * mean:
+            return samples, step
+        # between its points a digitised trace is straight, and 1 ms is finer than they are
+        fine = 0.001
+        even = np.arange(times[0], times[-1] + 0.5 * fine, fine)
+        return np.interp(even, times, samples), fine
 
+    @staticmethod
+    def find_column_width(line: str) -> int | None:
+        """Return the column width of a Fortran format such as (8F10.3) in a line."""
+        match = re.search(r"\(\s*\d+[FE](\d+)\.\d+\s*\)", line, re.IGNORECASE)
+        return int(match[1]) if match else None
 
-def space_evenly(text: RecordText, pairs: Array, line: int) -> tuple[Array, float]:
-    """Return samples at a constant step, and the step [s], of numbers that are (time, sample)."""
-    times, samples = np.reshape(pairs, (-1, 2)).T
-    if len(times) < 2 or not np.all(np.diff(times) >= 0.0):
-        raise text.error("pairs of a time and a sample are expected, but times decrease", line)
-    mean, apart = fit_step(times)
-    step = text.check_step(float(f"{mean:.6g}"), line)
-    # printed times are rounded; a film is digitised at uneven ones
-    if apart <= 0.25 * mean:
-        return samples, step
-    # between its points a digitised trace is straight, and 1 ms is finer than they are
-    fine = 0.001
-    even = np.arange(times[0], times[-1] + 0.5 * fine, fine)
-    return np.interp(even, times, samples), fine
-
-
-def find_column_width(line: str) -> int | None:
-    """Return the column width of a Fortran format such as (8F10.3) in a line."""
-    match = re.search(r"\(\s*\d+[FE](\d+)\.\d+\s*\)", line, re.IGNORECASE)
-    return int(match[1]) if match else None
+    @staticmethod
+    def find_units(header: str) -> set[float]:
+        """Return the values of the units of acceleration in a header [m/s²]."""
+        # longer units first: each match is removed before the search for the next
+        patterns = (
+            (r"mm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-3),
+            (r"cms?\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-2),
+            (r"\bgals?\b", 1e-2),
+            (r"\bm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1.0),
+            (r"units?\s*(?:of|:|=|in)?\s*\(?g\b|[(\[]\s*g\s*[)\]]|\bin\s+g\b", STANDARD_GRAVITY),
+        )
+        units = set()
+        for pattern, unit in patterns:
+            header, count = re.subn(pattern, " ", header, flags=re.IGNORECASE)
+            if count:
+                units.add(unit)
+        return units
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,21 +281,3 @@ def parse_unit(name: str) -> float:
     if key not in unit_names:
         raise InvalidInput(f"units {name!r} are unknown: use one of {', '.join(unit_names)}")
     return unit_names[key]
-
-
-def find_units(header: str) -> set[float]:
-    """Return the values of the units of acceleration in a header [m/s²]."""
-    # longer units first: each match is removed before the search for the next
-    patterns = (
-        (r"mm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-3),
-        (r"cms?\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-2),
-        (r"\bgals?\b", 1e-2),
-        (r"\bm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1.0),
-        (r"units?\s*(?:of|:|=|in)?\s*\(?g\b|[(\[]\s*g\s*[)\]]|\bin\s+g\b", STANDARD_GRAVITY),
-    )
-    units = set()
-    for pattern, unit in patterns:
-        header, count = re.subn(pattern, " ", header, flags=re.IGNORECASE)
-        if count:
-            units.add(unit)
-    return units

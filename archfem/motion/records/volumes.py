@@ -6,15 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from archfem._typing import Array
-from archfem.motion.records.record_file import (
-    COUNT_PATTERN,
-    NUMBER_PATTERN,
-    Channel,
-    RecordText,
-    find_column_width,
-    find_units,
-    space_evenly,
-)
+from archfem.motion.records.record_file import COUNT_PATTERN, NUMBER_PATTERN, Channel, RecordText
 from archfem.units import STANDARD_GRAVITY
 
 # Volume 2, and volume 1 of digital instruments: a line announces equally spaced samples.
@@ -66,10 +58,10 @@ def _read_spaced_channel(text: RecordText, start: int, end: int) -> Channel:
     dt = text.check_step(1.0 / max(spacing, 1e-9) if by_rate else spacing, line)
     # USC states the unit at the peak only
     words = block[4]
-    if not find_units(words) and (peak := text.search(_PEAK_PATTERN, start, line)):
+    if not text.find_units(words) and (peak := text.search(_PEAK_PATTERN, start, line)):
         words = f"in {peak[1][2]}"
     unit = text.find_unit(words, "no single unit of acceleration such as CM/SEC/SEC", line)
-    numbers, after = text.read_block(line + 1, int(block[1]), find_column_width(block[4]))
+    numbers, after = text.read_block(line + 1, int(block[1]), text.find_column_width(block[4]))
     _check_end(text, after, end, int(block[1]))
     return _create_channel(text, numbers * unit, dt, (start, line))
 
@@ -102,7 +94,7 @@ def _read_pairs(text: RecordText, start: int, end: int) -> Channel:
     _check_end(text, after, end, count)
     if abs(numbers[-2] - numbers[0] - duration) > 0.02 * duration:
         raise text.error(f"the points do not last {duration:g} s, as the header states", line)
-    samples, dt = space_evenly(text, numbers, first)
+    samples, dt = text.space_evenly(numbers, first)
     rms_pattern = rf"^\s*RMS ACC\w*\.? OF COMPLETE RECORD\s*=\s*({NUMBER_PATTERN})\s*G/10"
     if stated := text.search(rms_pattern, line, first):
         rms = float(np.sqrt(np.mean(numbers[1::2] ** 2)))
@@ -159,7 +151,7 @@ def _create_channel(
 ) -> Channel:
     """Create a channel of samples [m/s²] after a comparison with the peak of its header."""
     if found := text.search(_PEAK_PATTERN, *header):
-        peak, unit = found[1][1], find_units(f"in {found[1][2]}").pop()
+        peak, unit = found[1][1], text.find_units(f"in {found[1][2]}").pop()
         decimals = len(peak.partition(".")[2])
         text.check_peak(samples, float(peak) * unit, rounding=0.5 * unit * 10.0**-decimals)
     name_pattern = r"(?:\bCHAN\s+\d+:|^COMP(?:ONENT)?)\s+(\S+(?: DEG)?)"

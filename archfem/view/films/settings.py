@@ -16,7 +16,7 @@ from archfem.units import MPa, mm
 from archfem.view.joint_marks import round_magnification, support_outlines
 from archfem.view.positions import FallingBlocks
 from archfem.view.stress import Triangles
-from archfem.view.style import CLIPPED_PERCENT, COLOUR_MAP
+from archfem.view.style import CLIPPED_PERCENT, Colour
 
 
 @dataclass(frozen=True)
@@ -83,9 +83,9 @@ def fit_scale(cells: Cells, fields: Array, colour: str) -> Scale:
     values = np.array([colour_values(cells, q, colour) for q in fields])
     if colour == "displacement":
         highest = float(values.max()) or 1.0
-        return Scale(colour, "displacement [mm]", COLOUR_MAP, Normalize(0.0, highest), "neither")
+        return Scale(colour, "displacement [mm]", Colour.MAP, Normalize(0.0, highest), "neither")
     lowest = min(float(np.percentile(values, CLIPPED_PERCENT)), -1e-6)
-    label, shades = "least principal stress [MPa]", COLOUR_MAP.reversed()
+    label, shades = "least principal stress [MPa]", Colour.MAP.reversed()
     return Scale(colour, label, shades, Normalize(lowest, 0.0), "min")
 
 
