@@ -320,15 +320,18 @@ def takes_analysis(function: Function) -> Function:
     that is given replaces that of the analysis, as by `dataclasses.replace`.
     """
     names, known = [each.name for each in fields(Analysis)[1:]], {*signature(function).parameters}
+    # a solver of the user and a row of steps are no settings
+    kinds: Mapping[str, Any] = {"method": str, "dt": float | int | None}
 
     @wraps(function)
     def wrapper(model: Any, motion: Any, **given: Any) -> Any:
         if not isinstance(model, Analysis):
             return function(model, motion, **given)
-        # a method that is no word is a solver of the user, and no setting
-        words = {"method"} if isinstance(given.get("method", ""), str) else set()
-        changed = [key for key in given if key in {*names} - {"method"} | words]
-        changes = {key: given.pop(key) for key in changed}
+        changes = {
+            key: given.pop(key)
+            for key in [*given]
+            if key in names and isinstance(given[key], kinds.get(key, object))
+        }
         analysis = replace(model, **changes) if changes else model
         start = given.pop("start", None) or analysis.dead_load(motion)
         settings = {name: getattr(analysis, name) for name in names}

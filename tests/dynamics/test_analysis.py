@@ -88,6 +88,7 @@ def test_its_searches_are_those_of_the_functions():
     model = af.build(COLUMN, fidelity="rigid", displacements="large")
     options = {"precision": 0.2, "dt": [0.004, 0.002]}
     assert found == af.collapse_scale(model, MOTION, damping="effective", **options)
+    assert found == ROCKING.scale(MOTION, **options)
     scales = af.mechanism_scales(replace(ROCKING, criteria=af.Criteria(failures=1)), MOTION)
     assert scales["any joints at once"].upper <= scales["verified"].upper
     with pytest.raises(af.InvalidInput, match=r"small displacements.*displacements='large'"):
