@@ -456,8 +456,6 @@ class BlocksWithFill:
 
     def passive_forces(self) -> sparse.csr_matrix:
         """Return the generalised forces of each contact's pressure range (3 n_free, n)."""
-        if self.fill is None:
-            return sparse.csr_matrix((3 * len(self.rigid_regions.structure.free), 0))
         contacts = self.contacts
         points, forces = contacts.thrust(contacts.most - contacts.least, self.whole.width)
         return sparse.csr_matrix(self._apply_forces(contacts.block, points, forces).T)

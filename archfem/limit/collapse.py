@@ -379,18 +379,15 @@ def warn_sliding(names: Sequence[str], factor: float) -> None:
 
 
 def warn_cohesion(
-    structure: Structure,
-    failing: Sequence[int],
-    joints: xr.Dataset,
-    factor: float,
-    tolerance: float = 1e-6,
+    structure: Structure, failing: Sequence[int], joints: xr.Dataset, factor: float
 ) -> None:
     """Warn of failing joints whose shear exceeds the strength of their closed part."""
     normal, shear, moment = (joints[key].values for key in "NVM")
     strength = structure.cohesion * contact_fractions(structure, normal, moment)
     holds = np.isfinite(structure.friction) & (structure.cohesion > 0.0)
     strength[holds] += structure.friction[holds] * normal[holds]
-    limit = (1.0 + tolerance) * strength + tolerance * structure.cohesion
+    # round-off of the linear programme
+    limit = (1.0 + 1e-6) * strength + 1e-6 * structure.cohesion
     beyond = holds & (np.abs(shear) > limit)
     if overstrained := [number for number in sorted(failing) if beyond[number]]:
         logger.warning(

@@ -54,11 +54,6 @@ class KinematicChain:
     contacts: tuple[Contact, ...]  # those that persist
     is_flat: bool = False  # whether contacts were found to slide without dilatancy
 
-    @property
-    def sliding_joints(self) -> frozenset[int]:
-        """Numbers of the joints that slide."""
-        return frozenset(contact.joint for contact in self.contacts if contact.slip)
-
 
 @dataclass(frozen=True, eq=False)
 class PlacedBlocks:
@@ -88,9 +83,9 @@ class PlacedBlocks:
         return self.structure.centroids + self.displacement[:, :2]
 
     def places(self, points: Array, block: int) -> Array:
-        """Return the present places of points of a block, given at rest (p, 2) [m]."""
-        turn = rotation(self.displacement[block, 2])
-        return (points - self.structure.centroids[block]) @ turn.T + self.centroids[block]
+        """Return the present places of points of a block, given at rest (…, 2) [m]."""
+        arm = points - self.structure.centroids[block]
+        return rotate(arm, self.displacement[block, 2]) + self.centroids[block]
 
     @cached_property
     def outlines(self) -> list[Array]:
@@ -117,7 +112,7 @@ class PlacedBlocks:
     def attached(self) -> list[tuple[int, Array, AttachedLoad]]:
         """Block and present place of each attached load [m]."""
         loads = [(self.structure.block_number(load.block), load) for load in self.loads]
-        return [(k, self.places(np.array([load.point]), k)[0], load) for k, load in loads]
+        return [(k, self.places(np.array(load.point), k), load) for k, load in loads]
 
     @cached_property
     def dead(self) -> Array:
@@ -219,11 +214,6 @@ def _face_span(block: Block, line: Array, near: float) -> tuple[float, float]:
         if not arc and on_line and min(start, end) < depth - near and max(start, end) > near:
             low, high = min(low, start, end), max(high, start, end)
     return float(low), float(high)
-
-
-def rotation(turn: float) -> Array:
-    """Return the matrix that turns vectors anticlockwise (2, 2)."""
-    return np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
 
 
 def tangent(normal: Array) -> Array:

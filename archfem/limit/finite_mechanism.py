@@ -32,11 +32,10 @@ from archfem.limit.displaced_blocks import (
     KinematicChain,
     PlacedBlocks,
     find_mechanism,
-    rotation,
     tangent,
 )
 from archfem.limit.linear_programme import NoEquilibrium
-from archfem.masonry.block import largest_overlap
+from archfem.masonry.block import largest_overlap, rotate
 from archfem.masonry.structure import join_joint_names
 
 
@@ -64,14 +63,14 @@ class Linkage:
         for contact in self.mechanism.contacts:
             on_corner = self._at_rest(contact.point, contact.corner)
             on_face = self._at_rest(contact.point, contact.face)
-            turn = rotation(self.start.displacement[contact.face, 2])
-            found.append((on_corner, on_face, contact.normal @ turn))
+            normal = rotate(contact.normal, -self.start.displacement[contact.face, 2])
+            found.append((on_corner, on_face, normal))
         return found
 
     def _at_rest(self, point: Array, block: int) -> Array:
         """Return the place at rest of a point that moves with a block (2,) [m]."""
-        turn = rotation(self.start.displacement[block, 2])
-        return (point - self.start.centroids[block]) @ turn + self.start.structure.centroids[block]
+        arm = rotate(point - self.start.centroids[block], -self.start.displacement[block, 2])
+        return arm + self.start.structure.centroids[block]
 
     @cached_property
     def first_velocity(self) -> Array:
@@ -86,7 +85,7 @@ class Linkage:
         for number, (x, y, turn) in enumerate(motion.reshape(-1, 3)):
             own, reference = body == number, bodies.references[number]
             arm = blocks.centroids[own] - reference
-            displacement[own, :2] += (x, y) + arm @ (rotation(turn).T - np.eye(2))
+            displacement[own, :2] += rotate(arm, turn) - arm + (x, y)
             displacement[own, 2] += turn
         return LinkageState(self, blocks.moved(displacement))
 
@@ -108,9 +107,9 @@ class LinkageState:
         """Contacts at this place."""
         moved, kept = [], self.linkage.mechanism.contacts
         for contact, (on_corner, _, normal) in zip(kept, self.linkage.anchors, strict=True):
-            turn = rotation(self.blocks.displacement[contact.face, 2])
-            point = self.blocks.places(on_corner[None, :], contact.corner)[0]
-            moved.append(contact._replace(point=point, normal=turn @ normal))
+            normal = rotate(normal, self.blocks.displacement[contact.face, 2])
+            point = self.blocks.places(on_corner, contact.corner)
+            moved.append(contact._replace(point=point, normal=normal))
         return moved
 
     @cached_property
@@ -118,7 +117,7 @@ class LinkageState:
         """Violation of each constraint, gaps of all contacts and slips of sticking ones [m]."""
         gaps, slips = [], []
         for contact, (_, on_face, _) in zip(self.contacts, self.linkage.anchors, strict=True):
-            jump = contact.point - self.blocks.places(on_face[None, :], contact.face)[0]
+            jump = contact.point - self.blocks.places(on_face, contact.face)
             gaps.append(contact.normal @ jump)
             if not contact.slip:
                 slips.append(tangent(contact.normal) @ jump)

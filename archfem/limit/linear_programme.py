@@ -267,9 +267,11 @@ class Programme:
             every = np.arange(len(self.crushing))
             for share in (0.25, 0.5, 1.0):
                 limits = limits.joined(crushing_cuts(every, share * self.crushing, self.crushing))
+        columns = sparse.csr_matrix((len(self.load), 0)) if self.columns is None else self.columns
+        reduced = self.blocks.reduce(columns, self.friction, self.cohesion > 0.0)
         # As tangents of a parabola the cuts converge quadratically, in about six rounds.
         for _ in range(max_rounds):
-            optimum = self._solve_linear(limits)
+            optimum = reduced.solve(self, limits)
             if optimum is None or self.crushing is None:
                 return optimum
             thrust = optimum.forces.reshape(3, -1)[:2].sum(axis=0)
@@ -283,14 +285,6 @@ class Programme:
             f"the crushing limit is still violated after {max_rounds} rounds of cuts: "
             "check that strength is in Pa"
         )
-
-    def _solve_linear(self, limits: Limits) -> Optimum | None:
-        """Solve with linear limits only."""
-        columns = self.columns
-        if columns is None:
-            columns = sparse.csr_matrix((len(self.load), 0))
-        reduced = self.blocks.reduce(columns, self.friction, self.cohesion > 0.0)
-        return reduced.solve(self, limits)
 
 
 class Chains:

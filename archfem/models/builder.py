@@ -46,10 +46,8 @@ def _build_small(structure: Structure, settings: Discretisation) -> Model:
     from archfem.models.fem.space import build_broken_space
     from archfem.models.reference import MonolithicModel, build_full_model
 
-    if settings.mesh_file is None:
-        mesh = get_mesh(structure, settings)
-    else:
-        mesh = read_mesh(structure, settings.mesh_file)
+    given = settings.mesh_file
+    mesh = get_mesh(structure, settings) if given is None else read_mesh(structure, given)
     space = build_broken_space(mesh, settings.degree)
     if settings.fidelity == "monolithic":
         return MonolithicModel(space, settings.rule)

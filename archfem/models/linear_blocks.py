@@ -248,17 +248,12 @@ class LinearObserver(Observer):
     def _end_rows(self) -> sparse.csr_matrix:
         """Matrix from coordinates to displacements of the joint ends (4 n_joints, n)."""
         # an end is midway between its two blocks, and supports do not depend on the coordinates
-        fixed = sparse.csr_matrix((2, self.matrix.shape[1]))
-        rows = [
-            sum(
-                fixed
-                if self.structure.blocks[number].fixed
-                else 0.5 * self.cells.displacement_rows(number, end)
-                for number in joint.blocks
-            )
-            for joint in self.structure.joints
-            for end in joint.ends
-        ]
+        rows = []
+        for joint in self.structure.joints:
+            free = [number for number in joint.blocks if not self.structure.blocks[number].fixed]
+            for end in joint.ends:
+                moving = (0.5 * self.cells.displacement_rows(number, end) for number in free)
+                rows.append(sum(moving, sparse.csr_matrix((2, self.matrix.shape[1]))))
         return sparse.vstack(rows, format="csr")
 
     @cached_property

@@ -517,7 +517,8 @@ def _find_first_mechanism(
         raise refusal from error
     if any(found is not None and found.factor <= 1e-9 for found in (mechanism, *others)):
         raise refusal
-    if mechanism is None or friction != "nonassociated" or not mechanism.sliding_joints:
+    slides = mechanism is not None and any(each.slip for each in mechanism.contacts)
+    if friction != "nonassociated" or not slides:
         return mechanism
     if len(joints) < len(placed.structure.joints):
         raise InvalidInput(

@@ -239,16 +239,12 @@ class Forms:
     def _number(self, value: float) -> Any:
         return _fenicsx.constant(self.space.mesh.grid, value)
 
-    @property
-    def _width(self) -> Any:
-        return self._number(self.space.mesh.structure.width)
-
     def _stress(self, u: Any, material: Material) -> Any:
         return plane_stress(u, self._number(material.young), self._number(material.poisson))
 
     def block_work(self, u: Any, v: Any) -> Any:
         """Return ∫ w σ(u):ε(v), a UFL form."""
-        width = self._width
+        width = self._number(self.space.mesh.structure.width)
         return sum(
             width * ufl.inner(self._stress(u, material), strain(v)) * dx
             for material, dx in self._measures
@@ -256,7 +252,7 @@ class Forms:
 
     def over_joints(self, densities: list[Any]) -> Any:
         """Return Σ ∫ w d over the joints, a UFL form."""
-        width = self._width
+        width = self._number(self.space.mesh.structure.width)
         pairs = zip(densities, self.faces, strict=True)
         return sum(width * density * faces.patch.measure for density, faces in pairs)
 

@@ -127,17 +127,11 @@ class JointFacets:
         count = self._colour_count
         numbers = of_joint[self.joint] * count + self.colours
         tags = _fenicsx.tag_entities(grid, 1, self.numbers, numbers)
-        rule, degree = self._scheme
-        metadata = {"quadrature_rule": rule, "quadrature_degree": degree}
+        # FFCx's name of the rule, and the degree of the polynomials it integrates exactly
+        name, loss = ("default", 1) if self.rule.rule == "gauss" else ("GLL", 3)
+        metadata = {"quadrature_rule": name, "quadrature_degree": 2 * self.size - loss}
         dS = ufl.Measure("dS", domain=grid, subdomain_data=tags, metadata=metadata)
         return [Patch(contacts[k // count], k % count, dS(k)) for k in np.unique(numbers).tolist()]
-
-    @property
-    def _scheme(self) -> tuple[str, int]:
-        """Quadrature scheme of FFCx and the polynomial degree it integrates exactly."""
-        if self.rule.rule == "gauss":
-            return "default", 2 * self.size - 1
-        return "GLL", 2 * self.size - 3
 
     def _cellwise_space(self, size: int) -> tuple[Any, Numbers]:
         """Space of cellwise constants, `size` for each colour; entries of facets (f, 2, size)."""

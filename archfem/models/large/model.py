@@ -53,7 +53,10 @@ class CorotationalCoordinates:
     @classmethod
     def of(cls, small: LinearBlockModel) -> "CorotationalCoordinates":
         """Return the coordinates of the blocks of a model."""
-        fill, bases, order, blocks, count = set(_find_fill(small)), [], [], {}, 0
+        bases, order, blocks, count = [], [], {}, 0
+        # fill in one piece deforms with the blocks below: it gets no rotating frame
+        soft, stones = find_yielding_blocks(small.structure), small.structure.blocks
+        fill = {number for number in soft if not stones[number].grain}
         centres = np.array([block.centroid for block in small.structure.blocks], float)
         for number in small.structure.free:
             columns = np.flatnonzero(small.cells.coordinate_owner == number)
@@ -72,12 +75,6 @@ class CorotationalCoordinates:
     def block_starts(self) -> Array:
         """First coordinate of each free block, and the number of all (m + 1,)."""
         return np.array([0, *(span.stop for span, _ in self.blocks.values())])
-
-
-def _find_fill(small: LinearBlockModel) -> list[int]:
-    """Return the blocks of fill, which deform with the blocks below and get no rotating frame."""
-    blocks = small.structure.blocks
-    return [number for number in find_yielding_blocks(small.structure) if not blocks[number].grain]
 
 
 def _corotational_basis(small: LinearBlockModel, columns: Any, number: int) -> tuple[Array, Array]:
