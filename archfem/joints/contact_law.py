@@ -61,8 +61,9 @@ class ContactLaw(NamedTuple):
 
     @classmethod
     def of(cls, contact: Any) -> "ContactLaw":
-        """Return the law of an object with the parameters of a contact."""
-        law = cls(*(getattr(contact, name) for name in cls._fields[:-1]))
+        """Return the law of an object with parameters of a contact; others have their defaults."""
+        defaults = cls._field_defaults
+        law = cls(*(getattr(contact, name, defaults.get(name)) for name in cls._fields))
         held = law._replace(friction=0.0, cohesion=0.0, resistance=NO_LIMIT)
         return law if law.friction < inf else held
 

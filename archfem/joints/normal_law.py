@@ -38,20 +38,21 @@ from archfem.joints.quadrature import JointPoints, Numbers, Quadrature
 class Places:
     """Places of integration on facets between joint points, or at springs."""
 
-    gaps: Any  # at the places, each (k, f) [m]
-    area: Array  # of the places (k, f) [m²]
-    shapes: tuple[Any, ...]  # shape function of each end of the facets at the places; 1 of springs
+    gaps: Any  # at the places, each (k, f), or of springs (p,) [m]
+    area: Array  # of the places (k, f) or (p,) [m²]
+    shapes: Array | None = None  # φ of both ends of the facets there (2, k, f); None of springs
 
     def integrate(self, values: Array) -> Array:
         """Return integrals of values times φ_i, for each point (p,)."""
         weighted = self.area * values
-        return np.stack([(weighted * one).sum(axis=0) for one in self.shapes], axis=1).ravel()
+        return weighted if self.shapes is None else (self.shapes * weighted).sum(axis=1).T.ravel()
 
     def integrate_products(self, values: Array) -> Array:
         """Return integrals of values times φ_i φ_j, for each coupled pair of points (m,)."""
-        weighted, shapes = self.area * values, self.shapes
-        pairs = [(weighted * one * other).sum(axis=0) for one in shapes for other in shapes]
-        return np.concatenate(pairs)
+        weighted = self.area * values
+        if self.shapes is None:
+            return weighted
+        return ((self.shapes * weighted)[:, None] * self.shapes).sum(axis=2).ravel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +63,7 @@ class NormalLaw(ABC):
 
     end_count: ClassVar[int]  # points of a facet, its ends, or 1 of springs
 
-    @property
+    @cached_property
     def coupling_pairs(self) -> tuple[Numbers, Numbers]:
         """Pairs of points whose forces and openings are coupled, those of one facet, each (m,)."""
         ends = np.arange(len(self.points.offset)).reshape(-1, self.end_count).T
@@ -85,8 +86,13 @@ class NormalLaw(ABC):
 
     def forces(self, opening: Array) -> Array:
         """Return the normal forces at the points, positive where they pull (p,) [N]."""
+        return self.forces_and_area(opening)[0]
+
+    def forces_and_area(self, opening: Array) -> tuple[Array, Array]:
+        """Return `forces`, and the closed area distributed to the points (p,) [N, m²]."""
         places = self.divide(opening)
-        return places.integrate(self.contact.normal_traction(*places.gaps))
+        traction, closed = self.contact.normal_traction(*places.gaps), is_closed(*places.gaps)
+        return places.integrate(traction), places.integrate(closed.astype(float))
 
     def stiffness(self, opening: Array) -> Array:
         """Return the derivative of `forces` for each of `coupling_pairs` (m,) [N/m]."""
@@ -103,17 +109,12 @@ class NormalLaw(ABC):
         places = self.divide(opening)
         return places.integrate(self.contact.normal_energy(*places.gaps))
 
-    def contact_area(self, opening: Array) -> Array:
-        """Return the closed area, distributed to the points (p,) [m²]."""
-        places = self.divide(opening)
-        return places.integrate(np.where(is_closed(*places.gaps), 1.0, 0.0))
-
     def contact_area_rate(self, opening: Array) -> Array:
-        """Return the derivative of `contact_area` for each of `coupling_pairs` (m,) [m]."""
+        """Return the derivative of the closed area for each of `coupling_pairs` (m,) [m]."""
         return np.zeros_like(opening)
 
     def step_means(self, start: Array, end: Array) -> tuple[Array, Array]:
-        """Return the means over a step of `forces` and `contact_area`, each (p,) [N, m²]."""
+        """Return the means over a step of `forces_and_area`, each (p,) [N, m²]."""
         places = self.divide(start, end)
         traction = self.contact.mean_normal_traction(*places.gaps)
         return places.integrate(traction), places.integrate(contact_fraction(*places.gaps))
@@ -137,8 +138,8 @@ class Springs(NormalLaw):
     end_count = 1
 
     def divide(self, *gaps: Array) -> Places:
-        """Return the points themselves, k = 1 and f = p."""
-        return Places([gap[None] for gap in gaps], self.area, (1.0,))
+        """Return the points themselves."""
+        return Places(gaps, self.points.weight)
 
 
 # Gauss's three points on the unit interval, and their weights
@@ -165,31 +166,30 @@ class Facets(NormalLaw):
     def divide(self, *gaps: Array) -> Places:
         """Return Gauss's points on the parts of facets between the zero crossings of the gaps."""
         ends = [(gap[0::2], gap[1::2]) for gap in gaps]
-        zeros = np.sort([_zero_crossing(*each) for each in ends], axis=0)
-        breaks = np.concatenate([np.zeros_like(zeros[:1]), zeros, np.ones_like(zeros[:1])])
-        length = np.diff(breaks, axis=0)
-        count = zeros.shape[1]
-        place = (breaks[:-1, None] + GAUSS_POINTS[:, None] * length[:, None]).reshape(-1, count)
-        weight = (GAUSS_WEIGHTS[:, None] * length[:, None]).reshape(-1, count)
-        at_places = [(1.0 - place) * a + place * b for a, b in ends]
-        return Places(at_places, self.area * weight, (1.0 - place, place))
+        breaks = np.zeros((len(gaps) + 2, len(self.area)))
+        breaks[1:-1] = [a * _inverse_change(a, b) for a, b in ends]
+        breaks[1:-1].sort(axis=0)
+        breaks[-1] = 1.0
+        length = (breaks[1:] - breaks[:-1])[:, None]
+        place = (breaks[:-1, None] + GAUSS_POINTS[:, None] * length).reshape(-1, len(self.area))
+        weight = self.area * (GAUSS_WEIGHTS[:, None] * length).reshape(place.shape)
+        shapes = np.stack([1.0 - place, place])
+        return Places([a + place * (b - a) for a, b in ends], weight, shapes)
 
     def contact_area_rate(self, opening: Array) -> Array:
-        """Return the derivative of `contact_area` for each of `coupling_pairs` (2 p,) [m]."""
+        """Return the derivative of the closed area for each of `coupling_pairs` (2 p,) [m]."""
         a, b = opening[0::2], opening[1::2]
-        partly, zero = is_closed(a) != is_closed(b), _zero_crossing(a, b)
         # the zero z = a / (a - b) ends the closed part, or begins it; φ at z divides the area
-        sign = np.where(is_closed(a), 1.0, -1.0) * self.area
-        with np.errstate(divide="ignore", invalid="ignore"):
-            by_a, by_b = (np.where(partly, gap / (a - b) ** 2, 0.0) for gap in (-b, a))
-        parts = ((1.0 - zero) * by_a, (1.0 - zero) * by_b, zero * by_a, zero * by_b)
-        return np.concatenate([sign * part for part in parts])
+        inverse = _inverse_change(a, b)
+        zero, scale = a * inverse, np.where(is_closed(a), self.area, -self.area) * inverse**2
+        shapes, rates = np.stack([1.0 - zero, zero]), np.stack([-b * scale, a * scale])
+        return np.asarray(shapes[:, None] * rates).ravel()
 
 
-def _zero_crossing(a: Array, b: Array) -> Array:
-    """Return where a line from a to b crosses zero, on the unit interval; 0 where it does not."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(is_closed(a) != is_closed(b), a / (a - b), 0.0)
+def _inverse_change(a: Array, b: Array) -> Array:
+    """Return 1 / (a - b) where a line from a to b crosses zero, which is there at a / (a - b)."""
+    crosses = is_closed(a) != is_closed(b)
+    return np.divide(1.0, a - b, out=np.zeros_like(a), where=crosses)
 
 
 def choose_law(rule: Quadrature, points: JointPoints) -> NormalLaw:

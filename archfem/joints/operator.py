@@ -291,11 +291,10 @@ class JointOperator:
         Args:
             q: coordinates (n,).
         """
-        gaps, shear = self.effective_gaps(q), self.trial_shear(q)
-        normal = self.law.forces(gaps)
+        normal, closed = self.law.forces_and_area(self.effective_gaps(q))
+        shear = self.trial_shear(q)
         if self.slides:
-            limit = self.coulomb_limit(normal, self.law.contact_area(gaps))
-            shear = clip_to_friction(shear, limit)
+            shear = clip_to_friction(shear, self.coulomb_limit(normal, closed))
         return self.add_bond_pull(normal), shear
 
     def force(self, q: Array) -> Array:
@@ -357,7 +356,7 @@ class JointOperator:
         if self.bonds is None:
             return self.add_slip(excess)
         gaps = self.effective_gaps(q)
-        limit = self.coulomb_limit(self.law.forces(gaps), self.law.contact_area(gaps))
+        limit = self.coulomb_limit(*self.law.forces_and_area(gaps))
         return self.add_breakage(self.bonds.most_exceeded(gaps), excess, limit)
 
     def add_slip(self, excess: Array) -> Array:
@@ -394,8 +393,8 @@ class JointOperator:
         across = self.law.stiffness(gaps)
         if not self.slides:
             return np.concatenate([across, points.shear_spring])
-        closed = self.law.contact_area(gaps)
-        limit = self.coulomb_limit(self.law.forces(gaps), closed)
+        normal, closed = self.law.forces_and_area(gaps)
+        limit = self.coulomb_limit(normal, closed)
         along, by_limit = shear_tangent(self.trial_shear(q), limit, closed)
         coupled = self.friction_coupling(across, self.law.contact_area_rate(gaps), by_limit)
         return np.concatenate([across, along * points.shear_spring, coupled])

@@ -130,8 +130,7 @@ def _solve_creep_step(
         tresca = model.with_joint_law(TrescaJoints.of(joints, limit))
         solution = _solve_with_drag(solver, tresca, load, (start, q), drag, ("basic", "cp"))
         q, iterations = solution.q, iterations + solution.iterations
-        opening = joints.effective_gaps(q)
-        limit = joints.coulomb_limit(joints.law.forces(opening), joints.law.contact_area(opening))
+        limit = joints.coulomb_limit(*joints.law.forces_and_area(joints.effective_gaps(q)))
     return Solution(q, iterations, solution.residual)
 
 

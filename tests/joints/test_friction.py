@@ -108,7 +108,7 @@ def test_no_point_bears_more_shear_than_friction_holds(rule):
         model, q, _ = places(mixed(rule=rule), seed)
         operator = model.operator
         normal, shear = operator.point_forces(q)
-        closed = operator.law.contact_area(operator.openings(q))
+        closed = operator.law.forces_and_area(operator.openings(q))[1]
         slides = operator.points.slides
         limit = operator.points.contact.cohesion[slides] * closed[slides]
         limit -= operator.points.contact.friction[slides] * normal[slides]

@@ -24,6 +24,7 @@ from archfem.joints.contact_law import ContactLaw
 from archfem.joints.large.point_law import (
     joint_means,
     limit_rate,
+    released_energy,
     releases,
     shear_limit,
     shear_means,
@@ -454,8 +455,8 @@ def _enter(entries, number, where, value):  # type: ignore
 
 @kernel
 def open_forces(law, gap, released):  # type: ignore
-    """Evaluate the forces that open joints release at an instant, of all opening rows."""
-    points, facets, step = law.points, law.facets, 2 if law.facets else 1
+    """Evaluate the forces that joints release at an instant, of all opening rows; their energy."""
+    points, facets, step, energy = law.points, law.facets, 2 if law.facets else 1, 0.0
     for k in range(len(released)):
         released[k] = 0.0
     for segment in law.segments:
@@ -468,11 +469,13 @@ def open_forces(law, gap, released):  # type: ignore
                 opening, opening, points[first].share, points[first + step - 1].share
             )
             taken = joint_means(points[first], ends, 1.0, 1.0, facets)[1]
+            energy += points[first].area * released_energy(points[first], ends, taken)
             for end in range(step):
                 point = points[first + end]
                 force = point.area * taken[end]
                 released[segment.near] += (1.0 - point.share) * force
                 released[segment.far] += point.share * force
+    return energy
 
 
 @kernel

@@ -264,10 +264,7 @@ def _evaluate_linear_step(system, step, states, ground, results, memory):  # typ
         _instant_energies(law, linear.numbers.lag, work, energy)
     else:
         _path_energies(law, work.gap, energy, memory)
-        open_forces(law, law.start, work.released[0])
-    # elastic energy that open joints do not store
-    for row in range(work.released.shape[1]):
-        energy[1] -= 0.5 * law.start[row] * work.released[0, row]
+        energy[1] -= open_forces(law, law.start, work.released[0])
 
 
 @kernel
@@ -323,10 +320,10 @@ def _closed_energies(states, images, loads, damping, ground, energy):  # type: i
 
 @kernel
 def _instant_energies(law, lag, work, energy):  # type: ignore
-    """Subtract damping that open joints do not provide, by the trapezoidal rule."""
+    """Subtract energy and damping that open joints lack, the latter by the trapezoidal rule."""
     now, force, released = work.gap_end, work.spare[: law.openings], work.released
     late = released[1]
-    open_forces(law, now, released[0])
+    energy[1] -= open_forces(law, now, released[0])
     if lag > 0.0:
         # how much more is released where the law sees the joints than at the gaps themselves
         open_forces(law, work.gap_seen, force)

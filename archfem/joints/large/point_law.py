@@ -155,6 +155,12 @@ def point_energy(contact, gap):  # type: ignore
 
 
 @inlined_kernel
+def released_energy(contact, gaps, taken):  # type: ignore
+    """Return the energy that a joint does not store at the gaps of its ends, from the release."""
+    return 0.5 * (gaps[0] * taken[0] + gaps[1] * taken[1])
+
+
+@inlined_kernel
 def facet_energy(contact, first, last):  # type: ignore
     """Return the energy of a facet of unit length, its force, and its moment about the middle."""
     # closed part of the facet, from `low` to `high`
