@@ -37,7 +37,7 @@ COUNT = 400
 joint_means = from_python(point_law.joint_means)
 mean_tractions = from_python(point_law.mean_tractions)
 closed_means = from_python(point_law.closed_means)
-friction_means = from_python(point_law.friction_means)
+shear_means = from_python(point_law.shear_means)
 shear_limit = from_python(point_law.shear_limit)
 facet_energy = from_python(point_law.facet_energy)
 point_energy = from_python(point_law.point_energy)
@@ -97,7 +97,7 @@ def test_numpy_and_compiled_means_of_a_step_are_equal(lag):
     def at_point(contact, a, b, first, change):
         normals, _, _, times, _ = joint_means(contact, (a, a, b, b), lag, 1.0 + lag, False)
         limit = shear_limit(contact, normals[0], times[0])
-        mean, over, _, _, rubbing = friction_means(first, change, lag, limit)
+        mean, over, _, _, rubbing = shear_means(first, change, lag, limit)
         return normals[0], times[0], limit, mean, over, rubbing
 
     found = compiled(at_point, records, *path, *shear)
@@ -163,7 +163,7 @@ def test_tangents_of_a_step_are_equal_and_central_differences(lag):
 
     def at_point(contact, a, b, first, change, limit):
         ends = a, a, b, b
-        _, _, by_change, by_limit, _ = friction_means(first, change, lag, limit)
+        _, _, by_change, by_limit, _ = shear_means(first, change, lag, limit)
         tangent, rate = (f(contact, ends, lag, False)[1][0] for f in (mean_tractions, closed_means))
         return tangent, rate, by_change, by_limit
 
@@ -209,7 +209,7 @@ def test_an_instant_is_the_same_in_numpy_and_compiled():
         ends = 4 * (gap,)
         normals, _, _, times, _ = joint_means(contact, ends, 0.0, 1.0, False)
         limit = shear_limit(contact, normals[0], times[0])
-        mean, over, by_change, by_limit, _ = friction_means(trial, 0.0, 0.0, limit)
+        mean, over, by_change, by_limit, _ = shear_means(trial, 0.0, 0.0, limit)
         rate = mean_tractions(contact, ends, 0.0, False)[1][0]
         return energy, traction, normals[0], mean, over, 2.0 * by_change, by_limit, 2.0 * rate
 

@@ -28,7 +28,6 @@ from archfem.joints.large.point_law import (
     releases,
     shear_limit,
     shear_means,
-    sticks,
 )
 from archfem.joints.operator import JointOperator
 from archfem.joints.quadrature import JointPoints
@@ -54,9 +53,9 @@ POINT_RECORD = _record_type(
 )
 
 # Forces of a point over a step: mean normal force, positive in tension [N], mean closed area [m²],
-# derivatives of its released force by z at both ends of its segment [N/m], mean shear [N],
-# increment of irreversible slip [m], derivatives of the mean shear by its elastic change and by
-# Coulomb's limit [-], and energy dissipated by friction and damping along the joint [J].
+# derivatives of its released force by z at both ends of its segment [N/m], mean shear [N], elastic
+# shear lost by slip [N], derivatives of the mean shear by its elastic change and by Coulomb's limit
+# [-], and energy dissipated along the joint, times its shear stiffness [N²].
 POINT_STATE_RECORD = _record_type("", "normal area near far shear slip by_change by_limit lost")
 
 # Points of a joint between which the opening is linear: first point, one after the last, and rows
@@ -370,17 +369,12 @@ def evaluate_slips(law, gap, rows):  # type: ignore
             # elastic trial shear at the start, its change, and Coulomb's limit
             shear, change = point.shear * (start[row] - point.slip), point.shear * slip
             limit = shear_limit(point, state.normal, state.area)
-            stuck, trial = sticks(shear, change, late, limit)
-            state.lost, state.shear, state.slip = late * change * slip, trial, 0.0
-            state.by_change, state.by_limit = 0.5 + late, 0.0
-            if not stuck:
-                # it slides during the step: means of the path along the friction limit
-                mean, slid, by_change, by_limit, rubbing = shear_means(shear, change, late, limit)
-                state.shear, state.slip = mean, slid / point.shear
-                state.by_change, state.by_limit = by_change, by_limit
-                state.lost = rubbing / point.shear
-                released += trial - mean
-                rate += point.shear * (1.0 - gain * by_change)
+            means = shear_means(shear, change, late, limit)
+            state.shear, state.slip, state.by_change, state.by_limit, state.lost = means
+            if state.by_change != 0.5 + late or state.by_limit != 0.0:
+                # it slides during the step: the mean follows the friction limit
+                released += shear + (0.5 + late) * change - state.shear
+                rate += point.shear * (1.0 - gain * state.by_change)
         law.slips[group, 0], law.slips[group, 1] = released, rate
 
 

@@ -357,8 +357,8 @@ def _path_energies(law, gap, energy, memory):  # type: ignore
     for k in range(len(law.points)):
         point, state = law.points[k], law.point_states[k]
         if point.slip_row >= 0:
-            energy[3] += state.lost
-            point.slip += state.slip
+            energy[3] += state.lost / point.shear
+            point.slip += state.slip / point.shear
             memory[k] = point.slip
             # elastic energy of the slip, instead of that of a stuck point
             elastic, slip = start[point.slip_row] - point.slip, start[point.slip_row]

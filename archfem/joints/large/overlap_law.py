@@ -29,10 +29,10 @@ from archfem._typing import Array
 from archfem.joints.large.point_law import (
     closed_means,
     facet_energy,
-    friction_means,
     limit_rate,
     mean_tractions,
     point_energy,
+    shear_means,
 )
 
 # Slip, relative to the depth of the joint, below which |s| in the overlap is rounded [-]
@@ -234,7 +234,7 @@ def _add_point_shear(law, point, step, limits, memory, sums):  # type: ignore
     begin, now = s0 + place * e0, s1 + place * e1
     first, change = stiff * (begin - slip[point]), stiff * (now - begin)
     most = resistance + mean * limit
-    shear, over, by_change, by_limit, rubbing = friction_means(first, change, lag, most)
+    shear, over, by_change, by_limit, rubbing = shear_means(first, change, lag, most)
     end_slip[point] = slip[point] + over / stiff
     # slip direction reversed since the last evaluation: derivative and correction of sticking
     direction, missing = np.sign(over), 0.0

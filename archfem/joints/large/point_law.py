@@ -163,22 +163,8 @@ def released_energy(contact, gaps, taken):  # type: ignore
 @inlined_kernel
 def facet_energy(contact, first, last):  # type: ignore
     """Return the energy of a facet of unit length, its force, and its moment about the middle."""
-    # closed part of the facet, from `low` to `high`
-    low, high = 0.0, 1.0
-    if first > 0.0 and last > 0.0:
-        return 0.0, 0.0, 0.0
-    if (first <= 0.0) != (last <= 0.0):
-        zero = first / (first - last)
-        if first <= 0.0:
-            high = zero
-        else:
-            low = zero
-    # integrals of 1, x and x² over that part, and of the gap times 1 and x
-    step, a, b = last - first, high - low, 0.5 * (high**2 - low**2)
-    c = (high**3 - low**3) / 3.0
-    whole, tilted = first * a + step * b, first * b + step * c
-    half, stiffness = 0.5 * (first * whole + step * tilted), contact.normal_stiffness
-    return stiffness * half, stiffness * whole, stiffness * (tilted - 0.5 * whole)
+    near, far = joint_means(contact, (first, last, first, last), 1.0, 1.0, True)[0]
+    return 0.5 * (first * near + last * far), near + far, 0.5 * (far - near)
 
 
 @inlined_kernel
@@ -194,15 +180,27 @@ def shear_limit(contact, normal, closed):  # type: ignore
 
 
 @inlined_kernel
-def sticks(first, change, lag, limit):  # type: ignore
-    """Return whether a point sticks during a whole step, and its mean shear if it does."""
+def shear_means(first, change, lag, limit):  # type: ignore
+    """Return mean shear over a step, what slip loses of it, derivatives by change and limit, loss.
+
+    The loss is an energy times the shear stiffness. A point that sticks during the whole step has
+    the derivatives 1/2 + lag and 0.
+    """
     trial = first + (0.5 + lag) * change
-    return max(abs(first), abs(first + change), abs(trial)) <= limit, trial
+    stuck = max(abs(first), abs(first + change), abs(trial)) <= limit
+    # at an instant, also within the tolerance of the limit
+    if stuck or (change == 0.0 and abs(first) <= (1.0 + SLIP_LIMIT_TOLERANCE) * limit):
+        return trial, 0.0, 0.5 + lag, 0.0, lag * change * change
+    means = _sliding_means(first, change, lag, limit)
+    # slips at an instant: the shear follows the limit
+    if change == 0.0 and abs(first) > limit:
+        return means[0], means[1], 0.0, np.sign(means[0]), means[4]
+    return means
 
 
 @inlined_kernel
-def shear_means(first, change, lag, limit):  # type: ignore
-    """Return mean shear, excess, derivatives and loss of a point that slips during a step."""
+def _sliding_means(first, change, lag, limit):  # type: ignore
+    """Return `shear_means` of a point that slips during a step."""
     # elastic shear at the start and the end, clipped to the limit
     start = min(max(first, -limit), limit)
     last = min(max(start + change, -limit), limit)
@@ -222,17 +220,3 @@ def shear_means(first, change, lag, limit):  # type: ignore
     # loss: excess at the start, friction, damping
     rubbing = 0.5 * (first**2 - start**2) + abs(over) * limit + (shear - mean) * change
     return shear, first + change - last, by_change, by_limit, rubbing
-
-
-@inlined_kernel
-def friction_means(first, change, lag, limit):  # type: ignore
-    """Return `shear_means` of a point that slips or sticks, also without displacement."""
-    # sticks during the whole step; at an instant within the tolerance of the limit
-    stuck, trial = sticks(first, change, lag, limit)
-    if stuck or (change == 0.0 and abs(first) <= (1.0 + SLIP_LIMIT_TOLERANCE) * limit):
-        return trial, 0.0, 0.5 + lag, 0.0, lag * change * change
-    means = shear_means(first, change, lag, limit)
-    # slips at an instant: the shear follows the limit
-    if change == 0.0 and abs(first) > limit:
-        return means[0], means[1], 0.0, np.sign(means[0]), means[4]
-    return means
