@@ -1,8 +1,8 @@
 """The joint law, compiled: forces that joints release as they open and slide, with derivatives.
 
-The law of `archfem.joints.operator` and its passages, written for loops. A row of gaps z is an
-opening at one point of a joint, or the slip that some of its points share. If all
-joints were closed and stuck, their forces K z would be linear. The law returns the rest,
+Tractions and limits are by `archfem.joints.large.point_law`. A row of gaps z is an opening at one
+point of a joint, or the slip that some of its points share. If all joints were closed and stuck,
+their forces K z would be linear. The law returns the rest,
 
     λ = K z - f̄(z),
 

@@ -74,7 +74,7 @@ def _facet_means(contact, ends, first, second):  # type: ignore
         length = breaks[piece + 1] - breaks[piece]
         if length <= 0.0:
             continue
-        for k in range(3):
+        for k in range(len(GAUSS_POINTS)):
             place = breaks[piece] + GAUSS_POINTS[k] * length
             near, far = 1.0 - place, place
             before, after = near * a + far * c, near * b + far * d
