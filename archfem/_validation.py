@@ -71,9 +71,13 @@ def declared_keys(declaration: Callable[..., Any], named: tuple[type, ...] = ())
 
 def given_fields(instance: Any) -> dict[str, Any]:
     """Return the fields of a dataclass that are not None and differ from their defaults."""
-    values = {each.name: getattr(instance, each.name) for each in fields(instance)}
-    defaults = {each.name: each.default for each in fields(instance)}
-    return {name: v for name, v in values.items() if v is not None and v != defaults[name]}
+    given = {}
+    for each in fields(instance):
+        value = getattr(instance, each.name)
+        if value is not None and value != each.default:
+            # no file holds a number of NumPy
+            given[each.name] = value.item() if isinstance(value, np.generic) else value
+    return given
 
 
 @cache

@@ -5,13 +5,19 @@ read and written by the same declaration. A value that equals its default is not
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from archfem._validation import declared_keys, given_fields
 from archfem.cases.provenance import name_from
-from archfem.cases.toml_file import Table, check_choice, check_table, read_object
+from archfem.cases.toml_file import (
+    Table,
+    check_choice,
+    check_table,
+    read_object,
+    split_key_path,
+)
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.events import (
     CountedMechanism,
@@ -59,23 +65,27 @@ def find_section(keyword: str) -> str:
     return next((name for name, keys in SECTION_FIELDS.items() if keyword in keys), "")
 
 
+def complete_path(path: str) -> str:
+    """Return the path of a value in a case; a keyword of an analysis has its section before it."""
+    section = find_section(split_key_path(path)[0])
+    return f"{section}.{path}" if section else path
+
+
 def read_analysis(settings: Table, structure: Structure, folder: Path) -> Analysis:
     """Return the analysis of a structure that the tables of a case describe."""
     declared = declared_keys(Analysis) | dict.fromkeys(("damping", "scheme", "until"), (str, dict))
+    readers: Mapping[str, Callable[[Any], Any]] = {
+        "mesh_file": lambda file: folder / file,
+        "damping": _read_damping,
+        "scheme": lambda scheme: _read_named(scheme, _SCHEMES, "analysis.scheme"),
+        "until": _read_event,
+        "newton": lambda table: read_object(Newton, table, "analysis.newton"),
+    }
     values: dict[str, Any] = {}
     for section, names in SECTION_FIELDS.items():
         keys = {name: declared[name] for name in names}
-        values |= check_table(settings.get(section, {}), keys, section)
-    if "mesh_file" in values:
-        values["mesh_file"] = folder / values["mesh_file"]
-    if "damping" in values:
-        values["damping"] = _read_damping(values["damping"])
-    if "scheme" in values:
-        values["scheme"] = _read_named(values["scheme"], _SCHEMES, "analysis.scheme")
-    if "until" in values:
-        values["until"] = _read_event(values["until"])
-    if "newton" in values:
-        values["newton"] = read_object(Newton, values["newton"], "analysis.newton")
+        for name, value in check_table(settings.get(section, {}), keys, section).items():
+            values[name] = readers[name](value) if name in readers else value
     for name, cls in (("criteria", Criteria), ("record", Record)):
         if name in settings:
             values[name] = read_object(cls, settings[name], name)
@@ -88,19 +98,15 @@ def write_analysis_tables(analysis: Analysis, folder: Path | None) -> dict[str, 
     tables, given = dict[str, Any](), given_fields(analysis)
     del given["structure"]
     writers: Mapping[str, Callable[[Any], Any]] = {
-        "cells": list,
         "mesh_file": lambda file: name_from(file, folder),
         "damping": _write_damping,
         "scheme": lambda scheme: _write_named(scheme, _SCHEMES),
         "until": _write_event,
-        "newton": write_fields,
-        "criteria": write_fields,
-        "record": write_fields,
     }
     for name, value in given.items():
-        written = writers[name](value) if name in writers else value
+        written = writers.get(name, write_value)(value)
         if name == "stages":
-            tables["dead_load"] = {"stages": [write_fields(stage) for stage in value]}
+            tables["dead_load"] = {"stages": written}
         elif section := find_section(name):
             tables.setdefault(section, {})[name] = written
         else:
@@ -108,10 +114,11 @@ def write_analysis_tables(analysis: Analysis, folder: Path | None) -> dict[str, 
     return tables
 
 
-def write_fields(value: Any) -> dict[str, Any]:
-    """Return the fields of an object, but for those that equal their default, as a table."""
-    given = given_fields(value)
-    return {name: list(own) if isinstance(own, tuple) else own for name, own in given.items()}
+def write_value(value: Any) -> Any:
+    """Return a value of a table: of an object its fields but for those that equal their default."""
+    if is_dataclass(value):
+        return {name: write_value(own) for name, own in given_fields(value).items()}
+    return [write_value(each) for each in value] if isinstance(value, tuple) else value
 
 
 def _read_damping(given: str | Table) -> Viscous | EffectiveDamping:
@@ -133,13 +140,12 @@ def _read_damping(given: str | Table) -> Viscous | EffectiveDamping:
             'Rayleigh damping frequencies = [8.0, 16.0], or kind = "rayleigh" (and a mass_share) '
             'beside modes = "effective"'
         )
-    damping: Viscous | EffectiveDamping = read_object(cls, table, "analysis.damping")
-    return damping
+    return read_object(cls, table, "analysis.damping")
 
 
 def _write_damping(damping: Viscous | EffectiveDamping) -> dict[str, Any]:
     """Return the table of damping."""
-    table = {"ratio": damping.ratio, **write_fields(damping)}
+    table = {"ratio": damping.ratio, **write_value(damping)}
     return table | ({"modes": "effective"} if isinstance(damping, EffectiveDamping) else {})
 
 
@@ -153,7 +159,7 @@ def _read_named(given: str | Table, known: Mapping[str, type], section: str) -> 
 def _write_named(value: Any, known: Mapping[str, type]) -> Any:
     """Return the word of an object, with its fields if some differ from their defaults."""
     name = next(word for word, cls in known.items() if type(value) is cls)
-    own = write_fields(value)
+    own = write_value(value)
     return {"name": name, **own} if own else name
 
 
@@ -181,12 +187,7 @@ def _write_event(event: StopCondition) -> Any:
             f"until = {event!r} has no name in a file: register it by "
             "archfem.dynamics.register_criterion, and give what is registered"
         )
-    plain: Any = replace(event, criteria=None)  # type: ignore[type-var]
-    written = _write_named(plain, _EVENTS)
-    if (criteria := getattr(event, "criteria", None)) is None:
-        return written
-    table = {"name": written} if isinstance(written, str) else written
-    return {**table, "criteria": write_fields(criteria)}
+    return _write_named(event, _EVENTS)
 
 
 def _read_stages(table: Any, structure: Structure) -> Sequence[Stage] | None:

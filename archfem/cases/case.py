@@ -15,15 +15,20 @@ from archfem._files import atomic_write
 from archfem._validation import check_words, validate_arguments
 from archfem.cases import analysis_keys, motion_keys, provenance
 from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis
-from archfem.cases.analysis_tables import read_analysis, write_analysis_tables
+from archfem.cases.analysis_tables import (
+    complete_path,
+    read_analysis,
+    write_analysis_tables,
+)
 from archfem.cases.structure_keys import cached_structure, write_structure
 from archfem.cases.toml_file import (
     Table,
-    apply_change,
     check_table,
     format_tables,
+    parse_change,
     read_with_base,
     refuse_unknown,
+    set_value,
     split_key_path,
 )
 from archfem.dynamics.analysis import Analysis
@@ -87,7 +92,8 @@ class Case:
         path = Path(path)
         settings = read_with_base(path)
         for text in changes:
-            apply_change(settings, text)
+            path_of_value, value = parse_change(text)
+            set_value(settings, complete_path(path_of_value), value)
         try:
             return cls.of(settings, path.parent)
         except ArchfemError as error:

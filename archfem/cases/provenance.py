@@ -176,7 +176,7 @@ def load_extension(path: str | Path) -> ModuleType:
     except BaseException:
         del _loaded[name]  # a corrected file may be loaded
         raise
-    _permit(str(path))
+    permit_extensions(str(path))
     return module
 
 
@@ -187,10 +187,9 @@ def _installed_extensions() -> EntryPoints:
 
 def _package_versions(settings: Table) -> list[tuple[str, str]]:
     """Return names and versions of the installed packages that a case names in `extensions`."""
-    names = [str(name) for name in settings.get("extensions", ())]
     return [
         (name, entry.dist.version if entry.dist else "unknown")
-        for name in names
+        for name in map(str, settings.get("extensions", ()))
         for entry in _installed_extensions().select(name=name)
     ]
 
@@ -226,13 +225,8 @@ def name_from(file: str | Path, folder: Path | None) -> str:
     return place.as_posix() if folder is None else Path(os.path.relpath(place, folder)).as_posix()
 
 
-def permit_extensions() -> None:
-    """Permit the extensions of all cases that this process and its workers read."""
-    _permit("*")
-
-
-def _permit(name: str) -> None:
-    """Add a file to the permitted extensions."""
+def permit_extensions(name: str = "*") -> None:
+    """Permit an extension of cases that this process and its workers read, or all of them."""
     known = os.environ.get(OWN_CODE_VARIABLE, "").split(os.pathsep)
     os.environ[OWN_CODE_VARIABLE] = os.pathsep.join(dict.fromkeys([*filter(None, known), name]))
 

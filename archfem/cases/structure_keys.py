@@ -360,11 +360,16 @@ def _write_argument(value: Any, names: _PresetNames) -> Any:
         return value.tolist()
     if is_dataclass(value) and not isinstance(value, type):
         return {key: _write_argument(own, names) for key, own in given_fields(value).items()}
-    if isinstance(value, Sequence):
-        items = [_write_argument(each, names) for each in value]
-        named = items and all(isinstance(each, dict) for each in items)
-        return {each.pop("name"): each for each in items} if named else items
-    raise TypeError(value)
+    if not isinstance(value, Sequence):
+        raise TypeError(value)
+    items = [_write_argument(each, names) for each in value]
+    if not all(isinstance(each, dict) for each in items):
+        return items
+    # parts of a bridge are tables by their names, which may be the default one
+    return {
+        part.name: {key: own for key, own in table.items() if key != "name"}
+        for part, table in zip(value, items, strict=True)
+    }
 
 
 def _write_blocks(structure: Structure, names: _PresetNames) -> dict[str, Any]:

@@ -111,8 +111,8 @@ def remove_key(settings: dict[str, Any], path: str) -> None:
     del table[last]
 
 
-def apply_change(settings: dict[str, Any], text: str) -> None:
-    """Set one value from "section.key=value", read as TOML, or else as a word."""
+def parse_change(text: str) -> tuple[str, Any]:
+    """Return path and value of "section.key=value", read as TOML, or else as a word."""
     # A path and a value on both sides of an equals sign that is not in quotes.
     match = re.fullmatch(r"""((?:[^"'=]|"[^"]*"|'[^']*')+)=(.*)""", text, re.DOTALL)
     if not match or not match[1].strip():
@@ -120,10 +120,9 @@ def apply_change(settings: dict[str, Any], text: str) -> None:
     path, word = match.groups()
     # Shells strip quotes: `model.fidelity=rigid` is not TOML, but a word.
     try:
-        value = parse_tables(f"value = {word}")["value"]
+        return path, parse_tables(f"value = {word}")["value"]
     except InvalidInput:
-        value = word.strip()
-    set_value(settings, path, value)
+        return path, word.strip()
 
 
 def set_value(settings: dict[str, Any], path: str, value: Any) -> None:

@@ -4,11 +4,12 @@ It holds all but the ground motion. Each method calls the function of the same w
 analysis where it takes a structure or a model.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, wraps
+from inspect import signature
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from archfem._display import call_late_bound
 from archfem._files import hash_value
@@ -16,7 +17,7 @@ from archfem._typing import Metres, Seconds
 from archfem._validation import check_fields, check_number, given_fields, validate_methods
 from archfem.dynamics.events import StopCondition, resolve_criteria
 from archfem.dynamics.history import History
-from archfem.dynamics.model_selection import build
+from archfem.dynamics.model_selection import select_model
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.schemes import (
     Conserving,
@@ -33,6 +34,7 @@ from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.masonry.construction import Stage, resolve_stages
 from archfem.masonry.structure import Structure
+from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
@@ -42,8 +44,8 @@ from archfem.statics.newton import Newton
 
 _DEFAULT_SCHEME, _DEFAULT_NEWTON, _DEFAULT_RECORD = Conserving(), Newton(), Record()
 
-# Settings that `build` takes besides those of a discretisation
-_SELECTION_KEYWORDS = ("tolerance", "dt", "damping")
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 @validate_methods
@@ -132,6 +134,10 @@ class Analysis:
             object.__setattr__(self, "stages", tuple(self.stages))
             resolve_stages(self.structure, self.stages)
 
+    def __hash__(self) -> int:
+        """Return a hash of all values; those of equal analyses are equal."""
+        return hash(self.fingerprint)
+
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields alone: models are large, and built anew in other processes."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
@@ -192,9 +198,11 @@ class Analysis:
 
     def _compute_dead_load(self, motion: Motion | None) -> Equilibrium:
         """Build the model, and find its equilibrium."""
-        names = [*(each.name for each in fields(Discretisation)), *_SELECTION_KEYWORDS]
-        settings = {name: getattr(self, name) for name in names}
-        model = build(self.structure, motion=motion, **settings)
+        if self.selects_model:
+            settings = (self.tolerance, motion, self.damping, self.dt)
+            model = select_model(self.structure, *settings, displacements=self.displacements)
+        else:
+            model = build(self.structure, self.discretisation)
         return dead_load(model, self.newton, stages=self.stages)
 
     def modes(self, count: int = 6) -> Modes:
@@ -303,3 +311,34 @@ class Analysis:
                 name it.
         """
         return call_late_bound("Analysis.write", self, path)
+
+
+def takes_analysis(function: Function) -> Function:
+    """Decorate a function of a model and a motion so that it takes an `Analysis` for the model.
+
+    Settings of the analysis are keywords of the function, which begins at its dead load. A setting
+    that is given replaces that of the analysis, as by `dataclasses.replace`.
+    """
+    names, known = [each.name for each in fields(Analysis)[1:]], {*signature(function).parameters}
+    # a solver of the user and a row of steps are no settings
+    kinds: Mapping[str, Any] = {"method": str, "dt": float | int | None}
+
+    @wraps(function)
+    def wrapper(model: Any, motion: Any, **given: Any) -> Any:
+        if not isinstance(model, Analysis):
+            return function(model, motion, **given)
+        changes = {
+            key: given.pop(key)
+            for key in [*given]
+            if key in names and isinstance(given[key], kinds.get(key, object))
+        }
+        analysis = replace(model, **changes) if changes else model
+        start = given.pop("start", None) or analysis.dead_load(motion)
+        settings = {name: getattr(analysis, name) for name in names}
+        settings |= {"criteria": analysis.failure_criteria, "start": start, **given}
+        if analysis.dt is not None or analysis.selects_model:
+            settings["tolerance"] = None  # a step takes the place of a tolerance
+        used = {key: v for key, v in settings.items() if v is not None and key in known | {*given}}
+        return function(getattr(start, "model", analysis.model), motion, **used)
+
+    return wrapper  # type: ignore[return-value]

@@ -121,6 +121,11 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
                 f"mesh_file = {str(mesh_file)!r} is one mesh, and 'auto' chooses: name a fidelity"
             )
         return select_model(structure, tolerance, motion, damping, dt, displacements=displacements)
+    unused = {"motion": motion, "damping": damping, "dt": dt}
+    if given := [name for name, value in unused.items() if value is not None]:
+        raise InvalidInput(
+            f"{given} select a model with fidelity 'auto' alone: give them to an Analysis"
+        )
     settings = Discretisation(
         *(fidelity, cells, cell, max_cell_size, degree, quadrature, quadrature_points),
         *(displacements, mesh_file),

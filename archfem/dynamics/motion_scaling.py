@@ -17,7 +17,7 @@ from tqdm import tqdm
 from archfem._display import call_late_bound
 from archfem._files import align_columns
 from archfem._validation import validate_arguments, validate_methods
-from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.analysis import Analysis, takes_analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
@@ -150,6 +150,7 @@ class MechanismScales:
         ]
 
 
+@takes_analysis
 @validate_arguments
 def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the search)
     model: Model | Analysis,
@@ -197,17 +198,15 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
             "above 0, the smaller first"
         )
     start = start or dead_load(model)
-    own = model.failure_criteria if isinstance(model, Analysis) else None
-    assessed = criteria or own
 
     def run_scaled(scale: float) -> ScaledRun:
         scaled = motion.scaled(scale)
         solver = method if isinstance(method, str) else method(scaled)
-        options = {"until": EveryMechanism(), "criteria": assessed, "method": solver}
+        options = {"until": EveryMechanism(), "criteria": criteria, "method": solver}
         run = _run_as_far(model, scaled, start=start, damping=damping, dt=dt, **options)
         return ScaledRun(scale, first_mechanisms(run), run.ending, run.outcome)
 
-    definitions = (*applicable_definitions(start.model.structure, assessed), "verified")
+    definitions = (*applicable_definitions(start.model.structure, criteria), "verified")
     return search_scales(run_scaled, definitions, precision, admissible_range(between, motion))
 
 
@@ -370,6 +369,7 @@ class CollapseScale:
         return align_columns(["step", "scale", "the structure", "at", "residual"], rows)
 
 
+@takes_analysis
 @validate_arguments
 def collapse_scale(
     model: Model | Analysis,
@@ -377,7 +377,7 @@ def collapse_scale(
     *,
     start: Equilibrium | None = None,
     damping: Viscous | EffectiveDamping | str | None = None,
-    dt: Sequence[float] = (0.005, 0.0025),
+    dt: float | Sequence[float] = 0.005,
     precision: float = 0.05,
     between: tuple[float, float] = (0.1, 10.0),
 ) -> CollapseScale:
@@ -392,7 +392,7 @@ def collapse_scale(
         motion: motion to scale, vertical component included.
         start: dead load, computed if not given.
         damping: as for `time_history`.
-        dt: time steps [s].
+        dt: time steps, or one that is tried with its half too [s].
         precision: relative width of the final brackets [-].
         between: smallest and largest scale [-]; no ground motion may exceed 5 g.
 
@@ -409,9 +409,10 @@ def collapse_scale(
             f"model '{begin.model.fidelity}' has small displacements: build it with "
             "displacements='large'"
         )
-    if not _valid_search(precision, between) or not dt:
+    steps = (dt, 0.5 * dt) if isinstance(dt, int | float) else tuple(dt)
+    if not _valid_search(precision, between) or not steps:
         raise InvalidInput(
-            f"precision {precision:g} between scales {between} by steps {tuple(dt)}: give 0.0001 "
+            f"precision {precision:g} between scales {between} by steps {steps}: give 0.0001 "
             "to 1, two scales above 0, the smaller first, and a step or two"
         )
 
@@ -421,7 +422,7 @@ def collapse_scale(
 
     limits = admissible_range(between, motion)
     searches = {}
-    for step in dt:
+    for step in steps:
         run_at = partial(run_scaled, step)
         searches[step] = search_scales(run_at, (COLLAPSE_DEFINITION,), precision, limits)
     return CollapseScale(searches)

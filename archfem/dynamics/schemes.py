@@ -52,6 +52,7 @@ class Rayleigh:
             raise InvalidInput(
                 f"damping frequencies {self.frequencies} Hz: give two, the lower one first"
             )
+        object.__setattr__(self, "frequencies", (low, high))
         _check_joints(self.joints)
 
     @property

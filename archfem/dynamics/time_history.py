@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from archfem._threads import single_threaded
 from archfem._validation import check_number, check_type, validate_arguments
-from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.analysis import Analysis, takes_analysis
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.events import (
     EventMonitor,
@@ -53,6 +53,7 @@ from archfem.statics.newton import Newton
 logger = logging.getLogger("archfem")
 
 
+@takes_analysis
 @single_threaded
 def time_history(  # noqa: PLR0913  (one call, one object for each thing that may vary)
     model: Model | Analysis,
@@ -77,8 +78,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     the run and returns the steps computed so far.
 
     Args:
-        model: model of any fidelity, or an `Analysis`, whose settings are then the defaults of all
-            other arguments.
+        model: model of any fidelity, or an `Analysis`: any of its settings that is given as a
+            keyword replaces its own.
         motion: ground acceleration.
         dt: time step [s]; by default the step for which the model was selected, or else steps of
             varying length by `tolerance`. Accelerations between samples are interpolated.
@@ -117,10 +118,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     """
     check_type(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
     _check_types(start=start, scheme=scheme, record=record, criteria=criteria, newton=newton)
-    if isinstance(model, Analysis):
-        given: Any = {"dt": dt, "tolerance": tolerance, "damping": damping, "scheme": scheme}
-        given |= {"record": record, "until": until, "criteria": criteria, "newton": newton}
-        return _run_analysis(model, motion, start, {**given, "method": method})
+    assert not isinstance(model, Analysis)  # by the decorator
     check_model(model)
     dt, tolerance = _resolve_steps(model, dt, tolerance)
     criteria = resolve_criteria(criteria, until)
@@ -167,22 +165,6 @@ def _resolve_start(
         return model, start, resolve_effective_damping(damping, model, None)[0]
     rest = start or dead_load(model, newton)
     return rest.transfer_memory(model), rest, resolve_effective_damping(damping, model, rest)[0]
-
-
-def _run_analysis(
-    analysis: Analysis, motion: Motion, start: Equilibrium | State | None, given: dict[str, Any]
-) -> History:
-    """Run an analysis, some of whose settings are given anew."""
-    settings = {name: getattr(analysis, name) for name in given}
-    settings |= {name: value for name, value in given.items() if value not in (None, "auto")}
-    # a step, also that of a selected model, takes the place of a tolerance
-    if given["tolerance"] is not None and given["dt"] is None:
-        settings["dt"] = None
-    elif given["tolerance"] is None and (settings["dt"] is not None or analysis.selects_model):
-        settings["tolerance"] = None
-    start = start or analysis.dead_load(motion)
-    model = start.model if isinstance(start, Equilibrium) else analysis.model
-    return time_history(model, motion, start=start, **settings)
 
 
 def _state_tolerance(history: History, tolerance: float, share: float) -> History:

@@ -1,8 +1,9 @@
 """Mechanics of dry joints: contact law, quadrature, resultants and failure criteria.
 
-    contact_law       traction of a dry joint, instant and step mean; dilatancy and bonds
+    contact_law       tractions of a dry joint, at an instant and mean over a step
     criteria          Criteria, failure flags, durations
     large             joints between blocks with large displacements and rotations, compiled
+    normal_law        normal forces by springs or exact facets; dilatancy and bonds
     operator          joint operator G, forces, tangent, slip memory
     own_law           joint laws of the user: tractions, tangent and history
     quadrature        quadrature rules and points

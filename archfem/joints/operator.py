@@ -3,7 +3,7 @@
 The sparse operator G takes coordinates q to (opening, slip) at points along the joints, its
 transpose takes forces there to generalised forces. Whatever the coordinates are (nodal
 displacements, rigid motions, modes), the joint forces are Gᵀ f(G q) and their tangent is Gᵀ f' G,
-with the law f of `contact_law`, which has dilatancy and tensile bonds as well.
+with the law f of `contact_law`, and the dilatancy and tensile bonds of `normal_law`.
 
 Joints have memory: the irreversible slip of each point, and which bonds are broken. Forces follow
 from the displacements since the memory was updated.
@@ -20,13 +20,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem._typing import Array
-from archfem.joints.contact_law import Bonds, Facets, Law, clip_to_friction, dilatancy_opening
+from archfem.joints.contact_law import ContactLaw, clip_to_friction, shear_tangent
+from archfem.joints.normal_law import Bonds, Facets, NormalLaw, dilatancy_opening
 from archfem.joints.quadrature import JointPoints
 
 Flags = NDArray[np.bool_]
-
-# Excess over Coulomb's limit, relative to it, that counts as round-off of a point that holds [-]
-SLIP_LIMIT_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +107,7 @@ class JointOperator:
         broken: 1 where a bond is broken, else 0 (p,); None for none.
     """
 
-    law: Law
+    law: NormalLaw
     opening: sparse.csr_matrix
     slip: sparse.csr_matrix
     gap_offset: Array | None = None
@@ -238,10 +236,18 @@ class JointOperator:
             q: coordinates (n,).
             dilatancy: opening by dilatancy (p,) [m]; by default that of the memory.
         """
-        gaps = self.openings(q)
-        dilatancy = self.dilatancy_opening if dilatancy is None else dilatancy
-        gaps = gaps if dilatancy is None else gaps - dilatancy
+        gaps = self.gaps_of_faces(q, dilatancy)
         return gaps if self.bonds is None else gaps - self.bonds.stretch
+
+    def gaps_of_faces(self, q: Array, dilatancy: Array | None = None) -> Array:
+        """Return the gaps less dilatancy (p,) [m].
+
+        Args:
+            q: coordinates (n,).
+            dilatancy: opening by dilatancy (p,) [m]; by default that of the memory.
+        """
+        dilatancy = self.dilatancy_opening if dilatancy is None else dilatancy
+        return self.openings(q) if dilatancy is None else self.openings(q) - dilatancy
 
     def trial_shear(self, q: Array) -> Array:
         """Return the shear forces at the points without further slip (p,) [N].
@@ -261,17 +267,15 @@ class JointOperator:
             closed: closed area of each point (p,) [m²].
 
         Returns:
-            The limit, 0 where a point never slides.
+            The limit, `NO_LIMIT` where a point never slides.
         """
-        slides, points = self.points.slides, self.points
-        limit = self._effective_cohesion * closed
-        limit[slides] -= points.friction[slides] * normal[slides]
-        return np.where(slides, limit, 0.0)
+        return np.asarray(self.contact.shear_limit(normal, closed))
 
-    @property
-    def _effective_cohesion(self) -> Array:
-        """Cohesion to be used with `effective_gaps` (p,) [Pa]."""
-        return self.points.cohesion if self.bonds is None else self.bonds.cohesion
+    @cached_property
+    def contact(self) -> ContactLaw:
+        """Contact law of the points with the cohesion that belongs to `effective_gaps`."""
+        contact = self.points.contact
+        return contact if self.bonds is None else contact._replace(cohesion=self.bonds.cohesion)
 
     def add_bond_pull(self, normal: Array) -> Array:
         """Return normal forces with the pull of bonds (p,) [N].
@@ -287,11 +291,10 @@ class JointOperator:
         Args:
             q: coordinates (n,).
         """
-        gaps, shear = self.effective_gaps(q), self.trial_shear(q)
-        normal = self.law.forces(gaps)
+        normal, closed = self.law.forces_and_area(self.effective_gaps(q))
+        shear = self.trial_shear(q)
         if self.slides:
-            limit = self.coulomb_limit(normal, self.law.contact_area(gaps))
-            shear = np.where(self.points.slides, clip_to_friction(shear, limit), shear)
+            shear = clip_to_friction(shear, self.coulomb_limit(normal, closed))
         return self.add_bond_pull(normal), shear
 
     def force(self, q: Array) -> Array:
@@ -318,22 +321,27 @@ class JointOperator:
         Args:
             q: coordinates (n,).
         """
-        gaps, shear = self.effective_gaps(q), self.trial_shear(q)
-        stored = gaps @ self.law.forces(gaps) + shear @ (shear / self.points.shear_spring)
-        return 0.5 * float(stored) + self._bond_energy(gaps)
+        return float(self.point_energies(q).sum())
 
-    def normal_energy(self, gaps: Array) -> float:
-        """Return the energy stored across the joints [J].
+    def point_energies(self, q: Array) -> Array:
+        """Return the energies stored at the points without further slip (p,) [J].
 
         Args:
-            gaps: gaps less dilatancy (p,) [m].
+            q: coordinates (n,).
         """
-        gaps = gaps if self.bonds is None else gaps - self.bonds.stretch
-        return 0.5 * float(gaps @ self.law.forces(gaps)) + self._bond_energy(gaps)
+        along = 0.5 * self.trial_shear(q) ** 2 / self.points.shear_spring
+        return self.normal_energies(self.gaps_of_faces(q)) + along
 
-    def _bond_energy(self, gaps: Array) -> float:
-        """Return the energy of the bonds' pull, from effective gaps [J]."""
-        return 0.0 if self.bonds is None else float(self.bonds.energy_of_pull(gaps).sum())
+    def normal_energies(self, gaps: Array) -> Array:
+        """Return the energies stored across the joints, distributed to the points (p,) [J].
+
+        Args:
+            gaps: as `gaps_of_faces` (p,) [m].
+        """
+        if self.bonds is None:
+            return self.law.energies(gaps)
+        gaps = gaps - self.bonds.stretch
+        return self.law.energies(gaps) + self.bonds.energy_of_pull(gaps)
 
     def updated_memory(self, q: Array) -> Array:
         """Return the memory once the joints are at rest at q, as `memory`.
@@ -348,7 +356,7 @@ class JointOperator:
         if self.bonds is None:
             return self.add_slip(excess)
         gaps = self.effective_gaps(q)
-        limit = self.coulomb_limit(self.law.forces(gaps), self.law.contact_area(gaps))
+        limit = self.coulomb_limit(*self.law.forces_and_area(gaps))
         return self.add_breakage(self.bonds.most_exceeded(gaps), excess, limit)
 
     def add_slip(self, excess: Array) -> Array:
@@ -357,8 +365,7 @@ class JointOperator:
         Args:
             excess: shear force beyond the limit during the step (p,) [N].
         """
-        slip = np.where(self.points.slides, excess / self.points.shear_spring, 0.0)
-        return self._slip_memory + slip
+        return self._slip_memory + excess / self.points.shear_spring
 
     def add_breakage(self, exceeded: Flags, excess: Array, limit: Array) -> Array:
         """Return the memory of joints with bonds at the end of a step, as `memory` (2 p,).
@@ -369,8 +376,7 @@ class JointOperator:
             limit: Coulomb's limit (p,) [N].
         """
         assert self.bonds is not None
-        sliding = np.where(self.points.slides, excess, 0.0)
-        broken = self.bonds.broken_after(exceeded, sliding, limit)
+        broken = self.bonds.broken_after(exceeded, excess, limit)
         return np.concatenate([self.add_slip(excess), broken])
 
     def stiffness(self, q: Array) -> Array:
@@ -387,17 +393,11 @@ class JointOperator:
         across = self.law.stiffness(gaps)
         if not self.slides:
             return np.concatenate([across, points.shear_spring])
-        normal, shear = self.law.forces(gaps), self.trial_shear(q)
-        closed = self.law.contact_area(gaps)
-        limit = (1.0 + SLIP_LIMIT_TOLERANCE) * self.coulomb_limit(normal, closed)
-        slides = points.slides & ((np.abs(shear) > limit) | (closed == 0.0))
-        sign = np.where(slides, np.sign(shear), 0.0)
-        # A sliding point retains a small part of its elastic stiffness: a body that slides at all
-        # its joints would be free, though it holds as soon as it moves back. Open points have none.
-        residual = np.where(limit > 0.0, 1e-9, 0.0)
-        along = np.where(slides, residual, 1.0) * points.shear_spring
-        coupled = self.friction_coupling(across, self.law.contact_area_rate(gaps), sign)
-        return np.concatenate([across, along, coupled])
+        normal, closed = self.law.forces_and_area(gaps)
+        limit = self.coulomb_limit(normal, closed)
+        along, by_limit = shear_tangent(self.trial_shear(q), limit, closed)
+        coupled = self.friction_coupling(across, self.law.contact_area_rate(gaps), by_limit)
+        return np.concatenate([across, along * points.shear_spring, coupled])
 
     def friction_coupling(self, across: Array, closed: Array, rate: Array) -> Array:
         """Return the derivative of shear by gaps through Coulomb's limit, for coupled pairs.
@@ -411,8 +411,8 @@ class JointOperator:
             Derivatives (m,) [N/m].
         """
         row = self.law.coupling_pairs[0]
-        friction = np.where(self.points.slides, self.points.friction, 0.0)[row]
-        return rate[row] * (self._effective_cohesion[row] * closed - friction * across)
+        contact = self.contact.mapped(lambda values: values[row])
+        return np.asarray(rate[row] * contact.limit_rate(across, closed))
 
     def linear_forces(self, stiffness: Array, gaps: Array) -> tuple[Array, Array]:
         """Return normal and shear forces at the points from point stiffnesses, each (p,) [N].
@@ -439,7 +439,7 @@ class JointOperator:
 
     def elastic_stiffness(self) -> Array:
         """Return the point stiffnesses with all joints closed and no slip (m,) [N/m]."""
-        across = self.law.stiffness(np.full(len(self.points.offset), -1.0))
+        across = self.law.closed_stiffness
         parts = [across, self.points.shear_spring]
         return np.concatenate([*parts, np.zeros_like(across)] if self.slides else parts)
 

@@ -22,9 +22,11 @@ from scipy import sparse
 from archfem._typing import Array, Pascals, PascalsPerMetre
 from archfem._validation import check_own_keys, report_user_errors, short_repr, validate_arguments
 from archfem.errors import InvalidInput
-from archfem.joints.contact_law import choose_law
+from archfem.joints.contact_law import ContactLaw, clip_to_friction, is_closed, shear_tangent
+from archfem.joints.normal_law import choose_law
 from archfem.joints.operator import JointOperator, Pattern
 from archfem.joints.quadrature import JointPoints, Numbers, Quadrature
+from archfem.joints.step_average import StepForces
 from archfem.masonry.materials import Contact
 from archfem.masonry.structure import Structure
 
@@ -95,25 +97,20 @@ class DryJoint:
 
     def respond(self, opening: Array, slip: Array, memory: Array) -> tuple[Any, Any, Any]:
         """Return tractions, tangent and irreversible slip, as `JointLaw.respond`."""
-        closed = opening <= 0.0
-        normal = np.where(closed, self.normal_stiffness * opening, 0.0)
-        across = np.where(closed, self.normal_stiffness, 0.0)
-        trial = self.shear_stiffness * (slip - memory[0])
-        if np.isinf(self.friction):
-            return (normal, trial), ((across, 0.0), (0.0, self.shear_stiffness)), memory
-        limit = np.where(closed, self.cohesion, 0.0) - self.friction * normal
-        slides = (np.abs(trial) > limit) | ~closed
-        shear = np.clip(trial, -limit, limit)
-        # a small part of the stiffness remains: a body that slides at all its joints would be free
-        along = np.where(slides, np.where(closed, 1e-9, 0.0), 1.0) * self.shear_stiffness
-        coupling = np.where(slides, -np.sign(trial) * self.friction * across, 0.0)
-        lost = slip - shear / self.shear_stiffness
-        return (normal, shear), ((across, 0.0), (coupling, along)), lost[None]
+        law, closed = ContactLaw.of(self), is_closed(opening)
+        normal, across = law.normal_traction(opening), law.normal_tangent(opening)
+        trial, limit = law.shear_traction(slip - memory[0]), law.shear_limit(normal, closed)
+        shear = clip_to_friction(trial, limit)
+        by_trial, by_limit = shear_tangent(trial, limit, closed)
+        along, coupling = law.shear_traction(by_trial), by_limit * law.limit_rate(across, 0.0)
+        lost = (trial - shear) / self.shear_stiffness
+        return (normal, shear), ((across, 0.0), (coupling, along)), memory + lost
 
     def energy(self, opening: Array, slip: Array, memory: Array) -> Array:
         """Return the energy of both springs, as `JointLaw.energy`."""
-        across = self.normal_stiffness * np.minimum(opening, 0.0) ** 2
-        return 0.5 * (across + self.shear_stiffness * (slip - memory[0]) ** 2)
+        law, elastic = ContactLaw.of(self), slip - memory[0]
+        along = 0.5 * law.shear_traction(elastic) * elastic
+        return np.asarray(law.normal_energy(opening) + along)
 
 
 # Laws that case files can name
@@ -365,7 +362,7 @@ class OwnLawOperator(JointOperator):
         """Return the point stiffnesses with all joints closed, by the contacts' stiffnesses."""
         points = self.points
         none = np.zeros_like(points.weight)
-        across = points.weight * points.normal_stiffness
+        across = points.weight * points.contact.normal_stiffness
         return np.concatenate([across, none, none, points.shear_spring])
 
     def tangent_map(self, pattern: Pattern) -> sparse.csr_matrix:
@@ -396,26 +393,24 @@ def make_operator(
 
 
 @dataclass(frozen=True, eq=False)
-class OwnLawStep:
-    """Mean joint forces of a time step by laws of the user, as `StepForces`."""
+class OwnLawStep(StepForces):
+    """Mean joint forces of a time step by laws of the user, without dilatancy of their own."""
 
     operator: OwnLawOperator  # with the joint memory at the start
-    start: Array  # coordinates at its start (n,)
-    damping_lag: float  # time lag of damping over the length of the step, β/Δt [-]
     # means at the last coordinates, which force and tangent share
     _last: dict[bytes, tuple[Array, Array]] = field(default_factory=dict)
 
     @cached_property
-    def _before(self) -> Array:
+    def _gaps_before(self) -> Array:
         """Opening and slip at the start (2, p) [m]."""
         return self.operator.gaps(self.start)
 
-    def _means(self, q: Array) -> tuple[Array, Array]:
+    def _mean_response(self, q: Array) -> tuple[Array, Array]:
         """Return mean tractions (2, p), and their derivatives by the gaps at the end (2, 2, p)."""
         key = q.tobytes()
         if key not in self._last:
             self._last.clear()
-            self._last[key] = self._integrate(self.operator.gaps(q) - self._before)
+            self._last[key] = self._integrate(self.operator.gaps(q) - self._gaps_before)
         return self._last[key]
 
     def _integrate(self, change: Array, tolerance: float = 1e-10) -> tuple[Array, Array]:
@@ -447,7 +442,7 @@ class OwnLawStep:
         """Return tractions, and derivatives by the gaps at the end, on the way (5, 6, k)."""
         # places of the points `rows` (k,) from 0 at the start to 1 at the end (5, k)
         ahead = places + self.damping_lag
-        gaps = self._before[:, rows, None] + change[:, rows, None] * ahead.T
+        gaps = self._gaps_before[:, rows, None] + change[:, rows, None] * ahead.T
         all_rows = np.repeat(rows, len(places))
         memory = self.operator.variables[:, all_rows]
         tractions, tangent, _ = self.operator.laws.respond(gaps.reshape(2, -1), memory, all_rows)
@@ -458,32 +453,20 @@ class OwnLawStep:
 
     def _point_forces(self, q: Array) -> tuple[Array, Array]:
         """Return mean normal and shear forces, each (p,) [N]."""
-        normal, shear = self.operator.points.weight * self._means(q)[0]
+        normal, shear = self.operator.points.weight * self._mean_response(q)[0]
         return normal, shear
-
-    def force(self, q: Array) -> Array:
-        """Return the mean of the generalised forces of the joints (n,)."""
-        return self.operator.generalised_force(*self._point_forces(q))
-
-    def resultants(self, q: Array) -> Array:
-        """Return the means of N, V, M of every joint (n_joints, 3) [N, N, N m]."""
-        return self.operator.sum_resultants(*self._point_forces(q))
 
     def stiffness(self, q: Array) -> Array:
         """Return the derivative of the mean force, for `OwnLawOperator.tangent_map` (4 p,)."""
-        return self.operator.arrange_stiffness(self._means(q)[1])
+        return self.operator.arrange_stiffness(self._mean_response(q)[1])
 
     def updated_memory(self, q: Array) -> Array:
         """Return the joint memory at the end of the step, as `OwnLawOperator.memory`."""
         return self.operator.updated_memory(q)
 
-    def with_dilatancy(self, q: Array) -> "OwnLawStep":
-        """Return the same step: dilatancy is part of a law."""
-        return self
-
     def dissipation(self, q: Array) -> float:
         """Return the work on the joints less the change of their energy [J]."""
-        change = self.operator.gaps(q) - self._before
+        change = self.operator.gaps(q) - self._gaps_before
         work = float(np.sum(self._point_forces(q) * change))
         after = self.operator.with_memory(self.updated_memory(q))
         return work - (after.energy(q) - self.operator.energy(self.start))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from archfem._typing import Array
 from archfem._validation import check_integer, is_one_of
 from archfem.errors import InvalidInput
+from archfem.joints.contact_law import ContactLaw
 from archfem.masonry.structure import Structure
 
 legendre: Any = np.polynomial.legendre  # without type annotations
@@ -130,10 +131,7 @@ class JointPoints:
     joint: Numbers  # number of each point's joint (p,)
     offset: Array  # distance from the joint's mid-depth toward the extrados (p,) [m]
     weight: Array  # joint area of each point, width included (p,) [m²]
-    normal_stiffness: Array  # k_n (p,) [Pa/m]
-    shear_stiffness: Array  # k_s (p,) [Pa/m]
-    friction: Array  # coefficient μ, infinite where a point never slides (p,) [-]
-    cohesion: Array  # c (p,) [Pa]
+    contact: ContactLaw  # contact law, an array (p,) for each parameter
     joint_count: int
     dilatancy: Array | None = None  # tan ψ (p,) [-]; None without dilatancy at any point
     tension: Array | None = None  # tensile strength f_t (p,) [Pa]; None without bonds
@@ -149,10 +147,7 @@ class JointPoints:
             joint,
             np.concatenate([offsets for offsets, _ in rules]),
             np.concatenate([lengths for _, lengths in rules]) * structure.width,
-            np.array([contact.normal_stiffness for contact in contacts])[joint],
-            np.array([contact.shear_stiffness for contact in contacts])[joint],
-            np.array([contact.coefficient for contact in contacts])[joint],
-            np.array([contact.cohesion for contact in contacts])[joint],
+            ContactLaw.at_points(contacts, joint),
             len(rules),
             _spread_if_any([contact.dilatancy for contact in contacts], joint),
             _spread_if_any([contact.tension for contact in contacts], joint),
@@ -163,7 +158,8 @@ class JointPoints:
         """Return some of the points with other weights."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         of_points: Any = {key: v[rows] for key, v in values.items() if isinstance(v, np.ndarray)}
-        return replace(self, **of_points | {"weight": weight})
+        contact = self.contact.mapped(lambda values: values[rows])
+        return replace(self, **of_points | {"weight": weight, "contact": contact})
 
     @property
     def is_plain(self) -> bool:
@@ -173,12 +169,12 @@ class JointPoints:
     @cached_property
     def slides(self) -> NDArray[np.bool_]:
         """Whether each point can slide (p,)."""
-        return np.isfinite(self.friction)
+        return np.asarray(self.contact.resistance == 0.0)
 
     @cached_property
     def shear_spring(self) -> Array:
         """Elastic shear stiffness of each point (p,) [N/m]."""
-        return self.weight * self.shear_stiffness
+        return self.weight * self.contact.shear_stiffness
 
 
 def _spread_if_any(values: list[float], joint: Numbers) -> Array | None:

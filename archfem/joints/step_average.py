@@ -18,11 +18,12 @@ import numpy as np
 from archfem._typing import Array
 from archfem.joints.contact_law import (
     ZERO_DIVISION_GUARD,
-    clip_to_friction,
-    dilatancy_opening,
-    friction_excess,
+    lagged_path,
+    mean_shear_tangent,
+    shear_loss,
     shear_over_step,
 )
+from archfem.joints.normal_law import dilatancy_opening
 from archfem.joints.operator import JointOperator
 
 
@@ -46,27 +47,18 @@ class StepForces:
     def _gap_path(self, q: Array) -> tuple[Array, Array]:
         """Return the gaps at start and end, plus their change times `damping_lag`, each (p,)."""
         before, after = self._before[0], self.operator.effective_gaps(q, self.end_opening)
-        ahead = self.damping_lag * (after - before)
-        return before + ahead, after + ahead
+        return lagged_path(before, after, self.damping_lag)
 
-    def _shear_change(self, q: Array) -> Array:
-        """Return the change of the elastic shear without further slip (p,) [N]."""
-        return self.operator.trial_shear(q) - self._before[1]
+    def _shear_path(self, q: Array) -> tuple[Array, Array]:
+        """Return the elastic shear at the start and its change without further slip (p,) [N]."""
+        return self._before[1], self.operator.trial_shear(q) - self._before[1]
 
     def _means(self, q: Array) -> tuple[Array, Array, Array, Array]:
-        """Return mean normal force, mean shear, Coulomb's limit, elastic shear at the end (p,)."""
-        operator, slides = self.operator, self.operator.points.slides
-        normal, closed = operator.law.step_means(*self._gap_path(q))
-        limit = operator.coulomb_limit(normal, closed)
-        first, change = self._before[1], self._shear_change(q)
-        shear, last = shear_over_step(first, change, self.damping_lag, limit)
-        linear = first + (0.5 + self.damping_lag) * change
-        return (
-            normal,
-            np.where(slides, shear, linear),
-            limit,
-            np.where(slides, last, first + change),
-        )
+        """Return mean normal force, mean shear, Coulomb's limit, shear lost by slip (p,)."""
+        normal, closed = self.operator.law.step_means(*self._gap_path(q))
+        limit = self.operator.coulomb_limit(normal, closed)
+        shear, lost = shear_over_step(*self._shear_path(q), self.damping_lag, limit)
+        return normal, shear, limit, lost
 
     def _point_forces(self, q: Array) -> tuple[Array, Array]:
         """Return mean normal and shear forces, each (p,) [N]."""
@@ -83,12 +75,11 @@ class StepForces:
 
     def updated_memory(self, q: Array) -> Array:
         """Return the joint memory at the end of the step, as `JointOperator.memory`."""
-        operator, (_, _, limit, last) = self.operator, self._means(q)
-        excess = operator.trial_shear(q) - last
+        operator, (_, _, limit, lost) = self.operator, self._means(q)
         if operator.bonds is None:
-            return operator.add_slip(excess)
+            return operator.add_slip(lost)
         exceeded = operator.bonds.find_exceeded(operator.effective_gaps(q, self.end_opening))
-        return operator.add_breakage(exceeded, excess, limit)
+        return operator.add_breakage(exceeded, lost, limit)
 
     def with_dilatancy(self, q: Array) -> "StepForces":
         """Return the step with the dilatancy opening due to the slip on the way to q."""
@@ -123,25 +114,18 @@ class StepForces:
         operator = self.operator
         if operator.bonds is None:
             return 0.0
-        gaps = operator.effective_gaps(q, self.end_opening) + operator.bonds.stretch
+        gaps = operator.gaps_of_faces(q, self.end_opening)
         after = operator.with_memory(self.updated_memory(q))
-        return operator.normal_energy(gaps) - after.normal_energy(gaps)
+        return float(np.sum(operator.normal_energies(gaps) - after.normal_energies(gaps)))
 
     def dissipation(self, q: Array) -> float:
         """Return the energy lost to friction, broken bonds and damping [J]; never negative."""
         operator, points = self.operator, self.operator.points
         before, after = self._before[0], operator.effective_gaps(q, self.end_opening)
-        normal, shear, limit, _ = self._means(q)
+        normal, _, limit, _ = self._means(q)
         # damping across: lagged less unlagged mean force, on the change of the gap
         across = (normal - operator.law.step_means(before, after)[0]) @ (after - before)
-        # along: excess at the start, friction while sliding, damping
-        change, first = self._shear_change(q), self._before[1]
-        start = np.where(points.slides, clip_to_friction(first, limit), first)
-        excess = np.abs(friction_excess(start + change, limit))
-        mean = np.where(
-            points.slides, shear_over_step(first, change, 0.0, limit)[0], first + 0.5 * change
-        )
-        along = 0.5 * (first**2 - start**2) + excess * limit + (shear - mean) * change
+        along = shear_loss(*self._shear_path(q), self.damping_lag, limit)
         lost = float(across + np.sum(along / points.shear_spring))
         if points.is_plain:
             return lost
@@ -156,26 +140,10 @@ class StepForces:
         across = operator.law.mean_stiffness(*path, rates)
         if not operator.slides:
             return np.concatenate([across, (0.5 + lag) * points.shear_spring])
-        by_change, by_limit = self._shear_rates(q)
-        along = np.where(points.slides, by_change, 0.5 + lag) * points.shear_spring
+        by_change, by_limit = mean_shear_tangent(*self._shear_path(q), lag, self._means(q)[2])
         area_rate = operator.law.mean_area_rate(*path, rates)
         coupling = operator.friction_coupling(across, area_rate, by_limit)
-        return np.concatenate([across, along, coupling])
-
-    def _shear_rates(self, q: Array) -> tuple[Array, Array]:
-        """Return derivatives of the mean shear by its elastic change and by the limit, (p,) [-]."""
-        first, change, limit = self._before[1], self._shear_change(q), self._means(q)[2]
-        start = clip_to_friction(first, limit)
-        excess = friction_excess(start + change, limit)
-        # part of the step in which the point slides; very small changes are lost in the sums
-        with np.errstate(all="ignore"):
-            sliding = np.where(excess != 0.0, np.clip(excess / change, 0.0, 1.0), 0.0)
-        clipped = np.where(np.abs(first) > limit, np.sign(first), 0.0)
-        mean = shear_over_step(first, change, 0.0, limit)[0] + self.damping_lag * change
-        at_limit = np.abs(mean) > limit
-        by_change = 0.5 * (1.0 - sliding) ** 2 + self.damping_lag
-        by_limit = (1.0 - sliding) * clipped + sliding * np.sign(change)
-        return np.where(at_limit, 0.0, by_change), np.where(at_limit, np.sign(mean), by_limit)
+        return np.concatenate([across, by_change * points.shear_spring, coupling])
 
 
 def _aitken_factor(error: Array, last_error: Array, last_factor: float) -> float:

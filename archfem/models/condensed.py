@@ -19,7 +19,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from archfem._typing import Array, Numbers
-from archfem.joints.contact_law import Facets
+from archfem.joints.normal_law import Facets
 from archfem.joints.operator import JointOperator
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.models.linear_blocks import LinearBlockModel

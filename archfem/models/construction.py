@@ -89,13 +89,8 @@ class PartialStructure(LinearBlockModel):
 
     def energy(self, q: Array) -> float:
         """Return the potential energy of what stands without further slip [J]."""
-        joints, active = self.operator, self._active_points
-        gaps, shear = joints.effective_gaps(q), joints.trial_shear(q)
-        stored = gaps * joints.law.forces(gaps) + shear**2 / joints.points.shear_spring
-        if joints.bonds is not None:
-            stored = stored + 2.0 * joints.bonds.energy_of_pull(gaps)
-        in_blocks = 0.5 * float(q @ (self.block_stiffness @ q))
-        return in_blocks + 0.5 * float(np.sum(stored[active]))
+        in_joints = self.operator.point_energies(q)[self._active_points]
+        return 0.5 * float(q @ (self.block_stiffness @ q)) + float(in_joints.sum())
 
     def resultants(self, q: Array) -> Array:
         """Return N, V, M of every joint, zero next to missing blocks (n_joints, 3)."""

@@ -9,7 +9,7 @@ corners of all free blocks.
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from scipy import sparse
@@ -91,9 +91,8 @@ class LinearBlockModel(Model):
 
     def begin_step(self, start: Array, damping_lag: float) -> ModelStep:
         """Return a time step from a state with the present joint memory."""
-        if isinstance(self.operator, OwnLawOperator):
-            return LinearBlockStep(self, OwnLawStep(self.operator, start, damping_lag))
-        return LinearBlockStep(self, StepForces(self.operator, start, damping_lag))
+        kind: Any = OwnLawStep if isinstance(self.operator, OwnLawOperator) else StepForces
+        return LinearBlockStep(self, kind(self.operator, start, damping_lag))
 
     def observer(self) -> Observer:
         """Return the observer of joint faces and block displacements."""
@@ -140,7 +139,7 @@ class LinearBlockStep:
     """A time step of linear blocks between joints."""
 
     model: LinearBlockModel  # with the joint memory at the start
-    joints: StepForces | OwnLawStep  # the same step of the joints alone
+    joints: StepForces  # the same step of the joints alone
 
     def force(self, q: Array) -> Array:
         """Return the mean of the internal forces of blocks and joints (n,)."""

@@ -33,7 +33,8 @@ from scipy.sparse.linalg import splu
 
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
-from archfem.joints.operator import SLIP_LIMIT_TOLERANCE, JointOperator
+from archfem.joints.contact_law import exceeds_limit
+from archfem.joints.operator import JointOperator
 from archfem.models.linear_blocks import LinearBlockModel
 from archfem.models.model import Model
 from archfem.statics.newton import (
@@ -66,7 +67,9 @@ class TrescaJoints(JointOperator):
     def of(cls, joints: JointOperator, shear_limit: Array) -> "TrescaJoints":
         """Return joints with other shear limits and the same memory."""
         operator = joints.law, joints.opening, joints.slip, joints.gap_offset
-        return cls(*operator, joints.irreversible_slip, joints.broken, shear_limit)
+        # joints that never slide have no other limit than their own
+        limit = np.maximum(shear_limit, joints.points.contact.resistance)
+        return cls(*operator, joints.irreversible_slip, joints.broken, limit)
 
     def coulomb_limit(self, normal: Array, closed: Array) -> Array:
         """Return the shear limits, for any normal forces (p,) [N]."""
@@ -75,8 +78,7 @@ class TrescaJoints(JointOperator):
     def stiffness(self, q: Array) -> Array:
         """Return the point stiffnesses of the tangent, as `tangents` takes them (m,) [N/m]."""
         across = self.law.stiffness(self.effective_gaps(q))
-        limit = (1.0 + SLIP_LIMIT_TOLERANCE) * self.shear_limit
-        over = self.points.slides & (np.abs(self.trial_shear(q)) > limit)
+        over = exceeds_limit(self.trial_shear(q), self.shear_limit)
         along = np.where(over, 0.0, self.points.shear_spring)
         # no coupling of slip with opening: it is zero where that of Coulomb's law would stand
         return np.concatenate([across, along, *([np.zeros_like(across)] if self.slides else [])])
@@ -128,8 +130,7 @@ def _solve_creep_step(
         tresca = model.with_joint_law(TrescaJoints.of(joints, limit))
         solution = _solve_with_drag(solver, tresca, load, (start, q), drag, ("basic", "cp"))
         q, iterations = solution.q, iterations + solution.iterations
-        opening = joints.effective_gaps(q)
-        limit = joints.coulomb_limit(joints.law.forces(opening), joints.law.contact_area(opening))
+        limit = joints.coulomb_limit(*joints.law.forces_and_area(joints.effective_gaps(q)))
     return Solution(q, iterations, solution.residual)
 
 

@@ -16,7 +16,7 @@ from scipy import stats
 from scipy.stats import qmc
 
 from archfem._validation import check_integer, short_repr
-from archfem.cases.analysis_tables import find_section
+from archfem.cases.analysis_tables import complete_path
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_sections
 from archfem.cases.toml_file import (
@@ -24,7 +24,6 @@ from archfem.cases.toml_file import (
     check_table,
     refuse_unknown,
     set_value,
-    split_key_path,
 )
 from archfem.errors import InvalidInput
 
@@ -77,6 +76,9 @@ def parameter_axes(over: Any, samples: Mapping[str, Any] | None = None) -> tuple
         axes.append(_sample_axis(random, samples))
     elif samples is not None:
         raise InvalidInput("samples needs distributions, and there are none: take samples out")
+    keys = [key for axis in axes for key in axis.keys]
+    if twice := sorted({key for key in keys if keys.count(key) > 1}):
+        raise InvalidInput(f"{twice} vary twice: a keyword and its path in a case are one")
     return tuple(axes)
 
 
@@ -130,13 +132,11 @@ def _value_axis(key: str, values: Any) -> Axis:
     """The axis of a list of values."""
     if not len(values):
         raise InvalidInput(f"{key} is empty: a product over it has no points; give values")
-    return Axis(_complete(key), (_complete(key),), tuple((_to_python(value),) for value in values))
-
-
-def _complete(path: str) -> str:
-    """Return the path of a value in a case; a keyword of an analysis has its section before it."""
-    section = find_section(split_key_path(path)[0])
-    return f"{section}.{path}" if section else path
+    if any(value is None for value in values):
+        raise InvalidInput(f"{key} has the value None, which no file holds: list points without it")
+    return Axis(
+        complete_path(key), (complete_path(key),), tuple((_to_python(value),) for value in values)
+    )
 
 
 def _to_python(value: Any) -> Any:
@@ -150,7 +150,7 @@ def _point_axis(points: Sequence[Any]) -> Axis:
         raise InvalidInput("the list of points is empty: give a table of keys of the case for each")
     keys = tuple(dict.fromkeys(key for point in points for key in point))
     rows = tuple(tuple(_to_python(point.get(key)) for key in keys) for point in points)
-    return Axis("point", tuple(map(_complete, keys)), rows)
+    return Axis("point", tuple(map(complete_path, keys)), rows)
 
 
 def _sample_axis(random: Mapping[str, Any], samples: Mapping[str, Any] | None) -> Axis:
@@ -172,7 +172,7 @@ def _sample_axis(random: Mapping[str, Any], samples: Mapping[str, Any] | None) -
     seed = check_integer(settings.get("seed", 0), "samples.seed", minimum=0)
     shares = samplers[method](len(random), seed=seed).random(count)  # between 0 and 1
     columns = [_quantiles(key, random[key], shares[:, k]) for k, key in enumerate(random)]
-    return Axis("sample", tuple(map(_complete, random)), tuple(zip(*columns, strict=True)))
+    return Axis("sample", tuple(map(complete_path, random)), tuple(zip(*columns, strict=True)))
 
 
 def _quantiles(key: str, setting: Any, shares: Any) -> list[float]:

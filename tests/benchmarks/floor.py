@@ -215,7 +215,7 @@ class Floor:
         effective += (1.0 + 2.0 / DT * DAMPING.stiffness) * k
         opening = model.operator.opening[:, order].tocsr()
         opening.sort_indices()
-        springs = points.weight * points.normal_stiffness
+        springs = points.weight * points.contact.normal_stiffness
         # Inertia forces of the first sample of the ground motion act on the structure at rest.
         inertia = -model.mass_influence[:, 0] * motion.at(0.0)[0, 0]
         start = np.stack([rest, np.zeros_like(rest), spsolve(model.mass.tocsc(), inertia)])

@@ -62,9 +62,9 @@ def _springs(model) -> None:
             ops.fix(count, 1, 1)
         pair = [count if node is None else node + 1 for node in (lower, higher)]
         tag = len(model.cells.polygons) + 1 + point
-        area = points.weight[point]
-        ops.uniaxialMaterial("ENT", 2 * point + 1, float(points.normal_stiffness[point] * area))
-        ops.uniaxialMaterial("Elastic", 2 * point + 2, float(points.shear_stiffness[point] * area))
+        area, contact = points.weight[point], points.contact
+        ops.uniaxialMaterial("ENT", 2 * point + 1, float(contact.normal_stiffness[point] * area))
+        ops.uniaxialMaterial("Elastic", 2 * point + 2, float(contact.shear_stiffness[point] * area))
         axes = [*map(float, normal), 0.0, *map(float, tangent), 0.0]
         springs = ["-mat", 2 * point + 1, 2 * point + 2, "-dir", 1, 2]
         ops.element("zeroLength", tag, *pair, *springs, "-doRayleigh", 1, "-orient", *axes)

@@ -190,6 +190,16 @@ def test_fingerprints_differ_by_the_last_bit():
     assert len({each.fingerprint for each in [column, *others]}) == 5
 
 
+def test_parts_of_default_names_and_numbers_of_numpy_are_written(tmp_path):
+    arch = af.shapes.Arch(span=4.0, rise=1.5, thickness=0.4, voussoirs=5)
+    bridge = af.bridge(arches=[arch], width=2.0)
+    numbers = {"dt": np.float32(0.005), "cells": (np.int64(2), np.int64(3))}
+    analysis = af.Analysis(bridge, fidelity="faces", damping=af.Rayleigh(0.03, [6, 30]), **numbers)
+    again = read_again(analysis, tmp_path)
+    assert again == analysis
+    assert again.structure.origin[0] == "bridge"
+
+
 @dataclass(frozen=True)
 class Linear(DryJoint):
     """A law of the user."""

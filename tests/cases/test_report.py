@@ -13,7 +13,7 @@ from pages import read_page
 import archfem as af
 from archfem._files import read_file_list, replace_results
 from archfem.cases.report import report, report_data
-from archfem.cases.report.checks import supported_weight_ratio
+from archfem.cases.report.sections import supported_weight_ratio
 from archfem.cases.run import carry_out, replace_run
 
 CASE = """

@@ -10,7 +10,7 @@ import archfem as af
 from archfem._files import replace_results
 from archfem.cases.case import case_of
 from archfem.cases.report import report_data, sections
-from archfem.cases.report.checks import _check_row, supported_weight_ratio
+from archfem.cases.report.sections import _check_row, supported_weight_ratio
 from archfem.cases.result_text import tabulate_joints, tabulate_motions, tabulate_runs
 
 

@@ -7,10 +7,11 @@ import pytest
 
 import archfem as af
 from archfem.cases.toml_file import (
-    apply_change,
     check_choice,
     merge_tables,
+    parse_change,
     remove_key,
+    set_value,
     split_key_path,
 )
 
@@ -82,8 +83,8 @@ def test_tables_override_those_of_another_case():
     }
     assert below == {"a": {"x": 1, "y": 2}, "b": 3}
     remove_key(below, "a.x")
-    apply_change(below, "a.z='5 m'")
-    apply_change(below, "c.d=word")
+    set_value(below, *parse_change("a.z='5 m'"))
+    set_value(below, *parse_change("c.d=word"))
     assert below == {"a": {"y": 2, "z": "5 m"}, "b": 3, "c": {"d": "word"}}
 
 
@@ -100,7 +101,7 @@ def test_tables_override_those_of_another_case():
 def test_names_with_spaces_and_dots_are_quoted_as_in_toml(path, names):
     assert split_key_path(path) == names
     settings = {}
-    apply_change(settings, f"{path} = what's new")
+    set_value(settings, *parse_change(f"{path} = what's new"))
     for name in names:
         settings = settings[name]
     assert settings == "what's new"

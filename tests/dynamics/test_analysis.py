@@ -37,7 +37,9 @@ def test_its_run_is_that_of_the_functions_with_the_same_words():
     [
         ({"dt": 0.008}, {"dt": 0.008}),
         ({"damping": af.StiffnessDamping(0.1, 5.0)}, {"damping": af.StiffnessDamping(0.1, 5.0)}),
-        ({"tolerance": 0.02}, {"tolerance": 0.02, "dt": None}),
+        ({"tolerance": 0.02, "dt": None}, {"tolerance": 0.02, "dt": None}),
+        ({"damping": None}, {"damping": None}),
+        ({"displacements": "small"}, {"displacements": "small"}),
         ({"record": af.Record(every=3)}, {"record": af.Record(every=3)}),
         ({"criteria": af.Criteria(hinge=0.4)}, {"criteria": af.Criteria(hinge=0.4)}),
         ({"method": "snes"}, {"method": "snes"}),
@@ -82,10 +84,11 @@ def test_functions_of_models_and_structures_take_it():
 
 
 def test_its_searches_are_those_of_the_functions():
-    options = {"precision": 0.2, "dt": [0.004]}
-    found = ROCKING.scale(MOTION, **options)
+    found = ROCKING.scale(MOTION, precision=0.2)
     model = af.build(COLUMN, fidelity="rigid", displacements="large")
-    assert found.lower == af.collapse_scale(model, MOTION, damping="effective", **options).lower
+    options = {"precision": 0.2, "dt": [0.004, 0.002]}
+    assert found == af.collapse_scale(model, MOTION, damping="effective", **options)
+    assert found == ROCKING.scale(MOTION, **options)
     scales = af.mechanism_scales(replace(ROCKING, criteria=af.Criteria(failures=1)), MOTION)
     assert scales["any joints at once"].upper <= scales["verified"].upper
     with pytest.raises(af.InvalidInput, match=r"small displacements.*displacements='large'"):
@@ -181,6 +184,7 @@ def test_models_are_built_once_and_not_sent_to_other_processes(monkeypatch):
 
 def test_its_repr_has_what_differs_from_the_defaults():
     assert repr(af.Analysis(COLUMN)) == "Analysis(column)"
+    assert len({ROCKING, replace(ROCKING), replace(ROCKING, dt=0.002)}) == 2
     text = repr(replace(ROCKING, damping=None))
     assert text == "Analysis(column, fidelity='rigid', displacements='large', dt=0.004)"
 
@@ -188,14 +192,14 @@ def test_its_repr_has_what_differs_from_the_defaults():
 def test_auto_selects_a_model_for_each_motion(monkeypatch):
     motions = []
 
-    def select(structure, *, motion, **settings):
-        motions.append((motion, settings["tolerance"], settings["fidelity"]))
+    def select(structure, tolerance, motion, damping, dt, *, displacements):
+        motions.append((motion, tolerance, damping, dt, displacements))
         return af.build(structure, fidelity="rigid")
 
-    monkeypatch.setattr(analysis, "build", select)
+    monkeypatch.setattr(analysis, "select_model", select)
     auto = af.Analysis(COLUMN, fidelity="auto", tolerance=0.01, dt=0.004)
     assert auto.discretisation.fidelity == "full"
     auto.dead_load(MOTION)
     auto.dead_load()
-    assert motions == [(MOTION, 0.01, "auto"), (None, 0.01, "auto")]
+    assert motions == [(each, 0.01, None, 0.004, "small") for each in (MOTION, None)]
     assert np.isfinite(auto.run(MOTION).joints["N"].values).all()

@@ -48,17 +48,18 @@ def scalar(model, i, gap, slip):
     """Normal and shear force of one spring, how far it has slid and whether it broke, by cases."""
     points, count = model.operator.points, len(model.operator.points.offset)
     slid, broken = model.memory[i], model.memory[count + i]
-    area, k_n, k_s = points.weight[i], points.normal_stiffness[i], points.shear_stiffness[i]
+    contact = points.contact
+    area, k_n, k_s = points.weight[i], contact.normal_stiffness[i], contact.shear_stiffness[i]
     bonded = points.tension[i] > 0.0 and not broken
     most = points.tension[i] if bonded else 0.0
     stress = k_n * (gap - points.dilatancy[i] * abs(slid))
     torn = stress > most
     stress = min(stress, most)
     shear = k_s * (slip - slid)
-    if not np.isfinite(points.friction[i]):
+    if not points.slides[i]:
         return area * stress, area * shear, slid, float(broken or (bonded and torn))
-    cohesion = points.cohesion[i] if bonded or points.tension[i] == 0.0 else 0.0
-    limit = 0.0 if torn else cohesion - points.friction[i] * stress
+    cohesion = contact.cohesion[i] if bonded or points.tension[i] == 0.0 else 0.0
+    limit = 0.0 if torn else cohesion - contact.friction[i] * stress
     if abs(shear) > limit:
         slid, torn = slip - np.sign(shear) * limit / k_s, True
         shear = np.sign(shear) * limit

@@ -3,13 +3,12 @@
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import archfem as af
-from archfem.joints.step_average import StepForces
+from archfem.joints.contact_law import mean_shear_tangent
 
 RULES = ("lobatto", "exact")
 
@@ -59,7 +58,7 @@ def slid_and_held(model, q):
     """Whether any points slide, hold and are open at q."""
     operator = model.operator
     normal, shear = operator.point_forces(q)
-    slides = np.isfinite(operator.points.friction)
+    slides = operator.points.slides
     held = np.isclose(shear, operator.trial_shear(q), rtol=1e-9, atol=1e-9)
     return (slides & ~held).any(), (slides & held & (normal < 0.0)).any(), (normal == 0.0).any()
 
@@ -69,12 +68,13 @@ def slid_and_held(model, q):
 
 def scalar(points, i, gap, slip, slid):
     """Normal and shear force of one spring, and how far it has slid, written out by cases."""
-    area, k_n, k_s = points.weight[i], points.normal_stiffness[i], points.shear_stiffness[i]
+    contact = points.contact
+    area, k_n, k_s = points.weight[i], contact.normal_stiffness[i], contact.shear_stiffness[i]
     normal = area * k_n * gap if gap < 0.0 else 0.0
     shear = area * k_s * (slip - slid)
-    if not np.isfinite(points.friction[i]):
+    if not points.slides[i]:
         return normal, shear, 0.0
-    limit = points.friction[i] * -normal + (points.cohesion[i] * area if gap <= 0.0 else 0.0)
+    limit = contact.friction[i] * -normal + (contact.cohesion[i] * area if gap <= 0.0 else 0.0)
     if shear > limit:
         return normal, limit, slip - limit / (area * k_s)
     if shear < -limit:
@@ -108,10 +108,10 @@ def test_no_point_bears_more_shear_than_friction_holds(rule):
         model, q, _ = places(mixed(rule=rule), seed)
         operator = model.operator
         normal, shear = operator.point_forces(q)
-        closed = operator.law.contact_area(operator.openings(q))
-        slides = np.isfinite(operator.points.friction)
-        limit = operator.points.cohesion[slides] * closed[slides]
-        limit -= operator.points.friction[slides] * normal[slides]
+        closed = operator.law.forces_and_area(operator.openings(q))[1]
+        slides = operator.points.slides
+        limit = operator.points.contact.cohesion[slides] * closed[slides]
+        limit -= operator.points.contact.friction[slides] * normal[slides]
         over = np.abs(shear[slides]) - limit
         assert over.max() <= 1e-12 * np.abs(shear).max()
         apart = slides & (operator.openings(q) > 0.0) & (closed == 0.0)
@@ -172,9 +172,14 @@ def test_a_step_of_springs_is_the_mean_along_its_path(late):
     gaps = operator.openings(first), operator.openings(last)
     ahead = late * (gaps[1] - gaps[0])
     start, end = gaps[0] + ahead, gaps[1] + ahead
-    normal = points.weight * points.normal_stiffness * (below(end) - below(start)) / (end - start)
+    normal = (
+        points.weight
+        * points.contact.normal_stiffness
+        * (below(end) - below(start))
+        / (end - start)
+    )
     closed = (np.minimum(end, 0.0) - np.minimum(start, 0.0)) / (end - start)
-    limit = -points.friction * normal + points.cohesion * points.weight * closed
+    limit = -points.contact.friction * normal + points.contact.cohesion * points.weight * closed
     elastic = operator.trial_shear(first), operator.trial_shear(last)
     change = elastic[1] - elastic[0]
     begin = np.clip(elastic[0], -limit, limit)
@@ -239,13 +244,7 @@ def test_the_rates_of_a_step_shorter_than_rounding_are_those_of_a_slide():
     random = np.random.default_rng(0)
     first, limit = 1e4 * random.standard_normal(2000), 1e4 * random.random(2000)
     for change in (0.0, 1e-320, 1e-13):
-        step = SimpleNamespace(
-            _before=(None, first),
-            _shear_change=lambda q, change=change: np.full(2000, change),
-            _means=lambda q: (None, None, limit, None),
-            damping_lag=0.0,
-        )
-        by_change, by_limit = StepForces._shear_rates(step, None)
+        by_change, by_limit = mean_shear_tangent(first, np.full(2000, change), 0.0, limit)
         assert ((by_change >= 0.0) & (by_change <= 0.5)).all()
         assert (np.abs(by_limit) <= 1.0).all()
 

@@ -18,8 +18,7 @@ def pushed():
 def test_with_coulombs_limits_forces_are_coulombs(pushed):
     model, q = pushed
     joints = model.operator
-    opening = joints.openings(q)
-    own = joints.coulomb_limit(joints.law.forces(opening), joints.law.contact_area(opening))
+    own = joints.coulomb_limit(*joints.law.forces_and_area(joints.openings(q)))
     given = TrescaJoints.of(joints, own)
     assert np.any(np.abs(joints.trial_shear(q)) > own)
     assert np.array_equal(given.force(q), joints.force(q))

@@ -5,6 +5,8 @@ import pytest
 from kernels import from_python
 from repeats import each_once
 
+import archfem as af
+from archfem.joints.contact_law import NO_LIMIT, ContactLaw
 from archfem.joints.large import face_kinematics
 from archfem.joints.large.face_kinematics import FaceKinematics
 from archfem.joints.large.forces import (
@@ -14,6 +16,7 @@ from archfem.joints.large.forces import (
     joint_energy,
 )
 from archfem.joints.large.overlap_law import FaceLaw
+from archfem.joints.large.point_law import CONTACT_RECORD
 from archfem.joints.large.rates import assemble_rates, find_block_starts, find_rate_pairs
 
 joint_measures = from_python(face_kinematics.joint_measures)
@@ -105,16 +108,17 @@ def two_joints(shapes, friction, facets, rng, fill=False):
     else:
         place = np.tile(0.5 * (edges[:-1] + edges[1:]), 2)
     points = len(place) // 2
+    laws = [af.Contact(1e6, 1e6, friction), af.Contact(2e6, 1e6, friction, cohesion=2e3)]
+    records = np.array([ContactLaw.of(law) for law in laws], CONTACT_RECORD)
     faces = FaceLaw(
         np.array([1.0, 0.8]),
-        np.array([1e6, 2e6]),
-        np.array([friction, friction]),
+        1.0,
+        records,
         np.array([0, points, 2 * points]),
         place,
         np.full(2 * points, 1.0 / count),
         np.repeat([3e4, 2e4], points) / points,
         facets,
-        np.array([0.0, 2e3]),
         np.array([False, shapes > 0]),
     )
     whole = np.arange(2)
@@ -215,7 +219,9 @@ def test_a_slip_that_reversed_holds_as_a_joint_that_never_slid(shapes, fill, fac
     """Force and what it lacks, and the rate, are then those of joints that never slide."""
     rng = np.random.default_rng(shapes + 7)
     joints, size = two_joints(shapes, 0.3, facets, rng, fill), 2 * (3 + shapes)
-    still = joints._replace(face_law=joints.face_law._replace(friction=np.full(2, np.inf)))
+    held = joints.face_law.contacts.copy()
+    held["friction"], held["resistance"] = 0.0, NO_LIMIT
+    still = joints._replace(face_law=joints.face_law._replace(contacts=held))
     before = 0.05 * rng.normal(size=size)
     after = before + 0.01 * rng.normal(size=size)
     slid = 0.01 * rng.normal(size=len(joints.face_law.place))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.joints.contact_law import choose_law
+from archfem.joints.normal_law import choose_law
 from archfem.joints.quadrature import JointPoints
 
 

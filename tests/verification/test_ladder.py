@@ -9,7 +9,8 @@ from glued import glued
 from repeats import each_once
 
 import archfem as af
-from archfem.joints.contact_law import Facets, Springs
+from archfem.joints.contact_law import ContactLaw
+from archfem.joints.normal_law import Facets, Springs
 from archfem.joints.quadrature import JointPoints
 
 MOTION = af.Motion.synthetic(duration=4.0, pga=2.5, seed=5)
@@ -229,10 +230,7 @@ def test_joint_forces_integrate_the_traction(rule):
         np.zeros(2, dtype=int),
         np.array([-0.25, 0.25]),
         np.array([0.25, 0.25]),
-        np.full(2, 2e9),
-        np.full(2, 1e9),
-        np.full(2, np.inf),
-        np.zeros(2),
+        ContactLaw.at_points([af.Contact(2e9, 1e9, None)], np.zeros(2, dtype=int)),
         1,
     )
     law = Facets(points) if rule == "exact" else Springs(points)

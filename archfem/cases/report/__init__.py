@@ -1,9 +1,8 @@
 """HTML report of the results of a case.
 
-    checks       sections on checks and provenance
     report       HTML report of a case
     report_data  case, runs and files of a report
-    sections     sections on case, dead load, ground motion and response
+    sections     sections on case, dead load, ground motion, response, checks and sources
 
 Start reading at `report`.
 """

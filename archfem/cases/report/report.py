@@ -4,15 +4,8 @@ from hashlib import sha256
 from pathlib import Path
 
 from archfem.cases.case import Case
-from archfem.cases.report.checks import build_check_section, build_source_section
 from archfem.cases.report.report_data import ReportData, build_player
-from archfem.cases.report.sections import (
-    build_case_sections,
-    build_dead_load_sections,
-    build_ground_section,
-    build_run_sections,
-    list_facts,
-)
+from archfem.cases.report.sections import build_sections, list_facts
 from archfem.cases.result_folder import ResultFolder
 from archfem.cases.run import Run
 from archfem.cases.toml_file import parse_tables
@@ -25,20 +18,12 @@ from archfem.view.pages.player import Player, write_page
 def write_report(data: ReportData, path: str | Path) -> Path:
     """Write a report atomically."""
     case = data.case
-    sections = [
-        *build_case_sections(data),
-        *build_dead_load_sections(data),
-        build_ground_section(data),
-        *build_run_sections(data),
-        build_check_section(data),
-        build_source_section(data),
-    ]
     subtitle = f"archfem report · case {sha256(case.text().encode()).hexdigest()[:12]}"
     footer = (
         "Written by archfem from the results named above; figures and numbers are theirs. On paper "
         "a player shows the instant and the joint that it showed on the screen."
     )
-    document = Document(case.title, subtitle, list_facts(data), sections, footer)
+    document = Document(case.title, subtitle, list_facts(data), build_sections(data), footer)
     return write_page(path, document.page)
 
 

@@ -14,7 +14,7 @@ from archfem.cases.case import Case
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError
 from archfem.models.builder import build
-from archfem.models.discretisation import MODEL_FIDELITIES, Discretisation
+from archfem.models.discretisation import Discretisation
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
 from archfem.view.pages.document import FigureBlock, TextBlock
@@ -125,8 +125,6 @@ def _discretisation_of(case: Case, run: History) -> Discretisation:
         return case.analysis.discretisation
     fidelity = str(run.dataset.attrs["fidelity"])
     displacements = case.analysis.discretisation.displacements
-    if fidelity in MODEL_FIDELITIES:
-        return Discretisation(fidelity, displacements=displacements)
     # "backfill: full, rest: faces", as `Discretisation.name` writes it.
     by_part = dict(part.rsplit(": ", 1) for part in fidelity.split(", ") if ": " in part)
-    return Discretisation(by_part, displacements=displacements)
+    return Discretisation(by_part or fidelity, displacements=displacements)

@@ -1,8 +1,9 @@
-"""Report sections: case and geometry, dead load, modes, limit analysis, ground motion, response."""
+"""Sections of a report: case, dead load, ground motion, response, checks, sources."""
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,11 @@ import xarray as xr
 from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults, list_default_keys
+from archfem.cases.provenance import hash_file
 from archfem.cases.report.report_data import ReportData, build_player, missing_note
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import SIGN_CONVENTION, History
+from archfem.dynamics.recorder import library_versions
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.dynamics.verdict import Verdict
 from archfem.joints.criteria import assessed_joints
@@ -28,6 +31,18 @@ from archfem.view.histories import draw_envelopes
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
 from archfem.view.structure import draw_names, draw_structure
+
+
+def build_sections(data: ReportData) -> list[Section]:
+    """Build all sections of a report."""
+    return [
+        *build_case_sections(data),
+        *build_dead_load_sections(data),
+        build_ground_section(data),
+        *build_run_sections(data),
+        build_check_section(data),
+        build_source_section(data),
+    ]
 
 
 def build_case_sections(data: ReportData) -> list[Section]:
@@ -137,32 +152,23 @@ def _tabulate_materials(case: Case) -> list[Grid]:
     def mark(item: Material | Contact, key: str, text: str) -> str:
         return f"{text} (default)" if key in list_default_keys(case, item) else text
 
-    materials = [
-        [
-            material.name,
-            mark(material, "young", f"{material.young / MPa:.6g}"),
-            f"{material.poisson:g}",
-            mark(material, "unit_weight", f"{material.unit_weight / kN:g}"),
-            "not known"
-            if material.strength is None
-            else mark(material, "strength", f"{material.strength / MPa:g}"),
-        ]
-        for material in dict.fromkeys(block.material for block in structure.blocks)
-    ]
-    contacts = [
-        [
-            contact.name if contact.law is None else f"{contact.name}: {contact.law}",
-            mark(contact, "normal_stiffness", f"{contact.normal_stiffness / 1e9:.3g}"),
-            mark(contact, "shear_stiffness", f"{contact.shear_stiffness / 1e9:.3g}"),
-            mark(contact, "friction", f"{contact.coefficient:g}")
-            if contact.slides
-            else "never slides",
-            f"{contact.cohesion / 1e3:g}",
-            f"{contact.tension / 1e3:g}",
-            f"{contact.dilatancy:g}",
-        ]
-        for contact in dict.fromkeys(joint.contact for joint in structure.joints)
-    ]
+    materials, contacts = [], []
+    for material in dict.fromkeys(block.material for block in structure.blocks):
+        row = [material.name, mark(material, "young", f"{material.young / MPa:.6g}")]
+        row.append(f"{material.poisson:g}")
+        row.append(mark(material, "unit_weight", f"{material.unit_weight / kN:g}"))
+        strength = "not known"
+        if material.strength is not None:
+            strength = mark(material, "strength", f"{material.strength / MPa:g}")
+        materials.append([*row, strength])
+    for contact in dict.fromkeys(joint.contact for joint in structure.joints):
+        row = [contact.name if contact.law is None else f"{contact.name}: {contact.law}"]
+        row.append(mark(contact, "normal_stiffness", f"{contact.normal_stiffness / 1e9:.3g}"))
+        row.append(mark(contact, "shear_stiffness", f"{contact.shear_stiffness / 1e9:.3g}"))
+        friction = mark(contact, "friction", f"{contact.coefficient:g}")
+        row.append(friction if contact.slides else "never slides")
+        row += [f"{contact.cohesion / 1e3:g}", f"{contact.tension / 1e3:g}"]
+        contacts.append([*row, f"{contact.dilatancy:g}"])
     material_head = ["material", "E [MPa]", "ν [–]", "weight [kN/m³]", "strength [MPa]"]
     contact_head = ["contact", "normal [MPa/mm]", "shear [MPa/mm]", "μ [–]", "c [kPa]"]
     contact_head += ["tension [kPa]", "dilatancy [–]"]
@@ -438,3 +444,106 @@ def _sentence(text: str) -> str:
     """Return a text with a capital at its beginning and a full stop at its end."""
     text = text.strip()
     return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+
+
+def build_check_section(data: ReportData) -> Section:
+    """Build the section on predicted error, energy balance and model."""
+    blocks: list[Any] = []
+    if data.runs:
+        head = ["run", "energy from nowhere", "supports bear", "Newton", "halved"]
+        head += ["predicted error", "end"]
+        rows = [_check_row(data.case, name, run) for name, run in data.runs.items()]
+        caption = (
+            "Checks of each run; energy relative to the largest exchanged, supports under dead load"
+        )
+        blocks.append(Grid(head, rows, caption))
+    else:
+        blocks.append(missing_note("a run to check", "A case with [motion] or [suite] has one."))
+    blocks.append(Grid((), _describe_model(data), "Model and mesh"))
+    if not any("predicted_error" in run.dataset.attrs for run in data.runs.values()):
+        remedy = 'fidelity = "auto" predicts one.'
+        blocks.append(missing_note("a predicted error of the model", remedy))
+    caption = "Speed against error over fidelities, meshes and steps."
+    remedy = "`archfem accuracy CASE.toml --out FOLDER` adds it to the folder."
+    what = "a comparison of meshes and steps"
+    blocks += data.read_result("accuracy.txt", "accuracy.png", caption, what, remedy)
+    caption = "Residual displacement over each property; falls are above the line."
+    what = "the range of the verdict"
+    remedy = "`archfem verdict CASE.toml --out FOLDER` adds it to the folder."
+    blocks += data.read_result("verdict_range.txt", "verdict_range.png", caption, what, remedy)
+    return Section("Predicted error, checks and range of the verdict", blocks)
+
+
+def _check_row(case: Case, name: str, run: History) -> list[str]:
+    """Row of the checks of a run."""
+    attrs = run.dataset.attrs
+    predicted = attrs.get("predicted_error")
+    iterations = run.dataset["iterations"].values if "iterations" in run.dataset else np.zeros(0)
+    ratio = supported_weight_ratio(case.structure, run.joints.isel(time=0, drop=True))
+    return [
+        name,
+        f"{abs(float(attrs.get('energy_drift', np.nan))):.1e}",
+        f"{ratio:.4f} of the weight",
+        f"≤ {int(iterations.max())} a record" if len(iterations) else "–",
+        f"{int(attrs.get('halved_steps', 0))} steps",
+        "–" if predicted is None else f"{float(predicted):.2g} in |e|",
+        run.outcome,
+    ]
+
+
+def supported_weight_ratio(structure: Structure, joints: xr.Dataset) -> float:
+    """Return the vertical reaction of the supports relative to the weight; 1 in equilibrium [-]."""
+    # Force on the higher block of each joint (j, 2).
+    force = joints["N"].values[:, None] * structure.normals
+    force -= joints["V"].values[:, None] * structure.tangents
+    reaction = 0.0
+    for (lower, higher), (_, vertical) in zip(structure.pairs, force, strict=True):
+        # A support bears the joint's force; a joint between two supports cancels.
+        below, above = (structure.blocks[number].fixed for number in (lower, higher))
+        reaction += vertical * (int(below) - int(above))
+    return float(reaction / structure.weight)
+
+
+def _describe_model(data: ReportData) -> list[tuple[str, str]]:
+    """Describe fidelity, mesh and quadrature."""
+    discretisation, rows = data.case.analysis.discretisation, []
+    for run in list(data.runs.values())[:1]:  # all runs have the same model
+        attrs, unknown = run.dataset.attrs, "unknown"
+        rows = [
+            ("fidelity of the model", str(attrs.get("fidelity", unknown))),
+            ("coordinates", str(run.dataset.sizes.get("coordinate", unknown))),
+            ("solver of the steps", str(attrs.get("method", unknown))),
+        ]
+    if data.case.analysis.selects_model:
+        return [*rows, ("mesh", "selected with the fidelity, and not saved in the results")]
+    rule = ("quadrature on joints", discretisation.rule.rule)
+    if discretisation.fidelity == "rigid":
+        return [*rows, ("mesh", "none, for blocks are rigid"), rule]
+    through, along = discretisation.cells
+    cells = ("cells at least", f"{through} through the thickness, {along} along each block")
+    elements = ("elements", f"{discretisation.cell}s of degree {discretisation.degree}")
+    return [*rows, cells, elements, rule]
+
+
+def build_source_section(data: ReportData) -> Section:
+    """Build the section on versions, digests of inputs and files, and the case itself."""
+    runs = data.runs.items()
+    # Usually one line: all runs were computed with the same versions.
+    made = sorted({str(run.dataset.attrs.get("versions", "unknown")) for _, run in runs})
+    rows = [("computed with", text) for text in made]
+    rows.append(("report written with", library_versions()))
+    rows += [
+        (f"SHA-256 of case, files and program: {name}", str(run.dataset.attrs["inputs"]))
+        for name, run in runs
+        if "inputs" in run.dataset.attrs
+    ]
+    rows.append(("SHA-256 of the case", sha256(data.case.text().encode()).hexdigest()))
+    blocks: list[Any] = [Grid((), rows)]
+    if data.folder is not None:
+        table = []
+        for name, path in sorted(data.files.items()):
+            table.append([name, f"{path.stat().st_size / 1e3:.1f}", hash_file(path)[:16]])
+        caption = "Files of the folder that have the inputs of the run"
+        blocks.append(Grid(["file", "kB", "SHA-256"], table, caption))
+    blocks.append(TextBlock(data.case.text(), "lines"))
+    return Section("Versions, hashes and the case as a file", blocks)

@@ -35,6 +35,7 @@ from archfem.dynamics.solvers.joint_law import (
     largest_force,
     predict_gaps,
 )
+from archfem.joints.large.point_law import shear_limit
 
 # Equations up to which a problem is solved by its factor; at 100, steps of a wall that never slides
 # take twice as long
@@ -73,7 +74,7 @@ def _add_slips_near_limit(law, near):  # type: ignore
             continue
         for k in range(segment.begin, segment.end):
             point, state = law.points[k], law.point_states[k]
-            limit = point.cohesion * state.area - point.friction * state.normal
+            limit = shear_limit(point, state.normal, state.area)
             if point.slip_row >= 0 and abs(state.shear) > 0.5 * limit:
                 near[point.slip_row] = True
 

@@ -1,8 +1,8 @@
 """The joint law, compiled: forces that joints release as they open and slide, with derivatives.
 
-The law of `archfem.joints.operator` and its passages, written for loops. A row of gaps z is an
-opening at one point of a joint, or the slip that some of its points share. If all
-joints were closed and stuck, their forces K z would be linear. The law returns the rest,
+Tractions and limits are by `archfem.joints.large.point_law`. A row of gaps z is an opening at one
+point of a joint, or the slip that some of its points share. If all joints were closed and stuck,
+their forces K z would be linear. The law returns the rest,
 
     λ = K z - f̄(z),
 
@@ -20,8 +20,15 @@ from scipy import sparse
 from archfem._numba import inlined_kernel, kernel
 from archfem._typing import Array
 from archfem.dynamics.solvers.newmark import StepNumbers
-from archfem.joints.contact_law import Facets
-from archfem.joints.large.overlap_law import facet_means, point_means, shear_means
+from archfem.joints.contact_law import ContactLaw
+from archfem.joints.large.point_law import (
+    joint_means,
+    limit_rate,
+    released_energy,
+    releases,
+    shear_limit,
+    shear_means,
+)
 from archfem.joints.operator import JointOperator
 from archfem.joints.quadrature import JointPoints
 
@@ -36,18 +43,19 @@ def _record_type(integers: str, floats: str) -> np.dtype[Any]:
 
 
 # Properties of a joint point: segment along which its opening is interpolated, row of its slip (-1
-# where slips are not followed) and joint; weight of the far end of the segment [-], stiffness
-# across the joint (of a facet, that of the whole) [N/m], closed normal force per opening at the
-# near and at the far end [N/m], area (of a facet, that of the whole) [m²], μ [-], c [Pa], shear
-# stiffness [N/m], irreversible slip before the step [m], and distance from mid-depth [m].
+# where slips are not followed) and joint; weight of the far end of the segment [-], closed normal
+# force per opening at the near and at the far end [N/m], area (of a facet, that of the whole) [m²],
+# shear stiffness [N/m], irreversible slip before the step [m], distance from mid-depth [m], and the
+# parameters of the contact law.
 POINT_RECORD = _record_type(
-    "segment slip_row joint", "share stiffness near far area friction cohesion shear slip lever"
+    "segment slip_row joint",
+    " ".join(["share near far area shear slip lever", *ContactLaw._fields]),
 )
 
 # Forces of a point over a step: mean normal force, positive in tension [N], mean closed area [m²],
-# derivatives of its released force by z at both ends of its segment [N/m], mean shear [N],
-# increment of irreversible slip [m], derivatives of the mean shear by its elastic change and by
-# Coulomb's limit [-], and energy dissipated by friction and damping along the joint [J].
+# derivatives of its released force by z at both ends of its segment [N/m], mean shear [N], elastic
+# shear lost by slip [N], derivatives of the mean shear by its elastic change and by Coulomb's limit
+# [-], and energy dissipated along the joint, times its shear stiffness [N²].
 POINT_STATE_RECORD = _record_type("", "normal area near far shear slip by_change by_limit lost")
 
 # Points of a joint between which the opening is linear: first point, one after the last, and rows
@@ -130,7 +138,7 @@ def _segments(joints: JointOperator, own: Any, gaps: Array) -> tuple[Any, Any, A
     if np.abs(error).max() <= SAME_ROW_TOLERANCE:
         return np.array(ends), np.array([[0, 0, 1]]), shares.ravel()
     first, number = _distinct_rows(gaps)
-    step = 2 if isinstance(joints.law, Facets) else 1
+    step = joints.law.end_count
     places = np.arange(len(own))
     parts = [places[::step], number[::step], number[step - 1 :: step]]
     return first, np.stack(parts, axis=1), (places % step).astype(float)
@@ -185,13 +193,12 @@ def joint_law(
     Pairs are the row of a released force and the row of z of each of its derivatives.
     """
     points, gaps = joints.points, gap_rows(joints)
-    stiffness, facets = points.weight * points.normal_stiffness, isinstance(joints.law, Facets)
-    if facets:
-        stiffness = np.repeat(stiffness[0::2] + stiffness[1::2], 2)
+    area, facets = np.repeat(joints.law.area, joints.law.end_count), joints.law.end_count == 2
+    stiffness = area * points.contact.normal_stiffness
     count = len(points.offset)
     offset = np.zeros((2, count)) if joints.gap_offset is None else joints.gap_offset
     segments = _records(SEGMENT_RECORD, gaps.begin[:-1], gaps.begin[1:], gaps.near, gaps.far)
-    law_points = _point_records(points, gaps, stiffness, facets)
+    law_points = _point_records(points, gaps, area, facets)
     members = np.argsort(gaps.group, kind="stable")
     members = members[gaps.group[members] >= 0]
     first = np.append(0, np.cumsum(gaps.sizes))
@@ -216,22 +223,21 @@ def joint_law(
     return law, gaps.rows, pairs
 
 
-def _point_records(points: JointPoints, gaps: GapRows, stiffness: Array, facets: bool) -> Any:
+def _point_records(points: JointPoints, gaps: GapRows, area: Array, facets: bool) -> Any:
     """Return the records of all joint points (p,)."""
+    stiffness = area * points.contact.normal_stiffness
     return _records(
         POINT_RECORD,
         gaps.segment,
         gaps.group,
         points.joint,
         gaps.share,
-        stiffness,
         *_closed_forces(stiffness, gaps.share, facets).T,
-        stiffness / points.normal_stiffness,
-        points.friction,
-        points.cohesion,
+        area,
         points.shear_spring,
         0.0,
         points.offset,
+        *points.contact,
     )
 
 
@@ -303,8 +309,8 @@ def evaluate_openings(law, gap, segments):  # type: ignore
         moved = half * (near - start[segment.near]), half * (far - start[segment.far])
         before, after = (near - moved[0], far - moved[1]), (near + moved[0], far + moved[1])
         state.near = state.far = state.first = state.mixed = state.last = 0.0
-        if max(before[0], before[1], after[0], after[1]) <= 0.0:
-            # closed over the whole path: forces are linear and nothing is released
+        if not releases(points[segment.begin], before + after):
+            # forces are linear over the whole path
             for k in range(segment.begin, segment.end):
                 point, point_state = points[k], law.point_states[k]
                 point_state.normal = point.near * near + point.far * far
@@ -314,13 +320,13 @@ def evaluate_openings(law, gap, segments):  # type: ignore
         for first in range(segment.begin, segment.end, step):
             # means over the path at a spring, or exactly over a facet
             a, b = points[first].share, points[first + step - 1].share
-            ends = between(before, a), between(before, b), between(after, a), between(after, b)
-            means = _mean_forces(ends, (1.0 - half, 1.0 + half), facets)
+            ends = gaps_between(before, after, a, b)
+            means = joint_means(points[first], ends, 1.0 - half, 1.0 + half, facets)
             for end in range(step):
                 # forces of the points go to the ends of the segment by linear interpolation
                 point, point_state = points[first + end], law.point_states[first + end]
                 _open_point(point, point_state, means, end, (a, b))
-                released, share = point.stiffness * means[1][end], point.share
+                released, share = point.area * means[1][end], point.share
                 state.near += (1.0 - share) * released
                 state.far += share * released
                 state.first += (1.0 - share) * point_state.near
@@ -331,27 +337,24 @@ def evaluate_openings(law, gap, segments):  # type: ignore
 @inlined_kernel
 def _open_point(point, state, means, end, shares):  # type: ignore
     """Store normal force, closed area and derivatives of a point from the means over its path."""
-    (normal, _, rate, time), (a, b), stiffness = means, shares, point.stiffness
-    state.normal = stiffness * normal[end]
-    state.area = point.area * time[end]
+    (normal, _, rate, time, _), (a, b), area = means, shares, point.area
+    state.normal = area * normal[end]
+    state.area = area * time[end]
     # chain rule: openings of the facet's ends by those of the segment's ends
-    state.near = stiffness * (rate[end] * (1.0 - a) + rate[end + 1] * (1.0 - b))
-    state.far = stiffness * (rate[end] * a + rate[end + 1] * b)
-
-
-@kernel
-def _mean_forces(ends, rates, facets):  # type: ignore
-    """Return means of <g>₋, <g>₊, its rate, and closed time at a facet's ends, or at a spring."""
-    if facets:
-        return facet_means(ends, rates[0], rates[1])
-    normal, opening, rate, time = point_means(ends[0], ends[2], rates[0], rates[1])
-    return (normal, 0.0), (opening, 0.0), (rate, 0.0, 0.0), (time, 0.0)
+    state.near = area * (rate[end] * (1.0 - a) + rate[end + 1] * (1.0 - b))
+    state.far = area * (rate[end] * a + rate[end + 1] * b)
 
 
 @inlined_kernel
 def between(ends, share):  # type: ignore
     """Interpolate between the ends of a segment."""
     return (1.0 - share) * ends[0] + share * ends[1]
+
+
+@inlined_kernel
+def gaps_between(before, after, a, b):  # type: ignore
+    """Interpolate to the ends of a facet, at start and end of a step, as for `joint_means`."""
+    return between(before, a), between(before, b), between(after, a), between(after, b)
 
 
 @kernel
@@ -363,22 +366,15 @@ def evaluate_slips(law, gap, rows):  # type: ignore
         group = row - law.openings
         for place in range(first[group], first[group + 1]):
             point, state = law.points[law.members[place]], law.point_states[law.members[place]]
-            # elastic trial shear at the start, its change, and Coulomb's limit c A - μ N
+            # elastic trial shear at the start, its change, and Coulomb's limit
             shear, change = point.shear * (start[row] - point.slip), point.shear * slip
-            limit = np.inf
-            if point.friction < np.inf:
-                limit = max(point.cohesion * state.area - point.friction * state.normal, 0.0)
-            trial = shear + (0.5 + late) * change
-            state.lost, state.shear, state.slip = late * change * slip, trial, 0.0
-            state.by_change, state.by_limit = 0.5 + late, 0.0
-            if max(abs(shear), abs(shear + change), abs(trial)) > limit:
-                # it slides during the step: means of the path along the friction limit
-                mean, slid, by_change, by_limit, rubbing = shear_means(shear, change, late, limit)
-                state.shear, state.slip = mean, slid / point.shear
-                state.by_change, state.by_limit = by_change, by_limit
-                state.lost = rubbing / point.shear
-                released += trial - mean
-                rate += point.shear * (1.0 - gain * by_change)
+            limit = shear_limit(point, state.normal, state.area)
+            means = shear_means(shear, change, late, limit)
+            state.shear, state.slip, state.by_change, state.by_limit, state.lost = means
+            if state.by_change != 0.5 + late or state.by_limit != 0.0:
+                # it slides during the step: the mean follows the friction limit
+                released += shear + (0.5 + late) * change - state.shear
+                rate += point.shear * (1.0 - gain * state.by_change)
         law.slips[group, 0], law.slips[group, 1] = released, rate
 
 
@@ -430,8 +426,7 @@ def _slip_derivatives(law, place, row, entries, count):  # type: ignore
         point, state = law.points[law.members[member]], law.point_states[law.members[member]]
         if point.segment != last:
             last, pair = point.segment, pair + 2
-        factor = state.by_limit * point.friction
-        if state.by_limit == 0.0 or factor == 0.0:
+        if state.by_limit == 0.0 or point.friction == 0.0:
             continue
         if entered != last:
             segment, entered = law.segments[last], last
@@ -439,8 +434,8 @@ def _slip_derivatives(law, place, row, entries, count):  # type: ignore
             _enter(entries, count + 1, (k, place[segment.far], pair + 1), 0.0)
             count += 2
         # normal force of the point: that of a closed point, less the force that it releases
-        entries[1][count - 2] += factor * (point.near - state.near)
-        entries[1][count - 1] += factor * (point.far - state.far)
+        entries[1][count - 2] -= state.by_limit * limit_rate(point, point.near - state.near, 0.0)
+        entries[1][count - 1] -= state.by_limit * limit_rate(point, point.far - state.far, 0.0)
     return count
 
 
@@ -454,24 +449,27 @@ def _enter(entries, number, where, value):  # type: ignore
 
 @kernel
 def open_forces(law, gap, released):  # type: ignore
-    """Evaluate the forces that open joints release at an instant, of all opening rows."""
-    points, facets, step = law.points, law.facets, 2 if law.facets else 1
+    """Evaluate the forces that joints release at an instant, of all opening rows; their energy."""
+    points, facets, step, energy = law.points, law.facets, 2 if law.facets else 1, 0.0
     for k in range(len(released)):
         released[k] = 0.0
     for segment in law.segments:
         opening = gap[segment.near], gap[segment.far]
-        if max(opening[0], opening[1]) <= 0.0:
+        if not releases(points[segment.begin], opening):
             continue
         for first in range(segment.begin, segment.end, step):
             # a path without length: both its ends are the gaps themselves
-            a = between(opening, points[first].share)
-            b = between(opening, points[first + step - 1].share)
-            means = _mean_forces((a, b, a, b), (1.0, 1.0), facets)
+            ends = gaps_between(
+                opening, opening, points[first].share, points[first + step - 1].share
+            )
+            taken = joint_means(points[first], ends, 1.0, 1.0, facets)[1]
+            energy += points[first].area * released_energy(points[first], ends, taken)
             for end in range(step):
                 point = points[first + end]
-                force = point.stiffness * means[1][end]
+                force = point.area * taken[end]
                 released[segment.near] += (1.0 - point.share) * force
                 released[segment.far] += point.share * force
+    return energy
 
 
 @kernel

@@ -27,6 +27,7 @@ from archfem.dynamics.solvers.joint_law import (
     collect_released,
     evaluate_openings,
     evaluate_slips,
+    gaps_between,
     joint_law,
     open_forces,
 )
@@ -38,7 +39,7 @@ from archfem.dynamics.solvers.sparse_products import (
     sparse_rows,
     without_round_off,
 )
-from archfem.joints.large.overlap_law import facet_means, point_means
+from archfem.joints.large.point_law import joint_means, releases
 
 
 class LinearSystem(NamedTuple):
@@ -263,10 +264,7 @@ def _evaluate_linear_step(system, step, states, ground, results, memory):  # typ
         _instant_energies(law, linear.numbers.lag, work, energy)
     else:
         _path_energies(law, work.gap, energy, memory)
-        open_forces(law, law.start, work.released[0])
-    # elastic energy that open joints do not store
-    for row in range(work.released.shape[1]):
-        energy[1] -= 0.5 * law.start[row] * work.released[0, row]
+        energy[1] -= open_forces(law, law.start, work.released[0])
 
 
 @kernel
@@ -322,10 +320,10 @@ def _closed_energies(states, images, loads, damping, ground, energy):  # type: i
 
 @kernel
 def _instant_energies(law, lag, work, energy):  # type: ignore
-    """Subtract damping that open joints do not provide, by the trapezoidal rule."""
+    """Subtract energy and damping that open joints lack, the latter by the trapezoidal rule."""
     now, force, released = work.gap_end, work.spare[: law.openings], work.released
     late = released[1]
-    open_forces(law, now, released[0])
+    energy[1] -= open_forces(law, now, released[0])
     if lag > 0.0:
         # how much more is released where the law sees the joints than at the gaps themselves
         open_forces(law, work.gap_seen, force)
@@ -359,8 +357,8 @@ def _path_energies(law, gap, energy, memory):  # type: ignore
     for k in range(len(law.points)):
         point, state = law.points[k], law.point_states[k]
         if point.slip_row >= 0:
-            energy[3] += state.lost
-            point.slip += state.slip
+            energy[3] += state.lost / point.shear
+            point.slip += state.slip / point.shear
             memory[k] = point.slip
             # elastic energy of the slip, instead of that of a stuck point
             elastic, slip = start[point.slip_row] - point.slip, start[point.slip_row]
@@ -371,7 +369,7 @@ def _path_energies(law, gap, energy, memory):  # type: ignore
 @kernel
 def _open_damping(law, gap):  # type: ignore
     """Return the energy dissipated by the lag on openings, less that of closed joints [J]."""
-    start, points, lost = law.start, law.points, 0.0
+    start, points, lost, step = law.start, law.points, 0.0, 2 if law.facets else 1
     for number in range(len(law.segments)):
         part, state = law.segments[number], law.segment_states[number]
         first = start[part.near], start[part.far]
@@ -379,19 +377,14 @@ def _open_damping(law, gap):  # type: ignore
         last = first[0] + moved[0], first[1] + moved[1]
         # work of the released forces, which contain the lag ...
         lost -= moved[0] * state.near + moved[1] * state.far
-        if max(first[0], first[1], last[0], last[1]) <= 0.0:
+        if not releases(points[part.begin], first + last):
             continue
         # ... less that of the same forces without lag
-        for point in range(part.begin, part.end):
-            stiffness, share = points[point].stiffness, points[point].share
-            a, b, change = between(first, share), between(last, share), between(moved, share)
-            if not law.facets:
-                lost += change * stiffness * point_means(a, b, 0.0, 0.0)[1]
-            elif point % 2 == 0:
-                other = points[point + 1].share
-                ends = (a, between(first, other), b, between(last, other))
-                opened = facet_means(ends, 0.0, 0.0)[1]
-                lost += stiffness * (change * opened[0] + between(moved, other) * opened[1])
+        for k in range(part.begin, part.end, step):
+            point, a, b = points[k], points[k].share, points[k + step - 1].share
+            ends = gaps_between(first, last, a, b)
+            taken = joint_means(point, ends, 0.0, 0.0, law.facets)[1]
+            lost += point.area * (between(moved, a) * taken[0] + between(moved, b) * taken[1])
     return lost
 
 

@@ -158,10 +158,10 @@ def joint_energy(joints, q, slip):  # type: ignore
         measures = segment_measures(joints, segment, q)
         longer = joints.initial_measures[segment, 3]
         longer = longer + relative_stretch(joints.kinematics, segment, q)
-        # across: k_n w ℓ Φ
+        # across: w ℓ Φ
         length = overlap_length(law, segment, measures[1])[0]
         phi = closing_energy(law, segment, length, measures[0], measures[2])[0]
-        total += law.normal_stiffness[segment] * length * phi
+        total += law.width * length * phi
         # along: the shear spring of each point
         for point in range(law.first_point[segment], law.first_point[segment + 1]):
             elastic = measures[1] + law.place[point] * longer - slip[point]

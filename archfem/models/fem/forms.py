@@ -10,7 +10,7 @@ s = ⟦u⟧·t:
     t_n = k_n <g>_-,    t_s = k_s (s - s_p),    |t_s| ≤ μ |t_n| + c on the closed part of a joint,
 
 where s_p is the irreversible slip of each point, which grows where friction does not hold t_s.
-Joints without friction coefficient never slide. `models.reference` has the means over a step.
+`models.reference` has the means over a step.
 
 With n the normal from one side of a facet to the other and ⟦u⟧ the jump along it, neither gap nor
 slip depends on which side comes first. Here t is ±n rotated to the left, with the sign that, for n
@@ -28,15 +28,14 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem.joints.contact_law import (
+    SLIP_LIMIT_TOLERANCE,
+    ContactLaw,
     clip_to_friction,
     contact_fraction,
-    friction_excess,
-    mean_closing,
-    normal_traction,
+    lagged_path,
+    shear_loss,
     shear_over_step,
-    shear_traction,
 )
-from archfem.joints.operator import SLIP_LIMIT_TOLERANCE
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.materials import Material
 from archfem.models.fem import _fenicsx
@@ -61,16 +60,9 @@ class ContactFaces:
         return _fenicsx.constant(self.facets.space.mesh.grid, value)
 
     @cached_property
-    def _stiffness(self) -> Fields:
-        """k_n and k_s [Pa/m]."""
-        contact = self.patch.contact
-        return self._number(contact.normal_stiffness), self._number(contact.shear_stiffness)
-
-    @cached_property
-    def _strength(self) -> Fields:
-        """Friction μ [-] and cohesion c [Pa]."""
-        contact = self.patch.contact
-        return self._number(contact.coefficient), self._number(contact.cohesion)
+    def _law(self) -> ContactLaw:
+        """Contact law with constants of the forms."""
+        return ContactLaw.of(self.patch.contact).mapped(self._number)
 
     @cached_property
     def _normal(self) -> Any:
@@ -87,13 +79,16 @@ class ContactFaces:
 
     def _trial_shear(self, u: Any) -> Any:
         """Traction along the joint without further slip [Pa]."""
-        slip = self.slip(u) - self.facets.point_values(self.patch.colour)
-        return shear_traction(slip, self._stiffness[1])
+        return self._law.shear_traction(self.slip(u) - self._irreversible_slip)
 
-    def _limit(self, normal: Any, closed: Any) -> Any:
-        """Coulomb's limit, μ |t_n| + c where closed [Pa]."""
-        friction, cohesion = self._strength
-        return cohesion * closed - friction * normal
+    @property
+    def _irreversible_slip(self) -> Any:
+        """Irreversible slip before [m]."""
+        return self.facets.point_values(self.patch.colour)
+
+    def _gap(self, u: Any) -> Any:
+        """Gap of the normal law, slightly closed where faces just touch [m]."""
+        return self.opening(u) - CONTACT_PERTURBATION
 
     def tractions(self, u: Any) -> Fields:
         """Return the tractions across and along the joint [Pa]."""
@@ -104,92 +99,70 @@ class ContactFaces:
 
         The limit is a little larger; `fixed` equals u, but the derivative by u leaves it constant.
         """
-        if not self.patch.contact.slides:
-            return self.tractions(u)
-        limit, closed = self._limit_of(fixed), self._is_closed(fixed)
+        limit, closed = self._limit(fixed), self._is_closed(fixed)
         return self._tractions(u, SLIP_LIMIT_TOLERANCE * limit + CONTACT_PERTURBATION * closed)
 
     def _tractions(self, u: Any, reserve: Any) -> Fields:
         """Tractions with Coulomb's limit raised by `reserve` [Pa]."""
-        normal = normal_traction(self.opening(u) - CONTACT_PERTURBATION, self._stiffness[0])
-        shear = self._trial_shear(u)
-        if self.patch.contact.slides:
-            shear = clip_to_friction(shear, self._limit_of(u) + reserve)
-        return normal, shear
+        normal = self._law.normal_traction(self._gap(u))
+        return normal, clip_to_friction(self._trial_shear(u), self._limit(u) + reserve)
 
     def _is_closed(self, u: Any) -> Any:
         """One where the joint is closed, else zero [-]."""
-        return ufl.conditional(ufl.lt(self.opening(u) - CONTACT_PERTURBATION, 0.0), 1.0, 0.0)
+        return ufl.conditional(ufl.lt(self._gap(u), 0.0), 1.0, 0.0)
 
-    def _limit_of(self, u: Any) -> Any:
+    def _limit(self, u: Any) -> Any:
         """Coulomb's limit at the normal traction that a displacement causes [Pa]."""
-        normal = normal_traction(self.opening(u) - CONTACT_PERTURBATION, self._stiffness[0])
-        return self._limit(normal, self._is_closed(u))
+        normal = self._law.normal_traction(self._gap(u))
+        return self._law.shear_limit(normal, self._is_closed(u))
 
     def energy(self, u: Any) -> Any:
         """Return the energy stored per area without further slip [J/m²]."""
-        normal = normal_traction(self.opening(u), self._stiffness[0])
-        return 0.5 * (normal * self.opening(u) + self._trial_shear(u) ** 2 / self._stiffness[1])
+        along = 0.5 * self._trial_shear(u) ** 2 / self._law.shear_stiffness
+        return self._law.normal_energy(self.opening(u)) + along
 
     def add_slip(self, u: Any) -> Any:
         """Return the irreversible slip once the joint is displaced by u [m]."""
-        return self._irreversible_slip(u, self.tractions(u)[1])
+        return self._add_slip(self._trial_shear(u) - self.tractions(u)[1])
 
-    def _irreversible_slip(self, u: Any, shear: Any) -> Any:
-        """Slip less its elastic part [m]."""
-        if not self.patch.contact.slides:
-            return self.facets.point_values(self.patch.colour)
-        return self.slip(u) - shear / self._stiffness[1]
+    def _add_slip(self, lost: Any) -> Any:
+        """Irreversible slip once an elastic traction is lost [m]."""
+        return self._irreversible_slip + lost / self._law.shear_stiffness
 
     def _gap_path(self, step: Fields, lag: Any) -> Fields:
         """Gaps at start and end of the step, plus their change times `lag`, due to damping [m]."""
-        before, after = (self.opening(u) - CONTACT_PERTURBATION for u in step)
-        ahead = lag * (after - before)
-        return before + ahead, after + ahead
+        return lagged_path(self._gap(step[0]), self._gap(step[1]), lag)
 
     def _shear_path(self, step: Fields) -> Fields:
         """Elastic traction at the start, and its change without further slip [Pa]."""
-        return self._trial_shear(step[0]), shear_traction(
-            self.slip(step[1]) - self.slip(step[0]), self._stiffness[1]
-        )
+        change = self.slip(step[1]) - self.slip(step[0])
+        return self._trial_shear(step[0]), self._law.shear_traction(change)
 
     def _mean_limit(self, step: Fields, lag: Any) -> Any:
         """Coulomb's limit over a step: that of the mean normal traction [Pa]."""
         path = self._gap_path(step, lag)
-        return self._limit(self._stiffness[0] * mean_closing(*path), contact_fraction(*path))
-
-    def _mean_shear(self, step: Fields, lag: Any, shear_lag: Any) -> Fields:
-        """Mean shear and its elastic part at the end, for damping lags of limit and shear [Pa]."""
-        first, change = self._shear_path(step)
-        if not self.patch.contact.slides:
-            return first + (0.5 + shear_lag) * change, first + change
-        return shear_over_step(first, change, shear_lag, self._mean_limit(step, lag))
+        return self._law.shear_limit(self._law.mean_normal_traction(*path), contact_fraction(*path))
 
     def means(self, step: Fields, lag: Any) -> Fields:
         """Return the means over a step of the tractions across and along the joint [Pa]."""
-        normal = self._stiffness[0] * mean_closing(*self._gap_path(step, lag))
-        return normal, self._mean_shear(step, lag, lag)[0]
+        return self._law.mean_normal_traction(*self._gap_path(step, lag)), self._shear(step, lag)[0]
+
+    def _shear(self, step: Fields, lag: Any) -> Fields:
+        """Mean traction along the joint over a step, and what is lost by slip [Pa]."""
+        return shear_over_step(*self._shear_path(step), lag, self._mean_limit(step, lag))
 
     def slip_after_step(self, step: Fields, lag: Any) -> Any:
         """Return the irreversible slip at the end of a step [m]."""
-        return self._irreversible_slip(step[1], self._mean_shear(step, lag, lag)[1])
+        return self._add_slip(self._shear(step, lag)[1])
 
     def dissipation(self, step: Fields, lag: Any) -> Any:
         """Return the energy per area lost to friction and damping over a step [J/m²]."""
         # damping across the joint: lagged minus unlagged mean traction, on the change of the gap
         before, after = self._gap_path(step, 0.0)
-        ahead = mean_closing(*self._gap_path(step, lag)) - mean_closing(before, after)
-        across = self._stiffness[0] * ahead * (after - before)
-        first, change = self._shear_path(step)
-        lagged, mean = (self._mean_shear(step, lag, each)[0] for each in (lag, 0.0))
-        along = (lagged - mean) * change
-        if self.patch.contact.slides:
-            # energy lost by a shear limit lowered at the start, and friction along the slip
-            limit = self._mean_limit(step, lag)
-            start = clip_to_friction(first, limit)
-            excess = abs(friction_excess(start + change, limit))
-            along += 0.5 * (first**2 - start**2) + excess * limit
-        return across + along / self._stiffness[1]
+        means = (self._law.mean_normal_traction(*self._gap_path(step, each)) for each in (lag, 0.0))
+        across = (next(means) - next(means)) * (after - before)
+        along = shear_loss(*self._shear_path(step), lag, self._mean_limit(step, lag))
+        return across + along / self._law.shear_stiffness
 
 
 def strain(u: Any) -> Any:

@@ -17,11 +17,13 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem.errors import InvalidInput
-from archfem.joints.contact_law import Facets
+from archfem.joints.contact_law import ContactLaw
 from archfem.joints.large.face_kinematics import FaceKinematics
 from archfem.joints.large.forces import LargeDisplacementJoints
 from archfem.joints.large.overlap_law import FaceLaw
+from archfem.joints.large.point_law import CONTACT_RECORD
 from archfem.joints.large.rates import find_block_starts
+from archfem.joints.normal_law import Facets
 from archfem.masonry.structure import Structure
 from archfem.models.linear_blocks import LinearBlockModel, joint_orientation
 
@@ -205,18 +207,16 @@ def _build_law(model: LinearBlockModel, segments: JointSegments) -> FaceLaw:
     """Build the parameters of the law of the segments."""
     structure, points = model.structure, model.operator.points
     contacts = [structure.joints[joint].contact for joint in segments.joint]
-    facets, segment = isinstance(model.operator.law, Facets), segments.of_point
+    law, segment = model.operator.law, segments.of_point
     depth, orientation = segments.depth[segment], joint_orientation(structure)[points.joint]
-    share = points.weight / (structure.width * depth)
     return FaceLaw(
         segments.depth,
-        structure.width * np.array([contact.normal_stiffness for contact in contacts]),
-        np.array([contact.coefficient for contact in contacts]),
+        structure.width,
+        np.array([ContactLaw.of(contact) for contact in contacts], CONTACT_RECORD),
         segments.first,
         orientation * (points.offset - segments.segment_offset[segment]) / depth,
-        np.repeat(share[0::2] + share[1::2], 2) if facets else share,
+        np.repeat(law.area, law.end_count) / (structure.width * depth),
         points.shear_spring,
-        facets,
-        structure.width * np.array([contact.cohesion for contact in contacts]),
+        law.end_count == 2,
         segments.paired,
     )

@@ -346,7 +346,8 @@ class LargeDisplacementModel(Model):
 
     def gather_forces(self, force: Array) -> Array:
         """Return generalised forces from those on the coordinates of each face (n,)."""
-        return np.bincount(self._rows, force.ravel()[self._forces], self.size)
+        values = force.ravel()[self._forces]
+        return np.bincount(self._rows, values, self.size).astype(float, copy=False)
 
     def assemble_tangent(
         self, block_factor: float, joint_factor: float, forces: JointStepForces

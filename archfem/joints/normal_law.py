@@ -1,0 +1,274 @@
+"""Normal forces of the contact law at joint points: springs, exact facets, and tensile bonds.
+
+Two integrations of the traction across the joint have the same methods. `Springs` makes every
+quadrature point a spring, f = W t. `Facets` integrates the traction exactly along facets with
+linear opening. Along the joint every point is a spring in both.
+
+Dilatancy and tensile bonds shift the gap of the normal law. Dilatancy, by saw teeth of the angle ψ,
+opens a joint by tan ψ |s_p|. An intact bond reaches its tensile strength f_t at the gap
+g_t = f_t / k_n, and
+
+    t_n = k_n <g - g_t>_- + f_t,    |t_s| ≤ (c - μ f_t) - μ k_n <g - g_t>_-
+
+is linear elastic up to f_t and stays there until the bond is declared broken; the limit is that of
+the true traction, μ |t_n| + c. The law of dry joints therefore holds, also averaged over a step,
+with a shifted gap, a constant pull and another cohesion. Along a facet between an intact and a
+broken end the bond decreases linearly.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from archfem._typing import Array
+from archfem.joints.contact_law import (
+    ContactLaw,
+    contact_fraction,
+    contact_fraction_rate,
+    is_closed,
+)
+from archfem.joints.quadrature import JointPoints, Numbers, Quadrature
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places of integration on facets between joint points, or at springs."""
+
+    gaps: Any  # at the places, each (k, f), or of springs (p,) [m]
+    area: Array  # of the places (k, f) or (p,) [m²]
+    shapes: Array | None = None  # φ of both ends of the facets there (2, k, f); None of springs
+
+    def integrate(self, values: Array) -> Array:
+        """Return integrals of values times φ_i, for each point (p,)."""
+        weighted = self.area * values
+        return weighted if self.shapes is None else (self.shapes * weighted).sum(axis=1).T.ravel()
+
+    def integrate_products(self, values: Array) -> Array:
+        """Return integrals of values times φ_i φ_j, for each coupled pair of points (m,)."""
+        weighted = self.area * values
+        if self.shapes is None:
+            return weighted
+        return ((self.shapes * weighted)[:, None] * self.shapes).sum(axis=2).ravel()
+
+
+@dataclass(frozen=True, eq=False)
+class NormalLaw(ABC):
+    """Normal forces at joint points from their openings."""
+
+    points: JointPoints
+
+    end_count: ClassVar[int]  # points of a facet, its ends, or 1 of springs
+
+    @cached_property
+    def coupling_pairs(self) -> tuple[Numbers, Numbers]:
+        """Pairs of points whose forces and openings are coupled, those of one facet, each (m,)."""
+        ends = np.arange(len(self.points.offset)).reshape(-1, self.end_count).T
+        pairs = np.broadcast_arrays(ends[:, None], ends)
+        return pairs[0].ravel(), pairs[1].ravel()
+
+    @cached_property
+    def contact(self) -> ContactLaw:
+        """Contact law of each facet or spring, an array (f,) for each parameter."""
+        return self.points.contact.mapped(lambda values: values[:: self.end_count])
+
+    @cached_property
+    def area(self) -> Array:
+        """Area of each facet or spring (f,) [m²]."""
+        return self.points.weight.reshape(-1, self.end_count).sum(axis=1)
+
+    @abstractmethod
+    def divide(self, *gaps: Array) -> Places:
+        """Return the places of integration, from gaps of the points (p,)."""
+
+    def forces(self, opening: Array) -> Array:
+        """Return the normal forces at the points, positive where they pull (p,) [N]."""
+        return self.forces_and_area(opening)[0]
+
+    def forces_and_area(self, opening: Array) -> tuple[Array, Array]:
+        """Return `forces`, and the closed area distributed to the points (p,) [N, m²]."""
+        places = self.divide(opening)
+        traction, closed = self.contact.normal_traction(*places.gaps), is_closed(*places.gaps)
+        return places.integrate(traction), places.integrate(closed.astype(float))
+
+    def stiffness(self, opening: Array) -> Array:
+        """Return the derivative of `forces` for each of `coupling_pairs` (m,) [N/m]."""
+        places = self.divide(opening)
+        return places.integrate_products(self.contact.normal_tangent(*places.gaps))
+
+    @property
+    def closed_stiffness(self) -> Array:
+        """Derivative of `forces` where all joints just touch and are closed (m,) [N/m]."""
+        return self.stiffness(np.zeros_like(self.points.weight))
+
+    def energies(self, opening: Array) -> Array:
+        """Return the energies stored across the joints, distributed to the points (p,) [J]."""
+        places = self.divide(opening)
+        return places.integrate(self.contact.normal_energy(*places.gaps))
+
+    def contact_area_rate(self, opening: Array) -> Array:
+        """Return the derivative of the closed area for each of `coupling_pairs` (m,) [m]."""
+        return np.zeros_like(opening)
+
+    def step_means(self, start: Array, end: Array) -> tuple[Array, Array]:
+        """Return the means over a step of `forces_and_area`, each (p,) [N, m²]."""
+        places = self.divide(start, end)
+        traction = self.contact.mean_normal_traction(*places.gaps)
+        return places.integrate(traction), places.integrate(contact_fraction(*places.gaps))
+
+    def mean_stiffness(self, start: Array, end: Array, rates: tuple[float, float]) -> Array:
+        """Return the derivative of the mean force by a parameter, as `stiffness` (m,) [N/m]."""
+        places = self.divide(start, end)
+        before, after = places.gaps
+        return places.integrate_products(self.contact.mean_normal_tangent(before, after, rates))
+
+    def mean_area_rate(self, start: Array, end: Array, rates: tuple[float, float]) -> Array:
+        """Return the derivative of the mean area by a parameter (m,) [m]."""
+        places = self.divide(start, end)
+        before, after = places.gaps
+        return places.integrate_products(contact_fraction_rate(before, after, rates))
+
+
+class Springs(NormalLaw):
+    """Normal forces by a quadrature rule: each point is a spring, closed or open as a whole."""
+
+    end_count = 1
+
+    def divide(self, *gaps: Array) -> Places:
+        """Return the points themselves."""
+        return Places(gaps, self.points.weight)
+
+
+# Gauss's three points on the unit interval, and their weights
+GAUSS_POINTS = 0.5 * (1.0 + np.sqrt([0.6, 0.0, 0.6]) * [-1, 0, 1])
+GAUSS_WEIGHTS = np.array([5, 8, 5]) / 18.0
+
+
+class Facets(NormalLaw):
+    """Normal forces integrated exactly over facets along which the opening is linear.
+
+    The `points` are both ends of each facet, one facet after the other. With φ the two linear
+    functions of a facet,
+
+        f_i = ∫ w t φ_i,   ∂f_i/∂g_j = ∫ w t' φ_i φ_j.
+
+    Gauss's rule integrates between the places where the facet opens or closes, at an instant, or
+    at the start and at the end of a step. There traction, energy and their means over a step with
+    gaps linear in time are polynomials, which the rule integrates exactly; so the work of a step is
+    the change of energy.
+    """
+
+    end_count = 2
+
+    def divide(self, *gaps: Array) -> Places:
+        """Return Gauss's points on the parts of facets between the zero crossings of the gaps."""
+        ends = [(gap[0::2], gap[1::2]) for gap in gaps]
+        breaks = np.zeros((len(gaps) + 2, len(self.area)))
+        breaks[1:-1] = [a * _inverse_change(a, b) for a, b in ends]
+        breaks[1:-1].sort(axis=0)
+        breaks[-1] = 1.0
+        length = (breaks[1:] - breaks[:-1])[:, None]
+        place = (breaks[:-1, None] + GAUSS_POINTS[:, None] * length).reshape(-1, len(self.area))
+        weight = self.area * (GAUSS_WEIGHTS[:, None] * length).reshape(place.shape)
+        shapes = np.stack([1.0 - place, place])
+        return Places([a + place * (b - a) for a, b in ends], weight, shapes)
+
+    def contact_area_rate(self, opening: Array) -> Array:
+        """Return the derivative of the closed area for each of `coupling_pairs` (2 p,) [m]."""
+        a, b = opening[0::2], opening[1::2]
+        # the zero z = a / (a - b) ends the closed part, or begins it; φ at z divides the area
+        inverse = _inverse_change(a, b)
+        zero, scale = a * inverse, np.where(is_closed(a), self.area, -self.area) * inverse**2
+        shapes, rates = np.stack([1.0 - zero, zero]), np.stack([-b * scale, a * scale])
+        return np.asarray(shapes[:, None] * rates).ravel()
+
+
+def _inverse_change(a: Array, b: Array) -> Array:
+    """Return 1 / (a - b) where a line from a to b crosses zero, which is there at a / (a - b)."""
+    crosses = is_closed(a) != is_closed(b)
+    return np.divide(1.0, a - b, out=np.zeros_like(a), where=crosses)
+
+
+def choose_law(rule: Quadrature, points: JointPoints) -> NormalLaw:
+    """Return the normal law of a quadrature rule."""
+    return Facets(points) if rule.rule == "exact" else Springs(points)
+
+
+# Excess over the strength of a bond, relative to it, that counts as round-off [-]
+BOND_STRENGTH_TOLERANCE = 1e-9
+
+
+def dilatancy_opening(points: JointPoints, slip: Array) -> Array | None:
+    """Return the opening of each point by dilatancy (p,) [m]; None without dilatancy."""
+    return None if points.dilatancy is None else points.dilatancy * np.abs(slip)
+
+
+@dataclass(frozen=True, eq=False)
+class Bonds:
+    """Intact and broken bonds of the joint points."""
+
+    law: NormalLaw  # normal forces from gaps
+    broken: Array  # 1 where a bond is broken, else 0 (p,)
+
+    @cached_property
+    def intact(self) -> NDArray[np.bool_]:
+        """Whether each point has an intact bond (p,)."""
+        return (self._strength > 0.0) & (self.broken == 0.0)
+
+    @cached_property
+    def stretch(self) -> Array:
+        """Gap at the tensile strength, f_t / k_n; 0 without bond (p,) [m]."""
+        return np.where(self.intact, self._strength, 0.0) / self.law.points.contact.normal_stiffness
+
+    @cached_property
+    def pull(self) -> Array:
+        """Force of each point at the gap `stretch`, f_t times its area (p,) [N]."""
+        return normal_forces(self.law, self.stretch)
+
+    @cached_property
+    def cohesion(self) -> Array:
+        """Cohesion for gaps less `stretch`: c - μ f_t if bonded, 0 if broken (p,) [Pa]."""
+        contact = self.law.points.contact
+        lowered = contact.cohesion - contact.friction * self._strength
+        bonded = np.where(self.intact, np.maximum(lowered, 0.0), 0.0)
+        return np.where(self._strength > 0.0, bonded, contact.cohesion)
+
+    def energy_of_pull(self, gaps: Array) -> Array:
+        """Return the energy of the forces `pull`, from gaps less `stretch` (p,) [J]."""
+        return self.pull * (gaps + 0.5 * self.stretch)
+
+    def find_exceeded(self, gaps: Array) -> NDArray[np.bool_]:
+        """Return which bonds are pulled beyond their strength, from gaps less `stretch` (p,)."""
+        return self.intact & (gaps > BOND_STRENGTH_TOLERANCE * self.stretch)
+
+    def most_exceeded(self, gaps: Array) -> NDArray[np.bool_]:
+        """Return the bonds beyond their strength at the largest gap of each joint (p,)."""
+        exceeded, joint = self.find_exceeded(gaps), self.law.points.joint
+        largest = np.zeros(self.law.points.joint_count)
+        np.maximum.at(largest, joint, np.where(exceeded, gaps, 0.0))
+        # points with gaps equal but for round-off break together
+        return exceeded & (gaps >= (1.0 - 1e-6) * largest[joint])
+
+    def broken_after(self, exceeded: NDArray[np.bool_], excess: Array, limit: Array) -> Array:
+        """Return the flags of broken bonds at the end of a step, as `broken` (p,)."""
+        points = self.law.points
+        tolerance = BOND_STRENGTH_TOLERANCE * (limit + points.contact.cohesion * points.weight)
+        # a bond also breaks once its point slides
+        broken = self.intact & (exceeded | (np.abs(excess) > tolerance))
+        return np.where(broken, 1.0, self.broken)
+
+    @property
+    def _strength(self) -> Array:
+        strength = self.law.points.tension
+        return np.zeros_like(self.broken) if strength is None else strength
+
+
+def normal_forces(law: NormalLaw, gaps: Array) -> Array:
+    """Return the normal forces at the points of joints closed all over (p,) [N]."""
+    first, second = law.coupling_pairs
+    forces = np.zeros_like(gaps)
+    np.add.at(forces, first, law.closed_stiffness * gaps[second])
+    return forces
