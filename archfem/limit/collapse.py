@@ -24,7 +24,7 @@ from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
-from archfem.masonry.loads import BodyForce, PointLoad, Settlement, list_loads
+from archfem.masonry.loads import Action, Settlement, list_loads
 from archfem.masonry.structure import (
     HasStructure,
     Structure,
@@ -82,7 +82,7 @@ class Collapse(ResultDisplay):
     motion: Array
     solutions: NonassociatedBounds | None = None
     soil: xr.Dataset | None = None
-    live: tuple[BodyForce | PointLoad | Settlement, ...] = ()
+    live: tuple[Action | Settlement, ...] = ()
     structure: Structure | None = None
 
     @property
@@ -113,7 +113,7 @@ class Collapse(ResultDisplay):
 def collapse_factor(
     structure: Structure | HasStructure,
     *,
-    live: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
+    live: Action | Settlement | Sequence[Action],
     friction: str | None = "coulomb",
     strength: Pascals | None = None,
     fill: Fill | None = None,
@@ -178,9 +178,10 @@ def collapse_factor(
         (1978) 1853-1871. Ferris and Tin-Loi, Int. J. Mech. Sci. 43 (2001) 209-224.
     """
     structure = structure_of(structure)
-    actions = (live,) if isinstance(live, Settlement) else tuple(list_loads(live))
+    loads = live if isinstance(live, Settlement) else list_loads(live)
     stones, dead = self_weight_programme(structure, friction, strength, fill)
-    result = _solve_collapse(structure, stones, dead, live, friction)
+    result = _solve_collapse(stones, dead, loads, friction)
+    actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
     return replace(result, live=actions, structure=structure)
 
 
@@ -268,14 +269,10 @@ def contact_fractions(structure: Structure, normal: Array, moment: Array) -> Arr
 
 
 def _solve_collapse(
-    structure: Structure,
-    stones: BlocksWithFill,
-    dead: Programme,
-    live: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
-    friction: str | None,
+    stones: BlocksWithFill, dead: Programme, live: Settlement | list[Action], friction: str | None
 ) -> Collapse:
     """Return the result of `collapse_factor`, without its live actions."""
-    fall = dead.minimise_residual()
+    fall, structure = dead.minimise_residual(), stones.whole
     if not is_balanced(fall, dead):
         return _read_result(stones, dead, Outcome.INFEASIBLE, np.nan, _without_forces(fall))
     support = None
@@ -288,7 +285,7 @@ def _solve_collapse(
         scale = dead.blocks.force_unit
         bounded, unbounded = Outcome.SETTLES, Outcome.LOCKS
     else:
-        programme, scale = dead.with_load_factor(stones.load(list_loads(live))), -1.0
+        programme, scale = dead.with_load_factor(stones.load(live)), -1.0
         bounded, unbounded = Outcome.COLLAPSES, Outcome.UNBOUNDED
     optimum = associated = programme.solve()
     solutions = None
@@ -309,7 +306,7 @@ def _solve_collapse(
     result = _read_result(stones, programme, bounded, scale * optimum.value, optimum, support)
     result = replace(result, solutions=solutions)
     if not isinstance(live, Settlement):
-        stones.warn_of_sliding_fill(list_loads(live), result.factor)
+        stones.warn_of_sliding_fill(live, result.factor)
         failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
         if friction is not None:
             warn_cohesion(structure, tuple(failing), result.joints, result.factor)

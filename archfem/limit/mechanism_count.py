@@ -320,14 +320,9 @@ def _mechanism(flags: xr.DataArray, instant: int, kind: str, group: Sequence[str
     """Return the mechanism of the failed joints of some parts at an instant."""
     flags = flags.isel(time=instant)
     flags = flags[flags.values & np.isin(flags["part"].values.astype(str), group)]
-    time = float(flags["time"])
-    return Mechanism(
-        kind,
-        " + ".join(group),
-        tuple(flags["joint"].values.tolist()),
-        None if np.isnan(time) else time,
-        names=tuple(flags["name"].values.astype(str).tolist()),
-    )
+    joints, names = flags["joint"].values.tolist(), flags["name"].values.astype(str).tolist()
+    time = None if np.isnan(flags["time"]) else float(flags["time"])
+    return Mechanism(kind, " + ".join(group), tuple(joints), time, names=tuple(names))
 
 
 def _widest_group(

@@ -266,15 +266,12 @@ class Verifier:
         regions, blocks = self.rigid_regions, self.rigid_regions.structure.blocks
         roles = {blocks[k].part: blocks[k].role for k in moving if blocks[k].part in self.parts}
         numbers = tuple(regions.joints[k] for k in working)
-        moved = Mechanism(
-            mechanism_kind(roles.values()),
-            " + ".join(roles),
-            numbers,
-            float(joints["time"]) if "time" in joints.coords else None,
-            tuple(regions.blocks[k] for k in moving),
-            tuple(self.structure.joints[number].name for number in numbers),
-            tuple(blocks[k].name for k in moving),
-        )
+        names = tuple(self.structure.joints[number].name for number in numbers)
+        free = tuple(regions.blocks[k] for k in moving)
+        free_names = tuple(blocks[k].name for k in moving)
+        kind, time = mechanism_kind(roles.values()), joints.coords.get("time")
+        at = None if time is None else float(time)
+        moved = Mechanism(kind, " + ".join(roles), numbers, at, free, names, free_names)
         return VerifiedMechanism(moved, counted_mechanism(joints), regions.expand_motion(motion))
 
     def verify_if_moving(self, joints: xr.Dataset) -> VerifiedMechanism | None:

@@ -295,14 +295,10 @@ def _random_vertex(
         factor = 10.0 ** rng.uniform(-1, 1) * weight / live_size if live_size > 0.0 else 0.0
     else:
         factor = float(rng.random() * start.unknowns[0])
-    return replace(
-        programme,
-        force_cost=cost,
-        load=programme.load - live @ np.array([factor]),
-        columns=others,
-        unknown_cost=programme.unknown_cost[1:],
-        upper_bounds=programme.upper_bounds[1:],
-    ).solve()
+    load = programme.load - live @ np.array([factor])
+    costs, bounds = programme.unknown_cost[1:], programme.upper_bounds[1:]
+    loaded = replace(programme, load=load, columns=others, unknown_cost=costs, upper_bounds=bounds)
+    return replace(loaded, force_cost=cost).solve()
 
 
 def _bound_objective(programme: Programme, smallest: Array) -> float:

@@ -324,7 +324,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     positions = _places_along(weighted, _parse_axles(axles, driven.spacings))
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
     moving = moving_load(weighted, axles, spacings=driven.spacings, positions=positions, **options)
-    geometric = _geometric_factor(weighted, moving, friction, strength, fill)
+    geometric = _geometric_factor(weighted, moving, options)
     return Rating(structure, driven, live, impact, dead, width, moving, geometric)
 
 
@@ -366,16 +366,10 @@ def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Seq
 
 
 def _geometric_factor(
-    structure: Structure,
-    moving: MovingLoad,
-    friction: str | None,
-    strength: float | None,
-    fill: Fill | None,
-    tolerance: float = 1e-4,
-    deepest: float = 1e3,
+    structure: Structure, moving: MovingLoad, options: dict[str, Any], tolerance: float = 1e-4
 ) -> float:
     """Return the depth of joints over the least one that carries the worst row of axles [-]."""
-    stones, dead = self_weight_programme(structure, friction, strength, fill)
+    stones, dead = self_weight_programme(structure, **options)
     axles = stones.load([load for load in moving.worst.live if isinstance(load, PointLoad)])
 
     def is_carried(share: float) -> bool:
@@ -391,7 +385,7 @@ def _geometric_factor(
     low, high = 0.0, 1.0
     while not moving.worst.factor >= 1.0 and not is_carried(high):
         low, high = high, 2.0 * high
-        if high > deepest:
+        if high > 1e3:  # no depth helps
             return np.nan
     while high - low > tolerance * high:
         middle = 0.5 * (low + high)
@@ -473,12 +467,10 @@ def _collapse_factors(
 
 
 def _search_nonassociated(
-    programmes: dict[AxleRow, Programme],
-    associated: dict[AxleRow, Optimum | None],
-    random_starts: int = 2,
+    programmes: dict[AxleRow, Programme], associated: dict[AxleRow, Optimum | None]
 ) -> dict[AxleRow, Optimum | None]:
     """Find the state of least factor without dilatancy at each place, started from neighbours."""
-    # Forwards from the associated optimum, a few random states and the solution of the place
+    # Forwards from the associated optimum, two random states and the solution of the place
     # before; then backwards once more from the solution of the place behind.
     states: dict[AxleRow, Optimum | None] = dict.fromkeys(programmes)
     for backwards in (False, True):
@@ -487,7 +479,7 @@ def _search_nonassociated(
             programme, weakest = programmes[row], states[row]
             starts = list(neighbour)
             if not backwards:
-                starts += starting_forces(programme, associated[row], random_starts, seed)
+                starts += starting_forces(programme, associated[row], 2, seed)
             state = find_weakest(programme, starts)
             if weakest is None or (state is not None and state.value > weakest.value):
                 states[row] = weakest = state

@@ -284,10 +284,7 @@ def check_simple(outline: Array, name: str) -> None:
 
 
 def check_overlaps(
-    outlines: Sequence[Array],
-    names: Sequence[str],
-    slight: float = 0.0,
-    body: Numbers | None = None,
+    outlines: Sequence[Array], names: Sequence[str], thin: float = 0.0, body: Numbers | None = None
 ) -> None:
     """Refuse outlines that cross themselves, are the same or overlap; those of a body may do."""
     for outline, name in zip(outlines, names, strict=True):
@@ -302,7 +299,7 @@ def check_overlaps(
     one, other = names[first], names[second]
     if both.area > (1.0 - 1e-6) * max(measure_polygon(outlines[k])[0] for k in pairs[worst]):
         raise InvalidStructure(f"'{one}' and '{other}' are the same: leave one out")
-    remedy = ", or raise snap above that" if depth[worst] < slight else ""
+    remedy = ", or raise snap above that" if depth[worst] < thin else ""
     raise InvalidStructure(
         f"'{one}' and '{other}' overlap by {1e4 * both.area:.3g} cm², about "
         f"{1e3 * depth[worst]:.3g} mm deep at ({both.centroid.x:.3f}, {both.centroid.y:.3f}): "

@@ -34,6 +34,9 @@ from archfem.statics.relaxation import (
 # Residual relative to the sum of all loads, and of the added equation relative to the step [-]
 RESIDUAL_TOLERANCE = 1e-9
 
+# Row and right side of the added equation, and the length of the step
+Goal = tuple[Array, float, float]
+
 # First displacement, relative to the structure's size [-]
 FIRST_DISPLACEMENT = 1e-6
 
@@ -148,7 +151,7 @@ class LoadPath(EquilibriumPath):
         target = float(row @ x) + distance
         # Where several joints slide or turn under the same load the tangent is singular, although
         # each step has an equilibrium: then a small part of the closed stiffness is mixed in.
-        return any(self._solve_step(row, target, distance, share) for share in (0.0, 1e-3))
+        return any(self._solve_step((row, target, distance), share) for share in (0.0, 1e-3))
 
     def advance_normal(self, distance: float) -> bool:
         """Add the equilibrium in the hyperplane normal to the last step, at a distance."""
@@ -169,7 +172,8 @@ class LoadPath(EquilibriumPath):
             bend = (step / length - before / earlier) / (length + earlier)
             guesses.insert(0, straight + distance * (distance + length) * bend)
         sense = self._sense(self.model, x, step)
-        return any(self._solve_step(row, target, distance, 0.0, guess, sense) for guess in guesses)
+        goal = row, target, distance
+        return any(self._solve_step(goal, 0.0, guess, sense) for guess in guesses)
 
     def _sense(self, model: Model, x: Array, step: Array) -> float:
         """Return 1 or -1, which changes where a path turns back, never where it bends, or 0."""
@@ -204,20 +208,14 @@ class LoadPath(EquilibriumPath):
         return True
 
     def _solve_step(
-        self,
-        row: Array,
-        target: float,
-        distance: float,
-        share: float,
-        guess: Array | None = None,
-        sense: float | None = None,
+        self, goal: Goal, share: float, guess: Array | None = None, sense: float = 0.0
     ) -> bool:
         """Add the equilibrium with row·(q, λ) = target, once joint memory is stationary."""
         last = np.append(self.states[-1], self.factors[-1])
         x = last if guess is None else guess
         model, iterations = self.model, 0
         for number in range(MAX_IRREVERSIBLE_ITERATIONS):
-            solution = self._iterate(model, x, (row, target, distance), share)
+            solution = self._iterate(model, x, goal, share)
             if solution is None:
                 return False
             x, iterations = solution[0], iterations + solution[1]
@@ -233,10 +231,10 @@ class LoadPath(EquilibriumPath):
         return False
 
     def _iterate(
-        self, model: Model, x: Array, constraint: tuple[Array, float, float], share: float
+        self, model: Model, x: Array, goal: Goal, share: float
     ) -> tuple[Array, int] | None:
         """Find (q, λ) in one (n + 1,), and the number of iterations, by Newton's method."""
-        row, target, distance = constraint
+        row, target, distance = goal
         for iteration in range(30 if share == 0.0 else 60):
             tangent, rate = model.tangent(x[:-1]), self.load.rate(x[:-1])
             if rate is not None:

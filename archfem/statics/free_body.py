@@ -96,13 +96,10 @@ def forces_on(
     crossings = np.where(np.isnan(crossings), structure.middles[around], crossings)
     area, centroid = _area_and_centroid(body, number, cells)
     weight = area * structure.width * body.material.unit_weight
-    return FreeBody(
-        body,
-        (*(structure.joints[k].name for k in around), "weight"),
-        tuple(map(int, around)),
-        np.concatenate([crossings, centroid[None]]),
-        np.concatenate([forces, [[0.0, -weight]]]),
-    )
+    names = (*(structure.joints[k].name for k in around), "weight")
+    points = np.concatenate([crossings, centroid[None]])
+    forces = np.concatenate([forces, [[0.0, -weight]]])
+    return FreeBody(body, names, tuple(map(int, around)), points, forces)
 
 
 def _area_and_centroid(block: Block, number: int, cells: Cells | None) -> tuple[float, Array]:

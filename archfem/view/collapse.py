@@ -105,7 +105,7 @@ def draw_rating(found: Rating) -> Figure:
     # the front axle, since long vehicles have no middle
     half = 0.5 * sum(found.vehicle.spacings)
     label = "front axle, x [m]"
-    return _draw_factors(found.moving, found.structure, title, label, half, required=1.0)
+    return _draw_factors(found.moving, title, label, half, required=1.0)
 
 
 @validate_arguments
@@ -119,21 +119,16 @@ def draw_moving_load(found: MovingLoad) -> Figure:
         The figure: factors of both directions over the place of the vehicle's middle, up to four
         times the least one, above the mechanism at the worst place.
     """
-    structure = found.worst.structure
-    assert structure is not None  # it was analysed
     title = f"least factor {found.worst.factor:.3g}, driving {found.direction}"
-    return _draw_factors(found, structure, title, "middle of the vehicle, x [m]")
+    return _draw_factors(found, title, "middle of the vehicle, x [m]")
 
 
 def _draw_factors(
-    found: MovingLoad,
-    structure: Structure,
-    title: str,
-    label: str,
-    half: float = 0.0,
-    required: float = 0.0,
+    found: MovingLoad, title: str, label: str, half: float = 0.0, required: float = 0.0
 ) -> Figure:
     """Draw factors over a point `half` ahead of the vehicle's middle, above the worst mechanism."""
+    structure = found.worst.structure
+    assert structure is not None  # it was analysed
     wide, tall = structure_figure(structure).get_size_inches()
     # height to spare, so that the bridge fills the width and both panels have one x axis
     figure = new_figure(wide, 1.5 * tall + 3.0)

@@ -1,7 +1,7 @@
 """Map of principal compression over the blocks, with thrust lines and principal directions."""
 
 from collections.abc import Collection
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -143,17 +143,11 @@ def _shade(axes: Axes, cells: Cells, compression: Array, blocks: Numbers) -> Non
     unit, name = (MPa, "MPa") if highest >= 0.05 * MPa else (kPa, "kPa")
     # warm colours, so that the blue thrust line stands out
     colours = (Colour.STONE, "#f6d19a", "#ea9a5b", "#c9553a", "#7d1d32")
-    painted = axes.tripcolor(
-        Triangulation(x, y, np.arange(len(x)).reshape(-1, 3)),
-        triangles.corners(compression)[shaded].ravel().clip(0.0) / unit,
-        shading="gouraud",
-        cmap=LinearSegmentedColormap.from_list("compression", colours),
-        vmin=0.0,
-        vmax=highest / unit,
-        zorder=2,
-        rasterized=True,
-        gid="compression",
-    )
+    scale: dict[str, Any] = {"cmap": LinearSegmentedColormap.from_list("compression", colours)}
+    scale |= {"vmin": 0.0, "vmax": highest / unit, "shading": "gouraud"}
+    mesh = Triangulation(x, y, np.arange(len(x)).reshape(-1, 3))
+    values = triangles.corners(compression)[shaded].ravel().clip(0.0) / unit
+    painted = axes.tripcolor(mesh, values, zorder=2, rasterized=True, gid="compression", **scale)
     # width of the colour bar, and its distance from the axes: 0.16 inch
     wide = 0.16 / cast(Figure, axes.figure).get_figwidth()
     beside = axes.inset_axes((1.0 + wide, 0.0, wide, 1.0))

@@ -276,16 +276,10 @@ def build_ring(
     arch: Arch, left: float, material: Material, contact: Contact, chords: int
 ) -> Structure:
     """Build a ring at its position in a bridge, between abutments that are dropped later."""
-    ring = circular_arch(
-        radius=arch.radius,
-        thickness=arch.thickness,
-        # with its unit, so that no small angle is taken for radians
-        embrace=f"{np.degrees(2.0 * arch.half):.17g} degree",
-        voussoirs=arch.voussoirs,
-        material=material,
-        contact=contact,
-        chords=chords,
-    )
+    # the embrace with its unit, so that no small angle is taken for radians
+    shape: dict[str, Any] = {"embrace": f"{np.degrees(2.0 * arch.half):.17g} degree"}
+    shape |= {"radius": arch.radius, "thickness": arch.thickness, "voussoirs": arch.voussoirs}
+    ring = circular_arch(material=material, contact=contact, chords=chords, **shape)
     # from the centre of the circle to the left end of the deck and the springing level
     right, up = left + arch.centre_line_span / 2.0, -arch.radius * cos(arch.half)
 

@@ -68,19 +68,14 @@ class RingGeometry:
         """Assemble stones, from left to right, between two fixed abutments."""
         faces = [(as_point(inner[0]), as_point(outer[0])) for inner, outer in stones]
         faces.append((as_point(stones[-1][0][-1]), as_point(stones[-1][1][-1])))
-        blocks = [
-            Block(
-                # anticlockwise: along the intrados, and back along the extrados
-                (*map(as_point, inner), *map(as_point, outer[::-1])),
-                self.material,
-                f"voussoir {k}",
-                corners=(0, len(inner) - 1, len(inner), len(inner) + len(outer) - 1),
-                part="arch",
-                centre=centre,
-                role="ring",
-            )
-            for k, (inner, outer) in enumerate(stones, 1)
-        ]
+        of_ring: dict[str, Any] = {"part": "arch", "centre": centre, "role": "ring"}
+        blocks = []
+        for k, (inner, outer) in enumerate(stones, 1):
+            # anticlockwise: along the intrados, and back along the extrados
+            outline = tuple(map(as_point, (*inner, *outer[::-1])))
+            corners = 0, len(inner) - 1, len(inner), len(outline) - 1
+            name_of_stone = f"voussoir {k}"
+            blocks.append(Block(outline, self.material, name_of_stone, corners=corners, **of_ring))
         half = 0.5 * float(np.linalg.norm(np.subtract(*faces[0])))
         depth = half if abutment_depth is None else abutment_depth
         left = _build_abutment(faces[0], -1.0, depth, self.material, "left abutment")

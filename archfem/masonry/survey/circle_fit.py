@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 
 from archfem._typing import Array
 from archfem.errors import InvalidInput
-from archfem.masonry.block import Point, check_points
+from archfem.masonry.block import Point, as_point, check_points
 
 
 @dataclass(frozen=True)
@@ -79,10 +79,5 @@ def fitted_circle(points: Sequence[Point] | Array) -> FittedCircle:
     circle = fit.x
     offsets = centred - circle[:2]
     angles = np.unwrap(np.arctan2(offsets[:, 1], offsets[:, 0]))
-    centre = mean + circle[:2]
-    return FittedCircle(
-        (float(centre[0]), float(centre[1])),
-        float(circle[2]),
-        distances(circle),
-        float(np.degrees(abs(angles[-1] - angles[0]))),
-    )
+    centre, embrace = mean + circle[:2], float(np.degrees(abs(angles[-1] - angles[0])))
+    return FittedCircle(as_point(centre), float(circle[2]), distances(circle), embrace)

@@ -167,16 +167,9 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
     survey = read_outlines(
         path, unit=unit, snap=snap, layers=layers, material=material, materials=materials
     )
-    structure = assembled(
-        survey.blocks,
-        by_materials(contact, contacts),
-        width=width,
-        gravity=gravity,
-        name=Path(path).stem,
-    )
-    if Path(path).suffix == ".msh":
-        return _name_joints(structure, Path(path), unit)
-    return structure
+    law, name = by_materials(contact, contacts), Path(path).stem
+    structure = assembled(survey.blocks, law, width=width, gravity=gravity, name=name)
+    return _name_joints(structure, Path(path), unit) if Path(path).suffix == ".msh" else structure
 
 
 def _name_joints(structure: Structure, path: Path, unit: str | None) -> Structure:

@@ -129,16 +129,10 @@ def render(template: str, **values: Any) -> str:
 @cache
 def _templates() -> Environment:
     """Return the environment of the templates, which may include style and script files."""
-    environment = Environment(
-        loader=PackageLoader("archfem.view.pages"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    assert environment.loader is not None
-    source = environment.loader.get_source
+    loader = PackageLoader("archfem.view.pages")
+    blocks = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **blocks)
+    source = loader.get_source
     environment.globals["plain"] = lambda name: Markup(source(environment, name)[0])
     environment.globals["raw"] = Markup
     environment.filters["typeset"] = _typeset
