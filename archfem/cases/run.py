@@ -335,7 +335,7 @@ def run_time_history(
         DidNotConverge: a step failed; `history` of the error is the record up to it.
     """
     attrs = {"case": case.text(), "inputs": case.hash_inputs()}
-    given = {} if damping is None else {"damping": damping}  # None would be undamped
+    given: Any = {} if damping is None else {"damping": damping}  # None would be undamped
     try:
         with log_prefix(case.title, motion.name):
             run = time_history(case.analysis, motion, start=dead, **given)

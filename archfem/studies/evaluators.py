@@ -277,8 +277,7 @@ class Evaluator:
     @property
     def name(self) -> str:
         """Name of one of archfem's functions, as study files give it; "" for others."""
-        names = {find: name for name, find in NAMED_EVALUATORS.items()}
-        return names.get(self.find, "")
+        return next((name for name, find in NAMED_EVALUATORS.items() if find is self.find), "")
 
     @property
     def units(self) -> Mapping[str, str]:
