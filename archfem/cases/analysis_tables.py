@@ -19,23 +19,9 @@ from archfem.cases.toml_file import (
     split_key_path,
 )
 from archfem.dynamics.analysis import Analysis
-from archfem.dynamics.events import (
-    CountedMechanism,
-    EveryMechanism,
-    MovingMechanism,
-    StopCondition,
-    registered_criteria,
-)
+from archfem.dynamics.events import EVENTS, StopCondition, registered_criteria
 from archfem.dynamics.recorder import Record
-from archfem.dynamics.schemes import (
-    HHT,
-    Conserving,
-    EffectiveDamping,
-    Newmark,
-    Rayleigh,
-    StiffnessDamping,
-    Viscous,
-)
+from archfem.dynamics.schemes import SCHEMES, EffectiveDamping, Rayleigh, StiffnessDamping, Viscous
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.masonry.construction import Stage, usual_stages
@@ -49,14 +35,6 @@ SECTION_FIELDS: Mapping[str, tuple[str, ...]] = {
         *("quadrature_points", "displacements", "mesh_file", "tolerance"),
     ),
     "analysis": ("dt", "damping", "scheme", "method", "newton", "until"),
-}
-
-# Objects that a word stands for, or a table with this word as `name` and the object's fields
-_SCHEMES: Mapping[str, type] = {"conserving": Conserving, "newmark": Newmark, "hht": HHT}
-_EVENTS: Mapping[str, type] = {
-    "counted mechanism": CountedMechanism,
-    "moving mechanism": MovingMechanism,
-    "every mechanism": EveryMechanism,
 }
 
 
@@ -77,7 +55,7 @@ def read_analysis(settings: Table, structure: Structure, folder: Path) -> Analys
     readers: Mapping[str, Callable[[Any], Any]] = {
         "mesh_file": lambda file: folder / file,
         "damping": _read_damping,
-        "scheme": lambda scheme: _read_named(scheme, _SCHEMES, "analysis.scheme"),
+        "scheme": lambda scheme: _read_named(scheme, SCHEMES, "analysis.scheme"),
         "until": _read_event,
         "newton": lambda table: read_object(Newton, table, "analysis.newton"),
     }
@@ -100,7 +78,7 @@ def write_analysis_tables(analysis: Analysis, folder: Path | None) -> dict[str, 
     writers: Mapping[str, Callable[[Any], Any]] = {
         "mesh_file": lambda file: name_from(file, folder),
         "damping": _write_damping,
-        "scheme": lambda scheme: _write_named(scheme, _SCHEMES),
+        "scheme": lambda scheme: _write_named(scheme, SCHEMES),
         "until": _write_event,
     }
     for name, value in given.items():
@@ -170,8 +148,8 @@ def _read_event(given: str | Table) -> StopCondition:
     table = {"name": given} if isinstance(given, str) else dict(given)
     criteria = table.pop("criteria", None)
     if isinstance(given, str):
-        check_choice(given, (*_EVENTS, *registered_criteria), "analysis.until")
-    event: Any = _read_named(table, _EVENTS, "analysis.until")
+        check_choice(given, (*EVENTS, *registered_criteria), "analysis.until")
+    event: Any = _read_named(table, EVENTS, "analysis.until")
     if criteria is None:
         return event
     criteria = read_object(Criteria, criteria, "analysis.until.criteria")
@@ -182,12 +160,12 @@ def _write_event(event: StopCondition) -> Any:
     """Return the word or table of an event, or the name of a registered criterion."""
     if name := next((name for name, own in registered_criteria.items() if own is event), ""):
         return name
-    if type(event) not in _EVENTS.values():
+    if type(event) not in EVENTS.values():
         raise InvalidInput(
             f"until = {event!r} has no name in a file: register it by "
             "archfem.dynamics.register_criterion, and give what is registered"
         )
-    return _write_named(event, _EVENTS)
+    return _write_named(event, EVENTS)
 
 
 def _read_stages(table: Any, structure: Structure) -> Sequence[Stage] | None:

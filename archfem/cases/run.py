@@ -28,7 +28,6 @@ from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.history import Ending, History, partial_history
 from archfem.dynamics.schemes import Viscous
-from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints
@@ -319,12 +318,7 @@ def damping_of(case: Case, dead: Equilibrium) -> tuple[Viscous | None, str]:
 
 @validate_arguments
 def run_time_history(
-    case: Case,
-    motion: Motion,
-    dead: Equilibrium,
-    damping: Viscous | None = None,
-    *,
-    method: str | Stepper = "auto",
+    case: Case, motion: Motion, dead: Equilibrium, damping: Viscous | None = None
 ) -> History:
     """Compute the time history of a case under a motion; the history contains the case.
 
@@ -333,7 +327,6 @@ def run_time_history(
         motion: ground motion.
         dead: equilibrium that the run starts from.
         damping: damping of the run; by default that of the case.
-        method: solver of the time steps, as for `archfem.time_history`.
 
     Returns:
         The history.
@@ -342,9 +335,10 @@ def run_time_history(
         DidNotConverge: a step failed; `history` of the error is the record up to it.
     """
     attrs = {"case": case.text(), "inputs": case.hash_inputs()}
+    given: Any = {} if damping is None else {"damping": damping}  # None would be undamped
     try:
         with log_prefix(case.title, motion.name):
-            run = time_history(case.analysis, motion, start=dead, damping=damping, method=method)
+            run = time_history(case.analysis, motion, start=dead, **given)
     except DidNotConverge as error:
         # The partial history is saved like a complete one.
         if error.history is not None:
@@ -430,14 +424,13 @@ def _compare_start(
     other: tuple[Analysis, Equilibrium] | None,
     motion: Motion,
     history: History,
-    duration: float = 0.5,  # from the start of the motion [s]
 ) -> tuple[float, float, str] | None:
     """Return the difference of another analysis in the largest |e|, its end, and the fidelity."""
     if other is None:
         return None
     analysis, dead = other
     try:
-        cut = motion.cut(0.0, duration)
+        cut = motion.cut(0.0, 0.5)
         run = time_history(analysis, cut, start=dead, damping=at_rest.damping[0])
     except ArchfemError:  # it has no equilibrium at some step: no comparison
         return None

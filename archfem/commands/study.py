@@ -7,13 +7,7 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from archfem._files import (
-    DERIVED,
-    atomic_write,
-    create_result_folder,
-    hash_content,
-    replace_results,
-)
+from archfem._files import DERIVED, create_result_folder, hash_content, replace_results
 from archfem.errors import InvalidInput
 from archfem.studies.result_store import RESULT_FILES, format_table, status
 
@@ -55,21 +49,20 @@ def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> None
     from archfem.studies.comparison import file_name, study_table, write_finding
     from archfem.studies.study import Comparison
     from archfem.view.studies import draw_findings, draw_study
-    from archfem.view.style import save
+    from archfem.view.style import write_files
 
     findings = definition.findings(table) if isinstance(definition, Comparison) else {}
     for name, finding in findings.items():
         write_finding(finding, folder / f"{file_name(name)}.json")
     text = study_table(findings) if findings else format_table(table)
     print(text)
-    with atomic_write(folder / "study.txt") as draft:
-        draft.write_text(f"{definition.title}\n\n{text}\n", encoding="utf-8")
-    picture = folder / "study.png"
+    write_files({"study.txt": f"{definition.title}\n\n{text}"}, folder)
     factors = {name: finding.factors for name, finding in findings.items() if finding.scales}
     try:
         if isinstance(definition, Comparison) and factors:
-            save(draw_study(factors, definition.reduction, definition.title), picture)
+            picture = draw_study(factors, definition.reduction, definition.title)
         else:
-            save(draw_findings(table), picture)
+            picture = draw_findings(table)
+        write_files({"study.png": picture}, folder)
     except InvalidInput as error:
         print(f"no picture: {error}")

@@ -14,11 +14,7 @@ from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.error_estimation import largest_difference, severe_motion
 from archfem.dynamics.history import Ending, History
-from archfem.dynamics.model_selection import (
-    discretisation_label,
-    exact_discretisation,
-    stone_fidelity,
-)
+from archfem.dynamics.model_selection import Setting, exact_discretisation, stone_fidelity
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
@@ -35,19 +31,6 @@ TRIED_FIDELITIES = ("rigid", "faces", "condensed")
 TRIED_MESHES = ((2, 2), (4, 4), (8, 8))
 TRIED_QUADRATURES = (("nodal", None), ("lobatto", None), ("gauss", None), ("exact", None))
 TRIED_TIME_STEPS = (0.01, 0.005, 0.0025)
-
-
-@dataclass(frozen=True)
-class Setting:
-    """A discretisation and a time step."""
-
-    discretisation: Discretisation
-    dt: float  # time step [s]
-
-    @property
-    def label(self) -> str:
-        """Discretisation and time step as short text."""
-        return f"{discretisation_label(self.discretisation)} {1e3 * self.dt:g} ms"
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ evaluate the costly condition (mechanism count, rigid-block motion) once per dis
 """
 
 import inspect
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial, wraps
 from typing import Any, Protocol, runtime_checkable
@@ -376,6 +376,14 @@ class EveryMechanism:
             return "a mechanism by each definition" if met >= required else None
 
         return FailureMonitor(FailureScan(structure, criteria, scanned, conditions_of), 1, reason)
+
+
+# Events by their words in a case
+EVENTS: Mapping[str, type] = {
+    "counted mechanism": CountedMechanism,
+    "moving mechanism": MovingMechanism,
+    "every mechanism": EveryMechanism,
+}
 
 
 class RecordCounter:

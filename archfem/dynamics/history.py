@@ -511,21 +511,3 @@ def first_mechanisms(run: History, criteria: Criteria | None = None) -> dict[str
     judged = run if criteria is None else run.with_criteria(criteria)
     definitions = (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
     return {name: judged.verdict.mechanisms.get(name) for name in definitions}
-
-
-def corner_displacements(model: Model, fields: Array) -> xr.Dataset:
-    """Return the displacements of the corners of the free blocks, for each row of coordinates."""
-    structure, cells = model.structure, model.cells
-    points = cells.corners(structure)
-    names = [structure.blocks[number].name for number in cells.block[points]]
-    displacements = np.array([cells.displacement(q)[points] for q in fields])
-    x, y = cells.places[points].T
-    return xr.Dataset(
-        {"displacement": (("frame", "corner", "axis"), displacements, {"units": "m"})},
-        {
-            "corner_block": ("corner", names),
-            "corner_x": ("corner", x, {"units": "m"}),
-            "corner_y": ("corner", y, {"units": "m"}),
-            "axis": ["x", "y"],
-        },
-    )

@@ -154,6 +154,19 @@ def discretisation_label(settings: Discretisation) -> str:
     return f"{name} {settings.through}×{settings.along} {settings.rule.rule}{points}"
 
 
+@dataclass(frozen=True)
+class Setting:
+    """A discretisation and a time step."""
+
+    discretisation: Discretisation
+    dt: float  # time step [s]
+
+    @property
+    def label(self) -> str:
+        """Discretisation and time step as short text."""
+        return f"{discretisation_label(self.discretisation)} {1e3 * self.dt:g} ms"
+
+
 def select_model(
     structure: Structure,
     tolerance: float,
@@ -175,7 +188,7 @@ def select_model(
         trial, error = _select_trial(trials, history[-1], tolerance)
     else:
         trial, error = trials[-1], history[-1][-1]
-    names = (f"{discretisation_label(each.settings)} {1e3 * each.dt:g} ms" for each in trials)
+    names = (Setting(each.settings, each.dt).label for each in trials)
     # change of |e| by large displacements, over the rotation of a joint [1/rad]: median of eleven
     # structures under two motions each, with values from 0.5 to 8.5
     error_per_rotation = 3.0

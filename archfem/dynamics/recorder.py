@@ -12,20 +12,14 @@ from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem._validation import check_integer
-from archfem.dynamics.history import (
-    COORDINATES_VERSION,
-    SIGN_CONVENTION,
-    Ending,
-    History,
-    corner_displacements,
-)
+from archfem.dynamics.history import COORDINATES_VERSION, SIGN_CONVENTION, Ending, History
 from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.state import Batch, State
 from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_dataset
 from archfem.masonry.stiffness_ratio import list_stones
-from archfem.models.model import Doubt
+from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 
 
@@ -248,6 +242,24 @@ class Recorder:
             variables[f"last_{name}"] = "coordinate", getattr(self.state, name)
         if self.state.memory is not None:
             variables["last_memory"] = "point", self.state.memory
+
+
+def corner_displacements(model: Model, fields: Array) -> xr.Dataset:
+    """Return the displacements of the corners of the free blocks, for each row of coordinates."""
+    structure, cells = model.structure, model.cells
+    points = cells.corners(structure)
+    names = [structure.blocks[number].name for number in cells.block[points]]
+    displacements = np.array([cells.displacement(q)[points] for q in fields])
+    x, y = cells.places[points].T
+    return xr.Dataset(
+        {"displacement": (("frame", "corner", "axis"), displacements, {"units": "m"})},
+        {
+            "corner_block": ("corner", names),
+            "corner_x": ("corner", x, {"units": "m"}),
+            "corner_y": ("corner", y, {"units": "m"}),
+            "axis": ["x", "y"],
+        },
+    )
 
 
 @cache

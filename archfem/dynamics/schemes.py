@@ -5,6 +5,7 @@ alone. A scheme is given by the weights β, γ of the new acceleration and by th
 t + (1 + α) Δt at which forces are taken.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi
 
@@ -253,6 +254,9 @@ class Conserving:
 
 
 Scheme = Newmark | HHT | Conserving
+
+# Schemes by their words in a case
+SCHEMES: Mapping[str, type] = {"conserving": Conserving, "newmark": Newmark, "hht": HHT}
 
 
 def check_large_displacement_scheme(scheme: Scheme) -> None:

@@ -21,7 +21,6 @@ from archfem._validation import check_array, validate_arguments, validate_method
 from archfem.cases.case import Case, case_of
 from archfem.dynamics.accuracy import (
     Accuracy,
-    Setting,
     TimedRun,
     candidate_settings,
     compare_runs,
@@ -30,6 +29,7 @@ from archfem.dynamics.accuracy import (
 )
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.damping import resolve_effective_damping
+from archfem.dynamics.model_selection import Setting
 from archfem.dynamics.schemes import Viscous
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.builder import build

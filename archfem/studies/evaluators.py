@@ -275,6 +275,11 @@ class Evaluator:
         return f"{name} {sorted(self.options.items())!r}\n{source}"
 
     @property
+    def name(self) -> str:
+        """Name of one of archfem's functions, as study files give it; "" for others."""
+        return next((name for name, find in NAMED_EVALUATORS.items() if find is self.find), "")
+
+    @property
     def units(self) -> Mapping[str, str]:
         """SI units of its findings, by name."""
         return FINDING_UNITS.get(self.find, {})

@@ -103,6 +103,26 @@ class Store:
         """Write the progress, for another process to read."""
         self._write(self._progress, asdict(status))
 
+    def write_table(self, table: xr.Dataset) -> None:
+        """Write a table as NetCDF, CSV, and, if their packages are installed, Parquet and Excel."""
+        folder, inputs = self.folder, _files.hash_json(self.read_plan()["points"])
+        frame = _flatten(table)
+        quoted = frame.map(_quote_formula).rename(columns=_quote_formula)
+        with explain_full_disk(folder), _files.stage_results(folder, "study", inputs) as draft:
+            netcdf, csv, excel, parquet = (draft / name for name in RESULT_FILES)
+            write_dataset(table, netcdf)
+            # Some versions of HDF5 write the time into a file: a table of the same content stays,
+            # and with it what was derived from it.
+            if _holds_same(folder / netcdf.name, netcdf):
+                shutil.copyfile(folder / netcdf.name, netcdf)
+            with _files.atomic_write(csv) as part:
+                quoted.to_csv(part, index=False)
+            with suppress(ImportError), _files.atomic_write(parquet) as part:
+                frame.to_parquet(part, index=False)
+            if len(frame) <= 1_048_575:  # rows of a sheet of Excel below the header
+                with suppress(ImportError), _files.atomic_write(excel) as part:
+                    _write_sheet(quoted, part)
+
     def read_rates(self) -> dict[str, float]:
         """Read what the latest driver knew of its speed; nothing if unknown."""
         try:
@@ -313,26 +333,6 @@ def load_table_libraries() -> None:
         frame.to_parquet()
     with suppress(ImportError):
         import_module("openpyxl")
-
-
-def write_table(table: xr.Dataset, folder: Path, inputs: str) -> None:
-    """Write a table as NetCDF and CSV, and as Parquet and Excel if their packages are installed."""
-    frame = _flatten(table)
-    quoted = frame.map(_quote_formula).rename(columns=_quote_formula)
-    with explain_full_disk(folder), _files.stage_results(folder, "study", inputs) as draft:
-        netcdf, csv, excel, parquet = (draft / name for name in RESULT_FILES)
-        write_dataset(table, netcdf)
-        # Some versions of HDF5 write the time into a file: a table of the same content stays, and
-        # with it what was derived from it.
-        if _holds_same(folder / netcdf.name, netcdf):
-            shutil.copyfile(folder / netcdf.name, netcdf)
-        with _files.atomic_write(csv) as part:
-            quoted.to_csv(part, index=False)
-        with suppress(ImportError), _files.atomic_write(parquet) as part:
-            frame.to_parquet(part, index=False)
-        if len(frame) <= 1_048_575:  # rows of a sheet of Excel below the header
-            with suppress(ImportError), _files.atomic_write(excel) as part:
-                _write_sheet(quoted, part)
 
 
 def _holds_same(stored: Path, table: Path) -> bool:

@@ -13,7 +13,7 @@ from typing import Any, Self
 
 import xarray as xr
 
-from archfem._files import hash_json, temporary_folder
+from archfem._files import temporary_folder
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case, case_of
 from archfem.cases.provenance import describe_version
@@ -24,16 +24,7 @@ from archfem.dynamics.history import Ending
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.motion.motion import Motion
 from archfem.studies.comparison import Finding, build_findings, file_name, parse_search
-from archfem.studies.evaluators import (
-    Evaluator,
-    Findings,
-    evaluate_comparison,
-    evaluate_dead_load,
-    evaluate_history,
-    evaluate_limit,
-    evaluate_scales,
-    refuse_code,
-)
+from archfem.studies.evaluators import Evaluator, Findings, refuse_code
 from archfem.studies.parameter_space import (
     PAIR_KEY,
     Axis,
@@ -45,14 +36,7 @@ from archfem.studies.parameter_space import (
     parameter_axes,
 )
 from archfem.studies.process_pool import Row, evaluate_points
-from archfem.studies.result_store import (
-    Progress,
-    Store,
-    build_table,
-    load_table_libraries,
-    status,
-    write_table,
-)
+from archfem.studies.result_store import Progress, Store, build_table, load_table_libraries, status
 
 logger = logging.getLogger("archfem")
 
@@ -209,7 +193,7 @@ class Study:
             rows = self._collect_rows(store, shared, workers, client)
             table = build_table(self.axes, rows, self.evaluator.units, self._attributes)
             if store is not None:
-                write_table(table, store.folder, hash_json(store.read_plan()["points"]))
+                store.write_table(table)
         return table
 
     status = staticmethod(status)
@@ -376,7 +360,7 @@ def _read_study(
     vary, samples = settings.get("vary"), settings.get("samples")
     varied = () if vary is None else parameter_axes(vary, samples)
     # findings of one motion: a case with a suite is evaluated under each of its pairs
-    of_motions = asked.find in (evaluate_history, evaluate_scales, evaluate_comparison)
+    of_motions = asked.name in ("history", "scales", "comparison")
     by_pair = of_motions and all(PAIR_KEY not in axis.keys for axis in varied)
     rows = _pair_cases(cases, settings.get("pairs"), asked, by_pair)
     if any(axis.name == "point" for axis in varied):  # the name of the cases with their pairs
@@ -387,7 +371,7 @@ def _read_study(
         for changed in changes_along(varied)
     )
     title, axes = settings.get("title", path.stem), (*_case_axes(rows, settings), *varied)
-    if asked.find is not evaluate_comparison:
+    if asked.name != "comparison":
         return Study.of_points(title, asked, axes, points, samples)
     comparison = Comparison.of_points(title, asked, axes, points, samples)
     comparison.cases = cases
@@ -401,7 +385,7 @@ def _parse_evaluator(settings: Mapping[str, Any], own_code: bool) -> Evaluator:
     if not own_code:
         refuse_code(find)
     asked = Evaluator.of(find)
-    if asked.find is evaluate_comparison:
+    if asked.name == "comparison":
         scales = settings.get("scales", asked.options.get("scales") or False)
         return Evaluator(asked.find, {"scales": parse_search(scales)})
     if "scales" in settings:
@@ -409,7 +393,7 @@ def _parse_evaluator(settings: Mapping[str, Any], own_code: bool) -> Evaluator:
             "scales is the search of a comparison: take it out, or compute = { name = 'scales', "
             "precision = 0.1, between = [0.2, 2.0] }"
         )
-    if "pairs" in settings and asked.find in (evaluate_dead_load, evaluate_limit):
+    if "pairs" in settings and asked.name in ("dead load", "limit"):
         raise InvalidInput(f"pairs are motions, and compute = {find!r} needs none: take pairs out")
     return asked
 
@@ -442,7 +426,7 @@ def _pair_cases(
     rows: list[tuple[str, ...]] = []
     for name, own in available.items():
         chosen = [pair for pair in own if pairs is None or pair in pairs]
-        if asked.find is evaluate_comparison and not own:
+        if asked.name == "comparison" and not own:
             raise InvalidInput(
                 f"the case of '{name}' has no [suite] to compare under: "
                 'give it one, or say what to compute, such as compute = "limit"'

@@ -8,7 +8,7 @@ import xarray as xr
 
 import archfem as af
 from archfem.dynamics import History, first_mechanisms, partial_history
-from archfem.dynamics.history import corner_displacements
+from archfem.dynamics.recorder import corner_displacements
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 

@@ -7,9 +7,13 @@ import pytest
 from glued import glued
 
 import archfem as af
-from archfem.dynamics.accuracy import Setting
 from archfem.dynamics.error_estimation import default_damping, largest_difference, run_peaks
-from archfem.dynamics.model_selection import TRIED_SETTINGS, exact_discretisation, select_model
+from archfem.dynamics.model_selection import (
+    TRIED_SETTINGS,
+    Setting,
+    exact_discretisation,
+    select_model,
+)
 from archfem.models.builder import build as plain
 from archfem.models.linear_blocks import build_rigid_model
 
