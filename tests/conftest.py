@@ -1,5 +1,6 @@
 """Structures and models that many tests use."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -26,6 +27,13 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     if config.getoption("--verified") and not hasattr(config, "workerinput"):
         config.pluginmanager.register(Table(config.getoption("--verified")))
+
+
+def pytest_collection_finish():
+    """Look for garbage among what tests make alone, and seldom: it takes a twentieth of their time."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 100)
 
 
 def pytest_collection_modifyitems(config, items):
