@@ -30,7 +30,7 @@ def pytest_configure(config):
 
 
 def pytest_collection_finish():
-    """Look for garbage among what tests make alone, and seldom: it takes a twentieth of their time."""
+    """Look for garbage among what tests make alone, and seldom: a twentieth of their time."""
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 100)
