@@ -70,7 +70,7 @@ def matched(
     record: the final velocity and displacement are unchanged to round-off. Where the spectrum
     starts at period zero, the peak acceleration is corrected as well. Horizontal components are
     matched to the horizontal spectrum, the vertical one to the vertical. A permanent displacement
-    of the ground is taken out as drift is; a warning has its size, and PGV and PGD before and after.
+    of the ground is taken out as drift; a warning has its size, and PGV and PGD before and after.
 
     Args:
         motion: of at least twice the longest period.
@@ -133,8 +133,8 @@ def _warn_of_lost_displacement(
     lost = motion.displacement(name)[-1]
     if abs(lost) > 0.1 * before.pgd:  # less is no fling
         logger.warning(
-            "motion %r, %s: matching took out a displacement of %.3g m at the end, as drift; PGD was "
-            "%.3g and is %.3g m, PGV %.3g and %.3g m/s: do not use it where a fling matters",
+            "motion %r, %s: matching took out a displacement of %.3g m at the end, as drift; PGD "
+            "was %.3g and is %.3g m, PGV %.3g and %.3g m/s: do not use it where a fling matters",
             *(motion.name, name, lost, before.pgd, after.pgd, before.pgv, after.pgv),
         )
 

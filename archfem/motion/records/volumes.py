@@ -95,14 +95,14 @@ def _read_pairs(text: RecordText, start: int, end: int) -> Channel:
     _check_end(text, after, end, count)
     if abs(numbers[-2] - numbers[0] - duration) > 0.02 * duration:
         raise text.error(f"the points do not last {duration:g} s, as the header states", line)
-    samples, dt = text.space_evenly(numbers, first)
+    samples, dt, begin = text.space_evenly(numbers, first)
     rms_pattern = rf"^\s*RMS ACC\w*\.? OF COMPLETE RECORD\s*=\s*({NUMBER_PATTERN})\s*G/10"
     if stated := text.search(rms_pattern, line, first):
         rms = float(np.sqrt(np.mean(numbers[1::2] ** 2)))
         # USC states no peak but the rms, of later files to 1 %, of earlier ones up to 1.9 times
         if not 0.4 * rms < float(stated[1][1]) + 0.001 < 2.5 * rms + 0.002:
             raise text.error(f"the rms of the points is {rms:.3f} G/10: damaged", stated[0])
-    return _create_channel(text, samples * unit, dt, (start, first))
+    return _create_channel(text, samples * unit, dt, (start, first), begin)
 
 
 def _find_volume_1_header(text: RecordText, start: int, end: int) -> tuple[int, int, float, float]:
@@ -148,7 +148,11 @@ def read_geonet(text: RecordText) -> list[Channel]:
 
 
 def _create_channel(
-    text: RecordText, samples: Array, dt: float, header: tuple[int, int]
+    text: RecordText,
+    samples: Array,
+    dt: float,
+    header: tuple[int, int],
+    start_time: float | None = None,
 ) -> Channel:
     """Create a channel of samples [m/s²] after a comparison with the peak of its header."""
     if found := text.search(_PEAK_PATTERN, *header):
@@ -158,4 +162,5 @@ def _create_channel(
     name_pattern = r"(?:\bCHAN\s+\d+:|^COMP(?:ONENT)?)\s+(\S+(?: DEG)?)"
     direction = text.find(name_pattern, *header)[1][1]
     # BHRC numbers its components: L1, V2 and T3
-    return Channel.from_direction(samples, dt, re.sub(r"^([LVT])\d$", r"\1", direction))
+    direction = re.sub(r"^([LVT])\d$", r"\1", direction)
+    return Channel.from_direction(samples, dt, direction, start_time)
