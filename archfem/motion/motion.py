@@ -243,9 +243,8 @@ class Motion(ResultDisplay):
             )
         kept = slice(int(first), int(last) + 1)
         begin = None if self.start_time is None else self.start_time + float(first) * self.dt
-        return self._map_components(
-            lambda row: row[kept] if len(row[kept]) else np.zeros(1), start_time=begin
-        )
+        part = self._map_components(lambda row: row[kept] if len(row[kept]) else np.zeros(1))
+        return replace(part, start_time=begin)
 
     def significant(self, low: float = 0.05, high: float = 0.95) -> "Motion":
         """Return the part of significant duration, after Trifunac and Brady (1975).
