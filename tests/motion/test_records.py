@@ -407,7 +407,7 @@ def test_components_of_stated_times_are_shifted_by_their_difference(write):
     assert motion.start_time == 0.0
     assert motion.vertical == pytest.approx(shifted, abs=1e-6)
     assert motion.horizontal == pytest.approx(DAMAGE["WAVE"], abs=1e-6)
-    # the other way round the horizontal waits, and a motion that is cut goes on from there
+    # the other way round the horizontal waits, and a part of the motion keeps its time
     motion = af.Motion.read(files[1], vertical=files[0]).cut(0.1)
     assert motion.horizontal == pytest.approx(shifted[10:], abs=1e-6)
     again = motion.with_transverse(af.Motion.read(files[1]))
