@@ -257,8 +257,6 @@ class Case:
         blocks = write_structure(self.structure)
         tables = blocks | self.settings | {"structure": blocks["structure"]}
         with suppress(ArchfemError):
-            if not {"materials", "contacts"} & set(self.settings):
-                return format_tables(tables)
             if cached_structure(tables) == self.structure:
                 return format_tables(tables)
         # materials of the case under other names than theirs

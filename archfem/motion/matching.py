@@ -112,9 +112,8 @@ def matched(
         for name in names
     }
     before, after = ({name: measure_intensity(m, name) for name in names} for m in (motion, result))
-    for name in names:
-        _warn_of_lost_displacement(motion, name, before[name], after[name])
     match = Match(result, misfit, before, after, band)
+    _warn_of_lost_displacement(motion, match)
     worst = max(misfit.values())
     if worst > tolerance:
         raise DidNotConverge(
@@ -126,17 +125,16 @@ def matched(
     return match
 
 
-def _warn_of_lost_displacement(
-    motion: Motion, name: str, before: IntensityMeasures, after: IntensityMeasures
-) -> None:
+def _warn_of_lost_displacement(motion: Motion, match: Match) -> None:
     """Warn of a final displacement that the correction of the baseline has taken out."""
-    lost = motion.displacement(name)[-1]
-    if abs(lost) > 0.1 * before.pgd:  # less is no fling
-        logger.warning(
-            "motion %r, %s: matching took out a displacement of %.3g m at the end, as drift; PGD "
-            "was %.3g and is %.3g m, PGV %.3g and %.3g m/s: do not use it where a fling matters",
-            *(motion.name, name, lost, before.pgd, after.pgd, before.pgv, after.pgv),
-        )
+    for name, before in match.before.items():
+        lost, after = motion.displacement(name)[-1], match.after[name]
+        if abs(lost) > 0.1 * before.pgd:  # less is no fling
+            logger.warning(
+                "motion %r, %s: matching took out a displacement of %.3g m at the end, as drift; "
+                "PGD was %.3g and is %.3g m, PGV %.3g and %.3g m/s: do not use it for a fling",
+                *(motion.name, name, lost, before.pgd, after.pgd, before.pgv, after.pgv),
+            )
 
 
 def spectral_misfit(

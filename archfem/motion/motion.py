@@ -337,10 +337,9 @@ class Motion(ResultDisplay):
             steps = f"a step of {other.dt:g} s ({other.name!r}) and one of {self.dt:g} s"
             raise InvalidInput(f"{steps}: bring one to the other's with resampled")
         row = other.vertical if name == "vertical" else None
-        rows = {each: self.component(each) for each in self.components}
-        rows[name] = other.horizontal if row is None else row
-        starts = dict.fromkeys(rows, self.start_time) | {name: other.start_time}
-        return replace(self, **signal_processing.align_starts(rows, starts, self.dt))
+        rows = {each: (self.component(each), self.start_time) for each in self.components}
+        rows[name] = (other.horizontal if row is None else row), other.start_time
+        return replace(self, **signal_processing.align_starts(rows, self.dt))
 
     def _map_components(self, change: Callable[..., Array], *args: Any, **options: Any) -> "Motion":
         rows: dict[str, Any] = {

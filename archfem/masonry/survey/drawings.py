@@ -188,9 +188,8 @@ class Entity:
     text: str = ""
     closed: bool = False
     is_mesh: bool = False
-    bulges: tuple[
-        float, ...
-    ] = ()  # tangent of a quarter of each edge's angle, positive to the left
+    # tangent of a quarter of the angle of each edge, positive where its arc turns left
+    bulges: tuple[float, ...] = ()
 
 
 def _read_dxf(
@@ -208,11 +207,11 @@ def _read_dxf(
         curves = Counter(entity.kind for entity in others)
         found = ", ".join(f"{count} {kind}" for kind, count in curves.items())
         raise InvalidInput(f"it has no polylines, but {found}: make a closed one of each stone")
-    for entity in others:
-        beside = " beside its polylines" if entity.layer in layers else ", which would be left out"
+    for kind, layer in ((each.kind, each.layer) for each in others):
+        beside = " beside its polylines" if layer in layers else ", which would be left out"
         raise InvalidInput(
-            f"layer '{entity.layer}' has a {entity.kind}{beside}: make a closed polyline of each "
-            "stone, and ignore layers of other things"
+            f"layer '{layer}' has a {kind}{beside}: make a closed polyline of each stone, and "
+            "ignore layers of other things"
         )
     if unit is None and own_unit is None:
         raise InvalidInput('the drawing does not say its unit ($INSUNITS): give one, e.g. "mm"')

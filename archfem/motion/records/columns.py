@@ -31,7 +31,9 @@ def read(
     if not (first or directions) and _runs_along_lines(rows):
         rows, rest = np.append(rows, rest)[:, None], []
     if rest:
-        _refuse_width(text, len(rest), rows.shape[1], lines[-1])
+        raise text.error(
+            "the last row is shorter than the others: the file is cut short", lines[-1]
+        )
     if column is None:
         chosen = list(range(first, rows.shape[1]))
         if len(chosen) != 1 and len(directions) != len(chosen):
@@ -86,15 +88,6 @@ def _runs_along_lines(rows: Array) -> bool:
     return bool(max(by_column) < 1.5 * min(by_column) and along.mean() < 0.8 * down)
 
 
-def _refuse_width(text: RecordText, width: int, first: int, line: int) -> None:
-    """Refuse a row of another width than the first."""
-    raise text.error(
-        f"{width} columns where the first row has {first}: this is neither a table nor a known "
-        "format",
-        line,
-    )
-
-
 def _read_table(text: RecordText) -> tuple[Array, list[float], list[int], str]:
     """Return numbers (n, columns), a shorter last row, line numbers, and comments in one string."""
     start = text.header_length()
@@ -104,15 +97,18 @@ def _read_table(text: RecordText) -> tuple[Array, list[float], list[int], str]:
         if content.startswith(("#", "%", "!", "*")):
             comments.append(content)
         elif content:
-            if table and len(table[-1]) != len(table[0]):
-                _refuse_width(text, len(table[-1]), len(table[0]), lines[-1])
             table.append(text.parse_row(line))
             lines.append(line)
-    if len(table[-1]) > len(table[0]):
-        _refuse_width(text, len(table[-1]), len(table[0]), lines[-1])
+    rest = table.pop() if len(table[-1]) < len(table[0]) else []
+    for row, line in zip(table, lines, strict=False):
+        if len(row) != len(table[0]):
+            raise text.error(
+                f"{len(row)} columns where the first row has {len(table[0])}: this is neither a "
+                "table nor a known format",
+                line,
+            )
     _refuse_decimal_commas(text, start, "\n".join(comments))
     text.check_end()
-    rest = table.pop() if len(table[-1]) < len(table[0]) else []
     if len(table) < 2:
         raise text.error("one row is no accelerogram", start)
     return np.array(table), rest, lines, "\n".join(comments)
@@ -149,9 +145,7 @@ def _find_unit(text: RecordText, comments: str, units: str | None) -> float:
         return unit
     if len(written) != 1:
         found = "no unit" if not written else "several units"
-        raise text.error(
-            f"the comments state {found}: give units= as g, m/s2, cm/s2, gal or 0.1 gal"
-        )
+        raise text.error(f"the comments state {found}: give units= as g, m/s2, gal or 0.1 gal")
     return written.pop()
 
 

@@ -105,10 +105,9 @@ def read_components(path: str | PathLike[str], **options: Any) -> dict[str, Chan
 
 def join_channels(channels: Mapping[str, Channel]) -> dict[str, Any]:
     """Return the fields of a motion, with each component at its time."""
-    starts = {name: channel.start_time for name, channel in channels.items()}
-    rows = {name: channel.samples for name, channel in channels.items()}
+    rows = {name: (channel.samples, channel.start_time) for name, channel in channels.items()}
     dt = channels["horizontal"].dt
-    return {"dt": dt} | signal_processing.align_starts(rows, starts, dt)
+    return {"dt": dt} | signal_processing.align_starts(rows, dt)
 
 
 def read_channels(

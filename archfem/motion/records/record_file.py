@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from math import inf, isfinite
+from math import isfinite
 from os import PathLike
 from pathlib import Path
 
@@ -18,8 +18,8 @@ from archfem.units import STANDARD_GRAVITY
 # Pattern of a number as Fortran and C print it
 NUMBER_PATTERN = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
 
-# Pattern of a factor of a unit
-_FACTOR = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
+# Pattern of a factor of a unit, which is not zero
+_FACTOR = r"(?=[\d.]*[1-9])(?:\d{1,9}(?:\.\d{0,9})?|\.\d{1,9})(?:e[-+]?\d\d?)?"
 
 # Pattern of a number of samples
 COUNT_PATTERN = r"\d{1,9}"
@@ -276,9 +276,9 @@ class RecordText:
                 )
                 if (before or not valued) and (after or not re.match(r"\s*/\s*\w", tail)):
                     numbers = after.groups() if after else (None, None)
-                    units.add(_multiply(unit, before and before[1], *numbers))
+                    units.add(unit * _combine_factors(before and before[1], *numbers))
                 header = f"{head} {tail}"
-        return {unit for unit in units if 0.0 < unit < inf}
+        return units
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,16 +318,14 @@ def parse_unit(name: str) -> float:
     found = re.fullmatch(
         rf"(?:({_FACTOR})[x×*·]?)?(mm/s2|cm/s2|m/s2|gal|g)(?:([/x×*·])({_FACTOR}))?", key
     )
-    unit = _multiply(unit_names[found[2]], *found.group(1, 3, 4)) if found else 0.0
-    if not 0.0 < unit < inf:
+    if found is None:
         known = ", ".join(unit_names)
         raise InvalidInput(
             f"units {name!r} are unknown: use one of {known}, or a multiple such as 0.1 gal"
         )
-    return unit
+    return unit_names[found[2]] * _combine_factors(*found.group(1, 3, 4))
 
 
-def _multiply(unit: float, before: str | None, operator: str | None, after: str | None) -> float:
-    """Multiply a unit by the number before it, and multiply or divide it by that after it."""
-    last = float(after or 1.0)
-    return unit * float(before or 1.0) * (last if operator != "/" else 1.0 / last if last else 0.0)
+def _combine_factors(before: str | None, operator: str | None, after: str | None) -> float:
+    """Return the factor of a unit from the number before it, and the operator and number after."""
+    return float(before or 1.0) * float(after or 1.0) ** (-1.0 if operator == "/" else 1.0)

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -102,7 +103,7 @@ def _read_pairs(text: RecordText, start: int, end: int) -> Channel:
         # USC states no peak but the rms, of later files to 1 %, of earlier ones up to 1.9 times
         if not 0.4 * rms < float(stated[1][1]) + 0.001 < 2.5 * rms + 0.002:
             raise text.error(f"the rms of the points is {rms:.3f} G/10: damaged", stated[0])
-    return _create_channel(text, samples * unit, dt, (start, first), begin)
+    return replace(_create_channel(text, samples * unit, dt, (start, first)), start_time=begin)
 
 
 def _find_volume_1_header(text: RecordText, start: int, end: int) -> tuple[int, int, float, float]:
@@ -148,11 +149,7 @@ def read_geonet(text: RecordText) -> list[Channel]:
 
 
 def _create_channel(
-    text: RecordText,
-    samples: Array,
-    dt: float,
-    header: tuple[int, int],
-    start_time: float | None = None,
+    text: RecordText, samples: Array, dt: float, header: tuple[int, int]
 ) -> Channel:
     """Create a channel of samples [m/s²] after a comparison with the peak of its header."""
     if found := text.search(_PEAK_PATTERN, *header):
@@ -162,5 +159,4 @@ def _create_channel(
     name_pattern = r"(?:\bCHAN\s+\d+:|^COMP(?:ONENT)?)\s+(\S+(?: DEG)?)"
     direction = text.find(name_pattern, *header)[1][1]
     # BHRC numbers its components: L1, V2 and T3
-    direction = re.sub(r"^([LVT])\d$", r"\1", direction)
-    return Channel.from_direction(samples, dt, direction, start_time)
+    return Channel.from_direction(samples, dt, re.sub(r"^([LVT])\d$", r"\1", direction))
