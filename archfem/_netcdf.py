@@ -19,6 +19,9 @@ from archfem.errors import InvalidInput
 # Precedes the digest at the end of a file.
 CHECKSUM_MARK = b"\narchfem: SHA-256 of all before this line "
 
+# Prefix of variables that hold texts for which an attribute has no room [bytes]
+LONG_ATTRIBUTE, MAX_ATTRIBUTE_SIZE = "attribute ", 60_000
+
 # Attribute of a dataset with a checksum: without the mark such a file is truncated.
 CHECKSUM_ATTRIBUTE = "sealed"
 
@@ -33,6 +36,11 @@ def write_dataset(
         store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
         large = [name for name, values in dataset.items() if values.ndim > 1]
         small = dataset.drop_vars(large).assign_attrs({CHECKSUM_ATTRIBUTE: 1})
+        for name, text in dataset.attrs.items():
+            if isinstance(text, str) and len(text.encode()) > MAX_ATTRIBUTE_SIZE:
+                small[f"{LONG_ATTRIBUTE}{name}"] = small.attrs.pop(name)
+        dataset = dataset.assign_attrs()
+        dataset.attrs.clear()  # which each part would write again
         # encoding copies: of a long history one variable at a time
         for part in (small, *(dataset[[name]] for name in large)):
             own = {name: encoding[name] for name in part if name in encoding}
@@ -66,6 +74,9 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
             dataset = opened.load()
     except Exception as error:  # HDF5, NetCDF and xarray raise errors of many classes
         raise InvalidInput(f"{path} is not a NetCDF file: {error}") from error
+    for name in [str(name) for name in dataset if str(name).startswith(LONG_ATTRIBUTE)]:
+        dataset.attrs[name.removeprefix(LONG_ATTRIBUTE)] = str(dataset[name].item())
+        dataset = dataset.drop_vars(name)
     if dataset.attrs.pop(CHECKSUM_ATTRIBUTE, None) is not None and end < 0:
         raise damaged
     return dataset

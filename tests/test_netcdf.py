@@ -27,6 +27,16 @@ def test_a_file_contains_the_written_data(written):
         assert plain["N"].equals(dataset["N"])
 
 
+def test_texts_of_any_length_are_attributes(tmp_path):
+    """An attribute of HDF5 holds 64 kB: the blocks of 200 stones take as much."""
+    dataset = xr.Dataset({"N": (("time", "joint"), np.ones((2, 2)))}, attrs={"sealed": 1})
+    for size in (60_000, 66_000, 2_000_000):
+        dataset = dataset.assign_attrs(case="é" * (size // 2), title="short")
+        path = write_dataset(dataset, tmp_path / "run.nc")
+        read = read_dataset(path, "history")
+        assert (list(read), read.attrs) == (["N"], {"case": "é" * (size // 2), "title": "short"})
+
+
 def test_a_file_is_read_once(written, monkeypatch):
     """The checked data are the data that are read: the file is gone before its numbers are used."""
     dataset, path = written

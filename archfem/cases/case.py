@@ -5,6 +5,7 @@ a wrong unit or an impossible geometry is an error that names the key and the re
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import reduce
@@ -249,8 +250,17 @@ class Case:
         return Case.of(settings, self.folder)
 
     def text(self) -> str:
-        """Return the case as TOML, changes included."""
-        return format_tables(self.settings)
+        """Return the case as TOML, changes included, with the blocks of a drawing for its file."""
+        if "file" not in self.settings.get("structure", ()):
+            return format_tables(self.settings)
+        # results must not need the drawing beside them
+        blocks = write_structure(self.structure)
+        tables = blocks | self.settings | {"structure": blocks["structure"]}
+        with suppress(ArchfemError):
+            if cached_structure(tables) == self.structure:
+                return format_tables(tables)
+        # materials of the case under other names than theirs
+        return format_tables(self.settings | blocks)
 
     def hash_inputs(self, *, presentation: bool = True) -> str:
         """Return the SHA-256 of the case, its input files and the program.

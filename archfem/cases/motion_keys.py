@@ -170,10 +170,13 @@ def write_selected_suite(selection: RecordSelection, folder: Path, target: Table
 
 def _locate_component(path: Path, samples: Array, folder: Path) -> dict[str, Any]:
     """Return the file of a component, and its column where it is not the first."""
-    # columns of plain files count a column of times, which numbers of channels do not
+    # columns of plain files count a column of times, which numbers of channels do not; a component
+    # that begins later than another one has zeros in front
+    shaken = np.trim_zeros(samples, "f")
     for column in (None, 1, 2, 3, 4):
         try:
-            if np.array_equal(Motion.read(path, column=column).horizontal, samples):
+            read = Motion.read(path, column=column).horizontal
+            if np.array_equal(np.trim_zeros(read, "f"), shaken):
                 number = {} if column is None else {"column": column}
                 return {"file": path.absolute().relative_to(folder).as_posix(), **number}
         except InvalidInput:

@@ -76,7 +76,8 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
 
     Args:
         folder: the folder.
-        inputs: folder of the drawing that the case names; by default the result folder.
+        inputs: folder of the mesh that the case names, or of a drawing in results of earlier
+            versions; by default the result folder.
 
     Returns:
         Case and histories of the folder.

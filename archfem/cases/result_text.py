@@ -142,17 +142,16 @@ def tabulate_motions(motions: Sequence[Motion]) -> ResultTable:
 
 
 def tabulate_matches(matches: Sequence[Match]) -> ResultTable:
-    """Tabulate misfit, drift, and measures before and after spectral matching."""
-    head = ["pair", "component", "misfit", "drift", "PGA", "matched", "Arias", "matched"]
-    head += ["D5-95", "matched"]
+    """Tabulate misfit, and measures before and after spectral matching."""
+    head = ["pair", "component", "misfit"]
+    head += [word for measure in ("PGA", "PGD", "Arias", "D5-95") for word in (measure, "matched")]
     rows = []
     for match in matches:
         for component, misfit in match.misfit.items():
             before, after = match.before[component], match.after[component]
-            # The drift is the final displacement, which a matched motion must not have.
             cells = [match.motion.name, component, f"{misfit:.2%}"]
-            cells.append(f"{abs(match.motion.displacement(component)[-1]):.0e} m")
             cells += [f"{each.pga / STANDARD_GRAVITY:.4f} g" for each in (before, after)]
+            cells += [f"{each.pgd:.4f} m" for each in (before, after)]
             cells += [f"{each.arias:.3g} m/s" for each in (before, after)]
             cells += [f"{each.significant_duration:.2f} s" for each in (before, after)]
             rows.append(cells)

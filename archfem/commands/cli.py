@@ -195,7 +195,8 @@ def _add_case_commands(commands: Any) -> None:
 def _add_changes(add_argument: AddArgument) -> None:
     """Add the options that change values of a case, and permit its code."""
     _add_own_code(add_argument)
-    about, metavar = "use this value instead of the file's; may be given again", "SECTION.KEY=VALUE"
+    metavar = "SECTION.KEY=VALUE"
+    about = "use this value instead of the file's, and names of files from its folder; repeatable"
     add_argument("--set", action="append", default=[], metavar=metavar, dest="changes", help=about)
 
 
@@ -212,7 +213,7 @@ def _add_result_commands(commands: Any) -> None:
     add = _add_command(commands, "report", about, "run", description=text)
     add("folder", metavar="FOLDER", help="that `archfem run` has written")
     add("--out", metavar="FILE.html", help="the page (FOLDER/report.html)")
-    add("--inputs", metavar="DIR", help="folder of the case's drawing (FOLDER)")
+    add("--inputs", metavar="DIR", help="folder of a mesh that the case names (FOLDER)")
     add("--pdf", action="store_true", help="also print it, by Chromium or Chrome")
     _add_own_code(add)
     about = "many cases: a table of results, on all cores or a cluster"

@@ -1,5 +1,6 @@
 """Spectral matching of a motion by wavelets in the time domain."""
 
+import logging
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -17,6 +18,8 @@ from archfem.motion.response_spectra import IntensityMeasures, measure_intensity
 from archfem.units import STANDARD_GRAVITY
 
 Target = Callable[[Array], Array]
+
+logger = logging.getLogger("archfem")
 
 # A wavelet has decayed to 2e-9 after this many of its widths.
 WAVELET_HALF_LENGTH = 4.5
@@ -66,7 +69,8 @@ def matched(
     differences of a displacement, a cosine under a Gauss bell that vanishes at the ends of the
     record: the final velocity and displacement are unchanged to round-off. Where the spectrum
     starts at period zero, the peak acceleration is corrected as well. Horizontal components are
-    matched to the horizontal spectrum, the vertical one to the vertical.
+    matched to the horizontal spectrum, the vertical one to the vertical. A permanent displacement
+    of the ground is taken out as drift; a warning has its size, and PGV and PGD before and after.
 
     Args:
         motion: of at least twice the longest period.
@@ -109,6 +113,7 @@ def matched(
     }
     before, after = ({name: measure_intensity(m, name) for name in names} for m in (motion, result))
     match = Match(result, misfit, before, after, band)
+    _warn_of_lost_displacement(motion, match)
     worst = max(misfit.values())
     if worst > tolerance:
         raise DidNotConverge(
@@ -118,6 +123,18 @@ def matched(
             last=match,
         )
     return match
+
+
+def _warn_of_lost_displacement(motion: Motion, match: Match) -> None:
+    """Warn of a final displacement that the correction of the baseline has taken out."""
+    for name, before in match.before.items():
+        lost, after = motion.displacement(name)[-1], match.after[name]
+        if abs(lost) > 0.1 * before.pgd:  # less is no fling
+            logger.warning(
+                "motion %r, %s: matching took out a displacement of %.3g m at the end, as drift; "
+                "PGD was %.3g and is %.3g m, PGV %.3g and %.3g m/s: do not use it for a fling",
+                *(motion.name, name, lost, before.pgd, after.pgd, before.pgv, after.pgv),
+            )
 
 
 def spectral_misfit(

@@ -10,10 +10,10 @@ import numpy as np
 
 from archfem._display import ResultDisplay
 from archfem._typing import Array, MetresPerSecondSquared, Seconds
-from archfem._validation import check_words, is_number, short_repr, validate_methods
+from archfem._validation import check_number, check_words, is_number, short_repr, validate_methods
 from archfem.errors import InvalidInput
 from archfem.motion import signal_processing
-from archfem.motion.records.reader import read_components
+from archfem.motion.records.reader import join_channels, read_components
 from archfem.units import STANDARD_GRAVITY
 
 COMPONENTS = "horizontal", "vertical", "transverse"
@@ -25,6 +25,7 @@ class Motion(ResultDisplay):
     """The acceleration of the ground in up to three directions, which begin together.
 
     Components keep their own lengths, zero before and after; what changes one returns a new motion.
+    Components of one file or several that state when they begin are shifted, by whole steps.
 
     Args:
         horizontal: accelerations along the arch (n,) [m/s²].
@@ -32,6 +33,8 @@ class Motion(ResultDisplay):
         vertical: accelerations upwards (m,) [m/s²], or None.
         name: what to call it.
         transverse: the other horizontal (k,) [m/s²], or None; only `rotated` makes use of it.
+        start_time: of the first sample on the clock of its file [s], since 1970 where that has a
+            date; None where nothing states it, and components added begin with this motion.
 
     Raises:
         InvalidInput: a component is no row of finite numbers up to 5 g, or dt is not positive.
@@ -42,10 +45,13 @@ class Motion(ResultDisplay):
     vertical: Array | None = None
     name: str = ""
     transverse: Array | None = field(default=None, kw_only=True)
+    start_time: float | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         if not (is_number(self.dt) and self.dt >= 1e-6):
             raise InvalidInput(f"dt {short_repr(self.dt)} s is no positive number from 1e-6 on")
+        if self.start_time is not None:
+            check_number(self.start_time, "start_time of a motion [s]")
         check_words(self.name, "name of a motion")
         for component in COMPONENTS:
             samples = getattr(self, component)
@@ -90,9 +96,8 @@ class Motion(ResultDisplay):
             NotInstalled: miniSEED and SAC need ObsPy.
         """
         channels = read_components(path, column=column, units=units, dt=dt, response=response)
-        rows: dict[str, Any] = {name: channel.samples for name, channel in channels.items()}
         try:
-            motion = cls(**rows, dt=channels["horizontal"].dt, name=Path(path).stem)
+            motion = cls(**join_channels(channels), name=Path(path).stem)
         except InvalidInput as error:
             raise InvalidInput(f"{path}: {error}") from error
         if vertical is not None:
@@ -237,7 +242,9 @@ class Motion(ResultDisplay):
                 f"cut from {start:g} to {stop:g} s: nothing of the {self.duration:g} s is left"
             )
         kept = slice(int(first), int(last) + 1)
-        return self._map_components(lambda row: row[kept] if len(row[kept]) else np.zeros(1))
+        begin = None if self.start_time is None else self.start_time + float(first) * self.dt
+        part = self._map_components(lambda row: row[kept] if len(row[kept]) else np.zeros(1))
+        return replace(part, start_time=begin)
 
     def significant(self, low: float = 0.05, high: float = 0.95) -> "Motion":
         """Return the part of significant duration, after Trifunac and Brady (1975).
@@ -302,36 +309,37 @@ class Motion(ResultDisplay):
         return replace(self, horizontal=level, transverse=across)
 
     def with_vertical(self, other: "Motion | None") -> "Motion":
-        """Return the motion with the vertical of another one.
+        """Return the motion with the vertical of another one, at its time where both state one.
 
         Args:
             other: gives its vertical, or without one its horizontal; None leaves the vertical out.
 
         Raises:
-            InvalidInput: the steps of the two differ.
+            InvalidInput: the steps of the two differ, or they have no time in common.
         """
         if other is None:
             return replace(self, vertical=None)
-        self._check_step(other)
-        up = other.horizontal if other.vertical is None else other.vertical
-        return replace(self, vertical=up)
+        return self._add_component("vertical", other)
 
     def with_transverse(self, other: "Motion") -> "Motion":
-        """Return the motion with the horizontal of another one as its transverse.
+        """Return the motion with the horizontal of another one as its transverse, at its time.
 
         Args:
             other: gives its horizontal.
 
         Raises:
-            InvalidInput: the steps of the two differ.
+            InvalidInput: the steps of the two differ, or they have no time in common.
         """
-        self._check_step(other)
-        return replace(self, transverse=other.horizontal)
+        return self._add_component("transverse", other)
 
-    def _check_step(self, other: "Motion") -> None:
+    def _add_component(self, name: str, other: "Motion") -> "Motion":
         if not np.isclose(other.dt, self.dt, rtol=1e-6, atol=0.0):
             steps = f"a step of {other.dt:g} s ({other.name!r}) and one of {self.dt:g} s"
             raise InvalidInput(f"{steps}: bring one to the other's with resampled")
+        row = other.vertical if name == "vertical" else None
+        rows = {each: (self.component(each), self.start_time) for each in self.components}
+        rows[name] = (other.horizontal if row is None else row), other.start_time
+        return replace(self, **signal_processing.align_starts(rows, self.dt))
 
     def _map_components(self, change: Callable[..., Array], *args: Any, **options: Any) -> "Motion":
         rows: dict[str, Any] = {

@@ -28,7 +28,7 @@ from archfem._validation import (
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
-from archfem.motion.records.reader import read_channels
+from archfem.motion.records.reader import join_channels, read_channels
 from archfem.motion.records.record_file import Channel
 from archfem.motion.response_spectra import response_spectrum, rotated_spectrum
 from archfem.motion.suite import Suite
@@ -388,10 +388,13 @@ def _read_candidates(
         groups[key] += [_Source(path, k, channel) for k, channel in enumerate(channels, 1)]
     found: list[_Candidate] = []
     for sources in groups.values():
-        if refusal := _refuse_group(sources, measure):
+        refusal = _refuse_group(sources, measure)
+        try:
+            found += [] if refusal else list(_combine_components(sources, measure))
+        except InvalidInput as error:  # of components at other times
+            refusal = str(error)
+        if refusal:
             skipped |= {str(each.path.relative_to(folder)): refusal for each in sources}
-        else:
-            found += _combine_components(sources, measure)
     return tuple(found), skipped
 
 
@@ -437,8 +440,8 @@ def _combine_components(sources: Sequence[_Source], measure: Measure) -> Iterato
         several = len({each.path for each in sources}) < len(sources)
         # components of one file differ by their direction alone
         name = f"{first.path.stem} {first.channel.direction}" if several else first.path.stem
-        rows = {key: each.channel.samples for key, each in parts.items()}
-        motion = Motion(**rows, dt=first.channel.dt, name=name)
+        rows = join_channels({key: each.channel for key, each in parts.items()})
+        motion = Motion(**rows, name=name)
         yield _Candidate(motion, event, {k: (each.path, each.number) for k, each in parts.items()})
 
 

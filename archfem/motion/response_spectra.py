@@ -29,7 +29,7 @@ def find_peak_responses(
     """Find the largest pseudo-acceleration of oscillators at rest at first, and when it occurs."""
     # u'' + 2 ζ ω u' + ω² u = -a is solved exactly from sample to sample. The record is interpolated
     # to 40 samples a period, and the peak is that of a parabola through the largest sample and its
-    # neighbours. The response after the end of the record is ignored.
+    # neighbours, or of the free vibration after the last sample.
     check_oscillators(periods, damping)
     values, times = np.empty(len(periods)), np.empty(len(periods))
     finer: dict[int, Array] = {1: samples}
@@ -41,10 +41,34 @@ def find_peak_responses(
         parts = _count_parts(dt, period)
         if parts not in finer:
             finer[parts] = interpolate_steps(samples, parts)
-        moved = oscillator_displacement(finer[parts], dt / parts, period, damping)
+        ground, step = finer[parts], dt / parts
+        moved = oscillator_displacement(ground, step, period, damping)
         peak, at = _find_parabola_peak(moved)
-        values[index], times[index] = -((2.0 * np.pi / period) ** 2) * peak, at * dt / parts
+        later, delay = _find_free_peak(moved[-2:], ground[-2:], step, period, damping)
+        if abs(later) > abs(peak):
+            peak, at = float(later), len(moved) - 1 + float(delay) / step
+        values[index], times[index] = -((2.0 * np.pi / period) ** 2) * peak, at * step
     return values, times
+
+
+def _find_free_peak(
+    moved: Array, ground: Array, dt: float, period: float, damping: float
+) -> tuple[Array, Array]:
+    """Find the first extreme of free vibrations after the last two samples, and its delay [s]."""
+    now, step = moved[..., -1], 2.0 * np.pi / period * dt
+    # the filter needs a state of two samples; a stiff oscillator follows the ground to its end
+    if moved.shape[-1] < 2 or step > 1.0:
+        return now, np.zeros_like(now)
+    numerator, (_, trace, determinant), at_rest = _oscillator_filter(dt, period, damping)
+    # the next sample of the recurrence, where the ground jumps to rest at the last one
+    after = numerator[2] * ground[..., 0] - at_rest[1] * ground[..., 1]
+    after -= trace * now + determinant * moved[..., 0]
+    # u = exp(-ζ ω t) (u₀ cos ω_d t + s sin ω_d t)
+    fade, turn = damping * step, np.sqrt(1.0 - damping**2) * step
+    sine = (after * np.exp(fade) - now * np.cos(turn)) / np.sin(turn)
+    steps = np.arctan2(turn * sine - fade * now, turn * now + fade * sine) % np.pi / turn
+    peak = now * np.cos(turn * steps) + sine * np.sin(turn * steps)
+    return np.exp(-fade * steps) * peak, steps * dt
 
 
 def _count_parts(dt: float, period: float) -> int:
@@ -121,7 +145,7 @@ def response_spectrum(
 
     Solved exactly for an acceleration that runs straight between samples; the record is
     interpolated until period / step >= 40, and peaks between the samples are found by a parabola.
-    The oscillators are followed to the end of the record.
+    After the last sample the ground is at rest, and the free vibration counts.
 
     Args:
         motion: the ground motion.
@@ -201,7 +225,7 @@ def _peaks_by_direction(
     if period <= 1e-9 * dt:  # such an oscillator has the acceleration of the ground
         return np.abs(directions @ np.array(pair)).max(axis=1)
     parts = _count_parts(dt, period)
-    fine = (interpolate_steps(samples, parts) for samples in pair)
+    fine = [interpolate_steps(samples, parts) for samples in pair]
     moved = np.array([oscillator_displacement(row, dt / parts, period, damping) for row in fine])
     try:
         extreme = scipy.spatial.ConvexHull(moved.T).vertices
@@ -214,7 +238,9 @@ def _peaks_by_direction(
     bend = before - 2.0 * here + after
     inside = (bend != 0.0) & (tops > 0) & (tops < moved.shape[1] - 1)
     peaks = here - np.divide((before - after) ** 2, 8.0 * bend, out=0.0 * here, where=inside)
-    return (2.0 * np.pi / period) ** 2 * np.abs(peaks)
+    ends = (directions @ moved[:, -2:], directions @ np.array(fine)[:, -2:])
+    later = _find_free_peak(*ends, dt / parts, period, damping)[0]
+    return (2.0 * np.pi / period) ** 2 * np.maximum(np.abs(peaks), np.abs(later))
 
 
 @validate_arguments

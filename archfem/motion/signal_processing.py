@@ -1,5 +1,8 @@
 """Sampled accelerations: integration, filters, baseline, resampling, energy, artificial ones."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import scipy  # loads scipy.signal, which is slow, when it is first used
 from scipy import integrate
@@ -125,6 +128,30 @@ def resample_peaks(samples: Array, dt: float, new_dt: float) -> Array:
     turns = turns[np.argsort(np.abs(samples[turns]), kind="stable")]
     new[np.minimum(np.rint(turns * dt / new_dt).astype(int), count - 1)] = samples[turns]
     return new
+
+
+def align_starts(rows: Mapping[str, tuple[Array, float | None]], dt: float) -> dict[str, Any]:
+    """Return components, given with their starts [s], with zeros in front: they begin together.
+
+    Components whose start is not stated (None) begin with the earliest of the others.
+    """
+    known = {name: start for name, (_, start) in rows.items() if start is not None}
+    first, last = min(known.values(), default=None), max(known.values(), default=0.0)
+    if any(last > start + dt * len(rows[name][0]) for name, start in known.items()):
+        stated = ", ".join(f"{name} from {_describe_time(start)}" for name, start in known.items())
+        raise InvalidInput(
+            f"the components have no time in common ({stated}): their times contradict; correct "
+            "those of the files, or leave the times out where components begin together"
+        )
+    lead = {name: round((start - (first or 0.0)) / dt) for name, start in known.items()}
+    padded = {name: np.pad(row, (lead.get(name, 0), 0)) for name, (row, _) in rows.items()}
+    return {**padded, "start_time": first}
+
+
+def _describe_time(seconds: float) -> str:
+    """Describe a time on the clock of a file, which counts from 1970 where it has a date [s]."""
+    dated = 1e8 <= abs(seconds) < 1e11
+    return f"{np.datetime64(round(1e3 * seconds), 'ms')}" if dated else f"{seconds:g} s"
 
 
 def count_in_samples(times: float | Array, dt: float) -> Array:

@@ -1,6 +1,7 @@
 """Motions, suites and target spectra of case files."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -159,3 +160,29 @@ def test_a_selected_record_is_read_again_from_its_columns(columns, level, tmp_pa
     (pair,) = build_suite(parse_suite(tomllib.loads(text)["suite"])).pairs
     assert pair.horizontal.tolist() == (1.5 * motion.horizontal).tolist()
     assert pair.vertical.tolist() == (1.5 * motion.vertical).tolist()
+
+
+def test_a_component_of_a_later_time_is_selected_and_read_at_its_time(tmp_path):
+    """Files of one instrument, of which the vertical begins 0.2 s after the horizontal."""
+    shaking = af.Motion.synthetic(duration=4.0, dt=0.01, seed=4)
+    parts = ("NS", 7.0, shaking.horizontal), ("UD", 7.2, shaking.vertical)
+    for number in range(3):
+        for name, begin, row in parts:
+            rows = [f"{begin + 0.01 * k:.2f} {value:.5f}" for k, value in enumerate(row)]
+            head = f"# 1990-01-{number + 1:02d} m/s2\n# time {name}\n"
+            (tmp_path / f"r{number}.{name}").write_text(head + "\n".join(rows) + "\n")
+    target = {"code": "EC8", "ag": 0.25, "ground": "B"}
+    rule = replace(af.motion.SELECTION_RULES["EC8"], lower=0.0, zero_period=0.0)
+    found = af.select_records(tmp_path, af.Eurocode8(0.25, "B"), 0.3, count=3, rule=rule)
+    text = motion_keys.write_selected_suite(found, tmp_path, target)
+    later = np.append(np.zeros(20), shaking.vertical)
+    for record, pair in zip(
+        found.records, build_suite(parse_suite(tomllib.loads(text)["suite"])).pairs, strict=True
+    ):
+        for motion in (record.motion.scaled(record.scale), pair):
+            assert motion.vertical == pytest.approx(record.scale * later, abs=1e-4)
+            assert motion.horizontal == pytest.approx(record.scale * shaking.horizontal, abs=1e-4)
+    # a day later there is no time in common, and the files are left out with the reason
+    (tmp_path / "r0.UD").write_text("# m/s2\n# time UD\n100.00 1.0\n100.01 -1.0\n100.02 0.0\n")
+    with pytest.raises(af.InvalidInput, match=r"r0.NS: .*no time in common \(horizontal from 7 s"):
+        af.select_records(tmp_path, af.Eurocode8(0.25, "B"), 0.3, count=3, rule=rule)

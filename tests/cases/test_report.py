@@ -3,6 +3,7 @@
 import logging
 import shutil
 import tomllib
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from pages import read_page
 
 import archfem as af
 from archfem._files import read_file_list, replace_results
+from archfem.cases.defaults import describe_defaults
 from archfem.cases.report import report, report_data
 from archfem.cases.report.sections import supported_weight_ratio
 from archfem.cases.run import carry_out, replace_run
@@ -195,3 +197,44 @@ def test_results_are_read_though_a_file_was_deleted(kept):
         (draft / "modes.txt").write_text("mode 1 at 3.14 Hz")
     (kept / "modes.txt").unlink()
     assert set(af.cases.open_results(kept).runs) == {"first", "second"}
+
+
+@pytest.mark.parametrize("name", ["rubble", "own"])
+def test_results_need_no_drawing_beside_them(name, undrawn, tmp_path, capsys):
+    """A pier of a drawing is run, and reported and filmed from a folder that was moved alone."""
+    drawing, place = tmp_path / "drawn" / "pier.geojson", tmp_path / "elsewhere"
+    drawing.parent.mkdir()
+    rubble = replace(af.STONE, name=name, unit_weight=17e3)
+    pier = af.column(breadth=0.8, heights=[0.7, 0.9], material=rubble, width=1.0)
+    af.masonry.write_outlines(pier, drawing)
+    # a material under the name of its table, and one that its table gives another name
+    material = {"young": 30e9, "poisson": 0.2, "unit_weight": "17 kN/m**3"}
+    tables = {
+        "title": "a pier",
+        "structure": {"shape": "outlines", "file": drawing.name, "width": 1.0},
+        "materials": {name: material},
+        "model": {"fidelity": "rigid"},
+        "motion": {"synthetic": {"duration": 0.3, "pga": 1.0, "vertical_ratio": 0.0}},
+        "record": {"fields_every": 4},
+    }
+    if name == "own":
+        drawing.write_text(drawing.read_text().replace('"own"', '"coarse"'))
+        tables["materials"] = {"coarse": material | {"name": "own"}}
+    case = af.Case.of(tables, drawing.parent)
+    with replace_run(case, tmp_path / "out") as draft:
+        list(carry_out(case, draft))
+    defaults = describe_defaults(case)
+    shutil.rmtree(drawing.parent)
+    shutil.move(tmp_path / "out", place)
+    found = af.cases.open_results(place)
+    assert replace(found.case.structure, name="a pier") == case.structure
+    if name == "rubble":  # the words name a material by its table
+        assert describe_defaults(found.case) == defaults
+    assert af.commands.main(["report", str(place)]) == 0
+    read_page((place / "report.html").read_text(encoding="utf-8"))
+    given = ["--out", str(place / "film.gif"), "--size", "480x320", "--fps", "5"]
+    assert af.commands.main(["animate", str(place), *given]) == 0
+    # and the history alone
+    assert af.History.read(place / "history.nc").report(tmp_path / "alone.html").is_file()
+    # the case of the folder is one to run
+    assert af.Case.read(place / "case.toml").structure.weight == pytest.approx(pier.weight)

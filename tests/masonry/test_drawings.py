@@ -3,9 +3,11 @@
 import json
 import resource
 import struct
+from itertools import pairwise
 from pathlib import Path
 
 import ezdxf
+import numpy as np
 import pytest
 from drawn import assert_same, dxf, geojson, layers_of, square
 
@@ -42,7 +44,16 @@ def test_round_trip_through_2d_polylines_drawn_clockwise(tmp_path):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"geometry": {"type": "MultiPolygon", "coordinates": [[square(0, 0)]]}}, "a MultiPolygon"),
+        (
+            {
+                "geometry": {
+                    "type": "MultiPolygon",
+                    "coordinates": [[square(0, 0)], [square(2, 0)]],
+                }
+            },
+            "'a' is a MultiPolygon: give each block as one Polygon",
+        ),
+        ({"geometry": {"type": "MultiPolygon", "coordinates": [3]}}, "'a' is a Polygon|Multi"),
         ({"geometry": None}, "'a' is a None"),
         (
             {
@@ -112,9 +123,19 @@ def test_files_that_are_no_drawings(tmp_path):
     [
         (lambda s: s.add_lwpolyline(square(2, 0)), r"at \(2, 0\) on layer '0' is not closed"),
         (lambda s: s.add_line((0, 0), (1, 1)), "layer '0' has a LINE beside its polylines"),
+        (lambda s: s.add_hatch(), "layer '0' has a HATCH beside its polylines: make a closed"),
         (
-            lambda s: s.add_lwpolyline([(2, 0, 0.3), (3, 0, 0), (3, 1, 0)], "xyb", close=True),
-            "has arcs, and joints are straight",
+            lambda s: s.add_solid(square(2, 0), dxfattribs={"layer": "TOP"}),
+            "layer 'TOP' has a SOLID, which would be left out: make a closed polyline of each",
+        ),
+        (lambda s: s.add_trace(square(2, 0)), "layer '0' has a TRACE"),
+        (lambda s: s.add_3dface(square(2, 0)), "layer '0' has a 3DFACE"),
+        (lambda s: s.add_mline(square(2, 0)), "layer '0' has a MLINE"),
+        (lambda s: setattr(s.add_region(), "sat", ["x"]), "layer '0' has a REGION"),
+        (lambda s: s.add_circle((2, 0), 1), "layer '0' has a CIRCLE"),
+        (
+            lambda s: s.add_lwpolyline([(2, 0), (3, 0), (3, 1), (2, 0.002)]),
+            "is not closed, by 2 mm: close it",
         ),
         (lambda s: s.add_polymesh((3, 3)), "is a mesh"),
         (
@@ -127,12 +148,142 @@ def test_files_that_are_no_drawings(tmp_path):
     ],
 )
 def test_dxf_that_cannot_be_read(tmp_path, draw, says):
-    drawing = ezdxf.new()
+    drawing = ezdxf.new("R2000")  # which holds regions as text
     drawing.modelspace().add_lwpolyline(square(0, 0), close=True)
     draw(drawing.modelspace())
     drawing.saveas(tmp_path / "bad.dxf")
     with pytest.raises(af.errors.InvalidInput, match=says):
         af.read_outlines(tmp_path / "bad.dxf")
+
+
+def test_a_multipolygon_of_one_polygon_is_that_polygon(tmp_path):
+    """As QGIS exports layers of polygons."""
+    path = geojson(tmp_path / "qgis.geojson", {"a": square(0, 0), "b": square(0, 1)})
+    one = af.read_outlines(path)
+    table = json.loads(path.read_text())
+    for feature in table["features"]:
+        rings = feature["geometry"]["coordinates"]
+        feature["geometry"] = {"type": "MultiPolygon", "coordinates": [rings]}
+    path.write_text(json.dumps(table))
+    assert af.read_outlines(path).blocks == one.blocks
+
+
+def test_an_outline_whose_ends_coincide_within_snap_is_closed(tmp_path):
+    """Ends that a program prints with other digits, after an arc or a line."""
+    for gap, bulge in ((4e-7, 0.0), (9e-4, 0.0), (4e-7, 0.2)):
+        drawing = ezdxf.new(units=6)
+        points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, bulge), (gap, 0, 0)]
+        drawing.modelspace().add_lwpolyline(points, "xyb")
+        drawing.saveas(tmp_path / "open.dxf")
+        (block,) = af.read_outlines(tmp_path / "open.dxf").blocks
+        # a segment of the half angle 2 atan(0.2) beside the square
+        half = 2.0 * np.arctan(bulge)
+        radius = 0.5 / np.sin(half) if bulge else 0.0
+        segment = radius**2 * (half - 0.5 * np.sin(2.0 * half))
+        assert block.area == pytest.approx(1.0 + segment, abs=1e-3)
+    with pytest.raises(af.InvalidInput, match=r"is not closed, by 0\.0004 mm"):
+        af.read_outlines(tmp_path / "open.dxf", snap=1e-7)
+
+
+def bulged_arch(path, *, mirrored=False, filled=False, count=13):
+    """Draw a semicircular ring of radii 2 and 2.4 m with arcs, on rock, and soil above it."""
+    drawing = ezdxf.new(units=6)
+    space = drawing.modelspace()
+    sense = -1.0 if mirrored else 1.0
+    angles = np.linspace(np.pi, 0.0, count + 1)
+    bulge = np.tan(0.25 * np.pi / count)
+
+    def draw(layer, *vertices):
+        row = [(sense * x, y, sense * b) for x, y, b in vertices]
+        normal = {"extrusion": (0, 0, sense)}
+        # in the coordinates of a polyline whose normal points away, x and the arcs are mirrored
+        row = [(sense * x, y, sense * b) for x, y, b in row]
+        space.add_lwpolyline(row, "xyb", close=True, dxfattribs={"layer": layer} | normal)
+
+    for first, last in pairwise(angles):
+        corners = (2.0, first, -bulge), (2.0, last, 0), (2.4, last, bulge), (2.4, first, 0)
+        draw("ARCH", *((r * np.cos(a), r * np.sin(a), b) for r, a, b in corners))
+    for side in (-1.0, 1.0):
+        x, width = side * 2.0, side * 1.4
+        draw("ROCK", (x, -0.5, 0), (x + width, -0.5, 0), (x + width, 0, 0), (x, 0, 0))
+    if filled:
+        above = (2.4, 0, 0), (3.4, 0, 0), (3.4, 3, 0), (-3.4, 3, 0), (-3.4, 0, 0), (-2.4, 0, -1.0)
+        draw("FILL", *above)
+    drawing.saveas(path)
+    return path
+
+
+ARCH = {
+    "ARCH": af.masonry.Layer(part="arch", role="ring"),
+    "ROCK": af.masonry.Layer(part="rock", role="other", fixed=True),
+}
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_arcs_of_polylines_are_read_to_half_of_snap(tmp_path, mirrored, verified):
+    """A ring drawn with bulges bears as the ring of exact arcs does, and weighs the same."""
+    path = bulged_arch(tmp_path / "arcs.dxf", mirrored=mirrored)
+    exact = af.circular_arch(radius=2.2, thickness=0.4, embrace=180.0, voussoirs=13)
+    area = sum(block.area for block in exact.blocks if not block.fixed)
+    factors = []
+    for snap in (1e-3, 1e-5):
+        found = af.masonry.surveyed(path, layers=ARCH, snap=snap)
+        assert len(found.joints) == 14
+        stones = [block for block in found.blocks if not block.fixed]
+        for block in stones:
+            assert block.corners is not None
+            radii = np.linalg.norm(block.points, axis=1)
+            assert np.minimum(abs(radii - 2.0), abs(radii - 2.4)) == pytest.approx(0.0, abs=1e-9)
+        # chords lie below an arc by 2/3 of their sagitta, a half of snap at most, on average
+        lost = area - sum(block.area for block in stones)
+        assert 0.0 < lost < np.pi * 2.4 * snap / 3.0
+        factors.append(af.collapse_factor(found, live=af.BodyForce(1.0)).factor)
+    reference = af.collapse_factor(exact, live=af.BodyForce(1.0)).factor
+    assert factors == pytest.approx([reference] * 2, rel=1e-3)
+    assert factors[1] == pytest.approx(reference, rel=1e-5)
+    verified("ring drawn with arcs of DXF: collapse factor", reference, "exact arcs", factors[1])
+
+
+def test_stones_on_both_sides_of_an_arc_touch_along_it(tmp_path):
+    """Soil is drawn with one arc over all voussoirs, which it meets chord by chord."""
+    layers = ARCH | {"FILL": af.masonry.Layer(part="backfill", material="backfill", role="other")}
+    path = bulged_arch(tmp_path / "fill.dxf", filled=True)
+    found = af.masonry.surveyed(path, layers=layers)
+    fill = next(k for k, block in enumerate(found.blocks) if block.part == "backfill")
+    along = [joint for joint in found.joints if fill in joint.blocks and joint.middle[1] > 1e-6]
+    length = sum(np.linalg.norm(joint.ends[1] - joint.ends[0]) for joint in along)
+    assert length == pytest.approx(np.pi * 2.4, rel=1e-3)
+    assert {min(joint.blocks) for joint in along} == set(range(13))
+
+
+def test_blocks_inserted_in_a_drawing_are_read(tmp_path):
+    """Of an insert the layer 0 is its own; stones in an array are within another insert."""
+    drawing = ezdxf.new(units=6)
+    space, stone = drawing.modelspace(), drawing.blocks.new("stone")
+    stone.add_lwpolyline(square(0, 0), close=True)
+    stone.add_text("note", dxfattribs={"layer": "NOTES"})
+    outer = drawing.blocks.new("pair")
+    array = {"layer": "PIER", "row_count": 2, "row_spacing": 1.0}
+    outer.add_blockref("stone", (0, 0), dxfattribs=array)
+    space.add_blockref("pair", (5, 1))
+    space.add_lwpolyline(square(5, 0), close=True, dxfattribs={"layer": "ROCK"})
+    space.add_blockref("stone", (9, 9), dxfattribs={"layer": "NOTES"})
+    drawing.saveas(tmp_path / "blocks.dxf")
+    layers = {"PIER": af.masonry.Layer(), "ROCK": af.masonry.Layer(fixed=True)}
+    layers["NOTES"] = af.masonry.Layer(ignore=True)
+    found = af.masonry.surveyed(tmp_path / "blocks.dxf", layers=layers)
+    assert [block.name for block in found.blocks] == ["PIER 1", "PIER 2", "ROCK 1"]
+    assert found.blocks[1].centroid == pytest.approx([5.5, 2.5])
+    # without a row of the table the stones of an insert are named, as any other
+    del layers["PIER"]
+    with pytest.raises(af.InvalidInput, match="of layer 'PIER' nothing is said"):
+        af.read_outlines(tmp_path / "blocks.dxf", layers=layers)
+    array["row_count"] = 30_000
+    for place in range(4):
+        space.add_blockref("stone", (place, 0), dxfattribs=array)
+    drawing.saveas(tmp_path / "blocks.dxf")
+    with pytest.raises(af.InvalidInput, match="more than 100000 entities"):
+        read_drawing(tmp_path / "blocks.dxf")
 
 
 def test_dxf_without_a_unit(tmp_path, stack):

@@ -61,6 +61,25 @@ def test_matching_twice_changes_little(match):
     assert np.abs(again.motion.horizontal - match.motion.horizontal).max() < 0.05 * match.motion.pga
 
 
+def test_a_fling_that_matching_takes_out_is_said_with_its_size(shaking, caplog):
+    """A pulse of whole sine, 2 π d/T² high, moves the ground by d = 1 m in T = 3 s."""
+    times = shaking.times()
+    pulse = np.sin(2.0 * np.pi * (times - 4.0) / 3.0) * ((times >= 4.0) & (times <= 7.0))
+    fling = af.Motion(shaking.horizontal + 2.0 * np.pi / 9.0 * pulse, shaking.dt, name="fling")
+    periods = np.geomspace(0.05, 2.0, 100)
+    own = af.response_spectrum(fling, periods) / af.units.STANDARD_GRAVITY
+    with caplog.at_level("WARNING", logger="archfem"):
+        match = matched(fling, af.motion.TableSpectrum(periods, own))
+    (said,) = caplog.messages
+    assert "motion 'fling', horizontal: matching took out a displacement of 1 m at the end" in said
+    before, after = match.before["horizontal"], match.after["horizontal"]
+    assert before.pgd > 1.0 > 2.0 * after.pgd
+    assert f"PGD was {before.pgd:.3g} and is {after.pgd:.3g} m, PGV {before.pgv:.3g}" in said
+    caplog.clear()
+    matched(shaking.with_vertical(None), CASE_STUDY)  # which ends where it began
+    assert not caplog.messages
+
+
 def test_other_spectra_and_bands(shaking):
     target = af.Eurocode8(ag=0.25, ground="B")
     level = shaking.with_vertical(None)

@@ -1,6 +1,8 @@
 """The record readers: every format by content, every doubt refused with file and line."""
 
+import re
 import runpy
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -278,6 +280,176 @@ def test_time_and_acceleration_in_columns(write):
         assert motion.dt == pytest.approx(0.02)
         assert motion.pga == pytest.approx(0.1 * unit)
         assert len(motion.horizontal) == 50
+
+
+SHAKING = af.Motion.synthetic(duration=9.99, seed=2, dt=0.01)
+UPRIGHT, ACROSS = SHAKING.vertical, af.Motion.synthetic(duration=9.99, seed=5, dt=0.01).horizontal
+
+
+def table(*columns, between=" "):
+    """Print columns of numbers, of which a time has six decimals."""
+    rows = zip(*columns, strict=True)
+    return "".join(between.join(f"{value:.6f}" for value in row) + "\n" for row in rows)
+
+
+@pytest.mark.parametrize("width", [2, 3, 7, 8])
+def test_samples_that_follow_one_another_along_the_lines_are_read_in_order(write, width):
+    """As in 8F10.6, with a shorter last line where their number is no multiple."""
+    rows = [SHAKING.horizontal[k : k + width] for k in range(0, 1000, width)]
+    text = "".join("".join(f"{value:10.6f}" for value in row) + "\n" for row in rows)
+    path = write("# m/s2, dt = 0.01 s\n" + text)
+    (found,) = read_channels(path)
+    assert found.samples == pytest.approx(SHAKING.horizontal, abs=1e-6)
+    with pytest.raises(af.InvalidInput, match="column 2 is not an acceleration of this file"):
+        read_channels(path, column=2)
+
+
+@pytest.mark.parametrize("others", [(UPRIGHT, ACROSS), (SHAKING.horizontal,) * 2, (UPRIGHT,) * 7])
+def test_columns_beside_one_another_are_no_samples_along_the_lines(write, others):
+    """Components of their own, the same one again, and an instrument among others."""
+    path = write("# m/s2, dt = 0.01 s\n" + table(SHAKING.horizontal, *others))
+    said = r"columns could be .* choose with column=.* name them above.* write one a line"
+    with pytest.raises(af.InvalidInput, match=said):
+        read_channels(path)
+    (found,) = read_channels(path, column=1)
+    assert found.samples == pytest.approx(SHAKING.horizontal, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("head", "timed"),
+    [
+        ("Z,N,E (m/s2)", False),
+        ("Time (s),HNZ (m/s2),HNN (m/s2),HNE (m/s2)", True),
+        ("# station 41.2 N 29.0 E, m/s2\n# t acc_Z acc_N acc_E", True),
+        ("m/s2\nsec; vertical; north; east", True),
+    ],
+)
+def test_heads_name_components_by_letters_codes_and_words(write, head, timed):
+    columns = [UPRIGHT, SHAKING.horizontal, ACROSS]
+    columns = [SHAKING.times(), *columns] if timed else columns
+    between = ";" if ";" in head else ","
+    path = write(f"{head}\n" + table(*columns, between=between))
+    motion = af.Motion.read(path, dt=None if timed else 0.01)
+    assert motion.components == ("horizontal", "vertical", "transverse")
+    for name, row in (("horizontal", SHAKING.horizontal), ("vertical", UPRIGHT)):
+        assert motion.component(name) == pytest.approx(row, abs=1e-6)
+    assert motion.transverse == pytest.approx(ACROSS, abs=1e-6)
+
+
+def test_single_letters_in_other_words_name_no_columns(write):
+    path = write("# 41.2 N 29.0 E, m/s2, dt = 0.01 s\n" + table(UPRIGHT, ACROSS))
+    with pytest.raises(af.InvalidInput, match="2 columns could be the acceleration"):
+        read_channels(path)
+
+
+@pytest.mark.parametrize(
+    ("form", "begin"),
+    [
+        ("%Y/%m/%d %H:%M:%S.%f", 1704125409.0),
+        ("%Y-%m-%dT%H:%M:%S.%fZ", 1704125409.0),
+        ("%d.%m.%Y,%H:%M:%S.%f", 1704125409.0),
+        ("%H:%M:%S.%f", 58209.0),
+    ],
+)
+def test_a_clock_in_the_first_column_is_time(write, form, begin):
+    """1704125409 s after 1970 it was 16:10:09 UTC on the first of January 2024."""
+    start = datetime(2024, 1, 1, 16, 10, 9)
+    clock = [(start + timedelta(milliseconds=10 * k)).strftime(form) for k in range(1000)]
+    rows = table(SHAKING.horizontal, ACROSS, UPRIGHT, between=",").splitlines()
+    lines = (f"{time},{row}\n" for time, row in zip(clock, rows, strict=True))
+    path = write(
+        "Station,CHB003\nRecord Time,2024/01/01 16:10:09\n"
+        "Time,N-S(m/s2),E-W(m/s2),U-D(m/s2)\n" + "".join(lines)
+    )
+    motion = af.Motion.read(path)
+    assert (motion.dt, motion.start_time) == (0.01, begin)
+    assert motion.vertical == pytest.approx(UPRIGHT, abs=1e-6)
+    assert motion.transverse == pytest.approx(ACROSS, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("head", "unit"),
+    [
+        ("time (s), acc (gal/10)", 1e-3),
+        ("time (s), acc (10 x cm/s2)", 0.1),
+        ("# units of g/10", 0.980665),
+        ("acc (gal), PGA 312.5 gal", 1e-2),
+        ("# 0.1 gal", None),
+        ("# 10^-2 x m/s2", None),
+        ("# in gal/count", None),
+        ("# in gal/10^2", None),
+    ],
+)
+def test_factors_of_a_unit_count_or_are_refused(write, head, unit):
+    path = write(f"{head}\n" + table(SHAKING.times(), SHAKING.horizontal))
+    if unit is None:
+        with pytest.raises(af.InvalidInput, match=r"no unit|several units"):
+            af.Motion.read(path)
+        unit = 1e-3
+        motion = af.Motion.read(path, units="0.1 gal")
+    else:
+        motion = af.Motion.read(path)
+    assert motion.pga == pytest.approx(unit * SHAKING.pga, rel=1e-6)
+
+
+def knet_from(second):
+    """The sample of K-NET, whose record begins at a second of a minute."""
+    return SAMPLES["knet"].replace("Sampl", f"Record Time       2014/12/31 23:49:{second}\nSampl")
+
+
+def test_components_of_stated_times_are_shifted_by_their_difference(write):
+    """CSV of the seconds 0 and 3; K-NET of 15 and 15 s; ESM of a millisecond's clock."""
+    rows = table(np.arange(40) * 0.01, DAMAGE["WAVE"])
+    later = table(0.3 + np.arange(40) * 0.01, 2.0 * DAMAGE["WAVE"])
+    files = [write("# m/s2\n" + text, name) for text, name in ((rows, "a"), (later, "b"))]
+    shifted = np.append(np.zeros(30), 2.0 * DAMAGE["WAVE"])
+    motion = af.Motion.read(files[0], vertical=files[1])
+    assert motion.start_time == 0.0
+    assert motion.vertical == pytest.approx(shifted, abs=1e-6)
+    assert motion.horizontal == pytest.approx(DAMAGE["WAVE"], abs=1e-6)
+    # the other way round the horizontal waits, and a part of the motion keeps its time
+    motion = af.Motion.read(files[1], vertical=files[0]).cut(0.1)
+    assert motion.horizontal == pytest.approx(shifted[10:], abs=1e-6)
+    again = motion.with_transverse(af.Motion.read(files[1]))
+    assert again.transverse == pytest.approx(shifted[10:], abs=1e-6)
+    # a motion of no file begins with the other
+    assert len(motion.with_vertical(af.Motion(np.ones(9), 0.01)).vertical) == 9
+
+
+@pytest.mark.parametrize(
+    ("form", "key", "value"),
+    [
+        ("knet", "Sampling Freq", "Record Time       2014/12/31 23:49:1{}\n"),
+        ("afad", "NUMBER", "RECORD TIME             : 20/07/2017 22:30:5{}.000000 (GMT)\r\n"),
+        ("esm", "NDATA", "DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS: 20190728_16090{}.000\n"),
+        ("cwb", "#RecordLength", "#StartTime: 2018/02/06-23:50:4{}.000\n"),
+        ("cosmos", " 100 Int", "Rcrd start time: 11/30/2018, 17:29:3{}.000 UTC (Q=5)\n"),
+    ],
+)
+def test_formats_state_the_time_of_their_first_sample(write, form, key, value):
+    at = SAMPLES[form].index(key)
+    begins = []
+    for second in (5, 8):
+        text = SAMPLES[form][:at] + value.format(second) + SAMPLES[form][at:]
+        begins.append(read_channels(write(text))[0].start_time)
+    assert begins[1] - begins[0] == 3.0
+    assert begins[0] % 60.0 == float(re.search(r"(\d){}", value)[1] + "5")
+    damaged = (
+        value.replace("2014/12", "2014/19").replace("20/07", "20/13").replace("201907", "201913")
+    )
+    damaged = damaged.replace("/02/06", "/02/31").replace("11/30", "21/30").format(5)
+    with pytest.raises(af.InvalidInput, match="is no time"):
+        read_channels(write(SAMPLES[form][:at] + damaged + SAMPLES[form][at:]))
+
+
+def test_components_without_a_time_in_common_are_refused(write):
+    """K-NET of records 3 s apart that last 0.4 s; and a date beside the seconds of a file."""
+    files = [write(knet_from(second), f"{second}.EW") for second in (15, 18)]
+    rows = "# m/s2\n" + table(np.arange(40) * 0.01, DAMAGE["WAVE"])
+    said = r"horizontal from 2014-12-31T23:49:15.000, vertical from .*their times contradict"
+    for other in (files[1], write(rows)):
+        with pytest.raises(af.InvalidInput, match=said):
+            af.Motion.read(files[0], vertical=other)
 
 
 @pytest.mark.parametrize(

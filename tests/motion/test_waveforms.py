@@ -115,6 +115,29 @@ def test_a_case_names_its_response_beside_its_record(miniseed, tmp_path):
     assert len(digests) == 2
 
 
+def test_a_channel_that_begins_later_is_shifted(miniseed, tmp_path):
+    """Zeros stand where the instrument of the vertical did not record yet."""
+    obspy = pytest.importorskip("obspy")
+    header = {"network": "XX", "station": "PLC", "delta": 0.01}
+    begin = obspy.UTCDateTime(2020, 1, 1)
+    codes = ("HNZ", 3.0), ("HNN", 0.0), ("HNE", 0.004)
+    traces = [
+        obspy.Trace(COUNTS, {**header, "channel": code, "starttime": begin + later})
+        for code, later in codes
+    ]
+    path = tmp_path / "three.mseed"
+    obspy.Stream(traces).write(path, format="MSEED")
+    motion = af.Motion.read(path, units="0.0000025 m/s2")
+    assert motion.start_time == begin.timestamp
+    assert motion.vertical == pytest.approx(np.append(np.zeros(300), WAVE), abs=1e-12)
+    for name in ("horizontal", "transverse"):  # to the nearest step
+        assert motion.component(name) == pytest.approx(WAVE, abs=1e-12)
+    traces[0].stats.starttime = begin + 9.0
+    obspy.Stream(traces).write(path, format="MSEED")
+    with pytest.raises(af.InvalidInput, match=r"vertical from 2020-01-01T00:00:09\.000"):
+        af.Motion.read(path, units="0.0000025 m/s2")
+
+
 def test_pieces_that_meet_are_one_and_a_gap_is_refused(miniseed, tmp_path):
     path = miniseed((0, COUNTS[:150]), (1.5, COUNTS[150:]))
     assert af.Motion.read(path, response=station(tmp_path)).horizontal == pytest.approx(WAVE)

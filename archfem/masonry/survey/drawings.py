@@ -8,10 +8,14 @@ are damaged raise errors of any class there.
 import json
 import re
 import resource
+from cmath import rect
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice, pairwise
+from math import acos, atan, ceil, dist, radians, tau
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +29,14 @@ from archfem.masonry.block import measure_polygon
 from archfem.masonry.structure import suggest_name
 from archfem.units import in_unit
 
-# Entities of a DXF file that are read; with other curves stones are drawn too, but not outlined
+# Entities of a DXF file that are read, and those that draw no stone; all others may draw one
 POLYLINES = ("LWPOLYLINE", "POLYLINE")
-OTHER_CURVES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT")
+ANNOTATIONS = (
+    *("TEXT", "MTEXT", "ATTDEF", "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION", "LEADER"),
+    *("MULTILEADER", "TOLERANCE", "POINT", "RAY", "XLINE", "VIEWPORT", "IMAGE", "WIPEOUT"),
+    *("PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY", "OLE2FRAME", "ACAD_TABLE", "LIGHT", "SUN"),
+)
+MAX_ENTITIES = 100_000  # blocks inserted into blocks may be any number
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +52,12 @@ class Outline:
 
 
 def read_drawing(
-    path: str | Path, unit: str | None = None, ignored: Collection[str] = ()
+    path: str | Path, unit: str | None = None, ignored: Collection[str] = (), snap: float = 1e-3
 ) -> list[Outline]:
-    """Read the closed polygons of a drawing, without those on ignored layers."""
+    """Read the closed polygons of a drawing, without ignored layers; arcs stray by half of snap."""
     path = Path(path)
-    readers = {".geojson": _read_geojson, ".json": _read_geojson}
-    readers |= {".dxf": _read_dxf, ".msh": _read_msh}
+    readers = {".geojson": _read_geojson, ".json": _read_geojson, ".msh": _read_msh}
+    readers[".dxf"] = partial(_read_dxf, snap=snap)
     if (read := readers.get(path.suffix.lower())) is None:
         raise InvalidInput(f"{path} is no drawing: give a .geojson, a .dxf or a .msh file")
     check_file(path, "drawing", max_bytes=2**25)
@@ -143,9 +152,11 @@ def _read_feature(feature: dict[str, Any], number: int, factor: float) -> Outlin
     name = str(data.get("name") or f"outline {number}")
     _check_properties(data, name)
     geometry = _as_table(feature.get("geometry"), f"'geometry' of '{name}'")
-    rings = geometry.get("coordinates")
-    if geometry.get("type") != "Polygon" or not isinstance(rings, list) or not rings:
-        raise InvalidInput(f"'{name}' is a {geometry.get('type')}: give each block as one Polygon")
+    kind, rings = geometry.get("type"), geometry.get("coordinates")
+    if kind == "MultiPolygon" and isinstance(rings, list) and len(rings) == 1:
+        kind, rings = "Polygon", rings[0]
+    if kind != "Polygon" or not isinstance(rings, list) or not rings:
+        raise InvalidInput(f"'{name}' is a {kind}: give each block as one Polygon")
     if len(rings) > 1:
         raise InvalidInput(f"'{name}' has a hole: cut it into blocks without holes")
     points = _check_polygon(rings[0], f"'{name}'", factor)
@@ -176,31 +187,38 @@ class Entity:
     points: list[tuple[float, ...]]  # vertices, or the place of a text, in drawing units
     text: str = ""
     closed: bool = False
-    has_arc: bool = False
     is_mesh: bool = False
+    # tangent of a quarter of the angle of each edge, positive where its arc turns left
+    bulges: tuple[float, ...] = ()
 
 
-def _read_dxf(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
+def _read_dxf(
+    path: Path, unit: str | None, ignored: Collection[str], snap: float
+) -> Iterator[Outline]:
     """Read the closed polylines of a DXF file, named by the texts inside them."""
     with _foreign_reader("ezdxf", "DXF drawing"):
-        entities, own_unit = _load_dxf(path)
-    read = [entity for entity in entities if entity.layer not in ignored]
+        read, own_unit = _load_dxf(path, ignored)
+    if len(read) > MAX_ENTITIES:
+        raise InvalidInput(f"it has more than {MAX_ENTITIES} entities: leave out other things")
     polylines = [entity for entity in read if entity.kind in POLYLINES]
     layers = {entity.layer for entity in polylines}
-    for entity in read:
-        if entity.kind in OTHER_CURVES and entity.layer in layers:
-            raise InvalidInput(
-                f"layer '{entity.layer}' has a {entity.kind} beside its polylines: make "
-                "a closed polyline of each stone, and leave out layers of other things"
-            )
-    curves = Counter(entity.kind for entity in read if entity.kind in OTHER_CURVES)
-    if curves and not polylines:
+    others = [each for each in read if each.kind not in (*POLYLINES, *ANNOTATIONS, "INSERT")]
+    if others and not polylines:
+        curves = Counter(entity.kind for entity in others)
         found = ", ".join(f"{count} {kind}" for kind, count in curves.items())
         raise InvalidInput(f"it has no polylines, but {found}: make a closed one of each stone")
+    for kind, layer in ((each.kind, each.layer) for each in others):
+        beside = " beside its polylines" if layer in layers else ", which would be left out"
+        raise InvalidInput(
+            f"layer '{layer}' has a {kind}{beside}: make a closed polyline of each stone, and "
+            "ignore layers of other things"
+        )
     if unit is None and own_unit is None:
         raise InvalidInput('the drawing does not say its unit ($INSUNITS): give one, e.g. "mm"')
     factor = in_unit(f"1 {unit}", "m", "unit") if unit is not None else float(own_unit or 1.0)
-    outlines = [_read_polyline(entity, factor) for entity in polylines]
+    points = (complex(*point[:2]) for each in polylines for point in each.points)
+    corners = np.array([point for point in points if abs(point) < 1e12])  # others are refused
+    outlines = [_read_polyline(entity, factor, snap, corners) for entity in polylines]
     texts = []
     for entity in read:
         if text := entity.text:
@@ -212,46 +230,106 @@ def _read_dxf(path: Path, unit: str | None, ignored: Collection[str]) -> Iterato
         yield replace(outline, name=_block_name(outline, texts, counts[outline.layer]))
 
 
-def _load_dxf(path: Path) -> tuple[list[Entity], float | None]:
-    """Load polylines, texts and other curves of a DXF file, and its unit [m] if it has one."""
+def _load_dxf(path: Path, ignored: Collection[str]) -> tuple[list[Entity], float | None]:
+    """Load all entities of a DXF file but ignored layers, and its unit [m] if it has one."""
     from ezdxf import units  # slow to import
     from ezdxf.enums import InsertUnits
     from ezdxf.filemanagement import readfile
 
     drawing: Any = readfile(path)
     entities = []
-    for entity in drawing.modelspace():
-        kind, layer = entity.dxftype(), entity.dxf.layer
+    for entity, layer in islice(_walk_dxf(drawing.modelspace(), ignored), MAX_ENTITIES + 1):
+        kind = entity.dxftype()
         if kind in POLYLINES:
             light = kind == "LWPOLYLINE"
             points = map(tuple, entity.vertices_in_wcs() if light else entity.points_in_wcs())
             is_mesh = not (light or entity.is_2d_polyline or entity.is_3d_polyline)
-            kinds = entity.is_closed, entity.has_arc, is_mesh
+            # a mirrored polyline has its normal downwards, and arcs on the other side
+            sense = -1.0 if entity.dxf.extrusion.z < 0.0 else 1.0
+            row = [v[0] for v in entity.get_points("b")] if light else entity.vertices
+            bulges = tuple(sense * (v if light else v.dxf.get("bulge", 0.0)) for v in row)
+            kinds = entity.is_closed, is_mesh, bulges
             entities.append(Entity(kind, layer, list(points), "", *kinds))
         elif kind in ("TEXT", "MTEXT"):
             place = entity.dxf.insert if kind == "MTEXT" else entity.get_placement()[1]
             text = " ".join(entity.plain_text().split())
             entities.append(Entity(kind, layer, [(place.x, place.y)], text))
-        elif kind in OTHER_CURVES:
+        else:
             entities.append(Entity(kind, layer, []))
     known = drawing.units  # 0 where the drawing has none
     factor = units.conversion_factor(known, InsertUnits.Meters) if known else None
     return entities, factor
 
 
-def _read_polyline(entity: Entity, factor: float) -> Outline:
-    """Return the outline of a closed polyline."""
+def _walk_dxf(
+    space: Any, ignored: Collection[str], parent: str | None = None
+) -> Iterator[tuple[Any, str]]:
+    """Yield entities and their layers, also those of inserted blocks, but ignored layers."""
+    lost: list[tuple[Any, str]] = []  # of a block, which ezdxf does not transform
+
+    def keep(part: Any, _: str) -> None:
+        lost.append((part, part.dxf.layer))
+
+    for entity in space:
+        # within a block, layer 0 is that of the insert
+        layer = parent if parent is not None and entity.dxf.layer == "0" else entity.dxf.layer
+        if layer in ignored:
+            continue
+        copied = entity.dxftype() == "INSERT" and entity.mcount > 1
+        for each in entity.multi_insert() if copied else (entity,):
+            yield each, layer
+            if each.dxftype() == "INSERT":
+                parts = each.virtual_entities(skipped_entity_callback=keep)
+                yield from _walk_dxf(parts, ignored, layer)
+    yield from lost
+
+
+def _draw_arcs(entity: Entity, corners: Array, snap: float) -> list[tuple[float, ...]]:
+    """Return the vertices of a polyline with chords of its arcs, which stray by half of snap.
+
+    An arc is divided at the corners of all outlines along it, then evenly between these, so that
+    outlines on both sides of it have the same vertices.
+    """
+    points, bulges = entity.points, (*entity.bulges, *[0.0] * len(entity.points))
+    drawn = list[tuple[float, ...]]()
+    for point, after, bulge in zip(points, points[1:] + points[:1], bulges, strict=False):
+        drawn.append(point)
+        start, end, turn = complex(*point[:2]), complex(*after[:2]), 4.0 * atan(bulge)
+        if start == end or not 1e-9 < abs(bulge) < 1e6:
+            continue
+        # p₁ - p₀ = arm (exp(i θ) - 1), with the arm from the centre to p₀
+        arm = (end - start) / (rect(1.0, turn) - 1.0)
+        near = snap / abs(arm)
+        # stones keep their corners where other vertices turn by at most 10 degrees
+        step = min(max(2.0 * acos(max(1.0 - 0.5 * near, 0.0)), 1e-3), radians(9.0))
+        away = (corners - start) / arm + 1.0
+        angles = np.copysign(1.0, turn) * np.angle(away) % tau
+        on = (np.abs(np.abs(away) - 1.0) <= near) & (angles > near) & (angles < abs(turn) - near)
+        breaks = [0.0, *sorted(angles[on]), abs(turn)]
+        for low, high in pairwise(breaks):
+            for angle in np.linspace(low, high, ceil((high - low) / step) + 1)[1:]:
+                place = start + arm * (rect(1.0, np.copysign(angle, turn)) - 1.0)
+                drawn.append((place.real, place.imag, *point[2:]))
+        drawn.pop()  # the end, which is the next vertex
+    return drawn
+
+
+def _read_polyline(entity: Entity, factor: float, snap: float, corners: Array) -> Outline:
+    """Return the outline of a closed polyline, whose ends may be apart by the tolerance."""
     given, layer = entity.points, entity.layer
     if not given:
         raise InvalidInput(f"a polyline on layer '{layer}' has no vertices: take it out")
     where = f"a polyline at ({given[0][0]:.6g}, {given[0][1]:.6g}) on layer '{layer}'"
     if entity.is_mesh:
         raise InvalidInput(f"{where} is a mesh: draw the block as a closed polyline")
-    if entity.has_arc:
-        raise InvalidInput(f"{where} has arcs, and joints are straight: draw chords instead")
-    if not entity.closed and given[0] != given[-1]:
-        raise InvalidInput(f"{where} is not closed: close it, or leave its layer out")
-    return Outline(_check_polygon(given, where, factor), where, layer)
+    _check_coordinates(given, where, factor)
+    if not entity.closed:
+        if (gap := factor * dist(given[0], given[-1])) > snap:
+            apart = f"is not closed, by {1e3 * gap:.3g} mm"
+            raise InvalidInput(f"{where} {apart}: close it, or leave its layer out")
+        entity = replace(entity, points=given[:-1] if len(given) > 1 else given)
+    points = _draw_arcs(entity, corners, snap / factor)
+    return Outline(_check_polygon(points, where, factor), where, layer)
 
 
 def _block_name(outline: Outline, texts: list[tuple[str, Array]], number: int) -> str:

@@ -102,7 +102,8 @@ def read_outlines(
     Args:
         path: GeoJSON file, DXF file or gmsh mesh of an elevation, y upwards.
         unit: unit of the coordinates; by default that of the DXF file, and metres otherwise.
-        snap: vertices and edges nearer than this are made to touch [m].
+        snap: vertices and edges nearer than this are made to touch; chords stand for arcs, to half
+            of it [m].
         layers: properties of all layers of the drawing by name. Role, material and fixed of a
             GeoJSON feature take precedence.
         material: material of blocks for which neither feature nor layer names one.
@@ -115,7 +116,7 @@ def read_outlines(
     """
     known = layers or {}
     ignored = [name for name, layer in known.items() if layer.ignore]
-    outlines = read_drawing(path, unit, ignored)
+    outlines = read_drawing(path, unit, ignored, snap)
     if layers is not None:
         _check_layers(outlines, layers, path)
     try:

@@ -1,12 +1,19 @@
 """Plain columns of accelerations, with a time column or a step from header or keyword."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
 from archfem._typing import Array
 from archfem._validation import check_number
-from archfem.motion.records.record_file import NUMBER_PATTERN, Channel, RecordText, parse_unit
+from archfem.motion.records.record_file import (
+    CLOCK_PATTERN,
+    NUMBER_PATTERN,
+    Channel,
+    RecordText,
+    parse_unit,
+)
 
 
 def read(
@@ -15,16 +22,25 @@ def read(
     """Read the acceleration columns of a plain file."""
     # Lines before the first line of numbers, and lines that begin with #, %, ! or *, are comments;
     # they may state units and step. An increasing first column is time.
-    rows, lines, comments = _read_table(text)
+    text = _count_seconds(text)
+    rows, rest, lines, comments = _read_table(text)
     unit = _find_unit(text, comments, units)
     step = _find_step(text, rows, lines, _list_stated_steps(comments, dt))
     first = 1 if _is_time(rows) else 0
+    directions = _find_directions(comments, rows.shape[1], first)
+    if not (first or directions) and _runs_along_lines(rows):
+        rows, rest = np.append(rows, rest)[:, None], []
+    if rest:
+        raise text.error(
+            "the last row is shorter than the others: the file is cut short", lines[-1]
+        )
     if column is None:
         chosen = list(range(first, rows.shape[1]))
-        directions = re.findall(r"\b(?:N-S|E-W|U-D|NS|EW|UD|UP|DOWN)\b", comments.upper())
         if len(chosen) != 1 and len(directions) != len(chosen):
             raise text.error(
-                f"{len(chosen)} columns could be the acceleration: choose with column=, from 1"
+                f"{len(chosen)} columns could be the acceleration: choose with column=, from 1; "
+                "name them above, as N-S, E-W or U-D; or, where the samples follow one another "
+                "along the lines, write one a line"
             )
     else:
         if not first < column <= rows.shape[1]:
@@ -34,13 +50,48 @@ def read(
             )
         chosen, directions = [column - 1], []
     named = directions if len(directions) == len(chosen) else [""] * len(chosen)
-    return Channel.from_table(rows[:, chosen] * unit, step, named)
+    begin = float(rows[0, 0]) if first else None
+    return Channel.from_table(rows[:, chosen] * unit, step, named, begin)
 
 
-def _read_table(text: RecordText) -> tuple[Array, list[int], str]:
-    """Return the numbers (n, columns), their line numbers, and all comments in one string."""
+def _count_seconds(text: RecordText) -> RecordText:
+    """Return the text with a time of the clock in front of numbers in seconds."""
+    lines = list(text.lines)
+    for line, content in enumerate(lines):
+        if found := re.match(rf"\s*{CLOCK_PATTERN}Z?(?=[\s,;]+[-+.\d])", content):
+            lines[line] = f"{text.parse_clock(found[0], line):.6f}{content[found.end() :]}"
+    return replace(text, lines=tuple(lines))
+
+
+def _find_directions(comments: str, width: int, first: int) -> list[str]:
+    """Return the directions of the columns from the first acceleration on, as far as named."""
+    words = r"N-S|E-W|U-D|NS|EW|UD|UP|DOWN"
+    name = rf"(?:^|[\s_])({words}|[BCEHLS][NLG][ZNE12]|[ZNEV]|NORTH|EAST|VERT(?:ICAL)?)(?=$|[\s_])"
+    # single letters name columns only in a head that has a cell for each column
+    for comment in reversed(comments.upper().splitlines()):
+        head = re.sub(r"[(\[].*?[)\]]", " ", comment).strip("#%!* \t")
+        cells = re.split(r"\s*[,;\t]\s*" if re.search(r"[,;\t]", head) else r"\s+", head.strip())
+        found = [re.search(name, cell) for cell in cells[first:]]
+        if len(cells) == width and all(found):
+            return [match[1] for match in found if match]
+    return re.findall(rf"\b(?:{words})\b", comments.upper())
+
+
+def _runs_along_lines(rows: Array) -> bool:
+    """Return whether samples follow one another along the lines of a table, by their steps."""
+    if len(rows) < 10 or rows.shape[1] < 2:
+        return False
+    along = np.abs(np.diff(rows.ravel()))
+    by_column = [along[k :: rows.shape[1]].mean() for k in range(rows.shape[1])]
+    # steps are as large within a line as to the next, and smaller than down a column
+    down = np.abs(np.diff(rows, axis=0)).mean()
+    return bool(max(by_column) < 1.5 * min(by_column) and along.mean() < 0.8 * down)
+
+
+def _read_table(text: RecordText) -> tuple[Array, list[float], list[int], str]:
+    """Return numbers (n, columns), a shorter last row, line numbers, and comments in one string."""
     start = text.header_length()
-    comments, table, lines = list(text.lines[:start]), [], []
+    comments, table, lines = list(text.lines[:start]), list[list[float]](), list[int]()
     for line in range(start, len(text.lines)):
         content = text.lines[line].strip()
         if content.startswith(("#", "%", "!", "*")):
@@ -48,17 +99,19 @@ def _read_table(text: RecordText) -> tuple[Array, list[int], str]:
         elif content:
             table.append(text.parse_row(line))
             lines.append(line)
-            if len(table[-1]) != len(table[0]):
-                raise text.error(
-                    f"{len(table[-1])} columns where the first row has {len(table[0])}: this is "
-                    "neither a table nor a known format",
-                    line,
-                )
+    rest = table.pop() if len(table[-1]) < len(table[0]) else []
+    for row, line in zip(table, lines, strict=False):
+        if len(row) != len(table[0]):
+            raise text.error(
+                f"{len(row)} columns where the first row has {len(table[0])}: this is neither a "
+                "table nor a known format",
+                line,
+            )
     _refuse_decimal_commas(text, start, "\n".join(comments))
     text.check_end()
     if len(table) < 2:
         raise text.error("one row is no accelerogram", start)
-    return np.array(table), lines, "\n".join(comments)
+    return np.array(table), rest, lines, "\n".join(comments)
 
 
 def _refuse_decimal_commas(text: RecordText, start: int, comments: str) -> None:
@@ -87,12 +140,12 @@ def _find_unit(text: RecordText, comments: str, units: str | None) -> float:
     written = text.find_units(comments)
     if units is not None:
         unit = parse_unit(units)
-        if written and unit not in written:
+        if written and not np.isclose(unit, list(written), rtol=1e-9, atol=0.0).any():
             raise text.error(f"units={units!r} contradicts the unit stated in the comments")
         return unit
     if len(written) != 1:
         found = "no unit" if not written else "several units"
-        raise text.error(f"the comments state {found}: give units= as g, m/s2, cm/s2 or gal")
+        raise text.error(f"the comments state {found}: give units= as g, m/s2, gal or 0.1 gal")
     return written.pop()
 
 

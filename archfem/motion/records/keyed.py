@@ -20,7 +20,9 @@ def read_afad(text: RecordText) -> list[Channel]:
     stated = [float(peak) * unit for peak in re.findall(rf"\)\s*({NUMBER_PATTERN})", peaks[2])]
     # the header has the peaks before the correction of the offset
     _check_peaks(text, table, stated, tolerance=0.5)
-    return Channel.from_table(table, text.check_step(float(step[1]), step_line), names.groups())
+    dt = text.check_step(float(step[1]), step_line)
+    start_time = text.find_start(r"^\s*RECORD TIME\s*:")
+    return Channel.from_table(table, dt, names.groups(), start_time)
 
 
 def read_unam(text: RecordText) -> list[Channel]:
@@ -67,7 +69,7 @@ def read_cwb(text: RecordText) -> list[Channel]:
     extremes = rf"^#AmplitudeMAX\.\s*%s:\s*({NUMBER_PATTERN})\s*~\s*({NUMBER_PATTERN})"
     stated = [max(map(float, text.find(extremes % name)[1].groups()), key=abs) for name in names]
     _check_peaks(text, table[:, 1:], stated, rounding=0.0005)
-    return Channel.from_table(table[:, 1:] * unit, dt, names)
+    return Channel.from_table(table[:, 1:] * unit, dt, names, text.find_start("^#StartTime"))
 
 
 def _read_table(text: RecordText, first: int, count: int, width: int) -> Array:
@@ -100,7 +102,8 @@ def read_esm(text: RecordText) -> list[Channel]:
     if peak := _find_value(text, r"PGA_CM/S\^2"):
         text.check_peak(samples, 0.01 * _parse_number(text, peak))
     direction = _find_value(text, "STREAM") or _find_value(text, "COMPONENT")
-    return [Channel.from_direction(samples, dt, direction)]
+    start = text.find_start(r"^\s*DATE_TIME_FIRST_SAMPLE_YYYY")
+    return [Channel.from_direction(samples, dt, direction, start)]
 
 
 def _find_value(text: RecordText, key: str) -> str:
@@ -145,7 +148,8 @@ def read_knet(text: RecordText) -> list[Channel]:
     dt = text.check_step(1.0 / frequency, rate_line)
     # kiK-net numbers its components: 1 to 3 in the borehole, 4 to 6 at the surface
     name = "U-D" if direction in ("3", "6") else direction
-    return [Channel.from_direction(samples, dt, name)]
+    start = text.find_start(r"^\s*Record Time\s")
+    return [Channel.from_direction(samples, dt, name, start)]
 
 
 def read_peer(text: RecordText) -> list[Channel]:

@@ -48,7 +48,8 @@ def _read_channel(text: RecordText, start: int) -> tuple[Channel, int]:
         raise text.error(f"more follows after the {count} samples stated", after)
     # codes of the azimuth of a vertical sensor
     direction = {400: "Up", 401: "Down", 402: "Vertical"}.get(azimuth, code[1])
-    return Channel.from_direction(numbers * unit, dt, direction), end + 1
+    start_time = text.find_start(r"\bRcrd start time", start, line)
+    return Channel.from_direction(numbers * unit, dt, direction, start_time), end + 1
 
 
 def _read_header(text: RecordText, kind: str, start: int) -> tuple[list[float], int]:
@@ -77,21 +78,21 @@ def read_smc(text: RecordText) -> list[Channel]:
     comments = text.lines[comment_line:start]
     if comment_count < 0 or not all(comment.lstrip().startswith("|") for comment in comments):
         raise text.error(f"{len(comments)} comment lines expected", comment_line)
-    samples, dt = _read_samples(text, start, sample_count, rate, real_line)
+    samples, dt, begin = _read_samples(text, start, sample_count, rate, real_line)
     if not np.isnan([maximum, minimum]).all():
         text.check_peak(samples, np.nanmax(np.abs([maximum, minimum])))
     written = re.search(r"component\s*=\s*(\S+)", " ".join(text.lines[:integer_line]))
     # degrees from the upward vertical
     direction = {0: "UP", 180: "DOWN"}.get(tilt, written[1] if written else "")
-    return [Channel.from_direction(0.01 * samples, dt, direction)]
+    return [Channel.from_direction(0.01 * samples, dt, direction, begin)]
 
 
 def _read_samples(
     text: RecordText, start: int, count: int, rate: float, line: int
-) -> tuple[Array, float]:
-    """Return the samples [cm/s²] and their step [s], from a rate that may be unknown (NaN)."""
+) -> tuple[Array, float, float | None]:
+    """Return samples [cm/s²], step and start [s], of which rate (NaN) and start may be unknown."""
     if rate > 0.0:
-        return text.read_last_block(start, count), text.check_step(1.0 / rate, line)
+        return text.read_last_block(start, count), text.check_step(1.0 / rate, line), None
     if "UNCORRECTED" not in text.lines[0]:
         raise text.error("the real header does not state the sampling rate", line)
     # a digitised film has pairs of a time and a sample, of which the count is that of numbers

@@ -103,6 +103,13 @@ def read_components(path: str | PathLike[str], **options: Any) -> dict[str, Chan
     return named | ({"vertical": upright[0]} if upright else {})
 
 
+def join_channels(channels: Mapping[str, Channel]) -> dict[str, Any]:
+    """Return the fields of a motion, with each component at its time."""
+    rows = {name: (channel.samples, channel.start_time) for name, channel in channels.items()}
+    dt = channels["horizontal"].dt
+    return {"dt": dt} | signal_processing.align_starts(rows, dt)
+
+
 def read_channels(
     path: str | PathLike[str],
     *,

@@ -4,6 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from math import isfinite
 from os import PathLike
 from pathlib import Path
@@ -17,8 +18,18 @@ from archfem.units import STANDARD_GRAVITY
 # Pattern of a number as Fortran and C print it
 NUMBER_PATTERN = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
 
+# Pattern of a factor of a unit, which is not zero
+_FACTOR = r"(?=[\d.]*[1-9])(?:\d{1,9}(?:\.\d{0,9})?|\.\d{1,9})(?:e[-+]?\d\d?)?"
+
 # Pattern of a number of samples
 COUNT_PATTERN = r"\d{1,9}"
+
+
+# Pattern of a time on the clock, after a date where there is one
+CLOCK_PATTERN = (
+    r"(?<![\d:])(?:(\d{4}|\d\d?)([-/.]?)(\d\d?)\2(\d{4}|\d\d?)[T\s_,;-]+(?=\d{6}|\d\d?:)"
+    r"|(?=\d\d?:))(\d\d?):?(\d\d):?(\d\d(?:\.\d*)?)(?![\d:])"
+)
 
 
 @dataclass(frozen=True)
@@ -158,6 +169,28 @@ class RecordText:
         matches = ((line, search(text)) for line, text in enumerate(self.lines[start:stop], start))
         return next(((line, match) for line, match in matches if match), None)
 
+    def find_start(self, key: str, start: int = 0, stop: int | None = None) -> float | None:
+        """Return the time on the line of a key [s] since 1970, None where there is no such line."""
+        found = self.search(key, start, stop)
+        return None if found is None else self.parse_clock(self.lines[found[0]], found[0])
+
+    def parse_clock(self, words: str, line: int) -> float | None:
+        """Convert the first date and time in words to seconds since 1970; None without any."""
+        found = re.search(CLOCK_PATTERN, words)
+        if found is None:
+            return None
+        first, _, month, last, hour, minute, second = found.groups()
+        if first is None:  # the seconds of a day
+            first, month, last = "1970", "1", "1"
+        year, day = (first, last) if len(first) == 4 else (last, first)
+        # the order of day and month is that of the larger number; no shift depends on it
+        month, day = (day, month) if int(month) > 12 else (month, day)
+        try:
+            date_time = datetime(int(year), int(month), int(day), int(hour), int(minute), 0, 0, UTC)
+        except ValueError as error:
+            raise self.error(f"{found[0]!r} is no time: {error}", line) from error
+        return date_time.timestamp() + float(second)
+
     def contains(self, pattern: str, stop: int, start: int = 0) -> bool:
         """Return whether a line contains a pattern."""
         return self.search(pattern, start, stop) is not None
@@ -196,8 +229,8 @@ class RecordText:
         step, begin = np.polyfit(count, times, 1)
         return step, np.abs(times - begin - step * count).max()
 
-    def space_evenly(self, pairs: Array, line: int) -> tuple[Array, float]:
-        """Return samples at a constant step, and the step [s], of pairs of time and sample."""
+    def space_evenly(self, pairs: Array, line: int) -> tuple[Array, float, float]:
+        """Return samples at a constant step, step and start [s], of pairs of time and sample."""
         times, samples = np.reshape(pairs, (-1, 2)).T
         if len(times) < 2 or not np.all(np.diff(times) >= 0.0):
             raise self.error("pairs of a time and a sample are expected, but times decrease", line)
@@ -205,11 +238,11 @@ class RecordText:
         step = self.check_step(float(f"{mean:.6g}"), line)
         # printed times are rounded; a film is digitised at uneven ones
         if apart <= 0.25 * mean:
-            return samples, step
+            return samples, step, float(times[0])
         # between its points a digitised trace is straight, and 1 ms is finer than they are
         fine = 0.001
         even = np.arange(times[0], times[-1] + 0.5 * fine, fine)
-        return np.interp(even, times, samples), fine
+        return np.interp(even, times, samples), fine, float(times[0])
 
     @staticmethod
     def find_column_width(line: str) -> int | None:
@@ -220,19 +253,31 @@ class RecordText:
     @staticmethod
     def find_units(header: str) -> set[float]:
         """Return the values of the units of acceleration in a header [m/s²]."""
-        # longer units first: each match is removed before the search for the next
+        # Longer units first: each match is removed before the search for the next. A number with
+        # an operator is a factor, as in gal/10; without one, as in 312 gal, it is a value.
         patterns = (
             (r"mm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-3),
             (r"cms?\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-2),
             (r"\bgals?\b", 1e-2),
             (r"\bm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1.0),
-            (r"units?\s*(?:of|:|=|in)?\s*\(?g\b|[(\[]\s*g\s*[)\]]|\bin\s+g\b", STANDARD_GRAVITY),
+            (
+                r"units?\s*(?:of|:|=|in)?\s*\(?g\b|[(\[]\s*g(?=\s*(?:[/x×*·][^)\]]*)?[)\]])|\bin\s+g\b",
+                STANDARD_GRAVITY,
+            ),
         )
-        units = set()
+        units, power = set[float](), rf"(?:10|1/)?[-+]?{_FACTOR}"
         for pattern, unit in patterns:
-            header, count = re.subn(pattern, " ", header, flags=re.IGNORECASE)
-            if count:
-                units.add(unit)
+            while found := re.search(pattern, header, re.IGNORECASE):
+                head, tail = header[: found.start()].lower(), header[found.end() :].lower()
+                before = re.search(rf"(?<![\w.^*+-])({_FACTOR})\s*[x×*·]\s*$", head)
+                after = re.match(rf"\s*([/x×*·])\s*({_FACTOR})(?![\w.^*])", tail)
+                valued = re.search(
+                    rf"(?:(?:^|[\s(\[=:,^*]){power}|\)\s*[x×*·])\s*[x×*·]?\s*$", head
+                )
+                if (before or not valued) and (after or not re.match(r"\s*/\s*\w", tail)):
+                    numbers = after.groups() if after else (None, None)
+                    units.add(unit * _combine_factors(before and before[1], *numbers))
+                header = f"{head} {tail}"
         return units
 
 
@@ -244,27 +289,43 @@ class Channel:
     dt: float  # time between samples [s]
     direction: str = ""  # what the file calls the component, e.g. `N-S`, `270`, `UP`
     is_vertical: bool = False  # whether the component is the vertical one
+    start_time: float | None = None  # of the first sample on the file's clock [s]; None if unknown
 
     @classmethod
-    def from_direction(cls, samples: Array, dt: float, direction: str) -> "Channel":
+    def from_direction(
+        cls, samples: Array, dt: float, direction: str, start_time: float | None = None
+    ) -> "Channel":
         """Create a channel; a vertical component with positive downwards changes its sign."""
         name = direction.strip()
         if re.search(r"\b(DWN|DOWN|DN)\b|DWN$", name, re.IGNORECASE):
-            return cls(-samples, dt, f"{name}, turned up", True)
+            return cls(-samples, dt, f"{name}, turned up", True, start_time)
         upward = r"\b(UP|UPDO|VERT|VERTICAL|V|VER|U-D|UD|U|Z|[A-Z]{2}Z)\b|UP$"
-        return cls(samples, dt, name, bool(re.search(upward, name, re.IGNORECASE)))
+        return cls(samples, dt, name, bool(re.search(upward, name, re.IGNORECASE)), start_time)
 
     @classmethod
-    def from_table(cls, table: Array, dt: float, names: Sequence[str]) -> "list[Channel]":
+    def from_table(
+        cls, table: Array, dt: float, names: Sequence[str], start_time: float | None = None
+    ) -> "list[Channel]":
         """Create a channel of each column of a table (n, columns)."""
         columns = zip(table.T, names, strict=True)
-        return [cls.from_direction(column, dt, name) for column, name in columns]
+        return [cls.from_direction(column, dt, name, start_time) for column, name in columns]
 
 
 def parse_unit(name: str) -> float:
-    """Return the value of a unit of acceleration by its name [m/s²]."""
+    """Return the value of a unit of acceleration by its name, or of a multiple of it [m/s²]."""
     unit_names = {"g": STANDARD_GRAVITY, "m/s2": 1.0, "cm/s2": 1e-2, "gal": 1e-2, "mm/s2": 1e-3}
     key = str(name).lower().replace("²", "2").replace("^", "").replace(" ", "")
-    if key not in unit_names:
-        raise InvalidInput(f"units {name!r} are unknown: use one of {', '.join(unit_names)}")
-    return unit_names[key]
+    found = re.fullmatch(
+        rf"(?:({_FACTOR})[x×*·]?)?(mm/s2|cm/s2|m/s2|gal|g)(?:([/x×*·])({_FACTOR}))?", key
+    )
+    if found is None:
+        known = ", ".join(unit_names)
+        raise InvalidInput(
+            f"units {name!r} are unknown: use one of {known}, or a multiple such as 0.1 gal"
+        )
+    return unit_names[found[2]] * _combine_factors(*found.group(1, 3, 4))
+
+
+def _combine_factors(before: str | None, operator: str | None, after: str | None) -> float:
+    """Return the factor of a unit from the number before it, and the operator and number after."""
+    return float(before or 1.0) * float(after or 1.0) ** (-1.0 if operator == "/" else 1.0)

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -95,14 +96,14 @@ def _read_pairs(text: RecordText, start: int, end: int) -> Channel:
     _check_end(text, after, end, count)
     if abs(numbers[-2] - numbers[0] - duration) > 0.02 * duration:
         raise text.error(f"the points do not last {duration:g} s, as the header states", line)
-    samples, dt = text.space_evenly(numbers, first)
+    samples, dt, begin = text.space_evenly(numbers, first)
     rms_pattern = rf"^\s*RMS ACC\w*\.? OF COMPLETE RECORD\s*=\s*({NUMBER_PATTERN})\s*G/10"
     if stated := text.search(rms_pattern, line, first):
         rms = float(np.sqrt(np.mean(numbers[1::2] ** 2)))
         # USC states no peak but the rms, of later files to 1 %, of earlier ones up to 1.9 times
         if not 0.4 * rms < float(stated[1][1]) + 0.001 < 2.5 * rms + 0.002:
             raise text.error(f"the rms of the points is {rms:.3f} G/10: damaged", stated[0])
-    return _create_channel(text, samples * unit, dt, (start, first))
+    return replace(_create_channel(text, samples * unit, dt, (start, first)), start_time=begin)
 
 
 def _find_volume_1_header(text: RecordText, start: int, end: int) -> tuple[int, int, float, float]:

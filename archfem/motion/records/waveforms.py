@@ -52,7 +52,8 @@ def read(
         samples = np.asarray(trace.data, dtype=float)
         samples = (samples - samples.mean()) * scale
         dt = RecordText(Path(path), (), True).check_step(float(trace.stats.delta))
-        channels.append(Channel.from_direction(samples, dt, trace.stats.channel))
+        begin = float(trace.stats.starttime.timestamp)
+        channels.append(Channel.from_direction(samples, dt, trace.stats.channel, begin))
     return channels
 
 
