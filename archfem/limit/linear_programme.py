@@ -107,11 +107,8 @@ class RigidBlocks:
     def rates(self) -> sparse.csr_matrix:
         """Openings of intrados and extrados ends, and slips (3 n_joints, 3 n_blocks) [-, m]."""
         structure, (intrados, extrados) = self.structure, np.moveaxis(self.structure.ends, 1, 0)
-        frames = (
-            (structure.normals, intrados),
-            (structure.normals, extrados),
-            (structure.tangents, intrados),
-        )
+        normals, tangents = structure.normals, structure.tangents
+        frames = (normals, intrados), (normals, extrados), (tangents, intrados)
         rows = [jump_rates(*frame, structure.pairs, structure.centroids) for frame in frames]
         return sparse.vstack(rows, format="csr")
 
@@ -323,10 +320,8 @@ class ReducedBalance:
         self._alone = np.flatnonzero(used & (coheres | ~np.isfinite(friction)))
         self._map = _cone_generators(friction, used, self._alone, columns.shape[1])
         self._count = self._map.shape[1] - columns.shape[1]
-        loads = sparse.csr_matrix(
-            (columns.data, columns.indices + self._count, columns.indptr),
-            (columns.shape[0], self._map.shape[1]),
-        )
+        entries = columns.data, columns.indices + self._count, columns.indptr
+        loads = sparse.csr_matrix(entries, (columns.shape[0], self._map.shape[1]))
         if len(chains.pivots):
             self._eliminate(loads[~chains.kept])
         self._equations = chains.balance @ self._map + loads[chains.kept]

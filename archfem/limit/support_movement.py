@@ -52,10 +52,7 @@ GEOMETRY_TOLERANCE = 1e-8
 class End(ExplainedWord):
     """Reason for which a movement ends."""
 
-    FALLS = (
-        "falls",
-        "beyond, no thrust line fits into the shape that it has taken, and it falls",
-    )
+    FALLS = ("falls", "beyond, no thrust line fits into the shape that it has taken, and it falls")
     LEAPS = "leaps", "beyond, no equilibrium lies near: it leaps to another, or falls"
     SLIDES = "slides", "beyond, a joint needs more than its friction and slides"
     LOCKS = "locks", "without sliding in its joints it cannot follow any further"

@@ -232,19 +232,18 @@ class Rating(ResultDisplay):
         factors = self.moving.factors["factor"].min("position")
         least = (f"{way} {float(factors.sel(direction=way)):.4g}" for way in DRIVING_DIRECTIONS)
         favourable = "EN 1990:2002, Table A2.4(B), favourable; from memory"
-        return "\n".join(
-            [
-                f"{self._summary()}",
-                f"least factor driving {', '.join(least)}",
-                f"{self.moving}",
-                f"geometric factor of safety at that place: {self._geometric_text()}",
-                f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN "
-                f"over {self.width:.3g} m of width; {source}",
-                f"live load by {self.live:g} ({self._source('live')})",
-                f"impact by {self.impact:g} ({self._source('impact')})",
-                f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
-            ]
-        )
+        lines = [
+            f"{self._summary()}",
+            f"least factor driving {', '.join(least)}",
+            f"{self.moving}",
+            f"geometric factor of safety at that place: {self._geometric_text()}",
+            f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN "
+            f"over {self.width:.3g} m of width; {source}",
+            f"live load by {self.live:g} ({self._source('live')})",
+            f"impact by {self.impact:g} ({self._source('impact')})",
+            f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
+        ]
+        return "\n".join(lines)
 
     def _source(self, factor: str) -> str:
         """Return where a factor on the vehicle comes from."""

@@ -285,13 +285,8 @@ def _build_observer(model: Model, operator: JointOperator) -> LinearObserver:
     structure, cells = model.structure, model.cells
     of_faces, face_offset = face_matrix(operator)
     corners = cells.corners(structure)
-    return LinearObserver(
-        sparse.vstack([of_faces, cells.shapes_at(corners)], "csr"),
-        # corners are read from zero on
-        np.concatenate([face_offset, np.zeros(2 * len(corners))]),
-        len(structure.joints),
-        cells.block[corners],
-        structure,
-        cells,
-        model.support_motion,
-    )
+    matrix = sparse.vstack([of_faces, cells.shapes_at(corners)], "csr")
+    # corners are read from zero on
+    offset = np.concatenate([face_offset, np.zeros(2 * len(corners))])
+    count, owner = len(structure.joints), cells.block[corners]
+    return LinearObserver(matrix, offset, count, owner, structure, cells, model.support_motion)

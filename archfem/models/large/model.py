@@ -346,7 +346,7 @@ class LargeDisplacementModel(Model):
 
     def gather_forces(self, force: Array) -> Array:
         """Return generalised forces from those on the coordinates of each face (n,)."""
-        return np.bincount(self._rows, force.ravel()[self._forces], self.size)
+        return np.asarray(np.bincount(self._rows, force.ravel()[self._forces], self.size), float)
 
     def assemble_tangent(
         self, block_factor: float, joint_factor: float, forces: JointStepForces
