@@ -18,7 +18,7 @@ import xarray as xr
 from scipy import sparse
 
 from archfem._typing import Array, Degrees, Flags, Numbers, Pascals
-from archfem._validation import check_number, check_type, is_one_of, short_repr
+from archfem._validation import check_choice, check_number, check_type
 from archfem.errors import InvalidInput
 from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks, rigid_load
@@ -105,10 +105,7 @@ class Fill:
                 raise InvalidInput(
                     f"fill, {key} {getattr(self, key):.4g} is above 1: give a part of the pressure"
                 )
-        if self.dispersal not in (choices := ("boussinesq", "uniform")):
-            raise InvalidInput(
-                f"fill, dispersal {self.dispersal!r} is not known: use one of {choices}"
-            )
+        check_choice(self.dispersal, "fill, dispersal", ("boussinesq", "uniform"))
         if not 0.1 <= self.spread <= 80.0:
             raise InvalidInput(
                 f"fill, spread {self.spread:.4g}° is not between 0.1° and 80°: give degrees from "
@@ -518,8 +515,7 @@ def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
 
 def _check_options(structure: Structure, friction: str | None, strength: float | None) -> None:
     """Refuse unknown options, and joints with tensile strength, which break and do not yield."""
-    if not is_one_of(friction, choices := ("coulomb", "nonassociated", None)):
-        raise InvalidInput(f"friction {short_repr(friction)} is not known: use one of {choices}")
+    check_choice(friction, "friction", ("coulomb", "nonassociated", None))
     if strength is not None and not check_number(strength, "strength [Pa]") > 0.0:
         raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
     if structure.tension.any():

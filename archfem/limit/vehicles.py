@@ -166,7 +166,14 @@ def moving_load(
     worst = collapse_factor(structure, live=list(rows[direction][place]), **options)
     if friction == "nonassociated":
         factors[direction, place] = worst.factor  # by the whole search: may be a weaker state
-    dataset = _label_factors(places, factors, count)
+    dims = ("direction", "position")
+    variables = {
+        "factor": (dims, factors, {"units": "1", "long_name": "factor at collapse"}),
+        "axles": (dims, count, {"units": "1", "long_name": "axles on the structure"}),
+    }
+    position = ("position", places, {"units": "m"})
+    coordinates = {"direction": list(DRIVING_DIRECTIONS), "position": position}
+    dataset = xr.Dataset(variables, coordinates)
     return MovingLoad(dataset, worst, DRIVING_DIRECTIONS[direction], float(places[place]))
 
 
@@ -494,17 +501,6 @@ def _find_worst(factors: Array, count: Numbers) -> tuple[int, int]:
         flat = (factors <= (1.0 + 1e-6) * factors[finite].min()).argmax()
     direction, place = np.unravel_index(flat, factors.shape)
     return int(direction), int(place)
-
-
-def _label_factors(places: Array, factors: Array, count: Numbers) -> xr.Dataset:
-    """Return factors and numbers of axles over direction and position."""
-    dims = ("direction", "position")
-    variables = {
-        "factor": (dims, factors, {"units": "1", "long_name": "factor at collapse"}),
-        "axles": (dims, count, {"units": "1", "long_name": "axles on the structure"}),
-    }
-    position = ("position", places, {"units": "m"})
-    return xr.Dataset(variables, {"direction": list(DRIVING_DIRECTIONS), "position": position})
 
 
 VEHICLES: Mapping[str, Vehicle] = _read_vehicles()
