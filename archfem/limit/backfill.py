@@ -342,11 +342,9 @@ class FillContacts:
 
     def thrust(self, pressure: Array, width: float) -> tuple[Array, Array]:
         """Return points and resultants (n, 2) of pressures that are linear along each piece."""
-        rise = np.abs(self.ends[:, 1, 1] - self.ends[:, 0, 1])
-        size = self.toward * pressure.mean(axis=1) * rise * width
-        points = self.ends[:, 0] + _centroid_share(pressure)[:, None] * (
-            self.ends[:, 1] - self.ends[:, 0]
-        )
+        along = self.ends[:, 1] - self.ends[:, 0]
+        size = self.toward * pressure.mean(axis=1) * np.abs(along[:, 1]) * width
+        points = self.ends[:, 0] + _centroid_share(pressure)[:, None] * along
         return points, np.stack([size, np.zeros(len(size))], axis=1)
 
 

@@ -118,9 +118,8 @@ class LinearBlockModel(Model):
 
     def assemble_tangent(self, block_factor: float, stiffness: Array) -> sparse.csr_matrix:
         """Return the block stiffness times a factor, plus the tangent of the joints (n, n)."""
-        return self._pattern.with_data(
-            block_factor * self.block_stiffness.data + self._joint_tangent @ stiffness
-        )
+        of_joints = self._joint_tangent @ stiffness
+        return self._pattern.with_data(block_factor * self.block_stiffness.data + of_joints)
 
     def closed_tangent(self) -> sparse.csr_matrix:
         """Return the tangent with every joint closed over its whole depth, without slip."""

@@ -520,9 +520,8 @@ def _find_first_mechanism(
             "friction 'nonassociated' is searched for the whole structure only: leave out part "
             "and blocks, or use 'coulomb'"
         )
-    found = collapse_factor(
-        placed.structure, live=BodyForce(placed.direction), friction="nonassociated"
-    )
+    live = BodyForce(placed.direction)
+    found = collapse_factor(placed.structure, live=live, friction="nonassociated")
     if not found.motion.any():
         return mechanism
     contacts = placed.touching(joints)

@@ -149,9 +149,8 @@ class ContactFaces:
 
     def _shear_path(self, step: Fields) -> Fields:
         """Elastic traction at the start, and its change without further slip [Pa]."""
-        return self._trial_shear(step[0]), shear_traction(
-            self.slip(step[1]) - self.slip(step[0]), self._stiffness[1]
-        )
+        change = self.slip(step[1]) - self.slip(step[0])
+        return self._trial_shear(step[0]), shear_traction(change, self._stiffness[1])
 
     def _mean_limit(self, step: Fields, lag: Any) -> Any:
         """Coulomb's limit over a step: that of the mean normal traction [Pa]."""

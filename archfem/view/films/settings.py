@@ -149,9 +149,8 @@ class Setup:
         if falls is None:
             return self
         size, cells = self.model.structure.size, self.model.cells
-        places = np.array(
-            [falls.places(cells.places, cells.block, float(time)) for time in falls.times]
-        )
+        moved = (falls.places(cells.places, cells.block, float(time)) for time in falls.times)
+        places = np.array(list(moved))
         points = np.concatenate([*places, [self.low, self.high]])
         low = np.maximum(points.min(axis=0), self.low - size)
         high = np.minimum(points.max(axis=0), self.high + size)
