@@ -21,7 +21,7 @@ from archfem._typing import Array, Degrees, Flags, Numbers, Pascals
 from archfem._validation import check_choice, check_number, check_type
 from archfem.errors import InvalidInput
 from archfem.joints.rigid_kinematics import jump_rates
-from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks, rigid_load
+from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
 from archfem.masonry.loads import BodyForce, PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
@@ -409,7 +409,7 @@ class BlocksWithFill:
                 if self._place[number] < 0:
                     total += self._spread_load(action, point)
                     continue
-            total += rigid_load(self.rigid_regions.structure, [action])
+            total += RigidBlocks(self.rigid_regions.structure).load([action])
         return total
 
     def _spread_load(self, load: PointLoad, point: Array) -> Array:
