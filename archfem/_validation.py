@@ -142,6 +142,12 @@ def is_one_of(value: Any, known: Collection[Any]) -> bool:
     return isinstance(value, (str, *_NUMBER_TYPES, NoneType)) and value in known
 
 
+def check_choice(value: Any, name: str, choices: Collection[Any]) -> None:
+    """Refuse a value that is not one of some strings or numbers."""
+    if not is_one_of(value, choices):
+        raise InvalidInput(f"{name} {short_repr(value)} is not known: use one of {choices}")
+
+
 def is_number(value: Any) -> bool:
     """Return whether a value is a finite number that a float can hold."""
     try:

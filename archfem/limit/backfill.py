@@ -18,10 +18,10 @@ import xarray as xr
 from scipy import sparse
 
 from archfem._typing import Array, Degrees, Flags, Numbers, Pascals
-from archfem._validation import check_number, check_type, is_one_of, short_repr
+from archfem._validation import check_choice, check_number, check_type
 from archfem.errors import InvalidInput
 from archfem.joints.rigid_kinematics import jump_rates
-from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks, rigid_load
+from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
 from archfem.masonry.loads import BodyForce, PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
@@ -105,10 +105,7 @@ class Fill:
                 raise InvalidInput(
                     f"fill, {key} {getattr(self, key):.4g} is above 1: give a part of the pressure"
                 )
-        if self.dispersal not in (choices := ("boussinesq", "uniform")):
-            raise InvalidInput(
-                f"fill, dispersal {self.dispersal!r} is not known: use one of {choices}"
-            )
+        check_choice(self.dispersal, "fill, dispersal", ("boussinesq", "uniform"))
         if not 0.1 <= self.spread <= 80.0:
             raise InvalidInput(
                 f"fill, spread {self.spread:.4g}° is not between 0.1° and 80°: give degrees from "
@@ -345,11 +342,9 @@ class FillContacts:
 
     def thrust(self, pressure: Array, width: float) -> tuple[Array, Array]:
         """Return points and resultants (n, 2) of pressures that are linear along each piece."""
-        rise = np.abs(self.ends[:, 1, 1] - self.ends[:, 0, 1])
-        size = self.toward * pressure.mean(axis=1) * rise * width
-        points = self.ends[:, 0] + _centroid_share(pressure)[:, None] * (
-            self.ends[:, 1] - self.ends[:, 0]
-        )
+        along = self.ends[:, 1] - self.ends[:, 0]
+        size = self.toward * pressure.mean(axis=1) * np.abs(along[:, 1]) * width
+        points = self.ends[:, 0] + _centroid_share(pressure)[:, None] * along
         return points, np.stack([size, np.zeros(len(size))], axis=1)
 
 
@@ -414,7 +409,7 @@ class BlocksWithFill:
                 if self._place[number] < 0:
                     total += self._spread_load(action, point)
                     continue
-            total += rigid_load(self.rigid_regions.structure, [action])
+            total += RigidBlocks(self.rigid_regions.structure).load([action])
         return total
 
     def _spread_load(self, load: PointLoad, point: Array) -> Array:
@@ -518,8 +513,7 @@ def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
 
 def _check_options(structure: Structure, friction: str | None, strength: float | None) -> None:
     """Refuse unknown options, and joints with tensile strength, which break and do not yield."""
-    if not is_one_of(friction, choices := ("coulomb", "nonassociated", None)):
-        raise InvalidInput(f"friction {short_repr(friction)} is not known: use one of {choices}")
+    check_choice(friction, "friction", ("coulomb", "nonassociated", None))
     if strength is not None and not check_number(strength, "strength [Pa]") > 0.0:
         raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
     if structure.tension.any():

@@ -383,8 +383,8 @@ def warn_cohesion(
     strength = structure.cohesion * contact_fractions(structure, normal, moment)
     holds = np.isfinite(structure.friction) & (structure.cohesion > 0.0)
     strength[holds] += structure.friction[holds] * normal[holds]
-    # round-off of the linear programme
-    limit = (1.0 + 1e-6) * strength + 1e-6 * structure.cohesion
+    tolerance = 1e-6  # relative, above the round-off of the linear programme
+    limit = (1.0 + tolerance) * strength + tolerance * structure.cohesion
     beyond = holds & (np.abs(shear) > limit)
     if overstrained := [number for number in sorted(failing) if beyond[number]]:
         logger.warning(

@@ -56,23 +56,6 @@ def solve_linear(
     raise DidNotConverge(f"the linear programme found no state: {result.message}")
 
 
-def rigid_load(structure: Structure, actions: Sequence[BodyForce | PointLoad]) -> Array:
-    """Return the generalised forces of actions on the free blocks (3 n_free,) [N, N, N m]."""
-    load = np.zeros(3 * len(structure.free))
-    for action in actions:
-        if isinstance(action, BodyForce):
-            free = [structure.blocks[number] for number in structure.free]
-            weight = np.array([b.area * b.material.unit_weight * structure.width for b in free])
-            load[0::3] += weight * action.horizontal
-            load[1::3] += weight * action.vertical
-        else:
-            number, point = action.place(structure)
-            motion = rigid_motion_matrix(point[None, :], structure.centroids[number])[0]
-            first = structure.first_coordinates[number]
-            load[first : first + 3] += np.array(action.force) @ motion
-    return load
-
-
 @dataclass(frozen=True, eq=False)
 class RigidBlocks:
     """Rigid blocks of a structure, with forces at the two ends of each joint."""
@@ -107,11 +90,8 @@ class RigidBlocks:
     def rates(self) -> sparse.csr_matrix:
         """Openings of intrados and extrados ends, and slips (3 n_joints, 3 n_blocks) [-, m]."""
         structure, (intrados, extrados) = self.structure, np.moveaxis(self.structure.ends, 1, 0)
-        frames = (
-            (structure.normals, intrados),
-            (structure.normals, extrados),
-            (structure.tangents, intrados),
-        )
+        normals, tangents = structure.normals, structure.tangents
+        frames = (normals, intrados), (normals, extrados), (tangents, intrados)
         rows = [jump_rates(*frame, structure.pairs, structure.centroids) for frame in frames]
         return sparse.vstack(rows, format="csr")
 
@@ -147,6 +127,23 @@ class RigidBlocks:
             chains = self._chains[blocks]
             self._reductions[key] = ReducedBalance(chains, columns, friction, coheres)
         return self._reductions[key]
+
+    def load(self, actions: Sequence[BodyForce | PointLoad]) -> Array:
+        """Return the generalised forces of actions on the free blocks (3 n_free,) [N, N, N m]."""
+        structure = self.structure
+        load = np.zeros(3 * len(structure.free))
+        for action in actions:
+            if isinstance(action, BodyForce):
+                free = [structure.blocks[number] for number in structure.free]
+                weight = np.array([b.area * b.material.unit_weight * structure.width for b in free])
+                load[0::3] += weight * action.horizontal
+                load[1::3] += weight * action.vertical
+            else:
+                number, point = action.place(structure)
+                motion = rigid_motion_matrix(point[None, :], structure.centroids[number])[0]
+                first = structure.first_coordinates[number]
+                load[first : first + 3] += np.array(action.force) @ motion
+        return load
 
     def dimensionless(self, load: Array) -> Array:
         """Return generalised forces in the programme's units (3 n_free,)."""
@@ -323,10 +320,8 @@ class ReducedBalance:
         self._alone = np.flatnonzero(used & (coheres | ~np.isfinite(friction)))
         self._map = _cone_generators(friction, used, self._alone, columns.shape[1])
         self._count = self._map.shape[1] - columns.shape[1]
-        loads = sparse.csr_matrix(
-            (columns.data, columns.indices + self._count, columns.indptr),
-            (columns.shape[0], self._map.shape[1]),
-        )
+        entries = columns.data, columns.indices + self._count, columns.indptr
+        loads = sparse.csr_matrix(entries, (columns.shape[0], self._map.shape[1]))
         if len(chains.pivots):
             self._eliminate(loads[~chains.kept])
         self._equations = chains.balance @ self._map + loads[chains.kept]

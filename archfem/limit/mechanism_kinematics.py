@@ -79,14 +79,10 @@ def _select_blocks(structure: Structure, blocks: tuple[int, ...]) -> RigidRegion
     )
     if len(blocks) == len(structure.blocks) and len(joints) == len(structure.joints):
         return RigidRegions(structure, blocks, joints, len(blocks))
-    selected = replace(
-        structure,
-        blocks=tuple(structure.blocks[number] for number in blocks),
-        joints=tuple(
-            replace(joint, blocks=(place[joint.blocks[0]], place[joint.blocks[1]]))
-            for joint in map(structure.joints.__getitem__, joints)
-        ),
-    )
+    kept = [structure.joints[number] for number in joints]
+    renumbered = (replace(j, blocks=(place[j.blocks[0]], place[j.blocks[1]])) for j in kept)
+    those = tuple(structure.blocks[number] for number in blocks)
+    selected = replace(structure, blocks=those, joints=tuple(renumbered))
     return RigidRegions(selected, blocks, joints, len(structure.blocks))
 
 

@@ -316,9 +316,8 @@ def _bound_objective(programme: Programme, smallest: Array) -> float:
             normal = _least_objective(replace(programme, force_cost=cost, unknown_cost=no_cost))
             least[joint] = max(normal - RESISTANCE_MARGIN, 0.0)
     negated = None if programme.force_cost is None else -programme.force_cost
-    highest = -_least_objective(
-        replace(programme, force_cost=negated, unknown_cost=-programme.unknown_cost)
-    )
+    opposite = replace(programme, force_cost=negated, unknown_cost=-programme.unknown_cost)
+    highest = -_least_objective(opposite)
     try:
         safe = with_shear_limits(programme, shear_resistance(programme, least)).solve()
     except DidNotConverge:  # no equilibrium with so little friction

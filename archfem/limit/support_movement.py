@@ -31,13 +31,7 @@ from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.backfill import SELF_WEIGHT
 from archfem.limit.collapse import stands
 from archfem.limit.displaced_blocks import PlacedBlocks
-from archfem.limit.linear_programme import (
-    NoEquilibrium,
-    Optimum,
-    Programme,
-    RigidBlocks,
-    rigid_load,
-)
+from archfem.limit.linear_programme import NoEquilibrium, Optimum, Programme, RigidBlocks
 from archfem.masonry.block import rotate
 from archfem.masonry.loads import Settlement
 from archfem.masonry.structure import Structure, join_names
@@ -52,10 +46,7 @@ GEOMETRY_TOLERANCE = 1e-8
 class End(ExplainedWord):
     """Reason for which a movement ends."""
 
-    FALLS = (
-        "falls",
-        "beyond, no thrust line fits into the shape that it has taken, and it falls",
-    )
+    FALLS = ("falls", "beyond, no thrust line fits into the shape that it has taken, and it falls")
     LEAPS = "leaps", "beyond, no equilibrium lies near: it leaps to another, or falls"
     SLIDES = "slides", "beyond, a joint needs more than its friction and slides"
     LOCKS = "locks", "without sliding in its joints it cannot follow any further"
@@ -276,7 +267,7 @@ class _MovementPath:
         gaps = np.where(np.abs(gaps) > 1e-10 * self.structure.size, gaps, 0.0)
         if further is not None:
             gaps = gaps + blocks.gaps(further)
-        load = blocks.dimensionless(rigid_load(self.structure, [SELF_WEIGHT]))
+        load = blocks.dimensionless(blocks.load([SELF_WEIGHT]))
         rough = np.full(len(self.structure.joints), np.inf)  # friction is checked afterwards
         cost = np.concatenate([*gaps[:2], -gaps[2]])
         return Programme(blocks, load, rough, np.zeros(len(rough)), force_cost=cost)

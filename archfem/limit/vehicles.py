@@ -166,7 +166,14 @@ def moving_load(
     worst = collapse_factor(structure, live=list(rows[direction][place]), **options)
     if friction == "nonassociated":
         factors[direction, place] = worst.factor  # by the whole search: may be a weaker state
-    dataset = _label_factors(places, factors, count)
+    dims = ("direction", "position")
+    variables = {
+        "factor": (dims, factors, {"units": "1", "long_name": "factor at collapse"}),
+        "axles": (dims, count, {"units": "1", "long_name": "axles on the structure"}),
+    }
+    position = ("position", places, {"units": "m"})
+    coordinates = {"direction": list(DRIVING_DIRECTIONS), "position": position}
+    dataset = xr.Dataset(variables, coordinates)
     return MovingLoad(dataset, worst, DRIVING_DIRECTIONS[direction], float(places[place]))
 
 
@@ -232,19 +239,18 @@ class Rating(ResultDisplay):
         factors = self.moving.factors["factor"].min("position")
         least = (f"{way} {float(factors.sel(direction=way)):.4g}" for way in DRIVING_DIRECTIONS)
         favourable = "EN 1990:2002, Table A2.4(B), favourable; from memory"
-        return "\n".join(
-            [
-                f"{self._summary()}",
-                f"least factor driving {', '.join(least)}",
-                f"{self.moving}",
-                f"geometric factor of safety at that place: {self._geometric_text()}",
-                f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN "
-                f"over {self.width:.3g} m of width; {source}",
-                f"live load by {self.live:g} ({self._source('live')})",
-                f"impact by {self.impact:g} ({self._source('impact')})",
-                f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
-            ]
-        )
+        lines = [
+            f"{self._summary()}",
+            f"least factor driving {', '.join(least)}",
+            f"{self.moving}",
+            f"geometric factor of safety at that place: {self._geometric_text()}",
+            f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN "
+            f"over {self.width:.3g} m of width; {source}",
+            f"live load by {self.live:g} ({self._source('live')})",
+            f"impact by {self.impact:g} ({self._source('impact')})",
+            f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
+        ]
+        return "\n".join(lines)
 
     def _source(self, factor: str) -> str:
         """Return where a factor on the vehicle comes from."""
@@ -495,17 +501,6 @@ def _find_worst(factors: Array, count: Numbers) -> tuple[int, int]:
         flat = (factors <= (1.0 + 1e-6) * factors[finite].min()).argmax()
     direction, place = np.unravel_index(flat, factors.shape)
     return int(direction), int(place)
-
-
-def _label_factors(places: Array, factors: Array, count: Numbers) -> xr.Dataset:
-    """Return factors and numbers of axles over direction and position."""
-    dims = ("direction", "position")
-    variables = {
-        "factor": (dims, factors, {"units": "1", "long_name": "factor at collapse"}),
-        "axles": (dims, count, {"units": "1", "long_name": "axles on the structure"}),
-    }
-    position = ("position", places, {"units": "m"})
-    return xr.Dataset(variables, {"direction": list(DRIVING_DIRECTIONS), "position": position})
 
 
 VEHICLES: Mapping[str, Vehicle] = _read_vehicles()

@@ -66,9 +66,8 @@ def triangulate_polygon(points: Array, tolerance: float = 0.0) -> Numbers:
 def intersect_edges(points: Array, x: float, arcs: Sequence[int] = ()) -> list[float]:
     """Return the heights where a vertical line intersects straight edges of an outline."""
     heights, corners = [], points.tolist()  # floats: outlines have a few corners
-    for number, ((x_start, y_start), (x_end, y_end)) in enumerate(
-        zip(corners, corners[1:] + corners[:1], strict=True)
-    ):
+    edges = zip(corners, corners[1:] + corners[:1], strict=True)
+    for number, ((x_start, y_start), (x_end, y_end)) in enumerate(edges):
         step = x_end - x_start
         low, high = sorted((x_start, x_start + step))
         if number not in arcs and low <= x <= high and high > low:

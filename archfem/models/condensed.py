@@ -33,6 +33,7 @@ def project_model(
 ) -> LinearBlockModel:
     """Return a model in the coordinates of a basis, on request with another joint operator."""
     cells, transposed = model.cells, basis.T.tocsr()
+    stress = None if cells.stress is None else cells.stress @ basis
     return LinearBlockModel(
         model.structure,
         fidelity,
@@ -40,11 +41,7 @@ def project_model(
         block_stiffness=transposed @ (model.block_stiffness @ basis),
         mass_influence=basis.T @ model.mass_influence,
         operator=(operator or model.operator).projected(basis),
-        cells=replace(
-            cells,
-            shape_functions=cells.shape_functions @ basis,
-            stress=None if cells.stress is None else cells.stress @ basis,
-        ),
+        cells=replace(cells, shape_functions=cells.shape_functions @ basis, stress=stress),
     ).with_support_motion(model.support_motion)
 
 

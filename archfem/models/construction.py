@@ -35,9 +35,8 @@ class PartialStructure(LinearBlockModel):
         """Return the model with further blocks, placed on the structure displaced by q."""
         new = np.zeros_like(self.standing)
         new[list(blocks)] = True
-        other = self.copy_with(
-            standing=self.standing | new, centred=self.centred | (new & centring)
-        )
+        standing, centred = self.standing | new, self.centred | (new & centring)
+        other = self.copy_with(standing=standing, centred=centred)
         # points that begin to act are closed and without slip in the present displacement
         begin = other._active_points & ~self._active_points
         gaps = np.stack([self.operator.openings(q), self.operator.slips(q)])

@@ -117,9 +117,8 @@ class LinearBlockModel(Model):
 
     def assemble_tangent(self, block_factor: float, stiffness: Array) -> sparse.csr_matrix:
         """Return the block stiffness times a factor, plus the tangent of the joints (n, n)."""
-        return self._pattern.with_data(
-            block_factor * self.block_stiffness.data + self._joint_tangent @ stiffness
-        )
+        of_joints = self._joint_tangent @ stiffness
+        return self._pattern.with_data(block_factor * self.block_stiffness.data + of_joints)
 
     def closed_tangent(self) -> sparse.csr_matrix:
         """Return the tangent with every joint closed over its whole depth, without slip."""
@@ -284,13 +283,8 @@ def _build_observer(model: Model, operator: JointOperator) -> LinearObserver:
     structure, cells = model.structure, model.cells
     of_faces, face_offset = face_matrix(operator)
     corners = cells.corners(structure)
-    return LinearObserver(
-        sparse.vstack([of_faces, cells.shapes_at(corners)], "csr"),
-        # corners are read from zero on
-        np.concatenate([face_offset, np.zeros(2 * len(corners))]),
-        len(structure.joints),
-        cells.block[corners],
-        structure,
-        cells,
-        model.support_motion,
-    )
+    matrix = sparse.vstack([of_faces, cells.shapes_at(corners)], "csr")
+    # corners are read from zero on
+    offset = np.concatenate([face_offset, np.zeros(2 * len(corners))])
+    count, owner = len(structure.joints), cells.block[corners]
+    return LinearObserver(matrix, offset, count, owner, structure, cells, model.support_motion)

@@ -89,9 +89,8 @@ class Cells:
         """Edges along the outlines of the blocks, in the sense of their polygon (e, 2)."""
         # an edge on the outline belongs to one polygon, an inner one to two
         edges, _ = self._edges
-        _, first, count = np.unique(
-            np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
-        )
+        pairs = np.sort(edges, axis=1)
+        _, first, count = np.unique(pairs, axis=0, return_index=True, return_counts=True)
         return edges[first[count == 1]]
 
     def displacement_rows(self, block: int, point: Array) -> sparse.csr_matrix:

@@ -270,9 +270,8 @@ def _peak_lag(period: float, damping: float) -> float:
     dt = period / 100.0
     centre = WAVELET_HALF_LENGTH * 1.178 * period**0.93
     count = int(2.0 * centre / dt)
-    response = response_spectra.oscillator_displacement(
-        _build_wavelet(period, centre, dt, count), dt, period, damping
-    )
+    wave = _build_wavelet(period, centre, dt, count)
+    response = response_spectra.oscillator_displacement(wave, dt, period, damping)
     return float(np.argmax(np.abs(response)) * dt - centre)
 
 

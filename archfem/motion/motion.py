@@ -303,9 +303,8 @@ class Motion(ResultDisplay):
         Raises:
             InvalidInput: there is no transverse.
         """
-        level, across = signal_processing.rotate_components(
-            self.horizontal, self.component("transverse"), angle
-        )
+        pair = self.horizontal, self.component("transverse")
+        level, across = signal_processing.rotate_components(*pair, angle)
         return replace(self, horizontal=level, transverse=across)
 
     def with_vertical(self, other: "Motion | None") -> "Motion":

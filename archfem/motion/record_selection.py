@@ -205,11 +205,8 @@ class RecordSelection(ResultDisplay):
         Raises:
             InvalidInput: a period is negative.
         """
-        rows = [
-            record.scale * _compute_spectrum(record.motion, self.measure, periods)
-            for record in self.records
-        ]
-        return np.array(rows)
+        spectra = (_compute_spectrum(each.motion, self.measure, periods) for each in self.records)
+        return np.array([each.scale * row for each, row in zip(self.records, spectra, strict=True)])
 
     def suite(self, name: str = "selection") -> Suite:
         """Return the scaled records as a suite, for time histories and incremental analyses.

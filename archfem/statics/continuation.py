@@ -186,9 +186,8 @@ class LoadPath(EquilibriumPath):
         mass = self.model.structure.weight / self.model.structure.gravity
         motion = self.states[-number] - self.states[-number - 1]
         increment = self.factors[-number] - self.factors[-number - 1]
-        weighted = np.append(
-            self.model.mass @ motion / (mass * self.unit[0] ** 2), increment / self.unit[1] ** 2
-        )
+        inertia = self.model.mass @ motion / (mass * self.unit[0] ** 2)
+        weighted = np.append(inertia, increment / self.unit[1] ** 2)
         return np.append(motion, increment), weighted
 
     def advance_by_relaxation(self, increment: float, farthest: float) -> bool:

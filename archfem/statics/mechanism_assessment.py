@@ -101,23 +101,18 @@ class LimitState:
                 )
 
 
-# Displacement checks by name. The 2019 values were read in a transcription of the Circolare.
+# Sources of displacement checks; the 2019 values were read in a transcription of the Circolare.
+_CIRCOLARE_2009 = "Circolare 617/2009, C8A.4.2.2 and C8A.4.2.3, from memory: its text was not read"
+_CIRCOLARE_2019 = "Circolare 7/2019, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq."
+
+# Displacement checks by name
 LIMIT_STATES: Mapping[str, LimitState] = {
-    state.name: state
-    for state in (
-        LimitState(
-            *("NTC-2018 SLV", 0.4, 1.68, 1.0, 0.08),
-            "Circolare 7/2019, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq. C8.7.1.10",
-        ),
-        LimitState(
-            *("NTC-2018 SLC", 0.6, 1.56, 1.0, 0.10),
-            "Circolare 7/2019, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq. C8.7.1.11",
-        ),
-        LimitState(
-            *("NTC-2008 SLV", 0.4, 2.0, 0.4, 0.05),
-            "Circolare 617/2009, C8A.4.2.2 and C8A.4.2.3, from memory: its text was not read",
-        ),
-    )
+    name: LimitState(name, *values)
+    for name, values in {
+        "NTC-2018 SLV": (0.4, 1.68, 1.0, 0.08, f"{_CIRCOLARE_2019} C8.7.1.10"),
+        "NTC-2018 SLC": (0.6, 1.56, 1.0, 0.10, f"{_CIRCOLARE_2019} C8.7.1.11"),
+        "NTC-2008 SLV": (0.4, 2.0, 0.4, 0.05, _CIRCOLARE_2009),
+    }.items()
 }
 
 
@@ -525,9 +520,8 @@ def _find_first_mechanism(
             "friction 'nonassociated' is searched for the whole structure only: leave out part "
             "and blocks, or use 'coulomb'"
         )
-    found = collapse_factor(
-        placed.structure, live=BodyForce(placed.direction), friction="nonassociated"
-    )
+    live = BodyForce(placed.direction)
+    found = collapse_factor(placed.structure, live=live, friction="nonassociated")
     if not found.motion.any():
         return mechanism
     contacts = placed.touching(joints)
@@ -587,14 +581,9 @@ class _Oscillator:
                 own = self.placed.direction * self.path.velocity[self.control, 0]
                 moved = control / own * (weight @ speed**2) / (weight @ speed)
         acceleration = factors * self.placed.structure.gravity / self.e_star
-        return xr.Dataset(
-            {
-                "d": ("place", moved, {"units": "m"}),
-                "a": ("place", acceleration, {"units": "m/s2"}),
-                "alpha": ("place", factors, {"units": "1"}),
-                "d_control": ("place", control, {"units": "m"}),
-            }
-        )
+        values = {"d": moved, "a": acceleration, "alpha": factors, "d_control": control}
+        units = {"d": "m", "a": "m/s2", "alpha": "1", "d_control": "m"}
+        return xr.Dataset({key: ("place", values[key], {"units": units[key]}) for key in values})
 
     def notes(self, factor: float) -> list[str]:
         """Return what the curve leaves out."""

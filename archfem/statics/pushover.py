@@ -14,7 +14,7 @@ import xarray as xr
 from archfem._display import ResultDisplay
 from archfem._threads import single_threaded
 from archfem._typing import Array
-from archfem._validation import check_fields, check_type
+from archfem._validation import check_choice, check_fields, check_type
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria, with_failure_flags
 from archfem.joints.resultants import joint_dataset, select_joint
@@ -173,8 +173,7 @@ def pushover(
     References:
         Riks, Int. J. Solids Struct. 15 (1979) 529-551.
     """
-    if control not in (controls := ("displacement", "arc length", "path", "force")):
-        raise InvalidInput(f"control {control!r} is not known: use one of {controls}")
+    check_choice(control, "control", ("displacement", "arc length", "path", "force"))
     for value, kind in ((start, Equilibrium), (stop, Stop), (criteria, Criteria)):
         if value is not None:
             check_type(value, kind, kind.__name__.lower(), f"give a {kind.__name__}")

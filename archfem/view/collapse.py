@@ -135,9 +135,8 @@ def _draw_factors(
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 1.5 * tall])
     factors, least = found.factors["factor"], found.worst.factor
     ahead = {"right": half, "left": -half}
-    for (way, reach), line, colour in zip(
-        ahead.items(), ("-", "--"), (Colour.THRUST, Colour.LOAD), strict=True
-    ):
+    lines = zip(ahead.items(), ("-", "--"), (Colour.THRUST, Colour.LOAD), strict=True)
+    for (way, reach), line, colour in lines:
         style = {"color": colour, "ls": line, "lw": 1.5, "label": f"driving {way}"}
         drawn = factors.sel(direction=way)
         upper.plot(drawn["position"] + reach, drawn.where(np.isfinite(drawn)), **style)

@@ -73,9 +73,8 @@ def draw_envelope(
     joints_of_runs = {label: run.joints for label, run in runs.items()}
     panels, openings = _make_panels(joints_of_runs, axes), 0
     row_height = 0.05  # of the crosses of a run, in units of e
-    for row, ((label, joints), colour) in enumerate(
-        zip(joints_of_runs.items(), Colour.LINES, strict=False)
-    ):
+    coloured = zip(joints_of_runs.items(), Colour.LINES, strict=False)
+    for row, ((label, joints), colour) in enumerate(coloured):
         # shades of several runs add up where they overlap
         shade = 0.0 if label in dotted else 0.15 / len(runs)
         for part, panel in panels.items():

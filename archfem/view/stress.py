@@ -161,13 +161,11 @@ def _draw_crosses(axes: Axes, cells: Cells, stress: Array, blocks: Numbers) -> N
     # distance between crosses, and length of the longest arms: 0.21 inch on paper
     spacing = 0.21 * np.ptp(cells.places[:, 0]) / cast(Figure, axes.figure).get_figwidth()
     centre = np.array([cells.places[cell].mean(axis=0) for cell in cells.polygons])
-    groups = [
-        np.flatnonzero(cells.owner == number)[group]
-        for number in blocks
-        for group in _group_cells(
-            cells.places[cells.block == number], centre[cells.owner == number], spacing
-        )
-    ]
+    groups = []
+    for number in blocks:
+        own = np.flatnonzero(cells.owner == number)
+        near = _group_cells(cells.places[cells.block == number], centre[own], spacing)
+        groups += [own[group] for group in near]
     middle = np.array([centre[group].mean(axis=0) for group in groups])
     xx, yy, xy = np.array([stress[group].mean(axis=0) for group in groups]).T
     angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)

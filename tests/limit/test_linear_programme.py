@@ -8,7 +8,7 @@ from scipy import sparse
 
 import archfem as af
 from archfem.limit.backfill import self_weight_programme
-from archfem.limit.linear_programme import RigidBlocks, rigid_load
+from archfem.limit.linear_programme import RigidBlocks
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def test_loads_are_forces_at_centroids():
     structure = arch()
     weights = [b.area * b.material.unit_weight for b in structure.blocks[1:-1]]
     push = af.PointLoad(0.0, (2e3, -1e3))
-    found = rigid_load(structure, [af.BodyForce(0.5, -1.0), push]).reshape(-1, 3)
+    found = RigidBlocks(structure).load([af.BodyForce(0.5, -1.0), push]).reshape(-1, 3)
     block, point = push.place(structure)
     x, y = point - structure.blocks[block].centroid
     expected = np.outer(weights, [0.5, -1.0, 0.0])
@@ -87,9 +87,9 @@ def test_further_unknowns_keep_within_their_limit():
     """A stay holds a column back with up to T at its top: λ W h/2 = W b/2 + T h."""
     block = af.column(breadth=0.6, heights=[2.4])
     _, dead = self_weight_programme(block, "coulomb", None, None)
-    sideways = dead.with_load_factor(rigid_load(block, [SIDEWAYS]))
+    sideways = dead.with_load_factor(RigidBlocks(block).load([SIDEWAYS]))
     for limit in (0.0, 0.05, 0.1):
-        pull = rigid_load(block, [af.PointLoad(0.0, (-block.weight, 0.0))])
+        pull = RigidBlocks(block).load([af.PointLoad(0.0, (-block.weight, 0.0))])
         column = sparse.csr_matrix(-dead.blocks.dimensionless(pull)[:, None])
         found = sideways.with_unknowns(column, np.zeros(1), limit).solve()
         assert -found.value == pytest.approx(0.25 + 2.0 * limit, rel=1e-6)

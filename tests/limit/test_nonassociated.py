@@ -12,7 +12,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 import archfem as af
 from archfem.limit import Outcome, nonassociated
 from archfem.limit.backfill import self_weight_programme
-from archfem.limit.linear_programme import RigidBlocks, rigid_load
+from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.nonassociated import descend, find_solution, starting_forces
 
 EXACT = 1e-7
@@ -78,7 +78,7 @@ def check(structure, live, found):
     n, v, m = (found.joints[key].values for key in "NVM")
     ends = np.stack([n / 2.0 - m / structure.depths, n / 2.0 + m / structure.depths])
     forces = np.concatenate([*ends, v]) / blocks.force_unit
-    dead, push = (rigid_load(structure, [each]) for each in (af.BodyForce(0.0, -1.0), live))
+    dead, push = (RigidBlocks(structure).load([each]) for each in (af.BodyForce(0.0, -1.0), live))
     load = blocks.dimensionless(dead + found.factor * push)
     assert np.abs(blocks.balance @ forces - load).max() < EXACT * len(structure.free)
     largest = n.max()
@@ -107,7 +107,7 @@ def least_by_integers(structure, live, force=30.0, motion=30.0):
     """
     blocks = RigidBlocks(structure)
     dead, push = (
-        blocks.dimensionless(rigid_load(structure, [each]))
+        blocks.dimensionless(RigidBlocks(structure).load([each]))
         for each in (af.BodyForce(0.0, -1.0), live)
     )
     count, size = len(structure.joints), len(push)
@@ -284,7 +284,7 @@ def test_from_the_strongest_solution_the_search_goes_down_to_the_weakest():
     """A wall that slides at two factors, of which the mixed-integer programme finds the least."""
     structure = random_structure(10)
     _, dead = self_weight_programme(structure, "nonassociated", None, None)
-    programme = dead.with_load_factor(rigid_load(structure, [SIDEWAYS]))
+    programme = dead.with_load_factor(RigidBlocks(structure).load([SIDEWAYS]))
     starts = starting_forces(programme, programme.solve(), 40, 0)
     found = [turn for forces in starts if (turn := find_solution(programme, forces))]
     strongest = min(found, key=lambda turn: turn.state.value)

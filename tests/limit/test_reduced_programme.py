@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 
 import archfem as af
 from archfem.limit.backfill import self_weight_programme
-from archfem.limit.linear_programme import RigidBlocks, rigid_load
+from archfem.limit.linear_programme import RigidBlocks
 
 SIDEWAYS = af.BodyForce(1.0)
 
@@ -62,13 +62,13 @@ def factor_in_full(structure, live):
             [none, one, none],
         ]
     )
-    load = -blocks.dimensionless(rigid_load(structure, [live]))[:, None]
+    load = -blocks.dimensionless(RigidBlocks(structure).load([live]))[:, None]
     found = linprog(
         np.concatenate([np.zeros(3 * joints), [-1.0]]),
         A_ub=sparse.hstack([rows, sparse.csr_matrix((4 * joints, 1))], "csr"),
         b_ub=np.concatenate([np.zeros(2 * joints), np.tile(cohesion / blocks.force_unit, 2)]),
         A_eq=sparse.hstack([blocks.balance @ ends, load], "csr"),
-        b_eq=blocks.dimensionless(rigid_load(structure, [af.BodyForce(0.0, -1.0)])),
+        b_eq=blocks.dimensionless(RigidBlocks(structure).load([af.BodyForce(0.0, -1.0)])),
         bounds=[(None, None)] * (3 * joints) + [(0.0, None)],
         method="highs-ds",
         options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
@@ -122,7 +122,7 @@ def test_motions_of_eliminated_blocks_do_the_work_of_the_factor(structure):
     found = af.collapse_factor(structure, live=SIDEWAYS)
     motion = found.motion[list(structure.free)].ravel()
     dead, live = (
-        rigid_load(structure, [load]) @ motion for load in (af.BodyForce(0.0, -1.0), SIDEWAYS)
+        RigidBlocks(structure).load([load]) @ motion for load in (af.BodyForce(0.0, -1.0), SIDEWAYS)
     )
     intrados, extrados, slip = np.moveaxis(gaps(structure, found.motion), -1, 0)
     assert np.minimum(intrados, extrados) == pytest.approx(
@@ -150,7 +150,7 @@ def test_kept_parts_of_a_programme_serve_other_loads_and_costs(structure, differ
     The ring hinges: more cohesion does not change its factor.
     """
     _, dead = self_weight_programme(structure, "coulomb", None, None)
-    programme = dead.with_load_factor(rigid_load(structure, [SIDEWAYS]))
+    programme = dead.with_load_factor(RigidBlocks(structure).load([SIDEWAYS]))
     weights = np.random.default_rng(1).random(3 * len(structure.joints))
     changes = (
         {},

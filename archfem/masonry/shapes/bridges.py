@@ -249,11 +249,10 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
     # A pier is flush with the intrados of its rings: half their springing joints stand on it.
     reach = [0.0, *(arch.reach for arch in arches), 0.0]
     of_piers = _expand_values(count + 1, breadths=breadths, heights=heights)
+    rows = zip(*of_piers, reach[1:], reach[:-1], strict=True)
     piers = [
         Pier(gap=broad - right - left, height=high, course=course, name=f"pier {k}")
-        for k, (broad, high, right, left) in enumerate(
-            zip(*of_piers, reach[1:], reach[:-1], strict=True), 1
-        )
+        for k, (broad, high, right, left) in enumerate(rows, 1)
     ]
     common: dict[str, Any] = {"material": material, "contact": contact, "gravity": gravity}
     return bridge(arches=arches, piers=piers, chords=chords, width=width, **common)
@@ -287,12 +286,10 @@ def build_ring(
         return (float(point[0] + right), float(point[1] + up))
 
     part: dict[str, Any] = {"part": arch.name, "role": arch.role}
-    blocks = [
-        replace(
-            each, outline=tuple(map(at, each.outline)), name=f"{arch.name}, {each.name}", **part
-        )
-        for each in ring.blocks
-    ]
+    blocks = []
+    for each in ring.blocks:
+        outline, name = tuple(map(at, each.outline)), f"{arch.name}, {each.name}"
+        blocks.append(replace(each, outline=outline, name=name, **part))
     joints = [
         replace(each, intrados=at(each.intrados), extrados=at(each.extrados), part=arch.name)
         for each in ring.joints

@@ -335,9 +335,8 @@ class LargeDisplacementModel(Model):
     def step_forces(self, start: Array, end: Array, damping_lag: float) -> JointStepForces:
         """Return the mean forces of the joints over a step."""
         forces = allocate_step_forces(self.joints)
-        compute_step_forces(
-            self.joints, _plain(start), _plain(end), damping_lag, self._slip, forces
-        )
+        states = _plain(start), _plain(end)
+        compute_step_forces(self.joints, *states, damping_lag, self._slip, forces)
         return forces
 
     def _instant(self, q: Array) -> JointStepForces:
@@ -346,8 +345,7 @@ class LargeDisplacementModel(Model):
 
     def gather_forces(self, force: Array) -> Array:
         """Return generalised forces from those on the coordinates of each face (n,)."""
-        values = force.ravel()[self._forces]
-        return np.bincount(self._rows, values, self.size).astype(float, copy=False)
+        return np.asarray(np.bincount(self._rows, force.ravel()[self._forces], self.size), float)
 
     def assemble_tangent(
         self, block_factor: float, joint_factor: float, forces: JointStepForces
@@ -532,14 +530,12 @@ class LargeObserver(Observer):
         structure, q = self.model.structure, np.ascontiguousarray(q, float)
         joints, poses = self.model.joints, np.zeros((self.joint_count, 2, 3))
         # pose of a face is the mean of its segments'
-        weight = (
-            joints.face_law.depth / np.bincount(joints.joint, joints.face_law.depth)[joints.joint]
-        )
+        depth = joints.face_law.depth
+        weight = depth / np.bincount(joints.joint, depth)[joints.joint]
         for segment, joint in enumerate(joints.joint):
             for side in range(2):
-                poses[joint, side] += weight[segment] * np.array(
-                    face_pose(joints.kinematics, segment, side, q)
-                )
+                pose = np.array(face_pose(joints.kinematics, segment, side, q))
+                poses[joint, side] += weight[segment] * pose
         mean, apart = poses.mean(axis=1), poses[:, 1] - poses[:, 0]
         # mean direction of both faces: their tangent, rotated
         along = rotate(structure.tangents, mean[:, 2])

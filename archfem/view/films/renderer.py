@@ -193,9 +193,8 @@ class FrameLayout:
         top = 1.0 - 0.5 * self.header / self._inches[1]
         self._write(0.02, top, name[:1].upper() + name[1:], fontsize=13.0, ha="left")
         # 16 letters of this size take an inch
-        note = shorten(
-            describe_assessed_joints(joints), int(16.0 * self._inches[0]), placeholder=" …"
-        )
+        assessed = describe_assessed_joints(joints)
+        note = shorten(assessed, int(16.0 * self._inches[0]), placeholder=" …")
         low = 1.0 - 0.87 * self.header / self._inches[1]
         self._write(0.02, low, note, fontsize=0.75 * self.font_size, ha="left", color=Colour.EDGE)
         self._state_text = self._write(0.985, top, "", fontsize=13.0, animated=True)

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.colors import Colormap, Normalize, PowerNorm
 
 from archfem._typing import Array
+from archfem._validation import check_choice
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.models.model import Cells, Model, check_coordinate_count
@@ -48,9 +49,7 @@ def check_options(
     model: Model, colour: str, magnification: float | None, size: tuple[int, int]
 ) -> None:
     """Refuse invalid options of a frame."""
-    known = ("displacement", "stress")
-    if colour not in known:
-        raise InvalidInput(f"colour '{colour}' is not known: use one of {known}")
+    check_choice(colour, "colour", ("displacement", "stress"))
     if colour == "stress" and model.cells.stress is None:
         raise InvalidInput(
             "rigid blocks have no stress: use colour='displacement', or build and run the model "
@@ -97,7 +96,6 @@ class Setup:
     outlines: tuple[Array, ...] = ()  # of blocks displaced by a mechanism, each (k, 2) [m]
     since: float = 0.0  # time from which they are shown [s]
     falls: FallingBlocks | None = None  # positions of loose blocks; None if no block came loose
-    level: float | None = None  # of the ground below loose blocks [m]; None without loose blocks
 
     @cached_property
     def triangles(self) -> Triangles:
@@ -112,9 +110,9 @@ class Setup:
     @property
     def ground(self) -> Array | None:
         """Ends of the ground line (2, 2) [m]; None where it is not drawn."""
-        if self.level is None:
+        if self.falls is None:
             return None
-        return np.array([[self.low[0], self.level], [self.high[0], self.level]])
+        return np.array([[self.low[0], self.falls.level], [self.high[0], self.falls.level]])
 
     @property
     def hinge_disc(self) -> Array:
@@ -151,9 +149,8 @@ class Setup:
         if falls is None:
             return self
         size, cells = self.model.structure.size, self.model.cells
-        places = np.array(
-            [falls.places(cells.places, cells.block, float(time)) for time in falls.times]
-        )
+        moved = (falls.places(cells.places, cells.block, float(time)) for time in falls.times)
+        places = np.array(list(moved))
         points = np.concatenate([*places, [self.low, self.high]])
         low = np.maximum(points.min(axis=0), self.low - size)
         high = np.minimum(points.max(axis=0), self.high + size)
@@ -166,7 +163,7 @@ class Setup:
             # a fall is some ten times the motion before it; square roots show both
             extend = "max" if lengths.max() > largest else "neither"
             scale = replace(scale, norm=PowerNorm(0.5, 0.0, largest), extend=extend)
-        return replace(self, low=low, high=high, scale=scale, falls=falls, level=falls.level)
+        return replace(self, low=low, high=high, scale=scale, falls=falls)
 
 
 def polygon_sides(outlines: Sequence[Array]) -> Array:

@@ -77,9 +77,8 @@ class Scene:
 
     def count_static(self) -> int:
         """Return the number of actors that do not move."""
-        actors = [
-            each for each in self.plotter.renderer.actors.values() if each not in self._moving
-        ]
+        every = self.plotter.renderer.actors.values()
+        actors = [each for each in every if each not in self._moving]
         return sum(actor.mapper.dataset.n_points > 0 for actor in actors)
 
     def remove_moving(self) -> None:

@@ -102,9 +102,8 @@ def print_page(page: Path, target: Path) -> Path:
     """Print a page to a PDF file by an installed Chromium or Chrome."""
     if target.suffix.lower() != ".pdf":
         raise InvalidInput(f"{target} has suffix '{target.suffix}': a printed report is .pdf")
-    browser = next(
-        filter(None, map(which, ("chromium", "chromium-browser", "google-chrome"))), None
-    )
+    names = "chromium", "chromium-browser", "google-chrome"
+    browser = next(filter(None, map(which, names)), None)
     if browser is None:
         raise NotInstalled(missing_package_message("Chromium", "it is not on the PATH"))
     with atomic_write(target) as draft, temporary_folder() as profile:
