@@ -86,10 +86,10 @@ def test_joint_rules_select_the_method(column, motion, monkeypatch):
     built, rigid = [], []
     build, run = analysis.build, variations._run_rigid_blocks
 
-    def note(structure, **given):
+    def note(structure, settings):
         names = ("fidelity", "displacements", "quadrature", "quadrature_points")
-        built.append(tuple(given[name] for name in names))
-        return build(structure, **given)
+        built.append(tuple(getattr(settings, name) for name in names))
+        return build(structure, settings)
 
     monkeypatch.setattr(analysis, "build", note)
     monkeypatch.setattr(

@@ -158,7 +158,7 @@ def read_peer(text: RecordText) -> list[Channel]:
     # or two, or both precede or follow the names (`4096 0.0100 NPTS, DT`). The rest of the header
     # is free: a unit of acceleration identifies one, unless a velocity or displacement is named.
     count, dt, line = _find_count_and_step(text)
-    header = " ".join(text.lines[:line])
+    header = " ; ".join(text.lines[:line])
     other = re.search(r"\b(?:VELOC|DISPL)", header, re.IGNORECASE)
     if other and not re.search(r"\bACC", header, re.IGNORECASE):
         raise text.error("the header does not state an acceleration, but another quantity")
