@@ -339,6 +339,8 @@ def takes_analysis(function: Function) -> Function:
         if analysis.dt is not None or analysis.selects_model:
             settings["tolerance"] = None  # a step takes the place of a tolerance
         used = {key: v for key, v in settings.items() if v is not None and key in known | {*given}}
-        return function(getattr(start, "model", analysis.model), motion, **used)
+        # an equilibrium has its model, which would be built anew otherwise
+        subject = start.model if isinstance(start, Equilibrium) else analysis.model
+        return function(subject, motion, **used)
 
     return wrapper  # type: ignore[return-value]
