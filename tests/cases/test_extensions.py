@@ -97,7 +97,8 @@ def test_the_examples_of_the_page_work_together(folder):
     assert changed == "True"
 
 
-def test_no_case_runs_code_by_itself(folder):
+def test_no_case_runs_code_by_itself(folder, monkeypatch):
+    monkeypatch.setenv("ARCHFEM_OWN_CODE", "")  # which commands of other tests may have set
     (folder / "mine.py").write_text("open('it ran', 'w')")
     with pytest.raises(af.InvalidInput, match="is code, which no file runs by itself"):
         af.Case.read(folder / "case.toml")
