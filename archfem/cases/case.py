@@ -16,11 +16,7 @@ from archfem._files import atomic_write
 from archfem._validation import check_words, validate_arguments
 from archfem.cases import analysis_keys, motion_keys, provenance
 from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis
-from archfem.cases.analysis_tables import (
-    complete_path,
-    read_analysis,
-    write_analysis_tables,
-)
+from archfem.cases.analysis_tables import complete_path, read_analysis, write_analysis_tables
 from archfem.cases.structure_keys import cached_structure, write_structure
 from archfem.cases.toml_file import (
     Table,

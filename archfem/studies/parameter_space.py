@@ -19,12 +19,7 @@ from archfem._validation import check_integer, short_repr
 from archfem.cases.analysis_tables import complete_path
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_sections
-from archfem.cases.toml_file import (
-    check_choice,
-    check_table,
-    refuse_unknown,
-    set_value,
-)
+from archfem.cases.toml_file import check_choice, check_table, refuse_unknown, set_value
 from archfem.errors import InvalidInput
 
 # Sections of a case that define its model
