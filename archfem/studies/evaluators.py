@@ -247,10 +247,8 @@ class Evaluator:
     @classmethod
     def of(cls, setting: Any) -> "Evaluator":
         """Return the evaluator of a function, a name, or a table of `name` and options."""
-        options: dict[str, Any] = {}
-        if isinstance(setting, Mapping):
-            options = dict(setting)
-            setting = options.pop("name", None)
+        options = dict(setting) if isinstance(setting, Mapping) else {"name": setting}
+        setting = options.pop("name", None)
         find = _find_function(setting) if isinstance(setting, str) else setting
         if not callable(find):
             raise InvalidInput(
