@@ -25,7 +25,6 @@ from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import Equilibrium
 
 # Settings tried by default; quadratures with their points on a facet (None: default), steps in [s]
 TRIED_FIDELITIES = ("rigid", "faces", "condensed")
@@ -140,7 +139,7 @@ def accuracy(
     settings, reference, viscous = plan_comparison(structure, damping, *tried)
     motion = motion or severe_motion(reference)
     runs = [
-        time_run(build(structure, setting.discretisation), motion, viscous, setting.dt)
+        time_run(build(structure, setting.discretisation), motion, setting.dt, damping=viscous)
         for setting in tqdm(settings, unit="setting", disable=None, leave=False)
     ]
     tolerance = given.tolerance if tolerance is None else tolerance
@@ -186,19 +185,13 @@ def candidate_settings(
                 yield from (Setting(settings, dt) for dt in steps)
 
 
-def time_run(
-    model: Model,
-    motion: Motion,
-    damping: Viscous | None,
-    dt: float,
-    start: Equilibrium | None = None,
-) -> TimedRun:
-    """Run a model and measure the processor time."""
+def time_run(model: Model, motion: Motion, dt: float, **options: Any) -> TimedRun:
+    """Run a model and measure the processor time; options are those of `time_history`."""
     # two steps beforehand, so that compilation is not measured
-    time_history(model, motion.cut(0.0, 2.0 * dt), damping=damping, dt=dt, start=start)
+    time_history(model, motion.cut(0.0, 2.0 * dt), dt=dt, **options)
     begin = process_time()
     try:
-        run = time_history(model, motion, damping=damping, dt=dt, start=start)
+        run = time_history(model, motion, dt=dt, **options)
     except DidNotConverge:
         return TimedRun(model.size, process_time() - begin, None)
     if run.ending is Ending.INTERRUPTED:

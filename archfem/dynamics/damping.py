@@ -130,11 +130,7 @@ def effective_mode_range(
 
 
 def _modes_with_share(
-    model: Model,
-    start: Start,
-    mass_share: float,
-    initial_count: int = 32,
-    max_count: int = 1024,
+    model: Model, start: Start, mass_share: float, initial_count: int = 32, max_count: int = 1024
 ) -> tuple[Modes, Array]:
     """Return modes that reach a share of the mass along x, and their cumulative shares (modes,)."""
     model, state = resolve_start(model, start)

@@ -286,7 +286,8 @@ def evaluate_time(case: Case, damping: Viscous | None) -> Findings:
     """Return the processor time of a run of a case, and the largest |e| of each joint."""
     result, motion = dead_load_of(case), ground_motion(case)
     assert case.analysis.dt is not None  # each setting has a step
-    run = time_run(result.dead.model, motion, damping, case.analysis.dt, start=result.dead)
+    options = {"start": result.dead, "damping": damping}
+    run = time_run(result.dead.model, motion, case.analysis.dt, **options)
     findings: Findings = {"coordinates": run.size, "seconds": run.seconds}
     return findings if run.peaks is None else findings | {"peaks": run.peaks}
 

@@ -42,9 +42,8 @@ class Chosen:
             return RunPeaks(largest, turn, np.array([0.5, 1.5]), (start,))
 
         self._patch.setattr(model_selection, "run_peaks", run)
-        self.model = model_selection.select_model(
-            BLOCK, tolerance, MOTION, dt=dt, builder=build, **given
-        )
+        self._patch.setattr(model_selection.plain, "build", build)
+        self.model = model_selection.select_model(BLOCK, tolerance, MOTION, dt=dt, **given)
         return self.model.prediction
 
 
