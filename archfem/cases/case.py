@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
-from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +24,8 @@ from archfem.cases.toml_file import (
     parse_change,
     read_with_base,
     refuse_unknown,
+    remove_key,
     set_value,
-    split_key_path,
 )
 from archfem.dynamics.analysis import Analysis
 from archfem.errors import ArchfemError, InvalidInput
@@ -241,8 +240,8 @@ class Case:
         """
         settings = deepcopy(self.settings)
         for path in paths:
-            *parents, last = split_key_path(path)
-            reduce(lambda table, name: table.get(name, {}), parents, settings).pop(last, None)
+            with suppress(InvalidInput):  # there is no such key
+                remove_key(settings, path)
         return Case.of(settings, self.folder)
 
     def text(self) -> str:

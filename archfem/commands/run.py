@@ -165,7 +165,7 @@ def accuracy(options: argparse.Namespace) -> None:
     compared = case_accuracy(case, folder / "settings", workers=options.workers)
     text = result_text.describe_accuracy(compared)
     print(text)
-    files = {"accuracy.txt": text, "accuracy.png": draw_accuracy(compared)}
+    files: Files = {"accuracy.txt": text, "accuracy.png": draw_accuracy(compared)}
     _write_results("accuracy", case, options.out, lambda: files)
 
 

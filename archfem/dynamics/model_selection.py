@@ -15,16 +15,8 @@ from pathlib import Path
 from tqdm import tqdm
 
 from archfem._validation import check_number, check_type
+from archfem.dynamics import error_estimation
 from archfem.dynamics.damping import resolve_effective_damping
-from archfem.dynamics.error_estimation import (
-    RunPeaks,
-    default_damping,
-    estimate_errors,
-    parts_about_peaks,
-    run_peaks,
-    severe_motion,
-    strongest_window,
-)
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.errors import InvalidInput
 from archfem.joints.quadrature import Quadrature
@@ -218,7 +210,7 @@ class _Trial:
     settings: Discretisation
     dt: float  # time step [s]
     model: Model
-    run: RunPeaks
+    run: error_estimation.RunPeaks
     share: float  # of the motion that was run [-]
 
 
@@ -241,11 +233,11 @@ def _try_settings(
         excitation = excitation or _resolve_excitation(model, motion, damping)
         window, viscous, share = excitation
         if trials and trials[0].run.peaks is not None:
-            parts = parts_about_peaks(trials[0].run)
+            parts = error_estimation.parts_about_peaks(trials[0].run)
             window = window.cut(0.0, min(parts[-1][1], window.duration))
-        run = run_peaks(model, window, viscous, step, parts if same else None)
+        run = error_estimation.run_peaks(model, window, viscous, step, parts if same else None)
         trials.append(_Trial(discretisation, step, model, run, share))
-        history.append(estimate_errors([trial.run for trial in trials]))
+        history.append(error_estimation.estimate_errors([trial.run for trial in trials]))
         if history[-1][-1] <= tolerance or _stagnates(history):
             break
     return trials, history
@@ -278,9 +270,9 @@ def _resolve_excitation(
     if motion is None or viscous is None:
         soil = bool(find_soft_blocks(structure))
         probe = model if soil else build_rigid_model(structure, rule=Quadrature("exact"))
-        motion = severe_motion(probe) if motion is None else motion
-        viscous = viscous or default_damping(probe)
-    window = strongest_window(motion)
+        motion = error_estimation.severe_motion(probe) if motion is None else motion
+        viscous = viscous or error_estimation.default_damping(probe)
+    window = error_estimation.strongest_window(motion)
     return window, viscous, window.duration / motion.duration
 
 
@@ -312,7 +304,7 @@ def _doubts(prediction: Prediction, *, stagnates: bool, prescribed: bool) -> Ite
         )
 
 
-def _doubt_rocking(structure: Structure, run: RunPeaks) -> Iterator[Doubt]:
+def _doubt_rocking(structure: Structure, run: error_estimation.RunPeaks) -> Iterator[Doubt]:
     """Yield a doubt about the prediction where a stack of blocks rocks."""
     # a stack is determinate, so that nothing but impacts ends its rocking; uplift alone, |e| of 1/6
     # to 0.4, was followed by no such errors

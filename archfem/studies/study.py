@@ -451,11 +451,8 @@ def _log_stored(store: Store, digests: Sequence[str], rows: Mapping[str, Row]) -
     if rows:
         logger.info("%d of %d points were finished before", len(rows), len(digests))
     if others := len(store.digests() - set(digests)):
-        logger.warning(
-            "%s has %d points of other cases, findings or versions: they are left alone",
-            store.folder,
-            others,
-        )
+        text = "%s has %d points of other cases, findings or versions: they are left alone"
+        logger.warning(text, store.folder, others)
 
 
 @validate_arguments

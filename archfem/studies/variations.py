@@ -146,12 +146,13 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     if viscous is None:
         defaults = {name: defaults[name] for name in defaults if not name.startswith("damping")}
     ranges = _check_ranges({**defaults, **(vary or {})})
-    changes = [*_single_changes(ranges, viscous), *_sample_changes(ranges, samples, seed)]
+    neutral = {**NEUTRAL, "damping_kind": damping_kind(viscous)}
+    changes = [*_single_changes(ranges, neutral), *_sample_changes(ranges, samples, seed)]
     variations = [Variation(analysis, motion, _resolve_labels(ranges, each)) for each in changes]
     points, evaluator = list(enumerate(variations)), Evaluator(evaluate_variation)
     finished = evaluate_points(points, evaluator, workers)
     rows = dict(tqdm(finished, total=len(points), unit="run", disable=None, leave=False))
-    dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], viscous)
+    dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], neutral)
     dataset["sampled"] = "run", np.arange(len(points)) >= len(points) - samples
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
@@ -204,9 +205,8 @@ def _check_ranges(ranges: Mapping[str, Any]) -> dict[str, Any]:
     return checked
 
 
-def _single_changes(ranges: Mapping[str, Any], damping: Viscous | None) -> list[dict[str, Any]]:
+def _single_changes(ranges: Mapping[str, Any], neutral: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the run as given, and each property at each other value alone."""
-    neutral = {**NEUTRAL, "damping_kind": damping_kind(damping)}
     changes: list[dict[str, Any]] = [{}]
     for name, values in ranges.items():
         changes += [{name: value} for value in values if value != neutral.get(name)]
@@ -312,10 +312,9 @@ def _build_dataset(
     ranges: Mapping[str, Any],
     changes: Sequence[Mapping[str, Any]],
     rows: Sequence[Mapping[str, Any]],
-    damping: Viscous | None,
+    neutral: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Return the table of all runs."""
-    neutral = {**NEUTRAL, "damping_kind": damping_kind(damping)}
+    """Return the table of all runs; a property that a run does not change has its neutral value."""
     columns: dict[str, Any] = {}
     for name, values in ranges.items():
         first = "as given" if isinstance(values, Mapping) else neutral[name]
