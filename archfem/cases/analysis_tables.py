@@ -11,13 +11,7 @@ from typing import Any
 
 from archfem._validation import declared_keys, given_fields
 from archfem.cases.provenance import name_from
-from archfem.cases.toml_file import (
-    Table,
-    check_choice,
-    check_table,
-    read_object,
-    split_key_path,
-)
+from archfem.cases.toml_file import Table, check_choice, check_table, read_object, split_key_path
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.events import EVENTS, StopCondition, registered_criteria
 from archfem.dynamics.recorder import Record

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
-from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +15,7 @@ from archfem._files import atomic_write
 from archfem._validation import check_words, validate_arguments
 from archfem.cases import analysis_keys, motion_keys, provenance
 from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis
-from archfem.cases.analysis_tables import (
-    complete_path,
-    read_analysis,
-    write_analysis_tables,
-)
+from archfem.cases.analysis_tables import complete_path, read_analysis, write_analysis_tables
 from archfem.cases.structure_keys import cached_structure, write_structure
 from archfem.cases.toml_file import (
     Table,
@@ -29,8 +24,8 @@ from archfem.cases.toml_file import (
     parse_change,
     read_with_base,
     refuse_unknown,
+    remove_key,
     set_value,
-    split_key_path,
 )
 from archfem.dynamics.analysis import Analysis
 from archfem.errors import ArchfemError, InvalidInput
@@ -245,8 +240,8 @@ class Case:
         """
         settings = deepcopy(self.settings)
         for path in paths:
-            *parents, last = split_key_path(path)
-            reduce(lambda table, name: table.get(name, {}), parents, settings).pop(last, None)
+            with suppress(InvalidInput):  # there is no such key
+                remove_key(settings, path)
         return Case.of(settings, self.folder)
 
     def text(self) -> str:

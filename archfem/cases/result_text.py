@@ -12,7 +12,7 @@ from archfem.cases.defaults import describe_defaults
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import Ending, History
-from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
+from archfem.dynamics.verdict import ALL_DEFINITIONS
 from archfem.joints.criteria import (
     assessed_joints,
     envelope,
@@ -74,7 +74,6 @@ RUN_COLUMNS = (
 
 def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
     """Tabulate the runs of a suite: verdict, ground motion, critical joint, and mechanisms."""
-    definitions = (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
     endings = {Ending.FINISHED: "reached", Ending.EVENT: "ended"}
     rows = []
     for name, run in runs.items():
@@ -89,17 +88,17 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         row.append(format_ratio(float(joints["friction"].max())))
         row.append(f"{int(apart.sum())} joints" if apart.any() else "-")
         row += [format_mm(value) for value in (verdict.displacement, verdict.residual)]
-        row += [_mechanism_cell(verdict.mechanisms, definition) for definition in definitions]
+        row += [_mechanism_cell(verdict.mechanisms, definition) for definition in ALL_DEFINITIONS]
         rows.append([*row, f"{endings.get(run.ending, run.ending)} {run.time[-1]:.2f} s"])
     verdicts = [run.verdict for run in runs.values()]
     counts = [
         f"{sum(verdict.mechanisms.get(name) is not None for verdict in verdicts)} of {len(runs)}"
         if any(name in verdict.mechanisms for verdict in verdicts)
         else "-"  # the definition does not apply
-        for name in definitions
+        for name in ALL_DEFINITIONS
     ]
     rows.append(["all", *["-"] * (len(RUN_COLUMNS) - 1), *counts, "-"])
-    return ResultTable([*RUN_COLUMNS, *definitions, "end"], rows)
+    return ResultTable([*RUN_COLUMNS, *ALL_DEFINITIONS, "end"], rows)
 
 
 def describe_verdicts(runs: Iterable[History]) -> str:

@@ -90,10 +90,9 @@ def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     fill = values.pop("fill", {})
     values = _resolve_names(functions[name], values, settings)
     # All tables are read, also unused ones: a misspelt name of a preset is an error then.
-    for material in settings.get("materials", {}):
-        _material(settings, material)
-    for joint in settings.get("contacts", {}):
-        _contact(settings, joint)
+    for section in _PRESETS:
+        for key in settings.get(section, {}):
+            _resolve_preset(settings, section, key)
     if name == "bridge":
         values = _bridge_parts(values, settings)
     elif name == "outlines":
@@ -125,7 +124,7 @@ def _read_blocks(settings: Table) -> Structure:
     ]
     if joints:
         return Structure(tuple(blocks), tuple(joints), **values)
-    return assembled(blocks, _contact(settings, contact), **values)
+    return assembled(blocks, _resolve_preset(settings, "contacts", contact), **values)
 
 
 def _read_part(
@@ -166,10 +165,10 @@ def _bridge_parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
 def _resolve_names(function: Callable[..., Any], values: Table, settings: Table) -> dict[str, Any]:
     """Return the arguments of a shape or part with the material and contact that they name."""
     arguments, parameters = dict(values), inspect.signature(function).parameters
-    for key, find in (("material", _material), ("contact", _contact)):
+    for key in ("material", "contact"):
         if key in parameters:  # a table may change the default one
             name = values[key] if key in values else parameters[key].default.name
-            arguments[key] = find(settings, name)
+            arguments[key] = _resolve_preset(settings, f"{key}s", name)
     return arguments
 
 
@@ -187,10 +186,12 @@ def _outline_arguments(values: dict[str, Any], settings: Table, folder: Path) ->
     # Stone and backfill have a contact of their own unless the case names another.
     pairs = {"stone/backfill": "soil to stone"} | drawn.get("contacts", {})
     contacts = check_table(pairs, dict.fromkeys(pairs, str), "structure.contacts")
-    drawn["contacts"] = {pair: _contact(settings, name) for pair, name in contacts.items()}
+    drawn["contacts"] = {
+        pair: _resolve_preset(settings, "contacts", name) for pair, name in contacts.items()
+    }
     # Layers name their materials in the drawing, so that all materials are passed.
-    names = {*MATERIAL_PRESETS, *settings.get("materials", {})}
-    drawn["materials"] = {name: _material(settings, name) for name in sorted(names)}
+    names = sorted({*MATERIAL_PRESETS, *settings.get("materials", {})})
+    drawn["materials"] = {name: _resolve_preset(settings, "materials", name) for name in names}
     return drawn
 
 
@@ -225,21 +226,10 @@ def _call(function: Callable[..., Described], section: str, **values: Any) -> De
     return function(**values)
 
 
-def _material(settings: Table, name: str) -> Material:
-    """Return a material: a preset, or described or changed by a table of the case."""
-    return _resolve_preset(settings, "materials", name, Material)
-
-
-def _contact(settings: Table, name: str) -> Contact:
-    """Return a contact: a preset, or described or changed by a table of the case."""
-    return _resolve_preset(settings, "contacts", name, Contact)
-
-
-def _resolve_preset(
-    settings: Table, section: str, name: str, cls: Callable[..., Described]
-) -> Described:
-    """Return a named preset with the changes of its table, or the object of the table alone."""
+def _resolve_preset(settings: Table, section: str, name: str) -> Any:
+    """Return a material or contact: a preset, or described or changed by a table of the case."""
     tables, presets = settings.get(section, {}), _PRESETS[section]
+    cls: Callable[..., Any] = Material if section == "materials" else Contact
     if name not in presets and name not in tables:
         raise InvalidInput(
             f"'{name}' is not among the {section} {sorted(set(presets) | set(tables))}: "

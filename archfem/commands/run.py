@@ -163,10 +163,10 @@ def accuracy(options: argparse.Namespace) -> None:
 
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     compared = case_accuracy(case, folder / "settings", workers=options.workers)
-    with _replace_results("accuracy", case, folder) as draft:
-        text = result_text.describe_accuracy(compared)
-        print(text)
-        write({"accuracy.txt": text, "accuracy.png": draw_accuracy(compared)}, draft)
+    text = result_text.describe_accuracy(compared)
+    print(text)
+    files: Files = {"accuracy.txt": text, "accuracy.png": draw_accuracy(compared)}
+    _write_results("accuracy", case, options.out, lambda: files)
 
 
 def verdict(options: argparse.Namespace) -> None:

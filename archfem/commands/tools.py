@@ -57,19 +57,17 @@ def animate(options: argparse.Namespace) -> None:
     case = _read_case(path) if options.case is None else Case.read(options.case)
     run = History.read(path, case.structure)
     names = ("window", "colour", "magnification", "fps", "seconds", "size", "renderer")
-    settings = {key: getattr(options, key) for key in names}
-    if settings["window"] not in (None, "auto"):
-        refusal = "give 'auto', or two times in seconds such as 8.0,9.5"
-        refusal = f"--window {options.window}: {refusal}"
-        settings["window"] = _parse_pair(options.window, float, ",", refusal)
-    if settings["size"] is not None:
-        refusal = f"--size {options.size}: give width and height, such as 1280x720"
-        settings["size"] = _parse_pair(options.size, int, "x", refusal)
+    # Options that were not given keep the defaults of `film`.
+    settings = {key: value for key in names if (value := getattr(options, key)) is not None}
+    if settings.get("window", "auto") != "auto":
+        remedy = "give 'auto', or two times in seconds such as 8.0,9.5"
+        settings["window"] = _parse_pair("window", options.window, float, ",", remedy)
+    if "size" in settings:
+        remedy = "give width and height, such as 1280x720"
+        settings["size"] = _parse_pair("size", options.size, int, "x", remedy)
     from archfem.view.films.film import film  # pyvista and the encoder are slow to import
 
-    # Options that were not given keep the defaults of `film`.
     target = Path(options.out) if options.out is not None else path.with_suffix(".mp4")
-    settings = {key: value for key, value in settings.items() if value is not None}
     print(f"wrote {film(dead_load_of_case(case).model, run, target, **settings)}")
 
 
@@ -89,12 +87,14 @@ def _read_case(path: Path, name: str = "case.toml") -> Case:
     )
 
 
-def _parse_pair(text: str, number: type, separator: str, refusal: str) -> tuple[Any, Any]:
+def _parse_pair(
+    option: str, text: str, number: type, separator: str, remedy: str
+) -> tuple[Any, Any]:
     """Parse two numbers such as "1280x720"."""
     try:
         first, second = (number(part) for part in text.lower().split(separator))
     except ValueError as error:
-        raise InvalidInput(refusal) from error
+        raise InvalidInput(f"--{option} {text}: {remedy}") from error
     return first, second
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from time import process_time
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -24,7 +25,6 @@ from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import Equilibrium
 
 # Settings tried by default; quadratures with their points on a facet (None: default), steps in [s]
 TRIED_FIDELITIES = ("rigid", "faces", "condensed")
@@ -134,18 +134,30 @@ def accuracy(
         DidNotConverge: the reference itself failed.
     """
     given = structure if isinstance(structure, Analysis) else Analysis(structure)
-    structure = given.structure
-    references = reference_settings(structure)
-    model = build(structure, references[0].discretisation)
-    viscous, _ = resolve_effective_damping(damping or given.damping, model, None)
-    motion = motion or severe_motion(model)
-    settings = [*references, *candidate_settings(structure, rungs, cells, rules, steps)]
+    structure, damping = given.structure, damping or given.damping
+    tried = rungs, cells, rules, steps
+    settings, reference, viscous = plan_comparison(structure, damping, *tried)
+    motion = motion or severe_motion(reference)
     runs = [
-        time_run(build(structure, setting.discretisation), motion, viscous, setting.dt)
+        time_run(build(structure, setting.discretisation), motion, setting.dt, damping=viscous)
         for setting in tqdm(settings, unit="setting", disable=None, leave=False)
     ]
     tolerance = given.tolerance if tolerance is None else tolerance
     return compare_runs(settings, runs, motion.duration, tolerance)
+
+
+def plan_comparison(
+    structure: Structure, damping: Viscous | EffectiveDamping | str | None, *tried: Any
+) -> tuple[list[Setting], Model, Viscous | None]:
+    """Return the settings to compare, the reference model, and the damping of all runs.
+
+    The first two settings are the reference and the coarser one; `tried` is as for
+    `candidate_settings`. Effective modes are those of the reference model.
+    """
+    references = reference_settings(structure)
+    model = build(structure, references[0].discretisation)
+    viscous, _ = resolve_effective_damping(damping, model, None)
+    return [*references, *candidate_settings(structure, *tried)], model, viscous
 
 
 def reference_settings(structure: Structure, dt: float = 0.00125) -> tuple[Setting, Setting]:
@@ -173,19 +185,13 @@ def candidate_settings(
                 yield from (Setting(settings, dt) for dt in steps)
 
 
-def time_run(
-    model: Model,
-    motion: Motion,
-    damping: Viscous | None,
-    dt: float,
-    start: Equilibrium | None = None,
-) -> TimedRun:
-    """Run a model and measure the processor time."""
+def time_run(model: Model, motion: Motion, dt: float, **options: Any) -> TimedRun:
+    """Run a model and measure the processor time; options are those of `time_history`."""
     # two steps beforehand, so that compilation is not measured
-    time_history(model, motion.cut(0.0, 2.0 * dt), damping=damping, dt=dt, start=start)
+    time_history(model, motion.cut(0.0, 2.0 * dt), dt=dt, **options)
     begin = process_time()
     try:
-        run = time_history(model, motion, damping=damping, dt=dt, start=start)
+        run = time_history(model, motion, dt=dt, **options)
     except DidNotConverge:
         return TimedRun(model.size, process_time() - begin, None)
     if run.ending is Ending.INTERRUPTED:

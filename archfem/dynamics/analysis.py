@@ -15,20 +15,11 @@ from archfem._display import call_late_bound
 from archfem._files import hash_value
 from archfem._typing import Metres, Seconds
 from archfem._validation import check_fields, check_number, given_fields, validate_methods
+from archfem.dynamics import schemes
 from archfem.dynamics.events import StopCondition, resolve_criteria
 from archfem.dynamics.history import History
 from archfem.dynamics.model_selection import select_model
 from archfem.dynamics.recorder import Record
-from archfem.dynamics.schemes import (
-    Conserving,
-    EffectiveDamping,
-    Scheme,
-    Viscous,
-    check_friction_scheme,
-    check_large_displacement_scheme,
-    check_time_step,
-    interpret_damping,
-)
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
@@ -42,7 +33,7 @@ from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.modes import Modes, modes
 from archfem.statics.newton import Newton
 
-_DEFAULT_SCHEME, _DEFAULT_NEWTON, _DEFAULT_RECORD = Conserving(), Newton(), Record()
+_DEFAULT_SCHEME, _DEFAULT_NEWTON, _DEFAULT_RECORD = schemes.Conserving(), Newton(), Record()
 
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -103,8 +94,8 @@ class Analysis:
     mesh_file: str | Path | None = None
     tolerance: float = 0.005
     dt: Seconds | None = None
-    damping: Viscous | EffectiveDamping | Literal["effective"] | None = None
-    scheme: Scheme = _DEFAULT_SCHEME
+    damping: schemes.Viscous | schemes.EffectiveDamping | Literal["effective"] | None = None
+    scheme: schemes.Scheme = _DEFAULT_SCHEME
     method: str = "auto"
     newton: Newton = _DEFAULT_NEWTON
     until: StopCondition | None = None
@@ -114,21 +105,21 @@ class Analysis:
 
     def __post_init__(self) -> None:
         """Check the values, and that they do not exclude each other."""
-        object.__setattr__(self, "damping", interpret_damping(self.damping))
+        object.__setattr__(self, "damping", schemes.interpret_damping(self.damping))
         check_fields(self)
         object.__setattr__(self, "cells", self.discretisation.cells)
         if not 0.0 < check_number(self.tolerance, "tolerance on |e| [-]") < 1.0:
             raise InvalidInput(f"tolerance {self.tolerance:g} on |e| is not between 0 and 1")
         if self.dt is not None:
-            check_time_step(self.dt)
+            schemes.check_time_step(self.dt)
         if self.selects_model and self.mesh_file is not None:
             raise InvalidInput(
                 f"mesh_file = {str(self.mesh_file)!r} is one mesh, and fidelity 'auto' chooses: "
                 "name a fidelity"
             )
         if self.displacements == "large":
-            check_large_displacement_scheme(self.scheme)
-        check_friction_scheme(self.scheme, self.structure)
+            schemes.check_large_displacement_scheme(self.scheme)
+        schemes.check_friction_scheme(self.scheme, self.structure)
         resolve_criteria(self.criteria, self.until)
         if self.stages is not None:
             object.__setattr__(self, "stages", tuple(self.stages))

@@ -130,11 +130,7 @@ def effective_mode_range(
 
 
 def _modes_with_share(
-    model: Model,
-    start: Start,
-    mass_share: float,
-    initial_count: int = 32,
-    max_count: int = 1024,
+    model: Model, start: Start, mass_share: float, initial_count: int = 32, max_count: int = 1024
 ) -> tuple[Modes, Array]:
     """Return modes that reach a share of the mass along x, and their cumulative shares (modes,)."""
     model, state = resolve_start(model, start)
@@ -214,6 +210,35 @@ def resolve_effective_damping(
         return damping, f"{text} {damping.frequency:.2f} Hz, proportional to stiffness{origin}"
     low, high = damping.frequencies
     return damping, f"{text} {low:.2f} and {high:.2f} Hz{origin}"
+
+
+def damping_kind(damping: Viscous | None) -> str:
+    """Return the kind of a damping in words."""
+    return "mass and stiffness" if isinstance(damping, Rayleigh) else "stiffness"
+
+
+def vary_damping(
+    given: Viscous | EffectiveDamping | str | None,
+    model: Model,
+    start: Start,
+    kind: str | None,
+    factor: float,
+) -> Viscous | None:
+    """Return damping of a kind, or of its own with None, with a multiple of the ratio."""
+    damping, _ = resolve_effective_damping(given, model, start)
+    if damping is None:
+        return None
+    ratio = factor * damping.ratio
+    if kind in (None, damping_kind(damping)):
+        return replace(damping, ratio=ratio)
+    # the other kind has its frequencies from the effective modes too, or from the one that is given
+    if isinstance(given, EffectiveDamping):
+        other = "stiffness" if kind == "stiffness" else "rayleigh"
+        effective = replace(given, ratio=ratio, kind=other)
+        return _find_frequencies(effective, model, start)[0]
+    if isinstance(damping, Rayleigh):
+        return StiffnessDamping(ratio, damping.frequencies[0], damping.joints)
+    return Rayleigh(ratio, (damping.frequency, 2.0 * damping.frequency), damping.joints)
 
 
 def _find_frequencies(damping: EffectiveDamping, model: Model, start: Start) -> tuple[Viscous, str]:

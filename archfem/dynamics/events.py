@@ -58,27 +58,26 @@ class FailureState:
         return (self.side != 0) | self.slides | self.apart
 
 
+@dataclass(eq=False)
 class FailureScan:
     """Scan of joints for failures at every step; it evaluates each distinct failure pattern once.
 
     The query maps a pattern to the names of the conditions that hold; results are cached.
     """
 
-    def __init__(
-        self,
-        structure: Structure,
-        criteria: Criteria,
-        numbers: Sequence[int],
-        query: Callable[[FailureState], frozenset[str]],
-    ) -> None:
-        self._structure, self._criteria, self._query = structure, criteria, query
-        self._numbers = np.array(numbers, dtype=np.intp)
-        self._depth = structure.depths[self._numbers]
+    structure: Structure
+    criteria: Criteria
+    numbers: Sequence[int]  # of the scanned joints
+    query: Callable[[FailureState], frozenset[str]]
+
+    def __post_init__(self) -> None:
+        structure, numbers = self.structure, np.array(self.numbers, dtype=np.intp)
+        self._numbers, self._depth = numbers, structure.depths[numbers]
         self._laws = (
-            criteria.coefficients(structure.friction[self._numbers]),
-            criteria.cohesions(structure.cohesion[self._numbers]),
+            self.criteria.coefficients(structure.friction[numbers]),
+            self.criteria.cohesions(structure.cohesion[numbers]),
         )
-        self._tension = structure.tension[self._numbers]
+        self._tension = structure.tension[numbers]
         self._cache: dict[bytes, frozenset[str]] = {}
 
     def __call__(self, resultants: Array, min_failures: int) -> Iterator[frozenset[str]]:
@@ -86,7 +85,7 @@ class FailureScan:
         forces = resultants[:, self._numbers]
         e, friction = eccentricity_and_friction(forces, self._depth)
         limits = sliding_ratio(forces[..., 0], e, *self._laws)
-        hinges, slides = judge_joints(e, friction, limits, self._criteria.hinge)
+        hinges, slides = judge_joints(e, friction, limits, self.criteria.hinge)
         apart = tension_margin(forces[..., 0], self._tension) <= 0.0
         failures = np.count_nonzero(hinges | slides | apart, axis=1)
         senses = np.where(hinges, np.sign(e), 0.0), np.where(slides, np.sign(forces[..., 1]), 0.0)
@@ -100,12 +99,12 @@ class FailureScan:
                 side, sense, slid, loose = states[step]
                 joints = partial(self.joint_states, resultants[step])
                 state = FailureState(side, sense, slid.astype(bool), loose.astype(bool), joints)
-                self._cache[key] = self._query(state)
+                self._cache[key] = self.query(state)
             yield self._cache[key]
 
     def joint_states(self, resultants: Array) -> xr.Dataset:
         """Return the resultants and failure flags of all joints at a step, as a dataset."""
-        return joint_dataset(self._structure, resultants, criteria=self._criteria)
+        return joint_dataset(self.structure, resultants, criteria=self.criteria)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
+from xml.etree.ElementTree import Element, ElementTree, SubElement
 
 import numpy as np
 import xarray as xr
@@ -70,7 +70,8 @@ def write_xdmf(model: Model, run: xr.Dataset, path: str | Path) -> Path:
     with atomic_write(numbers) as draft:
         xr.Dataset(data).to_netcdf(draft, engine="netcdf4")
     with atomic_write(path) as draft:
-        draft.write_text(_xdmf_text(solids, series, len(mixed), numbers.name), encoding="utf-8")
+        tree = _xdmf_tree(solids, series, len(mixed), numbers.name)
+        tree.write(draft, "utf-8", xml_declaration=True)
     return path
 
 
@@ -122,41 +123,30 @@ def _xdmf_cell_type(size: int) -> tuple[int, ...]:
     return {3: (4,), 4: (5,)}.get(size, (3, size))
 
 
-def _xdmf_text(solids: Solids, series: list[FieldFrame], entries: int, file: str) -> str:
-    """Return the XML text that describes the arrays of the HDF5 file."""
-    points, cells = len(solids.cells.places), len(solids.cells.polygons)
+def _xdmf_tree(solids: Solids, series: list[FieldFrame], entries: int, file: str) -> ElementTree:
+    """Return the XML tree that describes the arrays of the HDF5 file."""
+    points, cells = len(solids.cells.places), str(len(solids.cells.polygons))
+    root, name = Element("Xdmf", Version="3.0"), solids.model.structure.name
+    grids = SubElement(SubElement(root, "Domain"), "Grid", Name=name, GridType="Collection")
+    grids.set("CollectionType", "Temporal")
 
-    def item(name: str, shape: str, kind: str = "Float") -> str:
-        return (
-            f'<DataItem Dimensions="{shape}" NumberType="{kind}" Precision="8" Format="HDF">'
-            f"{file}:/{name}</DataItem>"
-        )
+    def add_data(parent: Element, name: str, shape: str, kind: str = "Float") -> None:
+        item = SubElement(parent, "DataItem", Dimensions=shape, NumberType=kind, Precision="8")
+        item.set("Format", "HDF")
+        item.text = f"{file}:/{name}"
 
-    def attribute(name: str, kind: str, centre: str, data: str) -> str:
-        return (
-            f'<Attribute Name="{name}" AttributeType="{kind}" Center="{centre}">{data}</Attribute>'
-        )
-
-    lines = [
-        '<?xml version="1.0"?>',
-        '<Xdmf Version="3.0"><Domain>',
-        f'<Grid Name={quoteattr(solids.model.structure.name)} GridType="Collection" '
-        'CollectionType="Temporal">',
-    ]
     for number, frame in enumerate(series):
-        vectors = item(f"displacement_{number}", f"{points} 3")
-        lines += [
-            f'<Grid Name="frame {number}" GridType="Uniform"><Time Value="{frame.time:.9g}"/>',
-            f'<Topology TopologyType="Mixed" NumberOfElements="{cells}">',
-            item("cells", str(entries), "Int") + "</Topology>",
-            f'<Geometry GeometryType="XY">{item("points", f"{points} 2")}</Geometry>',
-            attribute("block", "Scalar", "Cell", item("block", str(cells), "Int")),
-            attribute("displacement", "Vector", "Node", vectors),
-        ]
-        lines += [
-            attribute(name, "Scalar", "Cell", item(f"{name}_{number}", str(cells)))
-            for name in solids.cell_data(frame.stress)
-            if name != "block"
-        ]
-        lines.append("</Grid>")
-    return "\n".join([*lines, "</Grid></Domain></Xdmf>\n"])
+        grid = SubElement(grids, "Grid", Name=f"frame {number}", GridType="Uniform")
+        SubElement(grid, "Time", Value=f"{frame.time:.9g}")
+        topology = SubElement(grid, "Topology", TopologyType="Mixed", NumberOfElements=cells)
+        add_data(topology, "cells", str(entries), "Int")
+        add_data(SubElement(grid, "Geometry", GeometryType="XY"), "points", f"{points} 2")
+        moved = {"Name": "displacement", "AttributeType": "Vector", "Center": "Node"}
+        vectors = SubElement(grid, "Attribute", moved)
+        add_data(vectors, f"displacement_{number}", f"{points} 3")
+        for name in solids.cell_data(frame.stress):
+            field = SubElement(grid, "Attribute", Name=name, AttributeType="Scalar", Center="Cell")
+            # blocks do not change
+            data, kind = (name, "Int") if name == "block" else (f"{name}_{number}", "Float")
+            add_data(field, data, cells, kind)
+    return ElementTree(root)

@@ -120,11 +120,10 @@ def simulate_fall(
         simulation = RigidBlockSimulation(loose, dt=dt, rocking_ratio=ratios)
         try:
             frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
+            return _fall_dataset(frames, motion, released).assign_attrs(fall_step=dt), frames
         except DidNotConverge as error:
             logger.info("the fall is repeated with shorter steps: %s", error)
             failure = error
-            continue
-        return _fall_dataset(frames, motion, released).assign_attrs(fall_step=dt), frames
     raise DidNotConverge(
         f"loose blocks could not be followed from {state.time:.4g} s on, by steps of "
         f"{1e3 * steps[0]:g} to {1e3 * steps[-1]:g} ms ('{failure}'): compare with "

@@ -18,8 +18,7 @@ from archfem._validation import check_type, validate_arguments, validate_methods
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.export import write_vtk, write_xdmf
 from archfem.dynamics.verdict import (
-    MECHANISM_DEFINITIONS,
-    PUBLISHED_DEFINITION,
+    ALL_DEFINITIONS,
     Verdict,
     brief_mechanism_remarks,
     detect_mechanisms,
@@ -509,5 +508,4 @@ def first_mechanisms(run: History, criteria: Criteria | None = None) -> dict[str
             "History.read(path, structure)"
         )
     judged = run if criteria is None else run.with_criteria(criteria)
-    definitions = (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
-    return {name: judged.verdict.mechanisms.get(name) for name in definitions}
+    return {name: judged.verdict.mechanisms.get(name) for name in ALL_DEFINITIONS}

@@ -8,23 +8,15 @@ selection takes about as long as the run for which it selects.
 
 import logging
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tqdm import tqdm
 
 from archfem._validation import check_number, check_type
+from archfem.dynamics import error_estimation
 from archfem.dynamics.damping import resolve_effective_damping
-from archfem.dynamics.error_estimation import (
-    RunPeaks,
-    default_damping,
-    estimate_errors,
-    parts_about_peaks,
-    run_peaks,
-    severe_motion,
-    strongest_window,
-)
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.errors import InvalidInput
 from archfem.joints.quadrature import Quadrature
@@ -37,8 +29,6 @@ from archfem.models.model import Doubt, Model, Prediction
 from archfem.motion.motion import Motion
 
 logger = logging.getLogger("archfem")
-
-Builder = Callable[[Structure, Discretisation], Model]
 
 # Fidelity, cells and time step [s] of the settings tried. The first two share a mesh: the error of
 # the step is the larger, and a second mesh costs as much to build as the window to run
@@ -175,15 +165,13 @@ def select_model(
     dt: float | None = None,
     *,
     displacements: str = "small",
-    builder: Builder = plain.build,
 ) -> Model:
     """Return a model and time step with a predicted error within a tolerance.
 
     Without any, the most accurate of those tried is returned with a warning.
     """
     Discretisation(displacements=displacements)  # refuses values other than small and large
-    settings = _settings_to_try(structure, dt)
-    trials, history = _try_settings(structure, settings, tolerance, motion, damping, builder)
+    trials, history = _try_settings(structure, tolerance, motion, damping, dt)
     if dt is None:
         trial, error = _select_trial(trials, history[-1], tolerance)
     else:
@@ -194,7 +182,7 @@ def select_model(
     error_per_rotation = 3.0
     model, small = trial.model, error_per_rotation * max(each.run.rotation for each in trials)
     if displacements == "large":
-        model, small = builder(structure, replace(trial.settings, displacements="large")), 0.0
+        model, small = plain.build(structure, replace(trial.settings, displacements="large")), 0.0
     candidates = tuple(zip(names, history[-1], strict=True))
     prediction = Prediction(error, tolerance, trial.dt, candidates, small)
     model = model.with_prediction(prediction)
@@ -222,35 +210,34 @@ class _Trial:
     settings: Discretisation
     dt: float  # time step [s]
     model: Model
-    run: RunPeaks
+    run: error_estimation.RunPeaks
     share: float  # of the motion that was run [-]
 
 
 def _try_settings(
     structure: Structure,
-    settings: Sequence[tuple[Discretisation, float]],
     tolerance: float,
     motion: Motion | None,
     damping: Viscous | EffectiveDamping | str | None,
-    builder: Builder,
+    dt: float | None,
 ) -> tuple[list[_Trial], list[list[float]]]:
     """Return settings tried until one is accurate enough, and all errors after each trial."""
     trials: list[_Trial] = []
     history: list[list[float]] = []
     excitation: tuple[Motion, Viscous | None, float] | None = None
-    for discretisation, dt in tqdm(
-        settings, unit="run", disable=None, leave=False, desc="choosing a model"
-    ):
+    settings = _settings_to_try(structure, dt)
+    bar = tqdm(settings, unit="run", disable=None, leave=False, desc="choosing a model")
+    for discretisation, step in bar:
         parts, same = None, trials and trials[-1].settings == discretisation
-        model = trials[-1].model if same else builder(structure, discretisation)
+        model = trials[-1].model if same else plain.build(structure, discretisation)
         excitation = excitation or _resolve_excitation(model, motion, damping)
         window, viscous, share = excitation
         if trials and trials[0].run.peaks is not None:
-            parts = parts_about_peaks(trials[0].run)
+            parts = error_estimation.parts_about_peaks(trials[0].run)
             window = window.cut(0.0, min(parts[-1][1], window.duration))
-        run = run_peaks(model, window, viscous, dt, parts if same else None)
-        trials.append(_Trial(discretisation, dt, model, run, share))
-        history.append(estimate_errors([trial.run for trial in trials]))
+        run = error_estimation.run_peaks(model, window, viscous, step, parts if same else None)
+        trials.append(_Trial(discretisation, step, model, run, share))
+        history.append(error_estimation.estimate_errors([trial.run for trial in trials]))
         if history[-1][-1] <= tolerance or _stagnates(history):
             break
     return trials, history
@@ -283,9 +270,9 @@ def _resolve_excitation(
     if motion is None or viscous is None:
         soil = bool(find_soft_blocks(structure))
         probe = model if soil else build_rigid_model(structure, rule=Quadrature("exact"))
-        motion = severe_motion(probe) if motion is None else motion
-        viscous = viscous or default_damping(probe)
-    window = strongest_window(motion)
+        motion = error_estimation.severe_motion(probe) if motion is None else motion
+        viscous = viscous or error_estimation.default_damping(probe)
+    window = error_estimation.strongest_window(motion)
     return window, viscous, window.duration / motion.duration
 
 
@@ -317,7 +304,7 @@ def _doubts(prediction: Prediction, *, stagnates: bool, prescribed: bool) -> Ite
         )
 
 
-def _doubt_rocking(structure: Structure, run: RunPeaks) -> Iterator[Doubt]:
+def _doubt_rocking(structure: Structure, run: error_estimation.RunPeaks) -> Iterator[Doubt]:
     """Yield a doubt about the prediction where a stack of blocks rocks."""
     # a stack is determinate, so that nothing but impacts ends its rocking; uplift alone, |e| of 1/6
     # to 0.4, was followed by no such errors

@@ -13,15 +13,9 @@ from tqdm import tqdm
 
 from archfem._threads import single_threaded
 from archfem._validation import check_number, check_type, validate_arguments
+from archfem.dynamics import events
 from archfem.dynamics.analysis import Analysis, takes_analysis
 from archfem.dynamics.damping import resolve_effective_damping
-from archfem.dynamics.events import (
-    EventMonitor,
-    StopCondition,
-    first_event,
-    resolve_criteria,
-    start_monitor,
-)
 from archfem.dynamics.fall import follow_fall
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.monitor import RunMonitor
@@ -65,7 +59,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     damping: Viscous | EffectiveDamping | str | None = None,
     scheme: Scheme | None = None,
     record: Record | None = None,
-    until: StopCondition | None = None,
+    until: events.StopCondition | None = None,
     criteria: Criteria | None = None,
     newton: Newton | None = None,
     method: str | Stepper = "auto",
@@ -121,8 +115,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     assert not isinstance(model, Analysis)  # by the decorator
     check_model(model)
     dt, tolerance = _resolve_steps(model, dt, tolerance)
-    criteria = resolve_criteria(criteria, until)
-    event = None if until is None else start_monitor(until, model.structure, criteria)
+    criteria = events.resolve_criteria(criteria, until)
+    event = None if until is None else events.start_monitor(until, model.structure, criteria)
     if model.large_displacements and scheme is not None:
         check_large_displacement_scheme(scheme)
     model, start, viscous = _resolve_start(model, start, damping, newton)
@@ -218,7 +212,7 @@ def _make_recorder(
 
 
 # What may end a run: an event, and blocks that become loose where displacements are large
-Monitors = tuple[EventMonitor | None, LooseningMonitor | None]
+Monitors = tuple[events.EventMonitor | None, LooseningMonitor | None]
 
 
 def _run_steps(
@@ -252,7 +246,7 @@ def _find_end(monitors: Monitors, batch: Batch, before: float) -> tuple[Ending, 
     # an event at that step or before has precedence
     if event is not None and last:
         steps = np.diff(batch.times[:last], prepend=before).tolist()
-        if met := first_event(event, batch.resultants[:last], steps):
+        if met := events.first_event(event, batch.resultants[:last], steps):
             return Ending.EVENT, met[1], met[0] + 1
     return ending, reason, last
 

@@ -41,6 +41,8 @@ MECHANISM_DEFINITIONS = (
 # Criterion of `demirel_aldemir_mechanism`
 PUBLISHED_DEFINITION = "Demirel and Aldemir"
 
+ALL_DEFINITIONS = (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
+
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Verdict:

@@ -6,7 +6,7 @@ computed anew.
 """
 
 from collections import OrderedDict
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -16,7 +16,6 @@ from archfem.cases.run import DeadLoadResult, damping_of, dead_load_of_case
 from archfem.errors import InvalidInput
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.modes import Modes, modes
 from archfem.studies.parameter_space import MODEL_SECTIONS
 from archfem.studies.shared_results import compute_once
@@ -37,7 +36,7 @@ def dead_load_of(case: Case) -> DeadLoadResult:
         DidNotConverge: the structure does not stand.
     """
     key = _model_key(case)
-    dead: Equilibrium = _look_up("equilibria", key, lambda: dead_load_of_case(case))
+    dead = _look_up("equilibria", key, lambda: dead_load_of_case(case))
     result = DeadLoadResult(case, dead)
     damping_key = f"{key} {case.analysis.damping!r}"
     # stored as the cached property `damping` of the result would store it
@@ -72,7 +71,7 @@ def ground_motion(case: Case) -> Motion:
     if case.motion is None:
         return case.ground_motion()  # raises the error for a case without motion
     # The scale is applied last, so that scaled motions share one file and one matching.
-    unscaled = replace(case, motion=_without(case.motion, ("scale",)))
+    unscaled = replace(case, motion={k: v for k, v in case.motion.items() if k != "scale"})
     key = case.hash_sections(("motion",), ("scale",))
     return _look_up("motions", key, unscaled.ground_motion).scaled(case.motion.get("scale", 1.0))
 
@@ -82,7 +81,7 @@ def ground_suite(case: Case) -> Suite:
     if (settings := case.suite) is None:
         return case.ground_suite()  # raises the error for a case without suite
     keys = ("scale", "reduction", "reversed")
-    plain = replace(case, suite=_without(settings, keys))
+    plain = replace(case, suite={k: v for k, v in settings.items() if k not in keys})
     key = case.hash_sections(("suite",), keys)
     suite = _look_up("suites", key, lambda: _match_once(plain, key))
     factors = {name: settings.get(name, 1.0) for name in ("scale", "reduction")}
@@ -111,11 +110,6 @@ def _model_key(case: Case) -> str:
     """Key of the model of a case; it includes the motion if that selects the model."""
     selection = ("motion", "suite", "analysis", "criteria") if case.analysis.selects_model else ()
     return case.hash_sections((*MODEL_SECTIONS, *selection))
-
-
-def _without(table: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
-    """A table without some of its keys."""
-    return {key: value for key, value in table.items() if key not in keys}
 
 
 def _look_up(kind: str, key: str, make: Callable[[], Value]) -> Value:

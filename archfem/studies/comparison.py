@@ -18,7 +18,7 @@ from archfem.cases.case import Case
 from archfem.cases.toml_file import check_table
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import Ending
-from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
+from archfem.dynamics.verdict import ALL_DEFINITIONS, MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
 from archfem.errors import InvalidInput
 from archfem.limit.mechanism_count import MECHANISM_KINDS
 from archfem.studies.parameter_space import PAIR_KEY, Point
@@ -87,7 +87,7 @@ def study_table(findings: Mapping[str, Finding]) -> str:
         findings: findings by name of the case.
     """
     head = ["case", "mode 1", "mass x", "|e| dead", "|e| rings", "|e| piers"]
-    head += [*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION]
+    head += ALL_DEFINITIONS
     falls = [_falls_text(finding) for finding in findings.values()]
     rows = []
     for name, finding in findings.items():
@@ -195,7 +195,7 @@ def _run_findings(row: Mapping[str, Any]) -> dict[str, Any]:
     kinds, times = _select(row, "mechanism"), _select(row, "time")
     mechanisms = {
         name: {"kind": kinds[name], "time": times.get(name, nan)} if name in kinds else None
-        for name in (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
+        for name in ALL_DEFINITIONS
     }
     sizes = {name: _select(row, name) for name in ("eccentricity", "friction")}
     end = {"fall": row["fall"] or None, "ended": row["ended"], "outcome": row["outcome"]}

@@ -19,20 +19,11 @@ from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import check_array, validate_arguments, validate_methods
 from archfem.cases.case import Case, case_of
-from archfem.dynamics.accuracy import (
-    Accuracy,
-    TimedRun,
-    candidate_settings,
-    compare_runs,
-    reference_settings,
-    time_run,
-)
+from archfem.dynamics.accuracy import Accuracy, TimedRun, compare_runs, plan_comparison, time_run
 from archfem.dynamics.analysis import Analysis
-from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.model_selection import Setting
 from archfem.dynamics.schemes import Viscous
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.models.builder import build
 from archfem.motion.motion import Motion
 from archfem.studies.cache import dead_load_of, ground_motion
 from archfem.studies.evaluators import Findings
@@ -263,11 +254,7 @@ def case_accuracy(
         StudyStopped: as for `Study.run`; finished settings are kept.
     """
     motion = ground_motion(case)
-    references = reference_settings(case.structure)
-    # damping from modes is that of the reference model in all runs
-    reference = build(case.structure, references[0].discretisation)
-    damping, _ = resolve_effective_damping(case.analysis.damping, reference, None)
-    settings = [*references, *candidate_settings(case.structure)]
+    settings, _, damping = plan_comparison(case.structure, case.analysis.damping)
     varied = ("fidelity", "cells", "quadrature", "quadrature_points", "tolerance")
     study = Study(
         case.without(*(f"model.{key}" for key in varied)),
@@ -299,7 +286,8 @@ def evaluate_time(case: Case, damping: Viscous | None) -> Findings:
     """Return the processor time of a run of a case, and the largest |e| of each joint."""
     result, motion = dead_load_of(case), ground_motion(case)
     assert case.analysis.dt is not None  # each setting has a step
-    run = time_run(result.dead.model, motion, damping, case.analysis.dt, start=result.dead)
+    options = {"start": result.dead, "damping": damping}
+    run = time_run(result.dead.model, motion, case.analysis.dt, **options)
     findings: Findings = {"coordinates": run.size, "seconds": run.seconds}
     return findings if run.peaks is None else findings | {"peaks": run.peaks}
 

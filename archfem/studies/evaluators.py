@@ -16,7 +16,7 @@ from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.run import DeadLoadResult, log_prefix, run_time_history
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.motion_scaling import mechanism_scales
-from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
+from archfem.dynamics.verdict import ALL_DEFINITIONS, MECHANISM_DEFINITIONS
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints, eccentricity_magnitude, part_roles
 from archfem.limit.mechanism_count import Mechanism
@@ -211,7 +211,7 @@ FINDING_UNITS: Mapping[Callable[..., Mapping[str, Any]], Mapping[str, str]] = {
     evaluate_history: {
         "rotation": "rad",
         **dict.fromkeys(("opening", "slip", "largest_displacement", "residual_displacement"), "m"),
-        **dict.fromkeys((*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION), "s"),
+        **dict.fromkeys(ALL_DEFINITIONS, "s"),
     },
     evaluate_dead_load: {"N": "N", "frequency": "Hz"},
 }
@@ -247,10 +247,8 @@ class Evaluator:
     @classmethod
     def of(cls, setting: Any) -> "Evaluator":
         """Return the evaluator of a function, a name, or a table of `name` and options."""
-        options: dict[str, Any] = {}
-        if isinstance(setting, Mapping):
-            options = dict(setting)
-            setting = options.pop("name", None)
+        options = dict(setting) if isinstance(setting, Mapping) else {"name": setting}
+        setting = options.pop("name", None)
         find = _find_function(setting) if isinstance(setting, str) else setting
         if not callable(find):
             raise InvalidInput(

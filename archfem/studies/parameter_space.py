@@ -19,12 +19,7 @@ from archfem._validation import check_integer, short_repr
 from archfem.cases.analysis_tables import complete_path
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_sections
-from archfem.cases.toml_file import (
-    check_choice,
-    check_table,
-    refuse_unknown,
-    set_value,
-)
+from archfem.cases.toml_file import check_choice, check_table, refuse_unknown, set_value
 from archfem.errors import InvalidInput
 
 # Sections of a case that define its model
@@ -134,9 +129,8 @@ def _value_axis(key: str, values: Any) -> Axis:
         raise InvalidInput(f"{key} is empty: a product over it has no points; give values")
     if any(value is None for value in values):
         raise InvalidInput(f"{key} has the value None, which no file holds: list points without it")
-    return Axis(
-        complete_path(key), (complete_path(key),), tuple((_to_python(value),) for value in values)
-    )
+    path = complete_path(key)
+    return Axis(path, (path,), tuple((_to_python(value),) for value in values))
 
 
 def _to_python(value: Any) -> Any:

@@ -222,7 +222,7 @@ class Study:
         failed = sum(bool(row["error"]) for row in rows.values())
         progress = Progress(len(numbers), len(rows), failed, store, shared)
         log = None if store is None else store.folder / "workers.log"
-        evaluation = self._evaluate(points, log, shared, workers, client)
+        evaluation = self._evaluate(points, shared, client, workers=workers, log=log)
         # closed on Ctrl-C too, which ends the workers
         with closing(progress), closing(evaluation) as finished:
             for number, row in finished:
@@ -242,14 +242,9 @@ class Study:
             logger.warning("point %d: a file it reads was changed meanwhile: not kept", number)
 
     def _evaluate(
-        self,
-        points: list[tuple[int, Point]],
-        log: Path | None,
-        shared: Path,
-        workers: int | None,
-        client: Any,
+        self, points: list[tuple[int, Point]], shared: Path, client: Any, **options: Any
     ) -> Generator[tuple[int, Row], None, None]:
-        """Yield the rows of points as they finish."""
+        """Yield the rows of points as they finish; options are those of `evaluate_points`."""
         if not points:
             return
         if client is not None:
@@ -261,8 +256,8 @@ class Study:
                 ) from error
             yield from evaluate_on_cluster(points, self.evaluator, client, shared)
             return
-        load = load_table_libraries
-        yield from evaluate_points(points, self.evaluator, workers, log, load, shared)
+        options |= {"meanwhile": load_table_libraries, "shared": shared}
+        yield from evaluate_points(points, self.evaluator, **options)
 
     def _check(self) -> None:
         """Make the cases at the ends of each axis, so that errors are raised before the study."""
@@ -456,11 +451,8 @@ def _log_stored(store: Store, digests: Sequence[str], rows: Mapping[str, Row]) -
     if rows:
         logger.info("%d of %d points were finished before", len(rows), len(digests))
     if others := len(store.digests() - set(digests)):
-        logger.warning(
-            "%s has %d points of other cases, findings or versions: they are left alone",
-            store.folder,
-            others,
-        )
+        text = "%s has %d points of other cases, findings or versions: they are left alone"
+        logger.warning(text, store.folder, others)
 
 
 @validate_arguments

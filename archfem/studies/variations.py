@@ -18,25 +18,17 @@ from tqdm import tqdm
 from archfem._validation import check_integer, check_number, validate_arguments
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import CollapseState, classify_collapse
-from archfem.dynamics.damping import resolve_effective_damping
+from archfem.dynamics.damping import damping_kind, resolve_effective_damping, vary_damping
 from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
-from archfem.dynamics.schemes import (
-    Conserving,
-    EffectiveDamping,
-    Rayleigh,
-    StiffnessDamping,
-    Viscous,
-    interpret_damping,
-)
+from archfem.dynamics.schemes import Conserving, EffectiveDamping, Viscous, interpret_damping
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import Equilibrium
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.process_pool import evaluate_points
 
@@ -154,12 +146,13 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     if viscous is None:
         defaults = {name: defaults[name] for name in defaults if not name.startswith("damping")}
     ranges = _check_ranges({**defaults, **(vary or {})})
-    changes = [*_single_changes(ranges, viscous), *_sample_changes(ranges, samples, seed)]
+    neutral = {**NEUTRAL, "damping_kind": damping_kind(viscous)}
+    changes = [*_single_changes(ranges, neutral), *_sample_changes(ranges, samples, seed)]
     variations = [Variation(analysis, motion, _resolve_labels(ranges, each)) for each in changes]
     points, evaluator = list(enumerate(variations)), Evaluator(evaluate_variation)
     finished = evaluate_points(points, evaluator, workers)
     rows = dict(tqdm(finished, total=len(points), unit="run", disable=None, leave=False))
-    dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], viscous)
+    dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], neutral)
     dataset["sampled"] = "run", np.arange(len(points)) >= len(points) - samples
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
@@ -212,14 +205,8 @@ def _check_ranges(ranges: Mapping[str, Any]) -> dict[str, Any]:
     return checked
 
 
-def _damping_kind(damping: Viscous | None) -> str:
-    """Return the name of the kind of a damping."""
-    return "mass and stiffness" if isinstance(damping, Rayleigh) else "stiffness"
-
-
-def _single_changes(ranges: Mapping[str, Any], damping: Viscous | None) -> list[dict[str, Any]]:
+def _single_changes(ranges: Mapping[str, Any], neutral: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the run as given, and each property at each other value alone."""
-    neutral = {**NEUTRAL, "damping_kind": _damping_kind(damping)}
     changes: list[dict[str, Any]] = [{}]
     for name, values in ranges.items():
         changes += [{name: value} for value in values if value != neutral.get(name)]
@@ -304,31 +291,12 @@ def _run_elastic_joints(
     rule: Any = {"quadrature": "trapezoidal", "quadrature_points": 3} if three else {}
     analysis = replace(analysis, **{"quadrature": "exact", "quadrature_points": None, **rule})
     rest = analysis.dead_load(motion)
-    damping = _vary_damping(analysis, rest, changes.get("damping_kind"), changes["damping_ratio"])
+    kind, factor = changes.get("damping_kind"), changes["damping_ratio"]
+    damping = vary_damping(analysis.damping, rest.model, rest, kind, factor)
     run = time_history(analysis, motion, start=rest, damping=damping)
     if run.fall is None:
         raise DidNotConverge(f"the run {run.outcome}", last=None)
     return run.fall
-
-
-def _vary_damping(
-    analysis: Analysis, rest: Equilibrium, kind: str | None, factor: float
-) -> Viscous | None:
-    """Return damping of a kind with a multiple of the ratio."""
-    damping, _ = resolve_effective_damping(analysis.damping, rest.model, rest)
-    if damping is None:
-        return None
-    ratio = factor * damping.ratio
-    if kind in (None, _damping_kind(damping)):
-        return replace(damping, ratio=ratio)
-    # the other kind has its frequencies from the effective modes too, or from the one that is given
-    if isinstance(analysis.damping, EffectiveDamping):
-        other = "stiffness" if kind == "stiffness" else "rayleigh"
-        effective = replace(analysis.damping, ratio=ratio, kind=other)
-        return resolve_effective_damping(effective, rest.model, rest)[0]
-    if isinstance(damping, Rayleigh):
-        return StiffnessDamping(ratio, damping.frequencies[0], damping.joints)
-    return Rayleigh(ratio, (damping.frequency, 2.0 * damping.frequency), damping.joints)
 
 
 def _run_rigid_blocks(structure: Structure, motion: Motion, dt: float) -> CollapseState:
@@ -344,10 +312,9 @@ def _build_dataset(
     ranges: Mapping[str, Any],
     changes: Sequence[Mapping[str, Any]],
     rows: Sequence[Mapping[str, Any]],
-    damping: Viscous | None,
+    neutral: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Return the table of all runs."""
-    neutral = {**NEUTRAL, "damping_kind": _damping_kind(damping)}
+    """Return the table of all runs; a property that a run does not change has its neutral value."""
     columns: dict[str, Any] = {}
     for name, values in ranges.items():
         first = "as given" if isinstance(values, Mapping) else neutral[name]

@@ -237,9 +237,9 @@ def compare(name: str, tolerance: float | None, duration: float | None) -> list[
     begin = process_time()
     model = build_model(structure, exact_discretisation(structure, *chosen))
     choosing -= process_time() - begin
-    run = time_run(model, motion, damping, prediction.dt)
+    run = time_run(model, motion, prediction.dt, damping=damping)
     step = FINEST_STEP * (2 if find_soft_blocks(structure) else 1)
-    reference = time_run(finest, motion, damping, step).peaks
+    reference = time_run(finest, motion, step, damping=damping).peaks
     actual = largest_difference(run.peaks, reference)
     return [
         name,

@@ -69,7 +69,7 @@ def test_no_more_time_is_reported_than_has_passed(stack, fails, monkeypatch):
 
         monkeypatch.setattr(accuracy, "time_history", failing)
     begun = process_time()
-    run = accuracy.time_run(model, motion, None, 0.005)
+    run = accuracy.time_run(model, motion, 0.005)
     assert 0.0 <= run.seconds <= process_time() - begun
     assert (run.peaks is None) is fails
     assert run.size == 6
@@ -80,4 +80,4 @@ def test_an_interrupted_run_ends_the_comparison(monkeypatch, stack):
     run = SimpleNamespace(ending=af.dynamics.Ending.INTERRUPTED)
     monkeypatch.setattr(accuracy, "time_history", lambda *_, **given: run)
     with pytest.raises(KeyboardInterrupt):
-        accuracy.time_run(model, af.Motion.synthetic(duration=0.25), None, 0.005)
+        accuracy.time_run(model, af.Motion.synthetic(duration=0.25), 0.005)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.dynamics import model_selection
+from archfem.dynamics import error_estimation, model_selection
 from archfem.dynamics.error_estimation import RunPeaks
 from archfem.dynamics.model_selection import discretisation_label, exact_discretisation
 from archfem.models.builder import build as plain
@@ -41,10 +41,9 @@ class Chosen:
             largest, start = np.array([0.1, peaks[number]]), SimpleNamespace(time=0.0)
             return RunPeaks(largest, turn, np.array([0.5, 1.5]), (start,))
 
-        self._patch.setattr(model_selection, "run_peaks", run)
-        self.model = model_selection.select_model(
-            BLOCK, tolerance, MOTION, dt=dt, builder=build, **given
-        )
+        self._patch.setattr(error_estimation, "run_peaks", run)
+        self._patch.setattr(model_selection.plain, "build", build)
+        self.model = model_selection.select_model(BLOCK, tolerance, MOTION, dt=dt, **given)
         return self.model.prediction
 
 
@@ -84,7 +83,7 @@ def test_only_the_first_runs_beyond_its_last_peak(chosen):
 
 def test_a_cheap_setting_that_took_longer_to_find_than_to_run_is_not_chosen(chosen, monkeypatch):
     """Where the strongest part is most of the motion."""
-    monkeypatch.setattr(model_selection, "strongest_window", lambda motion: motion)
+    monkeypatch.setattr(error_estimation, "strongest_window", lambda motion: motion)
     prediction = chosen.of(0.300, 0.299)
     assert prediction.dt == 0.0025
     assert prediction.error == pytest.approx(0.001 * REST)

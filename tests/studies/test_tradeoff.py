@@ -19,11 +19,12 @@ STEPS = (0.01, 0.005)
 @pytest.fixture
 def case(monkeypatch):
     """A ring under half a second of motion; few settings, and a coarse reference."""
-    for module in ("archfem.dynamics.accuracy", "archfem.studies.convergence"):
-        monkeypatch.setattr(f"{module}.reference_settings", lambda structure: REFERENCES)
+    monkeypatch.setattr(accuracy, "reference_settings", lambda structure: REFERENCES)
+    few = (*GIVEN.values(), STEPS)
     monkeypatch.setattr(
-        "archfem.studies.convergence.candidate_settings",
-        lambda structure: candidate_settings(structure, *GIVEN.values(), STEPS),
+        accuracy,
+        "candidate_settings",
+        lambda structure, *tried: candidate_settings(structure, *(tried or few)),
     )
     ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
     motion = {"synthetic": {"duration": 0.5, "pga": 2.0, "seed": 1}}

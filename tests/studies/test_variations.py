@@ -9,6 +9,7 @@ from pages import read_page
 
 import archfem as af
 from archfem.dynamics import CollapseState, analysis
+from archfem.dynamics.damping import vary_damping
 from archfem.studies import variations
 from archfem.studies.variations import (
     DEFAULT_RANGES,
@@ -155,7 +156,7 @@ def test_by_default_damping_is_that_of_effective_modes(column):
     model, rest = given.model, given.dead_load()
     for kind, name in (("stiffness", "stiffness"), ("mass and stiffness", "rayleigh")):
         expected = af.effective_damping(model, 0.025, kind=name)
-        assert variations._vary_damping(given, rest, kind, 0.5) == expected
+        assert vary_damping(given.damping, model, rest, kind, 0.5) == expected
 
 
 def test_the_run_as_given_comes_first_then_each_change_alone(column, motion, calls):
@@ -341,7 +342,8 @@ def test_a_case_gives_its_damping_and_its_step(tmp_path, calls):
     af.verdict_range(case.analysis, motion, samples=1)
     (_, moved, dt, given) = calls[0]
     model = af.build(case.structure, fidelity="rigid", displacements="large")
-    damping = variations._vary_damping(given, given.dead_load(), None, 1.0)
+    rest = given.dead_load()
+    damping = vary_damping(given.damping, rest.model, rest, None, 1.0)
     assert damping == af.effective_damping(model, 0.03)
     assert dt == 0.004
     assert np.array_equal(moved.horizontal, motion.horizontal)

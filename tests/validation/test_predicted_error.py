@@ -91,7 +91,7 @@ def test_prediction_is_of_the_order_of_the_error(name, tolerance):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dt", [None, 0.005])
-def test_each_model_is_built_once_and_damping_is_computed_of_the_first(ring, dt):
+def test_each_model_is_built_once_and_damping_is_computed_of_the_first(ring, dt, monkeypatch):
     built, damped = [], []
 
     def builder(structure, discretisation):
@@ -104,7 +104,8 @@ def test_each_model_is_built_once_and_damping_is_computed_of_the_first(ring, dt)
         return af.Rayleigh(0.05, (8.0, 24.0))
 
     motion = af.Motion.synthetic(duration=0.25, pga=1.0, seed=1)
-    select_model(ring, 1e-9, motion, damping, dt, builder=builder)
+    monkeypatch.setattr("archfem.models.builder.build", builder)
+    select_model(ring, 1e-9, motion, damping, dt)
     ladder = TRIED_SETTINGS[1:]  # its first setting shares the model of the second
     ladder = ladder[:1] if dt else ladder
     wanted = [exact_discretisation(ring, fidelity, cells) for fidelity, cells, _ in ladder]
@@ -179,9 +180,10 @@ def test_without_a_motion_a_severe_one_is_assumed(ring):
 
 
 @pytest.mark.slow
-def test_a_tolerance_out_of_reach_is_warned_of(ring, caplog):
+def test_a_tolerance_out_of_reach_is_warned_of(ring, caplog, monkeypatch):
     motion = af.Motion.synthetic(duration=0.25, pga=2.0, seed=3)
-    prediction = select_model(ring, 1e-9, motion, builder=quick).prediction
+    monkeypatch.setattr("archfem.models.builder.build", quick)
+    prediction = select_model(ring, 1e-9, motion).prediction
     assert not prediction.is_met
     assert "no setting meets the tolerance" in caplog.text
     assert all(name in prediction.text for name, _ in prediction.candidates)

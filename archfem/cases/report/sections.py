@@ -249,8 +249,7 @@ def _build_assessment(data: ReportData) -> list[Any]:
         remedy = "`archfem assess CASE.toml --out FOLDER` adds it to the folder."
         return [missing_note("a kinematic assessment", remedy)]
     caption = "Mechanism at the displacement capacity, and capacity curve with demand."
-    assert data.folder is not None  # the text is from there
-    names = sorted(path.name for path in data.folder.glob("assessment_*.png"))
+    names = sorted(name for name in data.files if name.startswith("assessment_"))
     figures = [figure for name in names for figure in data.read_figure(name, caption)]
     return [TextBlock(text, "lines"), *figures]
 
