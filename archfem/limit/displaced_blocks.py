@@ -19,7 +19,7 @@ from scipy.sparse import csgraph, csr_matrix
 
 from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge
-from archfem.joints.rigid_kinematics import jump_rates
+from archfem.joints.rigid_kinematics import jump_entries, jump_rates
 from archfem.limit.linear_programme import NoEquilibrium, solve_linear
 from archfem.masonry.block import Block, rotate
 from archfem.masonry.loads import AttachedLoad
@@ -294,18 +294,24 @@ class Bodies:
 
     def rates(self, contacts: Sequence[Contact]) -> Array:
         """Return rates of the contacts' gaps and slips (2, n_contacts, 3 n_bodies)."""
-        return np.array([each.toarray() for each in self.sparse_rates(contacts)])
+        rates = np.zeros((2, len(contacts), self.count, 3))
+        for rate, jumps in zip(rates, self._jumps(contacts), strict=True):
+            row, body, values = jump_entries(*jumps)
+            np.add.at(rate, (row, body), values)
+        return rates.reshape(2, len(contacts), -1)
 
-    def sparse_rates(self, contacts: Sequence[Contact]) -> tuple[csr_matrix, csr_matrix]:
+    def sparse_rates(self, contacts: Sequence[Contact]) -> list[csr_matrix]:
         """Return the rates of gaps and of slips, each (n_contacts, 3 n_bodies)."""
+        return [jump_rates(*jumps) for jumps in self._jumps(contacts)]
+
+    def _jumps(self, contacts: Sequence[Contact]) -> list[tuple[Array, Array, Numbers, Array]]:
+        """Return the arguments of `jump_rates` for gaps and for slips."""
         points = np.array([contact.point for contact in contacts]).reshape(-1, 2)
         normal = np.array([contact.normal for contact in contacts]).reshape(-1, 2)
         along = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
         # a jump is the motion of the corner's block less that of the face's
         pairs = np.array([(c.face, c.corner) for c in contacts], dtype=np.intp).reshape(-1, 2)
-        bodies = self.body[pairs]
-        gaps = jump_rates(normal, points, bodies, self.references)
-        return gaps, jump_rates(along, points, bodies, self.references)
+        return [(each, points, self.body[pairs], self.references) for each in (normal, along)]
 
 
 def find_mechanism(

@@ -16,7 +16,8 @@ References: Livesley, Int. J. Numer. Meth. Eng. 12 (1978) 1853-1871.
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -43,6 +44,7 @@ def solve_linear(
     method: str = "highs-ds",
 ) -> OptimizeResult | None:
     """Minimise a cost under equations and limits A x <= b; None where it is unbounded."""
+    equations, limits = (_small_as_array(*each) for each in (equations, limits))
     # Residuals are of order one. Where round-off stops the solver, presolve changes its path, and
     # then a coarser tolerance lets it end.
     for presolve, tolerance in ((False, 1e-9), (True, 1e-9), (True, 1e-8)):
@@ -54,6 +56,12 @@ def solve_linear(
         if result.status in (0, 3):
             return result if result.status == 0 else None
     raise DidNotConverge(f"the linear programme found no state: {result.message}")
+
+
+def _small_as_array(matrix: Any, values: Array | None, small: int = 20_000) -> tuple[Any, Any]:
+    """Return a small sparse matrix as an array: SciPy converts sparse ones four times."""
+    is_small = sparse.issparse(matrix) and matrix.shape[0] * matrix.shape[1] <= small
+    return (matrix.toarray() if is_small else matrix), values
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,10 +98,16 @@ class RigidBlocks:
     def rates(self) -> sparse.csr_matrix:
         """Openings of intrados and extrados ends, and slips (3 n_joints, 3 n_blocks) [-, m]."""
         structure, (intrados, extrados) = self.structure, np.moveaxis(self.structure.ends, 1, 0)
-        normals, tangents = structure.normals, structure.tangents
-        frames = (normals, intrados), (normals, extrados), (tangents, intrados)
-        rows = [jump_rates(*frame, structure.pairs, structure.centroids) for frame in frames]
-        return sparse.vstack(rows, format="csr")
+        places = intrados, extrados, intrados
+        return self.end_rates(structure.normals, structure.tangents, places, structure.centroids)
+
+    def end_rates(
+        self, normals: Array, tangents: Array, places: Sequence[Array], centroids: Array
+    ) -> sparse.csr_matrix:
+        """Return `rates` of openings at the first two places and of slips at the third."""
+        directions = np.concatenate([normals, normals, tangents])
+        pairs = np.tile(self.structure.pairs, (3, 1))
+        return jump_rates(directions, np.concatenate(places), pairs, centroids)
 
     @cached_property
     def kinematics(self) -> sparse.csr_matrix:
@@ -107,8 +121,12 @@ class RigidBlocks:
     @cached_property
     def balance(self) -> sparse.csr_matrix:
         """Equilibrium matrix of free blocks in the programme's units (3 n_free, 3 n_joints)."""
+        # products of sparse matrices would take longer than a programme of a ring
+        balance = self.kinematics.T.tocsr()
+        row = np.repeat(np.arange(balance.shape[0]), np.diff(balance.indptr))
         sign = np.repeat([-1.0, -1.0, 1.0], len(self.structure.depths))
-        return sparse.diags(self.coordinate_units) @ self.kinematics.T @ sparse.diags(sign)
+        balance.data *= self.coordinate_units[row] * sign[balance.indices]
+        return balance
 
     def reduce(
         self, columns: sparse.csr_matrix, friction: Array, coheres: Flags
@@ -180,6 +198,7 @@ class Limits:
         return Limits(rows, np.concatenate([self.bounds, other.bounds]))
 
 
+@cache
 def no_limits(joint_count: int) -> Limits:
     """Return an empty set of limits on the joint forces."""
     return Limits(sparse.csr_matrix((0, 3 * joint_count)), np.zeros(0))
@@ -348,10 +367,10 @@ class ReducedBalance:
         chains, constant = self._chains, np.zeros(self._map.shape[0])
         if len(chains.pivots):
             constant[chains.is_pivot] = chains.factors.solve(programme.load[~chains.kept])
-        force_cost = np.zeros_like(constant)
+        force_cost, cost = np.zeros_like(constant), np.zeros(self._map.shape[1])
         if programme.force_cost is not None:
             force_cost += programme.force_cost
-        cost = self._map.T @ force_cost
+            cost += self._map.T @ force_cost
         cost[self._count :] += programme.unknown_cost
         strength = np.tile(programme.cohesion[self._slides], 2)
         limits = Limits(self._rows, np.concatenate([np.zeros(2 * len(chains.pivots)), strength]))
@@ -422,24 +441,27 @@ def _find_chains(structure: Structure, excluded: Numbers) -> tuple[Numbers, Numb
 
 def _cone_generators(friction: Array, used: Flags, alone: Numbers, extra: int) -> sparse.csr_matrix:
     """Return generators of the forces of some joints, followed by zeros (3 n_joints, m + extra)."""
-    cone = np.isfinite(friction) & (friction > 0.0)
-    every = sparse.identity(len(used), format="csc")
-    slides, plain = every[:, used & cone], every[:, used & ~cone]
-    shear = slides @ sparse.diags(friction[used & cone])
+    cone, count = np.isfinite(friction) & (friction > 0.0), len(used)
+    slides, plain = np.flatnonzero(used & cone), np.flatnonzero(used & ~cone)
     # both ends with a shear of μ, both with -μ, both without shear, shear alone
-    rows = [
-        [slides, None, slides, None, plain, None, None],
-        [None, slides, None, slides, None, plain, None],
-        [shear, shear, -shear, -shear, None, None, every[:, alone]],
-    ]
-    zeros = sparse.csr_matrix((3 * len(used), extra))
-    return sparse.hstack([sparse.bmat(rows), zeros], format="csr")
+    ends = [slides, count + slides, slides, count + slides, plain, count + plain]
+    rows = np.concatenate([*ends, 2 * count + alone])
+    signs = np.repeat([1.0, 1.0, -1.0, -1.0], len(slides))
+    values = np.concatenate([np.ones(len(rows)), signs * np.tile(friction[slides], 4)])
+    columns = np.concatenate([np.arange(len(rows)), np.arange(len(signs))])
+    places = np.concatenate([rows, np.tile(2 * count + slides, 4)]), columns
+    return sparse.csr_matrix((values, places), (3 * count, len(rows) + extra))
 
 
 def _pivot_limits(friction: Array, pivots: Numbers, slides: Numbers) -> sparse.csr_matrix:
     """Return the rows of F_i, F_e >= 0 for pivots, and of ±V - μ N <= r for those that slide."""
-    every = sparse.identity(len(friction), format="csr")
-    end, shear = -every[pivots], every[slides]
-    slope = sparse.diags(-friction[slides]) @ shear
-    rows = [[end, None, None], [None, end, None], [slope, slope, shear], [slope, slope, -shear]]
-    return sparse.bmat(rows, format="csr")
+    count, ends = len(friction), np.concatenate([pivots, len(friction) + pivots])
+    pressed, cone = np.arange(len(ends)), len(ends) + np.arange(2 * len(slides))
+    both, slope = np.tile(slides, 2), np.tile(-friction[slides], 2)
+    rows = np.concatenate([pressed, cone, cone, cone])
+    columns = np.concatenate([ends, both, count + both, 2 * count + both])
+    signs = np.repeat([1.0, -1.0], len(slides))
+    values = np.concatenate([-np.ones(len(ends)), slope, slope, signs])
+    limits = sparse.csr_matrix((values, (rows, columns)), (len(ends) + len(cone), 3 * count))
+    limits.eliminate_zeros()
+    return limits

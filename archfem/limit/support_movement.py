@@ -27,7 +27,6 @@ from archfem._display import ExplainedWord
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.backfill import SELF_WEIGHT
 from archfem.limit.collapse import stands
 from archfem.limit.displaced_blocks import PlacedBlocks
@@ -217,9 +216,7 @@ class DisplacedBlocks(RigidBlocks):
         corners, (normals, tangents) = np.moveaxis(self.faces[1], 1, 0), self.axes
         nearer = corners[np.argmin(self.current_gaps[:2], axis=0), np.arange(len(normals))]
         centroids = self.structure.centroids + self.displacement[:, :2]
-        frames = (normals, corners[0]), (normals, corners[1]), (tangents, nearer)
-        rows = [jump_rates(*frame, self.structure.pairs, centroids) for frame in frames]
-        return sparse.vstack(rows, format="csr")
+        return self.end_rates(normals, tangents, (*corners, nearer), centroids)
 
 
 class _PathEnd(Exception):
