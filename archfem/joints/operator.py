@@ -125,18 +125,9 @@ class JointOperator:
         return bool(self.points.slides.any())
 
     @cached_property
-    def force_matrices(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    def force_matrices(self) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
         """Matrices from normal and shear forces at the points to generalised forces (n, p)."""
-        return self.opening.T.tocsr(), self.slip.T.tocsr()
-
-    @cached_property
-    def summation_matrices(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        """Matrices from point forces to their sum and moment in each joint (n_joints, p)."""
-        points = self.points
-        shape = (points.joint_count, len(points.offset))
-        entries = (points.joint, np.arange(len(points.offset)))
-        force = sparse.csr_matrix((np.ones(shape[1]), entries), shape)
-        return force, sparse.csr_matrix((points.offset, entries), shape)
+        return self.opening.T, self.slip.T
 
     def openings(self, q: Array) -> Array:
         """Return the openings at the points, positive where open (p,) [m].
@@ -172,13 +163,16 @@ class JointOperator:
             normal: normal forces, positive where they pull (p,) [N].
             shear: shear forces (p,) [N].
         """
-        force, moment = self.summation_matrices
-        return np.stack([-(force @ normal), force @ shear, -(moment @ normal)], axis=1)
+        points = self.points
+        sums = [points.sum_by_joint(force) for force in (-normal, shear, -points.offset * normal)]
+        return np.stack(sums, axis=1)
 
     def shear_resultants(self) -> sparse.csr_matrix:
         """Return the matrix from coordinates to elastic shear resultants (n_joints, n) [N]."""
-        springs = sparse.diags(self.points.shear_spring)
-        return (self.summation_matrices[0] @ springs @ self.slip).tocsr()
+        points = self.points
+        entries = points.shear_spring, (points.joint, np.arange(len(points.joint)))
+        shape = points.joint_count, len(points.joint)
+        return (sparse.csr_matrix(entries, shape) @ self.slip).tocsr()
 
     def projected(self, basis: sparse.csr_matrix) -> Self:
         """Return the joint operator in the coordinates of a basis, G B.

@@ -176,6 +176,10 @@ class JointPoints:
         """Elastic shear stiffness of each point (p,) [N/m]."""
         return self.weight * self.contact.shear_stiffness
 
+    def sum_by_joint(self, values: Array) -> Array:
+        """Return the sums over the points of every joint (n_joints,)."""
+        return np.asarray(np.bincount(self.joint, values, self.joint_count), float)
+
 
 def _spread_if_any(values: list[float], joint: Numbers) -> Array | None:
     """Return values of the joints at their points (p,); None where all are zero."""

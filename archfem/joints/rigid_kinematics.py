@@ -66,9 +66,8 @@ def jump_entries(
 ) -> tuple[Numbers, Numbers, Array]:
     """Return rows, bodies and values (n, 3) of the entries of `jump_rates`, by rows."""
     row, side = np.nonzero(pairs >= 0)
-    body, sign = pairs[row, side], np.where(side == 0, -1.0, 1.0)
-    motion = sign[:, None, None] * rigid_motion_matrix(places[row], centres[body])
-    values: Array = (
-        directions[row, 0, None] * motion[:, 0] + directions[row, 1, None] * motion[:, 1]
-    )
+    body = pairs[row, side]
+    motion: Array = rigid_motion_matrix(places[row], centres[body])
+    motion[side == 0] *= -1.0
+    values: Array = np.einsum("na,nac->nc", directions[row], motion)
     return row, body, values
