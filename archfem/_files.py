@@ -3,6 +3,9 @@
 Results of a command replace earlier ones together. They are written to a draft folder, which is
 renamed when all of them exist, and then moved. A list in the folder has the SHA-256 of each file
 and that of the command's inputs, so that a file of another run is recognised when it is read.
+
+A result folder may come from a stranger. Paths in it are made by `path_inside`, which refuses
+links; `SECURITY.md` says what is promised.
 """
 
 import errno
@@ -18,8 +21,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from glob import escape
 from numbers import Real
-from pathlib import Path
-from typing import Any, NamedTuple
+from pathlib import Path, PurePath
+from typing import IO, Any, NamedTuple
 
 from archfem._validation import short_repr
 from archfem.errors import DiskFull, InvalidInput
@@ -33,6 +36,13 @@ LIST_FILE = "archfem.json"
 # Folders in a result folder: drafts of commands, and the draft whose files are being moved
 DRAFT_PREFIX = ".unfinished-"
 FINISHED_FOLDER = ".finished"
+
+# Flags by which a system opens no link and waits for no pipe; where it has none, only the check of
+# `path_inside` remains
+SAFE_FLAGS = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+
+# Links of Windows to folders, which Python recognises since 3.12
+_is_junction = getattr(os.path, "isjunction", lambda _: False)
 
 # Results that are written from those of another command, and vanish when these are replaced
 DERIVED = {"run": "report", "study": "study summary"}
@@ -57,6 +67,32 @@ def check_file(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) 
             f"{place} has {status.st_size} bytes, and a {what} at most {max_bytes}: give that file"
         )
     return place
+
+
+def path_inside(folder: Path, name: str | PurePath) -> Path:
+    """Return the path of a name in a result folder; refuse links there, and names outside it."""
+    path, parts = folder, PurePath(name).parts
+    if PurePath(name).anchor or ".." in parts:
+        raise InvalidInput(f"{folder} names {short_repr(str(name))}, outside of it: delete it")
+    for part in parts:
+        path /= part
+        try:
+            mode = os.lstat(path).st_mode
+        except (OSError, ValueError):  # there is none, and none below it
+            return folder / name
+        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)) or _is_junction(path):
+            raise InvalidInput(
+                f"{path} is a link, a pipe or a device, and archfem writes none: it may lead to "
+                "files elsewhere; delete it, or name another folder"
+            )
+    return path
+
+
+def list_files(folder: Path) -> Iterator[Path]:
+    """Yield the files below a folder of results, in which links are refused."""
+    for name in sorted(os.listdir(folder)):
+        path = path_inside(folder, name)
+        yield from list_files(path) if path.is_dir() else [path]
 
 
 def read_bytes(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) -> bytes:
@@ -89,15 +125,29 @@ def atomic_write(path: Path) -> Iterator[Path]:
     _refuse_null(path)
     machine = os.uname().nodename
     draft = path.with_name(f".{path.stem}.{machine}.{os.getpid()}.part{path.suffix}")
+    pattern = f".{escape(path.stem)}.{machine}.*.part{escape(path.suffix)}"
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        for left in path.parent.glob(f".{escape(path.stem)}.{machine}.*.part{escape(path.suffix)}"):
-            if not _is_running(left.name.removesuffix(f".part{path.suffix}").rpartition(".")[2]):
-                left.unlink(missing_ok=True)  # of a process that was killed
-        yield draft
-        with draft.open("rb+") as file:
-            os.fsync(file.fileno())
-        os.replace(draft, path)
+        with _explain_write_errors(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            for left in path.parent.glob(pattern):
+                process = left.name.removesuffix(f".part{path.suffix}").rpartition(".")[2]
+                if not _is_running(process):
+                    left.unlink(missing_ok=True)  # of a process that was killed
+            draft.unlink(missing_ok=True)  # a link that another has made
+            yield draft
+            with draft.open("rb+") as file:
+                os.fsync(file.fileno())
+            os.replace(draft, path)
+    finally:
+        with suppress(OSError):  # the folder may be none, which was said above
+            draft.unlink(missing_ok=True)
+
+
+@contextmanager
+def _explain_write_errors(path: Path) -> Iterator[None]:
+    """Turn errors of the operating system into those of archfem."""
+    try:
+        yield
     except DiskFull:
         raise
     except OSError as error:
@@ -106,9 +156,6 @@ def atomic_write(path: Path) -> Iterator[Path]:
                 error.errno, f"{path} could not be written, for the disk is full: make room there"
             ) from error
         raise InvalidInput(_write_error(path, error)) from error
-    finally:
-        with suppress(OSError):  # the folder may be none, which was said above
-            draft.unlink(missing_ok=True)
 
 
 def _is_running(process: str) -> bool:
@@ -127,7 +174,7 @@ def temporary_folder() -> Iterator[Path]:
     """Yield a folder that is deleted when the block ends, or if killed, by the next call."""
     prefix = "archfem-temporary-"
     for left in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
-        with suppress(OSError):
+        with suppress(OSError, InvalidInput):
             if (left / ".lock").exists() and not is_locked(left):
                 shutil.rmtree(left)
     made = tempfile.TemporaryDirectory(prefix=prefix, ignore_cleanup_errors=True)
@@ -199,7 +246,7 @@ def lock_folder(folder: Path) -> Iterator[None]:
     path = create_result_folder(folder) / ".lock"
     while True:
         try:
-            lock = path.open("ab+", buffering=0)
+            lock = _open_lock(folder, "ab+")
         except OSError as error:
             raise InvalidInput(
                 f"{folder} cannot be written to ({error.strerror}): name another folder"
@@ -229,10 +276,23 @@ def lock_folder(folder: Path) -> Iterator[None]:
             path.unlink(missing_ok=True)
 
 
+def _open_lock(folder: Path, mode: str) -> IO[bytes]:
+    """Open the lock of a folder, which must be a file of its own."""
+    path = path_inside(folder, ".lock")
+    lock: IO[bytes] = open(  # noqa: SIM115
+        path, mode, buffering=0, opener=lambda name, flags: os.open(name, flags | SAFE_FLAGS, 0o666)
+    )
+    status = os.fstat(lock.fileno())
+    if not stat.S_ISREG(status.st_mode) or status.st_nlink > 1:
+        lock.close()
+        raise InvalidInput(f"{path} has another name elsewhere: delete it, or name another folder")
+    return lock
+
+
 def is_locked(folder: Path) -> bool:
     """Return whether a command writes to a folder."""
     try:
-        with (folder / ".lock").open("rb") as lock:
+        with _open_lock(folder, "rb") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except FileNotFoundError:
         return False
@@ -291,7 +351,7 @@ def _reduce_to_json(value: Any) -> Any:
 
 def read_file_list(folder: Path) -> dict[str, FileGroup]:
     """Return the files of a result folder by command; none if it has no list."""
-    path = folder / LIST_FILE
+    path = path_inside(folder, LIST_FILE)
     if not path.is_file():
         return {}
     content = read_sealed_json(path, "list of results")
@@ -302,6 +362,14 @@ def read_file_list(folder: Path) -> dict[str, FileGroup]:
         }
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InvalidInput(f"{path} is no list of results, but another file: run again") from error
+
+
+def read_listed(folder: Path, name: str) -> bytes:
+    """Read a file of a result folder, which must be the one that archfem wrote there."""
+    path = path_inside(folder, name)
+    content = read_bytes(path, "result", max_bytes=2**40)
+    check_listed(path, content)
+    return content
 
 
 def check_listed(path: Path, content: bytes) -> None:
@@ -358,7 +426,8 @@ def start_draft(folder: Path, command: str) -> Path:
     """
     remove_leftovers(folder)
     draft = folder / f"{DRAFT_PREFIX}{command}"
-    draft.mkdir(exist_ok=True)
+    with _explain_write_errors(draft):
+        draft.mkdir(exist_ok=True)
     return draft
 
 
@@ -366,17 +435,18 @@ def remove_leftovers(folder: Path) -> None:
     """Remove what killed commands have left in a folder, which is locked."""
     complete_publication(folder)
     for leftover in folder.glob(f"{DRAFT_PREFIX}*"):
+        path_inside(folder, leftover.name)
         if leftover.name != f"{DRAFT_PREFIX}run":
             shutil.rmtree(leftover, ignore_errors=True)
     for part in folder.glob(".*.part*"):
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # a folder
+            part.unlink()
 
 
 def publish_draft(folder: Path, command: str, inputs: str) -> None:
     """Replace the files that a command has written earlier by those of its draft."""
     draft = folder / f"{DRAFT_PREFIX}{command}"
-    paths = [path for path in draft.rglob("*") if path.is_file()]
-    files = {path.relative_to(draft).as_posix(): hash_content(path) for path in paths}
+    files = {p.relative_to(draft).as_posix(): hash_content(p) for p in list_files(draft)}
     listed = intact_file_list(folder)
     same = command in listed and listed[command].files == files
     replaced = {command} if same else {command, DERIVED.get(command)}
@@ -386,27 +456,45 @@ def publish_draft(folder: Path, command: str, inputs: str) -> None:
             others = {file: digest for file, digest in group.files.items() if file not in files}
             groups[name] = {"inputs": group.inputs, "files": others}
     write_sealed_json(draft / LIST_FILE, groups)
-    os.rename(draft, folder / FINISHED_FOLDER)  # from here on the new results are those that count
+    with _explain_write_errors(folder):
+        # from here on the new results are those that count
+        os.rename(draft, path_inside(folder, FINISHED_FOLDER))
     complete_publication(folder)
 
 
 def complete_publication(folder: Path) -> None:
     """Move finished results to their places; an interrupted call can be repeated."""
-    finished = folder / FINISHED_FOLDER
+    finished = path_inside(folder, FINISHED_FOLDER)
     if not finished.is_dir():
         return
-    if (finished / LIST_FILE).is_file():
-        listed = {name for group in read_file_list(finished).values() for name in group.files}
-        earlier = {name for group in intact_file_list(folder).values() for name in group.files}
-        for name in earlier - listed:
-            _delete_within(folder, name)
-        for path in [path for path in finished.rglob("*") if path.is_file()]:
-            target = folder / path.relative_to(finished)
-            if target.name != LIST_FILE:
-                target.parent.mkdir(parents=True, exist_ok=True)
-                os.replace(path, target)
-        os.replace(finished / LIST_FILE, folder / LIST_FILE)  # last: it says that all are there
-    shutil.rmtree(finished)
+    with _explain_write_errors(folder):
+        if (finished / LIST_FILE).is_file():
+            _move_finished(finished, folder)
+        shutil.rmtree(finished)
+
+
+def _move_finished(finished: Path, folder: Path) -> None:
+    """Move finished results to their places, and delete what they replace."""
+    listed = {name for group in read_file_list(finished).values() for name in group.files}
+    earlier = {name for group in intact_file_list(folder).values() for name in group.files}
+    # all places are checked before the first change
+    moves = [(p, path_inside(folder, p.relative_to(finished))) for p in list_files(finished)]
+    for name in earlier - listed:
+        _delete_within(folder, name)
+    moves.sort(key=lambda move: move[1] == folder / LIST_FILE)  # last: it says that all are there
+    for path, target in moves:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        os.replace(path, target)
+
+
+def describe_deleted(folder: Path) -> str:
+    """Say which listed files of a result folder are missing; "" if none is."""
+    # an earlier report may have been deleted, for it is written anew
+    groups = (group for name, group in read_file_list(folder).items() if name != "report")
+    names = [n for group in groups for n in group.files if not path_inside(folder, n).is_file()]
+    if not names:
+        return ""
+    return f"a listed file is missing: {', '.join(names)}; put it back, or run the case again"
 
 
 def intact_file_list(folder: Path) -> dict[str, FileGroup]:
@@ -419,11 +507,9 @@ def intact_file_list(folder: Path) -> dict[str, FileGroup]:
 
 def _delete_within(folder: Path, name: str) -> None:
     """Delete a file of a result folder, and its own folder if that is empty then."""
-    path = folder / name
-    if folder.resolve() not in path.resolve().parents:  # a list that was made up
-        return
-    path.unlink(missing_ok=True)
-    with suppress(OSError):
+    with suppress(InvalidInput, OSError):  # a list that was made up
+        path = path_inside(folder, name)
+        path.unlink(missing_ok=True)
         if path.parent != folder:
             path.parent.rmdir()
 

@@ -5,7 +5,9 @@ is created in memory and written atomically: a full disk raises the error of the
 """
 
 import hashlib
+import os
 from collections.abc import Mapping
+from math import prod
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -69,9 +71,12 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     check_listed(Path(path), content)
     try:
         file = netCDF4.Dataset(Path(path).name, memory=content)
+        _check_sizes(file, len(content))
         store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
         with xr.open_dataset(store) as opened:
             dataset = opened.load()
+    except InvalidInput as error:
+        raise InvalidInput(f"{path} {error}") from error
     except Exception as error:  # HDF5, NetCDF and xarray raise errors of many classes
         raise InvalidInput(f"{path} is not a NetCDF file: {error}") from error
     for name in [str(name) for name in dataset if str(name).startswith(LONG_ATTRIBUTE)]:
@@ -80,6 +85,20 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     if dataset.attrs.pop(CHECKSUM_ATTRIBUTE, None) is not None and end < 0:
         raise damaged
     return dataset
+
+
+def _check_sizes(file: netCDF4.Dataset, size: int) -> None:
+    """Refuse variables that declare more than a file of a size holds, or than fits into memory."""
+    # texts of any length are Python's, which take more; NumPy's product may overflow
+    sizes = [(prod(map(int, v.shape)), v.dtype) for v in file.variables.values()]
+    declared = sum(count * getattr(dtype, "itemsize", 64) for count, dtype in sizes)
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    most = min(1032 * size, memory)  # deflate compresses no content further
+    if declared > most:
+        raise InvalidInput(
+            f"declares {declared / 1e9:.3g} GB, and its {size} bytes hold at most {most / 1e9:.3g} "
+            "on this machine: delete it and run again"
+        )
 
 
 def _digest(content: bytes | memoryview) -> bytes:

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import nullcontext
 
 import pytest
 
@@ -57,6 +58,50 @@ def test_drafts_of_killed_processes_are_removed_by_the_next_writer(tmp_path, dea
         draft.write_text("whole")
     left = {path.name for path in tmp_path.iterdir()}
     assert left == {"run.txt", names[os.getppid()], *others}
+
+
+def test_a_draft_that_another_has_linked_to_a_file_leaves_that_file(tmp_path):
+    """The name of a draft can be guessed."""
+    (tmp_path / "mine.txt").write_text("mine")
+    draft = tmp_path / f".run.{os.uname().nodename}.{os.getpid()}.part.txt"
+    draft.symlink_to(tmp_path / "mine.txt")
+    with _files.atomic_write(tmp_path / "run.txt") as path:
+        path.write_text("new")
+    assert (tmp_path / "mine.txt").read_text() == "mine"
+    assert not (tmp_path / "run.txt").is_symlink()
+
+
+@pytest.mark.parametrize("flags", [_files.SAFE_FLAGS, 0])
+def test_links_are_refused_without_flags_of_the_system_too(flags, tmp_path, monkeypatch):
+    monkeypatch.setattr(_files, "SAFE_FLAGS", flags)
+    (tmp_path / "mine.txt").write_text("mine")
+    (tmp_path / ".lock").symlink_to(tmp_path / "mine.txt")
+    for use in (_files.lock_folder, lambda folder: nullcontext(_files.is_locked(folder))):
+        with pytest.raises(af.InvalidInput, match="is a link"), use(tmp_path):
+            pass
+    assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
+def test_a_link_that_appears_after_the_check_is_not_opened(tmp_path, monkeypatch):
+    (tmp_path / "mine.txt").write_text("mine")
+    (tmp_path / ".lock").symlink_to(tmp_path / "mine.txt")
+    monkeypatch.setattr(_files, "path_inside", lambda folder, name: folder / name)
+    with pytest.raises(af.InvalidInput, match="cannot be written"), _files.lock_folder(tmp_path):
+        pass
+    assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["/etc/passwd", "../a", "a/../../b", "x/../y"])
+def test_names_outside_of_a_folder_are_refused(name, tmp_path):
+    with pytest.raises(af.InvalidInput, match="outside"):
+        _files.path_inside(tmp_path, name)
+
+
+def test_a_folder_that_is_a_link_itself_is_the_users(tmp_path):
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "out").symlink_to(tmp_path / "disk")
+    write(tmp_path / "out", "run", "one", a_txt="1")
+    assert (tmp_path / "disk" / "a.txt").read_text() == "1"
 
 
 def test_temporary_folders_of_killed_processes_are_removed_by_the_next(tmp_path, monkeypatch):

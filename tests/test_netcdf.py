@@ -1,5 +1,8 @@
 """A damaged file is known before it is read."""
 
+from resource import RUSAGE_SELF, getrusage
+
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -70,6 +73,31 @@ def test_a_file_of_an_earlier_version_has_no_seal(written, tmp_path):
     dataset, _ = written
     dataset.to_netcdf(tmp_path / "old.nc", engine="netcdf4")
     assert read_dataset(tmp_path / "old.nc", "history").identical(dataset)
+
+
+@pytest.mark.parametrize("shape", [(1_500_000_000,), (2**32, 2**32), (1, 2**40)])
+@pytest.mark.parametrize("kind", ["f8", str])
+def test_sizes_are_checked_before_values_are_read(shape, kind, tmp_path):
+    """A file of kilobytes that declares terabytes, of which HDF5 stores none, takes no memory."""
+    path = tmp_path / "large.nc"
+    with netCDF4.Dataset(path, "w") as file:
+        dimensions = [f"d{k}" for k in range(len(shape))]
+        for name, size in zip(dimensions, shape, strict=True):
+            file.createDimension(name, size)
+        chunks = [min(size, 1000) for size in shape]
+        file.createVariable("N", kind, dimensions, zlib=kind == "f8", chunksizes=chunks)
+    before = getrusage(RUSAGE_SELF).ru_maxrss
+    with pytest.raises(af.InvalidInput, match=r"large\.nc declares .* GB, and its \d+ bytes hold"):
+        read_dataset(path, "history")
+    assert getrusage(RUSAGE_SELF).ru_maxrss - before < 100_000  # kB
+
+
+def test_what_compresses_best_is_read(tmp_path):
+    """Zeros are the content that deflate compresses most, to a thousandth."""
+    dataset = xr.Dataset({"N": (("time", "joint"), np.zeros((1000, 5000)))})
+    path = write_dataset(dataset, tmp_path / "run.nc", {"N": {"zlib": True, "complevel": 9}})
+    assert path.stat().st_size < 1e5
+    assert read_dataset(path, "history").identical(dataset)
 
 
 @pytest.mark.slow

@@ -3,13 +3,13 @@
 The files of a run appear in its folder together, when all of them exist (`archfem._files`).
 """
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from archfem import _files
-from archfem._files import FileGroup
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
@@ -34,6 +34,8 @@ from archfem.view.statics import draw_free_body
 from archfem.view.stress import draw_stress
 from archfem.view.structure import draw_during, draw_names
 from archfem.view.style import Files
+
+logger = logging.getLogger("archfem")
 
 
 @validate_methods
@@ -89,27 +91,29 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
     place = Path(folder)
     if not place.is_dir():
         raise InvalidInput(f"there is no folder {place}: give one that `archfem run` has written")
-    if (place / _files.FINISHED_FOLDER).is_dir():  # of a command that was killed
+    if _files.path_inside(place, _files.FINISHED_FOLDER).is_dir():  # of a command that was killed
         with _files.lock_folder(place):
             _files.complete_publication(place)
-    if not (place / CASE_FILE).is_file():
+    if not _files.path_inside(place, CASE_FILE).is_file():
         raise InvalidInput(_missing_case_message(place))
     case = _read_case(place, None if inputs is None else Path(inputs))
-    listed = _check_files(place).files
+    listed = _check_files(place)
+    if deleted := _files.describe_deleted(place):
+        logger.warning("%s: %s", place, deleted)
     pairs = (case.suite or {}).get("pairs", ())
     files = {name: place / name / HISTORY_FILE for name in pairs} or {"": place / HISTORY_FILE}
     runs = {
         name: History.read(path, case.structure)
         for name, path in files.items()
-        if path.is_file() and path.relative_to(place).as_posix() in listed
+        if path.relative_to(place).as_posix() in listed and path.is_file()
     }
     if single := runs.pop("", None):  # named by its motion
-        runs[str(single.dataset.attrs["motion"]) or "motion"] = single
+        runs[str(single.dataset.attrs.get("motion", "")) or "motion"] = single
     return ResultFolder(place, case, runs, tuple(name for name in pairs if name not in runs))
 
 
-def _check_files(place: Path) -> FileGroup:
-    """Return the files of the run in a folder; refuse any that was changed or is of another run."""
+def _check_files(place: Path) -> Collection[str]:
+    """Return the names of the files of the run in a folder; refuse files that are not as listed."""
     groups = _files.read_file_list(place)
     run = groups.get("run")
     if run is None:
@@ -119,10 +123,11 @@ def _check_files(place: Path) -> FileGroup:
         )
     # histories are checked as they are read, and an earlier report is replaced
     written = [group for command, group in groups.items() if command != "report"]
-    for path in (place / name for group in written for name in group.files):
+    for name in (name for group in written for name in group.files):
+        path = _files.path_inside(place, name)
         if path.is_file() and path.name != HISTORY_FILE:
-            _files.check_listed(path, _files.read_bytes(path, "result", max_bytes=2**40))
-    return run
+            _files.read_listed(place, name)
+    return run.files
 
 
 def _missing_case_message(place: Path) -> str:
@@ -208,7 +213,7 @@ def adopt_files(run: Run) -> bool:
         return False
     try:
         for name in names:
-            _files.check_listed(folder / name, _files.read_bytes(folder / name, "result"))
+            _files.read_listed(folder, name)
     except InvalidInput:
         return False
     for name in names:

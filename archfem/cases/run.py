@@ -478,12 +478,12 @@ def _start_draft(case: Case, folder: Path, inputs: str) -> Path:
     """Return a draft with the case, and of a suite the histories that earlier calls computed."""
     draft, listed = _files.start_draft(folder, "run"), _files.intact_file_list(folder).get("run")
     pairs = {f"{name}/{HISTORY_FILE}": name for name in (case.suite or {}).get("pairs", ())}
-    for path in [path for path in draft.rglob("*") if path.is_file()]:
+    for path in _files.list_files(draft):
         name = path.relative_to(draft).as_posix()
         if name not in pairs or not _is_of(path, case.alone(pairs[name])):
             path.unlink()
     for name, pair in pairs.items():
-        path = folder / name
+        path = _files.path_inside(folder, name)
         if path.is_file() and not (draft / name).exists():
             # histories of this very case need not be read again
             known = listed is not None and listed.inputs == inputs and name in listed.files
@@ -507,7 +507,7 @@ def _publish_run(run: Run, folder: Path, draft: Path, inputs: str) -> Run:
     """Move a run from its draft to its place, unless it is incomplete and would replace another."""
     assert run.path is not None
     name = run.path.relative_to(draft)
-    place, listed = folder / name, _files.intact_file_list(folder).get("run")
+    place, listed = _files.path_inside(folder, name), _files.intact_file_list(folder).get("run")
     if listed is not None:
         same = listed.inputs == inputs and name.as_posix() in listed.files
         if same and place.is_file() and _files.hash_content(place) == _files.hash_content(run.path):
@@ -524,7 +524,7 @@ def _publish_run(run: Run, folder: Path, draft: Path, inputs: str) -> Run:
 
 def _keep_partial_results(folder: Path, draft: Path, inputs: str) -> None:
     """Publish the results of a run that failed, unless the folder has those of another run."""
-    files = [path for path in draft.rglob("*") if path.is_file() and path.name != CASE_FILE]
+    files = [path for path in _files.list_files(draft) if path.name != CASE_FILE]
     new = [path for path in files if not is_linked(path, folder / path.relative_to(draft))]
     if new and "run" not in _files.intact_file_list(folder):
         _files.publish_draft(folder, "run", inputs)

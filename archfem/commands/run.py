@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from archfem._files import DRAFT_PREFIX, create_result_folder, replace_results
+from archfem._files import DRAFT_PREFIX, create_result_folder, path_inside, replace_results
 from archfem.cases import result_folder as results
 from archfem.cases import result_text
 from archfem.cases.analysis_keys import rate_case
@@ -162,7 +162,7 @@ def accuracy(options: argparse.Namespace) -> None:
     from archfem.view.studies import draw_accuracy
 
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
-    compared = case_accuracy(case, folder / "settings", workers=options.workers)
+    compared = case_accuracy(case, path_inside(folder, "settings"), workers=options.workers)
     text = result_text.describe_accuracy(compared)
     print(text)
     files: Files = {"accuracy.txt": text, "accuracy.png": draw_accuracy(compared)}

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from archfem import _numba, _optional
-from archfem._files import check_listed, read_bytes
+from archfem._files import path_inside, read_listed
 from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.examples import copy_example, list_example_titles, read_example
@@ -51,7 +51,7 @@ def check(options: argparse.Namespace) -> int:
 def animate(options: argparse.Namespace) -> None:
     """Film the history of a run."""
     path = Path(options.history)
-    path = path / HISTORY_FILE if path.is_dir() else path
+    path = path_inside(path, HISTORY_FILE) if path.is_dir() else path
     if not path.is_file():
         raise InvalidInput(f"there is no history file {path}")
     case = _read_case(path) if options.case is None else Case.read(options.case)
@@ -74,8 +74,8 @@ def animate(options: argparse.Namespace) -> None:
 def _read_case(path: Path, name: str = "case.toml") -> Case:
     """Read the case of a run: beside its history, or beside the folder of its pair."""
     for folder in (path.parent, path.absolute().parent.parent):
-        if (folder / name).is_file():
-            check_listed(folder / name, read_bytes(folder / name, "case file"))
+        if path_inside(folder, name).is_file():
+            read_listed(folder, name)
             try:
                 return Case.read(folder / name)
             except InvalidInput as error:

@@ -1,10 +1,11 @@
 """History of a run: recorded joints and fields, first mechanisms, verdict, and its file."""
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
+from operator import index
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from archfem._display import ResultDisplay, call_late_bound
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._typing import Array
 from archfem._validation import check_type, validate_arguments, validate_methods
-from archfem.dynamics.collapse_state import CollapseState
+from archfem.dynamics.collapse_state import COLLAPSE_STATES, CollapseState
 from archfem.dynamics.export import write_vtk, write_xdmf
 from archfem.dynamics.verdict import (
     ALL_DEFINITIONS,
@@ -35,7 +36,7 @@ from archfem.limit.mechanism_kinematics import (
     first_verified_mechanism,
     verified_mechanism,
 )
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Model
 
 logger = logging.getLogger("archfem")
@@ -74,6 +75,37 @@ class Ending(StrEnum):
     def is_complete(self) -> bool:
         """Whether the run was neither interrupted nor failed."""
         return self not in (Ending.INTERRUPTED, Ending.FAILED)
+
+
+def _read_number(value: Any) -> float:
+    """Return a number; a text that looks like one is none."""
+    return float(value + 0.0)
+
+
+# Functions that refuse a value which an attribute of a file cannot have
+ATTRIBUTE_KINDS: dict[str, Callable[[Any], Any]] = {
+    **dict.fromkeys(("pga", "energy_drift", "displacement", "residual"), _read_number),
+    **dict.fromkeys(("last_time", "predicted_error"), _read_number),
+    **dict.fromkeys(("fall_time", "fall_residual", "fall_resting"), _read_number),
+    **dict.fromkeys(("criteria_hinge", "criteria_duration", "criteria_friction"), _read_number),
+    **dict.fromkeys(("halved_steps", "steps", "criteria_failures"), index),
+    **dict.fromkeys(("structure", "fidelity", "fall_blocks"), str.strip),
+    "ended": Ending,
+    "fall": COLLAPSE_STATES.index,
+    "displacements": ("small", "large").index,
+}
+
+# Dimensions of the variables of every file, and the variables of joints that are texts
+DIMENSIONS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("N", "V", "M", "eccentricity", "friction"), ("time", "joint")),
+    **dict.fromkeys(("name", "part", "depth", "friction_limit"), ("joint",)),
+    "time": ("time",),
+    "ground": ("time", "axis"),
+}
+TEXTS = ("name", "part", "role")
+
+# Variables that other variables need
+COMPANIONS = {"rotation": ("slip",), "hinge": ("open", "slide")}
 
 
 @validate_methods
@@ -141,7 +173,7 @@ class History(ResultDisplay):
     @property
     def outcome(self) -> str:
         """How the run ended, in words."""
-        return str(self.dataset.attrs["outcome"])
+        return str(self.dataset.attrs.get("outcome", "ended, its file does not say how"))
 
     @property
     def ending(self) -> Ending:
@@ -163,18 +195,23 @@ class History(ResultDisplay):
 
         They concern energy drift above 5 % at any step, rotations and displacements too large for
         a model of small displacements, damping that drags loose blocks, a missed tolerance of the
-        steps, a fidelity that does not suit a block, a predicted error above its tolerance, and
-        joints between stones that fail and are not assessed. The last need the structure.
+        steps, a fidelity that does not suit a block, a predicted error above its tolerance, a run
+        that was broken off, and joints between stones that fail and are not assessed. The last need
+        the structure.
         """
         lines = str(self.dataset.attrs.get("doubts", "")).splitlines()
         stored = [Doubt(cause, remedy) for cause, _, remedy in (x.partition("\t") for x in lines)]
-        return (*stored, *self._unassessed_failures)
+        return (*stored, *self._derived_doubts)
 
     @cached_property
-    def _unassessed_failures(self) -> list[Doubt]:
-        """Doubt of joints that fail and are not assessed; it follows criteria and roles."""
+    def _derived_doubts(self) -> list[Doubt]:
+        """Doubts of a run broken off, and of joints that fail and, by roles, are not assessed."""
         joints, structure = self.joints, self.structure
-        return [] if structure is None else doubt_unassessed_joints(joints, structure)
+        doubts = [] if structure is None else doubt_unassessed_joints(joints, structure)
+        if self.dataset.attrs.get("ended") in (Ending.INTERRUPTED, Ending.FAILED):
+            cause = f"the run {self.outcome.partition(':')[0]}, and what comes after is not known"
+            doubts.append(Doubt(cause, "run the motion again, to its end"))
+        return doubts
 
     def with_doubts(self, doubts: Iterable[Doubt]) -> "History":
         """Return the same run with other doubts.
@@ -182,7 +219,7 @@ class History(ResultDisplay):
         Args:
             doubts: doubts in place of those of the run; repeated ones count once.
         """
-        stored = [each for each in dict.fromkeys(doubts) if each not in self._unassessed_failures]
+        stored = [each for each in dict.fromkeys(doubts) if each not in self._derived_doubts]
         text = "\n".join(f"{doubt.cause}\t{doubt.remedy}" for doubt in stored)
         return History(self.dataset.assign_attrs(doubts=text), self.structure)
 
@@ -319,9 +356,7 @@ class History(ResultDisplay):
                 structure; or it has no roles of parts and no structure is given.
         """
         dataset = read_dataset(path, "history file")
-        missing = {"N", "V", "M", "eccentricity", "name"} - set(dataset.variables)
-        if missing:
-            raise InvalidInput(f"{path} is not a time history: it lacks {sorted(missing)}")
+        _check_content(path, dataset)
         if structure is not None:
             _check_structure(path, dataset, structure)
             roles = [joint.role for joint in structure.joints]
@@ -434,6 +469,35 @@ def _without_other_coordinates(path: str | Path, dataset: xr.Dataset) -> xr.Data
     return dataset.drop_dims("coordinate", errors="ignore")
 
 
+def _check_content(path: str | Path, dataset: xr.Dataset) -> None:
+    """Refuse a file whose variables and attributes are not those of a history."""
+    shapes = {name: values.dims for name, values in dataset.variables.items()}
+    wrong = [name for name, dims in DIMENSIONS.items() if shapes.get(name) != dims]
+    wrong += [
+        str(name)
+        for name, values in dataset.variables.items()
+        if ("joint" in values.dims and values.dims not in DIMENSIONS.values())
+        or (
+            name not in TEXTS and {"time", "joint"} & {*values.dims} and values.dtype.kind in "OSUM"
+        )
+    ]
+    for present, others in COMPANIONS.items():
+        wrong += [name for name in others if present in shapes and name not in shapes]
+    required = [name for name in ATTRIBUTE_KINDS if "fall" in dataset.attrs and name[:5] == "fall_"]
+    for name, kind in ATTRIBUTE_KINDS.items():
+        try:
+            if name in dataset.attrs or name in required:
+                kind(dataset.attrs[name])
+        except (KeyError, TypeError, ValueError):
+            wrong.append(f"attribute {name}")
+    if wrong:
+        names = join_names(list(dict.fromkeys(wrong)))
+        raise InvalidInput(
+            f"{path} is not a time history that archfem wrote: it lacks {names}, or has something "
+            "else in its place; run again"
+        )
+
+
 def _check_structure(path: str | Path, dataset: xr.Dataset, structure: Structure) -> None:
     """Refuse a file of another structure, by names of joints and by fingerprint."""
     names = dataset["name"].values.astype(str).tolist()
@@ -442,7 +506,7 @@ def _check_structure(path: str | Path, dataset: xr.Dataset, structure: Structure
             f"{path} is of another structure: it has {len(names)} joints from '{names[0]}' to "
             f"'{names[-1]}', and '{structure.name}' has others; give the one that was shaken"
         )
-    if dataset.attrs.get("structure") not in (None, structure.fingerprint):
+    if dataset.attrs.get("structure", structure.fingerprint) != structure.fingerprint:
         raise InvalidInput(
             f"{path} is of another structure: its joints have the names of those of "
             f"'{structure.name}', but blocks are elsewhere; give the one that was shaken"

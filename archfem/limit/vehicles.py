@@ -93,12 +93,16 @@ class MovingLoad(ResultDisplay):
 
     def _summary(self) -> str:
         """Describe the least factor and its place in one line."""
-        place = f"at x = {self.position:.3g} m driving {self.direction}"
-        return f"MovingLoad: least factor {self.worst.factor:.4g}, {place}"
+        return f"MovingLoad: least factor {self.worst.factor:.4g}, {self._place}"
 
     def __str__(self) -> str:
         """Describe the worst place and its collapse in one line."""
-        return f"worst at x = {self.position:.3g} m, driving {self.direction}: {self.worst}"
+        return f"worst {self._place}: {self.worst}"
+
+    @property
+    def _place(self) -> str:
+        """Place and direction of the vehicle, in words."""
+        return f"at x = {self.position:.3g} m (the vehicle's middle), driving {self.direction}"
 
 
 def moving_load(
@@ -215,9 +219,17 @@ class Rating(ResultDisplay):
         """Whether the bridge carries the factored vehicle everywhere; no if it falls unloaded."""
         return bool(self.factor >= 1.0)
 
+    @property
+    def outcome(self) -> str:
+        """Whether it passes, and by which factors on the vehicle that nobody has given."""
+        names = {"partial": "live", "dynamic": "impact"}
+        missing = [n for n, key in names.items() if self._source(key).startswith("none")]
+        without = f" without {' and '.join(missing)} factor{'s'[: len(missing) - 1]}"
+        return f"{'passes' if self.passes else 'fails'}{without if missing else ''}"
+
     def table(self) -> str:
         """Return factors [-] and axles on the bridge at all places [m], as rows of CSV."""
-        rows = ["direction,position [m],factor [-],axles [-]"]
+        rows = ["direction,position of the vehicle's middle [m],factor [-],axles [-]"]
         for way in DRIVING_DIRECTIONS:
             here = self.moving.factors.sel(direction=way)
             values = (here[key].values for key in ("position", "factor", "axles"))
@@ -228,7 +240,7 @@ class Rating(ResultDisplay):
         """Describe the result in one line."""
         return (
             f"Rating of '{self.structure.name}' for {self.vehicle.name}: factor {self.factor:.4g} "
-            f"at x = {self.moving.position:.3g} m, {'passes' if self.passes else 'fails'}"
+            f"at x = {self.moving.position:.3g} m (the vehicle's middle), {self.outcome}"
         )
 
     def __str__(self) -> str:
@@ -241,9 +253,11 @@ class Rating(ResultDisplay):
         favourable = "EN 1990:2002, Table A2.4(B), favourable; from memory"
         lines = [
             f"{self._summary()}",
+            "the factor is on axles × live × impact; codes with partial factors require 1",
             f"least factor driving {', '.join(least)}",
             f"{self.moving}",
             f"geometric factor of safety at that place: {self._geometric_text()}",
+            "it is of the same vehicle; Heyman requires it, often 2 (from memory), and no code",
             f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN "
             f"over {self.width:.3g} m of width; {source}",
             f"live load by {self.live:g} ({self._source('live')})",
@@ -255,8 +269,11 @@ class Rating(ResultDisplay):
     def _source(self, factor: str) -> str:
         """Return where a factor on the vehicle comes from."""
         vehicle = self.vehicle
-        own = getattr(self, factor) == getattr(vehicle, factor)
-        return str(getattr(vehicle, f"{factor}_source")) if own else "given"
+        value, source = getattr(self, factor), str(getattr(vehicle, f"{factor}_source"))
+        if value != getattr(vehicle, factor):
+            return "given"
+        # a vehicle of one's own has factors of 1 where it gives none
+        return "none given" if value == 1.0 and source == "given" else source
 
     def _geometric_text(self) -> str:
         """Return the geometric factor of safety, in words where it is below 1."""

@@ -47,16 +47,19 @@ class Store:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._points, self._plan = folder / "points", folder / "study.json"
-        self._progress = folder / "progress.json"
-        self.shared = folder / "shared"  # results that workers share
+        names = "points", "study.json", "progress.json", "shared", "workers.log"
+        paths = (_files.path_inside(folder, name) for name in names)
+        # `shared` has the results that workers share
+        self._points, self._plan, self._progress, self.shared, self.log = paths
 
     @contextmanager
     def lock(self) -> Iterator[None]:
         """Refuse other drivers while this one runs, and remove what a killed one has left."""
         with _files.lock_folder(self.folder):
-            for draft in (*self._points.rglob(".*.part*"), *self.shared.rglob(".*")):
-                draft.unlink()
+            for place in filter(Path.is_dir, (self._points, self.shared)):
+                for path in _files.list_files(place):
+                    if path.name.startswith("."):
+                        path.unlink()
             _files.remove_leftovers(self.folder)
             yield
 

@@ -221,7 +221,7 @@ class Study:
         points = group_by_model([(number, self.points[number]) for number in missing])
         failed = sum(bool(row["error"]) for row in rows.values())
         progress = Progress(len(numbers), len(rows), failed, store, shared)
-        log = None if store is None else store.folder / "workers.log"
+        log = None if store is None else store.log
         evaluation = self._evaluate(points, shared, client, workers=workers, log=log)
         # closed on Ctrl-C too, which ends the workers
         with closing(progress), closing(evaluation) as finished:

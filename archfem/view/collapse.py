@@ -5,6 +5,7 @@ map of rings, and instants of a fall.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.limit.vehicles import MovingLoad, Rating
+from archfem.masonry.loads import PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.statics.mechanism_assessment import KinematicAssessment
@@ -60,7 +62,7 @@ def draw_collapse(structure: Structure, found: Collapse) -> Figure:
     return figure
 
 
-def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse) -> None:
+def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse, factors: str = "") -> None:
     """Draw mechanism, hinges, thrust line and loads over a structure that is drawn already."""
     if found.motion.any():
         motion = scale_motion(structure, found.motion)
@@ -71,7 +73,7 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse) -> None:
     soft = set(find_yielding_blocks(structure))
     stones = np.array([not soft & set(joint.blocks) for joint in structure.joints])
     draw_thrust(axes, Marker(structure, stones).at(found.joints))
-    factor = f"{found.factor:.3g} ×" if np.isfinite(found.factor) else ""
+    factor = f"{found.factor:.3g} ×{factors}" if np.isfinite(found.factor) else ""
     if found.outcome is not Outcome.INFEASIBLE:  # else nothing was loaded: the weight is too much
         draw_loads(axes, structure, found.live, factor=factor)
     has_factor = found.outcome in (Outcome.COLLAPSES, Outcome.BRACKETED)
@@ -97,15 +99,21 @@ def draw_rating(found: Rating) -> Figure:
         found: rating of a bridge for a vehicle.
 
     Returns:
-        The figure: factors of both directions over the place of the front axle, up to four times
-        the least one, above the mechanism at the worst place.
+        The figure: factors of both directions over the place of the vehicle's middle, up to four
+        times the least one, above the mechanism at the worst place with the axles as given.
     """
-    outcome = "passes" if found.passes else "fails"
-    title = f"{found.vehicle.name}: factor {found.factor:.3g}, {outcome}"
-    # the front axle, since long vehicles have no middle
-    half = 0.5 * sum(found.vehicle.spacings)
-    label = "front axle, x [m]"
-    return _draw_factors(found.moving, title, label, half, required=1.0)
+    title = f"{found.vehicle.name}: factor {found.factor:.3g}, {found.outcome}"
+    code = found.live * found.impact
+    # each axle as it was given, on its part of the width and without factors
+    share, worst = code * found.structure.width / found.width, found.moving.worst
+    live = [
+        replace(load, force=tuple(force / share for force in load.force))
+        for load in worst.live
+        if isinstance(load, PointLoad)
+    ]
+    factors = "" if code == 1.0 else f" {code:.3g} ×"
+    worst = replace(worst, live=live)
+    return _draw_factors(found.moving, worst, title, factors, required=1.0)
 
 
 @validate_arguments
@@ -120,40 +128,42 @@ def draw_moving_load(found: MovingLoad) -> Figure:
         times the least one, above the mechanism at the worst place.
     """
     title = f"least factor {found.worst.factor:.3g}, driving {found.direction}"
-    return _draw_factors(found, title, "middle of the vehicle, x [m]")
+    return _draw_factors(found, found.worst, title)
 
 
 def _draw_factors(
-    found: MovingLoad, title: str, label: str, half: float = 0.0, required: float = 0.0
+    found: MovingLoad, worst: Collapse, title: str, factors: str = "", required: float = 0.0
 ) -> Figure:
-    """Draw factors over a point `half` ahead of the vehicle's middle, above the worst mechanism."""
-    structure = found.worst.structure
+    """Draw factors over the vehicle's middle, above the worst mechanism on the same x axis."""
+    structure = worst.structure
     assert structure is not None  # it was analysed
+    over, top = found.factors["factor"], 4.0 * max(worst.factor, required)
+    low, high = outline_bounds(structure)
+    # a long vehicle is worst with its middle beside the bridge
+    seen = over["position"].values[((over <= top) & np.isfinite(over)).any("direction").values]
+    ends = np.array([*seen, low[0], high[0]])
     wide, tall = structure_figure(structure).get_size_inches()
-    # height to spare, so that the bridge fills the width and both panels have one x axis
-    figure = new_figure(wide, 1.5 * tall + 3.0)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 1.5 * tall])
-    factors, least = found.factors["factor"], found.worst.factor
-    ahead = {"right": half, "left": -half}
-    lines = zip(ahead.items(), ("-", "--"), (Colour.THRUST, Colour.LOAD), strict=True)
-    for (way, reach), line, colour in lines:
+    # height to spare, so that the bridge fills its part of the width, and room for the legend
+    tall = max(1.5 * tall * (high[0] - low[0]) / np.ptp(ends), 2.5)
+    figure = new_figure(wide, tall + 3.0)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, tall])
+    ways = zip(("right", "left"), ("-", "--"), (Colour.THRUST, Colour.LOAD), strict=True)
+    for way, line, colour in ways:
+        drawn = over.sel(direction=way)
         style = {"color": colour, "ls": line, "lw": 1.5, "label": f"driving {way}"}
-        drawn = factors.sel(direction=way)
-        upper.plot(drawn["position"] + reach, drawn.where(np.isfinite(drawn)), **style)
+        upper.plot(drawn["position"], drawn.where(np.isfinite(drawn)), **style)
     upper.axhline(required, color=Colour.GREY, lw=1.0)
-    if np.isfinite(least):
+    if np.isfinite(worst.factor):
         style = {"mfc": Colour.HINGE, "mec": "white", "ms": 7.5, "zorder": 5}
-        place = found.position + ahead[found.direction]
-        upper.plot([place], [least], "o", label="worst place", **style)
-        upper.set_ylim(0.0, 4.0 * max(least, required))
-    style_axes(upper, label, "factor [-]")
+        upper.plot([found.position], [worst.factor], "o", label="worst place", **style)
+        upper.set_ylim(0.0, top)
+    style_axes(upper, "middle of the vehicle, x [m]", "factor [-]")
     set_title(upper, title)
     upper.legend(frameon=False, fontsize=Size.LABEL)
     draw_structure(structure, axes=lower)
-    _draw_mechanism(lower, structure, found.worst)
-    low, high = outline_bounds(structure)
-    margin = 0.03 * (high[0] - low[0])
-    lower.set_xlim(low[0] - margin, high[0] + margin)
+    _draw_mechanism(lower, structure, worst, factors)
+    margin = 0.03 * np.ptp(ends)
+    lower.set_xlim(ends.min() - margin, ends.max() + margin)
     return figure
 
 

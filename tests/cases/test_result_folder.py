@@ -1,13 +1,15 @@
 """Files of result folders."""
 
+import os
 import shutil
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
 import xarray as xr
 
 import archfem as af
-from archfem._files import read_file_list, replace_results
+from archfem._files import read_file_list, replace_results, write_sealed_json
 from archfem.cases import result_folder as results
 from archfem.cases.run import carry_out, link_file, replace_run
 
@@ -325,3 +327,158 @@ def test_a_case_may_request_a_free_body():
         drawn = [f"dead_stress.{kind}" for kind in more]
         assert list(files) == ["dead.png", "names.png", *drawn, "free_body.png"]
     assert files["dead_stress.txt"].splitlines()[1].startswith("arch ")
+
+
+@pytest.fixture
+def mine(tmp_path):
+    """Folder of the user outside the result folder."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    for name in ("precious.txt", ".precious.part", "history.nc", "case.toml"):
+        (folder / name).write_bytes(b"precious!" * 1000)
+    return folder
+
+
+def contents(folder):
+    """Files, folders and links below a folder, with what they hold."""
+    return {
+        path.relative_to(folder).as_posix(): os.readlink(path)
+        if path.is_symlink()
+        else path.read_bytes()
+        if path.is_file()
+        else ""
+        for path in folder.rglob("*")
+    }
+
+
+def link(folder, name, target):
+    """Put a link in the place of a name in a result folder."""
+    path = folder / name
+    path.unlink(missing_ok=True)
+    path.symlink_to(target)
+
+
+def plant(folder, mine, name):
+    """Leave a finished draft with a file below a link, as if its publication was interrupted."""
+    (folder / ".finished" / "x").mkdir(parents=True)
+    (folder / ".finished" / "x" / name).write_text("planted")
+    shutil.copy(folder / "archfem.json", folder / ".finished")
+    link(folder, "x", mine)
+
+
+def link_to_results(folder, mine, name):
+    """Link to a result folder of the user, so that its files look like a draft."""
+    shutil.copytree(folder, mine / "results")
+    link(folder, name, mine / "results")
+
+
+def list_outside(folder, mine, name):
+    """List a file of the user with its very digest, in a list that is sealed again."""
+    groups = {k: {"inputs": v.inputs, "files": v.files} for k, v in read_file_list(folder).items()}
+    groups["run"]["files"][name] = sha256((mine / "precious.txt").read_bytes()).hexdigest()
+    write_sealed_json(folder / "archfem.json", groups)
+
+
+def copy_and_link(folder, mine, name):
+    """Link to a copy, whose digest is right."""
+    (mine / "copy").write_bytes((folder / name).read_bytes())
+    link(folder, name, mine / "copy")
+
+
+# What a stranger may have put into a folder whose report the user writes
+ATTACKS = {
+    "lock": lambda folder, mine: link(folder, ".lock", mine / "precious.txt"),
+    "lock to nowhere": lambda folder, mine: link(folder, ".lock", mine / "new.txt"),
+    "second name as lock": lambda folder, mine: os.link(mine / "precious.txt", folder / ".lock"),
+    "pipe as lock": lambda folder, mine: os.mkfifo(folder / ".lock"),
+    "finished draft": lambda folder, mine: link_to_results(folder, mine, ".finished"),
+    "finished file": lambda folder, mine: plant(folder, mine, "precious.txt"),
+    "finished new file": lambda folder, mine: plant(folder, mine, "planted.txt"),
+    "finished link": lambda folder, mine: (
+        (folder / ".finished").mkdir(),
+        copy_and_link(folder, mine, "archfem.json"),
+        link(folder, ".finished/archfem.json", mine / "copy"),
+    ),
+    "draft": lambda folder, mine: link(folder, ".unfinished-report", mine),
+    "draft of results": lambda folder, mine: link_to_results(folder, mine, ".unfinished-report"),
+    "other draft": lambda folder, mine: link(folder, ".unfinished-limit", mine),
+    "case": lambda folder, mine: copy_and_link(folder, mine, "case.toml"),
+    "list": lambda folder, mine: copy_and_link(folder, mine, "archfem.json"),
+    "history": lambda folder, mine: copy_and_link(folder, mine, "first/history.nc"),
+    "text": lambda folder, mine: copy_and_link(folder, mine, "limit.txt"),
+    "name outside": lambda folder, mine: list_outside(folder, mine, "../../mine/precious.txt"),
+    "name of the root": lambda folder, mine: list_outside(folder, mine, str(mine / "precious.txt")),
+    "folder as lock": lambda folder, mine: (folder / ".lock").mkdir(),
+    "folder as file": lambda folder, mine: (
+        (folder / ".finished").mkdir(),
+        (folder / ".finished" / "first").touch(),
+        shutil.copy(folder / "archfem.json", folder / ".finished"),
+    ),
+    "file as draft": lambda folder, mine: (folder / ".finished").touch(),
+}
+
+
+@pytest.mark.parametrize("attack", ATTACKS)
+def test_the_report_of_a_folder_touches_nothing_outside_it(attack, two_runs, mine, capsys):
+    """Links and names that lead out of the folder end in an error, and files stay as they are."""
+    folder, _ = two_runs
+    ATTACKS[attack](folder, mine)
+    before = contents(mine)
+    assert af.commands.main(["report", str(folder)]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("archfem: ")
+    assert contents(mine) == before
+    assert not set(contents(folder)) & {"precious.txt", ".precious.part"}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        ".unfinished-run",
+        ".unfinished-run/first",
+        ".unfinished-run/first/history.nc",
+        "first",
+        "first/history.nc",
+    ],
+)
+def test_a_run_in_a_folder_of_a_stranger_touches_nothing_outside(name, two_runs, mine, capsys):
+    folder, _ = two_runs
+    case = shutil.copy(folder / "case.toml", folder.parent)
+    if (folder / name).is_dir():
+        shutil.rmtree(folder / name)
+    (folder / name).parent.mkdir(parents=True, exist_ok=True)
+    link(folder, name, mine / ("history.nc" if name.endswith(".nc") else "."))
+    before = contents(mine)
+    assert af.commands.main(["run", str(case), "--out", str(folder)]) == 1
+    assert f"{name} is a link, a pipe or a device" in capsys.readouterr().err
+    with pytest.raises(af.InvalidInput, match="is a link"):
+        list(af.cases.run_case(af.Case.read(case), folder))
+    assert contents(mine) == before
+
+
+@pytest.mark.parametrize("name", ["points", "points/ab", "shared", "study.json", "workers.log"])
+def test_a_study_in_a_folder_of_a_stranger_touches_nothing_outside(name, two_runs, mine):
+    """Leftovers of its folders are deleted, which begin with a dot as those of the user do."""
+    folder, _ = two_runs
+    study = af.Study(af.Case.read(folder / "case.toml"), {"suite.scale": [1.0]}, "dead load")
+    (folder / name).parent.mkdir(exist_ok=True)
+    link(folder, name, mine / ("precious.txt" if "." in name else "."))
+    before = contents(mine)
+    with pytest.raises(af.InvalidInput, match=f"{name} is a link"):
+        study.run(folder, workers=1)
+    assert contents(mine) == before
+
+
+def test_files_that_are_missing_are_named(two_runs, caplog):
+    """Both a picture and a history of the list; a report itself may be deleted."""
+    folder, _ = two_runs
+    with replace_results(folder, "report", read_file_list(folder)["run"].inputs) as draft:
+        (draft / "report.html").touch()
+    (folder / "report.html").unlink()
+    af.cases.open_results(folder)
+    assert "missing" not in caplog.text
+    for name in ("first/envelope.png", "second/history.nc"):
+        (folder / name).unlink()
+    page = af.cases.open_results(folder).report().read_text(encoding="utf-8")
+    for text in (caplog.text, page):
+        assert "a listed file is missing: first/envelope.png, second/history.nc; put" in text

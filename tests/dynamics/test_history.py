@@ -229,3 +229,57 @@ def test_definitions_obey_the_criteria_of_the_run(run):
     found = first_mechanisms(loose)
     assert found == first_mechanisms(run, loose.criteria)
     assert found["any joints at once"] == replace(loose.mechanism, blocks=())
+
+
+# What a file may have in an attribute of a history, of which archfem writes none
+WRONG_ATTRIBUTES = {
+    "ended": ("halted", 1, np.array([1.0, 2.0])),
+    "fall": ("wobbles", 2.0),
+    "displacements": ("huge", 0),
+    "displacement": ("1 mm", "0.001", np.array([1.0, 2.0])),
+    "halved_steps": (np.nan, "many"),
+    "criteria_failures": (4.5, "four"),
+    "criteria_hinge": ("always",),
+    "pga": ("strong",),
+    "structure": (np.array([1.0, 2.0]),),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_ATTRIBUTES)
+def test_attributes_that_no_run_has_are_refused_by_name(name, run, tmp_path):
+    """Whoever changes a file can seal it again."""
+    fall = {"fall": "stands", "fall_time": np.nan, "fall_blocks": ""}
+    whole = run.dataset.assign_attrs(fall, fall_residual=0.0, fall_resting=1)
+    assert History.read(History(whole).save(tmp_path / "run.nc")).fall.kind == "stands"
+    for value in WRONG_ATTRIBUTES[name]:
+        path = History(whole.assign_attrs({name: value})).save(tmp_path / "run.nc")
+        with pytest.raises(af.InvalidInput, match=f"lacks attribute {name}, or has something else"):
+            History.read(path, run.structure)
+
+
+def test_variables_that_no_run_has_are_refused_by_name(run, tmp_path):
+    changed = {
+        "N": run.dataset["N"].T,
+        "V": run.dataset["V"].astype("S1"),
+        "part": run.dataset["part"][0],
+        "rotation": run.dataset["rotation"].astype("S1"),
+    }
+    names = ["M", "time", "slip", *changed]
+    for name in names:
+        dataset = run.dataset.drop_vars(name)
+        if name in changed:
+            dataset = run.dataset.assign({name: changed[name].variable})
+        path = History(dataset).save(tmp_path / "run.nc")
+        with pytest.raises(af.InvalidInput, match=f"lacks {name}, or has"):
+            History.read(path, run.structure)
+
+
+@pytest.mark.parametrize("ended", ["interrupted", "failed"])
+def test_a_run_that_was_broken_off_is_in_doubt(ended, run):
+    assert run.doubts == History(run.dataset.assign_attrs(ended="finished"), run.structure).doubts
+    dataset = run.dataset.assign_attrs(ended=ended, outcome=f"{ended} at 1.5 s: no equilibrium")
+    broken = History(dataset, run.structure)
+    (doubt,) = set(broken.doubts) - set(run.doubts)
+    assert doubt.cause == f"the run {ended} at 1.5 s, and what comes after is not known"
+    assert "no doubts" not in broken.verdict.headline
+    assert broken.with_doubts(broken.doubts).doubts == broken.doubts  # is not stored

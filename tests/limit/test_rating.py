@@ -139,9 +139,40 @@ def test_words_and_table(lorry_rating):
     assert ("passes" in repr(lorry_rating)) == (lorry_rating.factor >= 1.0)
     head, *rows = lorry_rating.table().splitlines()
     assert head.startswith("direction,position")
+    assert "of the vehicle's middle [m]" in head
+    assert words.count("(the vehicle's middle)") == 2
+    factor, geometric = (
+        next(k for k, line in enumerate(words.splitlines()) if start in line)
+        for start in ("Rating of", "geometric factor")
+    )
+    assert words.splitlines()[factor + 1].endswith("codes with partial factors require 1")
+    assert "Heyman requires it" in words.splitlines()[geometric + 1]
     assert len(rows) == lorry_rating.moving.factors["factor"].size
     least = min(float(row.split(",")[2]) for row in rows)
     assert least == pytest.approx(lorry_rating.factor, rel=1e-5)  # six digits
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "given", "says"),
+    [
+        ("own", {}, "passes without partial and dynamic factors"),
+        ("own", {"live": 1.5}, "passes without dynamic factor"),
+        ("own", {"impact": 1.3}, "passes without partial factor"),
+        ("own", {"live": 1.5, "impact": 1.3}, "passes"),
+        ("by span", {"live": 1.45}, "passes without dynamic factor"),
+        ("LM2", {"width": 100.0}, "passes"),
+    ],
+)
+def test_a_vehicle_without_factors_passes_in_so_many_words(vehicle, given, says):
+    """Those of LM2 are in its weights, and the one of LM71 depends on the span."""
+    stone = column_under_axle(width=100.0)
+    own = Vehicle("axle", (10e3,))
+    by_span = Vehicle("axle", (10e3,), impact_source=VEHICLES["LM71"].impact_source)
+    found = af.rate(stone, {"own": own, "by span": by_span}.get(vehicle, vehicle), **given)
+    assert str(found).splitlines()[0].endswith(f"(the vehicle's middle), {says}")
+    (live, impact) = (line for line in str(found).splitlines() if line[:6] in ("live l", "impact"))
+    assert ("(none" in live) == ("partial" in says)
+    assert ("(none" in impact) == ("dynamic" in says)
 
 
 def test_a_bridge_that_is_too_weak_would_carry_with_deeper_joints():

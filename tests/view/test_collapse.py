@@ -112,16 +112,13 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(ring, tmp_path):
         draw_kinematic_assessment(locked)
 
 
-def test_a_rating_shows_factors_over_the_front_axle_and_the_mechanism(ring):
+def test_a_rating_shows_factors_over_the_middle_and_the_mechanism(ring):
     lorry = af.limit.Vehicle("lorry", (5e3, 5e3), (1.0,))
     found = af.rate(ring, lorry)
     figure = draw_rating(found)
     upper, lower = figure.axes
     lines = lines_of(upper)
-    ahead = 0.5 if found.moving.direction == "right" else -0.5
-    np.testing.assert_allclose(
-        lines["worst place"], [[found.moving.position + ahead, found.factor]]
-    )
+    np.testing.assert_allclose(lines["worst place"], [[found.moving.position, found.factor]])
     drawn = lines[f"driving {found.moving.direction}"]
     assert np.nanmin(drawn[:, 1]) == pytest.approx(found.factor, rel=1e-6)
     assert f"factor {found.factor:.3g}" in upper.get_title()
@@ -129,6 +126,30 @@ def test_a_rating_shows_factors_over_the_front_axle_and_the_mechanism(ring):
     assert upper.get_xlim() == lower.get_xlim()
     labels = lower.get_legend_handles_labels()[1]
     assert f"live load: {found.factor:.3g} × 5 kN" in labels  # both axles are equal
+
+
+def test_a_rating_shows_its_worst_place_and_the_axles_as_given(ring):
+    """A lorry longer than the ring is worst with its middle far beside it; it spreads over 2 m."""
+    wide = replace(ring, width=4.0)
+    lorry = af.limit.Vehicle("lorry", (3e3, 12e3, 12e3), (12.0, 1.3), live=1.5, impact=1.2)
+    axles, places = [3.6 * axle for axle in lorry.axles], np.linspace(-9.0, 9.0, 37).tolist()
+    moving = af.moving_load(wide, axles, spacings=lorry.spacings, positions=places)
+    factors = {"live": 1.5, "impact": 1.2, "dead": 1.0, "geometric": 1.0}
+    found = af.limit.Rating(wide, lorry, width=2.0, moving=moving, **factors)
+    upper, lower = draw_rating(found).axes
+    place, drawn = lines_of(upper)["worst place"][0], lines_of(upper)
+    left, right = upper.get_xlim()
+    assert left < place[0] < right
+    assert abs(place[0]) > np.abs([block.points[:, 0] for block in ring.blocks]).max()
+    visible = drawn[f"driving {found.moving.direction}"]
+    visible = visible[(left < visible[:, 0]) & (visible[:, 0] < right)]
+    assert np.nanmin(visible[:, 1]) == pytest.approx(found.factor, rel=1e-6)
+    assert upper.get_ylim()[0] <= found.factor <= upper.get_ylim()[1]
+    labels = lower.get_legend_handles_labels()[1]
+    assert f"live load: {found.factor:.3g} × 1.8 × 12 kN" in labels
+    # the bridge is analysed under more newtons, over all of its width
+    sizes = [-load.force[1] for load in found.moving.worst.live]
+    np.testing.assert_allclose(sizes, 12e3 * 1.8 * 2.0)
 
 
 def test_a_moving_load_shows_factors_over_its_middle_and_the_mechanism(ring):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from archfem._files import check_listed, read_file_list
+from archfem._files import check_listed, describe_deleted, path_inside, read_file_list
 from archfem.cases.case import Case
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError
@@ -60,8 +60,14 @@ class ReportData:
         if self.folder is None or "run" not in listed:
             return {}
         groups = [group for group in listed.values() if group.inputs == listed["run"].inputs]
-        paths = {name: self.folder / name for group in groups for name in sorted(group.files)}
+        names = [name for group in groups for name in sorted(group.files)]
+        paths = {name: path_inside(self.folder, name) for name in names}
         return {name: path for name, path in paths.items() if path.is_file()}
+
+    @cached_property
+    def deleted(self) -> str:
+        """Say which listed files of the folder are missing; "" if none is."""
+        return "" if self.folder is None else describe_deleted(self.folder)
 
     def read_text(self, name: str) -> str | None:
         """Return the text of a file of the folder, or None."""

@@ -447,7 +447,7 @@ def _sentence(text: str) -> str:
 
 def build_check_section(data: ReportData) -> Section:
     """Build the section on predicted error, energy balance and model."""
-    blocks: list[Any] = []
+    blocks: list[Any] = [TextBlock(data.deleted, "missing")] if data.deleted else []
     if data.runs:
         head = ["run", "energy from nowhere", "supports bear", "Newton", "halved"]
         head += ["predicted error", "end"]
