@@ -242,7 +242,11 @@ def validate_arguments(function: Function) -> Function:
 
     @wraps(function)
     def wrapper(*args: Any, **options: Any) -> Any:
-        _check_values(signature.bind(*args, **options).arguments, _hints(function))
+        try:
+            bound = signature.bind(*args, **options)
+        except TypeError as error:
+            raise TypeError(f"{function.__qualname__}() {error}") from None
+        _check_values(bound.arguments, _hints(function))
         return function(*args, **options)
 
     return wrapper  # type: ignore[return-value]

@@ -1,14 +1,16 @@
 """Mechanisms verified by kinematics: rigid-block motions that only the failed joints permit.
 
 The motion is the optimum of a linear programme over the block motions (`verified_mechanism`).
-Before it is solved, a smaller problem rules out most states. The gaps g of the joints, openings
-and slips, are compatible where every closed loop of blocks closes: Rᵀ g = 0, with R a basis of the
-self-stresses, Gᵀ R = 0. A motion that the failed joints permit is then a point of a small cone,
+Before it is solved, a smaller problem rules out most states. Blocks between which no joint has
+failed are one body; where all are joined to the ground, nothing moves. The gaps g of the joints
+between bodies, openings and slips, are compatible where every closed loop of bodies closes:
+Rᵀ g = 0, with R a basis of the self-stresses, Gᵀ R = 0. A motion that the failed joints permit is
+then a point of a small cone,
 
-    R_fᵀ g_f = 0,   g_f >= 0 where a joint moves one way only,   g = 0 in all others,
+    Rᵀ g = 0,   g >= 0 where a joint moves one way only,   g = 0 where it does not move,
 
-three equations a loop, for any number of blocks (Gordan's alternative: either such a point exists,
-or a self-stress that presses every failed joint shut).
+three equations a loop (Gordan's alternative: either such a point exists, or a self-stress that
+presses every failed joint shut).
 """
 
 from dataclasses import dataclass, replace
@@ -22,10 +24,11 @@ from scipy import sparse
 from scipy.optimize import nnls
 from scipy.sparse.csgraph import dijkstra
 
-from archfem._typing import Array, Flags
+from archfem._typing import Array, Flags, Numbers
 from archfem._validation import check_type, validate_arguments
 from archfem.joints.criteria import Criteria, find_lasting, with_failure_flags
 from archfem.joints.resultants import check_instant
+from archfem.joints.rigid_kinematics import jump_entries
 from archfem.limit.linear_programme import RigidBlocks, solve_linear
 from archfem.limit.mechanism_count import (
     Mechanism,
@@ -332,55 +335,108 @@ def _largest_motion(blocks: RigidBlocks, freedoms: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class LoopCheck:
-    """Compatibility of gaps around all loops of rigid blocks, for the motion of some parts."""
+    """Compatibility of gaps around all loops of bodies, for the motion of some parts.
+
+    A body is made of blocks between which no joint has failed.
+    """
 
     blocks: RigidBlocks
     parts: tuple[str, ...]  # names of the parts that must move
 
     @cached_property
-    def stresses(self) -> Array:
-        """Orthonormal basis R of the self-stresses (3 n_joints, r) [-]."""
-        gaps = self.blocks.kinematics @ sparse.diags(self.blocks.coordinate_units)
-        basis = np.linalg.qr(gaps.toarray(), mode="complete")[0][:, gaps.shape[1] :]
-        return np.where(np.abs(basis) > 1e-12, basis, 0.0)  # round-off: the joint is in no loop
+    def judged(self) -> Numbers:
+        """Numbers of the free blocks of the parts."""
+        structure = self.blocks.structure
+        judged = [k for k in structure.free if structure.blocks[k].part in self.parts]
+        return np.array(judged, dtype=np.intp)
 
     @cached_property
-    def loop_joints(self) -> Flags:
-        """Joints on a path from the ground to each block of the parts (n_joints,)."""
-        # A block whose path neither opens nor slips anywhere does not move. Weights make paths
-        # avoid joints between blocks of other parts, whose own motion does not count.
+    def _vertices(self) -> list[tuple[int, int]]:
+        """Numbers of the two bodies at each joint if every block is one, 0 for the ground."""
         structure = self.blocks.structure
-        judged = [not block.fixed and block.part in self.parts for block in structure.blocks]
-        ground = len(structure.blocks)
-        vertex = [ground if block.fixed else k for k, block in enumerate(structure.blocks)]
-        between: dict[tuple[int, int], int] = {}
-        weights = sparse.lil_matrix((ground + 1, ground + 1))
-        for number, joint in enumerate(structure.joints):
-            a, b = (vertex[block] for block in joint.blocks)
-            between[a, b] = between[b, a] = number
-            near = any(judged[block] for block in joint.blocks)
-            weights[a, b] = weights[b, a] = 1.0 if near else float(len(structure.joints))
-        before = dijkstra(weights.tocsr(), indices=ground, return_predecessors=True)[1]
-        required = np.zeros(len(structure.joints), dtype=bool)
-        for block in np.flatnonzero(judged):
-            while block != ground:
-                required[between[block, before[block]]] = True
-                block = before[block]
-        return required
+        pairs = (structure.first_coordinates // 3 + 1)[structure.pairs]
+        return [(one, other) for one, other in pairs.tolist()]
 
-    def permits_motion(self, freedoms: Array) -> bool:
-        """Return whether the failed joints may permit a motion of the parts."""
+    def find_bodies(self, failed: Flags) -> Numbers:
+        """Return the body of each block, -1 for the ground, where some joints have failed."""
+        # a forest of blocks, each tree of which is a body; SciPy's components take longer in rings
+        structure = self.blocks.structure
+        above = list(range(len(structure.free) + 1))
+
+        def root(vertex: int) -> int:
+            while above[vertex] != vertex:
+                above[vertex] = vertex = above[above[vertex]]
+            return vertex
+
+        for number in np.flatnonzero(~failed).tolist():
+            one, other = map(root, self._vertices[number])
+            above[max(one, other)] = min(one, other)  # the ground stays the root of its tree
+        roots = np.array([root(vertex) for vertex in above])
+        return np.unique(roots, return_inverse=True)[1][structure.first_coordinates // 3 + 1] - 1
+
+    def self_stresses(self, joints: Numbers, bodies: Numbers) -> Array:
+        """Return an orthonormal basis R of the self-stresses of joints (3 n_joints, r) [-]."""
+        structure = self.blocks.structure
+        (intrados, extrados), normals = structure.ends[joints].swapaxes(0, 1), structure.normals
+        directions = normals[joints], normals[joints], structure.tangents[joints]
+        references = structure.centroids[np.unique(bodies, return_index=True)[1][1:]]
+        row, body, values = jump_entries(
+            np.concatenate(directions),
+            np.concatenate([intrados, extrados, intrados]),
+            np.tile(bodies[structure.pairs[joints]], (3, 1)),
+            references,
+        )
+        gaps = np.zeros((3 * len(joints), len(references), 3))
+        gaps[row, body] = values * [1.0, 1.0, 1.0 / self.blocks.length_unit]
+        gaps = gaps.reshape(len(gaps), -1)
+        basis = np.linalg.qr(gaps, mode="complete")[0][:, gaps.shape[1] :]
+        return np.where(np.abs(basis) > 1e-12, basis, 0.0)  # round-off: the joint is in no loop
+
+    def permits_motion(self, freedoms: Array, large: int = 200) -> bool:
+        """Return whether the failed joints may permit a motion of the parts.
+
+        Where more than `large` joints between bodies have failed, the programme takes less time.
+        """
+        freedoms = freedoms.reshape(3, -1)
+        bodies = self.find_bodies(freedoms.any(axis=0))
+        judged = np.unique(bodies[self.judged])
+        judged = judged[judged >= 0]
+        if not len(judged):
+            return False  # all parts are joined to the ground
+        one, other = bodies[self.blocks.structure.pairs].T
+        joints = np.flatnonzero(one != other)
+        if len(joints) > large:
+            return True
+        required = np.ones(3 * len(joints), dtype=bool)
+        if len(judged) <= bodies.max():  # others may move without them
+            required = np.tile(_find_paths(one[joints], other[joints], judged), 3)
+        freedoms = freedoms[:, joints].ravel()
         # one column for each freedom, two for a slip in either sense
         either = np.flatnonzero(freedoms == 2.0)
         rows = np.concatenate([np.flatnonzero(freedoms), either])
         sense = np.concatenate([np.sign(freedoms[freedoms != 0.0]), -np.ones(len(either))])
-        columns = self.stresses[rows].T * sense
+        columns = self.self_stresses(joints, bodies)[rows].T * sense
         # some required joint must move: any one-way gap, or a two-way slip in one of its senses
-        required = np.tile(self.loop_joints, 3)
         gaps = [np.where(required[rows] & (freedoms[rows] != 2.0), 1.0, 0.0)]
         for slip in either[required[either]]:
             gaps += [side * sense * (rows == slip) for side in (1, -1)]
         return any(_closes_loops(columns, gap) for gap in gaps)
+
+
+def _find_paths(one: Numbers, other: Numbers, judged: Numbers) -> Flags:
+    """Return the joints, between bodies, on a path from the ground to each judged body."""
+    # A body whose path neither opens nor slips anywhere does not move. Weights make paths avoid
+    # joints between other bodies, whose own motion does not count.
+    near = np.isin(one, judged) | np.isin(other, judged)
+    size, vertices = int(max(one.max(), other.max())) + 2, (one + 1, other + 1)
+    weights = np.zeros((size, size))
+    weights[vertices] = weights[vertices[::-1]] = np.where(near, 1.0, float(len(one)))
+    before = dijkstra(weights, indices=0, return_predecessors=True)[1]
+    on_path, pending = np.zeros((size, size), dtype=bool), judged + 1
+    while len(pending := pending[pending > 0]):
+        on_path[pending, before[pending]] = on_path[before[pending], pending] = True
+        pending = np.unique(before[pending])
+    return on_path[vertices]
 
 
 def _closes_loops(columns: Array, gap: Array, tolerance: float = 1e-5) -> bool:
