@@ -48,7 +48,11 @@ def test_a_run_returns_the_answer_with_version_settings_and_cost(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('return {"values"', 'while True: pass\n    return {"values"', "no answer within 2 s"),
+        (
+            'return {"values"',
+            'import time; time.sleep(60)\n    return {"values"',
+            "no answer within 2 s",
+        ),
         ('return {"values"', 'import os; os.abort()\n    return {"values"', "died of signal 6"),
         ('return {"values"', 'raise ValueError("no way")\n    return {"values"', "no way"),
         ("0.5", "float('nan')", "no number for factor"),
@@ -176,7 +180,8 @@ def test_every_program_answers_one_scene_where_it_is_installed(name):
 @pytest.mark.parametrize(
     ("cost", "tolerance", "least"),
     [
-        (0.1, 1e-3, 40),
+        # every scene that takes less than 0.1 s, by some of its settings
+        (0.08, 1e-3, 25),
         # amplitudes of falls are searched to 1 %, and depend on the rounding of the processor
         pytest.param(60.0, 1e-2, 140, marks=pytest.mark.slow),
     ],

@@ -229,7 +229,7 @@ def test_openings_follow_from_displacements_whatever_steps(ring, motion, fidelit
     slides = scheme == af.dynamics.Conserving()
     model = af.build(ring if slides else glued(ring), fidelity=fidelity)
     given = {"damping": af.Rayleigh(0.05, (8.0, 16.0)), "scheme": scheme, "dt": 0.005}
-    record, short = af.Record(every=3, fields_every=15), motion.cut(1.2, 1.5)
+    record, short = af.Record(every=3, fields_every=15), motion.cut(1.2, 1.35)
     gauges = model.observer()
     runs = {
         method: af.time_history(model, short, record=record, method=method, **given)
