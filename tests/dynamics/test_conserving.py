@@ -63,7 +63,9 @@ def balance(start, energy):
     return np.abs(drift).max(), exchanged
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.005, 0.002, 0.001])
+@pytest.mark.parametrize(
+    "dt", [0.01, *(pytest.param(dt, marks=pytest.mark.slow) for dt in (0.005, 0.002)), 0.001]
+)
 @pytest.mark.parametrize("friction", [0.3, 0.6, None])
 @pytest.mark.parametrize("kind", ["rocking", "sliding"])
 def test_an_undamped_block_neither_gains_nor_loses(kind, friction, dt):
