@@ -163,7 +163,7 @@ def test_a_ring_of_teeth_and_bonds_neither_gains_nor_loses(rule, damping):
         radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, contact=contact
     )
     model = af.build(structure, fidelity="rigid", quadrature=rule, cells=(1, 1))
-    motion = af.Motion.synthetic(duration=2.0, pga=8.0, seed=3).cut(0.4, 0.7)
+    motion = af.Motion.synthetic(duration=2.0, pga=8.0, seed=3).cut(0.4, 0.6)
     _, states, _, energies = run(model, motion, 0.005, damping=damping)
     memory = states[-1].memory
     count = len(memory) // 2
