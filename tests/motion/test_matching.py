@@ -105,7 +105,7 @@ def test_motions_and_bands_that_cannot_be_matched_are_refused(shaking):
         with pytest.raises(af.errors.InvalidInput, match="0 < first < second"):
             spectral_misfit(shaking, CASE_STUDY, band=band)
     spike = af.motion.TableSpectrum([0.01, 0.5, 0.51, 0.52, 5.0], [1e-3, 1e-3, 1.0, 1e-3, 1e-3])
-    short = af.Motion.synthetic(duration=4.0, dt=0.01, seed=3).with_vertical(None)
+    short = af.Motion.synthetic(duration=4.0, dt=0.02, seed=3).with_vertical(None)
     with pytest.raises(af.errors.DidNotConverge, match="misfit") as caught:
         matched(short, spike, tolerance=0.02)
     assert caught.value.last.misfit["horizontal"] > 0.02
