@@ -96,9 +96,8 @@ def overturns(ratio, peak, halves):
         for stop in (end, 30.0):
             if time >= stop:
                 continue
-            found = solve_ivp(
-                rates, (time, stop), state, events=[lands, falls], rtol=1e-10, atol=1e-12
-            )
+            events, tight = [lands, falls], {"rtol": 1e-10, "atol": 1e-12}
+            found = solve_ivp(rates, (time, stop), state, "DOP853", events=events, **tight)
             time, state = found.t[-1], found.y[:, -1]
             if found.status == 1:
                 break

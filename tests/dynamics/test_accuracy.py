@@ -59,7 +59,7 @@ def test_errors_are_the_largest_difference_to_the_reference(settings):
 @pytest.mark.parametrize("fails", [False, True])
 def test_no_more_time_is_reported_than_has_passed(stack, fails, monkeypatch):
     model = af.build(stack, fidelity="rigid")
-    motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1)
+    motion = af.Motion.synthetic(duration=0.3, pga=0.5, seed=1)
     if fails:
 
         def failing(model, motion, **options):

@@ -12,7 +12,7 @@ from archfem.dynamics.solvers.active_rows import MAX_DIRECT_ROWS
 from archfem.dynamics.solvers.compliance import ComplianceSolver
 from archfem.dynamics.solvers.joint_law import gap_rows
 
-DT, STEPS = 0.005, 60
+DT, STEPS = 0.005, 40
 
 CONSERVING, NEWMARK = af.dynamics.Conserving(), af.dynamics.Newmark()
 
@@ -70,7 +70,8 @@ def test_joints_open_and_close_and_newton_converges_fast(case):
     run, many, iterations = case
     assert len(run.batch.times) == STEPS
     changes = np.diff(run.opened.astype(int), axis=0)
-    assert min((changes > 0).sum(), (changes < 0).sum()) > 2 * run.opened.shape[1]
+    # on average each row opens and closes once in 40 steps, and did twice in 60
+    assert min((changes > 0).sum(), (changes < 0).sum()) > run.opened.shape[1]
     assert (run.opened.sum(axis=1).max() > MAX_DIRECT_ROWS) == many
     assert run.batch.iterations.mean() < iterations
 
@@ -100,7 +101,7 @@ def test_forces_that_the_joint_operator_evaluates_balance(case):
 
 
 def test_steps_are_those_of_snes(case):
-    """Of six steps SNES may give up one, as rounding decides where joints are stiff."""
+    """Of four steps SNES may give up one, as rounding decides where joints are stiff."""
     run, *_ = case
     exact = SnesSolver(run.equation, af.statics.Newton(tolerance=1e-13))
     given_up = 0
@@ -120,7 +121,7 @@ def test_steps_are_those_of_snes(case):
 def test_rows_that_were_active_before_do_not_matter(case):
     """Steps are repeated from later ones to earlier ones, with the workspace of those."""
     run, *_ = case
-    for k in (45, 30, 15, 0):
+    for k in (30, 15, 0):
         _, states = run.continued(run.states[k], 5)
         assert len(states) == 5
         for again, once in zip(states, run.states[k + 1 :], strict=False):

@@ -117,8 +117,9 @@ def test_a_bonded_block_swings_as_a_linear_one_until_it_breaks():
     model = block(stiffness, friction=None, tension=tension)
     omega = np.sqrt(stiffness / mass)
     speed = (tension + 2e3) / stiffness * omega
-    short = af.Motion(np.zeros(5), 0.05)
-    start, states, resultants, energies = run(model, short, 5e-4, [0.0, 0.99 * speed, 0.0])
+    # a period of 0.09 s, and the break at 0.02 s with some of the flight
+    period, flight = (af.Motion(np.zeros(2), end) for end in (0.1, 0.05))
+    start, states, resultants, energies = run(model, period, 5e-4, [0.0, 0.99 * speed, 0.0])
     assert not states[-1].memory.any()
     times = np.array([state.time for state in states])
     moved = np.array([state.q[1] for state in states]) - start.q[1]
@@ -126,7 +127,7 @@ def test_a_bonded_block_swings_as_a_linear_one_until_it_breaks():
     assert moved == pytest.approx(size * np.sin(omega * times), abs=5e-3 * size)
     assert resultants[:, 0].min() == pytest.approx(2e3 - stiffness * size, rel=1e-3)
     assert drift(energies)[0] < 1e-8
-    start, states, resultants, energies = run(model, short, 5e-4, [0.0, 1.1 * speed, 0.0])
+    start, states, resultants, energies = run(model, flight, 5e-4, [0.0, 1.1 * speed, 0.0])
     count = len(states[-1].memory) // 2
     assert np.all(states[-1].memory[count:] == 1.0)
     off, least = drift(energies)
@@ -134,7 +135,7 @@ def test_a_bonded_block_swings_as_a_linear_one_until_it_breaks():
     assert least >= -1e-12
     lost = energies[1][:, 3].sum()
     assert lost == pytest.approx(0.5 * tension**2 / stiffness, rel=0.05)
-    assert np.sum(resultants[:, 0] == 0.0) > 100  # it flies
+    assert np.sum(resultants[:, 0] == 0.0) > 50  # it flies for 30 ms of 50
 
 
 def test_the_loss_of_a_bond_tends_to_its_elastic_energy():
@@ -142,7 +143,7 @@ def test_the_loss_of_a_bond_tends_to_its_elastic_energy():
     stiffness, mass, tension = 1e6, 2e3 / GRAVITY, 4e3
     model = block(stiffness, friction=None, tension=tension)
     speed = 1.1 * (tension + 2e3) / stiffness * np.sqrt(stiffness / mass)
-    short, expected = af.Motion(np.zeros(2), 0.06), 0.5 * tension**2 / stiffness
+    short, expected = af.Motion(np.zeros(2), 0.03), 0.5 * tension**2 / stiffness
     errors = []
     for dt in (1e-3, 2e-4):
         *_, energies = run(model, short, dt, [0.0, speed, 0.0])
@@ -162,7 +163,7 @@ def test_a_ring_of_teeth_and_bonds_neither_gains_nor_loses(rule, damping):
         radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, contact=contact
     )
     model = af.build(structure, fidelity="rigid", quadrature=rule, cells=(1, 1))
-    motion = af.Motion.synthetic(duration=2.0, pga=8.0, seed=3).cut(0.4, 0.9)
+    motion = af.Motion.synthetic(duration=2.0, pga=8.0, seed=3).cut(0.4, 0.6)
     _, states, _, energies = run(model, motion, 0.005, damping=damping)
     memory = states[-1].memory
     count = len(memory) // 2

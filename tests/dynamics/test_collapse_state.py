@@ -25,12 +25,13 @@ def test_a_ring_that_hardly_moves_stands(ring):
     assert found.residual < 1e-3
 
 
-def test_a_ring_shaken_hard_has_fallen(ring):
+def test_a_ring_shaken_hard_has_fallen():
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=9, chords=1)
     found = shaken(ring, pulse(0.7))
     assert found.kind == "fallen"
     assert found.resting
     assert 0.5 < found.time < 2.0
-    assert "voussoir 9" in found.blocks
+    assert "voussoir 5" in found.blocks
     assert found.residual > 1.0
 
 

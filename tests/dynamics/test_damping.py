@@ -106,7 +106,7 @@ def test_a_block_in_flight_is_not_dragged():
         equation = af.dynamics.Equation(model, af.Motion(np.zeros(2), 0.2), damping)
         q = np.array([0.0, 0.5, 0.0])
         start = equation.at_rest(q, memory=af.dead_load(model).model.memory)
-        *_, last = stepper_for("snes", equation).batches(start, 0.01, 0.2)
+        *_, last = stepper_for("snes", equation).batches(start, 0.04, 0.2)
         ends[name] = last.state(len(last.times) - 1).velocity[1]
     assert ends["free"] == pytest.approx(-9.81 * 0.2, rel=1e-9)
     assert ends["stiffness"] == pytest.approx(ends["free"], rel=1e-9)

@@ -19,7 +19,7 @@ def shaken(fidelity, **options):
     model = af.build(ring, fidelity=fidelity, cells=(2, 1), **options)
     motion = af.Motion.synthetic(duration=0.5, pga=4.0, seed=1)
     record = af.Record(fields_every=10)
-    return model, af.time_history(model, motion, dt=0.01, record=record, method="snes")
+    return model, af.time_history(model, motion, dt=0.01, record=record)
 
 
 @pytest.fixture(scope="module", params=["rigid", "full"])

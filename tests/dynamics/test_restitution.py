@@ -111,7 +111,13 @@ def test_found_damping_gives_the_wanted_restitution(wanted):
     assert integrated(damping.stiffness) == pytest.approx(wanted, abs=1e-3)
 
 
-@pytest.mark.parametrize(("ratio", "known"), TABLE.items())
+@pytest.mark.parametrize(
+    ("ratio", "known"),
+    [
+        pytest.param(*each, marks=() if each[0] in (0.05, 0.5, 3.0) else pytest.mark.slow)
+        for each in TABLE.items()
+    ],
+)
 def test_restitution_falls_with_damping(ratio, known):
     """To 2e-3: rotations are small here and finite there."""
     found = restitution(of_bounce(ratio), BREADTH, HEIGHT, contact=contact(), material=STONE)
@@ -141,7 +147,7 @@ def in_large_motion(damping, impacts=2, dt=1e-3):
     return (turns[impacts][1] / turns[0][1]) ** (0.5 / impacts)
 
 
-@pytest.mark.parametrize("ratio", [0.1, 0.5, 1.5])
+@pytest.mark.parametrize("ratio", [0.1, pytest.param(0.5, marks=pytest.mark.slow), 1.5])
 def test_blocks_that_move_far_lose_as_much(ratio):
     """Damping that is found by small displacements therefore serves large ones.
 

@@ -115,7 +115,7 @@ def overlap_depth(one, two):
     ("build", "peak", "met"),
     [
         (beside_a_wall, 0.3, "'column' met 'wall'"),
-        (two_columns, 0.3, "'slender' met 'stout'"),
+        pytest.param(two_columns, 0.3, "'slender' met 'stout'", marks=pytest.mark.slow),
         (running_bond, 1.2, "met 'stone"),
     ],
 )

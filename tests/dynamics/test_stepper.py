@@ -29,7 +29,7 @@ def test_a_stepper_falls_back(ring, rule, scheme, solver):
     """With one pass allowed, every step that opens or closes a point is left to SNES."""
     slides = scheme == af.dynamics.Conserving()
     model = af.build(ring if slides else glued(ring), fidelity="rigid", quadrature=rule)
-    newton, short = af.statics.Newton(tolerance=1e-13), MOTION.cut(1.2, 1.6)
+    newton, short = af.statics.Newton(tolerance=1e-13), MOTION.cut(1.2, 1.4)
     equation = af.dynamics.Equation(model, short, DAMPING, scheme)
     solves, given = af.dynamics.SnesSolver(equation, newton), {"newton": newton, "dt": 0.005}
     exact = af.time_history(model, short, method=Stepper(equation, exact=solves), **given)
@@ -52,7 +52,7 @@ def test_a_step_that_does_not_settle_is_halved_by_the_solver(ring):
 
     Forces over the whole step are the mean of both.
     """
-    model, short = af.build(ring, fidelity="rigid"), MOTION.cut(1.2, 1.6)
+    model, short = af.build(ring, fidelity="rigid"), MOTION.cut(1.2, 1.4)
     equation = af.dynamics.Equation(model, short, DAMPING, af.dynamics.Conserving())
     solves = af.dynamics.SnesSolver(equation, attempts=_refused)
     halving = Stepper(equation, NewtonSolver.of(equation), exact=solves, advance=_never_the_first())

@@ -72,7 +72,7 @@ def test_the_tangent_is_the_derivative_far_from_rest(fidelity, friction):
 @pytest.mark.parametrize("fidelity", ["rigid", "faces"])
 def test_the_strategy_gives_the_history_of_snes(fidelity):
     """N to 1e-8 of the largest; slips, openings and rotations to 1e-9 m and rad."""
-    built, brief = model(fidelity), SHAKE.cut(0.4, 1.0)
+    built, brief = model(fidelity), SHAKE.cut(0.4, 0.7)
     runs = [
         af.time_history(built, brief, dt=0.005, damping=DAMPED, method=method, newton=TIGHT).joints
         for method in ("newton", "snes")
@@ -96,7 +96,7 @@ def test_an_undamped_run_keeps_its_energy(friction, dt, verified):
 
 
 @pytest.mark.skipif(not RECORDS.is_dir(), reason="records are not shipped")
-@pytest.mark.parametrize("friction", [0.6, None])
+@pytest.mark.parametrize("friction", [0.6, pytest.param(None, marks=pytest.mark.slow)])
 def test_an_undamped_run_keeps_its_energy_through_a_record(friction):
     """To 1e-6 of the largest exchanged, through the 10 s of Erzincan's worst; joints turn far."""
     motion = af.Motion.read(
@@ -169,7 +169,7 @@ def test_the_scale_at_which_it_falls_is_between_a_run_that_stands_and_one_that_f
         PULSE,
         damping=DAMPED,
         dt=(0.01, 0.005),
-        precision=0.3,
+        precision=0.6,
         between=(0.3, 1.0),
     )
     assert 0.3 <= found.lower < found.upper <= 1.0

@@ -179,7 +179,7 @@ def test_work_is_the_change_of_energy_and_a_loss_that_is_never_negative(
 def test_the_derivative_is_that_of_the_force(kind, friction, facets):
     """By central differences, but where the law bends between them: in three of four states."""
     (shapes, fill), rng, errors = kind, np.random.default_rng(3), []
-    for trial in range(40):
+    for trial in range(20):
         joints = two_joints(shapes, friction, facets, rng, fill)
         size = 2 * (3 + shapes)
         before = 0.05 * rng.normal(size=size)

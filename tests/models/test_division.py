@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from repeats import each_once
 from scipy.integrate import quad
 
 import archfem as af
@@ -34,9 +35,14 @@ def cells_on_edges(structure, meshing):
     return middles, np.array([len(division.stations[edge]) - 1 for edge in own])
 
 
-@pytest.mark.parametrize("cells", [(2, 2), (3, 5), (4, 4)])
-@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
-@pytest.mark.parametrize("make", ["ring of 16", "ring in chords", "fill", "fill on chords"])
+@pytest.mark.parametrize(
+    ("make", "cell", "cells"),
+    each_once(
+        ("ring of 16", "ring in chords", "fill", "fill on chords"),
+        ("quadrilateral", "triangle"),
+        ((2, 2), (3, 5), (4, 4)),
+    ),
+)
 def test_mirror_images_are_cut_equally(make, cell, cells):
     lengths = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 16}
     made = {

@@ -1,7 +1,7 @@
 """Meshes: their area, their files, and refused structures."""
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 
 import meshio
 import numpy as np
@@ -200,16 +200,20 @@ def scaled_jacobians(cells):
     return sine.min(axis=1) / best
 
 
-@pytest.mark.parametrize("make", [viaduct, one_arch])
-@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+# with more cells than one, an even and an odd number of each kind
+SOUND = {
+    (viaduct, "quadrilateral", 3),
+    (viaduct, "triangle", 2),
+    (one_arch, "quadrilateral", 2),
+    (one_arch, "triangle", 3),
+}
+
+
 @pytest.mark.parametrize(
-    "count",
+    ("make", "cell", "count"),
     [
-        pytest.param(1, marks=pytest.mark.slow),
-        2,
-        3,
-        pytest.param(4, marks=pytest.mark.slow),
-        pytest.param(6, marks=pytest.mark.slow),
+        pytest.param(*each, marks=() if each in SOUND else pytest.mark.slow)
+        for each in product((viaduct, one_arch), ("quadrilateral", "triangle"), (1, 2, 3, 4, 6))
     ],
 )
 def test_meshes_of_bridges_are_sound(make, cell, count):
@@ -287,14 +291,14 @@ def test_soil_has_the_cells_that_its_stones_impose():
     extrados = [k for k, pair in enumerate(pairs) if soil in pair and pair & stones]
     assert len(extrados) == 20
     counts = []
-    for coarse in (None, 0.3, 0.15):
+    for coarse in (None, 0.3, 0.2):
         made = generate_mesh(structure, af.models.Discretisation(max_cell_size=coarse))
         assert set(np.bincount(made.joints[1])[extrados]) == {4}
         counts.append(np.sum(made.blocks == soil))
     area = structure.blocks[soil].area
     assert counts[0] < counts[1] < counts[2]
     assert counts[1] > 0.8 * area / 0.3**2
-    assert counts[2] > 0.8 * area / 0.15**2
+    assert counts[2] > 0.8 * area / 0.2**2
 
 
 def block(name, *outline, corners=(0, 1, 2, 3), fixed=False):

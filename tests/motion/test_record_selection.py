@@ -245,6 +245,7 @@ def test_rules_have_ranges_of_their_codes():
         SelectionRule("own", 1.2, 1.0, 0.0, 0.1, 0.0, 1.0, 0.0, 1, "none")
 
 
+@pytest.mark.slow
 def test_real_records_of_seven_earthquakes():
     if not RECORDS.is_dir():
         pytest.skip(f"no records in {RECORDS}")
