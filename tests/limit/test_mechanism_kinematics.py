@@ -200,7 +200,7 @@ def test_loops_exclude_only_motions_that_the_programme_excludes(structure):
     """Two formulations: the cone of gaps that close every loop, and the programme in motions."""
     verifier, rng = af.limit.Verifier(structure), np.random.default_rng(1)
     agreed = {True: 0, False: 0}
-    for _ in range(60):
+    for _ in range(48):
         joints = random_state(structure, rng)
         moves = verifier.verify(joints).kind != "none"
         permitted = verifier.loop_check.permits_motion(verifier.freedoms(joints))
@@ -208,7 +208,7 @@ def test_loops_exclude_only_motions_that_the_programme_excludes(structure):
         agreed[moves] += permitted == moves
     assert agreed[True] > 10
     assert agreed[False] > 10
-    assert sum(agreed.values()) >= 59  # hinges almost in a line are left to the programme
+    assert sum(agreed.values()) >= 47  # hinges almost in a line are left to the programme
 
 
 def test_self_stresses_do_no_work_and_joints_in_no_loop_have_none():
