@@ -152,7 +152,10 @@ def test_every_state_is_one_of_three_hinges_and_the_last_one_is_the_last(
     assert len(found.sequence) == 2 + jumps
 
 
-@pytest.mark.parametrize(("thickness", "settlement"), [(0.15, SPREAD), (0.2, SINK)])
+@pytest.mark.parametrize(
+    ("thickness", "settlement"),
+    [(0.15, SPREAD), pytest.param(0.2, SINK, marks=pytest.mark.slow)],
+)
 def test_a_ring_falls_where_no_three_hinges_hold_the_thrust_line(thickness, settlement, verified):
     ring = semicircle(thickness, 8)
     found = rough_movement(thickness, 8, settlement)

@@ -253,6 +253,7 @@ def test_an_error_of_large_displacements_states_the_stiffness_that_is_needed(ver
         af.statics.equilibrium_under(soft, self_weight(soft))
 
 
+@pytest.mark.slow
 def test_the_error_also_states_that_a_ring_carries_a_thousandth_of_its_weight():
     """The first step of the load is larger than the load that it carries."""
     with pytest.raises(af.DidNotConverge, match=r"(39|4[01])0 times as stiff, k_n from [56]\.\de"):

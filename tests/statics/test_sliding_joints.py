@@ -86,7 +86,9 @@ def groove(friction):
     return af.Structure((*sides, wedge), tuple(joints))
 
 
-@pytest.mark.parametrize("control", ["displacement", "arc length", "force"])
+@pytest.mark.parametrize(
+    "control", ["displacement", "arc length", pytest.param("force", marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize(
     "friction",
     [pytest.param(0.0, marks=pytest.mark.slow), 0.2, pytest.param(0.45, marks=pytest.mark.slow)],
