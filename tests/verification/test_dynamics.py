@@ -174,8 +174,8 @@ def test_damping_ratio_is_met_at_its_frequencies(stack, joints):
     low = omega / 2.0 / np.pi
     damping = af.Rayleigh(0.05, (low, 4.0 * low), joints)
     stepper = af.dynamics.SnesSolver(af.dynamics.Equation(model, STILL, damping))
-    dt = 2.0 * np.pi / omega / 80.0
-    steps = list(stepper.steps(start, dt, 80 * dt * 2.2))
+    dt = 2.0 * np.pi / omega / 50.0
+    steps = list(stepper.steps(start, dt, 50 * dt * 2.2))
     found = np.array([shape @ (s.state.q - dead.q) / (shape @ shape) for s in steps])
     peaks = [k for k in range(1, len(found) - 1) if found[k - 1] < found[k] > found[k + 1]]
     decrement = np.log(found[peaks[0]] / found[peaks[1]])
