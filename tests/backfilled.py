@@ -1,6 +1,7 @@
 """Structures with a fill for tests of limit analysis, and the weight of the fill by other means."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from shapely import Polygon, box
@@ -10,6 +11,7 @@ import archfem as af
 SOIL = af.masonry.BACKFILL
 
 
+@cache
 def arch_bridge(cover=0.3, material=SOIL, width=1.0, **ring):
     """A ring of five metres between fixed sidewalls, under a level fill."""
     given = {"span": 5.0, "rise": 1.25, "thickness": 0.4, "voussoirs": 20} | ring

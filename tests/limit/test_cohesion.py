@@ -36,7 +36,10 @@ def block_on_incline(slope, contact, breadth=1.2, height=0.3, width=0.7):
 
 
 @pytest.mark.parametrize("friction", SLIDING)
-@pytest.mark.parametrize("cohesion", [0.0, 0.5 * af.units.kPa, 1.0 * af.units.kPa])
+@pytest.mark.parametrize(
+    "cohesion",
+    [0.0, pytest.param(0.5 * af.units.kPa, marks=pytest.mark.slow), 1.0 * af.units.kPa],
+)
 def test_a_pushed_block_slides_at_its_friction_and_cohesion(friction, cohesion):
     """λ W = μ W + c A, well before it overturns at breadth over height, 4."""
     structure = block_on_incline(0.0, glued(cohesion))

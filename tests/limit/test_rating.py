@@ -1,18 +1,28 @@
 """Rating of bridges: against `collapse_factor`, by hand, and both ways over a symmetric bridge."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from backfilled import arch_bridge
 
 import archfem as af
-from archfem.limit import VEHICLES, Vehicle
+from archfem.limit import VEHICLES, Vehicle, vehicles
+from archfem.limit.vehicles import _places_along as places_along
 
 EXACT = 1e-6
 """Relative: the programme is solved to 1e-9 block weights, corners count as one within 1e-6."""
 
 GRAVEL = af.limit.Fill(friction_angle=35.0)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_places():
+    """Places are a fortieth of the bridge apart, not a hundredth, which takes longer."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(vehicles, "_places_along", partial(vehicles._places_along, steps=40))
+        yield
 
 
 def scaled(joint, share):
@@ -24,10 +34,10 @@ def scaled(joint, share):
 
 
 @pytest.fixture(scope="module")
-def lorry_rating():
+def lorry_rating(few_places):
     """The rating of a lorry with unequal axles, on a bridge three metres wide."""
     lorry = Vehicle("lorry", (60e3, 115e3), (3.2,), live=1.35)
-    bridge = arch_bridge(width=3.0, voussoirs=8)
+    bridge = arch_bridge(width=3.0, voussoirs=5)
     return af.rate(bridge, lorry, width=2.0, dead=1.1, fill=GRAVEL)
 
 
@@ -46,7 +56,7 @@ def test_the_factor_is_that_of_point_loads_at_the_worst_place(lorry_rating):
         replace(material, unit_weight=1.1 * material.unit_weight)
         for material in (af.masonry.BACKFILL, af.STONE)
     )
-    bridge = arch_bridge(width=3.0, voussoirs=8)
+    bridge = arch_bridge(width=3.0, voussoirs=5)
     assert {block.material for block in bridge.blocks} == {af.masonry.BACKFILL, af.STONE}
     blocks = [
         replace(block, material=soil if block.material == af.masonry.BACKFILL else stone)
@@ -101,6 +111,11 @@ def test_an_axle_on_an_overhang_by_hand():
         resultant = (weight * (2.0 * 0.5 + 1.0 * 1.5) / 3.0 + axle * place) / (weight + axle)
         assert other.geometric == pytest.approx(0.5 / (resultant - 0.5), rel=2e-4)  # of the halving
         assert other.passes == (other.geometric >= 1.0) == stands
+
+
+def test_places_are_a_hundredth_of_the_bridge_apart():
+    places = places_along(column_under_axle(), np.array([[1.0, 0.0]]))
+    np.testing.assert_allclose(places, np.linspace(0.0, 2.0, 101), atol=1e-12)
 
 
 @pytest.mark.slow
@@ -176,7 +191,7 @@ def test_a_vehicle_without_factors_passes_in_so_many_words(vehicle, given, says)
 
 
 def test_a_bridge_that_is_too_weak_would_carry_with_deeper_joints():
-    ring = af.circular_arch(radius=2.95, thickness=0.45, embrace=140.0, voussoirs=9)
+    ring = af.circular_arch(radius=2.95, thickness=0.45, embrace=140.0, voussoirs=5)
     slides = af.rate(ring, "lm1")
     assert not slides.passes
     assert np.isnan(slides.geometric)

@@ -1,6 +1,7 @@
 """Movement of a support at which its structure falls, in the moved geometry."""
 
 from dataclasses import replace
+from functools import cache
 from itertools import combinations, product
 
 import numpy as np
@@ -25,6 +26,12 @@ def rough(friction):
 def semicircle(thickness, voussoirs, **given):
     shape = {"radius": 1.0, "embrace": 180.0}
     return af.circular_arch(**shape, thickness=thickness, voussoirs=voussoirs, **given)
+
+
+@cache
+def rough_movement(thickness, voussoirs, settlement):
+    """The largest movement of a semicircle that never slides, which several tests look at."""
+    return largest_movement(semicircle(thickness, voussoirs), settlement, friction=None)
 
 
 def cross(a, b):
@@ -128,14 +135,14 @@ def hinges_of(stage):
         (0.15, 8, SPREAD, 0),
         pytest.param(0.12, 60, SPREAD, 1, marks=pytest.mark.slow),
         pytest.param(0.2, 8, SINK, 0, marks=pytest.mark.slow),
-        (0.15, 30, SINK, 1),
+        (0.15, 13, SINK, 1),
     ],
 )
 def test_every_state_is_one_of_three_hinges_and_the_last_one_is_the_last(
     thickness, voussoirs, settlement, jumps
 ):
     ring = semicircle(thickness, voussoirs)
-    found = largest_movement(ring, settlement, friction=None)
+    found = rough_movement(thickness, voussoirs, settlement)
     assert found.end is End.FALLS
     hinged, shift = ThreeHinges(ring), np.array(settlement.motion[:2])
     for stage in found.stages[1:]:
@@ -145,10 +152,13 @@ def test_every_state_is_one_of_three_hinges_and_the_last_one_is_the_last(
     assert len(found.sequence) == 2 + jumps
 
 
-@pytest.mark.parametrize(("thickness", "settlement"), [(0.15, SPREAD), (0.2, SINK)])
+@pytest.mark.parametrize(
+    ("thickness", "settlement"),
+    [(0.15, SPREAD), pytest.param(0.2, SINK, marks=pytest.mark.slow)],
+)
 def test_a_ring_falls_where_no_three_hinges_hold_the_thrust_line(thickness, settlement, verified):
     ring = semicircle(thickness, 8)
-    found = largest_movement(ring, settlement, friction=None)
+    found = rough_movement(thickness, 8, settlement)
     hinged, shift = ThreeHinges(ring), np.array(settlement.motion[:2])
     assert hinged.stands((found.largest - TOLERANCE) * shift)
     assert not hinged.stands((found.largest + 3.0 * TOLERANCE) * shift)
@@ -171,7 +181,7 @@ def test_a_ring_leaps_where_only_far_hinges_would_hold():
 
 
 def test_the_work_of_the_thrust_is_that_of_the_weights():
-    ring = semicircle(0.2, 12)
+    ring = semicircle(0.2, 8)
     found = largest_movement(ring, SPREAD, friction=None)
     shares, works = np.array([(stage.share, stage.work) for stage in found.stages]).T
     works[0] = 2.0 * works[1] - works[2]  # at rest the thrust is any of many
@@ -224,16 +234,17 @@ def test_the_last_step_ends_at_the_given_movement(monkeypatch):
     assert [each.share for each in found.stages] == pytest.approx([0.0, 0.3, 0.6, 0.9, 1.0])
 
 
-def test_the_first_thrust_is_that_of_the_small_movement():
+def test_the_first_thrust_is_that_of_the_small_movement(monkeypatch):
+    monkeypatch.setattr(support_movement, "MAX_MOVEMENT_STEP", 0.5)  # its first step is enough
     ring = semicircle(0.15, 30)
     small = af.collapse_factor(ring, live=SPREAD, friction=None)
-    found = largest_movement(ring, af.Settlement("left abutment", (-1e-3, 0.0, 0.0)), friction=None)
-    assert 1e3 * found.stages[1].work == pytest.approx(small.factor, rel=1e-3)
+    found = largest_movement(ring, af.Settlement("left abutment", (-2e-5, 0.0, 0.0)), friction=None)
+    assert 5e4 * found.stages[1].work == pytest.approx(small.factor, rel=1e-3)
     assert found.stages[1].hinges == small.hinges
 
 
 def test_the_words_name_the_joints():
-    found = largest_movement(semicircle(0.15, 8), SPREAD, friction=None)
+    found = rough_movement(0.15, 8, SPREAD)
     assert "moves by -0.2269 m" in str(found)
     assert "joint 1 at the intrados; joint 4 at the extrados" in str(found)
     assert found.stages[-1].names == ("joint 1", "joint 4", "joint 7")
@@ -270,16 +281,17 @@ def test_invalid_input_is_refused(call, message):
 
 def test_steps_are_a_hundredth_of_the_movement():
     """Where each of them is held."""
-    block = af.column(breadth=1.0, heights=[0.5])
-    found = largest_movement(block, af.Settlement("base", (0.0, 0.0, 1e-3)), friction=None)
-    assert found.end is End.HOLDS
-    assert [each.share for each in found.stages] == pytest.approx(np.linspace(0.0, 1.0, 101))
+    found = rough_movement(0.15, 8, SPREAD)
+    held = int(found.largest / 0.01) + 1
+    shares = [each.share for each in found.stages[:held]]
+    assert held > 20
+    assert shares == pytest.approx(0.01 * np.arange(held))
 
 
 @pytest.mark.parametrize("settlement", [SPREAD, SINK])
 def test_blocks_neither_overlap_nor_slide_at_the_end_of_a_movement(settlement):
     """To rounding, by the places of their corners, after large steps of the support."""
-    ring = semicircle(0.15, 11, contact=rough(np.inf))
+    ring = semicircle(0.15, 7, contact=rough(np.inf))
     found = largest_movement(ring, settlement)
     moved = DisplacedBlocks(ring, found.displacement)
     intrados, extrados, slip = moved.current_gaps
@@ -294,6 +306,6 @@ def test_blocks_neither_overlap_nor_slide_at_the_end_of_a_movement(settlement):
 )
 def test_a_cube_on_ground_that_tilts_slides_or_falls(friction, end, slope):
     cube = af.column(breadth=1.0, heights=[1.0], contact=rough(friction))
-    found = largest_movement(cube, af.Settlement(0, (0.0, 0.0, 1.0)), tolerance=5e-3)
+    found = largest_movement(cube, af.Settlement(0, (0.0, 0.0, 4.0)), tolerance=1e-3)
     assert found.end is end
-    assert found.largest == pytest.approx(np.arctan(slope), abs=5e-3)
+    assert 4.0 * found.largest == pytest.approx(np.arctan(slope), abs=5e-3)

@@ -9,7 +9,7 @@ from archfem.limit import minimum_thickness
 
 
 def ring(**changes):
-    given = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 17}
+    given = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 7}
     return af.circular_arch(**(given | changes))
 
 

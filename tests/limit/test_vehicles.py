@@ -1,10 +1,12 @@
 """A vehicle over a bridge: each place against the collapse of its axles there."""
 
+from functools import cache
 from types import SimpleNamespace
 
+import backfilled
 import numpy as np
 import pytest
-from backfilled import SOIL, arch_bridge, fill_of
+from backfilled import SOIL, fill_of
 
 import archfem as af
 from archfem.limit.linear_programme import Programme
@@ -20,8 +22,14 @@ FEW = np.linspace(-1.0, 10.0, 23)
 
 def ring(**given):
     return af.circular_arch(
-        **{"radius": 2.95, "thickness": 0.45, "embrace": 140.0, "voussoirs": 17} | given
+        **{"radius": 2.95, "thickness": 0.45, "embrace": 140.0, "voussoirs": 11} | given
     )
+
+
+@cache
+def arch_bridge(**given):
+    """A bridge of seven stones, which many tests look at."""
+    return backfilled.arch_bridge(**{"voussoirs": 7} | given)
 
 
 def over(structure, axles, spacings=(), **given):
@@ -88,7 +96,9 @@ def test_the_worst_place_is_that_of_the_least_factor():
     found = over(structure, *LORRY, fill=GRAVEL)
     least = float(found.factors["factor"].min())
     here = found.factors["factor"].sel(direction=found.direction, position=found.position)
-    assert float(here) == least == pytest.approx(found.worst.factor, rel=EXACT)
+    # of places that differ by rounding, as on this symmetric bridge, the first is the worst
+    assert float(here) == pytest.approx(least, rel=EXACT)
+    assert least == pytest.approx(found.worst.factor, rel=EXACT)
     assert found.worst.outcome is af.limit.Outcome.COLLAPSES
     assert found.factors.sizes == {"direction": 2, "position": 101}
     assert f"driving {found.direction}" in str(found)
@@ -134,7 +144,7 @@ def test_twice_the_weight_has_half_the_factor():
 def test_an_influence_line_of_four_hinges():
     """By the kinematic theorem no place has a factor above what the worst mechanism gives there."""
     structure = ring()
-    found = over(structure, 1e4, friction=None)
+    found = over(structure, 1e4, positions=np.linspace(-2.9, 2.9, 71), friction=None)
     worst = found.worst
     work = worst.factor * descent(structure, worst.motion, found.position)
     bounded = 0
@@ -160,7 +170,10 @@ def test_more_cover_spreads_axles_and_carries_more():
     """A weightless fill without strength has only the spreading."""
     soil = af.Material(SOIL.young, SOIL.poisson, 1e-3, None, "light")
     fill = af.limit.Fill(friction_angle=0.0, mobilisation=0.0, active=0.0, spread=40.0)
-    worst = [over(arch_bridge(c, soil), 1e5, fill=fill).worst.factor for c in (0.05, 0.4, 0.9)]
+    worst = [
+        over(arch_bridge(cover=c, material=soil), 1e5, fill=fill).worst.factor
+        for c in (0.05, 0.4, 0.9)
+    ]
     assert (np.diff(worst) > 0.0).all()
 
 

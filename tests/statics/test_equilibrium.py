@@ -14,9 +14,9 @@ from archfem.statics.newton import Solution
 
 
 def semicircle(share, fidelity):
-    """A ring of 17 chorded stones, `share` times as thick as its polygon must be to stand."""
-    given = {"radius": 1.0, "embrace": 180.0, "voussoirs": 17, "chords": 1}
-    return af.build(af.circular_arch(thickness=share * 0.10546, **given), fidelity=fidelity)
+    """A ring of 7 chorded stones, `share` times as thick as its polygon must be to stand."""
+    given = {"radius": 1.0, "embrace": 180.0, "voussoirs": 7, "chords": 1}
+    return af.build(af.circular_arch(thickness=share * 0.0957, **given), fidelity=fidelity)
 
 
 @pytest.mark.parametrize("fidelity", ["rigid", "full"])
@@ -248,10 +248,12 @@ def test_an_error_of_large_displacements_states_the_stiffness_that_is_needed(ver
     assert least < reported < 1.12 * least
     assert dead_load(thin_ring(reported)).steps >= 1
     assert dead_load(thin_ring(1.01 * least)).steps >= 1
+    soft = thin_ring(0.97 * least)
     with pytest.raises(af.DidNotConverge):
-        dead_load(thin_ring(0.97 * least))
+        af.statics.equilibrium_under(soft, self_weight(soft))
 
 
+@pytest.mark.slow
 def test_the_error_also_states_that_a_ring_carries_a_thousandth_of_its_weight():
     """The first step of the load is larger than the load that it carries."""
     with pytest.raises(af.DidNotConverge, match=r"(39|4[01])0 times as stiff, k_n from [56]\.\de"):

@@ -109,7 +109,14 @@ def test_effective_masses_add_up_to_all_that_moves(fidelity, verified):
     verified(case, of_blocks(shape), "mass that can move", total[0])
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "faces", "condensed", "full"])
+@pytest.mark.parametrize(
+    "fidelity",
+    [
+        "rigid",
+        *(pytest.param(each, marks=pytest.mark.slow) for each in ("faces", "condensed")),
+        "full",
+    ],
+)
 def test_as_dense_lapack_about_dead_load(ring, fidelity, verified):
     model = af.build(ring, fidelity=fidelity, cells=(2, 2))
     dead = af.dead_load(model)

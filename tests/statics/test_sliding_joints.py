@@ -86,7 +86,9 @@ def groove(friction):
     return af.Structure((*sides, wedge), tuple(joints))
 
 
-@pytest.mark.parametrize("control", ["displacement", "arc length", "force"])
+@pytest.mark.parametrize(
+    "control", ["displacement", "arc length", pytest.param("force", marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize(
     "friction",
     [pytest.param(0.0, marks=pytest.mark.slow), 0.2, pytest.param(0.45, marks=pytest.mark.slow)],
@@ -145,7 +147,7 @@ def test_a_loop_under_varying_thrust_is_that_of_one_spring():
     friction, k_n, k_s = 0.4, 1e9, 4e8
     structure = af.column(breadth=1.0, heights=[1.0], contact=af.Contact(k_n, k_s, friction))
     model = af.build(structure, fidelity="rigid", quadrature="lobatto")
-    phase = np.linspace(0.0, 6.0 * np.pi, 1201)
+    phase = np.linspace(0.0, 4.0 * np.pi, 801)
     slips, thrusts = 1e-4 * np.sin(phase), 20e3 * (1.0 + 0.6 * np.sin(2.0 * phase + 0.5))
     slid, shears, work = 0.0, [], []
     for slip, thrust in zip(slips, thrusts, strict=True):
@@ -161,10 +163,10 @@ def test_a_loop_under_varying_thrust_is_that_of_one_spring():
         assert np.abs(model.memory) == pytest.approx(abs(slid), abs=1e-9 * 1e-4)
         shears.append(shear)
         work.append(friction * thrust * abs(slid - before))
-    last = slice(800, None)  # the third loop, which closes
+    last = slice(400, None)  # the second loop, which closes
     mean = 0.5 * (np.array(shears[last])[1:] + np.array(shears[last])[:-1])
     area = mean @ np.diff(slips[last])
-    assert area == pytest.approx(sum(work[801:]), rel=5e-3)
+    assert area == pytest.approx(sum(work[401:]), rel=5e-3)
 
 
 # ---- an arch that slides at its springings
@@ -211,7 +213,9 @@ def thrust_at_springing(thickness):
     return 1.0 - centre / (1.0 + thickness / 2.0)
 
 
-@pytest.mark.parametrize("thickness", [0.13, 0.16, 0.2])
+@pytest.mark.parametrize(
+    "thickness", [*(pytest.param(each, marks=pytest.mark.slow) for each in (0.13, 0.16)), 0.2]
+)
 def test_an_arch_slides_at_its_springings(thickness):
     """H is at most μ W at the foot, and at least what the line of thrust needs within the ring.
 
@@ -300,7 +304,7 @@ def unbalanced(structure, load, pushed):
     return max(rest)
 
 
-QUICK = [(ring, seed) for seed in (0, 2, 4, 7, 9, 13)] + [
+QUICK = [(ring, seed) for seed in (0, 2, 4, 9, 13)] + [
     (wall, seed) for seed in (2, 3, 6, 9, 12, 15)
 ]
 OTHERS = [(make, seed) for make in (ring, wall) for seed in range(16) if (make, seed) not in QUICK]

@@ -62,7 +62,7 @@ def least():
     ("voussoirs", "ratio"),
     [
         (7, 0.0962),
-        (11, 0.1049),
+        pytest.param(11, 0.1049, marks=pytest.mark.slow),
         (17, 0.1056),
         pytest.param(27, 0.1068, marks=pytest.mark.slow),
         pytest.param(50, 0.1075, marks=pytest.mark.slow),
@@ -147,7 +147,9 @@ def test_embrace_of_120_degrees(verified):
     )
 
 
-@pytest.mark.parametrize(("voussoirs", "ratio"), [(7, 0.0957), (17, 0.10546)])
+@pytest.mark.parametrize(
+    ("voussoirs", "ratio"), [(7, 0.0957), pytest.param(17, 0.10546, marks=pytest.mark.slow)]
+)
 def test_stones_cut_along_chords_need_less(voussoirs, ratio):
     """Chords take weight from the flanks of long stones: 0.6 % less at 7 stones, 0.1 % at 17."""
     found = af.minimum_thickness(

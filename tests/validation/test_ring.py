@@ -43,8 +43,10 @@ def lawful(ring, request):
 
 
 @pytest.mark.parametrize("rule", ["lobatto", "nodal", "gauss"])
-def test_converges_under_refinement(lawful, rule):
-    ring, converged = lawful
+@pytest.mark.parametrize("law", ["sliding", pytest.param("glued", marks=pytest.mark.slow)])
+def test_converges_under_refinement(ring, law, rule):
+    """Of glued joints the values of each rule are pinned by `test_crown_eccentricity`."""
+    ring, converged = {"sliding": ring, "glued": glued(ring)}[law], CONVERGED[law]
     errors = []
     for cells in (4, 16):
         found = af.dead_load(af.build(ring, cells=(cells, cells), quadrature=rule)).joints

@@ -21,7 +21,7 @@ from archfem.dynamics.solvers.supernodal_lu import (
 
 TIGHT = af.statics.Newton(tolerance=1e-13)
 STRONG = af.Motion.synthetic(duration=4.0, pga=5.0, seed=5).cut(1.0, 1.6)
-BRIEF = STRONG.cut(0.0, 0.3)
+BRIEF = STRONG.cut(0.0, 0.25)
 NEWMARK, CONSERVING = af.dynamics.Newmark(), af.dynamics.Conserving()
 
 
@@ -46,7 +46,7 @@ def filled():
         ("closed", CONSERVING),
         ("closed", NEWMARK),
         ("initial", af.HHT(-0.1)),
-        ("none", CONSERVING),
+        pytest.param("none", CONSERVING, marks=pytest.mark.slow),
         pytest.param("none", af.HHT(-0.2), marks=pytest.mark.slow),
     ],
 )
@@ -151,15 +151,15 @@ def with_crumbs(rng):
     matrix = np.zeros((size, size))
     matrix[sides[0], sides[1]] = rng.uniform(size=2 * size)
     matrix += matrix.T + 10.0 * size * np.eye(size)
-    crumbs = rng.integers(size, size=(2, 6))
+    crumbs = rng.integers(size, size=(2, 24))
     matrix[tuple(crumbs)] += np.where(matrix[tuple(crumbs)] == 0.0, 1e-16, 0.0)
     return matrix
 
 
 def test_factor_bears_entries_that_rounding_has_left_on_one_side():
-    """Three such entries of 300 matrices used to lie outside the plan of the factor."""
+    """Three of 1800 such entries, six in each of 300 matrices, used to lie outside the plan."""
     rng = np.random.default_rng(1)
-    for _ in range(300):
+    for _ in range(75):
         matrix = with_crumbs(rng)
         plan = Elimination.of(sparse.csr_matrix(matrix))
         ordered = sparse.csr_matrix(matrix)[plan.order][:, plan.order]
@@ -209,7 +209,7 @@ def shuffled_structure(rng):
 
 
 @pytest.mark.parametrize(
-    ("first", "count"), [(0, 40), pytest.param(40, 2000, marks=pytest.mark.slow)]
+    ("first", "count"), [(0, 16), pytest.param(16, 2024, marks=pytest.mark.slow)]
 )
 def test_each_solve_of_a_random_structure_is_that_of_superlu(first, count):
     """Another order and another factor agree to 1e-8, with 1e12 between stiff and soft at most."""

@@ -1,6 +1,7 @@
 """Supports that move: joints follow, at every fidelity, toward limit states of rigid blocks."""
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -42,6 +43,13 @@ def at_rest(fidelity, rule):
     return af.dead_load(af.build(RING, fidelity=fidelity, cells=(2, 2), quadrature=rule))
 
 
+QUICK = [
+    *(("rigid", "exact"), ("faces", "nodal"), ("condensed", "gauss")),
+    *(("full", "lobatto"), ("monolithic", "lobatto")),
+]
+"""Each fidelity and each rule, once."""
+
+
 @pytest.mark.parametrize(
     "motion",
     [
@@ -52,12 +60,13 @@ def at_rest(fidelity, rule):
 )
 @pytest.mark.parametrize(
     ("fidelity", "rule"),
-    [(fidelity, "exact") for fidelity in ("rigid", "faces", "condensed", "full")]
-    + [(fidelity, "lobatto") for fidelity in FIDELITIES]
-    + [
-        (fidelity, rule)
-        for fidelity in ("rigid", "faces", "condensed")
-        for rule in ("nodal", "gauss")
+    [
+        pytest.param(*each, marks=() if each in QUICK else pytest.mark.slow)
+        for each in [
+            *product(("rigid", "faces", "condensed", "full"), ("exact", "lobatto")),
+            ("monolithic", "lobatto"),
+            *product(("rigid", "faces", "condensed"), ("nodal", "gauss")),
+        ]
     ],
 )
 def test_supports_that_move_together_change_nothing(fidelity, rule, motion):
@@ -84,7 +93,9 @@ def test_support_forces_are_the_derivative_of_the_force(fidelity):
     np.testing.assert_allclose((ahead - back) / 2e-9, pulled, atol=1e-6 * np.abs(pulled).max())
 
 
-@pytest.mark.parametrize("settlement", [(-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])
+@pytest.mark.parametrize(
+    "settlement", [(-1.0, 0.0, 0.0), pytest.param((0.0, -1.0, 0.0), marks=pytest.mark.slow)]
+)
 def test_a_support_that_moves_far_at_once_leads_where_small_steps_lead(settlement):
     """Joints slide to and fro on the way, by 0.1 to 0.3 mm; 5 cm at once give the same."""
     model = af.build(RING, fidelity="rigid")
@@ -100,7 +111,14 @@ def test_a_support_that_moves_far_at_once_leads_where_small_steps_lead(settlemen
     np.testing.assert_allclose(once.joints["slip"], last["slip"], atol=1e-10)
 
 
-@pytest.mark.parametrize("rule", ["lobatto", "nodal", "gauss", "exact"])
+@pytest.mark.parametrize(
+    "rule",
+    [
+        "lobatto",
+        *(pytest.param(each, marks=pytest.mark.slow) for each in ("nodal", "gauss")),
+        "exact",
+    ],
+)
 def test_condensation_and_modes_follow_as_all_nodes_do(rule):
     spread = af.Settlement("left abutment", (-2e-4, -1e-4, 1e-5))
     built = {
