@@ -73,7 +73,7 @@ def test_a_file_of_an_earlier_version_has_no_seal(written, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_damaged_history_is_run_again(small, undrawn, capsys):
+def test_a_damaged_history_is_run_again(small, unplotted, capsys):
     """The one of two finished pairs whose file has another byte is run again."""
     out = small.parent / "out"
     command = ["run", str(small), "--out", str(out)]

@@ -352,7 +352,7 @@ def test_a_case_gives_its_damping_and_its_step(tmp_path, calls):
     assert calls[-1][2] == 0.005  # without one
 
 
-def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, undrawn, calls):
+def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, unplotted, calls):
     path, out = tmp_path / "column.toml", tmp_path / "out"
     path.write_text(CASE)
     assert af.commands.main(["verdict", str(path), "--out", str(out), "--samples", "2"]) == 0
