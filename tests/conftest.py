@@ -100,6 +100,12 @@ def unplotted(undrawn, monkeypatch):
 
 
 @pytest.fixture
+def undoubted(monkeypatch):
+    """Runs of cases are not compared with finer ones: a third of the time of a short run."""
+    monkeypatch.setattr("archfem.cases.run.doubt_fidelity", lambda *_: [])
+
+
+@pytest.fixture
 def small(tmp_path):
     """File of a case: a column under two pairs of one second."""
     path = tmp_path / "small.toml"

@@ -39,8 +39,8 @@ def one_of_each():
         af.modes(model, 2),
         motion,
         af.kinematic_assessment(stones, af.Eurocode8(ag=0.2, ground="B")),
-        af.moving_load(stones, 1e3),
-        af.rate(stones, "LM1"),
+        af.moving_load(stones, 1e3, positions=[0.0]),
+        af.rate(stones, af.limit.Vehicle("lorry", (5e3,), ())),
         af.verdict_range(stones, motion, samples=2, vary={"joint_rule": "exact"}),
         af.studies.Ida(
             xr.Dataset(

@@ -117,7 +117,7 @@ def test_folders_that_hold_no_results_are_refused(kept, tmp_path):
         af.cases.open_results(tmp_path)
 
 
-def test_a_run_in_memory_has_a_report_and_a_player(small, unplotted, tmp_path):
+def test_a_run_in_memory_has_a_report_and_a_player(small, unplotted, undoubted, tmp_path):
     case = af.Case.read(small, ["analysis.damping={ratio=0.05, frequency=5.0}"])
     *_, run = af.cases.run_case(case, pairs=["first"])
     words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
@@ -200,7 +200,7 @@ def test_results_are_read_though_a_file_was_deleted(kept):
 
 
 @pytest.mark.parametrize("name", ["rubble", "own"])
-def test_results_need_no_drawing_beside_them(name, unplotted, tmp_path, capsys):
+def test_results_need_no_drawing_beside_them(name, unplotted, undoubted, tmp_path, capsys):
     """A pier of a drawing is run, and reported and filmed from a folder that was moved alone."""
     drawing, place = tmp_path / "drawn" / "pier.geojson", tmp_path / "elsewhere"
     drawing.parent.mkdir()

@@ -130,7 +130,8 @@ def test_one_command_runs_all_and_again_keeps_finished_runs(small, undrawn, requ
     assert re.search(r"^second +no mechanism +none .* none +reached 1\.00 s$", table, re.MULTILINE)
     assert "finished before" not in capsys.readouterr().out
 
-    request.getfixturevalue("unplotted")  # the first command has drawn
+    for name in ("unplotted", "undoubted"):  # the first command has drawn and compared
+        request.getfixturevalue(name)
     before = (out / "second" / "history.nc").stat().st_mtime_ns
     (out / "first" / "history.nc").unlink()
     assert run(small) == 0
@@ -174,7 +175,7 @@ def test_an_interrupted_suite_continues_with_the_motions_left(small, undrawn, ca
     assert "second: finished before" not in said
 
 
-def test_a_pair_that_fails_does_not_end_the_suite(small, unplotted, capsys):
+def test_a_pair_that_fails_does_not_end_the_suite(small, unplotted, undoubted, capsys):
     def failing(case, motion, *given):
         history = af.cases.run_time_history(case, motion, *given)
         if motion.name == "first":
@@ -195,7 +196,7 @@ def test_a_pair_that_fails_does_not_end_the_suite(small, unplotted, capsys):
     assert af.History.read(path).ending is af.dynamics.Ending.FAILED
 
 
-def test_a_motion_that_fails_is_kept_and_ends_the_command(small, unplotted, capsys):
+def test_a_motion_that_fails_is_kept_and_ends_the_command(small, unplotted, undoubted, capsys):
     small.write_text(small.read_text().split("[suite]")[0] + "[motion]\nsynthetic = { seed = 1 }")
 
     def failing(case, motion, *given):

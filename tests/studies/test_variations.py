@@ -307,7 +307,7 @@ def test_a_run_without_an_equilibrium_has_no_answer(column, motion):
     """Blocks that slide off each other under their own weight."""
     sloped = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5)
     vary = HELD | {"friction": (-0.55, 0.0)}
-    found = af.verdict_range(sloped, motion.scaled(0.1), samples=1, seed=0, vary=vary)
+    found = af.verdict_range(sloped, motion.cut(0.0, 0.2).scaled(0.1), samples=1, seed=0, vary=vary)
     slippery = found.dataset["friction"].values < -0.5
     assert "own weight" in found.dataset["error"].values[slippery][0]
     assert found.dataset["outcome"].values[slippery][0] == "unknown"
