@@ -187,7 +187,7 @@ def test_a_byte_order_mark_is_ignored(tmp_path):
 
 
 def test_a_chain_of_bases_is_refused_where_it_is_long(tmp_path):
-    for k in range(3000):
+    for k in range(40):
         (tmp_path / f"{k}.toml").write_text(f'base = "{k + 1}.toml"')
     with pytest.raises(af.InvalidInput, match="is the base of 20 files"):
         af.Case.read(tmp_path / "0.toml")

@@ -11,7 +11,7 @@ from archfem.view import draw_stress
 @pytest.fixture(scope="module")
 def backfilled():
     """A bridge of one arch below soil."""
-    arch = af.shapes.Arch(span=6.0, rise=1.5, thickness=0.4, voussoirs=9)
+    arch = af.shapes.Arch(span=6.0, rise=1.5, thickness=0.4, voussoirs=5)
     return af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.3), width=3.0)
 
 
