@@ -37,7 +37,7 @@ def run(ring):
 @pytest.fixture(scope="session")
 def runs():
     """A thick and a thin ring under one motion."""
-    motion = af.Motion.synthetic(duration=1.0, pga=3.0, seed=1)
+    motion = af.Motion.synthetic(duration=2.0, pga=3.0, seed=1)
     rings = {
         name: af.circular_arch(radius=2.95, thickness=t, embrace=159.0, voussoirs=9)
         for name, t in {"thick": 0.6, "thin": 0.5}.items()
