@@ -104,15 +104,17 @@ def permitted(monkeypatch, tmp_path):
     return tmp_path
 
 
-def test_no_case_runs_code_by_itself(permitted, monkeypatch, capsys):
+def test_no_case_runs_code_by_itself(permitted, monkeypatch):
     monkeypatch.chdir(permitted)
     (permitted / "case.toml").write_text(CASE.replace("mine.py", "module_that_leaves_a_file.py"))
     (permitted / "record.txt").write_text("OUR STATION\n")
     (permitted / "module_that_leaves_a_file.py").write_text("open('it ran', 'w').close()")
     with pytest.raises(af.InvalidInput, match="is code, which no file runs by itself"):
         af.Case.read(permitted / "case.toml")
-    assert af.commands.main(["check", "case.toml"]) == 1
-    assert "--own-code" in capsys.readouterr().err
+    # the only default test of `python -m archfem`, and so a process
+    refused = call(permitted, "-m", "archfem", "check", "case.toml")
+    assert refused.returncode == 1
+    assert "--own-code" in refused.stderr
     assert not (permitted / "it ran").exists()
     af.commands.main(["check", "case.toml", "--own-code"])
     assert (permitted / "it ran").exists()
