@@ -1,6 +1,7 @@
 """Structures and models that many tests use."""
 
 import gc
+import importlib
 import os
 from pathlib import Path
 
@@ -80,6 +81,41 @@ def undrawn(monkeypatch):
             Path(target).touch()
 
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", unprinted)
+
+
+@pytest.fixture
+def low_resolution(monkeypatch):
+    """Figures are printed with a quarter of the dots per inch, which shortens a command by half."""
+    from matplotlib.figure import Figure
+
+    print_figure = Figure.savefig
+    monkeypatch.setattr(
+        Figure,
+        "savefig",
+        lambda figure, target, **given: print_figure(figure, target, **{**given, "dpi": 75}),
+    )
+
+
+@pytest.fixture
+def unplotted(undrawn, monkeypatch):
+    """Commands and reports get empty figures: for tests of texts and files, in a third of the time.
+
+    Tests that take `undrawn` alone, and those of `view`, make the figures.
+    """
+    from matplotlib.figure import Figure
+
+    for room in ("cases.result_folder", "cases.report.sections", "commands.run"):
+        module = importlib.import_module(f"archfem.{room}")
+        for name in [name for name in vars(module) if name.startswith("draw_")]:
+            made = [Figure()] if name == "draw_envelopes" else Figure()
+            monkeypatch.setattr(module, name, lambda *_, made=made, **__: made)
+    monkeypatch.setattr("archfem._display.ResultDisplay.plot", lambda *_, **__: Figure())
+
+
+@pytest.fixture
+def undoubted(monkeypatch):
+    """Runs of cases are not compared with finer ones: a third of the time of a short run."""
+    monkeypatch.setattr("archfem.cases.run.doubt_fidelity", lambda *_: [])
 
 
 @pytest.fixture

@@ -197,6 +197,12 @@ def test_imports_by_string_go_to_the_left(name):
             assert may_import(here, found.split(".")[1].rstrip("*")), f"{name} imports {found}"
 
 
+@cache
+def class_names():
+    """Names of the classes of all modules."""
+    return [node.name for path in MODULES for node in nodes(path) if isinstance(node, ast.ClassDef)]
+
+
 @pytest.mark.parametrize("method", _display.LATE_BOUND_METHODS)
 def test_late_bound_methods_resolve(method):
     """The class has the method, and the function takes an instance of the class first."""
@@ -207,10 +213,7 @@ def test_late_bound_methods_resolve(method):
     kinds = [first.annotation, *get_args(first.annotation)]
     bases = {base.__name__ for kind in kinds for base in getattr(kind, "__mro__", ())}
     assert owner in bases
-    classes = [
-        node.name for path in MODULES for node in nodes(path) if isinstance(node, ast.ClassDef)
-    ]
-    assert classes.count(owner) == 1
+    assert class_names().count(owner) == 1
     assert all(hasattr(kind, name) for kind in kinds if getattr(kind, "__name__", "") == owner)
 
 

@@ -27,15 +27,20 @@ LONG = (
     "bridge_history",
     "bridge_range",
     "drift_and_equality",
+    "energy_drift",
+    "fidelity_errors",
     "floor",
+    "matched_records",
     "opensees_ring",
+    "predicted_error",
     "random_structures",
     "run",
+    "solvers",
     "study_efficiency",
     "study_kills",
 )
-"""Scripts that take a second or more: one runs five others of these, one compiles a loop of its
-own, two start studies of processes, two match motions, and one needs OpenSees."""
+"""Scripts that take half a second or more: one runs five others of these, one compiles a loop of
+its own, two start studies of processes, three match motions, and one needs OpenSees."""
 
 
 MARKED = [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in NAMES]

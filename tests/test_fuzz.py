@@ -5,7 +5,7 @@ import importlib
 import pytest
 from fuzz.trial import BAD
 
-COUNTS = {"case_files": 25, "records": 100, "drawings": 60, "calls": 150, "shakes": 2}
+COUNTS = {"case_files": 25, "records": 100, "drawings": 40, "calls": 100, "shakes": 1}
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")

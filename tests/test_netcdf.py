@@ -101,7 +101,7 @@ def test_what_compresses_best_is_read(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_damaged_history_is_run_again(small, undrawn, capsys):
+def test_a_damaged_history_is_run_again(small, unplotted, capsys):
     """The one of two finished pairs whose file has another byte is run again."""
     out = small.parent / "out"
     command = ["run", str(small), "--out", str(out)]

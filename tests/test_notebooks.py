@@ -50,10 +50,13 @@ def test_notebooks_are_shipped_as_their_scripts_ran(name):
 
 LONG = (
     "02_how_thin_can_it_be",
+    "03_a_load_finds_its_four_hinges",
     "04_how_many_springs",
     "05_speed_against_error",
     "06_a_roman_bridge",
     "07_from_first_hinge_to_the_ground",
+    "08_from_one_record_to_a_fragility_curve",
+    "10_where_checks_and_falls_differ",
 )
 """Notebooks whose results other tests check as well."""
 

@@ -100,20 +100,20 @@ def test_damaged_code_is_found_and_compiled_anew(which, damage, stored):
         compiled(hits=1)
 
 
-def test_one_of_several_processes_compiles(tmp_path):
-    """They begin at once, and the others load the code that the first one has stored."""
+def test_one_of_two_processes_compiles(tmp_path):
+    """They begin at once, and one loads the code that the other has stored."""
     (tmp_path / "functions.py").write_text(FUNCTION)
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     environment["PYTHONPATH"] = os.pathsep.join([os.getcwd(), str(tmp_path)])
     options = {"env": environment, "stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     words = [sys.executable, "-c", "import functions"]
-    processes = [subprocess.Popen(words, text=True, **options) for _ in range(3)]
-    for process in processes:  # until all have been imported
+    processes = [subprocess.Popen(words, text=True, **options) for _ in range(2)]
+    for process in processes:  # until both have been imported
         assert process.stdout.readline() == "ready\n"
     for process in processes:
         process.stdin.close()
     hits = [process.stdout.read().strip() for process in processes]
-    assert sorted(hits) == ["0", "1", "1"]
+    assert sorted(hits) == ["0", "1"]
     for process in processes:
         process.stdout.close()
         assert process.wait() == 0

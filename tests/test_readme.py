@@ -23,7 +23,10 @@ WORDS = "\n".join(PAGES.values())
 RUN = re.compile(r"```python\n(.*?)```(?:(?:(?!```).)*?```text\n(.*?)```)?", re.DOTALL)
 """A block of Python, and the output that the next block shows, if it does."""
 
-SLOW = ("docs/tutorial.md", "docs/index.md", "docs/howto/verdict.md")
+SLOW = tuple(
+    f"docs/{page}.md"
+    for page in ("tutorial", "index", "howto/assessment", "howto/bridges", "howto/verdict")
+)
 """Pages whose code other tests or the README's lines run as well."""
 
 

@@ -44,7 +44,7 @@ def test_a_run_takes_one_thread():
         model = af.build(column, fidelity="rigid")
         af.time_history(
             model,
-            af.Motion.synthetic(duration=1.0, pga=0.5),
+            af.Motion.synthetic(duration=0.3, pga=0.5),
             dt=0.01,
             until=lambda structure, resultants: seen.update(run=threads()),
         )

@@ -97,24 +97,27 @@ def test_the_examples_of_the_page_work_together(folder):
     assert changed == "True"
 
 
-def test_no_case_runs_code_by_itself(folder, monkeypatch):
-    monkeypatch.setenv("ARCHFEM_OWN_CODE", "")  # which commands of other tests may have set
-    (folder / "mine.py").write_text("open('it ran', 'w')")
-    with pytest.raises(af.InvalidInput, match="is code, which no file runs by itself"):
-        af.Case.read(folder / "case.toml")
-    refused = call(folder, "-m", "archfem", "check", "case.toml")
-    assert refused.returncode == 1
-    assert "--own-code" in refused.stderr
-    assert not (folder / "it ran").exists()
-    call(folder, "-m", "archfem", "check", "case.toml", "--own-code")
-    assert (folder / "it ran").exists()
-
-
 @pytest.fixture
 def permitted(monkeypatch, tmp_path):
-    monkeypatch.setenv("ARCHFEM_OWN_CODE", "")
+    monkeypatch.setenv("ARCHFEM_OWN_CODE", "")  # which commands of other tests may have set
     monkeypatch.setattr(sys, "path", list(sys.path))
     return tmp_path
+
+
+def test_no_case_runs_code_by_itself(permitted, monkeypatch):
+    monkeypatch.chdir(permitted)
+    (permitted / "case.toml").write_text(CASE.replace("mine.py", "module_that_leaves_a_file.py"))
+    (permitted / "record.txt").write_text("OUR STATION\n")
+    (permitted / "module_that_leaves_a_file.py").write_text("open('it ran', 'w').close()")
+    with pytest.raises(af.InvalidInput, match="is code, which no file runs by itself"):
+        af.Case.read(permitted / "case.toml")
+    # the only default test of `python -m archfem`, and so a process
+    refused = call(permitted, "-m", "archfem", "check", "case.toml")
+    assert refused.returncode == 1
+    assert "--own-code" in refused.stderr
+    assert not (permitted / "it ran").exists()
+    af.commands.main(["check", "case.toml", "--own-code"])
+    assert (permitted / "it ran").exists()
 
 
 @pytest.mark.parametrize(

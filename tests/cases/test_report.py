@@ -77,7 +77,7 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert f"{float(run.joints['friction'].max()):.3f}" in words
 
 
-def test_missing_pairs_are_named_and_different_cases_refused(kept):
+def test_missing_pairs_are_named_and_different_cases_refused(kept, unplotted):
     (kept / "second" / "history.nc").unlink()
     found = af.cases.open_results(kept)
     assert (list(found.runs), found.missing) == (["first"], ("second",))
@@ -117,7 +117,7 @@ def test_folders_that_hold_no_results_are_refused(kept, tmp_path):
         af.cases.open_results(tmp_path)
 
 
-def test_a_run_in_memory_has_a_report_and_a_player(small, undrawn, tmp_path):
+def test_a_run_in_memory_has_a_report_and_a_player(small, unplotted, undoubted, tmp_path):
     case = af.Case.read(small, ["analysis.damping={ratio=0.05, frequency=5.0}"])
     *_, run = af.cases.run_case(case, pairs=["first"])
     words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
@@ -133,7 +133,7 @@ def test_a_run_in_memory_has_a_report_and_a_player(small, undrawn, tmp_path):
     )  # none were written
 
 
-def test_a_history_has_a_report_and_a_player_too(kept, tmp_path):
+def test_a_history_has_a_report_and_a_player_too(kept, unplotted, tmp_path):
     """By the case that it keeps; one of a model made in Python has a player alone."""
     run = af.History.read(kept / "first" / "history.nc")
     run.dataset.attrs["title"] = "of another name: second"  # `motion` alone names what it ran
@@ -148,7 +148,7 @@ def test_a_history_has_a_report_and_a_player_too(kept, tmp_path):
     assert "<iframe" in alone.player()._repr_html_()
 
 
-def test_a_case_without_motion_has_a_report_too(small, undrawn, tmp_path):
+def test_a_case_without_motion_has_a_report_too(small, unplotted, tmp_path):
     case, folder = (
         af.Case.of(tomllib.loads(small.read_text().split("[suite]")[0])),
         tmp_path / "out",
@@ -200,7 +200,7 @@ def test_results_are_read_though_a_file_was_deleted(kept):
 
 
 @pytest.mark.parametrize("name", ["rubble", "own"])
-def test_results_need_no_drawing_beside_them(name, undrawn, tmp_path, capsys):
+def test_results_need_no_drawing_beside_them(name, unplotted, undoubted, tmp_path, capsys):
     """A pier of a drawing is run, and reported and filmed from a folder that was moved alone."""
     drawing, place = tmp_path / "drawn" / "pier.geojson", tmp_path / "elsewhere"
     drawing.parent.mkdir()

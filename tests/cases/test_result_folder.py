@@ -50,6 +50,14 @@ def run_into(folder, small, change):
     return case
 
 
+@pytest.fixture(scope="module", autouse=True)
+def undoubted_runs():
+    """Runs are not compared with finer ones, which test_run.py tests: a third of their time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("archfem.cases.run.doubt_fidelity", lambda *_: [])
+        yield
+
+
 @pytest.fixture(scope="module")
 def carried_out(tmp_path_factory):
     """Folder with the folders of two runs that differ in the scale of the motions."""

@@ -18,7 +18,7 @@ def names(results):
     return [type(result).__name__ for result in results]
 
 
-def test_results_come_as_they_are_found_and_histories_are_kept(small, tmp_path):
+def test_results_come_as_they_are_found_and_histories_are_kept(small, tmp_path, undoubted):
     case = af.Case.read(small, ["limit.horizontal=1"])
     results = list(af.cases.run_case(case, str(tmp_path / "out")))
     assert names(results) == ["Collapse", "DeadLoadResult", "Suite", "Run", "Run"]
@@ -40,7 +40,7 @@ def test_results_come_as_they_are_found_and_histories_are_kept(small, tmp_path):
         assert np.array_equal(run.history.joints["N"], before.history.joints["N"])
 
 
-def test_without_a_folder_nothing_is_kept_and_pairs_may_be_named(small):
+def test_without_a_folder_nothing_is_kept_and_pairs_may_be_named(small, undoubted):
     case = af.Case.read(small)
     before = set(small.parent.iterdir())
     *_, suite, run = af.cases.run_case(case, pairs=["second"])
@@ -49,7 +49,7 @@ def test_without_a_folder_nothing_is_kept_and_pairs_may_be_named(small):
     assert set(small.parent.iterdir()) == before
 
 
-def test_one_motion_has_its_history_in_the_folder_itself(small, tmp_path):
+def test_one_motion_has_its_history_in_the_folder_itself(small, tmp_path, undoubted):
     tables = tomllib.loads(small.read_text())
     tables["motion"] = tables.pop("suite")["pairs"]["first"]
     rest, run = af.cases.run_case(af.Case.of(tables), tmp_path / "out")
@@ -58,7 +58,7 @@ def test_one_motion_has_its_history_in_the_folder_itself(small, tmp_path):
     assert len(list(af.cases.run_case(af.Case.of(tables), tmp_path / "out"))) == 2
 
 
-def test_ctrl_c_ends_the_suite_after_the_run_it_met(small, tmp_path):
+def test_ctrl_c_ends_the_suite_after_the_run_it_met(small, tmp_path, undoubted):
     def interrupted(case, motion, *given):
         history = af.cases.run_time_history(case, motion, *given)
         history.dataset.attrs["ended"] = "interrupted"
@@ -72,7 +72,7 @@ def test_ctrl_c_ends_the_suite_after_the_run_it_met(small, tmp_path):
     )
 
 
-def test_a_step_that_fails_ends_its_run_only(small, tmp_path):
+def test_a_step_that_fails_ends_its_run_only(small, tmp_path, undoubted):
     def failing(case, motion, *given):
         history = af.cases.run_time_history(case, motion, *given)
         if motion.name == "first":
@@ -113,7 +113,9 @@ def test_pairs_are_run_again_where_their_files_have_changed(small, tmp_path, at2
 
 
 @pytest.mark.parametrize("what", ["drawing", "program"])
-def test_nothing_is_kept_of_another_drawing_or_by_another_program(what, tmp_path, monkeypatch):
+def test_nothing_is_kept_of_another_drawing_or_by_another_program(
+    what, undoubted, tmp_path, monkeypatch
+):
     """A drawing that is stretched leaves the case's own words and the ground as they are."""
     stretched, drawing = 1.3, tmp_path / "column.geojson"
     column = af.column(breadth=1.0, heights=[1.0, 1.0])

@@ -187,7 +187,7 @@ def test_a_byte_order_mark_is_ignored(tmp_path):
 
 
 def test_a_chain_of_bases_is_refused_where_it_is_long(tmp_path):
-    for k in range(3000):
+    for k in range(40):
         (tmp_path / f"{k}.toml").write_text(f'base = "{k + 1}.toml"')
     with pytest.raises(af.InvalidInput, match="is the base of 20 files"):
         af.Case.read(tmp_path / "0.toml")
@@ -215,8 +215,8 @@ def test_devices_and_pipes_are_no_drawings_of_a_case(tmp_path):
 
 def test_counts_beyond_the_room_are_refused_before_they_take_any():
     ring = af.circular_arch(radius=3, thickness=0.5, embrace=90, voussoirs=5)
-    with pytest.raises(af.errors.MeshError, match=r"a mesh of 5e.06 cells, and there is room"):
-        af.build(ring, cells=(1000, 1000))
+    with pytest.raises(af.errors.MeshError, match=r"a mesh of 1.1e.06 cells, and there is room"):
+        af.build(ring, cells=(1000, 220))
     with pytest.raises(af.InvalidInput, match=r"makes 1e.12, and there is room for 10000000"):
         af.Motion.synthetic(duration=1e9, dt=1e-3)
     with pytest.raises(af.InvalidInput, match="there is room for 10000000"):

@@ -192,7 +192,7 @@ def test_a_missing_record_is_reported_before_anything_is_computed(tmp_path, caps
         assert "dead load" not in out
 
 
-def test_a_refused_record_leaves_the_others(tmp_path, capsys):
+def test_a_refused_record_leaves_the_others(tmp_path, unplotted, capsys):
     (tmp_path / "bad.txt").write_text("words")
     rows = "".join(f"{0.01 * (k % 5 - 2):.4f}\n" for k in range(200))
     (tmp_path / "good.txt").write_text("# units g, dt 0.01\n" + rows)
@@ -226,7 +226,7 @@ def column(tmp_path):
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_a_motion_and_keeps_its_steps(
-    column, tmp_path, undrawn, monkeypatch, capsys, number, code
+    column, tmp_path, unplotted, monkeypatch, capsys, number, code
 ):
     def cut_short(case, motion, dead, damping):
         def press(structure, resultants):
@@ -251,7 +251,7 @@ def test_a_signal_ends_a_motion_and_keeps_its_steps(
     assert "interrupted" in capsys.readouterr().err
 
 
-def test_a_full_disk_is_an_error_in_words(column, tmp_path, undrawn, capsys):
+def test_a_full_disk_is_an_error_in_words(column, tmp_path, unplotted, capsys):
     """A file may not be longer than 20 kB, which acts as a full disk does."""
     out = tmp_path / "out"
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -136,7 +136,7 @@ def never(*_, **__):
     raise AssertionError("a case was run again")
 
 
-def test_a_study_continues_where_it_was_ended(study, tmp_path, monkeypatch):
+def test_a_study_continues_where_it_was_ended(study, undrawn, tmp_path, monkeypatch):
     unscaled(study)
     folder = tmp_path / "out"
     command = ["study", str(study), "--out", str(folder), "--workers", "1"]

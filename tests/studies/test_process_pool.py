@@ -102,6 +102,7 @@ def test_deaths_of_workers_are_reported_and_nothing_is_inherited(
     assert "so are errors" in log
 
 
+@pytest.mark.slow
 def test_a_study_outlives_its_fork_server(small_ring, tmp_path, finders):
     thicknesses = [0.5, 0.6, 0.7, 0.8]
     table = study_of(small_ring, "orphaned", thicknesses, tmp_path).run(workers=2)

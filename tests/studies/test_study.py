@@ -316,7 +316,7 @@ def test_a_repeated_warning_is_logged_once(small_ring, finders, caplog, workers)
     assert said[2:] == ["4 more warnings as above, of other runs, are not repeated"]
 
 
-def test_cases_and_findings_are_in_one_file(ring_file, tmp_path, capsys):
+def test_cases_and_findings_are_in_one_file(ring_file, low_resolution, tmp_path, capsys):
     path, folder = tmp_path / "study.toml", tmp_path / "out"
     path.write_text(
         'title = "two measures"\ncompute = "limit"\nset = ["limit.horizontal=1.0"]\n'

@@ -16,16 +16,23 @@ GIVEN = {"rungs": ("rigid",), "cells": ((2, 2),), "rules": (("gauss", 3), ("exac
 STEPS = (0.01, 0.005)
 
 
-@pytest.fixture
-def case(monkeypatch):
-    """A ring under half a second of motion; few settings, and a coarse reference."""
-    monkeypatch.setattr(accuracy, "reference_settings", lambda structure: REFERENCES)
+@pytest.fixture(scope="module")
+def few_settings():
+    """Few settings, and a coarse reference."""
     few = (*GIVEN.values(), STEPS)
-    monkeypatch.setattr(
-        accuracy,
-        "candidate_settings",
-        lambda structure, *tried: candidate_settings(structure, *(tried or few)),
-    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(accuracy, "reference_settings", lambda structure: REFERENCES)
+        patch.setattr(
+            accuracy,
+            "candidate_settings",
+            lambda structure, *tried: candidate_settings(structure, *(tried or few)),
+        )
+        yield
+
+
+@pytest.fixture(scope="module")
+def case(few_settings):
+    """A ring under half a second of motion."""
     ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
     motion = {"synthetic": {"duration": 0.5, "pga": 2.0, "seed": 1}}
     return af.Case.of(
@@ -38,9 +45,16 @@ def case(monkeypatch):
     )
 
 
-def test_a_case_is_compared_as_its_structure_is(case, tmp_path):
+@pytest.fixture(scope="module")
+def compared(case, tmp_path_factory):
+    """The comparison of that case, and the folder that keeps its runs."""
+    folder = tmp_path_factory.mktemp("compared")
+    return case_accuracy(case, folder), folder
+
+
+def test_a_case_is_compared_as_its_structure_is(case, compared):
     """The case's own fidelity, rule and step do not matter; its damping does."""
-    found = case_accuracy(case, tmp_path)
+    found, _ = compared
     given = {**GIVEN, "damping": case.analysis.damping, "steps": STEPS}
     known = af.accuracy(case.structure, case.ground_motion(), **given)
     assert [trial.setting for trial in found.trials] == [trial.setting for trial in known.trials]
@@ -50,10 +64,10 @@ def test_a_case_is_compared_as_its_structure_is(case, tmp_path):
     assert found.reference_error == pytest.approx(known.reference_error, abs=1e-9)
 
 
-def test_settings_that_ran_are_not_run_again(case, tmp_path, monkeypatch):
-    first = case_accuracy(case, tmp_path)
+def test_settings_that_ran_are_not_run_again(case, compared, monkeypatch):
+    first, folder = compared
     monkeypatch.setattr("archfem.studies.convergence.time_run", None)
-    again = case_accuracy(case, tmp_path)
+    again = case_accuracy(case, folder)
     assert again == first
 
 

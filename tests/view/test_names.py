@@ -35,7 +35,7 @@ def test_every_judged_joint_of_a_bridge_is_named(bridge):
     assert places == pytest.approx(ends)
 
 
-@pytest.mark.parametrize("voussoirs", [9, 17, 60])
+@pytest.mark.parametrize("voussoirs", [9, pytest.param(17, marks=pytest.mark.slow), 60])
 def test_names_of_a_ring_are_legible(voussoirs):
     """Each is turned with its joint, so that it takes a line; none is smaller than 5 points."""
     ring = af.circular_arch(radius=2.95, thickness=0.3, embrace=159.0, voussoirs=voussoirs)

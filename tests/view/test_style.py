@@ -12,7 +12,7 @@ from archfem.view.style import Page, set_title, structure_figure
 
 
 @pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".pdf", b"%PDF")])
-def test_a_figure_is_saved_whole(ring, tmp_path, suffix, start):
+def test_a_figure_is_saved_whole(ring, low_resolution, tmp_path, suffix, start):
     path = save(af.view.draw_structure(ring), tmp_path / "new" / f"ring{suffix}")
     assert path.read_bytes().startswith(start)
     assert [each.name for each in path.parent.iterdir()] == [path.name]

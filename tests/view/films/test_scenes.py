@@ -38,7 +38,7 @@ def test_a_film_decodes_to_its_frames(model, run, tmp_path, suffix):
         pytest.param(
             {"seconds": 3.0}, 13, 13 / 3.0, marks=pytest.mark.slow
         ),  # no more frames than fields
-        ({"seconds": 0.2, "fps": 50.0}, 10, 50.0),
+        ({"seconds": 0.1, "fps": 50.0}, 5, 50.0),
     ],
 )
 def test_a_film_lasts_for_the_given_time(model, run, tmp_path, options, frames, fps):

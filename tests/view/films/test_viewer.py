@@ -51,7 +51,7 @@ def test_pyvista_draws_the_films_of_matplotlib(shaken, tmp_path):
     films = {
         name: read_film(
             af.view.film(
-                model, run, tmp_path / f"{name}.gif", renderer=name, fps=10, size=(640, 480)
+                model, run, tmp_path / f"{name}.gif", renderer=name, fps=5, size=(640, 480)
             )
         )
         for name in ("matplotlib", "pyvista")
