@@ -102,12 +102,12 @@ def _fill(table: Any) -> Fill:
 def _point_load(table: Any) -> PointLoad:
     """Return a concentrated live load."""
     point = check_table(table, declared_keys(PointLoad), "limit.point")
-    if len(point) < 2 or len(point["force"]) != 2:
+    if not {"x", "force"} <= point.keys() or len(point["force"]) != 2:
         raise InvalidInput(
             f"limit.point = {table}: give a place and the two components of a force, e.g. "
             '{ x = "1.4 m", force = ["0 kN", "-1 kN"] }'
         )
-    return PointLoad(point["x"], point["force"])
+    return PointLoad(**point)
 
 
 def parse_rating(table: Any) -> Table:

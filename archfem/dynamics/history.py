@@ -95,7 +95,7 @@ ATTRIBUTE_KINDS: dict[str, Callable[[Any], Any]] = {
     "displacements": ("small", "large").index,
 }
 
-# Dimensions of the variables of every file, and the variables of joints that are texts
+# Dimensions of variables, which every file has but for the ground's motion, and texts of joints
 DIMENSIONS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("N", "V", "M", "eccentricity", "friction"), ("time", "joint")),
     **dict.fromkeys(("name", "part", "depth", "friction_limit"), ("joint",)),
@@ -472,6 +472,7 @@ def _without_other_coordinates(path: str | Path, dataset: xr.Dataset) -> xr.Data
 def _check_content(path: str | Path, dataset: xr.Dataset) -> None:
     """Refuse a file whose variables and attributes are not those of a history."""
     shapes = {name: values.dims for name, values in dataset.variables.items()}
+    shapes.setdefault("ground", DIMENSIONS["ground"])
     wrong = [name for name, dims in DIMENSIONS.items() if shapes.get(name) != dims]
     wrong += [
         str(name)

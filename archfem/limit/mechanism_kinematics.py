@@ -387,7 +387,7 @@ class LoopCheck:
             references,
         )
         gaps = np.zeros((3 * len(joints), len(references), 3))
-        gaps[row, body] = values * [1.0, 1.0, 1.0 / self.blocks.length_unit]
+        gaps[row, body] = values
         gaps = gaps.reshape(len(gaps), -1)
         basis = np.linalg.qr(gaps, mode="complete")[0][:, gaps.shape[1] :]
         return np.where(np.abs(basis) > 1e-12, basis, 0.0)  # round-off: the joint is in no loop

@@ -44,7 +44,7 @@ class BodyForce:
 
 @dataclass(frozen=True)
 class PointLoad:
-    """A force at the highest point of the structure at x.
+    """A force at the highest point of the structure at x, or at a height of a block.
 
     On a voussoir with arcs the force acts on the arc itself, so that an inclined force has its true
     lever arm.
@@ -52,17 +52,29 @@ class PointLoad:
     Attributes:
         x: position [m].
         force: its components for the whole width, up positive (2,) [N].
+        y: height, within a block or on its outline [m]; at a joint the block above carries the
+            force. None for the highest point at x.
 
     Raises:
-        InvalidInput: x is no number, or the force no two of up to 1e9 N.
+        InvalidInput: x or y is no number, or the force no two of up to 1e9 N.
+
+    Example:
+        >>> pier = af.column(breadth=0.6, heights=[1.0, 1.0, 1.0])
+        >>> weight = pier.weight  # at mid-height it tips over the foot, by W 0.3 m / 1.5 m
+        >>> push = af.PointLoad(0.0, (weight, 0.0), y=1.5)
+        >>> round(af.collapse_factor(pier, live=push).factor, 6)
+        0.2
     """
 
     x: Metres
     force: tuple[Newtons, Newtons]
+    y: Metres | None = None
 
     def __post_init__(self) -> None:
         """Check position and force."""
         check_number(self.x, "point load, x [m]")
+        if self.y is not None:
+            check_number(self.y, "point load, y [m]")
         force = check_numbers(self.force, "point load, force (x, y) [N]", 2)
         object.__setattr__(self, "force", force)
         if max(map(abs, force)) > 1e9:  # a mistake of units
@@ -75,8 +87,10 @@ class PointLoad:
             structure: whose blocks that move may carry it.
 
         Raises:
-            InvalidInput: no block that moves lies below or above x.
+            InvalidInput: no block that moves lies below or above x, or at y.
         """
+        if self.y is not None:
+            return self._place_at_height(structure, np.array([self.x, self.y]))
         found = {number: structure.blocks[number].top(self.x) for number in structure.free}
         tops = {number: top for number, top in found.items() if top is not None}
         if not tops:
@@ -88,6 +102,22 @@ class PointLoad:
             )
         block = max(tops, key=lambda number: tops[number])
         return block, np.array([self.x, tops[block]])
+
+    def _place_at_height(self, structure: Structure, point: Array) -> tuple[int, Array]:
+        """Return the highest block that has a point (2,) [m], and the point."""
+        import shapely
+
+        outlines = np.array([shapely.Polygon(structure.blocks[n].drawn()) for n in structure.free])
+        away = shapely.distance(outlines, shapely.Point(point))
+        near = away <= 1e-3 * structure.size  # chords for arcs, and coordinates in print
+        if not near.any():
+            nearest = structure.blocks[structure.free[int(away.argmin())]].name
+            raise InvalidInput(
+                f"a point load at ({self.x:.4g}, {self.y:.4g}) m is {away.min():.4g} m away from "
+                f"the nearest block that moves, '{nearest}': move it there"
+            )
+        carrying = [structure.free[k] for k in np.flatnonzero(near)]
+        return max(carrying, key=lambda number: structure.blocks[number].centroid[1]), point
 
 
 @dataclass(frozen=True)

@@ -93,16 +93,22 @@ class Pushover(ResultDisplay):
 
     @property
     def factor(self) -> float:
-        """Factor of the last step; under a load also the largest."""
-        return float(self.curve["factor"][-1])
+        """Largest factor under a load; of a settlement that of the last step.
+
+        Where bonds break or displacements are large, the curve falls after its largest factor.
+        """
+        factors = self.curve["factor"]
+        return float(factors.max() if factors.units == "1" else factors[-1])
 
     def _summary(self) -> str:
         """Describe the pushover in one or two lines."""
         steps, limit = self.curve.sizes["step"] - 1, ""
+        end = float(self.curve["factor"][-1])
+        last = "" if end == self.factor else f", at the end {end:.4g}"
         if np.isfinite(self.limit):
             limit = f", tends to {self.limit:.4g} ± {self.uncertainty:.2g}"
         return (
-            f"Pushover: factor {self.factor:.4g} after {steps} steps{limit}, "
+            f"Pushover: factor {self.factor:.4g} after {steps} steps{limit}{last}, "
             f"{len(self.hinges)} hinge{'s' if len(self.hinges) != 1 else ''}; {self.outcome}"
         )
 

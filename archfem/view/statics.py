@@ -349,7 +349,7 @@ def draw_pushover(
     style = {"color": Colour.HINGE, "ms": 6.0, "mec": "white"}
     axes.plot([], [], "o", label="first hinge of a joint", **style)
     # the list stands where no curve runs
-    falls = any(push.factor < float(push.curve["factor"][0]) for push in pushes.values())
+    falls = any(p.curve["factor"][-1] < p.curve["factor"][0] for p in pushes.values())
     axes.set_xlim(0.0, reach / mm)
     if len(pushes) == 1 and hinges:
         _list_hinges(axes, hinges, at_top=falls)

@@ -54,6 +54,13 @@ def test_a_fill_means_the_same_as_its_call():
     assert found.factor == af.collapse_factor(structure, live=live, fill=fill).factor
 
 
+def test_a_point_load_of_a_limit_may_have_a_height(stack):
+    point = {"x": "-0.5 m", "y": "1.25 m", "force": ["1 kN", "0 kN"]}
+    live = af.PointLoad(-0.5, (1e3, 0.0), y=1.25)
+    factor = parse_limit({"point": point}).solve(stack).factor
+    assert factor == af.collapse_factor(stack, live=live).factor
+
+
 def test_a_limit_without_a_load_has_friction_and_fill_for_a_rating(ring):
     limit = parse_limit({"friction": "none", "fill": {"friction_angle": "35 degree"}})
     assert (limit.friction, limit.fill.friction_angle) == (None, pytest.approx(35.0))
@@ -103,7 +110,7 @@ def test_a_case_is_rated_by_its_own_table(ring):
         ({"point": 3}, "limit.point = 3 is not a table"),
         ({"point": {"x": 1.4}}, "give a place and the two components of a force"),
         ({"point": {"x": 1.4, "force": [1.0]}}, "two components of a force"),
-        ({"point": {**POINT, "y": 1}}, "unknown key 'limit.point.y'"),
+        ({"point": {**POINT, "z": 1}}, "unknown key 'limit.point.z'"),
         ({"point": {**POINT, "force": ["0 m", "1 kN"]}}, "limit.point.force.0. = '0 m'"),
         (3, "limit = 3 is not a table"),
     ],

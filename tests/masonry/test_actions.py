@@ -51,6 +51,28 @@ def test_a_point_load_beside_the_structure_is_refused(stack):
         af.PointLoad(0.6, (0.0, -1.0)).place(stack)
 
 
+def test_a_point_load_at_a_height_acts_on_the_block_there(stack):
+    """Two square blocks: at the joint between them the upper one carries the load."""
+    places = [af.PointLoad(0.5, (-1.0, 0.0), y=y).place(stack) for y in (0.4, 1.0, 1.7)]
+    assert [number for number, _ in places] == [1, 2, 2]
+    assert [point.tolist() for _, point in places] == [[0.5, 0.4], [0.5, 1.0], [0.5, 1.7]]
+    with pytest.raises(af.InvalidInput, match=r"\(0.6, 0.4\) m is 0.1 m away .* 'block 1'"):
+        af.PointLoad(0.6, (-1.0, 0.0), y=0.4).place(stack)
+
+
+@pytest.mark.parametrize("fidelity", ["rigid", "full"])
+def test_a_push_below_mid_height_tips_a_stack_by_half_its_breadth_over_its_lever_arm(
+    stack, fidelity
+):
+    """W b/2 = λ W y: limit analysis exactly, the pushover within its uncertainty."""
+    push, tips = af.PointLoad(-0.5, (stack.weight, 0.0), y=0.9), 0.5 / 0.9
+    assert af.collapse_factor(stack, live=push).factor == pytest.approx(tips, rel=1e-9)
+    model = af.build(stack, fidelity=fidelity, cells=(2, 2))
+    found = af.pushover(model, push)
+    assert abs(found.limit - tips) <= found.uncertainty
+    assert found.limit == pytest.approx(tips, rel=0.01)
+
+
 def test_settlements_add_up_on_their_support(stack):
     sunk = af.Settlement("base", (0.0, -0.01, 0.0))
     at_rest = np.zeros((3, 3))

@@ -71,6 +71,15 @@ def test_a_bonded_bed_breaks_where_its_edge_reaches_the_strength(fidelity, rule)
         under(model, (1.001 if rule == "exact" else 1.3) * most, -1.0)
 
 
+def test_the_factor_of_a_pushover_is_its_peak_where_bonds_break():
+    """By hand 7/6: -W / A + 6 M / (w b²) = f_t; steps grow by a tenth. Dry, it tips at 1/2."""
+    push = af.pushover(bonded(), af.BodyForce(1.0))
+    assert 7.0 / 6.0 / 1.1 < push.factor <= 7.0 / 6.0
+    assert float(push.curve["factor"][-1]) == pytest.approx(0.5, rel=1e-6)
+    assert f"factor {push.factor:.4g} after" in str(push)
+    assert "at the end 0.5, " in str(push)
+
+
 def cracked(moment, tension):
     """Depth that still bears and turn of a bed of 1 m under its weight and a moment, by hand [m].
 

@@ -1,8 +1,9 @@
 """Solver "newton": Newton's method on the whole structure, for small and large displacements.
 
-One driver serves both: an initial guess, the assembled tangent, points that reverse their slip held
-once, and a line search. The tangent is a band where coordinates can be ordered so, else it is
-sparse (`tangent_lu`). Small displacements (`linear_step`) solve in every iteration
+One driver serves both (`semismooth_newton`): an initial guess, the assembled tangent, points that
+reverse their slip held once, and a line search. The tangent is a band where coordinates can be
+ordered so, else it is sparse (`tangent_lu`). Small displacements (`linear_step`) solve in every
+iteration
 
     (K + μ M + ν R - Gᵀ λ′ G) w = r + Gᵀ (λ - λ′ (z - z₀));
 
@@ -46,6 +47,7 @@ from archfem.dynamics.solvers.linear_step import (
     subtract_derivatives,
     tangent_pattern,
 )
+from archfem.dynamics.solvers.semismooth_newton import Correction, Tolerances, newton_driver
 from archfem.dynamics.solvers.sparse_products import (
     SparseRows,
     add_rows,
@@ -64,57 +66,6 @@ from archfem.joints.large.forces import (
     joint_energy,
 )
 from archfem.joints.large.rates import JointRates, add_rates, copy_rates, find_rate_pairs
-
-
-class Tolerances(NamedTuple):
-    """When iterations end."""
-
-    residual: float  # largest residual [N]
-    stalled: float  # the same where it does not fall any more, by rounding [N]
-    round_off: float  # correction that changes nothing [m]
-    rounded: float  # largest residual after such a correction [N]
-    reduction: float  # of the residual in an iteration, to which the last factor serves again [-]
-
-
-def newton_driver(evaluate_residual: Any, find_correction: Any, search_line: Any) -> Any:
-    """Return the compiled driver of iterations for small or for large displacements."""
-
-    @kernel
-    def newton_solve(system, work, tolerances, limits):  # type: ignore
-        """Iterate until the residual vanishes; returns evaluations, negative if it does not.
-
-        Semismooth Newton: a point that the first correction takes from sliding one way to sliding
-        the other is held in the second, as no derivative sees the range in which it sticks.
-        `limits` are the number of iterations, that of the first ones with whole corrections, after
-        which a line search is used, and whether the first may use an earlier step's factor.
-        """
-        max_iterations, full_steps, reusable = limits
-        error, norm, reverses = evaluate_residual(system, work, 0)
-        previous, change, evaluations = np.inf, np.inf, 0
-        for iteration in range(max_iterations):
-            stalled = error >= previous and error <= tolerances.stalled
-            rounded = change <= tolerances.round_off and error <= tolerances.rounded
-            if iteration > 0 and (error <= tolerances.residual or stalled or rounded):
-                return evaluations
-            # a factor serves again if one more step by it should suffice, or while it reduces the
-            # residual by more than a new factor is worth
-            hold = iteration == 1 and reverses
-            suffices = error**2 <= previous * tolerances.residual
-            reuse = suffices or error <= tolerances.reduction * previous
-            reuse = reuse and reusable and not hold
-            if evaluations > 5 * max_iterations or not find_correction(
-                system, work, iteration, reuse, hold
-            ):
-                return -evaluations - 1
-            whole, reusable, previous = hold or iteration < full_steps, not hold, error
-            found, change, tried = search_line(system, work, iteration + 1, norm, whole)
-            error, norm, reverses = found
-            evaluations += tried
-            if not error < np.inf:
-                return -evaluations
-        return -evaluations
-
-    return newton_solve
 
 
 class NewtonSolver(StepSolver):
@@ -245,19 +196,18 @@ class SmallSystem(NamedTuple):
 def _small_residual(system, work, iteration):  # type: ignore
     """Evaluate λ(z) at the trial gaps, and its difference from the λ in balance."""
     released, last, force = system.released, system.last, system.balanced
-    largest, square, reverses = 0.0, 0.0, False
+    largest, reverses = 0.0, False
     for row in range(len(released)):
         last[row] = released[row]
     evaluate_released(system.linear.law, system.linear.places, released)
     if iteration == 0:  # nothing is in balance with the guess
-        return np.inf, np.inf, False
+        return np.inf, False
     for row in range(len(released)):
         error = abs(released[row] - force[row])
-        square += error**2
         if not error <= largest:  # also where it is not a number
             largest = error
         reverses = reverses or last[row] * released[row] < 0.0
-    return largest, square, reverses
+    return largest, reverses
 
 
 @kernel
@@ -318,30 +268,38 @@ def _renew_factor(system, hold):  # type: ignore
 
 
 @kernel
-def _small_move(system, work, share):  # type: ignore
-    """Add a share of the correction to w, gaps and balanced λ before it."""
+def _small_move(system, work, before, share):  # type: ignore
+    """Add a share of the correction to w, gaps and balanced λ as they were without it."""
     law, contact = system.linear.law, system.contact
     for row in range(len(law.guess)):
         law.guess[row] = system.gap_origin[row] + share * system.along[row]
         system.balanced[row] = system.balanced_origin[row] + share * system.move[row]
     for k in range(contact.shape[1]):
         contact[0, k] = contact[1, k] + share * contact[2, k]
+    return 1.0  # no tolerance of these structures is one of a correction
 
 
 @kernel
-def _halve_small(system, work, iteration, before, whole):  # type: ignore
-    """Add the correction, or unless `whole` a share by halving, which reduces the residual."""
-    share, evaluations = 1.0, 0
-    while True:
-        _small_move(system, work, share)
-        error, norm, reverses = _small_residual(system, work, iteration)
-        evaluations += 1
-        if norm < before or whole or share <= 1.0 / 64.0:
-            return (error, norm, reverses), share, evaluations
-        share *= 0.5
+def _small_work(system, work):  # type: ignore
+    """Return the work of the released forces out of balance along the change of the gaps."""
+    total = 0.0
+    for row in range(len(system.along)):
+        total += system.along[row] * (system.released[row] - system.balanced[row])
+    return total
 
 
-_solve_small = newton_driver(_small_residual, _small_correction, _halve_small)
+@kernel
+def _reverse_small(system, work):  # type: ignore
+    """Turn the correction around."""
+    for row in range(len(system.along)):
+        system.along[row], system.move[row] = -system.along[row], -system.move[row]
+    for k in range(system.contact.shape[1]):
+        system.contact[2, k] = -system.contact[2, k]
+
+
+_solve_small = newton_driver(
+    _small_residual, Correction(_small_correction, _small_move, _small_work, _reverse_small)
+)
 
 
 @overload(solve_contact, jit_options=KERNEL_OPTIONS)
@@ -350,14 +308,18 @@ def _solve_contact(system):  # type: ignore
 
 
 def _solve_small_step(system):  # type: ignore
-    """Solve a step; a second try restarts from the guess, with a line search throughout."""
+    """Solve a step from where the velocity leads; a second try starts where the blocks are."""
+    # an impact between stiff joints leads far into the other block, or away from it
     law, work, total = system.linear.law, system.work, 0
     # relative to the largest force; ten times as much where rounding does not let it fall
     error = 1e-12 * largest_force(law, work.gap)
     tolerances = Tolerances(error, 10.0 * error, 0.0, 0.0, system.reduction)
-    for full_steps in (4, 1):
+    for limit, full_steps in ((12, 4), (60, 1)):
         predict_gaps(law, work.gap, work.gap_before)
-        iterations = _solve_small(system, work, tolerances, (60, full_steps, False))
+        if full_steps == 1:
+            for row in range(len(law.guess)):
+                law.guess[row] = law.start[row] if law.gain > 0.0 else work.gap[row]
+        iterations = _solve_small(system, work, tolerances, (limit, full_steps, False))
         total += abs(iterations)
         if iterations > 0:
             for row in range(len(law.guess)):
@@ -467,7 +429,7 @@ def _large_residual(system, work, iteration):  # type: ignore
                 residual[sides.index[joint, side, k]] -= forces.force[joint, side, k]
     for k in range(len(residual)):
         square += residual[k] ** 2
-    return np.sqrt(square), np.sqrt(square), reverses
+    return np.sqrt(square), reverses
 
 
 @kernel
@@ -527,18 +489,18 @@ def _has_changed(last, law):  # type: ignore
 
 
 @kernel
-def _large_move(work, share):  # type: ignore
-    """Add a share of the correction; returns the largest entry of the whole correction."""
-    move, correction, largest = work.move, work.correction, 0.0
+def _large_move(system, work, before, share):  # type: ignore
+    """Go from a share of the correction to another; returns the largest entry of all of it."""
+    move, correction, largest, added = work.move, work.correction, 0.0, share - before
     for k in range(len(move)):
-        move[k] += share * correction[k]
+        move[k] += added * correction[k]
         if not abs(correction[k]) <= largest:  # also where it is not a number
             largest = abs(correction[k])
     return largest
 
 
 @kernel
-def _correction_work(work):  # type: ignore
+def _large_work(system, work):  # type: ignore
     """Return the work of the residual along the correction."""
     total = 0.0
     for k in range(len(work.correction)):
@@ -547,42 +509,15 @@ def _correction_work(work):  # type: ignore
 
 
 @kernel
-def _search_large(system, work, iteration, before, whole):  # type: ignore
-    """Take the share of the correction at which the residual does no work along it.
-
-    But for friction the residual is the negative gradient of an energy, which is least there. With
-    stiff joints that open or close it is a small share, and the norm of the residual tells nothing.
-    """
-    start, share, evaluations = _correction_work(work), 1.0, 0
-    if start < 0.0 and not whole:  # uphill, by friction: the other way leads down
-        for k in range(len(work.correction)):
-            work.correction[k] = -work.correction[k]
-        start = -start
-    low, high, low_slope, high_slope = 0.0, np.inf, start, 0.0
-    largest = _large_move(work, share)
-    while True:
-        found = _large_residual(system, work, iteration)
-        evaluations += 1
-        slope = _correction_work(work)
-        if whole or not abs(slope) > 0.5 * start or evaluations >= 14:
-            break
-        if slope > 0.0:
-            # short of the place: go on where a longer way is worth it
-            if high == np.inf and (slope < 0.5 * start or share >= 4.0):
-                break
-            low, low_slope, following = share, slope, 2.0 * share
-        else:
-            high, high_slope = share, slope
-        if high < np.inf:  # by the secant, and a tenth of the interval at least
-            following = low + (high - low) * low_slope / (low_slope - high_slope)
-            margin = 0.1 * (high - low)
-            following = min(max(following, low + margin), high - margin)
-        _large_move(work, following - share)
-        share = following
-    return found, largest * share, evaluations
+def _reverse_large(system, work):  # type: ignore
+    """Turn the correction around."""
+    for k in range(len(work.correction)):
+        work.correction[k] = -work.correction[k]
 
 
-_solve_large = newton_driver(_large_residual, _large_correction, _search_large)
+_solve_large = newton_driver(
+    _large_residual, Correction(_large_correction, _large_move, _large_work, _reverse_large)
+)
 
 
 def _solve_large_step(system, step, states, ground):  # type: ignore
