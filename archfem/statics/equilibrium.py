@@ -28,14 +28,16 @@ from archfem.joints.criteria import assessed_joints
 from archfem.joints.resultants import joint_dataset, select_joint
 from archfem.limit.collapse import stands
 from archfem.limit.instability import explain_instability
+from archfem.limit.linear_programme import NoEquilibrium
 from archfem.masonry.construction import Stage, resolve_stages
 from archfem.masonry.loads import BodyForce
-from archfem.masonry.structure import join_joint_names
+from archfem.masonry.structure import Structure, join_joint_names
 from archfem.models.construction import PartialStructure
 from archfem.models.linear_blocks import LinearBlockModel
 from archfem.models.model import Doubt, Model, check_model
-from archfem.statics.newton import EquilibriumSolver, Newton
+from archfem.statics.newton import EquilibriumSolver, Newton, Solution
 from archfem.statics.relaxation import (
+    Search,
     SearchSequence,
     linear_predictor,
     solve_irreversible,
@@ -195,7 +197,7 @@ def dead_load(
     check_model(model)
     if stages is None:
         try:
-            return equilibrium_under(model, self_weight(model), newton)
+            return _load_from_rest(model, self_weight(model), newton, _solve_if_it_may_stand)
         except DidNotConverge as error:
             message = _describe_failure(model, error, newton)
             raise DidNotConverge(message, last=error.last) from error
@@ -288,11 +290,35 @@ def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -
     Raises:
         DidNotConverge: there is none; `last` is the last equilibrium.
     """
+    return _load_from_rest(model, load, newton, solve_or_relax)
+
+
+def _load_from_rest(
+    model: Model, load: Array, newton: Newton | None, first_search: Search
+) -> Equilibrium:
+    """Find the equilibrium under a load; the first search tries the whole of it."""
     solver = _create_solver(model, newton)
     fixed = model.with_support_motion(np.zeros_like(model.support_motion))
     unloaded = Equilibrium(fixed, np.zeros(model.size), 0, 0)
-    loaded = _increment_load(solver, unloaded, lambda part: (fixed, part * load), "load")
+    searches = first_search, solve_irreversible, solve_irreversible
+    loaded = _increment_load(solver, unloaded, lambda part: (fixed, part * load), "load", searches)
     return _move_supports(solver, loaded, load, model.support_motion)
+
+
+def _solve_if_it_may_stand(
+    solver: EquilibriumSolver, model: Model, load: Array, start: Array
+) -> tuple[Model, Solution]:
+    """Find an equilibrium under the weight, as `solve_or_relax`, unless limit analysis has none."""
+    try:
+        return solve_irreversible(solver, model, load, start)
+    except DidNotConverge:
+        # Resultants in balance within friction would be those of rigid blocks too. Without
+        # cohesion no part of the weight is carried either, which long searches would find.
+        structure = model.structure
+        scales = not (model.large_displacements or structure.cohesion.any())
+        if scales and not structure.has_own_laws and not _stands_as_rigid_blocks(structure):
+            raise NoEquilibrium("nothing within friction holds it as rigid blocks") from None
+    return solve_or_relax(solver, model, load, start)
 
 
 def _create_solver(model: Model, newton: Newton | None) -> EquilibriumSolver:
@@ -369,7 +395,7 @@ def _increment_load(
             # the step stays halved for the rest of the load
             step /= 2.0
             find = find_halved if step > min_load_step else find_smallest
-            if step >= min_load_step:
+            if step >= min_load_step and not isinstance(error, NoEquilibrium):
                 continue
             raise DidNotConverge(
                 f"no equilibrium beyond {factor:.3f} of the {what}: {error}", last=state
@@ -403,7 +429,7 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
     if smallest < 0.1:
         reason = f"the least coefficient of friction is {smallest:g}"
         doubts.append(Doubt(reason, "joints of stone have 0.6 to 0.75: check it"))
-    if not _stands_as_rigid_blocks(dead):
+    if not _stands_as_rigid_blocks(structure):
         reason = (
             "it was found at rest, but as rigid blocks nothing within friction holds it: "
             "archfem.stands says that it falls"
@@ -412,9 +438,9 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
     return tuple(doubts)
 
 
-def _stands_as_rigid_blocks(dead: Equilibrium) -> bool:
+def _stands_as_rigid_blocks(structure: Structure) -> bool:
     """Return whether limit analysis finds it standing, or does not apply."""
     try:
-        return stands(dead.model.structure)
+        return stands(structure)
     except (InvalidInput, DidNotConverge):  # soft bodies, bonds: no comparison is possible
         return True

@@ -336,7 +336,7 @@ def test_the_stiffness_that_is_needed_is_that_of_the_softest_joint(stack, monkey
     def fail(*_):
         raise af.DidNotConverge("made to fail", last=None)
 
-    monkeypatch.setattr(equilibrium, "equilibrium_under", fail)
+    monkeypatch.setattr(equilibrium, "_load_from_rest", fail)
     monkeypatch.setattr(equilibrium, "_find_carried_part", lambda model, newton: 0.42)
     with pytest.raises(
         af.DidNotConverge, match=r"if they are 2\.5 times as stiff, k_n from 5e\+09"
