@@ -43,8 +43,9 @@ def write_dataset(
                 small[f"{LONG_ATTRIBUTE}{name}"] = small.attrs.pop(name)
         dataset = dataset.assign_attrs()
         dataset.attrs.clear()  # which each part would write again
-        # encoding copies: of a long history one variable at a time
-        for part in (small, *(dataset[[name]] for name in large)):
+        # encoding copies: of a long history one variable at a time, with coordinates only once
+        bare = dataset.drop_vars(dataset.coords)
+        for part in (small, *(bare[[name]] for name in large)):
             own = {name: encoding[name] for name in part if name in encoding}
             part.dump_to_store(store, encoding=own)
             for name in own:

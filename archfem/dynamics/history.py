@@ -368,9 +368,10 @@ class History(ResultDisplay):
                 f"{path} does not say which parts are rings and piers, as files of earlier "
                 "versions do not: give the structure that was shaken too"
             )
-        for name in [name for name, values in dataset.items() if values.dtype == np.float32]:
+        for values in dataset.data_vars.values():
             # arithmetic with single precision would round again; one by one, for they are large
-            dataset[name] = dataset[name].astype(np.float64)
+            if values.dtype == np.float32:
+                values.data = values.data.astype(np.float64)
         return cls(with_failure_flags(_without_other_coordinates(path, dataset)), structure)
 
     def to_vtk(self, model: Model, path: str | Path) -> Path:

@@ -247,9 +247,7 @@ def find_failed_joints(joints: xr.Dataset) -> xr.DataArray:
     slides, is_open = (
         joints.variables[name].transpose(*hinge.dims).values for name in ("slide", "open")
     )
-    return xr.DataArray(
-        (hinge.values != 0) | slides | is_open, hinge.coords, hinge.dims, name="failed"
-    )
+    return hinge.copy(data=(hinge.values != 0) | slides | is_open).rename("failed")
 
 
 def first_time(flags: xr.DataArray) -> xr.DataArray:
