@@ -17,7 +17,7 @@ from .motion_scaling import CollapseScale as CollapseScale
 from .motion_scaling import mechanism_scales as mechanism_scales
 from .recorder import Record as Record
 from .rigid_body.bodies import LooseBlocks as LooseBlocks
-from .rigid_body.time_stepping import RigidBlockSimulation as RigidBlockSimulation
+from .rigid_body.simulation import RigidBlockSimulation as RigidBlockSimulation
 from .schemes import HHT as HHT
 from .schemes import Conserving as Conserving
 from .schemes import EffectiveDamping as EffectiveDamping

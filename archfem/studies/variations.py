@@ -22,7 +22,7 @@ from archfem.dynamics.damping import damping_kind, resolve_effective_damping, va
 from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
-from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
+from archfem.dynamics.rigid_body.simulation import RigidBlockSimulation
 from archfem.dynamics.schemes import Conserving, EffectiveDamping, Viscous, interpret_damping
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict_range import VerdictRange

@@ -18,7 +18,7 @@ heights = [0.8, 0.8]
 fidelity = "rigid"
 displacements = "large"
 [motion]
-synthetic = { seed = 1, duration = 1.5, pga = 30.0 }
+synthetic = { seed = 4, duration = 1.5, pga = 30.0 }
 [analysis]
 dt = 0.005
 [output]

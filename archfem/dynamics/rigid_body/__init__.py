@@ -3,6 +3,7 @@
     bodies             convex pieces, masses, friction, poses and velocities
     contact_detection  contact points by a sorted sweep and separating axes
     time_stepping      Moreau-Jean time stepping
+    simulation         frames of a run, its checks, and halved steps
 
 Start reading at `time_stepping`.
 """

@@ -92,6 +92,7 @@ class FallEnergy:
     lost: float  # in impacts and by friction
     # largest decrease of `lost` below an earlier value; zero for an exact solution
     gained: float
+    gained_share: float  # the same, beyond rounding, relative to the largest energy exchanged [-]
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,8 @@ class FallFrame(LooseBlocks):
     overlap: float  # deepest overlap of two blocks, or with the ground, since the start [m]
     settling: Settling
     resting: bool = False  # whether all blocks are at rest
+    # change of a block's displacement since twice the step, of the last frame; NaN: not compared
+    step_change: float = float("nan")
 
 
 def make_bodies(

@@ -11,7 +11,7 @@ from repeats import each_once
 
 import archfem as af
 from archfem.dynamics import LooseBlocks, RigidBlockSimulation
-from archfem.dynamics.rigid_body import time_stepping
+from archfem.dynamics.rigid_body import simulation, time_stepping
 
 THRESHOLDS = [(1.0, 0.33033), (3.0, 0.57432), (8.0, 1.20181)]
 """Frequency over p, and the least half sine that overturns the block 0.6 × 2.4 m, over g."""
@@ -272,12 +272,40 @@ def test_fast_blocks_stop_at_each_other(turn):
 
 def test_energy_from_nowhere_is_refused(monkeypatch, chords):
     """A coarse step gains energy beyond a bound that is set far below the true one."""
-    monkeypatch.setattr("archfem.dynamics.rigid_body.time_stepping.MAX_ENERGY_GAIN", 1e-12)
-    monkeypatch.setattr("archfem.dynamics.rigid_body.time_stepping.ENERGY_GAIN_NOISE", 0.0)
+    monkeypatch.setattr("archfem.dynamics.rigid_body.simulation.REFUSED_ENERGY_GAIN", 1e-12)
+    monkeypatch.setattr("archfem.dynamics.rigid_body.simulation.ENERGY_GAIN_NOISE", 0.0)
     with pytest.raises(af.errors.DidNotConverge, match="from nowhere"):
         RigidBlockSimulation(chords, dt=5e-3).final_frame(
             LooseBlocks.as_built(chords), 15.0, pulse(0.7, 0.5)
         )
+
+
+def test_a_fall_without_a_step_halves_steps_until_that_changes_little():
+    """Three drums under a synthetic motion: 9.8 mm by 0.5 ms, 33.5 mm by half, 34.9 mm at last."""
+    drums = af.column(breadth=0.6, heights=[0.8, 0.7, 0.9], contact=af.Contact(1e9, 4e8, 0.5))
+    motion = af.Motion.synthetic(duration=2.5, pga=3.5, seed=5)
+    start, found = LooseBlocks.as_built(drums), {}
+    for dt in (None, 5e-4, 6.25e-5):
+        frames = list(RigidBlockSimulation(drums, dt=dt).frames(start, 6.0, motion))
+        moved = af.dynamics.classify_collapse(drums, frames).displacement
+        found[dt] = moved, frames[-1].step_change
+    assert found[None][0] == pytest.approx(found[6.25e-5][0], rel=0.05)
+    assert found[5e-4][0] < 0.5 * found[6.25e-5][0]
+    assert found[None][1] < 0.2
+    assert np.isnan(found[5e-4][1])
+
+
+def test_steps_that_fail_are_halved_and_the_last_error_is_raised(chords, monkeypatch):
+    begin, count = LooseBlocks.as_built(chords), []
+
+    def fail(simulation, dt, *_):
+        count.append(dt)
+        raise af.DidNotConverge("made to fail")
+
+    monkeypatch.setattr(RigidBlockSimulation, "_take_steps", fail)
+    with pytest.raises(af.DidNotConverge, match=r"by steps of 0\.5 to 0\.0625 ms: made to fail"):
+        RigidBlockSimulation(chords).final_frame(begin, 1.0)
+    assert count == [5e-4, 2.5e-4, 1.25e-4, 6.25e-5]
 
 
 def test_rest_is_reported_only_once_the_ground_rests(chords):
@@ -324,12 +352,13 @@ def test_an_arch_falls_under_a_pulse_as_by_joints_of_springs(duration, least):
 @pytest.mark.parametrize("seed", range(3))
 def test_impulses_that_are_cut_short_add_no_energy(seed, monkeypatch):
     """After five sweeps of the hundreds that they take: else a run gains 1 to 3 % here."""
-    monkeypatch.setattr(time_stepping, "MAX_SWEEPS", 5)
-    monkeypatch.setattr(time_stepping, "FIRST_STEP_SWEEPS", 5)
+    monkeypatch.setattr(simulation, "MAX_SWEEPS", 5)
+    monkeypatch.setattr(simulation, "FIRST_STEP_SWEEPS", 5)
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
     start = LooseBlocks.as_built(ring)
     speeds = 0.3 * np.random.default_rng(seed).normal(size=start.velocities.shape)
-    end = RigidBlockSimulation(ring).final_frame(replace(start, velocities=speeds), 0.1)
+    falling = RigidBlockSimulation(ring, dt=5e-4)
+    end = falling.final_frame(replace(start, velocities=speeds), 0.1)
     assert end.energy.gained < time_stepping.MAX_ENERGY_GAIN * end.energy.lost
 
 
@@ -349,11 +378,12 @@ def test_a_ring_near_its_mechanism_moves_as_far_at_any_step():
 
 def test_impulses_that_are_cut_short_are_counted(monkeypatch, chords):
     start = LooseBlocks.as_built(chords)
-    settled = RigidBlockSimulation(chords).final_frame(start, 0.1, pulse(0.7, 0.5)).settling
+    falling = RigidBlockSimulation(chords, dt=5e-4)
+    settled = falling.final_frame(start, 0.1, pulse(0.7, 0.5)).settling
     assert settled.unsettled_share <= 0.02
     assert settled.sweeps >= settled.steps == 200
-    monkeypatch.setattr(time_stepping, "MAX_SWEEPS", 2)
-    cut = RigidBlockSimulation(chords).final_frame(start, 0.1, pulse(0.7, 0.5)).settling
+    monkeypatch.setattr(simulation, "MAX_SWEEPS", 2)
+    cut = falling.final_frame(start, 0.1, pulse(0.7, 0.5)).settling
     assert cut.unsettled_share > 0.1
     assert cut.residual > time_stepping.SETTLED
 
