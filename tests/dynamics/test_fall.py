@@ -11,7 +11,6 @@ from loose_blocks import G
 import archfem as af
 from archfem.dynamics import RigidBlockSimulation, State, fall, release_blocks
 
-
 # Attributes of a fall without doubts of energy and step
 BALANCED = {"fall_gained_share": 0.0, "fall_step_change": 0.0}
 
