@@ -212,8 +212,8 @@ class RunMonitor:
             when, share = self._drift_error
             raise DidNotConverge(
                 f"by t = {when:.4g} s {abs(share):.0%} of the energy had "
-                f"{'come from' if share > 0.0 else 'gone'} nowhere, so the history is wrong: use "
-                "the scheme Conserving, or damping and a smaller dt",
+                f"been {'gained without work' if share > 0.0 else 'lost to the scheme'}, so the "
+                "history is wrong: use the scheme Conserving, or damping and a smaller dt",
                 last=self._before,
             )
         if self._small and self.largest_displacement > size:
@@ -233,7 +233,9 @@ class RunMonitor:
         """Warn of energy drift, relative to the largest energy exchanged."""
         # amplitudes, which vary with the root of energy, are then off by 2.5 %
         if abs(self.worst_drift) > doubtful:
-            change = "had come from nowhere" if self.worst_drift > 0.0 else "was lost to the scheme"
+            change = (
+                "was gained by the scheme" if self.worst_drift > 0.0 else "was lost to the scheme"
+            )
             self._add_doubt(
                 "energy",
                 f"energy drifts: by t = {self._worst_time:.4g} s {abs(self.worst_drift):.0%} of "

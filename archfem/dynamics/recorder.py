@@ -221,7 +221,7 @@ class Recorder:
         since = "since the last record"
         passes = {"long_name": f"Newton iterations, or passes, {since}"}
         shortest = {"units": "s", "long_name": f"smallest step taken {since}"}
-        energy = {"units": "J", "long_name": "energy from nowhere since the start"}
+        energy = {"units": "J", "long_name": "energy drift since the start: gained without work"}
         return {
             "iterations": ("time", iterations, passes),
             "smallest_step": ("time", smallest, shortest),

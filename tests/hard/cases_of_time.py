@@ -156,7 +156,7 @@ def undamped(fidelity):
     return refused(
         lambda: shaken(model, quake(2.0), damping=None, scheme=scheme),
         af.DidNotConverge,
-        "come from nowhere",
+        "been gained without work",
     )
 
 

@@ -449,11 +449,12 @@ def build_check_section(data: ReportData) -> Section:
     """Build the section on predicted error, energy balance and model."""
     blocks: list[Any] = [TextBlock(data.deleted, "missing")] if data.deleted else []
     if data.runs:
-        head = ["run", "energy from nowhere", "supports bear", "Newton", "halved"]
+        head = ["run", "energy drift", "support reaction", "Newton iterations", "halved steps"]
         head += ["predicted error", "end"]
         rows = [_check_row(data.case, name, run) for name, run in data.runs.items()]
         caption = (
-            "Checks of each run; energy relative to the largest exchanged, supports under dead load"
+            "Checks of each run: energy drift relative to the largest energy exchanged, reaction "
+            "of the supports under dead load, and most Newton iterations between two records"
         )
         blocks.append(Grid(head, rows, caption))
     else:
@@ -483,7 +484,7 @@ def _check_row(case: Case, name: str, run: History) -> list[str]:
         name,
         f"{abs(float(attrs.get('energy_drift', np.nan))):.1e}",
         f"{ratio:.4f} of the weight",
-        f"≤ {int(iterations.max())} a record" if len(iterations) else "–",
+        f"≤ {int(iterations.max())}" if len(iterations) else "–",
         f"{int(attrs.get('halved_steps', 0))} steps",
         "–" if predicted is None else f"{float(predicted):.2g} in |e|",
         run.outcome,

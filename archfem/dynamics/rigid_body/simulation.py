@@ -345,7 +345,7 @@ class _Run:
         gained, allowed = self._energy[4], REFUSED_ENERGY_GAIN * self._energy[6] + noise
         if not gained <= allowed:
             raise DidNotConverge(
-                f"by {time:.4g} s the blocks have gained {gained:.3g} J from nowhere, of "
+                f"by {time:.4g} s the blocks have gained {gained:.3g} J without work, of "
                 f"{self._energy[6]:.3g} J exchanged (impulses of {self._settling[1]:.0f} steps did "
                 f"not settle): give a smaller dt than {self._dt:g} s"
             )
