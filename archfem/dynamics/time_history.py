@@ -6,6 +6,7 @@ blocks until they rest (`dynamics.fall`).
 """
 
 import logging
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -225,7 +226,8 @@ def _run_steps(
     else:
         assert recorder.dt is not None
         batches = stepper.batches(start, recorder.dt, end)
-    duration = round(end - start.time, 4)
+    duration, begun = round(end - start.time, 4), monotonic()
+    is_announced = False
     with tqdm(total=duration, unit="s", disable=None, leave=False) as bar:
         for batch in batches:
             ending, reason, size = _find_end(monitors, batch, recorder.state.time)
@@ -234,7 +236,24 @@ def _run_steps(
             bar.update(round(recorder.state.time - start.time - bar.n, 4))
             if reason is not None:
                 return ending, f"ended at {recorder.state.time:.4g} s by {reason}"
+            spent = monotonic() - begun
+            if not is_announced and spent > 5.0:
+                is_announced = True
+                _announce_long_run(spent, recorder.state.time - start.time, duration)
     return Ending.FINISHED, "reached the end of the motion"
+
+
+def _announce_long_run(spent: float, done: float, duration: float, long: float = 60.0) -> None:
+    """Warn of a run that takes long, estimated from its pace [s]."""
+    if (whole := spent * duration / done) > long:
+        logger.warning(
+            "the run takes about %.3g minutes at its pace (%.3g of %g s in %.3g s): Ctrl-C ends it "
+            "with what was computed, and a given dt skips the comparison of steps",
+            whole / 60.0,
+            done,
+            duration,
+            spent,
+        )
 
 
 def _find_end(monitors: Monitors, batch: Batch, before: float) -> tuple[Ending, str | None, int]:

@@ -205,3 +205,16 @@ def test_steps_that_missed_their_tolerance_are_doubted(share, count):
     doubts = _state_tolerance(History(xr.Dataset()), 1e-3, share).doubts
     assert len(doubts) == count
     assert all("more than 0.001 in |e| in 2% of the run" in doubt.cause for doubt in doubts)
+
+
+@pytest.mark.parametrize(("pace", "announced"), [(0.4, True), (0.01, False)])
+def test_a_run_of_minutes_is_announced_after_five_seconds(
+    stack, monkeypatch, caplog, pace, announced
+):
+    """By a clock that ticks at each look: 100 s, of which every batch of steps takes a share."""
+    looks = iter(np.arange(0.0, 1e4, 30.0 * pace))
+    monkeypatch.setattr("archfem.dynamics.time_history.monotonic", lambda: next(looks))
+    model = af.build(stack, fidelity="rigid")
+    af.time_history(model, af.Motion(np.zeros(4001), 0.005), dt=0.005)
+    words = [r.getMessage() for r in caplog.records if "the run takes about" in r.getMessage()]
+    assert len(words) == announced
