@@ -49,7 +49,7 @@ def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypat
     assert (dataset.attrs["fall_violation"], dataset.attrs["fall_unsettled"]) == (0.25, 0.5)
 
 
-@pytest.mark.parametrize("ratio", [0.9, 0.8, 0.5, None])
+@pytest.mark.parametrize("ratio", [0.9, pytest.param(0.8, marks=pytest.mark.slow), 0.5, None])
 def test_a_block_handed_over_rocks_on_with_the_restitution_of_its_damping(ratio):
     """Rocking energies of the first three tilts; Housner's 1 - 3/2 sin² α at least, with a doubt.
 

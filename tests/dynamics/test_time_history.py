@@ -82,7 +82,12 @@ def test_criteria_of_run_and_event_must_be_the_same(model, motion):
 
 
 @pytest.mark.parametrize(
-    "event", [af.dynamics.EveryMechanism(), af.CountedMechanism(), af.dynamics.MovingMechanism()]
+    "event",
+    [
+        af.dynamics.EveryMechanism(),
+        pytest.param(af.CountedMechanism(), marks=pytest.mark.slow),
+        pytest.param(af.dynamics.MovingMechanism(), marks=pytest.mark.slow),
+    ],
 )
 def test_an_event_begins_afresh_in_each_run(model, motion, event):
     first, second = (af.time_history(model, motion, **GIVEN, until=event) for _ in range(2))

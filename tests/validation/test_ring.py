@@ -28,7 +28,12 @@ TRIAL = {  # cells, rule, points: crown eccentricity as found in a trial of join
 }
 
 
-@pytest.mark.parametrize("setting", TRIAL, ids=str)
+@pytest.mark.parametrize(
+    "setting",
+    # other tests have meshes as fine
+    [pytest.param(each, marks=pytest.mark.slow if each[0] == 16 else ()) for each in TRIAL],
+    ids=str,
+)
 def test_crown_eccentricity(ring, setting):
     cells, rule, points = setting
     model = af.build(glued(ring), cells=(cells, cells), quadrature=rule, quadrature_points=points)

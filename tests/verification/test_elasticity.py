@@ -191,8 +191,8 @@ def jump_error(cells, degree, cell):
     ("degree", "cell", "bound"),
     [
         (1, "quadrilateral", 1.5e-4),
-        (1, "triangle", 1.7e-4),
-        (2, "quadrilateral", 5e-7),
+        pytest.param(1, "triangle", 1.7e-4, marks=pytest.mark.slow),
+        pytest.param(2, "quadrilateral", 5e-7, marks=pytest.mark.slow),
         (2, "triangle", 7e-7),
     ],
 )

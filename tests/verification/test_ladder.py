@@ -137,7 +137,7 @@ def test_compiled_steppers_give_the_history_of_snes(ring, fidelity, rule, joints
         "newton": TIGHT,
         "dt": 0.005,
     }
-    short = MOTION.cut(1.2, 1.5)
+    short = MOTION.cut(1.2, 1.4)
     slow = af.time_history(model, short, method="snes", **given)
     for method in ("newton", "compliance"):
         fast = af.time_history(model, short, method=method, **given)

@@ -40,7 +40,7 @@ def falls(ratio, peak, halves, dt=5e-4):
 
 @pytest.mark.parametrize(
     ("ratio", "least"),
-    [THRESHOLDS[0], pytest.param(*THRESHOLDS[1], marks=pytest.mark.slow), THRESHOLDS[2]],
+    [*(pytest.param(*each, marks=pytest.mark.slow) for each in THRESHOLDS[:2]), THRESHOLDS[2]],
 )
 def test_a_half_sine_overturns_above_its_threshold(ratio, least, verified):
     """Within 0.01 %, five digits of the threshold being known to 0.001 %."""
@@ -298,7 +298,9 @@ def test_a_column_that_swings_slowly_does_not_rest():
     assert end.poses[1, 2] == pytest.approx(-np.pi / 2.0, abs=1e-3)
 
 
-@pytest.mark.parametrize(("duration", "least"), [(0.2, 1.070), (1.5, 0.3827)])
+@pytest.mark.parametrize(
+    ("duration", "least"), [(0.2, 1.070), pytest.param(1.5, 0.3827, marks=pytest.mark.slow)]
+)
 def test_an_arch_falls_under_a_pulse_as_by_joints_of_springs(duration, least):
     """Oppenheim's arch, against stiff joints and conserved energy: within 1 % of their pulse [g].
 

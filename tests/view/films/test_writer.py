@@ -24,7 +24,7 @@ def test_a_killed_film_leaves_the_old_one(tmp_path, count, suffix):
     path.write_bytes(b"old")
     with pytest.raises(KeyboardInterrupt):
         write_film(path, cut_short(count), fps=10.0)
-    sleep(0.2)
+    sleep(0.2 if count else 0.0)  # no encoder begins without a frame
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
     assert path.read_bytes() == b"old"
 
