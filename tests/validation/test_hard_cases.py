@@ -4,6 +4,7 @@ import pytest
 from hard.table import CASES
 
 LONG = (
+    "joints 1000 × softer",
     "rocking block, HHT(-0.1), 1 ms",
     "time step 20 ms",
     "filled segment of 30°",

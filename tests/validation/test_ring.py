@@ -47,7 +47,9 @@ def lawful(ring, request):
     return {"sliding": ring, "glued": glued(ring)}[request.param], CONVERGED[request.param]
 
 
-@pytest.mark.parametrize("rule", ["lobatto", "nodal", "gauss"])
+@pytest.mark.parametrize(
+    "rule", ["lobatto", "nodal", pytest.param("gauss", marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("law", ["sliding", pytest.param("glued", marks=pytest.mark.slow)])
 def test_converges_under_refinement(ring, law, rule):
     """Of glued joints the values of each rule are pinned by `test_crown_eccentricity`."""

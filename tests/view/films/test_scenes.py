@@ -20,7 +20,7 @@ def reds(image):
     return int((np.abs(inside - RED).max(axis=-1) < 12).sum())
 
 
-@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
+@pytest.mark.parametrize("suffix", [".mp4", pytest.param(".gif", marks=pytest.mark.slow)])
 def test_a_film_decodes_to_its_frames(model, run, tmp_path, suffix):
     path = tmp_path / "new" / f"film{suffix}"
     assert film(model, run, path, fps=10, seconds=0.3, size=SIZE) == path

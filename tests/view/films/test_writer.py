@@ -5,6 +5,7 @@ from time import sleep
 import numpy as np
 import pytest
 from PIL import Image
+from repeats import each_once
 
 import archfem as af
 from archfem.view.films.encoder import film_path, write_film
@@ -16,8 +17,9 @@ def cut_short(count):
     raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
-@pytest.mark.parametrize("count", [0, 1, 5])
+@pytest.mark.parametrize(
+    ("count", "suffix"), [*each_once((0, 1), (".mp4", ".gif")), (5, ".mp4"), (5, ".gif")]
+)
 def test_a_killed_film_leaves_the_old_one(tmp_path, count, suffix):
     """Also once the encoder has ended, which may begin its file late."""
     path = tmp_path / f"film{suffix}"
