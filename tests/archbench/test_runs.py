@@ -187,8 +187,8 @@ def test_every_program_answers_one_scene_where_it_is_installed(name):
 @pytest.mark.parametrize(
     ("cost", "tolerance", "least"),
     [
-        # every scene that takes less than 0.1 s, by some of its settings
-        (0.08, 1e-3, 25),
+        # every scene that takes less than 0.05 s, by some of its settings
+        (0.05, 1e-3, 15),
         # amplitudes of falls are searched to 1 %, and depend on the rounding of the processor
         pytest.param(60.0, 1e-2, 140, marks=pytest.mark.slow),
     ],

@@ -427,7 +427,9 @@ ATTACKS = {
 
 
 @pytest.mark.parametrize("attack", ATTACKS)
-def test_the_report_of_a_folder_touches_nothing_outside_it(attack, two_runs, mine, capsys):
+def test_the_report_of_a_folder_touches_nothing_outside_it(
+    attack, two_runs, mine, unplotted, capsys
+):
     """Links and names that lead out of the folder end in an error, and files stay as they are."""
     folder, _ = two_runs
     ATTACKS[attack](folder, mine)
