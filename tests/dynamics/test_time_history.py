@@ -59,7 +59,10 @@ def test_criteria_of_the_event_are_those_of_the_run(model, weak):
     assert halted.mechanism.time == halted.time[-1]
 
 
-@pytest.mark.parametrize("event", [af.CountedMechanism(), af.dynamics.MovingMechanism()])
+@pytest.mark.parametrize(
+    "event",
+    [af.CountedMechanism(), pytest.param(af.dynamics.MovingMechanism(), marks=pytest.mark.slow)],
+)
 def test_an_event_obeys_the_criteria_of_the_run(model, motion, event):
     criteria = af.Criteria(hinge=0.42, friction=0.4)
     whole = af.time_history(model, motion, **GIVEN, criteria=criteria)

@@ -41,9 +41,19 @@ def model(fidelity="rigid", friction=0.6, displacements="large", quadrature="exa
     )
 
 
-@pytest.mark.parametrize("quadrature", ["exact", "nodal"])
-@pytest.mark.parametrize("friction", [0.4, None])
-@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+@pytest.mark.parametrize(
+    ("fidelity", "friction", "quadrature"),
+    [
+        ("rigid", 0.4, "nodal"),
+        ("faces", 0.4, "exact"),
+        ("faces", None, "nodal"),
+        pytest.param("rigid", 0.4, "exact", marks=pytest.mark.slow),
+        pytest.param("rigid", None, "exact", marks=pytest.mark.slow),
+        pytest.param("rigid", None, "nodal", marks=pytest.mark.slow),
+        pytest.param("faces", 0.4, "nodal", marks=pytest.mark.slow),
+        pytest.param("faces", None, "exact", marks=pytest.mark.slow),
+    ],
+)
 def test_small_motions_are_those_of_small_displacements(fidelity, friction, quadrature):
     """Forces and tangents at random states of 1 nm: the difference is of second order."""
     far = model(fidelity, friction, quadrature=quadrature)
