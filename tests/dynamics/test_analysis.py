@@ -131,12 +131,12 @@ def test_its_sensitivity_to_mesh_and_step():
 
 
 def test_the_range_of_its_verdict_is_of_large_displacements():
-    small = replace(ROCKING, displacements="small")
-    found = small.verdict_range(MOTION, samples=1, vary={"joint_rule": ["exact"]})
+    small, motion = replace(ROCKING, displacements="small"), MOTION.cut(0.0, 0.3)
+    found = small.verdict_range(motion, samples=1, vary={"joint_rule": ["exact"]})
     assert found.dataset["outcome"].values[0] == "stands"
-    assert found.dataset["displacement"].values[0] == ROCKING.run(MOTION).verdict.displacement
+    assert found.dataset["displacement"].values[0] == ROCKING.run(motion).verdict.displacement
     undamped = replace(ROCKING, damping=None).verdict_range(
-        MOTION, samples=1, vary={"joint_rule": ["exact"]}
+        motion, samples=1, vary={"joint_rule": ["exact"]}
     )
     assert not {"damping_ratio", "damping_kind"} & set(undamped.properties)
 

@@ -52,7 +52,7 @@ def damping_of(structure):
     return default_damping(build_rigid_model(structure, rule=af.joints.Quadrature("exact")))
 
 
-def actual_error(model, finest, motion, damping, step=0.000625):
+def actual_error(model, finest, motion, damping, step=0.00125):
     """Difference of the largest |e| of the worst joint to that of a finer model."""
     runs = [
         run_peaks(model, motion, damping, model.prediction.dt),
