@@ -66,7 +66,7 @@ def balance(start, energy):
 @pytest.mark.parametrize(
     "dt", [0.01, *(pytest.param(dt, marks=pytest.mark.slow) for dt in (0.005, 0.002)), 0.001]
 )
-@pytest.mark.parametrize("friction", [0.3, 0.6, None])
+@pytest.mark.parametrize("friction", [0.3, pytest.param(0.6, marks=pytest.mark.slow), None])
 @pytest.mark.parametrize("kind", ["rocking", "sliding"])
 def test_an_undamped_block_neither_gains_nor_loses(kind, friction, dt):
     """Drift is below 1e-8 of the exchanged energy; friction gives none; V ≤ μ N at every step."""
