@@ -20,6 +20,8 @@ FIRST = ("opensees_ring", "run")
 """Scripts that import OpenSees, which must be loaded before archfem and its MPI."""
 
 LONG = (
+    "scaling",
+    "shaken_blocks",
     "assessment_map",
     "bridge",
     "bridge_falls",

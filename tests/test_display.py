@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 import archfem as af
 from archfem._display import ResultDisplay
 from archfem.dynamics import CollapseState
+from archfem.limit import vehicles
 from archfem.studies import variations
 
 
@@ -21,6 +23,7 @@ def things():
         # the runs of the range, which other tests compute, take most of the time
         stands = CollapseState("stands", None, (), 0.02, 0.01, True)
         patch.setattr(variations, "_run_elastic_joints", lambda *_: stands)
+        patch.setattr(vehicles, "_places_along", partial(vehicles._places_along, steps=20))
         yield one_of_each()
 
 

@@ -16,7 +16,16 @@ def test_each_has_a_title():
     assert all(titles.values())
 
 
-@pytest.mark.parametrize("name", ["ring", "ring_falls", "ring_paper", "survey", "prusias_restored"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "ring",
+        "ring_falls",
+        "ring_paper",
+        "survey",
+        pytest.param("prusias_restored", marks=pytest.mark.slow),
+    ],
+)
 def test_a_case_that_is_printed_can_be_run_from_anywhere(name, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(read_example(name)[0], encoding="utf-8")

@@ -427,7 +427,9 @@ ATTACKS = {
 
 
 @pytest.mark.parametrize("attack", ATTACKS)
-def test_the_report_of_a_folder_touches_nothing_outside_it(attack, two_runs, mine, capsys):
+def test_the_report_of_a_folder_touches_nothing_outside_it(
+    attack, two_runs, mine, unplotted, capsys
+):
     """Links and names that lead out of the folder end in an error, and files stay as they are."""
     folder, _ = two_runs
     ATTACKS[attack](folder, mine)
@@ -477,7 +479,7 @@ def test_a_study_in_a_folder_of_a_stranger_touches_nothing_outside(name, two_run
     assert contents(mine) == before
 
 
-def test_files_that_are_missing_are_named(two_runs, caplog):
+def test_files_that_are_missing_are_named(two_runs, unplotted, caplog):
     """Both a picture and a history of the list; a report itself may be deleted."""
     folder, _ = two_runs
     with replace_results(folder, "report", read_file_list(folder)["run"].inputs) as draft:

@@ -123,7 +123,7 @@ def test_nothing_is_kept_of_another_drawing_or_by_another_program(
     tables = {
         "structure": {"shape": "outlines", "file": drawing.name},
         "model": {"fidelity": "rigid"},
-        "suite": {"pairs": {"one": {"synthetic": {"duration": 0.5, "pga": 0.5}}}},
+        "suite": {"pairs": {"one": {"synthetic": {"duration": 0.25, "pga": 0.5}}}},
         "analysis": {"dt": 0.005},
     }
     kept = []

@@ -16,7 +16,7 @@ from archfem.commands.run import print_results
 RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
 
 
-def test_run_command(tmp_path, low_resolution, capsys):
+def test_run_command(tmp_path, undrawn, capsys):
     changes = ["model.fidelity=rigid", "motion.end=0.5", "output.animation=false"]
     changes += ["structure.voussoirs=7"]
     given = [part for change in changes for part in ("--set", change)]

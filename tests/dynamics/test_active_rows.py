@@ -60,7 +60,12 @@ RUNS = {
 }
 
 
-@pytest.fixture(scope="module", params=RUNS)
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(name, marks=pytest.mark.slow if name == "many rows" else ()) for name in RUNS
+    ],
+)
 def case(request):
     *model, many, iterations = RUNS[request.param]
     return RandomRun(*model), many, iterations

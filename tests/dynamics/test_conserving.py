@@ -66,7 +66,7 @@ def balance(start, energy):
 @pytest.mark.parametrize(
     "dt", [0.01, *(pytest.param(dt, marks=pytest.mark.slow) for dt in (0.005, 0.002)), 0.001]
 )
-@pytest.mark.parametrize("friction", [0.3, 0.6, None])
+@pytest.mark.parametrize("friction", [0.3, pytest.param(0.6, marks=pytest.mark.slow), None])
 @pytest.mark.parametrize("kind", ["rocking", "sliding"])
 def test_an_undamped_block_neither_gains_nor_loses(kind, friction, dt):
     """Drift is below 1e-8 of the exchanged energy; friction gives none; V ≤ μ N at every step."""
@@ -176,7 +176,8 @@ def swing(built, dt, damping):
 
 
 @pytest.mark.parametrize(
-    ("friction", "least", "bound"), [(None, 1.7, 1e-5), (0.6, 1.7, 1e-5), (0.2, 1.2, 1e-5)]
+    ("friction", "least", "bound"),
+    [(None, 1.7, 1e-5), pytest.param(0.6, 1.7, 1e-5, marks=pytest.mark.slow), (0.2, 1.2, 1e-5)],
 )
 def test_order_of_a_rocking_block_through_impacts(friction, least, bound):
     """About second where joints damp and hold, of a swing of 16 mm and one impact and a half.

@@ -63,7 +63,7 @@ def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypat
     assert "how far a block falls or moves by 75%" in causes
 
 
-@pytest.mark.parametrize("ratio", [0.9, 0.8, 0.5, None])
+@pytest.mark.parametrize("ratio", [0.9, pytest.param(0.8, marks=pytest.mark.slow), 0.5, None])
 def test_a_block_handed_over_rocks_on_with_the_restitution_of_its_damping(ratio):
     """Rocking energies of the first three tilts; Housner's 1 - 3/2 sin² α at least, with a doubt.
 

@@ -113,10 +113,8 @@ def test_newmarks_block_under_an_earthquake(friction):
     assert abs(slid(friction, 1e11, motion, 2.5e-4) - expected) < 1e-3 * path
 
 
-@pytest.mark.parametrize(
-    "friction",
-    [pytest.param(0.1, marks=pytest.mark.slow), 0.2, pytest.param(0.3, marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [0.1, 0.2, 0.3])
 def test_newmarks_block_under_a_record(friction):
     """The first 10 s of Erzincan: 0.37, 0.20 and 0.06 m, to 1e-4 of the way."""
     motion = erzincan()

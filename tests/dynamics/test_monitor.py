@@ -258,7 +258,7 @@ def drift_by(method, ring, rule, joints, scheme):
         "damping": af.Rayleigh(0.05, (8.0, 16.0), joints),
         "newton": af.statics.Newton(tolerance=1e-13),
     }
-    run = af.time_history(model, SHAKING.cut(1.2, 1.3), method=method, **given)
+    run = af.time_history(model, SHAKING.cut(1.2, 1.26), method=method, **given)
     return run.dataset["energy_drift"].values, model
 
 

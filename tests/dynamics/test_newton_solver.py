@@ -38,7 +38,9 @@ def _steps(equation, start, widest):
     return list(Stepper(equation, NewtonSolver(equation, widest)).batches(start, DT, 0.15))
 
 
-@pytest.mark.parametrize("damping", [None, af.StiffnessDamping(0.05, 8.0)])
+@pytest.mark.parametrize(
+    "damping", [pytest.param(None, marks=pytest.mark.slow), af.StiffnessDamping(0.05, 8.0)]
+)
 # the sparse factor of small displacements, which "auto" never selects, compiles for 20 s
 @pytest.mark.parametrize(
     "widest",

@@ -29,7 +29,7 @@ def test_a_stepper_falls_back(ring, rule, scheme, solver):
     """With one pass allowed, every step that opens or closes a point is left to SNES."""
     slides = scheme == af.dynamics.Conserving()
     model = af.build(ring if slides else glued(ring), fidelity="rigid", quadrature=rule)
-    newton, short = af.statics.Newton(tolerance=1e-13), MOTION.cut(1.2, 1.4)
+    newton, short = af.statics.Newton(tolerance=1e-13), MOTION.cut(1.2, 1.3)
     equation = af.dynamics.Equation(model, short, DAMPING, scheme)
     solves, given = af.dynamics.SnesSolver(equation, newton), {"newton": newton, "dt": 0.005}
     exact = af.time_history(model, short, method=Stepper(equation, exact=solves), **given)

@@ -59,7 +59,10 @@ def test_criteria_of_the_event_are_those_of_the_run(model, weak):
     assert halted.mechanism.time == halted.time[-1]
 
 
-@pytest.mark.parametrize("event", [af.CountedMechanism(), af.dynamics.MovingMechanism()])
+@pytest.mark.parametrize(
+    "event",
+    [af.CountedMechanism(), pytest.param(af.dynamics.MovingMechanism(), marks=pytest.mark.slow)],
+)
 def test_an_event_obeys_the_criteria_of_the_run(model, motion, event):
     criteria = af.Criteria(hinge=0.42, friction=0.4)
     whole = af.time_history(model, motion, **GIVEN, criteria=criteria)
@@ -82,7 +85,12 @@ def test_criteria_of_run_and_event_must_be_the_same(model, motion):
 
 
 @pytest.mark.parametrize(
-    "event", [af.dynamics.EveryMechanism(), af.CountedMechanism(), af.dynamics.MovingMechanism()]
+    "event",
+    [
+        af.dynamics.EveryMechanism(),
+        pytest.param(af.CountedMechanism(), marks=pytest.mark.slow),
+        pytest.param(af.dynamics.MovingMechanism(), marks=pytest.mark.slow),
+    ],
 )
 def test_an_event_begins_afresh_in_each_run(model, motion, event):
     first, second = (af.time_history(model, motion, **GIVEN, until=event) for _ in range(2))

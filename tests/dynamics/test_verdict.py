@@ -100,7 +100,7 @@ def test_failures_at_different_times_count_over_the_record_alone():
     assert mechanism_over_record(apart) is None
 
 
-@pytest.mark.parametrize("dt", [0.005, None])
+@pytest.mark.parametrize("dt", [0.005, pytest.param(None, marks=pytest.mark.slow)])
 def test_an_event_over_the_record_ends_a_run_where_the_record_says(model, motion, dt):
     given, short = {"dt": dt, "damping": af.StiffnessDamping(0.05, 8.0)}, motion.cut(0.0, 1.5)
     event = af.dynamics.CountedMechanism(over="record")

@@ -122,7 +122,7 @@ def test_numpy_and_compiled_means_of_a_step_are_equal(lag):
 def test_ufl_and_numpy_means_of_a_step_are_equal():
     """UFL evaluates its own expressions of the same definition, and differentiates them."""
     ufl, lag = pytest.importorskip("ufl"), 0.3
-    law, _, gaps, shear = states(2, count := 6)
+    law, _, gaps, shear = states(2, count := 4)
     constant = constants_of_ufl()
     symbols = [constant() for _ in range(len(law) + 4)]
     symbolic, (a, b, first, change) = ContactLaw(*symbols[: len(law)]), symbols[len(law) :]

@@ -8,7 +8,7 @@ from kinematics import gaps
 
 import archfem as af
 from archfem.joints.criteria import with_failure_flags
-from archfem.limit import End, Outcome, closed_cohesion
+from archfem.limit import End, Outcome, closed_cohesion, nonassociated
 from archfem.limit.collapse import warn_cohesion
 
 EXACT = 1e-7
@@ -16,6 +16,12 @@ EXACT = 1e-7
 
 SIDEWAYS = af.BodyForce(1.0)
 SLIDING = ["coulomb", "nonassociated"]
+
+
+@pytest.fixture(autouse=True)
+def few_starts(monkeypatch):
+    """Searches without dilatancy start from the associated state and five others, not forty."""
+    monkeypatch.setattr(nonassociated, "MAX_START_COUNT", 5)
 
 
 def glued(cohesion, friction=0.4):

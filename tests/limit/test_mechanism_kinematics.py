@@ -179,12 +179,12 @@ def test_the_same_pile_is_judged_where_it_is_a_pier():
     assert (found.kind, found.moved.part) == ("local", "pier 2")
 
 
-def random_state(structure, rng):
+def random_state(structure, rng, apart=0.04):
     """A few joints that hinge, slide or come apart."""
     resultants = np.zeros((len(structure.joints), 3))
     resultants[:, 0] = WEIGHT
     for joint in rng.choice(len(structure.joints), rng.integers(2, 9), replace=False):
-        what = rng.choice(5, p=[0.4, 0.4, 0.08, 0.08, 0.04])
+        what = rng.choice(5, p=[0.44 - apart, 0.4, 0.08, 0.08, apart])
         arm = 0.5 * WEIGHT * structure.joints[joint].depth
         resultants[joint] = [
             (WEIGHT, 0.0, arm),
@@ -214,20 +214,26 @@ def bonded_wall():
 
 
 @pytest.mark.parametrize(
-    ("structure", "states"),
-    [(piers(chords=1), 60), (filled(), 60), (beside("side wall"), 60), (bonded_wall(), 300)],
+    ("structure", "states", "apart"),
+    [
+        (piers(chords=1), 40, 0.04),
+        (filled(), 50, 0.04),
+        (beside("side wall"), 40, 0.04),
+        (bonded_wall(), 60, 0.34),  # its stones seldom move where none of their joints comes apart
+    ],
     ids=["piers", "fill", "side wall", "bonded wall"],
 )
-def test_loops_exclude_only_motions_that_the_programme_excludes(structure, states):
+def test_loops_exclude_only_motions_that_the_programme_excludes(structure, states, apart):
     """Two formulations: the cone of gaps that close every loop, and the programme in motions."""
     verifier, rng = af.limit.Verifier(structure), np.random.default_rng(1)
     agreed = {True: 0, False: 0}
     for _ in range(states):
-        joints = random_state(structure, rng)
+        joints = random_state(structure, rng, apart)
         moves = verifier.verify(joints).kind != "none"
         permitted = verifier.loop_check.permits_motion(verifier.freedoms(joints))
         assert permitted or not moves
         agreed[moves] += permitted == moves
+    print(agreed)
     assert agreed[True] > 10
     assert agreed[False] > 10
     assert sum(agreed.values()) >= states - 1  # hinges almost in a line are left to the programme

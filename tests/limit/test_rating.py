@@ -170,9 +170,13 @@ def test_words_and_table(lorry_rating):
 @pytest.mark.parametrize(
     ("vehicle", "given", "says"),
     [
-        ("own", {}, "passes without partial and dynamic factors"),
+        pytest.param(
+            "own", {}, "passes without partial and dynamic factors", marks=pytest.mark.slow
+        ),
         ("own", {"live": 1.5}, "passes without dynamic factor"),
-        ("own", {"impact": 1.3}, "passes without partial factor"),
+        pytest.param(
+            "own", {"impact": 1.3}, "passes without partial factor", marks=pytest.mark.slow
+        ),
         ("own", {"live": 1.5, "impact": 1.3}, "passes"),
         ("by span", {"live": 1.45}, "passes without dynamic factor"),
         ("LM2", {"width": 100.0}, "passes"),

@@ -288,7 +288,7 @@ def test_steps_are_a_hundredth_of_the_movement():
     assert shares == pytest.approx(0.01 * np.arange(held))
 
 
-@pytest.mark.parametrize("settlement", [SPREAD, SINK])
+@pytest.mark.parametrize("settlement", [SPREAD, pytest.param(SINK, marks=pytest.mark.slow)])
 def test_blocks_neither_overlap_nor_slide_at_the_end_of_a_movement(settlement):
     """To rounding, by the places of their corners, after large steps of the support."""
     ring = semicircle(0.15, 7, contact=rough(np.inf))

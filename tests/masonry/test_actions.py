@@ -60,7 +60,7 @@ def test_a_point_load_at_a_height_acts_on_the_block_there(stack):
         af.PointLoad(0.6, (-1.0, 0.0), y=0.4).place(stack)
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "full"])
+@pytest.mark.parametrize("fidelity", ["rigid", pytest.param("full", marks=pytest.mark.slow)])
 def test_a_push_below_mid_height_tips_a_stack_by_half_its_breadth_over_its_lever_arm(
     stack, fidelity
 ):

@@ -96,7 +96,14 @@ def test_the_deck_is_as_long_as_its_parts(prusias):
 
 
 @pytest.mark.parametrize(
-    "name", ["prusias", "prusias_piers", "prusias_wall", "prusias_fill", "prusias_restored"]
+    "name",
+    [
+        "prusias",
+        pytest.param("prusias_piers", marks=pytest.mark.slow),
+        pytest.param("prusias_wall", marks=pytest.mark.slow),
+        "prusias_fill",
+        pytest.param("prusias_restored", marks=pytest.mark.slow),
+    ],
 )
 def test_blocks_of_the_shipped_bridges_do_not_overlap(name):
     assert_apart(af.Case.read(MESHES / f"{name}.toml").structure)

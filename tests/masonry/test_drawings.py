@@ -18,7 +18,13 @@ from archfem.masonry.survey.drawings import read_drawing
 
 @pytest.mark.parametrize(
     ("units", "factor", "unit"),
-    [(6, 1.0, None), (4, 1e3, None), (5, 1e2, None), (0, 1e3, "mm"), (1, 1e2, "cm")],
+    [
+        (6, 1.0, None),
+        (4, 1e3, None),
+        pytest.param(5, 1e2, None, marks=pytest.mark.slow),
+        pytest.param(0, 1e3, "mm", marks=pytest.mark.slow),
+        (1, 1e2, "cm"),
+    ],
     ids=["m", "mm", "cm", "given", "given against the file"],
 )
 def test_round_trip_through_dxf(viaduct, tmp_path, units, factor, unit):
@@ -227,7 +233,7 @@ def test_arcs_of_polylines_are_read_to_half_of_snap(tmp_path, mirrored, verified
     exact = af.circular_arch(radius=2.2, thickness=0.4, embrace=180.0, voussoirs=13)
     area = sum(block.area for block in exact.blocks if not block.fixed)
     factors = []
-    for snap in (1e-3, 1e-5):
+    for snap in (1e-3,) if mirrored else (1e-3, 1e-5):
         found = af.masonry.surveyed(path, layers=ARCH, snap=snap)
         assert len(found.joints) == 14
         stones = [block for block in found.blocks if not block.fixed]
@@ -240,7 +246,9 @@ def test_arcs_of_polylines_are_read_to_half_of_snap(tmp_path, mirrored, verified
         assert 0.0 < lost < np.pi * 2.4 * snap / 3.0
         factors.append(af.collapse_factor(found, live=af.BodyForce(1.0)).factor)
     reference = af.collapse_factor(exact, live=af.BodyForce(1.0)).factor
-    assert factors == pytest.approx([reference] * 2, rel=1e-3)
+    assert factors == pytest.approx([reference] * len(factors), rel=1e-3)
+    if mirrored:
+        return
     assert factors[1] == pytest.approx(reference, rel=1e-5)
     verified("ring drawn with arcs of DXF: collapse factor", reference, "exact arcs", factors[1])
 

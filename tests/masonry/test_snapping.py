@@ -10,7 +10,10 @@ import archfem as af
 from archfem.masonry.block import measure_polygon
 
 
-@pytest.mark.parametrize(("error", "snap"), [(0.5e-3, 2e-3), (2e-3, 8e-3), (8e-3, 0.03)])
+@pytest.mark.parametrize(
+    ("error", "snap"),
+    [(0.5e-3, 2e-3), pytest.param(2e-3, 8e-3, marks=pytest.mark.slow), (8e-3, 0.03)],
+)
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
 def test_disturbed_outlines_are_made_to_touch(viaduct, drawing, tmp_path, error, snap, seed):
     rng = np.random.default_rng(seed)

@@ -116,7 +116,7 @@ def test_motions_and_bands_that_cannot_be_matched_are_refused(shaking):
     [
         pytest.param("peer_at2/RSN126_GAZLI_GAZ-UP.AT2", marks=pytest.mark.slow),
         "plain_columns/erzikan.txt",
-        "other_formats/0111a.smc",
+        pytest.param("other_formats/0111a.smc", marks=pytest.mark.slow),
     ],
 )
 def test_real_records_match(name):

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from repeats import each_once
 
 import archfem as af
 from archfem.statics import FreeBody, forces_on
@@ -33,8 +34,9 @@ def check_balance(model, joints):
     return max(left)
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "faces", "full"])
-@pytest.mark.parametrize("name", ["ring", "stack", "portal"])
+@pytest.mark.parametrize(
+    ("name", "fidelity"), each_once(("ring", "stack", "portal"), ("rigid", "faces", "full"))
+)
 def test_forces_on_every_block_balance(request, name, fidelity):
     model = af.build(request.getfixturevalue(name), fidelity=fidelity)
     check_balance(model, af.dead_load(model).joints)

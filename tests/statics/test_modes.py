@@ -113,8 +113,8 @@ def test_effective_masses_add_up_to_all_that_moves(fidelity, verified):
     "fidelity",
     [
         "rigid",
-        *(pytest.param(each, marks=pytest.mark.slow) for each in ("faces", "condensed")),
-        "full",
+        "faces",
+        *(pytest.param(each, marks=pytest.mark.slow) for each in ("condensed", "full")),
     ],
 )
 def test_as_dense_lapack_about_dead_load(ring, fidelity, verified):

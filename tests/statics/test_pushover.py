@@ -87,7 +87,7 @@ def test_rigid_blocks_on_elastic_joints_reach_the_limit(control, load):
     ("fidelity", "load"),
     [
         ("faces", "two at the crown"),
-        ("condensed", "sideways"),
+        pytest.param("condensed", "sideways", marks=pytest.mark.slow),
         pytest.param("full", "two at the crown", marks=pytest.mark.slow),
         pytest.param("faces", "sideways", marks=pytest.mark.slow),
         pytest.param("condensed", "two at the crown", marks=pytest.mark.slow),
@@ -254,7 +254,7 @@ def test_the_outcome_names_the_load_or_the_support_that_moved():
     "motion",
     [
         (-1.0, 0.0, 0.0),
-        (1.0, 0.0, 0.0),
+        pytest.param((1.0, 0.0, 0.0), marks=pytest.mark.slow),
         pytest.param((0.0, -1.0, 0.0), marks=pytest.mark.slow),
     ],
 )

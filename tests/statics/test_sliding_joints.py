@@ -38,7 +38,14 @@ def incline(angle, friction, breadth=1.0, height=0.5):
     )
 
 
-@pytest.mark.parametrize(("friction", "rule"), each_once((0.2, 0.5, 0.8), ("lobatto", "exact")))
+@pytest.mark.parametrize(
+    ("friction", "rule"),
+    [
+        *each_once((0.2, 0.5), ("lobatto", "exact")),
+        pytest.param(0.8, "lobatto", marks=pytest.mark.slow),
+        pytest.param(0.8, "exact", marks=pytest.mark.slow),
+    ],
+)
 def test_a_block_stays_on_an_incline_up_to_the_angle_of_friction(friction, rule):
     """tan φ = μ - 1e-6 holds, with V / N = tan φ; tan φ = μ + 1e-6 does not."""
     steep = friction - 1e-6
@@ -304,9 +311,7 @@ def unbalanced(structure, load, pushed):
     return max(rest)
 
 
-QUICK = [(ring, seed) for seed in (0, 2, 4, 9, 13)] + [
-    (wall, seed) for seed in (2, 3, 6, 9, 12, 15)
-]
+QUICK = [(ring, seed) for seed in (2, 4, 9, 13)] + [(wall, seed) for seed in (2, 3, 6, 9, 12, 15)]
 OTHERS = [(make, seed) for make in (ring, wall) for seed in range(16) if (make, seed) not in QUICK]
 
 

@@ -191,6 +191,7 @@ def pushed_sideways(structure, cells, eccentricity):
     return field, float(joint_stress(structure, state.joints).max())
 
 
+@pytest.mark.slow
 def test_near_a_hinge_the_edge_stress_is_nearer_than_a_coarse_field(ring):
     """Pushed to |e| = 0.40: 5 % above 16 × 16 cells, where 4 × 4 are 18 % below."""
     fields, edges = zip(*(pushed_sideways(glued(ring), n, 0.395) for n in (4, 16)), strict=True)

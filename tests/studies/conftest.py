@@ -30,6 +30,11 @@ def lengths(case):
     return {"twice": 2.0 * ring["thickness"], "voussoirs": ring["voussoirs"], "rows": [1.0, 2.0]}
 
 
+def lengths_again(case):
+    """The same findings by another name."""
+    return lengths(case)
+
+
 def slowly(case, seconds=0.2):
     """Findings that take time."""
     time.sleep(seconds)
@@ -38,6 +43,7 @@ def slowly(case, seconds=0.2):
 
 def compiling(case):
     """Announces what every worker would compile."""
+    _numba._time_compilation = lambda: 0.1
     _numba._announce_compilation("SmallSystem")
     return lengths(case)
 

@@ -100,7 +100,7 @@ def test_a_worker_of_another_version_is_named(study_file, monkeypatch):
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "no address"])
 def test_a_dead_scheduler_is_named(study_file, monkeypatch, address):
-    monkeypatch.setattr("archfem.studies.cluster.SCHEDULER_TIMEOUT", 0.5)
+    monkeypatch.setattr("archfem.studies.cluster.SCHEDULER_TIMEOUT", 0.2)
     with pytest.raises(
         af.InvalidInput, match=r"no scheduler .*answers at .*start 'dask scheduler'"
     ):

@@ -99,7 +99,7 @@ def test_an_analysis_continues_where_it_ended(small_ida, monkeypatch):
     assert again.table.identical(found.table)
 
 
-@pytest.mark.parametrize("call", [2, 4])
+@pytest.mark.parametrize("call", [pytest.param(2, marks=pytest.mark.slow), 4])
 def test_each_run_is_kept_when_it_is_ended(small_ida, tmp_path, monkeypatch, call):
     case, _, found = small_ida
     runs, options = [], {"precision": 0.2, "between": (0.3, 2.5), "workers": 1}

@@ -134,7 +134,9 @@ def test_a_changed_case_is_computed_anew(
     elif what == "program":
         monkeypatch.setattr(provenance, "_hash_modules", lambda: "another")
     elif what == "option":
-        study_file.write_text(study_file.read_text().replace("tests:lengths", "tests:slowly"))
+        study_file.write_text(
+            study_file.read_text().replace("tests:lengths", "tests:lengths_again")
+        )
     else:
         monkeypatch.setattr(af, "__version__", "0.1.0")
     after = af.Study.read(study_file, own_code=True)
@@ -295,8 +297,8 @@ def title(found):
 def test_progress_is_reported_where_the_output_is_a_file(
     small_ring, finders, tmp_path, monkeypatch, capsys, workers
 ):
-    monkeypatch.setattr(result_store, "PROGRESS_INTERVAL", 0.05)
-    find = {"name": "finders_of_tests:slowly", "seconds": 0.2}
+    monkeypatch.setattr(result_store, "PROGRESS_INTERVAL", 0.02)
+    find = {"name": "finders_of_tests:slowly", "seconds": 0.08}
     af.Study(small_ring, {"structure.thickness": [0.5, 0.6, 0.7]}, find).run(workers=workers)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) > 2

@@ -294,6 +294,7 @@ def test_other_arguments_are_refused(column, motion):
 SMALL = {name: HELD[name] for name in ("k_s", "friction", "damping_ratio", "damping_kind", "dt")}
 
 
+@pytest.mark.slow
 def test_two_workers_give_the_same_bits_as_one(column, motion):
     alone, shared = (
         af.verdict_range(column, motion, samples=2, vary=SMALL, workers=workers)

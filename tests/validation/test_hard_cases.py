@@ -4,6 +4,9 @@ import pytest
 from hard.table import CASES
 
 LONG = (
+    "joints 1000 × softer",
+    "ring under 1.5 g vertical",
+    "rocking block, HHT(-0.1), 1 ms",
     "time step 20 ms",
     "filled segment of 30°",
     "cells 1 × 1",

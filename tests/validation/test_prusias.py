@@ -59,6 +59,7 @@ def test_compression_nears_that_of_the_paper_under_two_metres_of_fill(dead, veri
     verified(label, PAPER_STRESS / 1e6, source, largest[1] / 1e6)
 
 
+@pytest.mark.slow
 def test_modes_of_a_trial(verified):
     """3.03, 3.57, 4.22 Hz with 0.29, 0.26, 0.21 of the mass, by another mesh and program.
 

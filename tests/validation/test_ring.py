@@ -28,7 +28,12 @@ TRIAL = {  # cells, rule, points: crown eccentricity as found in a trial of join
 }
 
 
-@pytest.mark.parametrize("setting", TRIAL, ids=str)
+@pytest.mark.parametrize(
+    "setting",
+    # other tests have meshes as fine
+    [pytest.param(each, marks=pytest.mark.slow if each[0] == 16 else ()) for each in TRIAL],
+    ids=str,
+)
 def test_crown_eccentricity(ring, setting):
     cells, rule, points = setting
     model = af.build(glued(ring), cells=(cells, cells), quadrature=rule, quadrature_points=points)
@@ -42,7 +47,9 @@ def lawful(ring, request):
     return {"sliding": ring, "glued": glued(ring)}[request.param], CONVERGED[request.param]
 
 
-@pytest.mark.parametrize("rule", ["lobatto", "nodal", "gauss"])
+@pytest.mark.parametrize(
+    "rule", ["lobatto", "nodal", pytest.param("gauss", marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("law", ["sliding", pytest.param("glued", marks=pytest.mark.slow)])
 def test_converges_under_refinement(ring, law, rule):
     """Of glued joints the values of each rule are pinned by `test_crown_eccentricity`."""

@@ -1,5 +1,7 @@
 """Is the equation solved? Patch test, ties to the conforming space, manufactured solution."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 import ufl
@@ -95,12 +97,22 @@ def test_broken_space_tied_together_is_the_conforming_one(stack, degree):
     assert abs(ours - conforming).max() < 1e-12 * abs(conforming).max()
 
 
-@pytest.mark.parametrize("rule", RULES, ids=lambda rule: f"{rule.rule}{rule.points or ''}")
-@pytest.mark.parametrize(("degree", "cell"), each_once((1, 2), ("quadrilateral", "triangle")))
-def test_operator_equals_forms(ring, rule, degree, cell, verified):
+@pytest.mark.parametrize(
+    ("rule", "space"),
+    [
+        *each_once(RULES, ((1, "quadrilateral"), (2, "triangle"))),
+        *(
+            pytest.param(*each, marks=pytest.mark.slow)
+            for each in product(RULES, ((1, "triangle"), (2, "quadrilateral")))
+        ),
+    ],
+    ids=lambda each: f"{each.rule}{each.points or ''}" if hasattr(each, "rule") else str(each),
+)
+def test_operator_equals_forms(ring, rule, space, verified):
     """Force and tangent of the sparse products and of the compiled UFL forms."""
     from archfem.models.reference import build_full_model
 
+    degree, cell = space
     space = build_broken_space(
         generate_mesh(ring, af.models.Discretisation(cells=(3, 2), cell=cell)), degree
     )
@@ -191,8 +203,8 @@ def jump_error(cells, degree, cell):
     ("degree", "cell", "bound"),
     [
         (1, "quadrilateral", 1.5e-4),
-        (1, "triangle", 1.7e-4),
-        (2, "quadrilateral", 5e-7),
+        pytest.param(1, "triangle", 1.7e-4, marks=pytest.mark.slow),
+        pytest.param(2, "quadrilateral", 5e-7, marks=pytest.mark.slow),
         (2, "triangle", 7e-7),
     ],
 )

@@ -59,7 +59,7 @@ def at_rest(weight, width, length):
             af.dead_load(model, stages=stages).joints, force, length, f"{name}, built"
         )
         push = af.pushover(
-            model, af.BodyForce(1.0), stop=af.statics.Stop(steps=6, displacement=0.1 * length)
+            model, af.BodyForce(1.0), stop=af.statics.Stop(steps=4, displacement=0.1 * length)
         )
         found[f"{name}, push"] = push.factor
         found |= of_joints(push.joints.isel(step=-1), force, length, f"{name}, pushed")

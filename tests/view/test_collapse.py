@@ -1,6 +1,7 @@
 """Pictures of limit analysis: their content, not their looks."""
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -9,6 +10,7 @@ import xarray as xr
 from portals import DRY, box, portal
 
 import archfem as af
+from archfem.limit import vehicles
 from archfem.view import (
     draw_capacity,
     draw_collapse,
@@ -86,6 +88,12 @@ def test_the_load_is_drawn_and_named(ring):
     assert arrow.xy == pytest.approx(found.live[0].place(ring)[1])  # it points at the extrados
 
 
+@pytest.fixture
+def few_places(monkeypatch):
+    """Places of vehicles are a twentieth of a bridge apart, not a hundredth."""
+    monkeypatch.setattr(vehicles, "_places_along", partial(vehicles._places_along, steps=20))
+
+
 @pytest.fixture(scope="module")
 def coarse_ring():
     """The ring with fewer voussoirs, for searches of many programmes."""
@@ -120,7 +128,7 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(coarse_ring):
         draw_kinematic_assessment(locked)
 
 
-def test_a_rating_shows_factors_over_the_middle_and_the_mechanism(coarse_ring):
+def test_a_rating_shows_factors_over_the_middle_and_the_mechanism(coarse_ring, few_places):
     lorry = af.limit.Vehicle("lorry", (5e3, 5e3), (1.0,))
     found = af.rate(coarse_ring, lorry)
     figure = draw_rating(found)
@@ -136,7 +144,7 @@ def test_a_rating_shows_factors_over_the_middle_and_the_mechanism(coarse_ring):
     assert f"live load: {found.factor:.3g} × 5 kN" in labels  # both axles are equal
 
 
-def test_a_rating_shows_its_worst_place_and_the_axles_as_given(ring):
+def test_a_rating_shows_its_worst_place_and_the_axles_as_given(ring, few_places):
     """A lorry longer than the ring is worst with its middle far beside it; it spreads over 2 m."""
     wide = replace(ring, width=4.0)
     lorry = af.limit.Vehicle("lorry", (3e3, 12e3, 12e3), (12.0, 1.3), live=1.5, impact=1.2)

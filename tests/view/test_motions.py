@@ -15,7 +15,7 @@ def shaking():
     return af.Motion.synthetic(duration=6.0, seed=1, pga=2.0)
 
 
-def test_accelerogram_shows_all_components_and_integrals(shaking, tmp_path):
+def test_accelerogram_shows_all_components_and_integrals(shaking, low_resolution, tmp_path):
     figure = draw_motion(shaking)
     axes = figure.get_axes()
     assert len(axes) == 6

@@ -30,7 +30,14 @@ def test_a_title_is_words_and_no_formula(tmp_path):
     assert save(figure, tmp_path / "dear.png").stat().st_size > 1000
 
 
-@pytest.mark.parametrize("name", ["worth $5 or $6", "a $\\frac{ bridge", "back\\slash_{x}"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("worth $5 or $6", marks=pytest.mark.slow),
+        "a $\\frac{ bridge",
+        "back\\slash_{x}",
+    ],
+)
 def test_names_are_words_wherever_they_are_drawn(name, tmp_path):
     """Also where matplotlib writes the page itself, as notebooks do."""
     stones = replace(af.column(breadth=1.0, heights=[1.0]), name=name)
