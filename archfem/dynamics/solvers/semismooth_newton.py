@@ -39,7 +39,7 @@ def line_search(evaluate_residual: Any, correction: Correction) -> Any:
     _, add_share, residual_work, reverse_correction = correction
 
     @kernel
-    def search_line(system, work, iteration, whole):  # type: ignore
+    def search_line(system, work, iteration, before, whole):  # type: ignore
         """Add the correction, or unless `whole` the share at which the residual does no work."""
         start, share, evaluations = residual_work(system, work), 1.0, 0
         if start < 0.0 and not whole:  # uphill, by friction: the other way leads down
@@ -52,7 +52,11 @@ def line_search(evaluate_residual: Any, correction: Correction) -> Any:
             found = evaluate_residual(system, work, iteration)
             evaluations += 1
             left = residual_work(system, work)
-            if whole or not abs(left) > 0.5 * start or evaluations == MAX_SEARCH_EVALUATIONS:
+            # as good as any share: the whole correction, where it takes off half the residual
+            is_good = evaluations == 1 and found[0] < 0.5 * before
+            if whole or is_good or not abs(left) > 0.5 * start:
+                break
+            if evaluations == MAX_SEARCH_EVALUATIONS:
                 break
             if left > 0.0:
                 # short of the place: go on where a longer way is worth it
@@ -104,7 +108,7 @@ def newton_driver(evaluate_residual: Any, correction: Correction) -> Any:
             ):
                 return -evaluations - 1
             whole, reusable, previous = hold or iteration < full_steps, not hold, error
-            found, change, tried = search_line(system, work, iteration + 1, whole)
+            found, change, tried = search_line(system, work, iteration + 1, error, whole)
             error, reverses = found
             evaluations += tried
             if not error < np.inf:
