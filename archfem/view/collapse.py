@@ -162,6 +162,10 @@ def _draw_factors(
     upper.legend(frameon=False, fontsize=Size.LABEL)
     draw_structure(structure, axes=lower)
     _draw_mechanism(lower, structure, worst, factors)
+    # below both panels: arrows may stand anywhere in the lower one
+    lower.get_legend().remove()
+    handles, labels = lower.get_legend_handles_labels()
+    add_legend_below(figure, handles=handles, labels=labels)
     margin = 0.03 * np.ptp(ends)
     lower.set_xlim(ends.min() - margin, ends.max() + margin)
     return figure
