@@ -198,7 +198,8 @@ def run_files(run: Run, at_rest: DeadLoadResult, text: str) -> Files:
     if case.output.get("animation", False):
         from archfem.view.films.film import film  # pyvista and the encoder are slow to import
 
-        files["hinges.mp4"] = partial(film, dead.model, history, fps=12.0)
+        # a small film, which takes no longer than the rest; `archfem animate` writes larger ones
+        files["hinges.mp4"] = partial(film, dead.model, history, fps=12.0, size=(960, 540))
     return {**files, "summary.txt": text}
 
 
