@@ -121,7 +121,13 @@ def simulate_fall(
         names = {joint.name for joint in loose.joints} - unkept.keys()
         ratios = dict.fromkeys(names, rocking_ratio)
     simulation = RigidBlockSimulation(loose, rocking_ratio=ratios)
-    frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
+    try:
+        frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
+    except DidNotConverge as error:
+        raise DidNotConverge(
+            f"{error}; compare with another dt of time_history, or with "
+            "archfem.dynamics.RigidBlockSimulation from the start"
+        ) from error
     return _fall_dataset(frames, motion, released), frames
 
 

@@ -12,7 +12,7 @@ rigid blocks that no thrust line within friction can hold must not be at rest: t
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import sqrt
 from typing import Literal, Protocol, runtime_checkable
 
@@ -35,7 +35,7 @@ from archfem.masonry.structure import Structure, join_joint_names
 from archfem.models.construction import PartialStructure
 from archfem.models.linear_blocks import LinearBlockModel
 from archfem.models.model import Doubt, Model, check_model
-from archfem.statics.newton import EquilibriumSolver, Newton, Solution
+from archfem.statics.newton import EquilibriumSolver, Newton
 from archfem.statics.relaxation import (
     Search,
     SearchSequence,
@@ -197,7 +197,8 @@ def dead_load(
     check_model(model)
     if stages is None:
         try:
-            return _load_from_rest(model, self_weight(model), newton, _solve_if_it_may_stand)
+            search = partial(solve_or_relax, check=_refuse_if_rigid_blocks_fall)
+            return _load_from_rest(model, self_weight(model), newton, search)
         except DidNotConverge as error:
             message = _describe_failure(model, error, newton)
             raise DidNotConverge(message, last=error.last) from error
@@ -305,20 +306,14 @@ def _load_from_rest(
     return _move_supports(solver, loaded, load, model.support_motion)
 
 
-def _solve_if_it_may_stand(
-    solver: EquilibriumSolver, model: Model, load: Array, start: Array
-) -> tuple[Model, Solution]:
-    """Find an equilibrium under the weight, as `solve_or_relax`, unless limit analysis has none."""
-    try:
-        return solve_irreversible(solver, model, load, start)
-    except DidNotConverge:
-        # Resultants in balance within friction would be those of rigid blocks too. Without
-        # cohesion no part of the weight is carried either, which long searches would find.
-        structure = model.structure
-        scales = not (model.large_displacements or structure.cohesion.any())
-        if scales and not structure.has_own_laws and not _stands_as_rigid_blocks(structure):
-            raise NoEquilibrium("nothing within friction holds it as rigid blocks") from None
-    return solve_or_relax(solver, model, load, start)
+def _refuse_if_rigid_blocks_fall(model: Model) -> None:
+    """Refuse a structure that no joint forces within friction hold as rigid blocks."""
+    # Resultants in balance within friction would be those of rigid blocks too. Without cohesion no
+    # part of the weight is carried either, which long searches would find.
+    structure = model.structure
+    scales = not (model.large_displacements or structure.cohesion.any())
+    if scales and not structure.has_own_laws and not _stands_as_rigid_blocks(structure):
+        raise NoEquilibrium("nothing within friction holds it as rigid blocks")
 
 
 def _create_solver(model: Model, newton: Newton | None) -> EquilibriumSolver:
@@ -347,17 +342,17 @@ def _build_in_stages(
     solver: EquilibriumSolver, whole: LinearBlockModel, stages: Sequence[Stage]
 ) -> Equilibrium:
     """Build a structure stage by stage, each in equilibrium before the next."""
-    partial = PartialStructure(whole)
-    state = Equilibrium(partial, np.zeros(whole.size), 0, 0)
+    built = PartialStructure(whole)
+    state = Equilibrium(built, np.zeros(whole.size), 0, 0)
     for stage, blocks in zip(stages, resolve_stages(whole.structure, stages), strict=True):
         if stage.strike:
-            partial = partial.struck().with_memory(state.model.memory)
-            state = _apply_remaining_weight(solver, state, partial, f"'{stage.name}'")
+            built = built.struck().with_memory(state.model.memory)
+            state = _apply_remaining_weight(solver, state, built, f"'{stage.name}'")
         if blocks:
-            partial = partial.with_memory(state.model.memory)
-            partial = partial.placed(blocks, state.q, centring=stage.centring)
-            state = _apply_remaining_weight(solver, state, partial, f"'{stage.name}'")
-    return replace(state, model=partial.with_memory(state.model.memory).finished())
+            built = built.with_memory(state.model.memory)
+            built = built.placed(blocks, state.q, centring=stage.centring)
+            state = _apply_remaining_weight(solver, state, built, f"'{stage.name}'")
+    return replace(state, model=built.with_memory(state.model.memory).finished())
 
 
 def _apply_remaining_weight(

@@ -226,12 +226,21 @@ solve_local = partial(solve_irreversible, searches=("basic",))
 
 
 def solve_or_relax(
-    solver: EquilibriumSolver, model: Model, load: Array, start: Array
+    solver: EquilibriumSolver,
+    model: Model,
+    load: Array,
+    start: Array,
+    check: Callable[[Model], None] | None = None,
 ) -> tuple[Model, Solution]:
-    """Find an equilibrium by Newton's method, and where that fails by relaxation."""
+    """Find an equilibrium by Newton's method, and where that fails by relaxation.
+
+    The check comes between them, and may raise the reason for which there is none.
+    """
     try:
         return solve_irreversible(solver, model, load, start)
     except DidNotConverge:
+        if check is not None:
+            check(model)
         model, solution = relax(solver, model, load, start)
         if has_irreversible_joints(model):
             return solve_irreversible(solver, model, load, solution.q)

@@ -88,21 +88,27 @@ def test_a_block_handed_over_rocks_on_with_the_restitution_of_its_damping(ratio)
     assert np.sqrt(energies[1:] / energies[:-1]) == pytest.approx(np.full(2, wanted), rel=0.01)
 
 
+def test_a_fall_that_cannot_be_followed_says_what_to_compare(tower, monkeypatch):
+    def fail(*_):
+        raise af.DidNotConverge("made to fail")
+
+    monkeypatch.setattr(RigidBlockSimulation, "_take_steps", fail)
+    rest = State(1.0, *np.zeros((3, tower.size)))
+    with pytest.raises(af.DidNotConverge, match=r"made to fail.*another dt of time_history, or"):
+        fall.simulate_fall(tower, rest, af.Motion(np.zeros(3), 1.0))
+
+
 @pytest.mark.parametrize(("stiffness", "push", "doubted"), [(1e7, 0.24, True), (1e9, 0.4, False)])
 def test_a_fall_of_which_rigid_blocks_know_nothing_is_doubted(stiffness, push, doubted):
     """A column of breadth to height 1 to 4 rocks under 0.24 g at most by its softness."""
     contact = af.Contact(stiffness, 0.4 * stiffness, 0.6)
     column = af.column(breadth=0.6, heights=[2.4], contact=contact)
     ground = af.Motion(np.r_[np.full(60, push * G), np.zeros(40)], 0.01)
-    run = af.time_history(column_model(column), ground, dt=2e-3)
+    model = af.build(column, fidelity="rigid", displacements="large")
+    run = af.time_history(model, ground, dt=2e-3)
     assert run.fall.kind == "fallen"
     causes = [doubt.cause for doubt in run.doubts]
     assert any("as rigid blocks none falls" in cause for cause in causes) == doubted
-
-
-def column_model(column):
-    """Rigid blocks of large displacements."""
-    return af.build(column, fidelity="rigid", displacements="large")
 
 
 def test_a_fall_that_cannot_be_followed_keeps_the_history_up_to_it(monkeypatch):
