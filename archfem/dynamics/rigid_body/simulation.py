@@ -42,7 +42,8 @@ from archfem.motion.motion import Motion
 
 logger = logging.getLogger("archfem")
 
-# Energy gained without work, over the energy exchanged, from which a run is refused [-]
+# Energy gained without work, over the energy exchanged, from which a run is refused: speeds, which
+# vary with its root, then err by half a per cent [-]
 REFUSED_ENERGY_GAIN = 1e-2
 
 # The same for a run without exchange: lift of its weight, relative to the structure's size [-]
@@ -51,7 +52,8 @@ ENERGY_GAIN_NOISE = 1e-6
 # Steps that are tried where none is given, until halving them changes little [s]
 TRIED_STEPS = (5e-4, 2.5e-4, 1.25e-4, 6.25e-5)
 
-# Largest change of a block's displacement by halving the step [-]
+# Largest change of a block's displacement by halving the step, below what verdicts distinguish: a
+# doubt begins where a displacement is within a factor of 1.5 of a limit [-]
 MAX_STEP_CHANGE = 0.2
 
 # Free blocks up to which steps are tried; a fall of more takes minutes, and has the first of them
