@@ -70,13 +70,16 @@ class LimitAnalysis:
 def parse_limit(table: Any) -> LimitAnalysis:
     """Return the limit analysis of a case."""
     # the live load: multiples of the weight, and a force at a point
-    keys = _keys_beside(collapse_factor, "live") | declared_keys(BodyForce) | {"point": dict}
+    keys = (
+        _keys_beside(collapse_factor, "live") | declared_keys(BodyForce) | {"point": (dict, list)}
+    )
     values = check_table(table, keys, "limit")
     live: list[Action] = []
     if "horizontal" in values or "vertical" in values:
         live.append(BodyForce(values.get("horizontal", 0.0), values.get("vertical", 0.0)))
     if "point" in values:
-        live.append(_point_load(values["point"]))
+        points = values["point"]
+        live += map(_point_load, points if isinstance(points, list) else [points])
     friction = _check_friction(values.get("friction", "coulomb"), "limit.friction")
     fill = _fill(values["fill"]) if "fill" in values else None
     return LimitAnalysis(tuple(live), friction, values.get("strength"), fill)

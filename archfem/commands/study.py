@@ -55,6 +55,8 @@ def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> None
     for name, finding in findings.items():
         write_finding(finding, folder / f"{file_name(name)}.json")
     text = study_table(findings) if findings else format_table(table)
+    if isinstance(definition, Comparison) and definition.statements:
+        text = f"{definition.answers(table)}\n\n{text}"
     print(text)
     write_files({"study.txt": f"{definition.title}\n\n{text}"}, folder)
     factors = {name: finding.factors for name, finding in findings.items() if finding.scales}

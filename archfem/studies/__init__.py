@@ -13,6 +13,7 @@
     process_pool     workers on this machine
     result_store     rows on disk, progress, dataset
     shared_results   results that workers share, computed once
+    statements       statements of a publication beside findings
     study            Study, Comparison; study files; pairs of a suite
     variations       verdict_range: runs over uncertain properties
 

@@ -156,17 +156,28 @@ def build_findings(
     labels: Sequence[str], points: Sequence[Point], table: xr.Dataset, search: dict[str, Any] | None
 ) -> dict[str, Finding]:
     """Return the findings of a comparison by label, without those of which a point failed."""
-    columns = {str(name): table[name].values.ravel().tolist() for name in table.data_vars}
-    rows: dict[str, dict[str, dict[str, Any]]] = {}
     cases: dict[str, Case] = {}
-    for number, (label, point) in enumerate(zip(labels, points, strict=True)):
-        pair = str(dict(point.changes)[PAIR_KEY])
-        row = {name: values[number] for name, values in columns.items()}
-        rows.setdefault(label, {})[pair] = row
+    for label, point in zip(labels, points, strict=True):
         changes = tuple(change for change in point.changes if change[0] != PAIR_KEY)
         cases.setdefault(label, replace(point, changes=changes).case)
     return {
         label: _build_finding(cases[label].text(), by_pair, search)
+        for label, by_pair in rows_by_label(labels, points, table).items()
+        if cases[label].suite is not None
+    }
+
+
+def rows_by_label(
+    labels: Sequence[str], points: Sequence[Point], table: xr.Dataset
+) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return the rows of a comparison by label and pair, without labels with a failed point."""
+    columns = {str(name): table[name].values.ravel().tolist() for name in table.data_vars}
+    rows: dict[str, dict[str, dict[str, Any]]] = {}
+    for number, (label, point) in enumerate(zip(labels, points, strict=True)):
+        pair = str(dict(point.changes).get(PAIR_KEY, ""))
+        rows.setdefault(label, {})[pair] = {name: each[number] for name, each in columns.items()}
+    return {
+        label: by_pair
         for label, by_pair in rows.items()
         if not any(row["error"] for row in by_pair.values())
     }

@@ -24,6 +24,7 @@ from archfem.masonry.structure import suggest_name
 from archfem.motion.motion import Motion
 from archfem.studies.cache import dead_load_of, first_mode, ground_motion, ground_suite
 from archfem.studies.parameter_space import Point
+from archfem.studies.statements import capacity_findings, dead_load_findings, history_findings
 
 # A flat table: numbers, texts and rows of numbers by name
 Findings = dict[str, Any]
@@ -146,8 +147,12 @@ def evaluate_limit(case: Case) -> Findings:
     }
 
 
-def evaluate_comparison(case: Case, scales: Mapping[str, Any] | None = None) -> Findings:
-    """Return the findings of a case under the one pair of its suite."""
+def evaluate_comparison(
+    case: Case, scales: Mapping[str, Any] | None = None, statements: bool = False
+) -> Findings:
+    """Return the findings of a case under the one pair of its suite, or of its limit analysis."""
+    if case.suite is None:
+        return capacity_findings(case)
     result, motion = dead_load_of(case), ground_motion(case)
     joints = assessed_joints(result.dead.joints)
     findings: Findings = {
@@ -160,6 +165,9 @@ def evaluate_comparison(case: Case, scales: Mapping[str, Any] | None = None) -> 
     except DidNotConverge as error:
         run = partial_history(error)
     findings |= findings_by_part(run)
+    if statements:
+        findings |= dead_load_findings(result) | history_findings(run, case)
+        findings["pga"] = ground_suite(case).pairs[0].pga
     if scales is not None:
         suite = ground_suite(case)
         # the whole motion: the reduction R of the suite is not applied

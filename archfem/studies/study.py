@@ -23,7 +23,13 @@ from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import Ending
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.motion.motion import Motion
-from archfem.studies.comparison import Finding, build_findings, file_name, parse_search
+from archfem.studies.comparison import (
+    Finding,
+    build_findings,
+    file_name,
+    parse_search,
+    rows_by_label,
+)
 from archfem.studies.evaluators import Evaluator, Findings, refuse_code
 from archfem.studies.parameter_space import (
     PAIR_KEY,
@@ -37,6 +43,7 @@ from archfem.studies.parameter_space import (
 )
 from archfem.studies.process_pool import Row, evaluate_points
 from archfem.studies.result_store import Progress, Store, build_table, load_table_libraries, status
+from archfem.studies.statements import Statement, column_label, read_statements, statement_table
 
 logger = logging.getLogger("archfem")
 
@@ -278,10 +285,14 @@ class Comparison(Study):
     Attributes:
         cases: cases by name.
         pairs: pairs of the suites that are run; None for all.
+        columns: names of the changes that all cases get in turn.
+        statements: statements of a publication that the findings answer.
     """
 
     cases: Mapping[str, Case]
     pairs: tuple[str, ...] | None
+    columns: tuple[str, ...]
+    statements: tuple[Statement, ...]
 
     @property
     def scales(self) -> dict[str, Any] | None:
@@ -304,6 +315,15 @@ class Comparison(Study):
             Findings by name; without cases of which a point ended in an error.
         """
         return build_findings(self._labels, self.points, table, self.scales)
+
+    def answers(self, table: xr.Dataset) -> str:
+        """Return the table of the statements, each beside what every column finds.
+
+        Args:
+            table: table that `run` returned.
+        """
+        rows = rows_by_label(self._labels, self.points, table)
+        return statement_table(self.statements, self.columns, rows)
 
     @property
     def _labels(self) -> list[str]:
@@ -339,6 +359,7 @@ def _read_study(
     keys = {
         **{"title": str, "case": str, "cases": dict, "set": [str], "pairs": [str]},
         **{"vary": (dict, list), "samples": dict, "compute": (str, dict), "scales": (bool, dict)},
+        **{"columns": dict, "statements": list},
     }
     refuse_unknown(tables, keys)
     settings = check_table(tables, keys, "study")
@@ -370,6 +391,8 @@ def _read_study(
         return Study.of_points(title, asked, axes, points, samples)
     comparison = Comparison.of_points(title, asked, axes, points, samples)
     comparison.cases = cases
+    comparison.columns = tuple(settings.get("columns", ("",)))
+    comparison.statements = read_statements(settings)
     comparison.pairs = tuple(settings["pairs"]) if "pairs" in settings else None
     return comparison
 
@@ -382,7 +405,8 @@ def _parse_evaluator(settings: Mapping[str, Any], own_code: bool) -> Evaluator:
     asked = Evaluator.of(find)
     if asked.name == "comparison":
         scales = settings.get("scales", asked.options.get("scales") or False)
-        return Evaluator(asked.find, {"scales": parse_search(scales)})
+        stated = bool(settings.get("statements"))
+        return Evaluator(asked.find, {"scales": parse_search(scales), "statements": stated})
     if "scales" in settings:
         raise InvalidInput(
             "scales is the search of a comparison: take it out, or compute = { name = 'scales', "
@@ -398,13 +422,17 @@ def _read_cases(
 ) -> dict[str, Case]:
     """Read the cases of a study file by name; a single case has none."""
     tables = settings.get("cases", {"": {"case": settings.get("case")}})
+    columns = settings.get("columns", {"": []})
+    columns = check_table(columns, {key: [str] for key in columns}, "columns")
     cases = {}
     for name, table in tables.items():
         case = check_table(table, {"case": str, "set": [str]}, f"cases.{name}")
         if "case" not in case:
             raise InvalidInput(f"cases.{name} names no case file")
-        all_changes = [*settings.get("set", []), *case.get("set", []), *changes]
-        cases[name] = Case.read(folder / case["case"], all_changes)
+        for column, own in columns.items():
+            all_changes = [*settings.get("set", []), *own, *case.get("set", []), *changes]
+            label = column_label(name, column)
+            cases[label] = Case.read(folder / case["case"], all_changes)
     if not cases:
         raise InvalidInput('it has no cases: write [cases."name"] with case = "file.toml"')
     return cases
@@ -421,9 +449,9 @@ def _pair_cases(
     rows: list[tuple[str, ...]] = []
     for name, own in available.items():
         chosen = [pair for pair in own if pairs is None or pair in pairs]
-        if asked.name == "comparison" and not own:
+        if asked.name == "comparison" and not own and cases[name].limit is None:
             raise InvalidInput(
-                f"the case of '{name}' has no [suite] to compare under: "
+                f"the case of '{name}' has no [suite] to compare under, and no [limit]: "
                 'give it one, or say what to compute, such as compute = "limit"'
             )
         if own and not chosen:
