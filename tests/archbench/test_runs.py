@@ -201,6 +201,15 @@ def test_archfem_answers_as_it_is_stored(cost, tolerance, least):
     assert count >= least
 
 
+@pytest.mark.parametrize("name", ["S05", "S07", "S08_020", "S12_2r"])
+def test_a_history_of_each_kind_answers_as_it_is_stored(name, monkeypatch):
+    """Pulse, record, fall and rocking, which take too long for all settings: by the cheapest."""
+    runs = run.results_of("archfem")[name]["runs"]
+    cheapest = {name: {"runs": [min(runs, key=lambda each: each["cpu_s"])]}}
+    monkeypatch.setattr(run, "results_of", lambda program: cheapest)
+    assert run.compare_with_stored(cost=10.0, tolerance=1e-2) == ([], 1)
+
+
 def test_a_stored_answer_that_is_no_longer_true_is_reported(tmp_path, monkeypatch):
     """Also one by other settings than the first."""
     stored = run.results_of("archfem")["S27"]
