@@ -34,6 +34,7 @@ OPTIONAL_PACKAGES = {
     "PETSc": Requirement("its solvers", "it comes with FEniCSx, " + FENICSX_REMEDY),
     "ObsPy": Requirement("records in miniSEED and SAC", "pip install 'archfem[seismology]'"),
     "pygmm": Requirement("ground-motion models", "pip install 'archfem[hazard]'"),
+    "Clarabel": Requirement("bounds with a plastic fill", "pip install 'archfem[cones]'"),
     "Chromium": Requirement(
         "reports as PDF",
         "'apt-get install chromium', or install Google Chrome; or print the page in a browser",

@@ -2,13 +2,17 @@
 
     backfill              earth pressure, load spreading, self-weight programme
     collapse              collapse_factor, stands, warnings
+    cone_programme        second-order cone programmes
     displaced_blocks      limit analysis of blocks at displaced places
+    fill_bounds           bounds of the factor with a plastic fill
+    fill_mesh             triangles of a fill
     finite_mechanism      finite motion of a mechanism, load factor along its path
     instability           why a structure does not stand
     linear_programme      rigid-block equilibrium as a linear programme
     mechanism_count       mechanisms by counting failed joints; duration and opening
     mechanism_kinematics  mechanisms verified by a rigid-block motion
     nonassociated         sliding without dilatancy
+    plastic_fill          strength of a plastic fill
     support_movement      finite movement of a support
     thickness             least thickness
     vehicles              vehicles over a bridge, rating

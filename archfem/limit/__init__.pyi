@@ -14,6 +14,7 @@ from .mechanism_kinematics import Verifier as Verifier
 from .mechanism_kinematics import first_verified_mechanism as first_verified_mechanism
 from .mechanism_kinematics import verified_mechanism as verified_mechanism
 from .nonassociated import NonassociatedBounds as NonassociatedBounds
+from .plastic_fill import PlasticFill as PlasticFill
 from .support_movement import End as End
 from .support_movement import Movement as Movement
 from .support_movement import Stage as Stage

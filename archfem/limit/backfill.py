@@ -511,7 +511,7 @@ def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
     return BlocksWithFill(structure, fill, regions)
 
 
-def _check_options(structure: Structure, friction: str | None, strength: float | None) -> None:
+def check_options(structure: Structure, friction: str | None, strength: float | None) -> None:
     """Refuse unknown options, and joints with tensile strength, which break and do not yield."""
     check_choice(friction, "friction", ("coulomb", "nonassociated", None))
     if strength is not None and not check_number(strength, "strength [Pa]") > 0.0:
@@ -529,7 +529,7 @@ def self_weight_programme(
 ) -> tuple[BlocksWithFill, Programme]:
     """Return the rigid stones, and the linear programme of their self-weight without objective."""
     check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
-    _check_options(structure, friction, strength)
+    check_options(structure, friction, strength)
     stones = attach_fill(structure, fill)
     rigid = stones.rigid_regions.structure
     blocks = RigidBlocks(rigid)

@@ -20,10 +20,20 @@ import xarray as xr
 from archfem._display import ExplainedWord, ResultDisplay
 from archfem._typing import Array, Pascals
 from archfem._validation import validate_arguments
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.resultants import check_instant, joint_dataset
-from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
-from archfem.limit.linear_programme import Optimum, Programme
+from archfem.limit.backfill import (
+    BlocksWithFill,
+    Fill,
+    check_options,
+    is_balanced,
+    self_weight_programme,
+)
+from archfem.limit.fill_bounds import bound_factor
+from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
+from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
+from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.loads import Action, Settlement, list_loads
 from archfem.masonry.structure import (
     HasStructure,
@@ -69,7 +79,11 @@ class Collapse(ResultDisplay):
         solutions: bounds on all solutions where sliding is without dilatancy; else None.
         soil: pressure of the fill on each piece of a stone's face, with its least and largest
             possible values [Pa], the number of the block, the piece's ends and the sense of the
-            pressure along x; None without a fill.
+            pressure along x; of a `PlasticFill` pressure and shear at both ends; None without fill.
+        fill_motion: velocities of a `PlasticFill` by triangle, and strain rates over the largest;
+            else None.
+        upper: what no state of equilibrium exceeds: the factor itself, with a `PlasticFill` the
+            bound from above. `factor` is the bound from below then, and `lower` another name of it.
         live: the growing actions, or the settlement.
         structure: the analysed structure; None where the result was built by hand.
     """
@@ -82,8 +96,20 @@ class Collapse(ResultDisplay):
     motion: Array
     solutions: NonassociatedBounds | None = None
     soil: xr.Dataset | None = None
+    fill_motion: xr.Dataset | None = None
+    upper: float = np.nan
     live: tuple[Action | Settlement, ...] = ()
     structure: Structure | None = None
+
+    def __post_init__(self) -> None:
+        """Let the factor be its own upper bound where there is no other."""
+        if np.isnan(self.upper):
+            object.__setattr__(self, "upper", self.factor)
+
+    @property
+    def lower(self) -> float:
+        """The factor, which is on the safe side of all others with the same strength [-]."""
+        return self.factor
 
     @property
     def hinge_names(self) -> tuple[str, ...]:
@@ -105,7 +131,10 @@ class Collapse(ResultDisplay):
         sides = [f"{name} at the {side}" for (_, side), name in turning]
         hinges = join_names(sides, "; ") or "none"
         sliding = join_joint_names(self.sliding_names) or "none"
-        text = f"{self.outcome.sentence}: factor {self.factor:.4g}; hinges: {hinges}; "
+        bound = (
+            "" if self.upper == self.factor or np.isnan(self.factor) else f" to {self.upper:.4g}"
+        )
+        text = f"{self.outcome.sentence}: factor {self.factor:.4g}{bound}; hinges: {hinges}; "
         solutions = "" if self.solutions is None else f"; {self.solutions}"
         return f"{text}sliding: {sliding}{solutions}"
 
@@ -116,7 +145,7 @@ def collapse_factor(
     live: Action | Settlement | Sequence[Action],
     friction: str | None = "coulomb",
     strength: Pascals | None = None,
-    fill: Fill | None = None,
+    fill: Fill | PlasticFill | None = None,
 ) -> Collapse:
     """Find the factor at which live actions, over self-weight, make rigid blocks a mechanism.
 
@@ -155,8 +184,9 @@ def collapse_factor(
         strength: compressive strength σ of the blocks [Pa], which limits |M| to
             N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit.
         fill: strength of blocks softer than their joints, which become weight and pressures on the
-            stones (`Fill`), with those that rest on them; None where there are none, or where they
-            are cut into pieces (`jointed_fill`), whose joints have that strength.
+            stones (`Fill`), with those that rest on them, or a plastic continuum (`PlasticFill`),
+            for which the result has two bounds; None where there are none, or where they are cut
+            into pieces (`jointed_fill`), whose joints have that strength.
 
     Returns:
         The factor, the outcome and the mechanism.
@@ -179,6 +209,8 @@ def collapse_factor(
     """
     structure = structure_of(structure)
     loads = live if isinstance(live, Settlement) else list_loads(live)
+    if isinstance(fill, PlasticFill):
+        return _bound_collapse(structure, loads, friction, strength, fill)
     stones, dead = self_weight_programme(structure, friction, strength, fill)
     result = _solve_collapse(stones, dead, loads, friction)
     actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
@@ -315,6 +347,49 @@ def _solve_collapse(
     return result
 
 
+def _bound_collapse(
+    structure: Structure,
+    live: Settlement | list[Action],
+    friction: str | None,
+    strength: float | None,
+    fill: PlasticFill,
+) -> Collapse:
+    """Return the result of `collapse_factor` with a plastic fill."""
+    if isinstance(live, Settlement):
+        raise InvalidInput(
+            "a settlement and a plastic fill: the bounds are of loads that grow; give the fill as "
+            "af.limit.Fill, or a load"
+        )
+    check_options(structure, friction, strength)
+    bounds = bound_factor(structure, live, friction, strength, fill)
+    lower, upper = bounds.below.factor, bounds.above.factor
+    if np.isnan(lower) and not np.isnan(upper):
+        raise DidNotConverge(
+            f"whether it stands under its own weight is not known: on the finest mesh, of "
+            f"{len(bounds.filled.mesh.triangles)} triangles, no equilibrium was found and none is "
+            "excluded; give the fill some cohesion, or gap = 0.1 and look at the structure"
+        )
+    blocks, regions = bounds.filled.blocks, find_rigid_regions(structure)
+    outcome = Outcome.COLLAPSES if np.isfinite(upper) else Outcome.UNBOUNDED
+    outcome = Outcome.INFEASIBLE if np.isnan(upper) else outcome
+    motion = blocks.motion(bounds.above.motion if np.isfinite(upper) else 0.0 * bounds.above.motion)
+    if motion.any():
+        motion = motion / blocks.largest_displacement(motion)
+    hinges, slides = _find_failing(blocks, regions, motion)
+    joints = _read_joints(structure, blocks, regions, bounds.below.forces)
+    result = Collapse(lower, outcome, hinges, slides, joints, regions.expand_motion(motion))
+    if friction is not None:
+        warn_sliding(result.sliding_names, result.factor)
+    return replace(
+        result,
+        soil=bounds.contact_stress,
+        fill_motion=bounds.fill_motion,
+        upper=upper,
+        live=tuple(live),
+        structure=structure,
+    )
+
+
 def _without_forces(optimum: Optimum) -> Optimum:
     """Return the same mechanism with undefined forces (NaN)."""
     forces, unknowns = (np.full_like(each, np.nan) for each in (optimum.forces, optimum.unknowns))
@@ -337,6 +412,16 @@ def _read_result(
         motion = motion + support
     elif motion.any():
         motion = motion / blocks.largest_displacement(motion)
+    hinges, slides = _find_failing(blocks, regions, motion)
+    joints = _read_joints(stones.whole, blocks, regions, optimum.forces)
+    moved, soil = regions.expand_motion(motion), stones.pressure_dataset(optimum.unknowns)
+    return Collapse(float(factor), outcome, hinges, slides, joints, moved, soil=soil)
+
+
+def _find_failing(
+    blocks: RigidBlocks, regions: RigidRegions, motion: Array
+) -> tuple[tuple[tuple[int, str], ...], tuple[int, ...]]:
+    """Return the joints that turn in a motion, with the face in contact, and those that slide."""
     least = 1e-6 * blocks.largest_displacement(motion)  # above the round-off of the programme
     intrados, extrados, slip = blocks.gaps(motion)
     dilation = np.where(abs(slip) > 0.0, blocks.structure.friction, 0.0) * abs(slip)
@@ -346,12 +431,16 @@ def _read_result(
         (regions.joints[j], "intrados" if intrados[j] < extrados[j] else "extrados")
         for j in np.flatnonzero(turning)
     )
-    slides = tuple(regions.joints[j] for j in np.flatnonzero((abs(slip) > least) & ~apart))
-    resultants = np.full((len(stones.whole.joints), 3), np.nan)
-    resultants[list(regions.joints)] = blocks.resultants(optimum.forces)
-    joints = joint_dataset(stones.whole, resultants)
-    moved, soil = regions.expand_motion(motion), stones.pressure_dataset(optimum.unknowns)
-    return Collapse(float(factor), outcome, hinges, slides, joints, moved, soil=soil)
+    return hinges, tuple(regions.joints[j] for j in np.flatnonzero((abs(slip) > least) & ~apart))
+
+
+def _read_joints(
+    whole: Structure, blocks: RigidBlocks, regions: RigidRegions, forces: Array
+) -> xr.Dataset:
+    """Return the resultants of all joints of a structure from the forces between its stones."""
+    resultants = np.full((len(whole.joints), 3), np.nan)
+    resultants[list(regions.joints)] = blocks.resultants(forces)
+    return joint_dataset(whole, resultants)
 
 
 def warn_dilatancy(structure: Structure) -> None:

@@ -228,7 +228,7 @@ ROWS: dict[str, Callable[[Findings], float]] = {
     "restored, none": lambda it: float(len(_mechanisms(it, "restored"))),
     "restored, nearer the centre line": lambda it: 0.0 if _nearer(it) < 1.0 else WORST,
     "N5 beyond a limit, less so restored": lambda it: (
-        0.0 if it["existing"]["n5"][0] >= 1.0 > it["restored"]["n5"][0] else 1.0
+        0.0 if it["existing"]["n5"][0] >= max(1.0, it["restored"]["n5"][0] + 1e-3) else WORST
     ),
 }
 """Misfits by what the paper prints. Four failed joints of rings and piers are a mechanism."""
