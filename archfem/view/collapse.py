@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
 from archfem._typing import Array
@@ -64,6 +64,8 @@ def draw_collapse(structure: Structure, found: Collapse) -> Figure:
 
 def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse, factors: str = "") -> None:
     """Draw mechanism, hinges, thrust line and loads over a structure that is drawn already."""
+    if found.fill_motion is not None:
+        _draw_fill(axes, structure, found)
     if found.motion.any():
         motion = scale_motion(structure, found.motion)
         _draw_motion(axes, outline_moving_blocks(structure, motion), "mechanism")
@@ -77,9 +79,41 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse, factors: 
     if found.outcome is not Outcome.INFEASIBLE:  # else nothing was loaded: the weight is too much
         draw_loads(axes, structure, found.live, factor=factor)
     has_factor = found.outcome in (Outcome.COLLAPSES, Outcome.BRACKETED)
-    reached = f" at a factor of {found.factor:.4g}" if has_factor else ""
+    bound = "" if found.upper == found.factor else f" to {found.upper:.4g}"
+    reached = f" at a factor of {found.factor:.4g}{bound}" if has_factor else ""
     set_title(axes, f"{structure.name}: {found.outcome.sentence}{reached}")
     add_legend(axes)
+
+
+def _draw_fill(axes: Axes, structure: Structure, found: Collapse) -> None:
+    """Shade a plastic fill where it strains, and draw its pressure on the stones."""
+    fill, soil = found.fill_motion, found.soil
+    assert fill is not None
+    assert soil is not None
+    strain = np.sqrt(fill["strain"].values)  # bands of slip stand out, and what is beside them
+    corners = fill["corners"].values[strain > 0.05]
+    points = np.stack([fill["x"].values, fill["y"].values], axis=-1)
+    shaded = PolyCollection(points[corners], cmap="Oranges", alpha=0.55, linewidths=0.0)
+    shaded.set_array(strain[strain > 0.05])
+    shaded.set_clim(0.0, 1.0)
+    axes.add_collection(shaded)
+    # the largest pressure is as long as a twelfth of the structure
+    ends = np.stack([soil["x"].values, soil["y"].values], axis=-1)
+    along = np.diff(ends, axis=1)
+    outward = np.stack([along[..., 1], -along[..., 0]], axis=-1)
+    outward /= np.linalg.norm(outward, axis=-1, keepdims=True)
+    pressure = soil["pressure"].values / max(float(soil["pressure"].max()), 1e-300)
+    tips = ends - structure.size / 12.0 * pressure[..., None] * outward
+    faces = np.concatenate([ends, tips[:, ::-1]], axis=1)
+    axes.add_collection(
+        PolyCollection(
+            faces,
+            facecolors="none",
+            edgecolors=Colour.GREY,
+            linewidths=0.5,
+            label="pressure of the fill",
+        )
+    )
 
 
 def draw_collapse_result(found: Collapse) -> Figure:

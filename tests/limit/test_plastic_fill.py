@@ -89,7 +89,13 @@ def test_the_mirror_image_of_a_load_has_bounds_that_agree():
         assert one.lower < other.upper
         assert one.upper - one.lower <= 0.08 * one.upper
         assert len(one.hinges) >= 3
-        assert "to" in str(one)
+        bounds = f"factor {one.lower:.4g} to {one.upper:.4g}"
+        assert bounds in str(one)
+        axes = one.plot().axes[0]
+        assert axes.get_title().endswith(bounds.replace("factor", "at a factor of"))
+        # the triangles that strain, the others are left out
+        shaded = next(each for each in axes.collections if each.get_array() is not None)
+        assert 0 < len(shaded.get_paths()) < one.fill_motion.sizes["triangle"]
 
 
 def test_a_narrower_gap_is_within_a_wider_one():
