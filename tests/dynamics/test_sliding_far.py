@@ -24,8 +24,13 @@ def box(name, left, right, low, high, **options):
 
 
 @cache
-def block_on(*bases, friction=0.2, cohesion=0.0, stone=(0.0, 1.0), fidelity="rigid"):
-    """Model of a block on fixed bases, each from one place to another, side by side."""
+def block_on(*bases, fidelity="rigid", **given):
+    """Model of a block on fixed bases."""
+    return af.build(bases_and_block(*bases, **given), fidelity=fidelity, displacements="large")
+
+
+def bases_and_block(*bases, friction=0.2, cohesion=0.0, stone=(0.0, 1.0), height=0.4):
+    """Block on fixed bases, each from one place to another, side by side."""
     contact = af.Contact(STIFFNESS, STIFFNESS, friction, cohesion=cohesion)
     blocks, joints = [], []
     for k, (left, right) in enumerate(bases):
@@ -33,9 +38,8 @@ def block_on(*bases, friction=0.2, cohesion=0.0, stone=(0.0, 1.0), fidelity="rig
         ends = max(left, stone[0]), min(right, stone[1])
         places = [(x, 0.0) for x in ends]
         joints.append(af.Joint((k, len(bases)), *places, contact, f"bed {k}", role="pier"))
-    blocks.append(box("block", *stone, 0.0, 0.4))
-    structure = af.Structure(tuple(blocks), tuple(joints))
-    return af.build(structure, fidelity=fidelity, displacements="large")
+    blocks.append(box("block", *stone, 0.0, height))
+    return af.Structure(tuple(blocks), tuple(joints))
 
 
 def push(acceleration, duration, end=0.9):
@@ -82,6 +86,43 @@ def test_a_block_bears_on_all_of_its_face_however_far_it_slides(
     # all steps of fast slip, and with them the cohesion of the whole face, count as sliding
     slides = run.joints["slide"].values[:, 0]
     assert slides[np.diff(run.joints["slip"].values[:, 0], prepend=0.0) > 1e-4].all()
+
+
+@pytest.mark.parametrize(
+    ("bases", "friction", "cohesion", "acceleration", "duration"),
+    [
+        ([(-2.0, 4.0)], 0.2, 1e3, -5.0, 0.45),
+        ([(-2.0, 4.0)], 0.0, 3e3, -9.0, 0.3),
+        ([(-1.0, 0.5), (0.5, 3.0)], 0.1, 1e3, -6.0, 0.5),
+    ],
+)
+def test_a_loose_block_bears_on_all_of_its_face_too(
+    bases, friction, cohesion, acceleration, duration
+):
+    """The same as rigid blocks by the scheme of Moreau and Jean, which hold from the first step."""
+    structure = bases_and_block(*bases, friction=friction, cohesion=cohesion)
+    motion = push(acceleration, duration, end=1.5)
+    slip, _ = expected_slip(motion, friction * WEIGHT + cohesion)
+    simulation = af.dynamics.RigidBlockSimulation(structure, dt=5e-4)
+    start = af.dynamics.LooseBlocks.as_built(structure)
+    frame = simulation.final_frame(start, 3.0, motion)
+    # the step in which it stops errs by a dt² / 8, and each bend of the push by as much
+    assert frame.resting
+    assert frame.poses[-1, 0] == pytest.approx(slip, abs=1e-4)
+    assert np.abs(frame.poses[-1, 1:]).max() < 1e-6
+    assert frame.energy.gained_share < 1e-6
+
+
+def test_a_loose_block_on_its_corner_has_no_cohesion():
+    """Tilted, and without friction: nothing holds its corner, and its centroid falls straight."""
+    structure = bases_and_block((-2.0, 4.0), friction=0.0, cohesion=1e5)
+    start, turn = af.dynamics.LooseBlocks.as_built(structure), 0.05
+    c, s = np.cos(turn), np.sin(turn)
+    start.poses[1] = 0.0, 0.5 * s + 0.2 * (c - 1.0), turn
+    simulation = af.dynamics.RigidBlockSimulation(structure, dt=5e-4)
+    frame = simulation.final_frame(start, 0.05)
+    assert frame.poses[1, 2] < turn - 0.01
+    assert abs(frame.poses[1, 0]) < 1e-9
 
 
 def test_a_block_passes_from_one_base_to_the_next():
