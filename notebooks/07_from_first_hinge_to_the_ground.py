@@ -59,7 +59,7 @@ ring = ring_on(rough)
 #
 # $$ g = n \cdot d, \qquad s = t \cdot d, \qquad \sigma = 2 \sin \tfrac12 \delta , $$
 #
-# exactly, for any angles. Contact is where the faces still overlap, over a length of $h - |s|$.
+# exactly, for any angles. Contact is where the faces overlap: equal ones over $h - |s|$.
 # The rest is as before: a law of compression only over that length, and equilibrium
 #
 # $$ \sum_\text{joints} B(q)^T F(g, s, \sigma) = f_\text{weight} + \lambda\, f_\text{load} . $$

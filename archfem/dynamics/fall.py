@@ -182,12 +182,12 @@ def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterato
 
 
 def _with_sliding_joints(structure: Structure) -> Structure:
-    """Return the structure without cohesion, and with friction in joints that never slide."""
-    joints = []
-    for joint in structure.joints:
-        coefficient = joint.contact.coefficient if joint.contact.slides else ASSUMED_FRICTION
-        contact = replace(joint.contact, friction=coefficient, cohesion=0.0)
-        joints.append(replace(joint, contact=contact))
+    """Return the structure with friction, and no cohesion, in joints that never slide."""
+    joints = list(structure.joints)
+    for number, joint in enumerate(joints):
+        if not joint.contact.slides:
+            contact = replace(joint.contact, friction=ASSUMED_FRICTION, cohesion=0.0)
+            joints[number] = replace(joint, contact=contact)
     return replace(structure, joints=tuple(joints))
 
 
@@ -229,6 +229,7 @@ def _doubt_fall(structure: Structure, dataset: xr.Dataset, ratio: float | None) 
         )
     if cohesive := [j.name for j in joints if j.contact.slides and j.contact.cohesion > 0.0]:
         yield Doubt(
-            f"loose stones have no cohesion, in intact joints too: {join_names(cohesive)}",
+            "loose stones have cohesion on all of their faces that touch at both ends, also where "
+            f"the force is eccentric: {join_names(cohesive)}",
             "compare with joints without cohesion throughout",
         )

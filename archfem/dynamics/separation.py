@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem._typing import Array
+from archfem._typing import Array, Flags
 from archfem.dynamics.collapse_state import shallowest_depth
 from archfem.dynamics.history import Ending
 from archfem.dynamics.rigid_body.bodies import Bodies, make_bodies
@@ -23,6 +23,7 @@ from archfem.dynamics.rigid_body.contact_detection import (
 )
 from archfem.dynamics.state import Batch, State
 from archfem.masonry.stiffness_ratio import find_yielding_blocks, mark_stone_joints
+from archfem.masonry.structure import CONTACT_TOLERANCE
 from archfem.models.model import Model
 from archfem.units import G
 
@@ -65,8 +66,8 @@ class SeparationMonitor:
         """Return the first step of a batch with separated blocks and the reason, or None."""
         observer, structure = self.model.observer(), self.model.structure
         _, rotation, slip = np.moveaxis(observer.faces(batch.read(observer)), -2, 0)
-        rotation, slip = np.abs(rotation), np.abs(slip)
-        loose = (rotation > self.max_rotation) | (slip >= structure.depths)
+        rotation = np.abs(rotation)
+        loose = (rotation > self.max_rotation) | self._find_slid_off(slip)
         # which blocks are fill takes long to find out, and matters once a joint is loose
         if loose.any():
             loose &= mark_stone_joints(structure)
@@ -77,15 +78,28 @@ class SeparationMonitor:
         name = structure.joints[joint].name
         if rotation[k, joint] > self.max_rotation:
             return k, f"'{name}' had turned by {rotation[k, joint]:.2g} rad"
-        return k, f"'{name}' had slid by {slip[k, joint]:.2g} m, off its face"
+        return k, f"'{name}' had slid by {abs(slip[k, joint]):.2g} m, off its face"
+
+    def _find_slid_off(self, slip: Array) -> Flags:
+        """Return whether faces have slid off each other, and onto no other face (steps, joints)."""
+        structure, pairs = self.model.structure, self.model.structure.pairs
+        touching = structure.overlaps(slip)[0] > 0.0
+        off, near = ~touching, CONTACT_TOLERANCE * structure.size
+        for joint in np.flatnonzero(off.any(axis=0)):
+            # a stone on two others may leave one of them: joints of its face are on one line
+            free = [block for block in pairs[joint] if not structure.blocks[block].fixed]
+            heights = (structure.ends - structure.middles[joint]) @ structure.normals[joint]
+            beside = np.isin(pairs, free).any(axis=1) & (np.abs(heights) <= near).all(axis=1)
+            off[:, joint] &= ~touching[:, beside].any(axis=1)
+        return off
 
 
 @dataclass(frozen=True, eq=False)
 class MeetingMonitor:
     """Detection of the step at which stones meet outside their joints.
 
-    A model has contact forces in its joints alone. Once faces have slid these end with the overlap,
-    although one of the faces may be longer. Fill does not count, since it adapts.
+    A model has contact forces in its joints alone, which end with the overlap of their faces. Fill
+    does not count, since it adapts.
     """
 
     model: Model
@@ -114,7 +128,7 @@ class MeetingMonitor:
 
     def _may_overrun(self, faces: Array) -> bool:
         """Return whether a face has slid over its end and turned, with large displacements."""
-        # beyond the overlap a joint is open, and slip × rotation is how deep a longer face is there
+        # beyond the overlap a joint is open, and slip × rotation bounds how deep a stone is there
         _, rotation, slip = np.abs(faces).max(axis=0)
         return self.model.large_displacements and bool(np.any(rotation * slip > self.tolerance))
 
@@ -131,9 +145,11 @@ class MeetingMonitor:
 
     def _compressions(self, faces: Array) -> Array:
         """Return how deep stones are in each other at their joints (steps, joints) [m]."""
-        gap, rotation, slip = np.moveaxis(faces[..., self._joints], -2, 0)
-        overlap = np.maximum(self.model.structure.depths[self._joints] - np.abs(slip), 0.0)
-        return np.maximum(0.5 * overlap * np.abs(rotation) - gap, 0.0)
+        gap, rotation, slip = np.moveaxis(faces, -2, 0)
+        length, middle = self.model.structure.overlaps(slip)
+        turn = 2.0 * np.sin(0.5 * rotation)
+        depths = turn * middle + 0.5 * length * np.abs(turn) - gap
+        return np.maximum(depths[:, self._joints], 0.0)
 
     @cached_property
     def _joints(self) -> NDArray[np.intp]:

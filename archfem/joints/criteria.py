@@ -236,8 +236,9 @@ def sliding_limits(joints: xr.Dataset, criteria: Criteria) -> Array:
     )
     friction = joints["friction_limit"].values
     cohesion = np.zeros_like(friction)
-    if "cohesion_limit" in joints.coords:
-        cohesion = joints["cohesion_limit"].values
+    if "cohesion_limit" in joints.coords:  # over time too where faces slide far
+        limits = joints["cohesion_limit"]
+        cohesion = limits.transpose(..., "joint", missing_dims="ignore").values
     return sliding_ratio(normal, e, criteria.coefficients(friction), criteria.cohesions(cohesion))
 
 

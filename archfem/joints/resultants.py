@@ -105,7 +105,7 @@ def joint_dataset(
         faces: gaps at mid-depth, rotations and slips, as by `face_matrix`, (3, n_joints) or
             (steps, 3, n_joints) [m, rad, m]; None without displacements.
         moved: whether displacements may be large: eccentricity is then from the middle of the
-            overlap of both faces, as a fraction of its length h - |slip|.
+            overlap of both faces, as a fraction of its length, and cohesion acts on that length.
 
     Returns:
         Variables N, V, M, eccentricity and friction, `opening`, `rotation` and `slip` if `faces`
@@ -131,6 +131,9 @@ def joint_dataset(
         "friction_limit": ("joint", structure.friction),
         "cohesion_limit": ("joint", structure.cohesion, {"units": "N"}),
     }
+    if moved and faces is not None and structure.cohesion.any():
+        limits = _cohesion(structure, structure.overlaps(faces[..., 2, :])[0])
+        coordinates["cohesion_limit"] = dims, limits, {"units": "N"}
     if structure.tension.any():
         coordinates[TENSION_COORDINATE] = "joint", structure.tension, {"units": "Pa"}
     if time is not None:
@@ -169,15 +172,20 @@ def _derive_variables(
 ) -> dict[str, Any]:
     """Return eccentricity, friction, opening and failure flags of joints as variables."""
     dims = ("time", "joint")[3 - resultants.ndim :]
-    depth, normal = structure.depths, resultants[..., 0]
-    ratios = eccentricity_and_friction(resultants, _overlap(depth, faces) if moved else depth)
+    normal, length = resultants[..., 0], structure.depths
+    middle = np.zeros_like(length)
+    if moved and faces is not None:
+        length, middle = structure.overlaps(faces[..., 2, :])
+    ratios = eccentricity_and_friction(resultants, length)
     values = dict(zip(("eccentricity", "friction"), ratios, strict=True))
     if faces is not None:
+        # half the depth, not the overlap: faces as long as the joint have ends beside each other
         gap, rotation = faces[..., 0, :], faces[..., 1, :]
-        values["opening"] = np.maximum(gap + 0.5 * depth * np.abs(rotation), 0.0)
+        half = 0.5 * np.maximum(length, structure.depths)
+        values["opening"] = np.maximum(gap - rotation * middle + half * np.abs(rotation), 0.0)
     variables = {key: _with_units(key, dims, value) for key, value in values.items()}
-    laws = criteria.coefficients(structure.friction), criteria.cohesions(structure.cohesion)
-    limits = sliding_ratio(normal, ratios[0], *laws)
+    cohesion = criteria.cohesions(_cohesion(structure, length))
+    limits = sliding_ratio(normal, ratios[0], criteria.coefficients(structure.friction), cohesion)
     margin = tension_margin(normal, structure.tension)
     return variables | failure_flags(dims, margin, ratios, limits, criteria.hinge)
 
@@ -201,9 +209,9 @@ def _with_units(name: str, dims: tuple[str, ...], values: Array) -> tuple[Any, .
     return dims, values, attributes
 
 
-def _overlap(depth: Array, faces: Array | None) -> Array:
-    """Return the length over which the faces of joints overlap (…, n_joints) [m]."""
-    return depth if faces is None else np.maximum(depth - np.abs(faces[..., 2, :]), 0.0)
+def _cohesion(structure: Structure, length: Array) -> Array:
+    """Return the shear resistance by cohesion of joints closed on a length (…, n_joints) [N]."""
+    return structure.cohesion * (length / structure.depths)
 
 
 def check_instant(structure: Structure, joints: xr.Dataset) -> None:

@@ -21,7 +21,7 @@ from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge
 from archfem.joints.rigid_kinematics import jump_entries, jump_rates
 from archfem.limit.linear_programme import NoEquilibrium, solve_linear
-from archfem.masonry.block import Block, rotate
+from archfem.masonry.block import rotate
 from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.structure import Structure, largest_displacement
 
@@ -188,32 +188,8 @@ def find_corners(structure: Structure) -> Array:
 
     A face that extends beyond the joint has its corner there, and the other block slides on it.
     """
-    near = TOUCHING * structure.size
-    corners = np.empty((2, len(structure.joints), 2, 2))
-    for number, joint in enumerate(structure.joints):
-        pair = (structure.blocks[k] for k in structure.pairs[number])
-        spans = np.array([_face_span(block, joint.ends, near) for block in pair])
-        # Where both faces extend beyond an end of the joint, they do not touch there: it ends both.
-        beyond = np.abs(spans - [0.0, joint.depth]) > near
-        spans = np.where(beyond.all(axis=0), [0.0, joint.depth], spans)
-        corners[:, number] = joint.ends[0] + spans[..., None] * joint.tangent
-    return corners
-
-
-def _face_span(block: Block, line: Array, near: float) -> tuple[float, float]:
-    """Return where the face of a block along a line begins and ends, from the line's start [m]."""
-    depth = float(np.linalg.norm(line[1] - line[0]))
-    along = (line[1] - line[0]) / depth
-    arm = block.points - line[0]
-    share, height = arm @ along, arm @ [-along[1], along[0]]
-    low, high = 0.0, depth
-    for edge, (start, end) in enumerate(zip(share, np.roll(share, -1), strict=True)):
-        arc = block.centre is not None and edge in (0, 2)
-        on_line = max(abs(height[edge]), abs(height[edge + 1 - len(share)])) <= near
-        # an edge on the line belongs to the face where it overlaps the joint
-        if not arc and on_line and min(start, end) < depth - near and max(start, end) > near:
-            low, high = min(low, start, end), max(high, start, end)
-    return float(low), float(high)
+    along = structure.face_spans[..., None] * structure.tangents[:, None]
+    return structure.ends[:, :1] + along
 
 
 def tangent(normal: Array) -> Array:

@@ -246,6 +246,33 @@ class Block:
         """
         return find_side_of_line(self.points, line, near, self._arcs)
 
+    def face_span(self, line: Array, near: float) -> tuple[float, float]:
+        """Return where the straight face along a line begins and ends, from the line's start [m].
+
+        Consecutive edges on the line are one face.
+
+        Args:
+            line: start and end of a part of the face (2, 2) [m].
+            near: distance of points that count as one [m].
+        """
+        depth = float(np.linalg.norm(line[1] - line[0]))
+        along = (line[1] - line[0]) / depth
+        arm = self.points - line[0]
+        on_line = np.abs(arm @ [-along[1], along[0]]) <= near
+        straight = on_line & np.roll(on_line, -1)
+        straight[list(self._arcs)] = False
+        ends = np.stack([arm @ along, np.roll(arm @ along, -1)])[:, straight]
+        edges = list(zip(*np.sort(ends, axis=0).tolist(), strict=True))
+        low, high = 0.0, depth
+        # an outline does not touch itself: edges on the line that meet are consecutive
+        for start, end in sorted(edges):
+            if start <= high + near and end > near:
+                high = max(high, end)
+        for start, end in sorted(edges, key=lambda edge: -edge[1]):
+            if end >= low - near and start < depth - near:
+                low = min(low, start)
+        return low, high
+
     @property
     def _arcs(self) -> tuple[int, ...]:
         """Numbers of the sides that are arcs."""

@@ -278,6 +278,48 @@ class Structure(ResultDisplay):
         """Numbers of the two blocks at each joint, the lower first (n_joints, 2)."""
         return np.array([(joint.lower, joint.higher) for joint in self.joints], dtype=np.intp)
 
+    @cached_property
+    def face_spans(self) -> Array:
+        """Where faces of lower and higher blocks begin and end (2, n_joints, 2) [m].
+
+        Distances are from the intrados of each joint. A face ends with the outline of its block,
+        also that of a support, whatever ground is beside it. Where both faces extend beyond an end
+        of the joint they do not touch there, and it ends both.
+        """
+        near = CONTACT_TOLERANCE * self.size
+        spans = np.empty((2, len(self.joints), 2))
+        for number, joint in enumerate(self.joints):
+            for side, block in enumerate((joint.lower, joint.higher)):
+                spans[side, number] = self.blocks[block].face_span(joint.ends, near)
+        built = np.column_stack([np.zeros(len(self.joints)), self.depths])
+        return np.where((np.abs(spans - built) > near).all(axis=0), built, spans)
+
+    @cached_property
+    def end_slips(self) -> Array:
+        """Slips at which both faces end together, at intrados and extrados (n_joints, 2) [m].
+
+        Zero where both faces end with the joint; slip is positive toward the extrados.
+        """
+        slips = self.face_spans[0] - self.face_spans[1]
+        return np.where(np.abs(slips) > CONTACT_TOLERANCE * self.size, slips, 0.0)
+
+    def overlaps(self, slip: Array) -> tuple[Array, Array]:
+        """Return length and middle of the overlap of both faces of joints that have slid.
+
+        Args:
+            slip: of the higher block, positive toward the extrados (…, n_joints) [m].
+
+        Returns:
+            Length, at least 0, and middle of the overlap toward the extrados, from the mean of
+            both places of the joint's middle, on either face, (…, n_joints) [m].
+        """
+        # Each end of the overlap is that of the face which ends first. It moves by half the slip
+        # with either face, relative to the mean of both.
+        inner, outer = np.moveaxis(self.end_slips, -1, 0)
+        at_inner = 0.5 * (np.abs(slip - inner) - np.abs(inner))
+        at_outer = 0.5 * (np.abs(slip - outer) - np.abs(outer))
+        return np.maximum(self.depths - (at_inner + at_outer), 0.0), 0.5 * (at_inner - at_outer)
+
     def _normal(self, joint: Joint) -> Array:
         """Outward normal of the lower block along an edge that both blocks share."""
         if not 0 <= joint.lower < joint.higher < len(self.blocks):

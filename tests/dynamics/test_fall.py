@@ -129,11 +129,11 @@ def test_a_fall_that_cannot_be_followed_keeps_the_history_up_to_it(monkeypatch):
 
 
 def test_loose_stones_rub_as_their_joints_did_or_by_six_tenths():
-    for friction, rubs in ((0.45, 0.45), (None, 0.6)):
+    for friction, rubs, bond in ((0.45, 0.45, 1e4), (None, 0.6, 0.0)):
         contact = af.Contact(1e9, 4e8, friction, cohesion=1e4)
         loose = fall._with_sliding_joints(af.column(breadth=1.0, heights=[1.0], contact=contact))
         assert [joint.contact.friction for joint in loose.joints] == [rubs]
-        assert [joint.contact.cohesion for joint in loose.joints] == [0.0]
+        assert [joint.contact.cohesion for joint in loose.joints] == [bond]
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_loose_stones_rub_as_their_joints_did_or_by_six_tenths():
     [
         (af.Contact(1e9, 4e8, 0.45), []),
         (af.Contact(1e9, 4e8, None), ["friction of 0.6 where their joints never slide: joint 0"]),
-        (af.Contact(1e9, 4e8, 0.45, cohesion=1e4), ["no cohesion, in intact joints too: joint 0"]),
+        (af.Contact(1e9, 4e8, 0.45, cohesion=1e4), ["also where the force is eccentric: joint 0"]),
     ],
 )
 def test_friction_that_loose_stones_are_given_is_doubted(contact, words):

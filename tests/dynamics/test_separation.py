@@ -262,18 +262,39 @@ def test_stones_without_a_role_are_no_fill():
     assert monitor.find_first(moved) == (0, "'one' met 'two'")
 
 
-def test_a_face_that_extends_beyond_its_joint_is_met(pair):
-    """Slid by s, a column that tilts enters the floor by s sin θ beyond the end of its joint."""
-    monitor, slid, turns = MeetingMonitor(pair, at_rest(pair, np.zeros(6))), 0.02, (0.024, 0.026)
-    states = []
-    for turn in turns:
-        # about the left end of the overlap, at a distance of slid from the corner
-        arm = np.array([0.3 - slid, 1.2])
-        c, s = np.cos(turn), np.sin(turn)
-        x, y = np.array([[c, -s], [s, c]]) @ arm - arm
-        states.append([x - slid, y, turn, 0.0, 0.0, 0.0])
-    assert [slid * np.sin(turn) > 5e-4 for turn in turns] == [False, True]
-    assert monitor.find_first(steps(*states)) == (1, "'floor' met 'slender'")
+def test_a_corner_that_slid_beyond_its_joint_presses_the_longer_face(pair):
+    """A column that slid by s and tilts enters the floor by s sin θ at its corner: no meeting.
+
+    The wedge from there to the place about which it turned presses by k (s sin θ)² / (2 σ).
+    """
+    monitor, slid, turn = MeetingMonitor(pair, at_rest(pair, np.zeros(6))), 0.02, 0.026
+    # about a place of the face at a distance of slid from the corner
+    arm = np.array([0.3 - slid, 1.2])
+    c, s = np.cos(turn), np.sin(turn)
+    x, y = np.array([[c, -s], [s, c]]) @ arm - arm
+    state = np.array([x - slid, y, turn, 0.0, 0.0, 0.0])
+    assert slid * s > monitor.tolerance
+    assert monitor.find_first(steps(state)) is None
+    force = 0.5 * CONTACT.normal_stiffness * (slid * s) ** 2 / (2.0 * np.sin(0.5 * turn))
+    # the mean frame is turned by half of θ against the floor
+    assert pair.resultants(state)[0, 0] == pytest.approx(force, rel=2.0 * turn)
+
+
+@pytest.mark.parametrize(("slid", "found"), [(0.3, None), (0.5, None), (2.9, None), (3.1, 0)])
+def test_a_stone_that_left_one_of_two_bases_is_not_loose(slid, found):
+    """Bases end at -1, 0.5 and 3 m, and the stone is from 0 to 1 m: 3 m is as far as it is held."""
+    bases = (
+        stone("base", -1.0, -1.0, 0.5, 0.0, fixed=True),
+        stone("next", 0.5, -1.0, 3.0, 0.0, fixed=True),
+    )
+    joints = [
+        af.Joint((0, 2), (0.0, 0.0), (0.5, 0.0), CONTACT, "first", role="pier"),
+        af.Joint((1, 2), (0.5, 0.0), (1.0, 0.0), CONTACT, "second", role="pier"),
+    ]
+    built = af.Structure((*bases, stone("stone", 0.0, 0.0, 1.0, 0.4, role="pier")), tuple(joints))
+    model = af.build(built, fidelity="rigid", displacements="large")
+    loose = SeparationMonitor(model).find_first(steps([slid, 0.0, 0.0]))
+    assert (loose if loose is None else loose[0]) == found
 
 
 def test_a_stone_meets_the_ground():

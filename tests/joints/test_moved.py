@@ -110,6 +110,8 @@ def two_joints(shapes, friction, facets, rng, fill=False):
     points = len(place) // 2
     laws = [af.Contact(1e6, 1e6, friction), af.Contact(2e6, 1e6, friction, cohesion=2e3)]
     records = np.array([ContactLaw.of(law) for law in laws], CONTACT_RECORD)
+    # faces that extend beyond their joints by about as far as they slide, but for one end
+    longer = np.array([[-0.08, 0.05], [0.0, 0.1]])
     faces = FaceLaw(
         np.array([1.0, 0.8]),
         1.0,
@@ -120,6 +122,7 @@ def two_joints(shapes, friction, facets, rng, fill=False):
         np.repeat([3e4, 2e4], points) / points,
         facets,
         np.array([False, shapes > 0]),
+        longer,
     )
     whole = np.arange(2)
     angles, built = rng.uniform(-3, 3, 2), 0.03 * rng.normal(size=(2, 4))

@@ -5,6 +5,7 @@ import pytest
 
 import archfem as af
 from archfem.joints import resultants as resultants_module
+from archfem.joints.criteria import with_failure_flags
 from archfem.joints.resultants import eccentricity_and_friction
 
 DEPTH = 0.55
@@ -59,6 +60,35 @@ def test_faces_that_slid_are_judged_by_their_overlap(ring):
     assert moved[:2] == pytest.approx([0.055 / 0.44, 0.055 / 0.275])
     assert np.isnan(moved[2])
     assert moved[3:] == pytest.approx(0.1)
+
+
+def test_a_stone_on_a_longer_base_is_judged_by_all_of_its_face():
+    """Slid by 0.3 m from an edge on a base of 3 m: e, opening and bond of 1 m.
+
+    Openings are g - θ a at a distance a from the mean middle, and its face is from -0.35 to 0.65 m.
+    """
+    blocks = [
+        af.Block(((x, y), (x + b, y), (x + b, y + 1), (x, y + 1)), af.STONE, name, fixed=y < 0)
+        for x, y, b, name in ((0.0, -1.0, 3.0, "base"), (0.0, 0.0, 1.0, "stone"))
+    ]
+    contact = af.Contact(1e9, 1e9, 0.2, cohesion=1e3)
+    bed = af.Joint((0, 1), (0.0, 0.0), (1.0, 0.0), contact, "bed")
+    structure = af.Structure(tuple(blocks), (bed,))
+    resultants, faces = np.array([[1e4, 2.98e3, 500.0]]), np.array([[0.0], [-1e-3], [0.3]])
+    found = af.joints.joint_dataset(structure, resultants, faces=faces, moved=True)
+    assert found["eccentricity"].item() == pytest.approx(0.05)
+    assert found["opening"].item() == pytest.approx(0.65e-3)
+    assert found["cohesion_limit"].item() == pytest.approx(1e3)
+    assert not found["slide"].item()
+    # it slides by μ N + 0.99 c A, off the other edge by less
+    resultants[0, 1] = 2.995e3
+    assert af.joints.joint_dataset(structure, resultants, faces=faces, moved=True)["slide"].item()
+    faces[2], resultants[0, 1] = -0.3, 2.8e3
+    left = af.joints.joint_dataset(structure, resultants, faces=faces, moved=True)
+    assert left["cohesion_limit"].item() == pytest.approx(700.0)
+    assert left["slide"].item()
+    again = with_failure_flags(left, af.Criteria(hinge=0.4))
+    assert again["slide"].item()
 
 
 def test_variables_of_a_long_record_are_those_of_its_steps(ring):

@@ -141,3 +141,52 @@ def test_a_fingerprint_resolves_geometry_to_a_billionth_of_its_size():
     assert pair(1.0, width=1.0 + 2e-8).fingerprint != fingerprint
     # files that are written already are still of their structures
     assert af.column(breadth=1.0, heights=[1.0, 1.0]).fingerprint == "f33242d1fb0986b7"
+
+
+def on_two_bases(*vertices):
+    """A stone from 0 to 1 m on bases from -1 to 0.4 and to 3 m, with vertices on its lower face."""
+    bases = [
+        af.Block(((a, -1.0), (b, -1.0), (b, 0.0), (a, 0.0)), af.STONE, f"base {a}", fixed=True)
+        for a, b in ((-1.0, 0.4), (0.4, 3.0))
+    ]
+    outline = ((0.0, 0.0), *vertices, (1.0, 0.0), (1.0, 0.5), (0.0, 0.5))
+    contact = af.Contact(1e9, 1e9, 0.6)
+    joints = (
+        af.Joint((0, 2), (0.0, 0.0), (0.4, 0.0), contact, "first"),
+        af.Joint((1, 2), (1.0, 0.0), (0.4, 0.0), contact, "second"),
+    )
+    return af.Structure((*bases, af.Block(outline, af.STONE, "stone")), joints)
+
+
+@pytest.mark.parametrize("vertices", [(), ((0.4, 0.0),), ((0.2, 0.0), (0.4, 0.0), (0.9, 0.0))])
+def test_a_face_is_all_of_its_straight_edge(vertices):
+    """Whether or not vertices divide it, from the intrados of each joint."""
+    structure = on_two_bases(*vertices)
+    lower, higher = structure.face_spans
+    assert lower == pytest.approx(np.array([[-1.0, 0.4], [-2.0, 0.6]]))
+    assert higher == pytest.approx(np.array([[0.0, 1.0], [0.0, 1.0]]))
+
+
+def test_overlaps_are_the_common_part_of_both_faces():
+    """Of the stone from s to 1 + s and bases from -1 to 0.4 and from there to 3 m.
+
+    The second joint has its extrados on the left, so that its slip is -s.
+    """
+    structure = on_two_bases()
+    for s in (-2.1, -1.2, -0.7, 0.0, 0.3, 0.5, 1.9, 2.2, 3.1):
+        length, middle = structure.overlaps(np.array([s, -s]))
+        for joint, (a, b) in enumerate(((-1.0, 0.4), (0.4, 3.0))):
+            low, high = max(a, s), min(b, 1.0 + s)
+            assert length[joint] == pytest.approx(max(high - low, 0.0), abs=1e-12)
+            if high > low:
+                place = structure.middles[joint, 0] + 0.5 * s + (1.0, -1.0)[joint] * middle[joint]
+                assert place == pytest.approx(0.5 * (low + high), abs=1e-12)
+
+
+def test_faces_that_both_extend_beyond_a_joint_end_with_it():
+    contact = af.Contact(1e9, 1e9, 0.6)
+    blocks = on_two_bases().blocks
+    joint = af.Joint((1, 2), (0.5, 0.0), (0.8, 0.0), contact, "short")
+    short = af.Structure(blocks[1:], (replace(joint, blocks=(0, 1)),))
+    assert short.end_slips.tolist() == [[0.0, 0.0]]
+    assert short.overlaps(np.array([0.1]))[0] == pytest.approx([0.2])

@@ -37,6 +37,8 @@ class Bodies(NamedTuple):
     centre: Array  # centroids as built (b + 1, 2) [m]
     reach: Array  # distance of the farthest vertex from the centroid (b,) [m]
     friction: Array  # coefficient between two bodies (b + 1, b + 1) [-]
+    # resistance of closed faces by cohesion, for the whole width (b + 1, b + 1) [N/m]
+    cohesion: Array
     owner: NDArray[np.int64]  # body of each piece (p,)
     piece_starts: NDArray[np.int64]  # first vertex of each piece, and the number of all (p + 1,)
     # vertices from the body's centroid, as built, anticlockwise in each piece (k, 2) [m]
@@ -150,6 +152,7 @@ def make_bodies(
         np.array([*(block.centroid for block in blocks), (0.0, ground)]),
         np.array([max(np.hypot(*points.T).max() for points, _ in shape) for shape in shapes]),
         _friction_table(structure, friction),
+        _cohesion_table(structure),
         np.array(owner, dtype=np.int64),
         np.cumsum([0, *(len(points) for points, _ in pieces)]).astype(np.int64),
         arms,
@@ -164,17 +167,17 @@ def make_bodies(
     )
 
 
-def check_cohesionless(structure: Structure) -> None:
-    """Refuse cohesion and laws of the user, and warn of soft blocks, which are not rigid."""
+def check_rigid_blocks(structure: Structure) -> None:
+    """Refuse bonds and laws of the user, and warn of soft blocks, which are not rigid."""
     if structure.has_own_laws:
         raise InvalidInput(
             "contacts have a law of their own, which blocks that fall do not follow: leave it out"
         )
     for joint in structure.joints:
-        if joint.contact.cohesion > 0.0:
+        if joint.contact.tension > 0.0:
             raise InvalidInput(
-                f"joint '{joint.name}' has cohesion {joint.contact.cohesion:.3g} Pa, and blocks "
-                "that fall have none: leave cohesion out"
+                f"joint '{joint.name}' has tensile strength {joint.contact.tension:.3g} Pa, and "
+                "blocks that fall have none: leave tension out"
             )
     for number in find_soft_blocks(structure):
         if not structure.blocks[number].fixed:
@@ -210,6 +213,16 @@ def _friction_table(structure: Structure, default: float | None) -> Array:
         has_joint[a, b] = has_joint[b, a] = True
     # infinite friction of joints that never slide becomes 1000, since kernels multiply by it
     return np.minimum(np.where(has_joint, table, general), 1e3)
+
+
+def _cohesion_table(structure: Structure) -> Array:
+    """Return c w between any two bodies, the least of their joints, and zero without a joint."""
+    count = len(structure.blocks) + 1
+    table = np.full((count, count), inf)
+    for (a, b), joint in zip(structure.pairs, structure.joints, strict=True):
+        limit = structure.width * joint.contact.cohesion
+        table[a, b] = table[b, a] = min(table[a, b], limit)
+    return np.where(np.isinf(table), 0.0, table)
 
 
 def find_unkept_ratios(

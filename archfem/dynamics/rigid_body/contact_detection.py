@@ -400,7 +400,7 @@ def prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
         pull_x, pull_y = spin_a * xa - spin_b * xb, spin_a * ya - spin_b * yb
         rows[k, 6] = -0.5 * parameters.dt * (pull_x * nx + pull_y * ny)
         rows[k, 7] = -0.5 * parameters.dt * (pull_y * nx - pull_x * ny)
-        rows[k, 8] = bodies.friction[a, b]
+        rows[k, 8], rows[k, 14] = bodies.friction[a, b], 0.0
         # points that are still apart may close by the end of the step
         if contacts.gap[k] > bodies.contact_gap:
             rows[k, 6] -= 2.0 * contacts.gap[k] / parameters.dt
@@ -408,6 +408,7 @@ def prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
         rows[k, 9] = rows[k, 13] = 0.0
         if not has_partner(contacts, k, touching):
             continue
+        rows[k, 14] = rows[k + 1, 14] = _bond_impulse(bodies, parameters, contacts, k)
         a, b = contacts.bodies[k]
         (ma, ia), (mb, ib) = bodies.inverse_mass[a], bodies.inverse_mass[b]
         rows[k, 9] = ma + mb + ia * rows[k, 0] * rows[k + 1, 0] + ib * rows[k, 1] * rows[k + 1, 1]
@@ -415,6 +416,19 @@ def prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
         # points of a face that coincide are solved one after the other
         if determinant > 1e-9 * rows[k, 11] * rows[k + 1, 11]:
             rows[k, 13] = 1.0 / determinant
+
+
+@entry
+def _bond_impulse(bodies, parameters, contacts, k):  # type: ignore
+    """Return the limit by cohesion at each of the two points of a face in a step [N s]."""
+    cohesion = bodies.cohesion[contacts.bodies[k, 0], contacts.bodies[k, 1]]
+    if cohesion == 0.0 or max(contacts.gap[k], contacts.gap[k + 1]) > bodies.contact_gap:
+        return 0.0
+    x = contacts.point[k + 1, 0] - contacts.point[k, 0]
+    y = contacts.point[k + 1, 1] - contacts.point[k, 1]
+    # All of the length counts, however eccentric the force is: that of each of several faces of a
+    # rigid block is not unique.
+    return 0.5 * parameters.dt * cohesion * np.sqrt(x**2 + y**2)
 
 
 @entry
@@ -478,7 +492,7 @@ def measure_residual(bodies, workspace, touching):  # type: ignore
         worst = max(worst, abs(max(normal - kn * speed, 0.0) - normal) / kn)
         # likewise stick, or slip at Coulomb's limit
         speed = relative_speed(speeds, (a, b), (-ny, nx), (ta, tb)) - slip
-        limit = friction * normal
+        limit = friction * normal + workspace.rows[k, 14]
         change = min(max(tangential - kt * speed, -limit), limit) - tangential
         worst = max(worst, abs(change) / kt)
     return worst

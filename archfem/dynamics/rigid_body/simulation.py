@@ -18,7 +18,7 @@ from archfem.dynamics.rigid_body.bodies import (
     FallFrame,
     LooseBlocks,
     Settling,
-    check_cohesionless,
+    check_rigid_blocks,
     make_bodies,
 )
 from archfem.dynamics.rigid_body.contact_detection import (
@@ -69,7 +69,8 @@ class RigidBlockSimulation:
     """Free rigid blocks with impacts and friction, by the scheme of Moreau and Jean.
 
     The results are motions and final positions. Contact forces of standing blocks are not unique,
-    since rigid blocks touch at two points, and are not computed.
+    since rigid blocks touch at two points, and are not computed. Cohesion acts where faces of
+    blocks with a common joint touch at both ends of their common length, and on all of that.
 
     Attributes:
         bodies: masses, convex pieces and friction of the blocks.
@@ -90,7 +91,8 @@ class RigidBlockSimulation:
 
     Raises:
         InvalidInput: a number is out of range, a ratio has no effect, there is no coefficient of
-            friction, a joint has cohesion, or the ground lies above the foot of a free block.
+            friction, a joint has a bond or a law of its own, or the ground lies above the foot of a
+            free block.
     """
 
     structure: Structure
@@ -107,7 +109,7 @@ class RigidBlockSimulation:
             raise InvalidInput(f"dt {self.dt:g} s is not between 1e-6 and 0.01 s: give 5e-4")
         if not 0.0 <= check_number(self.restitution, "restitution") <= 1.0:
             raise InvalidInput(f"restitution {self.restitution:g} is not between 0 and 1")
-        check_cohesionless(self.structure)
+        check_rigid_blocks(self.structure)
         bodies = make_bodies(self.structure, self.friction, self.level, self.rocking_ratio)
         object.__setattr__(self, "bodies", bodies)
 
@@ -264,7 +266,7 @@ class _Run:
             contacts,
             allocate_stored_impulses(contacts),
             np.empty_like(self._q),
-            np.empty((len(contacts.key), 14)),
+            np.empty((len(contacts.key), 15)),
             np.zeros((len(self._q) + 1, 3)),
             *(
                 SweepResult(np.zeros((len(self._q) + 1, 3)), np.zeros((len(contacts.key), 2)))

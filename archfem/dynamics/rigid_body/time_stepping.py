@@ -5,9 +5,10 @@ middle of the step, q + ½ Δt v,
 
     M (v₁ - v₀) = Δt p + Hᵀ P,   0 <= u_N1 + e u_N0 ⊥ P_N >= 0,   q₁ = q₀ + ½ Δt (v₀ + v₁),
 
-|P_T| <= μ P_N, and P_T opposes u_T1 where that is not zero (Moreau, in: Nonsmooth Mechanics and
-Applications, 1988; Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235). Sweeps over the faces,
-each with both of its points at once, solve for the impulses P, from those of the step before. They
+|P_T| <= μ P_N + Δt c A with A half of the common area at each point of two faces, and P_T opposes
+u_T1 where that is not zero (Moreau, in: Nonsmooth Mechanics and Applications, 1988; Jean, Comput.
+Methods Appl. Mech. Eng. 177 (1999) 235). Sweeps over the faces, each with both of its points at
+once, solve for the impulses P, from those of the step before. They
 have momentum with restart (Nesterov, Soviet Math. Dokl. 27 (1983) 372; O'Donoghue and Candès,
 Found. Comput. Math. 15 (2015) 715), and end once no contact violates its conditions by more than a
 stated speed. Rebounds are reduced where they would add energy. Overlaps are corrected in positions.
@@ -80,7 +81,8 @@ class StepWorkspace(NamedTuple):
     # of each contact: cross products of the arms with the normal, first and second body, and with
     # the tangent; 1/(H M⁻¹ Hᵀ) of normal and tangent; target u_N and u_T; μ; coupling of u_N with
     # the impulse of the next contact, if of the same face; rebound in the target u_N; H M⁻¹ Hᵀ of
-    # normal and tangent; 1/determinant of the normal equations of a face, zero for none (c, 14)
+    # normal and tangent; 1/determinant of the normal equations of a face, zero for none; limit of
+    # the tangential impulse by cohesion (c, 15)
     rows: Array
     speeds: Array  # velocities during the sweeps, the ground's last (b + 1, 3)
     last: SweepResult  # of the sweep before
@@ -264,7 +266,7 @@ def _separate(bodies, parameters, workspace, touching):  # type: ignore
         deepest = max(deepest, excess)
         # the displacement of the contact, and no friction
         rows[k, 6] = excess
-        rows[k, 7] = rows[k, 8] = 0.0
+        rows[k, 7] = rows[k, 8] = rows[k, 14] = 0.0
     if deepest <= 0.0:
         return False
     speeds[:] = 0.0
@@ -422,8 +424,9 @@ def _sweep_friction(rows, impulse, points, speeds, inverse_mass):  # type: ignor
     (along, wa, wb, worst), (m, ia, ib) = speeds, inverse_mass
     total = 0.0
     for j in range(points[0], points[1]):
-        old, limit = impulse[j, 1], rows[j, 8] * impulse[j, 0]
-        # the impulse that stops the slip, at most Coulomb's limit; then velocities with its change
+        old, limit = impulse[j, 1], rows[j, 8] * impulse[j, 0] + rows[j, 14]
+        # the impulse that stops the slip, at most the limit by friction and cohesion; then
+        # velocities with its change
         slip = along + rows[j, 3] * wb - rows[j, 2] * wa - rows[j, 7]
         change = min(max(old - rows[j, 5] * slip, -limit), limit) - old
         worst = max(worst, abs(change) * rows[j, 12])

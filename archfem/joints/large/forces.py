@@ -24,7 +24,7 @@ from archfem.joints.large.face_kinematics import (
     step_measures,
     step_poses,
 )
-from archfem.joints.large.overlap_law import FaceLaw, closing_energy, overlap_length, segment_forces
+from archfem.joints.large.overlap_law import FaceLaw, closing_energy, overlap, segment_forces
 from archfem.joints.large.rates import JointRates
 
 
@@ -159,8 +159,9 @@ def joint_energy(joints, q, slip):  # type: ignore
         longer = joints.initial_measures[segment, 3]
         longer = longer + relative_stretch(joints.kinematics, segment, q)
         # across: w ℓ Φ
-        length = overlap_length(law, segment, measures[1])[0]
-        phi = closing_energy(law, segment, length, measures[0], measures[2])[0]
+        (length, _), (middle, _) = overlap(law, segment, measures[1])
+        opening = measures[0] - middle * measures[2]
+        phi = closing_energy(law, segment, length, opening, measures[2])[0]
         total += law.width * length * phi
         # along: the shear spring of each point
         for point in range(law.first_point[segment], law.first_point[segment + 1]):
@@ -195,13 +196,14 @@ def _compute_segment(joints, segment, states, lag, slip, forces):  # type: ignor
     end = _add_initial_measures(joints, segment, end)
     # forces on the measures, and their derivative
     memory = slip, forces.irreversible_slip, forces.slip_direction
-    force, law_rate, stretch_rate, (shear, forces.dissipation[segment], missing) = segment_forces(
+    force, law_rate, stretch_rate, others = segment_forces(
         law, segment, (start, end, (first, last)), lag, memory
     )
+    (shear, moment), forces.dissipation[segment], missing = others
     joint, orientation = joints.joint[segment], joints.orientation[segment]
     forces.resultants[joint, 0] -= force[0]
     forces.resultants[joint, 1] += orientation * shear
-    moment = orientation * force[2] - joints.segment_offset[segment] * force[0]
+    moment = orientation * moment - joints.segment_offset[segment] * force[0]
     forces.resultants[joint, 2] += moment
     # generalised forces, and their correction where points should stick
     means = lower_rates[0], higher_rates[0]

@@ -1,15 +1,25 @@
 """The contact law on the overlap of two faces, over a step, compiled.
 
-Faces of depth h that have slid by s overlap on ℓ = h - |s|, around their mean middle. The gap is
-linear there, g - x ℓ σ with x from -½ to ½. The traction of `point_law` is integrated exactly over
-facets, or by springs at the points of a rule. With Φ the mean energy on an area the joint stores
-w ℓ Φ, and the mean forces over a step are those whose work is the change of that:
+Each end of the overlap is that of the face which ends first. With s^- and s^+ the slips at which
+both faces end together, R(s) = |s|, and a along the mean line from the mean middle of the joint,
 
-    F_g = w ℓ̄ Σ t̄_i,   F_σ = -w ℓ̄² Σ x_i t̄_i,
-    F_s = w Δℓ/Δs (Φ̄ - ℓ̄ σ̄ Σ x_i t̄_i) + Σ τ̄_i,
+    a^± = ±h/2 ∓ ½ (R(s - s^±) - R(s^±)),   ℓ = a^+ - a^-,   c = ½ (a^+ + a^-).
+
+Faces as long as the joint have s^± = 0: they overlap on ℓ = h - |s| around c = 0. A stone on a
+longer face has ℓ = h, c = ±s/2, until it slides over the end of that. The gap is linear on the
+overlap, g' - x ℓ σ with g' = g - c σ and x from -½ to ½. The traction of `point_law` is integrated
+exactly over facets, or by springs at the points of a rule. With Φ the mean energy on an area the
+joint stores w ℓ Φ, and the mean forces over a step are those whose work is the change of that:
+
+    F_g = w ℓ̄ Σ t̄_i,   F'_σ = -w ℓ̄² Σ x_i t̄_i,
+    F'_s = w Δℓ/Δs (Φ̄ - ℓ̄ σ̄ Σ x_i t̄_i) + Σ τ̄_i,
 
 with t̄_i the means of ∫φ_i t_n dx, or of W_i t_n, for gaps linear in time, and bars for means
-of both ends. The shear τ̄_i of a point is that of a spring in series with a slider, as in
+of both ends. As Δg' = Δg - c̄ Δσ - σ̄ Δc, they do that work on g, σ and s with
+
+    F_σ = F'_σ - c̄ F_g,   F_s = F'_s - σ̄ Δc/Δs F_g.
+
+The shear τ̄_i of a point is that of a spring in series with a slider, as in
 `contact_law.shear_over_step`.
 
 Where faces stretch, points slip by s + x η, with η the elongation of the higher face less that of
@@ -53,11 +63,14 @@ class FaceLaw(NamedTuple):
     # whether places that touched at the start stay opposite, like nodes of a mesh, so that the
     # overlap is h (j,)
     paired: Any
+    # slips at which both faces end together, at their ends right and left of the normal; 0 where
+    # they end with the joint (j, 2) [m]
+    end_slip: Array
 
 
 @inlined_kernel
-def lost_overlap(depth, slip):  # type: ignore
-    """Return |s|, by which the overlap is shorter than the depth, and its derivative by s."""
+def rounded_size(depth, slip):  # type: ignore
+    """Return R(s), the size of a slip, and its derivative."""
     # Rounded where it is below 1e-5 of the depth. The force that pushes a face off an edge would
     # jump where the slip changes its sign, and Newton's method would alternate there.
     size, bend = abs(slip), ROUNDED_SLIP * depth
@@ -67,20 +80,26 @@ def lost_overlap(depth, slip):  # type: ignore
 
 
 @inlined_kernel
-def overlap(depth, slip):  # type: ignore
-    """Return the length on which the faces overlap, and its derivative by the slip."""
-    lost, rate = lost_overlap(depth, slip)
-    if lost >= depth:
-        return 0.0, 0.0
-    return depth - lost, -rate
+def _lost_end(depth, slip, end_slip):  # type: ignore
+    """Return by how much an end of the overlap has moved inward, and its derivative by s."""
+    size, rate = rounded_size(depth, slip - end_slip)
+    if end_slip != 0.0:
+        size -= rounded_size(depth, end_slip)[0]
+    return 0.5 * size, 0.5 * rate
 
 
 @inlined_kernel
-def overlap_length(law, segment, slip):  # type: ignore
-    """Return the length on which the law of a segment acts, and its derivative by the slip."""
+def overlap(law, segment, slip):  # type: ignore
+    """Return length and middle of the overlap, each with its derivative by the slip."""
+    depth = law.depth[segment]
     if law.paired[segment]:
-        return law.depth[segment], 0.0
-    return overlap(law.depth[segment], slip)
+        return (depth, 0.0), (0.0, 0.0)
+    right, right_rate = _lost_end(depth, slip, law.end_slip[segment, 0])
+    left, left_rate = _lost_end(depth, slip, law.end_slip[segment, 1])
+    middle = 0.5 * (right - left), 0.5 * (right_rate - left_rate)
+    if right + left >= depth:
+        return (0.0, 0.0), middle
+    return (depth - (right + left), -(right_rate + left_rate)), middle
 
 
 @inlined_kernel
@@ -101,21 +120,36 @@ def closing_energy(law, segment, length, opening, turn):  # type: ignore
 
 
 @inlined_kernel
-def overlap_slope(depth, before, after, first, last):  # type: ignore
-    """Return Δℓ/Δs over a step, and its derivative by the slip at the end."""
-    (l0, r0), (l1, r1) = first, last
+def _size_slope(depth, before, after):  # type: ignore
+    """Return ΔR/Δs over a step, and its derivative by the slip at the end."""
     moved, bend = after - before, ROUNDED_SLIP * depth
     if max(abs(before), abs(after)) < bend:
-        return -0.5 * (before + after) / bend, -0.5 / bend
+        return 0.5 * (before + after) / bend, 0.5 / bend
+    (first, r0), (last, r1) = rounded_size(depth, before), rounded_size(depth, after)
     # beyond, on one side of zero slip, or without slip, it is the derivative
-    same = r0 == r1 and l0 > 0.0 and l1 > 0.0
-    if same or abs(moved) <= 1e-12 * (abs(before) + abs(after)):
+    if r0 == r1 or abs(moved) <= 1e-12 * (abs(before) + abs(after)):
         return r1, 0.0
-    slope = l1 - l0
-    if l0 > 0.0 and l1 > 0.0:  # small lengths round less
-        slope = lost_overlap(depth, before)[0] - lost_overlap(depth, after)[0]
-    slope /= moved
+    slope = (last - first) / moved
     return slope, (r1 - slope) / moved
+
+
+@inlined_kernel
+def _overlap_slopes(law, segment, slips, lengths):  # type: ignore
+    """Return Δℓ/Δs and Δc/Δs over a step, each with its derivative by the slip at the end."""
+    depth, (before, after), ((l0, _), (l1, shrinks)) = law.depth[segment], slips, lengths
+    end = law.end_slip[segment, 0]
+    right, right_bend = _size_slope(depth, before - end, after - end)
+    end = law.end_slip[segment, 1]
+    left, left_bend = _size_slope(depth, before - end, after - end)
+    middle = 0.25 * (right - left), 0.25 * (right_bend - left_bend)
+    if l0 > 0.0 and l1 > 0.0:
+        return (-0.5 * (right + left), -0.5 * (right_bend + left_bend)), middle
+    # the faces part, or meet
+    moved = after - before
+    if abs(moved) <= 1e-12 * (abs(before) + abs(after)):
+        return (shrinks, 0.0), middle
+    slope = (l1 - l0) / moved
+    return (slope, (shrinks - slope) / moved), middle
 
 
 @inlined_kernel
@@ -137,12 +171,19 @@ def _friction_limits(law, point, segment, pressed, lagged, lag):  # type: ignore
 
 @inlined_kernel
 def segment_forces(law, segment, ends, lag, memory):  # type: ignore
-    """Return forces of a segment over a step, their derivatives, shear, loss and corrections."""
+    """Return forces of a segment over a step, their derivatives, shear, moment, loss, corrections.
+
+    Shear and moment are the resultants on the overlap, the moment about its middle.
+    """
     # overlap at both ends of the step; gaps at the middle and over the overlap
-    laps = overlap_length(law, segment, ends[0][1]), overlap_length(law, segment, ends[1][1])
-    (l0, _), (l1, shrinks) = laps
-    mean, half, tilts = 0.5 * (l0 + l1), 0.5 * shrinks, shrinks * ends[1][2]
-    bounds = ends[0][0], ends[1][0], l0 * ends[0][2], l1 * ends[1][2]
+    (g0, s0, t0), (g1, s1, t1), longer = ends
+    first, (c0, _) = overlap(law, segment, s0)
+    last, (c1, moves) = overlap(law, segment, s1)
+    (l0, _), (l1, shrinks), is_off_middle = first, last, c0 != 0.0 or c1 != 0.0 or moves != 0.0
+    g0, g1 = g0 - c0 * t0, g1 - c1 * t1
+    ends = (g0, s0, t0), (g1, s1, t1), longer
+    mean, half, tilts = 0.5 * (l0 + l1), 0.5 * shrinks, shrinks * t1
+    bounds = g0, g1, l0 * t0, l1 * t1
     (total, moment, gap, place, square, loss), rubs = _sum_points(
         law, segment, (bounds, ends), (mean, half, tilts, l1), lag, memory
     )
@@ -156,33 +197,68 @@ def segment_forces(law, segment, ends, lag, memory):  # type: ignore
         -scale * mean * leans[2],
     )
     # F_s: edge force and shear
-    push, slides = _edge_force(law, segment, ends, laps, (moment, leans))
-    force = scale * total, push + rubs[0], -scale * mean * moment, rubs[1]
+    push, slides, slope = _edge_force(law, segment, ends, (first, last), (moment, leans))
+    about = -scale * mean * moment
+    force = scale * total, push + rubs[0], about, rubs[1]
     slides = slides[0] + rubs[3], slides[1] + rubs[4], slides[2] + rubs[5]
     rates = opens, slides, turns, (rubs[6], rubs[7], rubs[8])
-    others = rubs[0], rubs[2] + scale * loss, (rubs[11], rubs[12])
+    if is_off_middle:
+        force, rates = _about_mean_middle(force, rates, (c0, c1, moves, slope), (t0, t1))
+    others = (rubs[0], about), rubs[2] + scale * loss, (rubs[11], rubs[12])
     return force, rates, (rubs[9], rubs[10]), others
 
 
 @inlined_kernel
-def _edge_force(law, segment, ends, laps, moments):  # type: ignore
-    """Return the force along the joint due to the shrinking overlap, and its derivatives."""
+def _about_mean_middle(force, rates, middle, turns):  # type: ignore
+    """Return forces and derivatives by g, s and σ from those by the gap at the overlap's middle."""
+    (c0, c1, moves, (slope, bends)), (t0, t1) = middle, turns
+    mean, turn, total = 0.5 * (c0 + c1), 0.5 * (t0 + t1), force[0]
+    # derivatives by g' = g - c σ at the end
+    opens = _by_gap(rates[0], c1, moves * t1)
+    slides = _by_gap(rates[1], c1, moves * t1)
+    turning = _by_gap(rates[2], c1, moves * t1)
+    # F_s - σ̄ Δc/Δs F_g and F_σ - c̄ F_g
+    pull = turn * slope
+    slides = (
+        slides[0] - pull * opens[0],
+        slides[1] - pull * opens[1] - turn * bends * total,
+        slides[2] - pull * opens[2] - 0.5 * slope * total,
+    )
+    turning = (
+        turning[0] - mean * opens[0],
+        turning[1] - mean * opens[1] - 0.5 * moves * total,
+        turning[2] - mean * opens[2],
+    )
+    force = total, force[1] - pull * total, force[2] - mean * total, force[3]
+    return force, (opens, slides, turning, _by_gap(rates[3], c1, moves * t1))
+
+
+@inlined_kernel
+def _by_gap(row, middle, moved):  # type: ignore
+    """Return derivatives by g, s and σ from those by g', s and σ."""
+    return row[0], row[1] - moved * row[0], row[2] - middle * row[0]
+
+
+@inlined_kernel
+def _edge_force(law, segment, ends, lengths, moments):  # type: ignore
+    """Return the force along the joint due to the shrinking overlap, its derivatives, and Δc/Δs."""
     if law.paired[segment]:
-        return 0.0, (0.0, 0.0, 0.0)
-    ((g0, s0, t0), (g1, s1, t1), _), (first, last) = ends, laps
+        return 0.0, (0.0, 0.0, 0.0), (0.0, 0.0)
+    ((g0, s0, t0), (g1, s1, t1), _), (first, last) = ends, lengths
     (l0, _), (l1, shrinks), (moment, leans) = first, last, moments
     # w Δℓ/Δs (Φ̄ - ℓ̄ σ̄ Σ x_i t̄_i)
     mean, turn = 0.5 * (l0 + l1), 0.5 * (t0 + t1)
     before = closing_energy(law, segment, l0, g0, t0)[0]
     after, whole, tilted = closing_energy(law, segment, l1, g1, t1)
-    slope, bends = overlap_slope(law.depth[segment], s0, s1, first, last)
+    (slope, bends), middle = _overlap_slopes(law, segment, (s0, s1), lengths)
     push, width = 0.5 * (before + after) - mean * turn * moment, law.width
     # derivatives by opening, slip and rotation at the end
     by_opening = 0.5 * whole - mean * turn * leans[0]
     by_slip = -0.5 * shrinks * (t1 * tilted + turn * moment) - mean * turn * leans[1]
     by_turn = -0.5 * (l1 * tilted + mean * moment) - mean * turn * leans[2]
     by_slip = width * (slope * by_slip + bends * push)
-    return width * slope * push, (width * slope * by_opening, by_slip, width * slope * by_turn)
+    rates = width * slope * by_opening, by_slip, width * slope * by_turn
+    return width * slope * push, rates, middle
 
 
 @inlined_kernel

@@ -1,6 +1,7 @@
 """Joint segments between blocks in corotational coordinates.
 
-Between faces that stay plane a joint is one segment, whose overlap shrinks as the faces slide.
+Between faces that stay plane a joint is one segment, on the overlap of the whole faces of both
+blocks, which changes as they slide.
 Where faces bend, or belong to a fill, each facet of the mesh is a segment between the two pairs of
 nodes at its ends. Displacement and rotation of its faces are linear in the deformations of the
 blocks in their frames, so that a segment follows the equations of plane faces. Its places stay
@@ -209,6 +210,9 @@ def _build_law(model: LinearBlockModel, segments: JointSegments) -> FaceLaw:
     contacts = [structure.joints[joint].contact for joint in segments.joint]
     law, segment = model.operator.law, segments.of_point
     depth, orientation = segments.depth[segment], joint_orientation(structure)[points.joint]
+    # intrados and extrados to the right and left of the normals
+    end_slip = structure.end_slips * joint_orientation(structure)[:, None]
+    end_slip = np.where(joint_orientation(structure)[:, None] > 0.0, end_slip, end_slip[:, ::-1])
     return FaceLaw(
         segments.depth,
         structure.width,
@@ -219,4 +223,5 @@ def _build_law(model: LinearBlockModel, segments: JointSegments) -> FaceLaw:
         points.shear_spring,
         law.end_count == 2,
         segments.paired,
+        np.ascontiguousarray(end_slip[segments.joint]),
     )

@@ -540,10 +540,11 @@ class LargeObserver(Observer):
         # mean direction of both faces: their tangent, rotated
         along = rotate(structure.tangents, mean[:, 2])
         slip = np.sum(along * apart[:, :2], axis=1)
-        half = 0.5 * np.maximum(structure.depths - np.abs(slip), 0.0) * np.cos(0.5 * apart[:, 2])
+        length, middle = structure.overlaps(slip)
+        half = 0.5 * length * np.cos(0.5 * apart[:, 2])
+        offsets = np.stack([middle - half, middle + half], axis=1)
         middles = structure.middles + mean[:, :2]
-        ends = middles[:, None] + np.array([-1.0, 1.0])[:, None] * (half[:, None] * along)[:, None]
-        return ends - structure.ends
+        return middles[:, None] + offsets[..., None] * along[:, None] - structure.ends
 
 
 def _plain(q: Array) -> Array:

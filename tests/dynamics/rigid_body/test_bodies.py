@@ -11,7 +11,7 @@ from loose_blocks import G, floor
 
 import archfem as af
 from archfem.dynamics.rigid_body.bodies import (
-    check_cohesionless,
+    check_rigid_blocks,
     drop_straight_vertices,
     find_unkept_ratios,
     make_bodies,
@@ -77,23 +77,23 @@ def test_a_sector_of_a_wide_angle_has_chords():
     ]
 
 
-def test_joints_with_cohesion_are_refused():
+def test_joints_with_bonds_are_refused():
     ring = af.circular_arch(
         radius=3.0,
         thickness=0.5,
         embrace=150.0,
         voussoirs=3,
-        contact=af.Contact(1e9, 1e9, 0.6, cohesion=1e4),
+        contact=af.Contact(1e9, 1e9, 0.6, cohesion=1e4, tension=5e3),
     )
-    with pytest.raises(af.errors.InvalidInput, match=r"cohesion 1e\+04 Pa"):
-        check_cohesionless(ring)
+    with pytest.raises(af.errors.InvalidInput, match=r"tensile strength 5e\+03 Pa"):
+        check_rigid_blocks(ring)
 
 
 def test_a_soft_body_is_doubted(caplog):
     soil = af.Material(6.25e6, 0.2, 18e3, name="soil")
     structure = floor((0.0, 0.0, 2.0, 2.0))
     blocks = (structure.blocks[0], replace(structure.blocks[1], material=soil))
-    check_cohesionless(replace(structure, blocks=blocks))
+    check_rigid_blocks(replace(structure, blocks=blocks))
     assert "'block 1' is soft" in caplog.text
 
 
