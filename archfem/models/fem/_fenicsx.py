@@ -145,9 +145,7 @@ def assemble_matrix(form: Any) -> sparse.csr_matrix:
 
 def assemble_vector(form: Any) -> Array:
     """Assemble a linear form."""
-    dofmap = form.function_spaces[0].dofmap
-    values = np.zeros(dofmap.index_map.size_local * dofmap.index_map_bs)
-    fem.assemble_vector(values, form)
+    values: Array = fem.assemble_vector(form).array.copy()
     return values
 
 
