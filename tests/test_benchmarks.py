@@ -33,6 +33,7 @@ LONG = (
     "fidelity_errors",
     "floor",
     "matched_records",
+    "monolithic",
     "opensees_ring",
     "predicted_error",
     "random_structures",

@@ -65,7 +65,7 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
             "rigid": rigid blocks, no mesh; all compliance is in the joints;
             "faces": each joint face moves as a plane, the rest statically condensed;
             "condensed": all nodes on joints, the rest statically condensed; "full": all nodes;
-            "monolithic": all nodes, UFL forms assembled at each iteration.
+            "monolithic": all nodes, UFL forms of joints assembled at each iteration.
             Or fidelities by block name or part, with "rest" for all others, for example
             {"backfill": "full", "rest": "faces"}.
             Or "auto": fidelity, mesh and time step with a predicted error below the tolerance,

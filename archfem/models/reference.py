@@ -1,7 +1,7 @@
 """Models with all nodes: linear blocks assembled once, and the reference without any shortcut.
 
-Both are of elastic blocks, meshed by gmsh and assembled by DOLFINx. The reference assembles its
-weak forms at every iteration; it is the independent check of the other models.
+Both are of elastic blocks, meshed by gmsh and assembled by DOLFINx. The reference assembles the
+weak forms of its joints at every iteration; it is the independent check of the other models.
 
 For a step along which displacements are linear from u_0 to u_1, with the tractions of
 `joints.contact_law` averaged over the step, internal forces are, for all v,
@@ -45,7 +45,7 @@ def build_full_model(space: BrokenSpace, rule: Quadrature) -> LinearBlockModel:
         space.mesh.structure,
         "full",
         mass=mass,
-        block_stiffness=forms.stiffness()[free][:, free],
+        block_stiffness=forms.stiffness[free][:, free],
         mass_influence=mass @ axes,
         operator=build_joint_operator(space, rule),
         cells=_build_cells(space, forms, free),
@@ -105,22 +105,20 @@ class StepForms:
 
     @cached_property
     def _work(self) -> Any:
-        """Work of the mean forces on a displacement v, a UFL form."""
-        (start, end), lag, forms = self._step, self._lag, self.forms
-        v = ufl.TestFunction(forms.space.functions)
-        mean = (0.5 - lag) * start + (0.5 + lag) * end
-        of_joints = forms.joint_work([faces.means(self._step, lag) for faces in forms.faces], v)
-        return forms.block_work(mean, v) + of_joints
+        """Work of the mean tractions on a displacement v, a UFL form."""
+        v = ufl.TestFunction(self.forms.space.functions)
+        means = [faces.means(self._step, self._lag) for faces in self.forms.faces]
+        return self.forms.joint_work(means, v)
 
     @cached_property
     def force(self) -> Any:
-        """Mean of the internal forces (2 m,) [N]."""
+        """Mean of the forces of the joints (2 m,) [N]."""
         return fem.form(self._work)
 
     @cached_property
-    def tangent(self) -> Any:
+    def tangent(self) -> _fenicsx.MatrixAssembler:
         """Derivative of `force` by the displacement at the end [N/m]."""
-        return fem.form(ufl.derivative(self._work, self._step[1]))
+        return _fenicsx.MatrixAssembler(fem.form(ufl.derivative(self._work, self._step[1])))
 
     @cached_property
     def tractions(self) -> PointReader:
@@ -132,11 +130,9 @@ class StepForms:
 
     @cached_property
     def dissipation(self) -> Any:
-        """Energy lost to friction and damping [J]."""
-        step, lag, forms = self._step, self._lag, self.forms
-        change = step[1] - step[0]
-        at_joints = forms.over_joints([faces.dissipation(step, lag) for faces in forms.faces])
-        return fem.form(lag * forms.block_work(change, change) + at_joints)
+        """Energy lost to friction and damping in the joints [J]."""
+        lost = [faces.dissipation(self._step, self._lag) for faces in self.forms.faces]
+        return fem.form(self.forms.over_joints(lost))
 
 
 class MonolithicModel(Model):
@@ -161,12 +157,14 @@ class MonolithicModel(Model):
         self._places, self._owner = space.places, space.owner
         self._displacement = np.zeros(2 * len(space.places))  # workspace, of all nodes
         self._memory = linear.memory
-        # the pattern of the forms couples all nodes of the two cells at a facet, even by zeros
-        coupled = self._forms.tangent(self._displacement, self._memory)[self.free][:, self.free]
-        self._pattern = Pattern.of(linear.mass, coupled)
+        coupled = self.facets.coupling()[self.free][:, self.free]
+        self._pattern = Pattern.of(linear.mass, linear.block_stiffness, coupled)
+        self._entries = self._find_entries()
         self.mass = self._pattern.spread(linear.mass)
         self.block_stiffness = self._pattern.spread(linear.block_stiffness)
         self._closed = linear.closed_tangent()
+        # assembled entries of joints and tangent of the last call
+        self._last: tuple[Array, sparse.csr_matrix] | None = None
 
     def with_support_motion(self, motion: Array) -> Self:
         """Return the model with supports displaced: their nodes follow."""
@@ -225,17 +223,38 @@ class MonolithicModel(Model):
         return self._forms.force(self.spread(q), self._memory)[self.free]
 
     def tangent(self, q: Array) -> sparse.csr_matrix:
-        """Return the derivative of `force`, assembled in every call."""
-        return self.of_free(self._forms.tangent(self.spread(q), self._memory))
+        """Return the derivative of `force`, the same object while no point changes its state."""
+        of_joints = self._forms.joint_tangent(self.spread(q), self._memory)
+        if self._last is None or not np.array_equal(of_joints, self._last[0]):
+            self._last = of_joints, self.add_joints(1.0, of_joints)
+        return self._last[1]
 
     def support_forces(self, q: Array, motion: Array) -> Array:
         """Return the linearised change of `force` due to a small motion of the supports (n,)."""
         tangent = self._forms.tangent(self.spread(q), self._memory)
         return (tangent @ self._support_displacement(motion))[self.free]
 
-    def of_free(self, matrix: sparse.csr_matrix) -> sparse.csr_matrix:
-        """Return the part of a matrix that belongs to the coordinates, on the model's pattern."""
-        return self._pattern.spread(matrix[self.free][:, self.free])
+    def _find_entries(self) -> tuple[Numbers, Numbers]:
+        """Return entries of assembled joint tangents, and their positions on the pattern."""
+        of_joints = self.steps.tangent.assemble().tocoo()
+        # Rows of fixed blocks are left out, rather than replaced as by boundary conditions of
+        # DOLFINx: coordinates are those of the free blocks, as for every other fidelity.
+        coordinate = np.full(len(self._displacement), -1)
+        coordinate[self.free] = np.arange(self.size)
+        rows, columns = coordinate[of_joints.row], coordinate[of_joints.col]
+        # entries of the pattern numbered from one, since absent ones read as zero
+        numbered = self._pattern.with_data(np.arange(1.0, len(self._pattern.indices) + 1.0))
+        position = np.asarray(numbered[rows, columns]).ravel().astype(np.intp) - 1
+        # Forms also couple nodes off the joint, by zeros, which would only make factors wider
+        kept = np.flatnonzero((rows >= 0) & (columns >= 0) & (position >= 0))
+        return kept, position[kept]
+
+    def add_joints(self, block_factor: float, of_joints: Array) -> sparse.csr_matrix:
+        """Return the block stiffness times a factor, plus assembled entries of joints (n, n)."""
+        assembled, positions = self._entries
+        data = block_factor * self.block_stiffness.data
+        data[positions] += of_joints[assembled]
+        return self._pattern.with_data(data)
 
     def closed_tangent(self) -> sparse.csr_matrix:
         """Return the tangent with every joint closed over its whole depth."""
@@ -266,11 +285,15 @@ class MonolithicStep(ModelStep):
 
     def force(self, q: Array) -> Array:
         """Return the mean of the internal forces of blocks and joints (n,)."""
-        return _fenicsx.assemble_vector(self._forms(q).force)[self.model.free]
+        model, lag = self.model, self.start.damping_lag
+        mean = (0.5 - lag) * self.start.displacement[model.free] + (0.5 + lag) * q
+        of_joints = _fenicsx.assemble_vector(self._forms(q).force)[model.free]
+        return np.asarray(model.block_stiffness @ mean) + of_joints
 
     def tangent(self, q: Array) -> sparse.csr_matrix:
         """Return the derivative of `force` (n, n)."""
-        return self.model.of_free(_fenicsx.assemble_matrix(self._forms(q).tangent))
+        factor = 0.5 + self.start.damping_lag
+        return self.model.add_joints(factor, self._forms(q).tangent.values())
 
     def _tractions(self, q: Array) -> Array:
         return self.model.facets.read(self._forms(q).tractions)
@@ -285,4 +308,7 @@ class MonolithicStep(ModelStep):
 
     def dissipation(self, q: Array) -> float:
         """Return the energy lost to friction and damping [J]."""
-        return float(fem.assemble_scalar(self._forms(q).dissipation))
+        change = q - self.start.displacement[self.model.free]
+        of_blocks = change @ (self.model.block_stiffness @ change)
+        at_joints = fem.assemble_scalar(self._forms(q).dissipation)
+        return float(self.start.damping_lag * of_blocks + at_joints)

@@ -17,7 +17,7 @@ from scipy import sparse
 
 from archfem._optional import require_package
 from archfem._typing import Array
-from archfem._validation import check_number, check_type
+from archfem._validation import check_fields, check_number, check_type
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.statics.newton_iteration import Equations, Residual, ScipyNewton, Tangent
 
@@ -30,6 +30,12 @@ MAX_ROUND_OFF_RESIDUAL = 1e-7
 # Coordinates up to which SciPy takes about as long as PETSc, 5 to 9 ms a dead load
 MAX_SCIPY_UNKNOWNS = 300
 
+# Options that PETSc reads, of a test of convergence that is not used
+UNUSED_TESTS = {
+    *("snes_rtol", "snes_atol", "snes_stol", "snes_divergence_tolerance"),
+    "snes_convergence_test",
+}
+
 # Line searches in the order tried along an energy
 CONVEX_SEARCHES = ("basic", "cp")
 
@@ -40,18 +46,25 @@ class Newton:
 
     Attributes:
         tolerance: largest residual, relative to the load [-].
-        petsc: further options for PETSc, without a prefix, e.g. {"snes_monitor": ""}. Methods for
-            symmetric matrices are refused where joints slide, since tangents then are not.
+        petsc: further options for PETSc, without a prefix, e.g. {"snes_monitor": ""}. The first
+            solve refuses what PETSc does not read, and methods for symmetric matrices where joints
+            slide, since tangents then are not.
     """
 
     tolerance: float = 1e-10
-    petsc: Mapping[str, str] = field(default_factory=dict)
+    petsc: Mapping[str, str | float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse tolerances that no solve could reach, and options without names."""
         if not 0.0 < check_number(self.tolerance, "tolerance of a solve [-]") < 1.0:
             raise InvalidInput(f"tolerance {self.tolerance:g} of a solve is not between 0 and 1")
         check_type(self.petsc, Mapping, "petsc", 'give a dictionary, e.g. {"snes_monitor": ""}')
+        check_fields(self)
+        if unused := UNUSED_TESTS & {*self.petsc}:
+            raise InvalidInput(
+                f"petsc = {sorted(unused)} has no effect: solves converge by the residual over the "
+                f"load; give Newton(tolerance={self.tolerance:g}) another value instead"
+            )
 
 
 @dataclass(frozen=True)

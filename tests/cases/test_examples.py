@@ -1,5 +1,7 @@
 """Example cases: titles, text and copies."""
 
+from dataclasses import replace
+
 import pytest
 
 import archfem as af
@@ -11,7 +13,7 @@ def test_each_has_a_title():
     assert (
         titles.keys()
         == list_examples().keys()
-        >= {"ring", "ring_falls", "ring_paper", "prusias", "survey"}
+        >= {"ring", "ring_falls", "ring_fenicsx", "ring_paper", "prusias", "survey"}
     )
     assert all(titles.values())
 
@@ -65,3 +67,18 @@ def test_the_ring_of_the_paper_has_its_geometry_and_rayleigh_damping():
     assert (case.structure.blocks, case.structure.joints) == (ring.blocks, ring.joints)
     assert case.analysis.damping == af.Rayleigh(0.05, (8.0, 16.0))
     assert (case.analysis.fidelity, case.analysis.discretisation.displacements) == ("full", "small")
+
+
+def test_the_ring_by_fenicsx_alone_has_the_history_of_the_compiled_path():
+    case = af.Case.read(list_examples()["ring_fenicsx"], ["model.cells=[2, 2]"])
+    slow, motion = case.analysis, case.ground_motion().cut(2.0, 2.3)
+    assert (slow.fidelity, slow.method, slow.scheme) == (
+        *("monolithic", "snes"),
+        af.dynamics.Newmark(),
+    )
+    assert slow.newton.petsc["pc_factor_mat_ordering_type"] == "rcm"
+    runs = [each.run(motion) for each in (slow, replace(slow, fidelity="full", method="auto"))]
+    assert runs[0].joints["opening"].max() > 1e-4  # joints open on the way
+    for key in "NVM":
+        found, known = (run.joints[key].values for run in runs)
+        assert abs(found - known).max() < 1e-8 * abs(known).max()  # tolerances of the solves

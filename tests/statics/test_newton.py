@@ -35,6 +35,42 @@ def test_petsc_options_are_passed_on_and_removed(ring):
     assert dict(PETSc.Options().getAll()) == before
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"snes_typ": "newtontr"}, "'snes_typ' is not known, did you mean 'snes_type'"),
+        ({"pc_type": "lu", "-ksp_monitor": ""}, "'-ksp_monitor' is not known, did you mean 'ksp_"),
+        ({"unlike": 1}, "'unlike' is not known, and no name is like it"),
+        ({"mat_mumps_icntl_14": 30}, "'mat_mumps_icntl_14' is of a solver that is not selected"),
+        ({"snes_rtol": 1e-3}, r"\['snes_rtol'\] has no effect.*Newton\(tolerance=1e-10\)"),
+        ({"snes_max_it": [1]}, "give a table of words and words or a number"),
+    ],
+)
+def test_options_without_effect_are_refused(ring, options, words):
+    with pytest.raises(af.InvalidInput, match=words):
+        af.dead_load(af.build(ring, fidelity="rigid"), Newton(petsc=options))
+
+
+@pytest.mark.parametrize("option", ["snes_monitor", "snes_view", "snes_converged_reason"])
+def test_what_petsc_reads_in_every_solve_is_accepted(ring, option, tmp_path):
+    """Some options are read by none but the solve, others by none but one line search."""
+    printed = tmp_path / "log.txt"
+    options = {option: f"ascii:{printed}::append", "snes_linesearch_alpha": 1e-3}
+    newton, model = Newton(petsc=options), af.build(ring, fidelity="rigid")
+    lengths = []
+    for _ in range(2):
+        af.dead_load(model, newton)
+        lengths.append(len(printed.read_text()))
+    assert lengths[1] == pytest.approx(2 * lengths[0], rel=0.05)  # names have a counter
+    solver, entered = EquilibriumSolver(1, newton), len(printed.read_text())
+    for load in (1.0, 2.0, 3.0):
+        given = lambda x, f=load: x - f, lambda x: sparse.csr_matrix([[1.0]])
+        assert solver.solve(*given, np.zeros(1), load).q[0] == pytest.approx(load)
+    text = printed.read_text()[entered:]
+    words = {"snes_monitor": "0 SNES Function", "snes_view": "SNES Object"}
+    assert text.count(words.get(option, "Nonlinear")) == 3
+
+
 @pytest.mark.parametrize("options", [{"pc_type": "cholesky"}, {"ksp_type": "cg", "pc_type": "icc"}])
 def test_methods_for_symmetric_tangents_are_refused_where_joints_slide(ring, options):
     """They would take half of the matrix for all of it. Glued joints leave it symmetric."""

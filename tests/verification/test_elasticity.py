@@ -81,7 +81,7 @@ def test_broken_space_tied_together_is_the_conforming_one(stack, degree):
     places, number = np.unique(space.places.round(9), axis=0, return_inverse=True)
     tie = sparse.csr_matrix((np.ones(len(number)), (np.arange(len(number)), number.ravel())))
     tied = sparse.kron(tie, sparse.identity(2)).tocsr()
-    broken = Forms(space, af.joints.Quadrature()).stiffness()
+    broken = Forms(space, af.joints.Quadrature()).stiffness
 
     whole = _fenicsx.vector_space(grid.grid, "Lagrange", degree, 2)
     u, v = ufl.TrialFunction(whole), ufl.TestFunction(whole)

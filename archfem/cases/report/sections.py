@@ -73,7 +73,7 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
         "faces": "elastic; each face of a joint moves as a plane, the rest is condensed statically",
         "condensed": "elastic; all nodes on joints are kept, the rest is condensed statically",
         "full": "elastic finite elements, all nodes kept",
-        "monolithic": "elastic finite elements, all nodes kept, weak forms assembled each time",
+        "monolithic": "elastic finite elements, all nodes kept, weak forms of joints",
     }
     large = case.analysis.discretisation.displacements == "large"
     own_limit = "its own limit, μ + c A / N"

@@ -108,31 +108,36 @@ class SnesSolver:
             DidNotConverge: SNES finds no equilibrium.
         """
         equation, (numbers, linear) = self.equation, self._step_matrix(dt)
-        load = equation.load(state.time + numbers.share * dt)
+        model, share, (rates, rate) = equation.model, numbers.share, numbers.velocity
         before = np.stack([state.q, state.velocity, state.acceleration])
-        unmoved = numbers.velocity[0] @ before, numbers.acceleration[0] @ before
+        # velocity, where the equation is written, and acceleration if nothing is displaced
+        still = (1.0 - share) * state.velocity + share * (rates @ before)
+        fading = numbers.acceleration[0] @ before
+        load = equation.load(state.time + share * dt)
+        load = load - model.mass @ fading - equation.viscous @ still
 
-        def end(q: Array) -> State:
-            moved = q - state.q
-            velocity = numbers.velocity[1] * moved + unmoved[0]
-            return State(state.time + dt, q, velocity, numbers.acceleration[1] * moved + unmoved[1])
+        def contact(moved: Array) -> Array:
+            # u + β v, where the equation is written
+            along = share * (1.0 + equation.lag * rate)
+            return np.asarray(state.q + equation.lag * still + along * moved)
 
         def residual(q: Array) -> Array:
-            now = _interpolate_states(state, end(q), numbers.share)
-            moving = equation.model.mass @ now.acceleration + equation.viscous @ now.velocity
-            return np.asarray(moving + equation.model.force(equation.contact(now)) - load)
+            moved = q - state.q
+            return np.asarray(linear @ moved + model.force(contact(moved)) - load)
 
         def tangent(q: Array) -> sparse.csr_matrix:
-            contact = equation.contact(_interpolate_states(state, end(q), numbers.share))
-            return self._tangent(contact, linear, numbers.gain)
+            return self._tangent(contact(q - state.q), linear, numbers.gain)
 
         guess = state.q + dt * state.velocity + 0.5 * dt**2 * state.acceleration
         solved = self._solver.solve(residual, tangent, guess, self._scale)
-        new = end(solved.q)
+        moved = solved.q - state.q
+        velocity = rate * moved + rates @ before
+        acceleration = numbers.acceleration[1] * moved + fading
+        new = State(state.time + dt, solved.q, velocity, acceleration)
         ground = equation.motion.at(np.array([state.time, state.time + dt])).mean(axis=0)
         ends = (state.q, state.velocity), (new.q, new.velocity)
         energy = equation.energy_meter.measure_step(*ends, ground)
-        resultants = equation.model.resultants(equation.contact(new))
+        resultants = model.resultants(equation.contact(new))
         return Step(new, resultants, solved.iterations, dt, energy)
 
     def averaged(self, state: State, dt: float) -> Step:
@@ -151,21 +156,17 @@ class SnesSolver:
         equation, (numbers, linear) = self.equation, self._step_matrix(dt)
         model = equation.with_memory(state)
         ground = equation.ground(np.array([state.time + dt]), dt)[0, 0]
-        load = equation.weight - model.mass_influence @ ground
-        gain = numbers.velocity[1]
-
-        def speed(q: Array) -> Array:
-            return np.asarray(gain * (q - state.q) - state.velocity)
+        # the mean velocity is that of the displacement; without one, v is stopped and reversed
+        stopped = model.mass @ (2.0 / dt * state.velocity)
+        load = equation.weight - model.mass_influence @ ground + stopped
 
         def solve_passage(passage: ModelStep, guess: Array) -> Solution:
             def residual(q: Array) -> Array:
-                change, drag = (speed(q) - state.velocity) / dt, 0.5 * (speed(q) + state.velocity)
-                moving = model.mass @ change + equation.viscous @ drag
-                return np.asarray(moving + passage.force(q) - load)
+                return np.asarray(linear @ (q - state.q) + passage.force(q) - load)
 
             def tangent(q: Array) -> sparse.csr_matrix:
                 matrix = passage.tangent(q)
-                matrix.data = matrix.data + linear.data / numbers.gain
+                matrix.data = matrix.data + linear.data
                 return matrix
 
             # without an energy where joints slide: down the residual
@@ -178,7 +179,7 @@ class SnesSolver:
         passage = model.begin_step(state.q, equation.lag / dt)
         passage, solution = _solve_with_teeth(passage, solve_passage, state.q + dt * state.velocity)
         q, moved = solution.q, solution.q - state.q
-        memory, velocity = passage.updated_memory(q), speed(q)
+        memory, velocity = passage.updated_memory(q), numbers.velocity[1] * moved - state.velocity
         new = State(state.time + dt, q, velocity, (velocity - state.velocity) / dt, memory)
         lost = passage.dissipation(q) + float(moved @ (equation.viscous @ moved)) / dt
         work = -float(moved @ (model.mass_influence @ ground))
@@ -186,11 +187,14 @@ class SnesSolver:
         return Step(new, passage.resultants(q), solution.iterations, dt, energy)
 
     def _step_matrix(self, dt: float) -> tuple[StepNumbers, sparse.csr_matrix]:
-        """StepNumbers of a step, and μ M + ν R; the same objects as before while the step stays."""
+        """Return numbers of a step, and the derivative of inertia and drag by its displacement.
+
+        They are the same objects as before while the length of the step stays.
+        """
         if self._step is None or abs(self._step[0] - dt) > 1e-9 * dt:
-            numbers, matrix = self.equation.numbers(dt), self.equation.rest.copy()
-            mass = self.equation.model.mass.data
-            matrix.data = numbers.inertia * mass + numbers.rate * matrix.data
+            numbers, matrix = self.equation.numbers(dt), self.equation.viscous.copy()
+            inertia = numbers.acceleration[1] * self.equation.model.mass.data
+            matrix.data = inertia + numbers.share * numbers.velocity[1] * matrix.data
             self._step = (dt, numbers, matrix)
         return self._step[1:]
 
@@ -199,7 +203,7 @@ class SnesSolver:
         stiffness, last = self.equation.model.tangent(contact), self._matrix
         if last is None or last[0] is not stiffness or last[1] is not linear:
             matrix = copy(stiffness)
-            matrix.data = (stiffness.data + linear.data) / gain
+            matrix.data = stiffness.data / gain + linear.data
             self._matrix = last = (stiffness, linear, matrix)
         return last[2]
 
@@ -264,9 +268,3 @@ def _solve_with_teeth(
             return passage, replace(solution, iterations=iterations)
         passage = following
     raise DidNotConverge(f"saw teeth of joints that slide do not converge in {alternations} turns")
-
-
-def _interpolate_states(start: State, end: State, share: float) -> State:
-    """Return the state where HHT writes the equation, with the acceleration at the end."""
-    between = start.velocity + share * (end.velocity - start.velocity)
-    return replace(end, q=start.q + share * (end.q - start.q), velocity=between)

@@ -43,7 +43,9 @@ from archfem.models.fem.joint_facets import JointFacets, Patch, PointReader
 from archfem.models.fem.space import BrokenSpace
 
 # Overlap of faces that just touch [m], and friction reserve there [Pa]: far below round-off of any
-# other value, but it makes UFL's derivatives those of a closed joint that holds
+# other value, but it makes UFL's derivatives those of a closed joint that holds. That of |x| is
+# zero at x = 0, which would halve the stiffness. `ufl.conditional` has a branch for this point, but
+# the law is written once for NumPy and UFL, which share no function with such a branch.
 CONTACT_PERTURBATION = 1e-200
 
 Fields = tuple[Any, Any]
@@ -239,8 +241,9 @@ class Forms:
         patches = [faces.patch for faces in self.faces]
         return self.facets.point_reader(list(zip(patches, values, strict=True)))
 
+    @cached_property
     def stiffness(self) -> sparse.csr_matrix:
-        """Assemble the blocks' stiffness [N/m]."""
+        """Stiffness of the blocks, assembled once since their law is linear (2 m, 2 m) [N/m]."""
         u, v = ufl.TrialFunction(self.space.functions), ufl.TestFunction(self.space.functions)
         return _fenicsx.assemble_matrix(fem.form(self.block_work(u, v)))
 
@@ -269,35 +272,39 @@ class Forms:
     @cached_property
     def _force(self) -> Any:
         u, v = self._displacements[0], ufl.TestFunction(self.space.functions)
-        of_joints = self.joint_work([faces.tractions(u) for faces in self.faces], v)
-        return fem.form(self.block_work(u, v) + of_joints)
+        return fem.form(self.joint_work([faces.tractions(u) for faces in self.faces], v))
 
     def force(self, displacement: Array, slip: Array | None = None) -> Array:
-        """Return the assembled internal forces of blocks and joints (2 m,) [N]."""
+        """Return the internal forces of blocks and joints (2 m,) [N]."""
         self._set_state(displacement, slip)
-        return _fenicsx.assemble_vector(self._force)
+        return np.asarray(self.stiffness @ displacement) + _fenicsx.assemble_vector(self._force)
 
     @cached_property
-    def _tangent(self) -> Any:
+    def _joint_tangent(self) -> _fenicsx.MatrixAssembler:
         (u, fixed), v = self._displacements, ufl.TestFunction(self.space.functions)
         of_joints = self.joint_work([f.tangent_tractions(u, fixed) for f in self.faces], v)
-        return fem.form(ufl.derivative(self.block_work(u, v) + of_joints, u))
+        return _fenicsx.MatrixAssembler(fem.form(ufl.derivative(of_joints, u)))
+
+    def joint_tangent(self, displacement: Array, slip: Array | None = None) -> Array:
+        """Return the entries of the assembled derivative of the joint forces (nnz,) [N/m]."""
+        self._set_state(displacement, slip)
+        return self._joint_tangent.values()
 
     def tangent(self, displacement: Array, slip: Array | None = None) -> sparse.csr_matrix:
-        """Return the assembled derivative of `force` (2 m, 2 m) [N/m]."""
+        """Return the derivative of `force` (2 m, 2 m) [N/m]."""
         self._set_state(displacement, slip)
-        return _fenicsx.assemble_matrix(self._tangent)
+        return self.stiffness + self._joint_tangent.assemble()
 
     @cached_property
     def _energy(self) -> Any:
         u = self._displacements[0]
-        stored = self.over_joints([faces.energy(u) for faces in self.faces])
-        return fem.form(0.5 * self.block_work(u, u) + stored)
+        return fem.form(self.over_joints([faces.energy(u) for faces in self.faces]))
 
     def energy(self, displacement: Array, slip: Array | None = None) -> float:
         """Return the potential energy of blocks and joints without further slip [J]."""
         self._set_state(displacement, slip)
-        return float(fem.assemble_scalar(self._energy))
+        of_blocks = 0.5 * displacement @ (self.stiffness @ displacement)
+        return float(of_blocks + fem.assemble_scalar(self._energy))
 
     @cached_property
     def _tractions(self) -> PointReader:
