@@ -20,7 +20,7 @@ from PIL import Image
 FOLDER = Path(__file__).resolve().parents[1] / "notebooks"
 
 # Notebooks that take many minutes, shipped with the coarse settings and short motions of the tests
-QUICK = ("06_a_roman_bridge", "07_from_first_hinge_to_the_ground")
+QUICK = ("07_from_first_hinge_to_the_ground",)
 
 NOTE = """```{note}
 The outputs of this notebook were computed with coarse settings (`ARCHFEM_QUICK`), which take half a

@@ -49,6 +49,28 @@ def test_notebooks_are_shipped_as_their_scripts_ran(name):
     assert (FOLDER / f"{name}.ipynb").stat().st_size < 6e6 / len(EXPECTED)
 
 
+CLAIMS = {
+    "06_a_roman_bridge": [
+        *(("3.205 s", "3.205 s, global"), ("15 ms, open by 1.6 mm", "15 ms, opens by 1.6 mm")),
+        *(("3.505 s for 15 ms", "3.505 s, global"), ("for 5 ms", "for 5 ms")),
+        *(("Hinges open by 5.9 mm", "opens by 5.9 mm"), ("25 mm are left", ": 25.2 mm left")),
+        ("19 mm are left", ": 19.5 mm left"),
+    ]
+}
+"""Words of the text, and of the output that they describe."""
+
+
+@pytest.mark.parametrize(("name", "words"), [(n, each) for n in CLAIMS for each in CLAIMS[n]])
+def test_the_text_of_a_notebook_describes_its_output(name, words):
+    jupytext = pytest.importorskip("jupytext")
+    cells = jupytext.read(FOLDER / f"{name}.ipynb").cells
+    text = " ".join(" ".join(each.source for each in cells if each.cell_type == "markdown").split())
+    outputs = [output for cell in cells for output in cell.get("outputs", [])]
+    printed = "".join(output.get("text", "") for output in outputs)
+    assert words[0] in text
+    assert words[1] in printed
+
+
 LONG = (
     "02_how_thin_can_it_be",
     "03_a_load_finds_its_four_hinges",

@@ -1,6 +1,6 @@
 """Sections [limit], [rating] and [assessment]: capacity and kinematic assessment."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ from archfem.cases.toml_file import Table, check_choice, check_table, read_objec
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import Fill
 from archfem.limit.collapse import Collapse, collapse_factor
+from archfem.limit.plastic_fill import PlasticFill
 from archfem.limit.vehicles import Rating, Vehicle, rate
 from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad
 from archfem.masonry.structure import Structure
@@ -39,7 +40,7 @@ class LimitAnalysis:
     live: Sequence[Action]
     friction: str | None
     strength: float | None = None
-    fill: Fill | None = None
+    fill: Fill | PlasticFill | None = None
 
     @property
     def resistance(self) -> dict[str, Any]:
@@ -91,15 +92,19 @@ def _check_friction(value: Any, key: str) -> str | None:
     return None if law == "none" else law
 
 
-def _fill(table: Any) -> Fill:
+def _fill(table: Any) -> Fill | PlasticFill:
     """Return the strength of the fill."""
-    fill = check_table(table, declared_keys(Fill), "limit.fill")
+    laws = {"pressure": Fill, "plastic": PlasticFill}
+    word = table.get("law", "pressure") if isinstance(table, Mapping) else "pressure"
+    law = laws[check_choice(word, tuple(laws), "limit.fill.law")]
+    fill = check_table(table, declared_keys(law) | {"law": str}, "limit.fill")
+    fill.pop("law", None)
     if "friction_angle" not in fill:
         raise InvalidInput(
             f"limit.fill = {table} lacks its angle of friction: give friction_angle = "
             '"35 degree", which well-packed gravel has'
         )
-    return Fill(**fill)
+    return law(**fill)
 
 
 def _point_load(table: Any) -> PointLoad:

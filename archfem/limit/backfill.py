@@ -488,6 +488,11 @@ class BlocksWithFill:
 
 def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
     """Separate the stones of a structure from its fill, and check that the fill has a strength."""
+    if fill is not None and not isinstance(fill, Fill):
+        raise InvalidInput(
+            f"this analysis cannot take a {type(fill).__name__}: only collapse_factor bounds a "
+            "plastic fill; give af.limit.Fill here"
+        )
     soil = find_yielding_blocks(structure)
     names = [structure.blocks[number].name for number in soil]
     # Fill cut into pieces has the strength of its joints: its pieces are rigid as stones are.

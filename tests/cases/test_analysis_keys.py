@@ -68,6 +68,23 @@ def test_a_limit_without_a_load_has_friction_and_fill_for_a_rating(ring):
         limit.solve(ring)
 
 
+def test_a_fill_of_a_limit_may_be_plastic():
+    keys = {"friction_angle": "30 degree", "cohesion": "5 kPa"}
+    given = {"friction_angle": pytest.approx(30.0), "cohesion": 5e3}
+    pressing, plastic = (
+        parse_limit({"fill": keys | law}).fill for law in ({}, {"law": "plastic", "gap": 0.05})
+    )
+    assert isinstance(pressing, af.limit.Fill)
+    assert isinstance(plastic, af.limit.PlasticFill)
+    for fill in (pressing, plastic):
+        assert {key: getattr(fill, key) for key in given} == given
+    assert plastic.gap == 0.05
+    with pytest.raises(af.InvalidInput, match="unknown key 'limit.fill.mobilisation'"):
+        parse_limit({"fill": keys | {"law": "plastic", "mobilisation": 1.0}})
+    with pytest.raises(af.InvalidInput, match=r"limit\.fill\.law"):
+        parse_limit({"fill": keys | {"law": "elastic"}})
+
+
 def test_stones_crush_at_the_strength_of_a_limit(ring):
     table = {"horizontal": 1.0, "strength": "0.5 MPa"}
     factor = parse_limit(table).solve(ring).factor

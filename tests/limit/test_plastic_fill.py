@@ -164,6 +164,8 @@ def test_analyses_that_have_no_bounds_are_refused():
             live=af.BodyForce(1.0),
             fill=FILL,
         )
+    with pytest.raises(InvalidInput, match="only collapse_factor bounds a plastic fill"):
+        af.rate(arch_bridge(), "LM1", fill=FILL)
     with pytest.raises(InvalidInput, match="need associated flow"):
         af.collapse_factor(arch_bridge(), live=load, fill=FILL, friction="nonassociated")
     with pytest.raises(InvalidInput, match="a settlement and a plastic fill"):
