@@ -359,7 +359,7 @@ def _read_study(
     keys = {
         **{"title": str, "case": str, "cases": dict, "set": [str], "pairs": [str]},
         **{"vary": (dict, list), "samples": dict, "compute": (str, dict), "scales": (bool, dict)},
-        **{"columns": dict, "statements": list},
+        **{"columns": dict, "statements": [dict]},
     }
     refuse_unknown(tables, keys)
     settings = check_table(tables, keys, "study")

@@ -79,7 +79,7 @@ def test_a_fill_of_a_limit_may_be_plastic():
     for fill in (pressing, plastic):
         assert {key: getattr(fill, key) for key in given} == given
     assert plastic.gap == 0.05
-    with pytest.raises(af.InvalidInput, match="unknown key 'limit.fill.mobilisation'"):
+    with pytest.raises(af.InvalidInput, match=r"unknown key 'limit\.fill\.mobilisation'"):
         parse_limit({"fill": keys | {"law": "plastic", "mobilisation": 1.0}})
     with pytest.raises(af.InvalidInput, match=r"limit\.fill\.law"):
         parse_limit({"fill": keys | {"law": "elastic"}})
