@@ -49,8 +49,9 @@ class Colour:
 class Size:
     """Font sizes [points], and widths of figures [inch]."""
 
-    LABEL, TITLE = 8.0, 9.5  # LABEL also of ticks and legends
-    COLUMN, PAGE = 6.4, 11.0  # PAGE for a long structure, or many panels
+    NOTE, LABEL, TITLE = 7.0, 8.0, 9.5  # LABEL also of ticks and legends; none is smaller than NOTE
+    # a page of A4 prints 170 mm: no figure is wider, so that its type is printed as it is
+    COLUMN, PAGE = 6.4, 6.7
 
 
 # Percentage of stresses beyond the end of a colour scale: peaks at the corners about which blocks
@@ -70,8 +71,8 @@ class Page(Figure):
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure of a size [inch]."""
-    return Page(figsize=(width, height), layout="constrained")
+    """Return an empty figure of a size [inch], at most as wide as a page."""
+    return Page(figsize=(min(width, Size.PAGE), height), layout="constrained")
 
 
 def disable_math(drawing: Artist) -> None:
@@ -113,10 +114,10 @@ def add_note(figure: Figure, notes: Mapping[str, str]) -> None:
     several = len(labels) > 1
     texts = [f"{join_names(labels[note])}: {note}" if several else note for note in labels if note]
     if texts and not figure.get_suptitle():  # a figure of the user may have a title
-        letters = int(figure.get_figwidth() / text_width(1))
+        letters = int(figure.get_figwidth() / text_width(1, Size.NOTE))
         text = "\n".join(fill(each, letters) for each in texts)
-        figure.suptitle(text, fontsize=Size.LABEL, color=Colour.EDGE, parse_math=False)
-        figure.set_figheight(figure.get_figheight() + 0.14 * (1 + text.count("\n")))
+        figure.suptitle(text, fontsize=Size.NOTE, color=Colour.EDGE, parse_math=False)
+        figure.set_figheight(figure.get_figheight() + 0.12 * (1 + text.count("\n")))
 
 
 def style_axes(axes: Axes, x: str = "", y: str = "", size: float = Size.LABEL) -> None:
@@ -225,18 +226,12 @@ def outline_bounds(structure: Structure) -> tuple[Array, Array]:
     return points.min(axis=0), points.max(axis=0)
 
 
-def fitting_width(width: float, height: float) -> float:
-    """Return the figure width [inch] for a drawing with these proportions."""
-    # a ring has at most about 3, a bridge more than 4
-    return Size.COLUMN if width < 4.0 * height else Size.PAGE
-
-
 def drawing_scale(structure: Structure) -> float:
     """Return the approximate scale at which a structure is drawn on its own figure [inch / m]."""
     low, high = outline_bounds(structure)
     width, height = high - low
     # margins: 0.8 inch beside the drawing, 1.2 above and below; a figure is at most 6.8 high
-    return float(min((fitting_width(width, height) - 0.8) / width, (6.8 - 1.2) / height))
+    return float(min((Size.PAGE - 0.8) / width, (6.8 - 1.2) / height))
 
 
 def structure_figure(structure: Structure) -> Figure:
