@@ -1,5 +1,7 @@
 """Eccentricity part by part: its range over runs, and its value at one instant."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -8,6 +10,8 @@ from pictures import APART, WEIGHT, history
 
 import archfem as af
 from archfem.view import draw_eccentricity, draw_envelope
+
+MESHES = Path(__file__).parents[2] / "meshes"
 
 
 def test_envelope_shows_extremes_faces_and_dead_load(run):
@@ -56,6 +60,43 @@ def test_two_bridges_are_distinguished_by_dots(bridge, ring):
         assert lines["before"].get_linestyle() == ":"
         assert lines["before"].get_ydata() == pytest.approx(0.4)
         assert lines["after"].get_ydata() == pytest.approx(0.1)
+
+
+@pytest.fixture(scope="module")
+def short():
+    """The bridge after its piers were made 0.8 m lower: they lose their two lowest joints."""
+    return af.Case.read(MESHES / "prusias_piers.toml").structure
+
+
+def test_piers_that_differ_are_drawn_by_height(bridge, short):
+    """The base of a lower pier is drawn where it is, beside a joint of the higher one."""
+    runs = {"high": history(bridge, 0.3), "low": history(short, 0.2)}
+    dead = {name: run.joints.isel(time=0) for name, run in runs.items()}
+    panels = {axes.get_title(): axes for axes in draw_envelope(runs, dead=dead).axes}
+    states = draw_eccentricity(dead).axes
+    for panel in (panels["south pier"], states[-1]):
+        assert panel.get_xlabel() == "height [m]"
+        lines = {line.get_label(): line for line in panel.lines}
+        for structure, name in ((bridge, "high"), (short, "low")):
+            own = [j.middle[1] for j in structure.joints if j.part == "south pier"]
+            assert lines[name].get_xdata() == pytest.approx(own)
+    lines = {line.get_label(): line for line in panels["main arch"].lines}
+    assert lines["high"].get_xdata().tolist() == list(range(18))
+    assert lines["dead load low"].get_ydata() == pytest.approx(0.2)
+    assert lines["dead load low"].get_color() == lines["low"].get_color()
+    # a file of an earlier version has no heights
+    bare = {name: af.History(run.dataset.drop_vars("height")) for name, run in runs.items()}
+    assert draw_envelope(bare).axes[-1].get_xlabel() == "joint [-]"
+
+
+def test_runs_of_one_structure_share_a_colour(run):
+    """Runs under several motions: each has its lines, and the label has one entry."""
+    figure = draw_envelope({"both": [run, run], "one": run})
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["hinge from |e| = 0.46", "both", "one", "opened"]
+    colours = [line.get_color() for line in figure.axes[0].lines if line.get_marker() == "o"]
+    assert colours == [colours[0]] * 4 + [colours[4]] * 2
+    assert colours[0] != colours[4]
 
 
 def test_many_parts_go_on_several_rows(ring):
