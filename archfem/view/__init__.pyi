@@ -24,6 +24,7 @@ from .statics import draw_free_body as draw_free_body
 from .statics import draw_modes as draw_modes
 from .statics import draw_pushover as draw_pushover
 from .stress import draw_stress as draw_stress
+from .structure import draw_backbones as draw_backbones
 from .structure import draw_displaced as draw_displaced
 from .structure import draw_instants as draw_instants
 from .structure import draw_names as draw_names
