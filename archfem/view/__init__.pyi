@@ -19,6 +19,8 @@ from .motions import draw_spectra as draw_spectra
 from .motions import draw_suite as draw_suite
 from .pages.player import Player as Player
 from .pages.player import player as player
+from .springs import draw_mesh as draw_mesh
+from .springs import draw_spring_forces as draw_spring_forces
 from .statics import draw_dead_load as draw_dead_load
 from .statics import draw_free_body as draw_free_body
 from .statics import draw_modes as draw_modes
