@@ -1,5 +1,6 @@
 """Figures and films of structures and of results.
 
+    circles      surveyed points against circles
     collapse     limit analysis, falls
     films        films, pictures and a viewer of moving structures
     histories    joints over time, envelopes

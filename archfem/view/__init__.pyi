@@ -1,3 +1,4 @@
+from .circles import draw_circle_fit as draw_circle_fit
 from .collapse import draw_capacity as draw_capacity
 from .collapse import draw_collapse as draw_collapse
 from .collapse import draw_fall as draw_fall
@@ -13,6 +14,7 @@ from .histories import draw_eccentricity as draw_eccentricity
 from .histories import draw_envelope as draw_envelope
 from .histories import draw_joint as draw_joint
 from .histories import draw_joints as draw_joints
+from .motions import draw_accelerograms as draw_accelerograms
 from .motions import draw_motion as draw_motion
 from .motions import draw_selection as draw_selection
 from .motions import draw_spectra as draw_spectra
