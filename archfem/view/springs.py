@@ -33,7 +33,8 @@ def draw_mesh(model: Model, block: int | str | None = None) -> Figure:
     """Draw the cells of all blocks, with the springs in joints that are drawn open.
 
     Above, the whole structure; below, a block and its neighbours at a larger scale. Each spring
-    acts across and along its joint. The gaps are drawn alone: joints of the model have none.
+    acts across and along its joint; exact joints are integrated between these points. The gaps are
+    drawn alone: joints of the model have none.
 
     Args:
         model: a model of small displacements, of any fidelity but "monolithic".
@@ -53,11 +54,12 @@ def draw_mesh(model: Model, block: int | str | None = None) -> Figure:
     wide, high = structure_figure(structure).get_size_inches()
     figure = new_figure(wide, high + 3.2)
     above, below = figure.subplots(2, 1, height_ratios=[high, 3.0])
-    # a gap of 1.2 points on the page
-    _draw_cells(above, model, _part_at_joints(model, 1.2 / 72.0 / drawing_scale(structure)))
+    # at least 1.2 points on the page
+    gap = max(1.2 / 72.0 / drawing_scale(structure), 0.08 * float(np.median(structure.depths)))
+    _draw_cells(above, model, _part_at_joints(model, gap))
     above.autoscale_view()
     count = len(model.cells.polygons)
-    set_title(above, f"{structure.name}: {count} cells, {len(points.joint)} springs in joints")
+    set_title(above, f"{structure.name}: {count} cells, {len(points.joint)} points in joints")
     joints = [k for k, joint in enumerate(structure.joints) if number in joint.blocks]
     outline = structure.blocks[number].drawn()
     gap = 0.1 * float(np.ptp(outline, axis=0).max())
@@ -65,7 +67,9 @@ def draw_mesh(model: Model, block: int | str | None = None) -> Figure:
     _draw_cells(below, model, shifts)
     springs = _spring_lines(model, np.flatnonzero(np.isin(points.joint, joints)), shifts)
     style = {"colors": Colour.HINGE, "linewidths": 0.8, "zorder": 4, "gid": "springs"}
-    below.add_collection(LineCollection(list(springs), label="spring", **style))
+    below.add_collection(
+        LineCollection(list(springs), label="spring at a point of a joint", **style)
+    )
     (left, low), (right, top) = outline.min(axis=0), outline.max(axis=0)
     margin = 0.5 * max(right - left, top - low)
     below.set(xlim=(left - 2.5 * margin, right + 2.5 * margin), ylim=(low - margin, top + margin))

@@ -292,7 +292,7 @@ def _draw_force_polygon(axes: Axes, body: FreeBody, colours: list[str]) -> None:
         outward = np.array([y, -x])
         _number_force(axes, k, 0.5 * (tail + head), outward, colours[k])
     _set_square_limits(axes, corners)
-    set_title(axes, f"closing error {body.closing_error:.0e} of the largest force")
+    set_title(axes, f"closes to {body.closing_error:.0e} of the largest force")
 
 
 def _set_square_limits(axes: Axes, points: Array) -> None:

@@ -99,9 +99,13 @@ def text_width(letters: float, size: float = Size.LABEL) -> float:
 
 def set_title(axes: Axes, text: str) -> None:
     """Set the title of axes, wrapped to the width of their part of the figure."""
-    place = axes.get_subplotspec()
-    columns = 1 if place is None else place.get_gridspec().ncols
-    letters = int(axes.figure.get_figwidth() / columns / text_width(1, Size.TITLE))
+    place, width = axes.get_subplotspec(), axes.figure.get_figwidth()
+    if place is not None and (columns := place.get_gridspec().ncols) > 1:
+        ratios = np.array(place.get_gridspec().get_width_ratios() or np.ones(columns), dtype=float)
+        # labels of the axis at the left take 0.5 inch
+        width *= ratios[list(place.colspan)].sum() / ratios.sum()
+        width -= 0.5
+    letters = int(width / text_width(1, Size.TITLE))
     lines = fill(" ".join(text.split()), max(letters, 12), break_long_words=False)
     axes.set_title(lines, fontsize=Size.TITLE, color=Colour.TEXT, parse_math=False)
 

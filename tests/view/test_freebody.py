@@ -33,7 +33,7 @@ def test_the_picture_shows_forces_where_they_act_and_a_closed_polygon(ring, ring
     assert sorted(np.linalg.norm(chain[:, 1] - chain[:, 0], axis=1)) == pytest.approx(
         sorted(body.sizes / 1e3)
     )
-    assert right.get_title() == f"closing error {body.closing_error:.0e} of the largest force"
+    assert right.get_title() == f"closes to {body.closing_error:.0e} of the largest force"
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert [word.split(":")[0] for word in words] == ["1  joint 4", "2  joint 5", "3  weight"]
     assert f"{body.sizes[0] / 1e3:.1f} kN" in words[0]

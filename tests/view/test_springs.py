@@ -22,7 +22,7 @@ def test_all_cells_are_drawn_and_part_at_the_joints(sprung, ring):
     """Points in a joint move by half the gap, away from each other; those inside stay."""
     figure = draw_mesh(sprung, "voussoir 5")
     above, below = figure.axes
-    assert "272 cells, 90 springs in joints" in " ".join(above.get_title().split())
+    assert "272 cells, 90 points in joints" in " ".join(above.get_title().split())
     gap = float(below.get_title().split(" by ")[1].removesuffix(" mm")) / 1e3
     (cells,) = [each for each in below.collections if each.get_gid() == "cells"]
     corners, built = bodies(cells), [sprung.cells.places[k] for k in sprung.cells.polygons]
