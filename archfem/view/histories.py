@@ -37,10 +37,10 @@ from archfem.view.style import (
     add_legend_below,
     add_note,
     annotate,
+    legend_columns,
     new_figure,
     set_title,
     style_axes,
-    text_width,
 )
 
 
@@ -71,8 +71,8 @@ def draw_envelope(
         The figure, with a panel for each ring and pier; that of `axes` if given.
 
     Raises:
-        InvalidInput: there is no run, or more than there are colours; axes were given for several
-            parts.
+        InvalidInput: there is no run, or more than there are colours; a label has none; axes were
+            given for several parts.
     """
     states = {
         label: [run.joints for run in ([runs] if isinstance(runs, History) else runs)]
@@ -96,23 +96,22 @@ def draw_envelope(
     first = panels[0].axes
     if openings:
         first.plot([], [], "x", ms=4, color=Colour.GREY, label="opened")
-    if dead is not None:
-        _draw_dead_load(panels, {"": dead} if isinstance(dead, xr.Dataset) else dead, list(runs))
+    colours = dict(zip(runs, Colour.LINES, strict=False))
+    for label, at_rest in ({"": dead} if isinstance(dead, xr.Dataset) else dead or {}).items():
+        style: dict[str, Any] = {"ls": "--" if label else ":", "lw": 1.0}
+        colour = colours.get(label, Colour.TEXT)
+        _draw_state(panels, at_rest, f"dead load {label}".strip(), colour, **style)
     first.set_ylim(-0.56, 0.56 + (row_height * len(runs) if openings else 0.0))
     return _finish_panels(panels, states)
 
 
-def _draw_dead_load(
-    panels: Sequence["PartPanel"], dead: Mapping[str, xr.Dataset], labels: Sequence[str]
+def _draw_state(
+    panels: Sequence["PartPanel"], joints: xr.Dataset, label: str, colour: str, **style: Any
 ) -> None:
-    """Draw eccentricities under dead load, that of a label in its colour."""
-    colours = dict(zip(labels, Colour.LINES, strict=False))
-    for label, joints in dead.items():
-        style: dict[str, Any] = {"color": colours.get(label, Colour.TEXT), "lw": 1.0}
-        style |= {"ls": "--" if label else ":", "label": f"dead load {label}".strip()}
-        for panel in panels:
-            places, own = panel.select(joints)
-            panel.axes.plot(places, own["eccentricity"].values, **style)
+    """Draw the eccentricities of joints at one instant in all panels."""
+    for panel in panels:
+        places, own = panel.select(joints)
+        panel.axes.plot(places, own["eccentricity"].values, label=label, color=colour, **style)
 
 
 def draw_envelopes(runs: Mapping[str, History], dead: xr.Dataset | None) -> list[Figure]:
@@ -145,11 +144,8 @@ def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[st
     listed = {label: [joints] for label, joints in states.items()}
     panels = _make_panels(listed, None)
     for (label, joints), colour in zip(states.items(), Colour.LINES, strict=False):
-        style: dict[str, Any] = {"color": colour, "lw": 1.2, "marker": "o", "ms": 2.2}
-        style["ls"] = ":" if label in dotted else "-"
-        for panel in panels:
-            places, own = panel.select(joints)
-            panel.axes.plot(places, own["eccentricity"].values, label=label, **style)
+        style: dict[str, Any] = {"ls": ":" if label in dotted else "-", "lw": 1.2}
+        _draw_state(panels, joints, label, colour, marker="o", ms=2.2, **style)
     panels[0].axes.set_ylim(-0.56, 0.56)
     return _finish_panels(panels, listed)
 
@@ -218,6 +214,8 @@ def _make_panels(
     """Return a panel for each ring and pier, the rings first, with the faces of its joints."""
     if not 1 <= len(states) <= len(Colour.LINES):
         raise InvalidInput(f"{len(states)} runs in one picture: give 1 to {len(Colour.LINES)}")
+    if empty := [label for label, several in states.items() if not several]:
+        raise InvalidInput(f"{empty} have no runs: give one or several each")
     names: dict[str, list[str]] = {}
     roles: dict[str, str] = {}
     every = [joints for several in states.values() for joints in several]
@@ -293,11 +291,9 @@ def _finish_panels(
     if len(panels) == 1:
         add_legend(first)
     else:
-        handles = first.get_legend_handles_labels()[0]
-        longest = max(len(str(handle.get_label())) for handle in handles)
-        # the symbol of an entry takes 0.6 inch
-        fitting = int(figure.get_figwidth() / (0.6 + text_width(longest)))
-        add_legend_below(figure, fitting, handles=handles)
+        handles, labels = first.get_legend_handles_labels()
+        columns = legend_columns(labels, figure.get_figwidth())
+        add_legend_below(figure, columns, handles=handles)
     notes = {label: describe_assessed_joints(several[0]) for label, several in states.items()}
     add_note(figure, notes)
     return figure

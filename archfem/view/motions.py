@@ -22,7 +22,6 @@ from archfem.view.style import (
     annotate,
     new_figure,
     style_axes,
-    white_halo,
 )
 
 # Periods at which spectra are drawn [s]
@@ -102,37 +101,30 @@ def draw_accelerograms(suite: Suite) -> Figure:
         The figure, with a panel for the horizontal components and one for the vertical ones.
     """
     pairs = [pair.scaled(suite.scale / STANDARD_GRAVITY) for pair in suite.pairs]
-    names = ["horizontal", "vertical"][: 1 + any(pair.vertical is not None for pair in pairs)]
-    peaks = [
-        np.abs(pair.component(n)).max() for pair in pairs for n in names if n in pair.components
-    ]
-    # distance of the baselines [g]: of two opposite peaks one above the other
+    names = [name for name in COMPONENTS[:2] if any(name in pair.components for pair in pairs)]
+    peaks = [np.abs(pair.component(n)).max() for pair in pairs for n in pair.components]
+    # distance of the baselines [g]: opposite peaks of neighbours do not meet
     apart = 1.6 * float(max(peaks)) or 1.0
-    figure = new_figure(Size.PAGE, 1.2 + 0.55 * len(pairs))
+    bases = [-apart * row for row in range(len(pairs))]
+    figure = new_figure(Size.PAGE, 1.0 + 0.55 * len(pairs))
     panels = figure.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
     for axes, name in zip(panels, names, strict=True):
         style_axes(axes, "time [s]")
         axes.set_title(name, fontsize=Size.LABEL)
-        for row, pair in enumerate(pairs):
+        for base, pair in zip(bases, pairs, strict=True):
             if name in pair.components:
                 values = pair.component(name)
-                axes.plot(pair.times(name), values - apart * row, Colour.LINES[0], lw=0.5)
-                text, place = f"{np.abs(values).max():.2f} g", (1.0, -apart * row)
-                style = {"xycoords": ("axes fraction", "data"), "fontsize": Size.NOTE}
-                annotate(
-                    axes, text, place, (0, 3), ha="right", path_effects=white_halo(2.0), **style
-                )
-        axes.set_yticks([-apart * row for row in range(len(pairs))], [pair.name for pair in pairs])
+                axes.plot(pair.times(name), base + values, Colour.LINES[0], lw=0.5)
+                style = {
+                    "xycoords": ("axes fraction", "data"),
+                    "fontsize": Size.NOTE,
+                    "ha": "right",
+                }
+                annotate(axes, f"{np.abs(values).max():.2f} g", (1.0, base), (0, 3), **style)
+        axes.set_yticks(bases, [pair.name for pair in pairs])
         axes.spines["left"].set_visible(False)
-        axes.tick_params(axis="y", length=0.0)
-    panels[0].set_xlim(left=0.0)
-    panels[0].set_ylim(-apart * (len(pairs) - 0.3), 0.7 * apart)
-    scale = float(f"{0.5 * apart:.1g}")
-    panels[0].plot(
-        [0.0, 0.0], [0.0, scale], color=Colour.HINGE, lw=2.0, label=f"scale: {scale:g} g"
-    )
+    panels[0].set(xlim=(0.0, None), ylim=(bases[-1] - 0.7 * apart, 0.7 * apart))
     _set_suite_title(figure, suite)
-    add_legend_below(figure)
     return figure
 
 

@@ -1,6 +1,6 @@
 """Figures of the mesh of a model and the springs in its joints, and of their forces on a block."""
 
-from typing import Any
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +14,7 @@ from archfem.joints.quadrature import JointPoints
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium
 from archfem.units import kN
+from archfem.view.statics import draw_block, draw_force, set_square_limits
 from archfem.view.structure import block_colours
 from archfem.view.style import (
     Colour,
@@ -112,23 +113,21 @@ def _draw_cells(axes: Axes, model: Model, shifts: Array) -> None:
     corners = [places[polygon] for polygon in cells.polygons]
     add_polygons(axes, corners, colours, width=0.35, zorder=2, gid="cells")
     fixed = [block.drawn() for block in structure.blocks if block.fixed]
-    style: dict[str, Any] = {"hatch": "////", "label": "fixed support", "gid": "supports"}
-    add_polygons(axes, fixed, Colour.SUPPORT, width=0.5, zorder=1, **style)
+    style = {"hatch": "////", "label": "fixed support", "gid": "supports"}
+    add_polygons(axes, fixed, Colour.SUPPORT, width=0.5, **style)
 
 
-def _spring_places(model: Model, chosen: Numbers) -> tuple[Array, Array, Array]:
-    """Return places of springs (k, 2) [m], and normals and tangents of their joints (k, 2)."""
+def _spring_places(model: Model, chosen: Numbers) -> Array:
+    """Return places of some springs (k, 2) [m]."""
     points, structure = _joint_points(model), model.structure
     joint = points.joint[chosen]
-    tangents = structure.tangents[joint]
-    places = structure.middles[joint] + points.offset[chosen][:, None] * tangents
-    return places, structure.normals[joint], tangents
+    return structure.middles[joint] + points.offset[chosen, None] * structure.tangents[joint]
 
 
 def _spring_lines(model: Model, chosen: Numbers, shifts: Array) -> Array:
     """Return the zigzag of each spring between its blocks, of shifted points (k, 8, 2) [m]."""
     cells, structure = model.cells, model.structure
-    ends = np.repeat(_spring_places(model, chosen)[0][:, None], 2, axis=1)
+    ends = np.repeat(_spring_places(model, chosen)[:, None], 2, axis=1)
     for number, joint in enumerate(_joint_points(model).joint[chosen]):
         for side, block in enumerate(
             (structure.joints[joint].lower, structure.joints[joint].higher)
@@ -164,45 +163,31 @@ def draw_spring_forces(dead: Equilibrium, block: int | str) -> Figure:
     points, structure = _joint_points(dead.model), dead.model.structure
     assert dead.model.operator is not None  # checked with its points
     # tractions are positive in tension
-    forces, number = -dead.model.operator.point_forces(dead.q)[0], structure.block_number(block)
+    forces, number = (
+        0.0 - dead.model.operator.point_forces(dead.q)[0],
+        structure.block_number(block),
+    )
     joints = [k for k, joint in enumerate(structure.joints) if number in joint.blocks]
     largest = float(np.abs(forces[np.isin(points.joint, joints)]).max(initial=0.0))
     if largest == 0.0:
         raise InvalidInput(f"no spring at '{structure.blocks[number].name}' carries a force")
     figure = new_figure(Size.COLUMN, 3.6 + 0.18 * len(joints))
     axes = figure.add_subplot()
-    style_length_axes(axes)
-    outline = structure.blocks[number].drawn()
-    others = {other for k in joints for other in structure.joints[k].blocks} - {number}
-    neighbours = [structure.blocks[k].drawn() for k in others]
-    add_polygons(axes, neighbours, "none", edge=Colour.UNDEFORMED, width=0.8)
-    add_polygons(axes, [outline], Colour.STONE, width=1.2, zorder=2)
+    drawn = [draw_block(axes, structure, number, joints)]
     # the largest force is drawn half as long as the block
-    length = 0.5 * float(np.ptp(outline, axis=0).max()) / largest
-    for place, k in enumerate(joints):
-        own = np.flatnonzero(points.joint == k)
-        colour = Colour.LINES[place % len(Colour.LINES)]
-        joint, springs = structure.joints[k], forces[own]
-        heads, normals, _ = _spring_places(dead.model, own)
+    length = 0.5 * float(np.ptp(drawn[0], axis=0).max()) / largest
+    for colour, k in zip(cycle(Colour.LINES), joints):
+        own, joint = np.flatnonzero(points.joint == k), structure.joints[k]
         # a joint pushes its higher block along the normal, its lower one against it
-        push = normals if joint.higher == number else -normals
-        _draw_pushes(axes, heads, heads - length * springs[:, None] * push, colour)
-        text = (
-            f"{joint.name}: {springs.sum() / kN:.1f} kN by {len(own)} springs of "
-            f"{abs(springs.min()) / kN:.1f} to {springs.max() / kN:.1f} kN"
-        )
-        axes.plot([], [], color=colour, lw=1.4, label=text)
-    margin = 1.15 * length * largest
-    (left, low), (right, top) = outline.min(axis=0) - margin, outline.max(axis=0) + margin
-    axes.set(xlim=(left, right), ylim=(low, top))
-    set_title(axes, f"{structure.blocks[number].name}: normal forces of springs")
+        push = structure.normals[k] if joint.higher == number else -structure.normals[k]
+        heads, springs = _spring_places(dead.model, own), forces[own]
+        tails = heads - length * springs[:, None] * push
+        for place in np.flatnonzero(springs):
+            draw_force(axes, tails[place], heads[place], colour)
+        low, high = np.sort(springs)[[0, -1]] / kN
+        text = f"{springs.sum() / kN:.1f} kN by {len(own)} springs of {low:.1f} to {high:.1f} kN"
+        axes.plot([], [], color=colour, lw=1.4, label=f"{joint.name}: {text}")
+        drawn.append(tails)
+    set_square_limits(axes, np.concatenate(drawn))
     add_legend_below(figure, 1)
     return figure
-
-
-def _draw_pushes(axes: Axes, heads: Array, tails: Array, colour: str) -> None:
-    """Draw arrows from tails to heads, none of no length."""
-    arrow = {"arrowstyle": "-|>", "color": colour, "lw": 1.2, "shrinkA": 0, "shrinkB": 0}
-    for head, tail in zip(heads, tails, strict=True):
-        if np.any(head != tail):
-            axes.annotate("", tuple(head), tuple(tail), arrowprops=arrow, zorder=5)

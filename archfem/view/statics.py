@@ -253,13 +253,7 @@ def _draw_block_forces(
     axes: Axes, structure: Structure, body: FreeBody, colours: list[str]
 ) -> None:
     """Draw the block between its neighbours, and the forces on it."""
-    style_length_axes(axes)
-    outline, number = body.block.drawn(), structure.blocks.index(body.block)
-    for joint in (structure.joints[k] for k in body.joints):
-        (other,) = set(joint.blocks) - {number}
-        neighbour = [structure.blocks[other].drawn()]
-        add_polygons(axes, neighbour, "none", edge=Colour.UNDEFORMED, width=0.8)
-    add_polygons(axes, [outline], Colour.STONE, width=1.2, zorder=2)
+    outline = draw_block(axes, structure, structure.blocks.index(body.block), body.joints)
     size = float(np.ptp(outline, axis=0).max())
     # the largest force is drawn 0.75 times as long as the block
     length = 0.75 * size / body.sizes.max()
@@ -267,15 +261,27 @@ def _draw_block_forces(
     heads[-1] += length * body.forces[-1]  # the weight begins where the others end
     tails = heads - length * body.forces
     for k in np.flatnonzero(_is_acting(body)):
-        _draw_force(axes, tails[k], heads[k], colours[k])
+        draw_force(axes, tails[k], heads[k], colours[k])
         away = np.array([1.0, 0.0])
         if k < len(tails) - 1:
             away = (tails[k] - heads[k]) / np.linalg.norm(tails[k] - heads[k])
         _number_force(axes, k, tails[k], away, colours[k])
     axes.plot(*body.points[:-1].T, "o", ms=3.0, color=Colour.TEXT, zorder=6)
     axes.plot(*body.points[-1:].T, "+", ms=8.0, color=Colour.TEXT, zorder=6)
-    _set_square_limits(axes, np.concatenate([outline, tails, heads]))
-    set_title(axes, body.block.name)
+    set_square_limits(axes, np.concatenate([outline, tails, heads]))
+
+
+def draw_block(axes: Axes, structure: Structure, number: int, joints: Sequence[int]) -> Array:
+    """Draw a block between its neighbours at some joints, and return its outline (k, 2) [m]."""
+    style_length_axes(axes)
+    for joint in (structure.joints[k] for k in joints):
+        (other,) = set(joint.blocks) - {number}
+        neighbour = [structure.blocks[other].drawn()]
+        add_polygons(axes, neighbour, "none", edge=Colour.UNDEFORMED, width=0.8)
+    outline = structure.blocks[number].drawn()
+    add_polygons(axes, [outline], Colour.STONE, width=1.2, zorder=2)
+    set_title(axes, structure.blocks[number].name)
+    return outline
 
 
 def _draw_force_polygon(axes: Axes, body: FreeBody, colours: list[str]) -> None:
@@ -287,15 +293,15 @@ def _draw_force_polygon(axes: Axes, body: FreeBody, colours: list[str]) -> None:
     order = order[_is_acting(body)[order]]
     corners = np.concatenate([np.zeros((1, 2)), np.cumsum(forces[order], axis=0)])
     for k, tail, head in zip(order, corners[:-1], corners[1:], strict=True):
-        _draw_force(axes, tail, head, colours[k])
+        draw_force(axes, tail, head, colours[k])
         x, y = forces[k] / np.linalg.norm(forces[k])
         outward = np.array([y, -x])
         _number_force(axes, k, 0.5 * (tail + head), outward, colours[k])
-    _set_square_limits(axes, corners)
+    set_square_limits(axes, corners)
     set_title(axes, f"closes to {body.closing_error:.0e} of the largest force")
 
 
-def _set_square_limits(axes: Axes, points: Array) -> None:
+def set_square_limits(axes: Axes, points: Array) -> None:
     """Set the limits of axes to a square around points."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle, half = 0.5 * (low + high), 0.58 * float((high - low).max())
@@ -303,7 +309,7 @@ def _set_square_limits(axes: Axes, points: Array) -> None:
     axes.set(xlim=(left, right), ylim=(bottom, top))
 
 
-def _draw_force(axes: Axes, tail: Array, head: Array, colour: str) -> None:
+def draw_force(axes: Axes, tail: Array, head: Array, colour: str) -> None:
     """Draw the arrow of a force."""
     arrow = {"arrowstyle": "-|>,head_length=0.5,head_width=0.22", "shrinkA": 0, "shrinkB": 0}
     arrow |= {"color": colour, "lw": 1.4, "mutation_scale": 10, "joinstyle": "miter"}

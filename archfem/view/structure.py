@@ -21,7 +21,6 @@ from archfem.joints.criteria import (
     with_failure_flags,
 )
 from archfem.joints.resultants import check_instant
-from archfem.limit.mechanism_count import counted_mechanism
 from archfem.limit.mechanism_kinematics import verified_mechanism
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement
 from archfem.masonry.structure import Joint, Structure
@@ -109,12 +108,11 @@ def _draw_state(axes: Axes, structure: Structure, joints: xr.Dataset | None, nam
 
 def _describe_failed_joints(structure: Structure, joints: xr.Dataset) -> str:
     """Return whether enough failed joints permit a motion; empty where fewer have failed."""
-    counted = counted_mechanism(joints)
-    if counted is None:
+    found = verified_mechanism(structure, joints)
+    if found.counted is None:
         return ""
-    kind = verified_mechanism(structure, joints).kind
-    motion = "no motion verified" if kind == "none" else f"{kind} mechanism verified"
-    return f": {len(counted.joints)} failed joints; {motion}"
+    motion = "no motion" if found.kind == "none" else f"{found.kind} mechanism"
+    return f": {len(found.counted.joints)} failed joints; {motion} verified"
 
 
 @validate_arguments

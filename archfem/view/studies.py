@@ -19,11 +19,11 @@ from archfem.view.style import (
     Size,
     add_legend_below,
     annotate,
+    legend_columns,
     new_axes,
     new_figure,
     set_title,
     style_axes,
-    text_width,
     white_halo,
 )
 
@@ -98,9 +98,7 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
         _draw_over_key(axes, frame.rename(columns={name: "value"}), key, others, coloured)
         if number < columns and coloured is not None:
             labels = axes.get_legend_handles_labels()[1]
-            # the symbol of an entry takes 0.6 inch
-            entry = 0.6 + text_width(max(map(len, labels)))
-            fitting = max(1, int(figure.get_figwidth() / columns / entry))
+            fitting = legend_columns(labels, figure.get_figwidth() / columns)
             place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": fitting}
             style = {"fontsize": Size.LABEL, "title_fontsize": Size.LABEL, "frameon": False}
             axes.legend(title=_label_key(flat, coloured), **place, **style)

@@ -210,15 +210,19 @@ def add_legend_below(figure: Figure, columns: int = 4, **options: Any) -> None:
     figure.legend(loc="outside lower center", ncols=columns, **options)
 
 
+def legend_columns(labels: Sequence[str], width: float) -> int:
+    """Return the number of columns of a legend that fit a width [inch]."""
+    longest = max((len(line) for label in labels for line in label.split("\n")), default=0)
+    # the symbol of an entry takes 0.6 inch
+    return max(1, int(width / (0.6 + text_width(longest))))
+
+
 def add_legend(axes: Axes) -> None:
     """Add a legend: below axes that have a figure of their own, else inside the axes."""
     page = axes.figure
     if len(page.axes) == 1 and isinstance(page, Figure) and page.get_layout_engine() is not None:
         labels = axes.get_legend_handles_labels()[1]
-        longest = max((len(line) for label in labels for line in label.split("\n")), default=0)
-        # the symbol of an entry takes 0.6 inch
-        fitting = int(page.get_figwidth() / (0.6 + text_width(longest)))
-        add_legend_below(page, max(1, min(4, fitting)))
+        add_legend_below(page, min(4, legend_columns(labels, page.get_figwidth())))
     else:
         axes.legend(frameon=False, fontsize=Size.LABEL)
     disable_math(page)

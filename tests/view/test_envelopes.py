@@ -128,6 +128,8 @@ def test_eccentricity_over_time_is_refused(run):
 def test_too_few_or_many_runs_are_refused(run, count):
     with pytest.raises(af.InvalidInput, match=rf"{count} runs in one picture: give 1 to 6"):
         draw_envelope({str(k): run for k in range(count)})
+    with pytest.raises(af.InvalidInput, match=r"\['none'\] have no runs"):
+        draw_envelope({"none": [], "one": run})
 
 
 def test_ticks_are_names_of_joints():
