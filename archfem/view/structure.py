@@ -297,7 +297,7 @@ def draw_marks(axes: Axes, marks: Marks, when: str = "") -> None:
     draw_thrust(axes, marks)
     style: dict[str, Any]
     if len(marks.hinges):
-        style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.9, "ms": 6, "zorder": 7}
+        style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.9, "ms": 5, "zorder": 7}
         axes.plot(*marks.hinges.T, "o", label=f"hinge{when}", gid="hinges", **style)
     if len(marks.slips):
         style = {"edge": "white", "width": 0.4, "zorder": 6, "gid": "slips"}
