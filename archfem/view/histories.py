@@ -83,7 +83,7 @@ def draw_envelope(
     coloured = zip(states.items(), Colour.LINES, strict=False)
     for row, ((label, several), colour) in enumerate(coloured):
         # shades of several runs add up where they overlap
-        shade = 0.0 if label in dotted else 0.3 / len(runs) / len(several)
+        shade = 0.0 if label in dotted else 0.2 / len(runs) / len(several)
         for panel in panels:
             opened = list[float]()
             for number, joints in enumerate(several):
