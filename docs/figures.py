@@ -282,7 +282,7 @@ def tutorial() -> None:
         "tutorial_collapse": af.view.draw_collapse(ring, limit),
     }
     for name, figure in drawn.items():
-        figure.savefig(FOLDER / f"{name}.png", dpi=90)
+        figure.savefig(FOLDER / f"{name}.png", dpi=140)
 
 
 def verdict_range() -> None:
@@ -290,7 +290,7 @@ def verdict_range() -> None:
     thin = af.circular_arch(radius=2.95, thickness=0.40, embrace=159.0, voussoirs=17)
     motion = af.Motion.synthetic(duration=8.0, pga=4.5, seed=3)
     found = af.verdict_range(thin, motion)
-    found.plot().savefig(FOLDER / "verdict_range.png", dpi=90)
+    found.plot().savefig(FOLDER / "verdict_range.png", dpi=140)
 
 
 def selection() -> None:
@@ -304,7 +304,7 @@ def selection() -> None:
             (Path(folder) / name).write_text(f"# acceleration [m/s2], dt = 0.01 s\n{rows}\n")
         spectrum = af.Eurocode8(0.25, "B")
         found = af.select_records(folder, spectrum, 0.4, rule="NTC-2018")
-    found.plot().savefig(FOLDER / "selection.png", dpi=90)
+    found.plot().savefig(FOLDER / "selection.png", dpi=140)
 
 
 def assessment_map() -> None:

@@ -110,8 +110,8 @@ def joint_dataset(
     Returns:
         Variables N, V, M, eccentricity and friction, `opening`, `rotation` and `slip` if `faces`
         is given, and `failure_flags`, over joint, or over time and joint; names, parts, roles,
-        depths, coefficients of friction and resistances by cohesion of the joints, and whether
-        they are assessed, as coordinates; the criteria as attributes.
+        depths, heights of the middles, coefficients of friction and resistances by cohesion of the
+        joints, and whether they are assessed, as coordinates; the criteria as attributes.
     """
     dims = ("joint",) if time is None else ("time", "joint")
     depth, criteria = structure.depths, criteria or Criteria()
@@ -128,6 +128,7 @@ def joint_dataset(
         "role": ("joint", [joint.role for joint in structure.joints]),
         "judged": ("joint", structure.judged),
         "depth": ("joint", depth, {"units": "m"}),
+        "height": ("joint", structure.middles[:, 1], {"units": "m"}),
         "friction_limit": ("joint", structure.friction),
         "cohesion_limit": ("joint", structure.cohesion, {"units": "N"}),
     }

@@ -22,7 +22,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, SuperLU, ei
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
 from archfem._threads import single_threaded
-from archfem._typing import Array
+from archfem._typing import Array, Flags
 from archfem._validation import check_type
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.model import Model
@@ -74,6 +74,15 @@ class Modes(ResultDisplay):
     def mass_ratios(self) -> Array:
         """Effective masses as shares of the mass that can move (k, 2) [-]."""
         return self.effective_masses / self.masses
+
+    @cached_property
+    def local(self) -> Flags:
+        """Whether other parts, such as fill, move over twice as far as any ring or pier (k,)."""
+        cells, blocks = self.model.cells, self.model.structure.blocks
+        assessed = np.array([blocks[number].role != "other" for number in cells.block])
+        moves = [np.linalg.norm(cells.displacement(shape), axis=1) for shape in self.shapes.T]
+        # without rings and piers, as in a single wall, there is nothing else to move
+        return np.array([assessed.any() and 2.0 * u[assessed].max() < u.max() for u in moves])
 
     def table(self) -> str:
         """Return a line for each mode: frequency, period, mass shares along x and y, their sums."""

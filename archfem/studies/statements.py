@@ -22,7 +22,8 @@ from archfem.dynamics.verdict import ALL_DEFINITIONS
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints, part_roles
 from archfem.masonry.structure import Structure, suggest_name
-from archfem.statics.modes import Modes, modes
+from archfem.masonry.survey.circle_fit import fitted_circle
+from archfem.statics.modes import modes
 from archfem.statics.pushover import pushover
 from archfem.units import G, MPa
 
@@ -109,7 +110,7 @@ def dead_load_findings(result: DeadLoadResult) -> dict[str, Any]:
     return {
         "compression": float(np.nanmax(stress * edge_factor(joints["eccentricity"].values))),
         "dead friction": float(joints["friction"].max()),
-        "fill modes": count_fill_modes(found),
+        "fill modes": int(found.local.sum()),
         **{f"mode: {n}": f for n, f in enumerate(found.frequencies.tolist(), 1)},
         **{f"rise: {ring}": rise for ring, rise in _rises(structure, joints).items()},
     }
@@ -121,27 +122,16 @@ def edge_factor(eccentricity: Array) -> Array:
     return np.where(away < 1.0 / 6.0, 1.0 + 6.0 * away, 2.0 / (3.0 * np.maximum(0.5 - away, 1e-9)))
 
 
-def count_fill_modes(found: Modes) -> int:
-    """Count modes in which other parts move more than twice as far as any ring or pier."""
-    cells, blocks = found.model.cells, found.model.structure.blocks
-    assessed = np.array([blocks[number].role != "other" for number in cells.block])
-    moved = [np.linalg.norm(cells.displacement(shape), axis=1) for shape in found.shapes.T]
-    return sum(bool(each[assessed].max() < 0.5 * each.max()) for each in moved)
-
-
 def _rises(structure: Structure, joints: xr.Dataset) -> dict[str, float]:
     """Return the rise of each ring: of a circle through its joints' middles above the first [m]."""
     places = np.array([structure.joints[n].middle for n in joints["joint"].values])
     rings = [part for part, role in part_roles(joints).items() if role == "ring"]
-    return {ring: _rise(places[joints["part"].values == ring]) for ring in rings}
-
-
-def _rise(points: Array) -> float:
-    """Return how far the top of the circle nearest to some points is above the first [m]."""
-    # x² + y² = 2 a x + 2 b y + c, with the centre (a, b), is linear in a, b, c
-    equations = np.column_stack([2.0 * points, np.ones(len(points))])
-    (a, b, c), *_ = np.linalg.lstsq(equations, (points**2).sum(axis=1), rcond=None)
-    return float(b + np.sqrt(c + a * a + b * b) - points[0, 1])
+    rises = {}
+    for ring in rings:
+        own = places[joints["part"].values == ring]
+        circle = fitted_circle(own)
+        rises[ring] = float(circle.centre[1] + circle.radius - own[0, 1])
+    return rises
 
 
 def history_findings(run: History, case: Case) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Figures and films of structures and of results.
 
+    circles      surveyed points against circles
     collapse     limit analysis, falls
     films        films, pictures and a viewer of moving structures
     histories    joints over time, envelopes
@@ -7,6 +8,7 @@
     motions      accelerograms and spectra
     pages        HTML pages: the player of a run, and documents that embed it
     positions    positions of blocks over a run
+    springs      cells and springs of a model, forces of springs
     statics      dead load, mode shapes, free body, pushover
     stress       stress map
     structure    structures, joint names, loads, displaced shapes

@@ -1,3 +1,4 @@
+from .circles import draw_circle_fit as draw_circle_fit
 from .collapse import draw_capacity as draw_capacity
 from .collapse import draw_collapse as draw_collapse
 from .collapse import draw_fall as draw_fall
@@ -13,17 +14,21 @@ from .histories import draw_eccentricity as draw_eccentricity
 from .histories import draw_envelope as draw_envelope
 from .histories import draw_joint as draw_joint
 from .histories import draw_joints as draw_joints
+from .motions import draw_accelerograms as draw_accelerograms
 from .motions import draw_motion as draw_motion
 from .motions import draw_selection as draw_selection
 from .motions import draw_spectra as draw_spectra
 from .motions import draw_suite as draw_suite
 from .pages.player import Player as Player
 from .pages.player import player as player
+from .springs import draw_mesh as draw_mesh
+from .springs import draw_spring_forces as draw_spring_forces
 from .statics import draw_dead_load as draw_dead_load
 from .statics import draw_free_body as draw_free_body
 from .statics import draw_modes as draw_modes
 from .statics import draw_pushover as draw_pushover
 from .stress import draw_stress as draw_stress
+from .structure import draw_backbones as draw_backbones
 from .structure import draw_displaced as draw_displaced
 from .structure import draw_instants as draw_instants
 from .structure import draw_names as draw_names

@@ -4,7 +4,8 @@ Time histories of several joints of a run or of one joint in several runs; the e
 eccentricities over runs, and the eccentricities at one instant.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from textwrap import wrap
 from typing import Any, cast
 
@@ -36,6 +37,7 @@ from archfem.view.style import (
     add_legend_below,
     add_note,
     annotate,
+    legend_columns,
     new_figure,
     set_title,
     style_axes,
@@ -44,22 +46,24 @@ from archfem.view.style import (
 
 @validate_arguments
 def draw_envelope(
-    runs: Mapping[str, History],
+    runs: Mapping[str, History | Sequence[History]],
     *,
-    dead: xr.Dataset | None = None,
+    dead: xr.Dataset | Mapping[str, xr.Dataset] | None = None,
     dotted: Collection[str] = (),
     axes: Axes | None = None,
 ) -> Figure:
     """Draw the least and largest eccentricity of each joint over runs, between the joint's faces.
 
-    Each ring and pier has its own panel, with short names of its joints at the axis. Crosses above
-    the upper face mark joints that opened at some time. Where runs have different criteria, the
-    least |e| of a hinge is shown.
+    Each ring and pier has its own panel, with short names of its joints at the axis; piers of
+    structures that differ have the heights of their joints there. Crosses above the upper face mark
+    joints that opened at some time. Where runs have different criteria, the least |e| of a hinge is
+    shown.
 
     Args:
-        runs: the label of each run, and the run; runs of different structures share the panels
-            of parts of the same name.
-        dead: joints under dead load, drawn dotted.
+        runs: the label of each run, and the run, or runs under several motions, which share a
+            colour; runs of different structures share the panels of parts of the same name.
+        dead: joints under dead load, drawn dotted; or those of each label, drawn dashed in its
+            colour.
         dotted: labels of the runs that are drawn dotted, without shading.
         axes: matplotlib axes, for a single ring or pier; by default those of a new figure.
 
@@ -67,32 +71,47 @@ def draw_envelope(
         The figure, with a panel for each ring and pier; that of `axes` if given.
 
     Raises:
-        InvalidInput: there is no run, or more than there are colours; axes were given for several
-            parts.
+        InvalidInput: there is no run, or more than there are colours; a label has none; axes were
+            given for several parts.
     """
-    joints_of_runs = {label: run.joints for label, run in runs.items()}
-    panels, openings = _make_panels(joints_of_runs, axes), 0
+    states = {
+        label: [run.joints for run in ([runs] if isinstance(runs, History) else runs)]
+        for label, runs in runs.items()
+    }
+    panels, openings = _make_panels(states, axes), 0
     row_height = 0.05  # of the crosses of a run, in units of e
-    coloured = zip(joints_of_runs.items(), Colour.LINES, strict=False)
-    for row, ((label, joints), colour) in enumerate(coloured):
+    coloured = zip(states.items(), Colour.LINES, strict=False)
+    for row, ((label, several), colour) in enumerate(coloured):
         # shades of several runs add up where they overlap
-        shade = 0.0 if label in dotted else 0.15 / len(runs)
-        for part, panel in panels.items():
-            own = _joints_of_part(joints, part)
-            _draw_band(panel, own, label, colour, shade=shade)
-            crosses = np.flatnonzero(own["open"].any("time").values)
-            height = np.full(len(crosses), 0.56 + row_height * row)
-            panel.plot(crosses, height, "x", ms=4, color=colour)
-            openings += len(crosses)
-    first = next(iter(panels.values()))
+        shade = 0.0 if label in dotted else 0.2 / len(runs) / len(several)
+        for panel in panels:
+            opened = list[float]()
+            for number, joints in enumerate(several):
+                places, own = panel.select(joints)
+                _draw_band(panel.axes, places, own, "" if number else label, colour, shade=shade)
+                opened += places[own["open"].any("time").values].tolist()
+            height = np.full(len(opened), 0.56 + row_height * row)
+            panel.axes.plot(opened, height, "x", ms=4, color=colour)
+            openings += len(opened)
+    first = panels[0].axes
     if openings:
         first.plot([], [], "x", ms=4, color=Colour.GREY, label="opened")
-    if dead is not None:
-        for part, panel in panels.items():
-            e = _joints_of_part(dead, part)["eccentricity"]
-            panel.plot(e.values, ":", color=Colour.TEXT, lw=1.4, label="dead load")
+    colours = dict(zip(runs, Colour.LINES, strict=False))
+    for label, at_rest in ({"": dead} if isinstance(dead, xr.Dataset) else dead or {}).items():
+        style: dict[str, Any] = {"ls": "--" if label else ":", "lw": 1.0}
+        colour = colours.get(label, Colour.TEXT)
+        _draw_state(panels, at_rest, f"dead load {label}".strip(), colour, **style)
     first.set_ylim(-0.56, 0.56 + (row_height * len(runs) if openings else 0.0))
-    return _finish_panels(panels, joints_of_runs)
+    return _finish_panels(panels, states)
+
+
+def _draw_state(
+    panels: Sequence["PartPanel"], joints: xr.Dataset, label: str, colour: str, **style: Any
+) -> None:
+    """Draw the eccentricities of joints at one instant in all panels."""
+    for panel in panels:
+        places, own = panel.select(joints)
+        panel.axes.plot(places, own["eccentricity"].values, label=label, color=colour, **style)
 
 
 def draw_envelopes(runs: Mapping[str, History], dead: xr.Dataset | None) -> list[Figure]:
@@ -122,27 +141,27 @@ def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[st
     several = [label for label, joints in states.items() if joints["N"].dims != ("joint",)]
     if several:
         raise InvalidInput(f"{several} have several instants: give one, e.g. joints.isel(time=-1)")
-    panels = _make_panels(states, None)
+    listed = {label: [joints] for label, joints in states.items()}
+    panels = _make_panels(listed, None)
     for (label, joints), colour in zip(states.items(), Colour.LINES, strict=False):
-        style: dict[str, Any] = {"color": colour, "lw": 1.4, "marker": "o", "ms": 2.8}
-        style["ls"] = ":" if label in dotted else "-"
-        for part, panel in panels.items():
-            e = _joints_of_part(joints, part)["eccentricity"]
-            panel.plot(e.values, label=label, **style)
-    next(iter(panels.values())).set_ylim(-0.56, 0.56)
-    return _finish_panels(panels, states)
+        style: dict[str, Any] = {"ls": ":" if label in dotted else "-", "lw": 1.2}
+        _draw_state(panels, joints, label, colour, marker="o", ms=2.2, **style)
+    panels[0].axes.set_ylim(-0.56, 0.56)
+    return _finish_panels(panels, listed)
 
 
-def _draw_band(axes: Axes, joints: xr.Dataset, label: str, colour: str, *, shade: float) -> None:
+def _draw_band(
+    axes: Axes, places: Array, joints: xr.Dataset, label: str, colour: str, *, shade: float
+) -> None:
     """Draw the least and the largest eccentricity of joints, dotted if the band is not shaded."""
-    span, number = envelope(joints), np.arange(joints.sizes["joint"])
-    style: dict[str, Any] = {"color": colour, "lw": 1.3, "marker": "o", "ms": 2.8}
+    span = envelope(joints)
+    style: dict[str, Any] = {"color": colour, "lw": 1.1, "marker": "o", "ms": 2.2}
     if shade > 0.0:
-        axes.fill_between(number, span["lowest"], span["highest"], color=colour, alpha=shade, lw=0)
+        axes.fill_between(places, span["lowest"], span["highest"], color=colour, alpha=shade, lw=0)
     else:
-        style |= {"ls": ":", "ms": 2.0}
-    axes.plot(number, span["highest"], **style, label=label)
-    axes.plot(number, span["lowest"], **style)
+        style |= {"ls": ":", "ms": 1.6}
+    axes.plot(places, span["highest"], **style, label=label)
+    axes.plot(places, span["lowest"], **style)
 
 
 def _draw_faces(axes: Axes, hinge: float) -> None:
@@ -161,13 +180,46 @@ def _joints_of_part(joints: xr.Dataset, part: str) -> xr.Dataset:
     return joints if own.all() else joints.isel(joint=own)
 
 
-def _make_panels(states: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[str, Axes]:
+@dataclass(frozen=True)
+class PartPanel:
+    """Axes of one ring or pier, over its joints one by one, or over their heights."""
+
+    axes: Axes
+    part: str
+    by_height: bool
+
+    def select(self, joints: xr.Dataset) -> tuple[Array, xr.Dataset]:
+        """Return the joints of the part, and their places along the axis (n,)."""
+        own = _joints_of_part(joints, self.part)
+        places = own["height"].values if self.by_height else np.arange(own.sizes["joint"])
+        return places.astype(float), own
+
+
+def _heights_differ(states: Iterable[xr.Dataset], part: str) -> bool:
+    """Return whether a pier has joints at heights that it has not in another state."""
+    found = set()
+    for joints in states:
+        own = _joints_of_part(joints, part)
+        # rings have joints of equal heights, and files of earlier versions no heights
+        if "height" not in own.coords or (own["role"] != "pier").any():
+            return False
+        if own.sizes["joint"]:
+            found.add(tuple(own["height"].values.round(6).tolist()))
+    return len(found) > 1
+
+
+def _make_panels(
+    states: Mapping[str, Sequence[xr.Dataset]], axes: Axes | None
+) -> Sequence[PartPanel]:
     """Return a panel for each ring and pier, the rings first, with the faces of its joints."""
     if not 1 <= len(states) <= len(Colour.LINES):
         raise InvalidInput(f"{len(states)} runs in one picture: give 1 to {len(Colour.LINES)}")
+    if empty := [label for label, several in states.items() if not several]:
+        raise InvalidInput(f"{empty} have no runs: give one or several each")
     names: dict[str, list[str]] = {}
     roles: dict[str, str] = {}
-    for joints in states.values():
+    every = [joints for several in states.values() for joints in several]
+    for joints in every:
         assessed = assessed_joints(joints)
         roles |= part_roles(assessed)
         for part in part_roles(assessed):
@@ -177,28 +229,33 @@ def _make_panels(states: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[st
     if axes is not None and len(parts) > 1:
         raise InvalidInput(f"parts {parts} do not fit one pair of axes: leave axes out")
     sizes = {part: len(names[part]) for part in parts}
-    panels = _lay_out_panels(sizes) if axes is None else {parts[0]: axes}
-    hinge = min(Criteria.of(joints).hinge for joints in states.values())
-    for part, panel in panels.items():
-        first = axes is not None or panel.get_subplotspec().is_first_col()
-        style_axes(panel, "joint [-]", "eccentricity e = M / (N h) [-]" if first else "")
-        _draw_faces(panel, hinge)
-        _label_joints(panel, [short_name(name, part) for name in names[part]])
+    drawn = _lay_out_panels(sizes) if axes is None else {parts[0]: axes}
+    hinge = min(Criteria.of(joints).hinge for joints in every)
+    panels = [PartPanel(each, part, _heights_differ(every, part)) for part, each in drawn.items()]
+    for panel in panels:
+        part, own = panel.part, panel.axes
+        first = axes is not None or own.get_subplotspec().is_first_col()
+        along = "height [m]" if panel.by_height else "joint [-]"
+        style_axes(own, along, "eccentricity e = M / (N h) [-]" if first else "")
+        _draw_faces(own, hinge)
+        if not panel.by_height:
+            _label_joints(own, [short_name(name, part) for name in names[part]])
         if len(parts) > 1:
-            set_title(panel, part)
-            panel.set_xlim(-0.7, sizes[part] - 0.3)
+            own.set_title(part, fontsize=Size.LABEL, color=Colour.TEXT)
+            if not panel.by_height:
+                own.set_xlim(-0.7, sizes[part] - 0.3)
     return panels
 
 
 def _label_joints(axes: Axes, names: Sequence[str]) -> None:
     """Write the names of joints at 0, 1, …, as far as there is room."""
     labels = {float(k): name for k, name in enumerate(names)}
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_major_locator(MaxNLocator(max(2, min(6, len(names) // 3)), integer=True))
     axes.xaxis.set_major_formatter(lambda place, _: labels.get(round(place, 6), ""))
 
 
 def _lay_out_panels(
-    sizes: Mapping[str, int], *, min_joints: int = 8, joints_per_row: int = 80
+    sizes: Mapping[str, int], *, min_joints: int = 10, joints_per_row: int = 80
 ) -> dict[str, Axes]:
     """Return empty panels on one figure, as wide as their parts have joints, in rows."""
     rows: list[dict[str, int]] = [{}]
@@ -224,17 +281,21 @@ def _lay_out_panels(
     return panels
 
 
-def _finish_panels(panels: Mapping[str, Axes], states: Mapping[str, xr.Dataset]) -> Figure:
+def _finish_panels(
+    panels: Sequence[PartPanel], states: Mapping[str, Sequence[xr.Dataset]]
+) -> Figure:
     """Mark quarters of the depth; add one legend for all panels, and a note on their joints."""
-    first = next(iter(panels.values()))
+    first = panels[0].axes
     first.set_yticks(np.linspace(-0.5, 0.5, 5))
     figure = cast(Figure, first.figure)
     if len(panels) == 1:
         add_legend(first)
     else:
-        handles = first.get_legend_handles_labels()[0]
-        add_legend_below(figure, 2 + len(Colour.LINES), handles=handles)
-    add_note(figure, {label: describe_assessed_joints(joints) for label, joints in states.items()})
+        handles, labels = first.get_legend_handles_labels()
+        columns = legend_columns(labels, figure.get_figwidth())
+        add_legend_below(figure, columns, handles=handles)
+    notes = {label: describe_assessed_joints(several[0]) for label, several in states.items()}
+    add_note(figure, notes)
     return figure
 
 
@@ -297,7 +358,7 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     Raises:
         InvalidInput: a run has no such joint.
     """
-    figure = new_figure(0.8 * Size.PAGE, 4.2)
+    figure = new_figure(Size.PAGE, 3.4)
     panels = figure.subplots(2, len(runs), sharex=True, sharey="row", squeeze=False)
     for column, (label, run) in zip(panels.T, runs.items(), strict=True):
         own = run.joint(joint)

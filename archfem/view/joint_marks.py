@@ -63,13 +63,12 @@ class Marker:
         ends, share = structure.ends + shift, 0.5 + e[:, None]
         # displacement of the point of the thrust, interpolated between the joint's ends
         carried = (1.0 - share) * shift[:, 0] + share * shift[:, 1]
-        line = structure.middles + e[:, None] * self._depth_vectors
         side = np.where(shown, hinge, 0)
         hinged = np.flatnonzero(side)
         slips = [
             self._slip_arrows(int(k), ends[k], shear[k]) for k in np.flatnonzero(shown & slide)
         ]
-        thrust = np.where(shown[:, None], carried + line, np.nan)
+        thrust = carried + self.points(e)
         links = thrust[self._pairs]
         return Marks(
             thrust=thrust,
@@ -78,6 +77,11 @@ class Marker:
             slips=np.array(slips).reshape(-1, 7, 2),
             gaps=ends[shown & opened],
         )
+
+    def points(self, eccentricity: Array) -> Array:
+        """Return points in undisplaced joints (n_joints, 2) [m]; NaN in those not shown."""
+        points = self._structure.middles + eccentricity[:, None] * self._depth_vectors
+        return np.where(self._shown[:, None], points, np.nan)
 
     @cached_property
     def _spacing(self) -> Array:

@@ -15,7 +15,14 @@ from archfem.motion.record_selection import RecordSelection
 from archfem.motion.response_spectra import response_spectrum
 from archfem.motion.suite import Suite
 from archfem.units import STANDARD_GRAVITY
-from archfem.view.style import Colour, Size, add_legend_below, annotate, new_figure, style_axes
+from archfem.view.style import (
+    Colour,
+    Size,
+    add_legend_below,
+    annotate,
+    new_figure,
+    style_axes,
+)
 
 # Periods at which spectra are drawn [s]
 SPECTRUM_PERIODS = np.geomspace(0.02, 3.0, 150)
@@ -81,11 +88,58 @@ def draw_spectra(motions: Sequence[Motion], *, damping: float = 0.05) -> Figure:
 
 
 @validate_arguments
+def draw_accelerograms(suite: Suite) -> Figure:
+    """Draw the accelerations of all pairs of a suite over time, at one scale.
+
+    They include the scale of the suite but not its reduction factor, like its spectra. Each has its
+    peak beside it.
+
+    Args:
+        suite: the suite; vertical components are drawn where a pair has one.
+
+    Returns:
+        The figure, with a panel for the horizontal components and one for the vertical ones.
+    """
+    pairs = [pair.scaled(suite.scale / STANDARD_GRAVITY) for pair in suite.pairs]
+    names = [name for name in COMPONENTS[:2] if any(name in pair.components for pair in pairs)]
+    peaks = [np.abs(pair.component(n)).max() for pair in pairs for n in pair.components]
+    # distance of the baselines [g]: opposite peaks of neighbours do not meet
+    apart = 1.6 * float(max(peaks)) or 1.0
+    bases = [-apart * row for row in range(len(pairs))]
+    figure = new_figure(Size.PAGE, 1.0 + 0.55 * len(pairs))
+    panels = figure.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, name in zip(panels, names, strict=True):
+        style_axes(axes, "time [s]")
+        axes.set_title(name, fontsize=Size.LABEL)
+        for base, pair in zip(bases, pairs, strict=True):
+            if name in pair.components:
+                values = pair.component(name)
+                axes.plot(pair.times(name), base + values, Colour.LINES[0], lw=0.5)
+                style = {
+                    "xycoords": ("axes fraction", "data"),
+                    "fontsize": Size.NOTE,
+                    "ha": "right",
+                }
+                annotate(axes, f"{np.abs(values).max():.2f} g", (1.0, base), (0, 3), **style)
+        axes.set_yticks(bases, [pair.name for pair in pairs])
+        axes.spines["left"].set_visible(False)
+    panels[0].set(xlim=(0.0, None), ylim=(bases[-1] - 0.7 * apart, 0.7 * apart))
+    _set_suite_title(figure, suite)
+    return figure
+
+
+def _set_suite_title(figure: Figure, suite: Suite) -> None:
+    """Write the name of a suite, and that its motions are not yet divided by R."""
+    divided = f", before division by R = {suite.reduction:g}" if suite.reduction != 1.0 else ""
+    figure.suptitle(f"{suite.name}{divided}", fontsize=Size.TITLE, wrap=True)
+
+
+@validate_arguments
 def draw_suite(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
     """Draw the response spectra of a suite, their mean, and the design spectrum.
 
     The spectra include the scale of the suite but not its reduction factor, like the design
-    spectrum.
+    spectrum, and the title states the latter.
 
     Args:
         suite: the suite; vertical components are drawn if all its motions have one.
@@ -109,7 +163,7 @@ def draw_suite(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
             axis.plot(*_tabulate(function), Colour.HINGE, ls="--", lw=1.8, label="target")
         _label_panel(axis, name)
         _mark_matched_periods(axis, suite)
-    figure.suptitle(suite.name, fontsize=Size.TITLE, wrap=True)
+    _set_suite_title(figure, suite)
     _add_common_legend(figure, axes)
     return figure
 

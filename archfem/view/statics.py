@@ -30,7 +30,6 @@ from archfem.view.style import (
     add_legend_below,
     add_polygons,
     annotate,
-    fitting_width,
     new_figure,
     outline_bounds,
     set_title,
@@ -77,7 +76,7 @@ def draw_dead_load(dead: Equilibrium, *, criteria: Criteria | None = None) -> Fi
     # the legend is made anew: entries were added after that of the structure
     for legend in figure.legends:
         legend.remove()
-    add_legend(axes)
+    add_legend_below(figure, 1)
     lines = sum(1 + text.get_text().count("\n") for text in figure.legends[0].get_texts())
     figure.set_figheight(figure.get_figheight() + 0.17 * (lines - 1))
     return figure
@@ -111,6 +110,9 @@ def _write_force(force: float) -> str:
 def draw_modes(modes: Modes, numbers: Sequence[int] | None = None) -> Figure:
     """Draw mode shapes over the undeformed outline; soil is paler than stone.
 
+    A mode in which other parts, such as the ends of the fill, move more than twice as far as any
+    ring or pier is called local.
+
     Args:
         modes: result of `modes`.
         numbers: of the modes, counted from 1; by default all.
@@ -137,8 +139,9 @@ def mode_panels(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, li
     low, high = outline_bounds(modes.model.structure)
     low, high = low - 1.1 * amplitude, high + 1.1 * amplitude
     wide, tall = high - low
-    columns, rows = min(2, len(chosen)), -(-len(chosen) // 2)
-    across = fitting_width(wide, tall) / 2.0
+    # a few modes of a long bridge need the whole width
+    columns = 1 if len(chosen) == 1 or (wide > 4.0 * tall and len(chosen) < 5) else 2
+    rows, across = -(-len(chosen) // columns), Size.PAGE / 2.0 if columns > 1 else Size.COLUMN
     # a panel is at most 3 inches high; its title takes 0.45, the text below all panels 0.25
     up = min(across * tall / wide, 3.0) + 0.45
     figure = new_figure(across * columns, up * rows + 0.25)
@@ -150,6 +153,8 @@ def mode_panels(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, li
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         panels.append(ModePanel(axes, modes, number))
     text = f"mode shapes are normalised to a largest displacement of {amplitude:.2g} m"
+    if modes.local[np.array(chosen) - 1].any():
+        text += "\nlocal: other parts move more than twice as far as any ring or pier"
     figure.supxlabel(text, fontsize=Size.LABEL, color=Colour.EDGE)
     return figure, panels
 
@@ -166,7 +171,10 @@ class ModePanel:
         self._displacements = shape * amplitude / np.linalg.norm(shape, axis=1).max()
         self._places, self._blocks = cells.places, DisplacedBlocks(axes, modes.model)
         frequency, (x, y) = modes.frequencies[number - 1], 100.0 * modes.mass_ratios[number - 1]
-        title = f"mode {number}: {frequency:.2f} Hz\neffective mass: x {x:.0f} %, y {y:.0f} %"
+        local = ", local" if modes.local[number - 1] else ""
+        title = (
+            f"mode {number}: {frequency:.2f} Hz{local}\neffective mass: x {x:.0f} %, y {y:.0f} %"
+        )
         axes.set_title(title, fontsize=Size.LABEL, color=Colour.TEXT)
 
     def show_phase(self, factor: float) -> None:
@@ -205,7 +213,7 @@ def draw_free_body(
             f"block '{body.block.name}' has {len(body.joints)} joints: forces of at most {limit} "
             "can be distinguished; choose a stone"
         )
-    figure = new_figure(9.6, 5.0 + 0.18 * len(body.names))
+    figure = new_figure(Size.PAGE, 3.5 + 0.18 * len(body.names))
     left, right = figure.subplots(1, 2)
     colours = [Colour.LINES[k % len(Colour.LINES)] for k in range(len(body.joints))]
     colours.append(Colour.GREY)
@@ -245,13 +253,7 @@ def _draw_block_forces(
     axes: Axes, structure: Structure, body: FreeBody, colours: list[str]
 ) -> None:
     """Draw the block between its neighbours, and the forces on it."""
-    style_length_axes(axes)
-    outline, number = body.block.drawn(), structure.blocks.index(body.block)
-    for joint in (structure.joints[k] for k in body.joints):
-        (other,) = set(joint.blocks) - {number}
-        neighbour = [structure.blocks[other].drawn()]
-        add_polygons(axes, neighbour, "none", edge=Colour.UNDEFORMED, width=0.8)
-    add_polygons(axes, [outline], Colour.STONE, width=1.2, zorder=2)
+    outline = draw_block(axes, structure, structure.blocks.index(body.block), body.joints)
     size = float(np.ptp(outline, axis=0).max())
     # the largest force is drawn 0.75 times as long as the block
     length = 0.75 * size / body.sizes.max()
@@ -259,15 +261,27 @@ def _draw_block_forces(
     heads[-1] += length * body.forces[-1]  # the weight begins where the others end
     tails = heads - length * body.forces
     for k in np.flatnonzero(_is_acting(body)):
-        _draw_force(axes, tails[k], heads[k], colours[k])
+        draw_force(axes, tails[k], heads[k], colours[k])
         away = np.array([1.0, 0.0])
         if k < len(tails) - 1:
             away = (tails[k] - heads[k]) / np.linalg.norm(tails[k] - heads[k])
-        _number_force(axes, k, tails[k] + 0.07 * size * away, colours[k])
+        _number_force(axes, k, tails[k], away, colours[k])
     axes.plot(*body.points[:-1].T, "o", ms=3.0, color=Colour.TEXT, zorder=6)
     axes.plot(*body.points[-1:].T, "+", ms=8.0, color=Colour.TEXT, zorder=6)
-    _set_square_limits(axes, np.concatenate([outline, tails, heads]))
-    set_title(axes, body.block.name)
+    set_square_limits(axes, np.concatenate([outline, tails, heads]))
+
+
+def draw_block(axes: Axes, structure: Structure, number: int, joints: Sequence[int]) -> Array:
+    """Draw a block between its neighbours at some joints, and return its outline (k, 2) [m]."""
+    style_length_axes(axes)
+    for joint in (structure.joints[k] for k in joints):
+        (other,) = set(joint.blocks) - {number}
+        neighbour = [structure.blocks[other].drawn()]
+        add_polygons(axes, neighbour, "none", edge=Colour.UNDEFORMED, width=0.8)
+    outline = structure.blocks[number].drawn()
+    add_polygons(axes, [outline], Colour.STONE, width=1.2, zorder=2)
+    set_title(axes, structure.blocks[number].name)
+    return outline
 
 
 def _draw_force_polygon(axes: Axes, body: FreeBody, colours: list[str]) -> None:
@@ -278,17 +292,16 @@ def _draw_force_polygon(axes: Axes, body: FreeBody, colours: list[str]) -> None:
     order = np.argsort(np.arctan2(forces[:, 1], forces[:, 0]), kind="stable")
     order = order[_is_acting(body)[order]]
     corners = np.concatenate([np.zeros((1, 2)), np.cumsum(forces[order], axis=0)])
-    span = float(np.ptp(corners, axis=0).max())
     for k, tail, head in zip(order, corners[:-1], corners[1:], strict=True):
-        _draw_force(axes, tail, head, colours[k])
+        draw_force(axes, tail, head, colours[k])
         x, y = forces[k] / np.linalg.norm(forces[k])
         outward = np.array([y, -x])
-        _number_force(axes, k, 0.5 * (tail + head) + 0.06 * span * outward, colours[k])
-    _set_square_limits(axes, corners)
-    set_title(axes, f"closing error {body.closing_error:.0e} of the largest force")
+        _number_force(axes, k, 0.5 * (tail + head), outward, colours[k])
+    set_square_limits(axes, corners)
+    set_title(axes, f"closes to {body.closing_error:.0e} of the largest force")
 
 
-def _set_square_limits(axes: Axes, points: Array) -> None:
+def set_square_limits(axes: Axes, points: Array) -> None:
     """Set the limits of axes to a square around points."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle, half = 0.5 * (low + high), 0.58 * float((high - low).max())
@@ -296,18 +309,17 @@ def _set_square_limits(axes: Axes, points: Array) -> None:
     axes.set(xlim=(left, right), ylim=(bottom, top))
 
 
-def _draw_force(axes: Axes, tail: Array, head: Array, colour: str) -> None:
+def draw_force(axes: Axes, tail: Array, head: Array, colour: str) -> None:
     """Draw the arrow of a force."""
     arrow = {"arrowstyle": "-|>,head_length=0.5,head_width=0.22", "shrinkA": 0, "shrinkB": 0}
-    arrow |= {"color": colour, "lw": 1.8, "mutation_scale": 14, "joinstyle": "miter"}
+    arrow |= {"color": colour, "lw": 1.4, "mutation_scale": 10, "joinstyle": "miter"}
     axes.annotate("", head, tail, arrowprops=arrow, zorder=5)
 
 
-def _number_force(axes: Axes, index: int, place: Array, colour: str) -> None:
-    """Write the number of a force, counted from 1."""
+def _number_force(axes: Axes, index: int, place: Array, away: Array, colour: str) -> None:
+    """Write the number of a force, counted from 1, beside a place in a direction."""
     style = {"fontsize": Size.TITLE, "ha": "center", "va": "center", "zorder": 7}
-    x, y = place
-    axes.text(x, y, str(index + 1), color=colour, **style)
+    annotate(axes, str(index + 1), place, 9.0 * away, color=colour, **style)
 
 
 @validate_arguments

@@ -153,7 +153,7 @@ def _shade(axes: Axes, cells: Cells, compression: Array, blocks: Numbers) -> Non
     beside = axes.inset_axes((1.0 + wide, 0.0, wide, 1.0))
     extend = "max" if shown.max() > highest else "neither"
     bar = axes.figure.colorbar(painted, cax=beside, extend=extend, ticks=MaxNLocator(5))
-    style_colour_bar(bar, f"largest compression [{name}]")
+    style_colour_bar(bar, f"compression [{name}]")
 
 
 def _draw_crosses(axes: Axes, cells: Cells, stress: Array, blocks: Numbers) -> None:

@@ -13,15 +13,24 @@ from matplotlib.patheffects import withStroke
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
-from archfem.joints.criteria import Criteria, describe_assessed_joints, with_failure_flags
+from archfem.errors import InvalidInput
+from archfem.joints.criteria import (
+    Criteria,
+    describe_assessed_joints,
+    envelope,
+    with_failure_flags,
+)
 from archfem.joints.resultants import check_instant
+from archfem.limit.mechanism_kinematics import verified_mechanism
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement
 from archfem.masonry.structure import Joint, Structure
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium
 from archfem.view.joint_marks import (
+    Marker,
     Marks,
     joint_marks,
+    joint_pairs,
     joints_of_state,
     model_and_coordinates,
     round_magnification,
@@ -76,21 +85,42 @@ def draw_structure(
         InvalidInput: `joints` has several instants, or belongs to another structure.
     """
     axes = structure_axes(structure, axes)
-    draw_blocks(axes, structure)
     if joints is not None:
         check_instant(structure, joints)
         joints = with_failure_flags(joints, criteria)
-        draw_marks(axes, joint_marks(structure, joints))
+    _draw_state(axes, structure, joints, structure.name)
+    if joints is not None:
         add_legend(axes)
         add_note(cast(Figure, axes.figure), {"": describe_assessed_joints(joints)})
-    set_title(axes, title_at_instant(structure.name, joints))
-    axes.autoscale_view()
     return cast(Figure, axes.figure)
+
+
+def _draw_state(axes: Axes, structure: Structure, joints: xr.Dataset | None, name: str) -> None:
+    """Draw blocks and, if given, their joints at one instant; the title states failed joints."""
+    draw_blocks(axes, structure)
+    title = title_at_instant(name, joints)
+    if joints is not None:
+        draw_marks(axes, joint_marks(structure, joints))
+        title += _describe_failed_joints(structure, joints)
+    set_title(axes, title)
+    axes.autoscale_view()
+
+
+def _describe_failed_joints(structure: Structure, joints: xr.Dataset) -> str:
+    """Return whether enough failed joints permit a motion; empty where fewer have failed."""
+    found = verified_mechanism(structure, joints)
+    if found.counted is None:
+        return ""
+    motion = "no motion" if found.kind == "none" else f"{found.kind} mechanism"
+    return f": {len(found.counted.joints)} failed joints; {motion} verified"
 
 
 @validate_arguments
 def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> Figure:
     """Draw several structures, one below the other, with thrust lines and failed joints.
+
+    Where enough joints have failed for a mechanism by count, the title states whether a motion of
+    the blocks is verified, as by `verified_mechanism`.
 
     Args:
         states: the label of each state, its structure, and its joints at one instant or None.
@@ -98,24 +128,112 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
     Returns:
         The figure, with a panel for each structure.
     """
-    wide, high = structure_figure(next(iter(states.values()))[0]).get_size_inches()
-    # a panel among others needs less height than a figure of its own
-    figure = new_figure(wide, 0.78 * high * len(states))
-    panels = figure.subplots(len(states), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    figure, panels = _lay_out_below([structure for structure, _ in states.values()])
     drawn = {label: joints for label, (_, joints) in states.items() if joints is not None}
-    add_note(figure, {label: describe_assessed_joints(each) for label, each in drawn.items()})
-    marks: dict[str, Any] = {}
     for axes, (label, (structure, joints)) in zip(panels, states.items(), strict=True):
-        draw_structure(structure, joints, axes=axes)
-        set_title(axes, title_at_instant(label, joints))
-        axes.label_outer()
+        if joints is not None:
+            check_instant(structure, joints)
+            joints = with_failure_flags(joints)
+        _draw_state(axes, structure, joints, label)
+    _explain_panels(figure, drawn)
+    return figure
+
+
+@validate_arguments
+def draw_backbones(
+    runs: History | Mapping[str, History],
+    *,
+    dead: xr.Dataset | Mapping[str, xr.Dataset] | None = None,
+) -> Figure:
+    """Draw the band that thrust lines cover over a run, on the outline of the structure.
+
+    At each joint of rings and piers the band reaches from the least to the largest eccentricity.
+    Red circles mark the faces at which joints hinged at some instant, gaps the joints that opened.
+
+    Args:
+        runs: a history with its structure, or the label of each one and the history.
+        dead: joints under dead load, of all runs or by label, drawn as a dotted thrust line.
+
+    Returns:
+        The figure, with a panel for each run, one below the other.
+
+    Raises:
+        InvalidInput: there is no run, a run has no structure, or `dead` is of another structure.
+    """
+    runs = {"": runs} if isinstance(runs, History) else runs
+    structures = [run.structure for run in runs.values() if run.structure is not None]
+    if not runs or len(structures) < len(runs):
+        raise InvalidInput(
+            f"{len(structures)} of {len(runs)} runs have a structure to draw: give one or more, "
+            "read with History.read(path, structure)"
+        )
+    if dead is None or isinstance(dead, xr.Dataset):
+        dead = {} if dead is None else dict.fromkeys(runs, dead)
+    if unknown := sorted(set(dead) - set(runs)):
+        raise InvalidInput(f"dead load of {unknown}, but the runs are {list(runs)}")
+    figure, panels = _lay_out_below(structures)
+    for axes, structure, (label, run) in zip(panels, structures, runs.items(), strict=True):
+        draw_blocks(axes, structure)
+        _draw_backbone(axes, structure, run.joints, dead.get(label))
+        first, last = run.time[[0, -1]]
+        set_title(axes, f"{label or structure.name}: thrust lines from {first:.4g} to {last:.4g} s")
+        axes.autoscale_view()
+    _explain_panels(figure, {label: run.joints for label, run in runs.items()})
+    return figure
+
+
+def _draw_backbone(
+    axes: Axes, structure: Structure, joints: xr.Dataset, dead: xr.Dataset | None
+) -> None:
+    """Draw the band between extreme thrust lines, hinges of all instants, and the dead load."""
+    shown, span = joints["judged"].values, envelope(joints)
+    marker, pairs = Marker(structure, shown), joint_pairs(structure, shown)
+    low, high = (marker.points(span[key].values) for key in ("lowest", "highest"))
+    first, second = pairs.T
+    # an extrados may be on the other hand in the next part: bands must not cross over
+    turned = np.einsum("ij,ij->i", *structure.tangents[pairs.T]) < 0.0
+    ends = [np.where(turned[:, None], a[second], b[second]) for a, b in ((low, high), (high, low))]
+    bands = np.stack([low[first], high[first], *ends], axis=1)
+    bands = bands[np.isfinite(bands).all(axis=(1, 2))]
+    style: dict[str, Any] = {"width": 0.0, "zorder": 4, "alpha": 0.35, "gid": "band"}
+    add_polygons(axes, list(bands), Colour.THRUST, **style)
+    sides = bands[:, [[0, 3], [1, 2]]].reshape(-1, 2, 2)
+    style = {"color": Colour.THRUST, "lw": 0.8, "zorder": 5}
+    style["label"] = "least and largest eccentricity"
+    axes.plot(*_join_segments(sides).T, gid="backbones", **style)
+    hinges = [
+        structure.ends[(joints["hinge"] == side).any("time").values & shown, end]
+        for side, end in ((-1, 0), (1, 1))
+    ]
+    gaps = structure.ends[joints["open"].any("time").values & shown]
+    draw_marks(axes, Marks(hinges=np.concatenate(hinges), gaps=gaps), " at some instant")
+    if dead is not None:
+        check_instant(structure, dead)
+        links = marker.points(dead["eccentricity"].values)[pairs]
+        style = {"color": Colour.TEXT, "lw": 1.0, "ls": ":", "zorder": 6, "label": "dead load"}
+        axes.plot(*_join_segments(links).T, gid="dead load", **style)
+
+
+def _lay_out_below(structures: Sequence[Structure]) -> tuple[Figure, Sequence[Axes]]:
+    """Return panels for structures, one below the other, on axes that they share."""
+    wide, high = structure_figure(structures[0]).get_size_inches()
+    # a panel among others needs less height than a figure of its own
+    figure = new_figure(wide, max(0.78 * len(structures), 1.0) * high)
+    panels = figure.subplots(len(structures), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for axes, structure in zip(panels, structures, strict=True):
+        structure_axes(structure, axes).label_outer()
+    return figure, panels
+
+
+def _explain_panels(figure: Figure, joints: Mapping[str, xr.Dataset]) -> None:
+    """Add one legend for the marks of all panels, and a note on the joints that are assessed."""
+    marks: dict[str, Any] = {}
+    for axes in figure.axes:
         handles, names = axes.get_legend_handles_labels()
         marks |= dict(zip(names, handles, strict=True))
-        if axes.get_legend() is not None:
-            axes.get_legend().remove()
-    if marks:  # one legend explains the marks of all panels
+    if marks:
         add_legend_below(figure, handles=list(marks.values()))
-    return figure
+    add_note(figure, {label: describe_assessed_joints(each) for label, each in joints.items()})
 
 
 def title_at_instant(name: str, joints: xr.Dataset | None) -> str:
@@ -164,23 +282,23 @@ class DisplacedBlocks:
 
 def draw_thrust(axes: Axes, marks: Marks) -> None:
     """Draw the thrust lines, and the points at which thrust crosses joints."""
-    style: dict[str, Any] = {"color": Colour.THRUST, "zorder": 5, "ms": 3.0, "lw": 1.7}
+    style: dict[str, Any] = {"color": Colour.THRUST, "zorder": 5, "ms": 2.2, "lw": 1.3}
     # where blocks have many joints, as in a wall, there are points alone
     label = "thrust at a joint"
     if len(marks.links):
-        halo, label = {"path_effects": white_halo(3.4)}, "_points"
+        halo, label = {"path_effects": white_halo(2.6)}, "_points"
         axes.plot(*_join_segments(marks.links).T, label="thrust line", gid="links", **style, **halo)
     if np.isfinite(marks.thrust).any():
         axes.plot(*marks.thrust.T, "o", label=label, gid="thrust", **style)
 
 
-def draw_marks(axes: Axes, marks: Marks) -> None:
+def draw_marks(axes: Axes, marks: Marks, when: str = "") -> None:
     """Draw thrust line, hinges, sliding and open joints; only those that occur have a label."""
     draw_thrust(axes, marks)
     style: dict[str, Any]
     if len(marks.hinges):
-        style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}
-        axes.plot(*marks.hinges.T, "o", label="hinge", gid="hinges", **style)
+        style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.9, "ms": 5, "zorder": 7}
+        axes.plot(*marks.hinges.T, "o", label=f"hinge{when}", gid="hinges", **style)
     if len(marks.slips):
         style = {"edge": "white", "width": 0.4, "zorder": 6, "gid": "slips"}
         add_polygons(axes, list(marks.slips), Colour.SLIDING, **style)
@@ -190,7 +308,7 @@ def draw_marks(axes: Axes, marks: Marks) -> None:
         edge = [withStroke(linewidth=3.8, foreground=Colour.EDGE)]
         style = {"color": "white", "lw": 2.4, "path_effects": edge, "zorder": 4, "gid": "gaps"}
         gaps = _join_segments(marks.gaps)
-        axes.plot(*gaps.T, label="open joint", solid_capstyle="butt", **style)
+        axes.plot(*gaps.T, label=f"open joint{when}", solid_capstyle="butt", **style)
 
 
 def _join_segments(segments: Array) -> Array:
@@ -206,10 +324,11 @@ def short_name(name: str, part: str) -> str:
 
 @validate_arguments
 def draw_names(structure: Structure) -> Figure:
-    """Draw the blocks, with the short name of each joint beside its intrados.
+    """Draw the blocks, with the short names of joints beside their intrados.
 
-    Joints of rings and piers are named, or all joints of a structure that has neither. The name of
-    the part stands in its middle: "5" in "main arch" is "main arch, joint 5".
+    Joints of rings and piers are named, or all joints of a structure that has neither; where they
+    are too near to one another on a page, every second or third. The name of a ring stands above
+    it, that of another part below: "5" in "main arch" is "main arch, joint 5".
 
     Args:
         structure: the structure.
@@ -222,8 +341,9 @@ def draw_names(structure: Structure) -> Figure:
     shown = [joint for joint, own in zip(structure.joints, structure.judged, strict=True) if own]
     inch = 1.0 / drawing_scale(structure)  # [m]
     low, high = outline_bounds(structure)
-    # names beside the blocks need at least 0.4 inch
-    axes.margins(max(0.1, 0.4 * inch / (high - low)[0]), 0.15)
+    # names beside and below the blocks need at least 0.4 inch
+    axes.margins(*np.maximum([0.1, 0.15], 0.4 * inch / (high - low)))
+    axes.figure.set_figheight(axes.figure.get_figheight() + 0.4)
     axes.autoscale_view()
     for joint in shown:
         axes.plot(*joint.ends.T, color=Colour.SLIDING, lw=1.0, zorder=4)
@@ -236,13 +356,15 @@ def draw_names(structure: Structure) -> Figure:
 
 
 def _name_part(axes: Axes, joints: Sequence[Joint], inch: float) -> None:
-    """Write the names of a part and of its joints, in type that fits their spacing."""
+    """Write the names of a part and of its joints, as many as fit in legible type."""
     style: dict[str, Any] = {"color": Colour.TEXT, "zorder": 8, "path_effects": white_halo(1.6)}
     ends = np.array([joint.ends[0] for joint in joints])
     apart = np.linalg.norm(np.diff(ends, axis=0), axis=1).min() if len(ends) > 1 else np.inf
-    # a line of type takes 0.65 of the spacing; type below 4.5 points cannot be read on paper
-    size = float(np.clip(0.65 * 72.0 * apart / inch, 4.5, Size.LABEL))
-    for joint in joints:
+    # a line of type takes 0.65 of the spacing
+    fitting = 0.65 * 72.0 * apart / inch
+    every = max(1, int(np.ceil(Size.NOTE / fitting)))
+    size = min(every * fitting, Size.LABEL)
+    for joint in joints[::every]:
         outward = -np.array(joint.tangent)
         angle = float(np.degrees(np.arctan2(outward[1], outward[0])))
         # a name must not be upside down; vertical ones are read from the right
@@ -253,11 +375,11 @@ def _name_part(axes: Axes, joints: Sequence[Joint], inch: float) -> None:
         annotate(axes, name, joint.ends[0], 0.5 * size * outward, fontsize=size, **style)
     if not joints[0].name.startswith(f"{joints[0].part}, "):
         return
-    place, style["va"] = ends.mean(axis=0), "center"
-    if joints[0].role != "ring":
-        place, style["va"] = min((j.middle for j in joints), key=lambda middle: middle[1]), "top"
-    style |= {"rotation": 0.0, "ha": "center"}
-    annotate(axes, joints[0].part, place, (0.0, -1.4 * Size.LABEL), **style)
+    is_ring = joints[0].role == "ring"
+    corners = np.array([joint.ends for joint in joints]).reshape(-1, 2)
+    place = corners[:, 0].mean(), corners[:, 1].max() if is_ring else corners[:, 1].min()
+    style |= {"rotation": 0.0, "ha": "center", "va": "bottom" if is_ring else "top"}
+    annotate(axes, joints[0].part, place, (0.0, 2.0 if is_ring else -Size.LABEL), **style)
 
 
 @validate_arguments

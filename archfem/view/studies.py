@@ -19,6 +19,7 @@ from archfem.view.style import (
     Size,
     add_legend_below,
     annotate,
+    legend_columns,
     new_axes,
     new_figure,
     set_title,
@@ -96,7 +97,9 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
         coloured = coloured or next(iter(few), None)
         _draw_over_key(axes, frame.rename(columns={name: "value"}), key, others, coloured)
         if number < columns and coloured is not None:
-            place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 3}
+            labels = axes.get_legend_handles_labels()[1]
+            fitting = legend_columns(labels, figure.get_figwidth() / columns)
+            place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": fitting}
             style = {"fontsize": Size.LABEL, "title_fontsize": Size.LABEL, "frameon": False}
             axes.legend(title=_label_key(flat, coloured), **place, **style)
     for axes in panels[len(names) * len(keys) :]:
@@ -160,7 +163,7 @@ def draw_study(
     scales = {d: np.array([case[d] for case in factors.values()]) for d in definitions}
     scales = {d: values for d, values in scales.items() if np.isfinite(values).any()}
     label = "scale of the motions at the first mechanism [-]"
-    figure, axes = new_axes(0.75 * Size.PAGE, 1.6 + 0.42 * len(names), label)
+    figure, axes = new_axes(Size.PAGE, 1.9 + 0.42 * len(names), label)
     finite = np.concatenate([[1.0], *(each[np.isfinite(each)] for each in scales.values())])
     end = 1.3 * finite.max()
     _draw_ranges(axes, scales, end)
@@ -182,7 +185,7 @@ def draw_study(
     if title:
         figure.suptitle(title, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
     head = "first mechanism: the first instant in which …"
-    add_legend_below(figure, 3, title=head, title_fontsize=Size.LABEL)
+    add_legend_below(figure, 2, title=head, title_fontsize=Size.LABEL)
     return figure
 
 
@@ -393,7 +396,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         "sign": "sign of the motion",
         "scale": "scale of the motion [-]",
     }
-    columns = min(4, len(shares))
+    columns = min(3, len(shares))
     lines = -(-len(shares) // columns)
     figure = new_figure(Size.PAGE, 0.7 + 2.1 * lines)
     panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()

@@ -49,8 +49,9 @@ class Colour:
 class Size:
     """Font sizes [points], and widths of figures [inch]."""
 
-    LABEL, TITLE = 8.0, 9.5  # LABEL also of ticks and legends
-    COLUMN, PAGE = 6.4, 11.0  # PAGE for a long structure, or many panels
+    NOTE, LABEL, TITLE = 7.0, 8.0, 9.5  # LABEL also of ticks and legends; none is smaller than NOTE
+    # a page of A4 prints 170 mm: no figure is wider, so that its type is printed as it is
+    COLUMN, PAGE = 6.4, 6.7
 
 
 # Percentage of stresses beyond the end of a colour scale: peaks at the corners about which blocks
@@ -70,8 +71,8 @@ class Page(Figure):
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure of a size [inch]."""
-    return Page(figsize=(width, height), layout="constrained")
+    """Return an empty figure of a size [inch], at most as wide as a page."""
+    return Page(figsize=(min(width, Size.PAGE), height), layout="constrained")
 
 
 def disable_math(drawing: Artist) -> None:
@@ -98,9 +99,13 @@ def text_width(letters: float, size: float = Size.LABEL) -> float:
 
 def set_title(axes: Axes, text: str) -> None:
     """Set the title of axes, wrapped to the width of their part of the figure."""
-    place = axes.get_subplotspec()
-    columns = 1 if place is None else place.get_gridspec().ncols
-    letters = int(axes.figure.get_figwidth() / columns / text_width(1, Size.TITLE))
+    place, width = axes.get_subplotspec(), axes.figure.get_figwidth()
+    if place is not None and (columns := place.get_gridspec().ncols) > 1:
+        ratios = np.array(place.get_gridspec().get_width_ratios() or np.ones(columns), dtype=float)
+        # labels of the axis at the left take 0.5 inch
+        width *= ratios[list(place.colspan)].sum() / ratios.sum()
+        width -= 0.5
+    letters = int(width / text_width(1, Size.TITLE))
     lines = fill(" ".join(text.split()), max(letters, 12), break_long_words=False)
     axes.set_title(lines, fontsize=Size.TITLE, color=Colour.TEXT, parse_math=False)
 
@@ -113,10 +118,10 @@ def add_note(figure: Figure, notes: Mapping[str, str]) -> None:
     several = len(labels) > 1
     texts = [f"{join_names(labels[note])}: {note}" if several else note for note in labels if note]
     if texts and not figure.get_suptitle():  # a figure of the user may have a title
-        letters = int(figure.get_figwidth() / text_width(1))
+        letters = int(figure.get_figwidth() / text_width(1, Size.NOTE))
         text = "\n".join(fill(each, letters) for each in texts)
-        figure.suptitle(text, fontsize=Size.LABEL, color=Colour.EDGE, parse_math=False)
-        figure.set_figheight(figure.get_figheight() + 0.14 * (1 + text.count("\n")))
+        figure.suptitle(text, fontsize=Size.NOTE, color=Colour.EDGE, parse_math=False)
+        figure.set_figheight(figure.get_figheight() + 0.12 * (1 + text.count("\n")))
 
 
 def style_axes(axes: Axes, x: str = "", y: str = "", size: float = Size.LABEL) -> None:
@@ -205,15 +210,19 @@ def add_legend_below(figure: Figure, columns: int = 4, **options: Any) -> None:
     figure.legend(loc="outside lower center", ncols=columns, **options)
 
 
+def legend_columns(labels: Sequence[str], width: float) -> int:
+    """Return the number of columns of a legend that fit a width [inch]."""
+    longest = max((len(line) for label in labels for line in label.split("\n")), default=0)
+    # the symbol of an entry takes 0.6 inch
+    return max(1, int(width / (0.6 + text_width(longest))))
+
+
 def add_legend(axes: Axes) -> None:
     """Add a legend: below axes that have a figure of their own, else inside the axes."""
     page = axes.figure
     if len(page.axes) == 1 and isinstance(page, Figure) and page.get_layout_engine() is not None:
         labels = axes.get_legend_handles_labels()[1]
-        longest = max((len(line) for label in labels for line in label.split("\n")), default=0)
-        # the symbol of an entry takes 0.6 inch
-        fitting = int(page.get_figwidth() / (0.6 + text_width(longest)))
-        add_legend_below(page, max(1, min(4, fitting)))
+        add_legend_below(page, min(4, legend_columns(labels, page.get_figwidth())))
     else:
         axes.legend(frameon=False, fontsize=Size.LABEL)
     disable_math(page)
@@ -225,18 +234,12 @@ def outline_bounds(structure: Structure) -> tuple[Array, Array]:
     return points.min(axis=0), points.max(axis=0)
 
 
-def fitting_width(width: float, height: float) -> float:
-    """Return the figure width [inch] for a drawing with these proportions."""
-    # a ring has at most about 3, a bridge more than 4
-    return Size.COLUMN if width < 4.0 * height else Size.PAGE
-
-
 def drawing_scale(structure: Structure) -> float:
     """Return the approximate scale at which a structure is drawn on its own figure [inch / m]."""
     low, high = outline_bounds(structure)
     width, height = high - low
     # margins: 0.8 inch beside the drawing, 1.2 above and below; a figure is at most 6.8 high
-    return float(min((fitting_width(width, height) - 0.8) / width, (6.8 - 1.2) / height))
+    return float(min((Size.PAGE - 0.8) / width, (6.8 - 1.2) / height))
 
 
 def structure_figure(structure: Structure) -> Figure:

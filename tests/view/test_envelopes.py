@@ -1,5 +1,7 @@
 """Eccentricity part by part: its range over runs, and its value at one instant."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -8,6 +10,8 @@ from pictures import APART, WEIGHT, history
 
 import archfem as af
 from archfem.view import draw_eccentricity, draw_envelope
+
+MESHES = Path(__file__).parents[2] / "meshes"
 
 
 def test_envelope_shows_extremes_faces_and_dead_load(run):
@@ -58,6 +62,43 @@ def test_two_bridges_are_distinguished_by_dots(bridge, ring):
         assert lines["after"].get_ydata() == pytest.approx(0.1)
 
 
+@pytest.fixture(scope="module")
+def short():
+    """The bridge after its piers were made 0.8 m lower: they lose their two lowest joints."""
+    return af.Case.read(MESHES / "prusias_piers.toml").structure
+
+
+def test_piers_that_differ_are_drawn_by_height(bridge, short):
+    """The base of a lower pier is drawn where it is, beside a joint of the higher one."""
+    runs = {"high": history(bridge, 0.3), "low": history(short, 0.2)}
+    dead = {name: run.joints.isel(time=0) for name, run in runs.items()}
+    panels = {axes.get_title(): axes for axes in draw_envelope(runs, dead=dead).axes}
+    states = draw_eccentricity(dead).axes
+    for panel in (panels["south pier"], states[-1]):
+        assert panel.get_xlabel() == "height [m]"
+        lines = {line.get_label(): line for line in panel.lines}
+        for structure, name in ((bridge, "high"), (short, "low")):
+            own = [j.middle[1] for j in structure.joints if j.part == "south pier"]
+            assert lines[name].get_xdata() == pytest.approx(own)
+    lines = {line.get_label(): line for line in panels["main arch"].lines}
+    assert lines["high"].get_xdata().tolist() == list(range(18))
+    assert lines["dead load low"].get_ydata() == pytest.approx(0.2)
+    assert lines["dead load low"].get_color() == lines["low"].get_color()
+    # a file of an earlier version has no heights
+    bare = {name: af.History(run.dataset.drop_vars("height")) for name, run in runs.items()}
+    assert draw_envelope(bare).axes[-1].get_xlabel() == "joint [-]"
+
+
+def test_runs_of_one_structure_share_a_colour(run):
+    """Runs under several motions: each has its lines, and the label has one entry."""
+    figure = draw_envelope({"both": [run, run], "one": run})
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["hinge from |e| = 0.46", "both", "one", "opened"]
+    colours = [line.get_color() for line in figure.axes[0].lines if line.get_marker() == "o"]
+    assert colours == [colours[0]] * 4 + [colours[4]] * 2
+    assert colours[0] != colours[4]
+
+
 def test_many_parts_go_on_several_rows(ring):
     """Four of ten rings of 18 joints fit side by side; all panels share one scale."""
     parts = [f"arch {number}" for number in range(1, 11)]
@@ -87,6 +128,8 @@ def test_eccentricity_over_time_is_refused(run):
 def test_too_few_or_many_runs_are_refused(run, count):
     with pytest.raises(af.InvalidInput, match=rf"{count} runs in one picture: give 1 to 6"):
         draw_envelope({str(k): run for k in range(count)})
+    with pytest.raises(af.InvalidInput, match=r"\['none'\] have no runs"):
+        draw_envelope({"none": [], "one": run})
 
 
 def test_ticks_are_names_of_joints():

@@ -1,5 +1,7 @@
 """Pictures of vibration shapes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -28,3 +30,27 @@ def test_picture_of_shapes(ring_model):
     for numbers in ([], [0], [4]):
         with pytest.raises(af.InvalidInput, match="cannot be drawn: there are 1 to 3"):
             draw_modes(found, numbers)
+
+
+def test_a_mode_of_the_fill_alone_is_called_local(bridge):
+    """Shapes of the first coordinates of a stone of a ring, of a sidewall, and of both."""
+    model = af.build(bridge, fidelity="rigid")
+    owner, shapes = model.cells.coordinate_owner, np.zeros((model.size, 3))
+    roles = np.array([bridge.blocks[number].role for number in owner])
+    ring, other = (np.flatnonzero(roles == role)[0] for role in ("ring", "other"))
+    shapes[ring, 0] = shapes[other, 1] = shapes[other, 2] = 1.0
+    shapes[ring, 2] = 0.6
+    found = af.statics.Modes(model, np.arange(1.0, 4.0), shapes, model.mass_influence.sum(axis=0))
+    assert found.local.tolist() == [False, True, False]
+    figure = draw_modes(found)
+    titles = [axes.get_title().partition("\n")[0] for axes in figure.axes]
+    assert titles == ["mode 1: 1.00 Hz", "mode 2: 2.00 Hz, local", "mode 3: 3.00 Hz"]
+    assert "local: other parts move more than twice as far" in figure.get_supxlabel()
+    assert "local" not in draw_modes(found, [1]).get_supxlabel()
+
+
+def test_no_mode_of_a_structure_without_rings_and_piers_is_local(stack):
+    blocks, joints = ([replace(x, role="other") for x in y] for y in (stack.blocks, stack.joints))
+    wall = replace(stack, blocks=tuple(blocks), joints=tuple(joints))
+    found = af.modes(af.build(wall, fidelity="rigid"), 2)
+    assert not found.local.any()

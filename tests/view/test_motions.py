@@ -7,7 +7,7 @@ import pytest
 
 import archfem as af
 from archfem.motion import Match
-from archfem.view import draw_motion, draw_spectra, draw_suite
+from archfem.view import draw_accelerograms, draw_motion, draw_spectra, draw_suite
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +47,30 @@ def test_suite_spectra_show_mean_and_target(shaking):
     assert mean == pytest.approx(2.0 * first)
     assert aim == pytest.approx(target.horizontal(periods))
     assert upright.get_lines()[-1].get_ydata() == pytest.approx(target.vertical(periods))
+
+
+def test_accelerograms_of_a_suite_share_one_scale(shaking):
+    """Each is its acceleration before division by R, from a baseline of its own."""
+    pairs = (shaking, shaking.scaled(0.5).with_vertical(None))
+    figure = draw_accelerograms(af.Suite("two", pairs, scale=2.0, reduction=3.0))
+    level, upright = figure.get_axes()
+    places = dict(zip(["first", "second"], level.get_yticks(), strict=True))
+    for line, pair, base in zip(level.get_lines(), pairs, places.values(), strict=False):
+        drawn = (line.get_ydata() - base) * af.units.STANDARD_GRAVITY
+        assert drawn == pytest.approx(2.0 * pair.horizontal)
+    assert len(upright.get_lines()) == 1
+    assert level.get_ylim() == upright.get_ylim()
+    # peaks of two neighbours in opposite directions do not meet
+    peak = 4.0 / af.units.STANDARD_GRAVITY
+    assert places["first"] - places["second"] > 1.5 * peak
+    assert [text.get_text() for text in level.texts] == [f"{peak:.2f} g", f"{peak / 2:.2f} g"]
+    assert figure.get_suptitle() == "two, before division by R = 3"
+
+
+def test_spectra_say_that_they_are_not_yet_divided(shaking):
+    for reduction, title in ((3.0, "one, before division by R = 3"), (1.0, "one")):
+        suite = af.Suite("one", (shaking,), reduction=reduction)
+        assert draw_suite(suite).get_suptitle() == title
 
 
 def test_target_is_drawn_where_it_is_defined(shaking):

@@ -28,7 +28,7 @@ def test_the_map_shows_compression_at_corners_with_thrust_line_and_crosses(ring_
     )
     assert shown.min() >= 0.0
     bar = figure.axes[0].child_axes[0]
-    assert bar.get_ylabel() == "largest compression [MPa]"
+    assert bar.get_ylabel() == "compression [MPa]"
     assert drawn(figure, "thrust").get_xydata().shape == (18, 2)
     crosses = figure.axes[0].findobj(lambda artist: artist.get_label() == "compression")[0]
     directions = np.diff(np.array(crosses.get_segments()), axis=1)[:, 0]
@@ -46,7 +46,7 @@ def test_the_map_of_one_part_has_its_own_scale(backfilled):
         draw_stress(model, q, parts=parts).axes[0].child_axes[0].get_ylabel()
         for parts in (None, ["backfill"])
     ]
-    assert labels == ["largest compression [MPa]", "largest compression [kPa]"]
+    assert labels == ["compression [MPa]", "compression [kPa]"]
     with pytest.raises(af.InvalidInput, match=r"parts \['deck'\] cannot be shaded: .*'backfill'"):
         draw_stress(model, q, parts=["deck"])
 

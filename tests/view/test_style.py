@@ -5,10 +5,12 @@ from html import escape
 
 import matplotlib
 import pytest
+from matplotlib.text import Text
+from pictures import history
 
 import archfem as af
 from archfem.view import save
-from archfem.view.style import Page, set_title, structure_figure
+from archfem.view.style import Page, new_figure, set_title, structure_figure
 
 
 @pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".pdf", b"%PDF")])
@@ -65,3 +67,19 @@ def test_long_titles_take_several_lines():
     page.draw_without_rendering()
     wide = axes.title.get_window_extent().width
     assert wide < page.bbox.width
+
+
+def test_no_type_is_printed_smaller_than_seven_points(bridge):
+    """Figures are at most 170 mm wide, so that a page prints their type as it is."""
+    assert new_figure(20.0, 3.0).get_figwidth() == 6.7
+    run = af.History(history(bridge, 0.3).dataset, bridge)
+    joints = run.joints.isel(time=0)
+    for figure in (
+        af.view.draw_names(bridge),
+        af.view.draw_structure(bridge, joints),
+        af.view.draw_envelope({"run": run}),
+        af.view.draw_backbones(run, dead=joints),
+    ):
+        assert figure.get_figwidth() <= 6.7
+        texts = [text for text in figure.findobj(Text) if text.get_text()]
+        assert min(text.get_fontsize() for text in texts) >= 7.0
