@@ -72,7 +72,7 @@ def parse_limit(table: Any) -> LimitAnalysis:
     """Return the limit analysis of a case."""
     # the live load: multiples of the weight, and a force at a point
     keys = (
-        _keys_beside(collapse_factor, "live") | declared_keys(BodyForce) | {"point": (dict, list)}
+        _keys_beside(collapse_factor, "live") | declared_keys(BodyForce) | {"point": (dict, [dict])}
     )
     values = check_table(table, keys, "limit")
     live: list[Action] = []
