@@ -58,6 +58,20 @@ existing, restored = (case.structure for case in cases.values())
 print(f"{len(existing.free)} blocks, {len(existing.joints)} joints, {existing.weight / 1e6:.2f} MN")
 af.view.draw_instants({name: (case.structure, None) for name, case in cases.items()})
 
+# %%
+drawn = af.build(existing, cells=(2, 2) if quick else (4, 4), quadrature="nodal")
+af.view.draw_mesh(drawn, block="main arch, voussoir 9")
+
+# %% [markdown]
+# ## The motions (figures 8 and 9)
+#
+# Six horizontal motions with three vertical ones, matched to the spectrum of the site. Both are
+# shown before the division by R = 3.
+
+# %%
+suite = cases["as it stands"].ground_suite()
+af.view.draw_accelerograms(suite)
+
 # %% [markdown]
 # ## Dead load (figure 12)
 #
@@ -163,8 +177,16 @@ af.view.draw_instants(
     }
 )
 
+# %% [markdown]
+# The band of all thrust lines of the run, drawn on the bridge (figure 13b and d), and the same as
+# eccentricities by joint, piers by their height (figure 15).
+
 # %%
-af.view.draw_envelope(paper, dotted=["as it stands"], dead=joints)
+at_rest = {name: each.joints for name, each in dead.items()}
+af.view.draw_backbones(paper, dead=at_rest)
+
+# %%
+af.view.draw_envelope(paper, dotted=["as it stands"], dead=at_rest)
 
 # %%
 af.view.draw_joint(paper, "north arch, joint 5")
