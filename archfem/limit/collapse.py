@@ -153,7 +153,8 @@ def collapse_factor(
             "nonassociated" searches states whose joints slide without dilating for the weakest;
             None forbids sliding.
         strength: compressive strength σ of the blocks [Pa], which limits |M| to
-            N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit.
+            N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit. Joints of fill in
+            pieces (`jointed_fill`) have their own strength, and not this one.
         fill: strength of blocks softer than their joints, which become weight and pressures on the
             stones (`Fill`), with those that rest on them; None where there are none, or where they
             are cut into pieces (`jointed_fill`), whose joints have that strength.
@@ -294,13 +295,15 @@ def _solve_collapse(
         optimum, solutions = search_nonassociated(programme, associated, scale)
     if optimum is None:
         at_rest = replace(fall, multipliers=np.zeros_like(fall.multipliers))
-        if solutions is None or associated is None:
+        bound = np.inf if solutions is None else solutions.bracket[0 if support is None else 1]
+        if not np.isfinite(bound):
+            if friction is not None:
+                warn_locking(structure)
             result = _read_result(stones, dead, unbounded, np.inf, at_rest)
             return replace(result, solutions=solutions)
         logger.warning(
             "no state without dilatancy was found; the factor is only a bound: %s", solutions
         )
-        bound = solutions.bracket[0 if support is None else 1]
         result = _read_result(stones, dead, Outcome.BRACKETED, bound, _without_forces(at_rest))
         return replace(result, solutions=solutions)
     result = _read_result(stones, programme, bounded, scale * optimum.value, optimum, support)
@@ -372,6 +375,16 @@ def warn_sliding(names: Sequence[str], factor: float) -> None:
             "joints slide (%s): with the dilatancy of associated flow the factor %.4g is an "
             "upper estimate; friction='nonassociated' does without it",
             *(join_joint_names(names), factor),
+        )
+
+
+def warn_locking(structure: Structure) -> None:
+    """Warn of a fill in pieces, which associated flow may lock so that no load is too large."""
+    if any(block.grain for block in structure.blocks):
+        logger.warning(
+            "an infinite factor is that of a fill in pieces which dilates by tan φ as it slides: "
+            "it may lock between the stones, as soil does not. Cut smaller pieces, or give "
+            "fill=af.limit.Fill(…) for the structure before it was cut"
         )
 
 
