@@ -182,6 +182,8 @@ def collapse_factor(
     loads = live if isinstance(live, Settlement) else list_loads(live)
     stones, dead = self_weight_programme(structure, friction, strength, fill)
     result = _solve_collapse(stones, dead, loads, friction)
+    if np.isinf(result.factor):
+        warn_locking(structure, friction)
     actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
     return replace(result, live=actions, structure=structure)
 
@@ -295,16 +297,14 @@ def _solve_collapse(
         optimum, solutions = search_nonassociated(programme, associated, scale)
     if optimum is None:
         at_rest = replace(fall, multipliers=np.zeros_like(fall.multipliers))
-        bound = np.inf if solutions is None else solutions.bracket[0 if support is None else 1]
-        if not np.isfinite(bound):
-            if friction is not None:
-                warn_locking(structure)
-            result = _read_result(stones, dead, unbounded, np.inf, at_rest)
-            return replace(result, solutions=solutions)
-        logger.warning(
-            "no state without dilatancy was found; the factor is only a bound: %s", solutions
-        )
-        result = _read_result(stones, dead, Outcome.BRACKETED, bound, _without_forces(at_rest))
+        bound = solutions.bracket[int(support is not None)] if solutions else np.inf
+        if np.isfinite(bound):
+            logger.warning(
+                "no state without dilatancy was found; the factor is only a bound: %s", solutions
+            )
+            unbounded, at_rest = Outcome.BRACKETED, _without_forces(at_rest)
+        factor = bound if np.isfinite(bound) else np.inf
+        result = _read_result(stones, dead, unbounded, factor, at_rest)
         return replace(result, solutions=solutions)
     result = _read_result(stones, programme, bounded, scale * optimum.value, optimum, support)
     result = replace(result, solutions=solutions)
@@ -378,9 +378,9 @@ def warn_sliding(names: Sequence[str], factor: float) -> None:
         )
 
 
-def warn_locking(structure: Structure) -> None:
+def warn_locking(structure: Structure, friction: str | None) -> None:
     """Warn of a fill in pieces, which associated flow may lock so that no load is too large."""
-    if any(block.grain for block in structure.blocks):
+    if friction is not None and any(block.grain for block in structure.blocks):
         logger.warning(
             "an infinite factor is that of a fill in pieces which dilates by tan φ as it slides: "
             "it may lock between the stones, as soil does not. Cut smaller pieces, or give "

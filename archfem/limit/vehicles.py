@@ -486,8 +486,8 @@ def _collapse_factors(
             factors[row] = -state.value
         elif associated[row] is not None:  # the whole search, or a bound
             factors[row] = collapse_factor(stones.whole, live=list(row), **options).factor
-    if options["friction"] is not None and np.inf in factors.values():
-        warn_locking(stones.whole)
+    if np.inf in factors.values():
+        warn_locking(stones.whole, options["friction"])
     return factors
 
 
