@@ -250,7 +250,8 @@ class _MovementPath:
     def follow(self, tolerance: float) -> Movement:
         """Move the support as far as there is equilibrium."""
         blocks = DisplacedBlocks(self.structure, np.zeros_like(self.support))
-        share, step, end, sliding = 0.0, MAX_MOVEMENT_STEP, End.HOLDS, ()
+        share, step, end = 0.0, MAX_MOVEMENT_STEP, End.HOLDS
+        sliding: tuple[str, ...] = ()
         stages = [self._stage(0.0, *self._equilibrate(blocks))]
         while share < 1.0 and step >= tolerance:
             step = min(step, 1.0 - share)
