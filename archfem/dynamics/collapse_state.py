@@ -150,6 +150,13 @@ def doubt_collapse(structure: Structure, fall: CollapseState) -> Iterator[Doubt]
             f"residual displacement {format_mm(fall.residual)}, limit {format_mm(limit)}",
             "state the displacement rather than the kind",
         )
+    # a portal that still rocked when its motion ended was dislocated by 70 mm, and at rest by none
+    if fall.kind == COLLAPSE_STATES[1] and not fall.resting:
+        yield Doubt(
+            f"blocks still move at the end: they may come back from {format_mm(fall.residual)}, or "
+            "go farther",
+            "add seconds without acceleration to the end of the motion",
+        )
 
 
 def shallowest_depth(structure: Structure) -> float:

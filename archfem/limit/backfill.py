@@ -541,7 +541,10 @@ def self_weight_programme(
     coefficient = rigid.friction if friction is not None else np.full(len(rigid.joints), np.inf)
     crushing = None
     if strength is not None:
+        # pieces of fill have the strength of their joints, and none of stone
+        is_piece = np.array([block.grain for block in rigid.blocks])[rigid.pairs].any(axis=1)
         crushing = strength * rigid.width * rigid.depths / blocks.force_unit
+        crushing = np.where(is_piece, np.inf, crushing)
     weight = blocks.dimensionless(stones.load([SELF_WEIGHT]) + stones.active_forces())
     dead = Programme(blocks, weight, coefficient, blocks.cohesion, crushing=crushing)
     if fill is None:

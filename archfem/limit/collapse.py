@@ -182,7 +182,8 @@ def collapse_factor(
             "nonassociated" searches states whose joints slide without dilating for the weakest;
             None forbids sliding.
         strength: compressive strength σ of the blocks [Pa], which limits |M| to
-            N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit.
+            N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit. Joints of fill in
+            pieces (`jointed_fill`) have their own strength, and not this one.
         fill: strength of blocks softer than their joints, which become weight and pressures on the
             stones (`Fill`), with those that rest on them, or a plastic continuum (`PlasticFill`),
             for which the result has two bounds; None where there are none, or where they are cut
@@ -213,6 +214,8 @@ def collapse_factor(
         return _bound_collapse(structure, loads, friction, strength, fill)
     stones, dead = self_weight_programme(structure, friction, strength, fill)
     result = _solve_collapse(stones, dead, loads, friction)
+    if np.isinf(result.factor):
+        warn_locking(structure, friction)
     actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
     return replace(result, live=actions, structure=structure)
 
@@ -326,14 +329,14 @@ def _solve_collapse(
         optimum, solutions = search_nonassociated(programme, associated, scale)
     if optimum is None:
         at_rest = replace(fall, multipliers=np.zeros_like(fall.multipliers))
-        if solutions is None or associated is None:
-            result = _read_result(stones, dead, unbounded, np.inf, at_rest)
-            return replace(result, solutions=solutions)
-        logger.warning(
-            "no state without dilatancy was found; the factor is only a bound: %s", solutions
-        )
-        bound = solutions.bracket[0 if support is None else 1]
-        result = _read_result(stones, dead, Outcome.BRACKETED, bound, _without_forces(at_rest))
+        bound = solutions.bracket[int(support is not None)] if solutions else np.inf
+        if np.isfinite(bound):
+            logger.warning(
+                "no state without dilatancy was found; the factor is only a bound: %s", solutions
+            )
+            unbounded, at_rest = Outcome.BRACKETED, _without_forces(at_rest)
+        factor = bound if np.isfinite(bound) else np.inf
+        result = _read_result(stones, dead, unbounded, factor, at_rest)
         return replace(result, solutions=solutions)
     result = _read_result(stones, programme, bounded, scale * optimum.value, optimum, support)
     result = replace(result, solutions=solutions)
@@ -461,6 +464,16 @@ def warn_sliding(names: Sequence[str], factor: float) -> None:
             "joints slide (%s): with the dilatancy of associated flow the factor %.4g is an "
             "upper estimate; friction='nonassociated' does without it",
             *(join_joint_names(names), factor),
+        )
+
+
+def warn_locking(structure: Structure, friction: str | None) -> None:
+    """Warn of a fill in pieces, which associated flow may lock so that no load is too large."""
+    if friction is not None and any(block.grain for block in structure.blocks):
+        logger.warning(
+            "an infinite factor is that of a fill in pieces which dilates by tan φ as it slides: "
+            "it may lock between the stones, as soil does not. Cut smaller pieces, or give "
+            "fill=af.limit.Fill(…) for the structure before it was cut"
         )
 
 

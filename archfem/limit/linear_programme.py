@@ -45,12 +45,15 @@ def solve_linear(
 ) -> OptimizeResult | None:
     """Minimise a cost under equations and limits A x <= b; None where it is unbounded."""
     equations, limits = (_small_as_array(*each) for each in (equations, limits))
-    # Residuals are of order one. Where round-off stops the solver, presolve changes its path, and
-    # then a coarser tolerance lets it end.
-    for presolve, tolerance in ((False, 1e-9), (True, 1e-9), (True, 1e-8)):
+    # Residuals are of order one. Where round-off stops the solver, presolve changes its path; then
+    # a coarser tolerance lets it end, or the interior point. Without a cost presolve comes first:
+    # it finds at once that fine pieces of fill do not stand, where the simplex method stalls.
+    first = (method, not np.any(cost), 1e-9)
+    more = (method, True, 1e-9), (method, True, 1e-8), ("highs-ipm", True, 1e-8)
+    for way, presolve, tolerance in dict.fromkeys((first, *more)):
         feasibility = (f"{side}_feasibility_tolerance" for side in ("primal", "dual"))
         options = {**dict.fromkeys(feasibility, tolerance), "presolve": presolve}
-        result = linprog(cost, *limits, *equations, bounds, method, options=options)
+        result = linprog(cost, *limits, *equations, bounds, way, options=options)
         if result.status == 2:
             raise NoEquilibrium("no state of equilibrium fulfils the limits")
         if result.status in (0, 3):
@@ -237,7 +240,8 @@ class Programme:
     friction: Array  # μ, infinite in joints that never slide (n_joints,) [-]
     cohesion: Array  # r, shear strength without compression (n_joints,) [mean block weights]
     limits: Limits | None = None  # further ones on the joint forces
-    crushing: Array | None = None  # crushing force σ w h (n_joints,) [mean block weights]
+    # crushing force σ w h, infinite in joints of fill in pieces (n_joints,) [mean block weights]
+    crushing: Array | None = None
     force_cost: Array | None = None  # a (3 n_joints,); None for zero
     columns: sparse.csr_matrix | None = None  # D (3 n_free, k); None without z
     unknown_cost: Array = field(default_factory=lambda: np.zeros(0))  # b (k,)
@@ -280,9 +284,10 @@ class Programme:
         """Solve, adding crushing cuts until none is violated; None where it is unbounded."""
         limits = self.limits or no_limits(len(self.friction))
         if self.crushing is not None:
-            every = np.arange(len(self.crushing))
+            crushes = np.flatnonzero(np.isfinite(self.crushing))
             for share in (0.25, 0.5, 1.0):
-                limits = limits.joined(crushing_cuts(every, share * self.crushing, self.crushing))
+                thrust = share * self.crushing[crushes]
+                limits = limits.joined(crushing_cuts(crushes, thrust, self.crushing))
         columns = sparse.csr_matrix((len(self.load), 0)) if self.columns is None else self.columns
         reduced = self.blocks.reduce(columns, self.friction, self.cohesion > 0.0)
         # As tangents of a parabola the cuts converge quadratically, in about six rounds.

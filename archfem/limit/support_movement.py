@@ -17,6 +17,8 @@ end that is nearer to contact. The rates of openings and slip are exact for corn
 that the forces of hinges act where the hinges are.
 """
 
+import logging
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -31,9 +33,12 @@ from archfem.limit.backfill import SELF_WEIGHT
 from archfem.limit.collapse import stands
 from archfem.limit.displaced_blocks import PlacedBlocks
 from archfem.limit.linear_programme import NoEquilibrium, Optimum, Programme, RigidBlocks
+from archfem.limit.nonassociated import RESISTANCE_MARGIN, normal_forces, shear_resistance
 from archfem.masonry.block import rotate
 from archfem.masonry.loads import Settlement
-from archfem.masonry.structure import Structure, join_names
+from archfem.masonry.structure import Structure, join_joint_names, join_names
+
+logger = logging.getLogger("archfem")
 
 # First and longest step, as a share of the full movement [-]
 MAX_MOVEMENT_STEP = 0.01
@@ -91,6 +96,8 @@ class Movement:
         stages: states of equilibrium from rest to the largest movement.
         displacement: displacement of every block's centroid, and its rotation, at the largest
             movement (n_blocks, 3) [m, m, rad].
+        sliding: names of the joints that need more than their friction beyond; none unless it ends
+            by sliding.
     """
 
     structure: Structure
@@ -99,6 +106,7 @@ class Movement:
     end: End
     stages: tuple[Stage, ...]
     displacement: Array
+    sliding: tuple[str, ...] = ()
 
     @property
     def settlement(self) -> Settlement:
@@ -119,6 +127,8 @@ class Movement:
             f"support {self.full_settlement.block} moves by {x:.4g} m, {y:.4g} m and "
             f"{turn:.4g} rad: {self.end.sentence}"
         )
+        if self.sliding:
+            head = f"{head}: {join_joint_names(self.sliding)}"
         return "\n".join([head, *map(str, self.sequence)])
 
 
@@ -152,7 +162,8 @@ def largest_movement(
 
     Note:
         Joints do not slide, so that a bonded wall, whose upright joints would have to, locks at
-        once; and blocks touch at the ends of their joints only. Where it falls there may be
+        once. Where it ends by sliding or locks, it may survive more movement, and a warning says
+        so. Blocks touch at the ends of their joints only. Where it falls there may be
         equilibrium elsewhere, which it could reach by a leap alone: that does not count as
         standing.
 
@@ -222,9 +233,9 @@ class DisplacedBlocks(RigidBlocks):
 class _PathEnd(Exception):
     """Raised with the reason where no further equilibrium is found."""
 
-    def __init__(self, end: End) -> None:
+    def __init__(self, end: End, sliding: tuple[str, ...] = ()) -> None:
         super().__init__(end.sentence)
-        self.end = end
+        self.end, self.sliding = end, sliding
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,22 +251,33 @@ class _MovementPath:
         """Move the support as far as there is equilibrium."""
         blocks = DisplacedBlocks(self.structure, np.zeros_like(self.support))
         share, step, end = 0.0, MAX_MOVEMENT_STEP, End.HOLDS
+        sliding: tuple[str, ...] = ()
         stages = [self._stage(0.0, *self._equilibrate(blocks))]
         while share < 1.0 and step >= tolerance:
             step = min(step, 1.0 - share)
             try:
                 trial, state = self._equilibrate(self._predict(blocks, step))
-                self._check_friction(trial)
+                self._check_friction(trial, state)
             except _PathEnd as stop:
-                end, step = stop.end, 0.5 * step
+                end, sliding, step = stop.end, stop.sliding, 0.5 * step
                 continue
             blocks, share = trial, share + step
             stages.append(self._stage(share, trial, state))
             # after the first failure steps only shrink: the bracket of the end is bisected
             step = min(2.0 * step, MAX_MOVEMENT_STEP) if end is End.HOLDS else step
-        end = End.HOLDS if share >= 1.0 else end
-        displacement = blocks.displacement
-        return Movement(self.structure, self.settlement, share, end, tuple(stages), displacement)
+        if share >= 1.0:
+            end, sliding = End.HOLDS, ()
+        found = Movement(
+            *(self.structure, self.settlement, share, end, tuple(stages)),
+            *(blocks.displacement, sliding),
+        )
+        if self.has_friction and end in (End.SLIDES, End.LOCKS):
+            logger.warning(
+                "%s; it may survive more than this movement, sliding, which is not followed here: "
+                "af.pushover with the Settlement does so",
+                str(found).partition("\n")[0],
+            )
+        return found
 
     def _programme(self, blocks: DisplacedBlocks, further: Array | None = None) -> Programme:
         """Return the equilibrium programme of least work on present and imposed gaps."""
@@ -303,18 +325,21 @@ class _MovementPath:
                 break
         raise _PathEnd(End.LEAPS)
 
-    def _check_friction(self, blocks: DisplacedBlocks) -> None:
+    def _check_friction(self, blocks: DisplacedBlocks, rolling: Optimum) -> None:
         """End the movement by sliding where no equilibrium satisfies the friction limits."""
         if not self.has_friction:
             return
         rough, friction = self._programme(blocks), self.structure.friction
-        try:
-            state = replace(rough, friction=friction, cohesion=blocks.cohesion).solve()
-        except DidNotConverge as error:
-            raise _PathEnd(End.SLIDES) from error
+        limited, state = replace(rough, friction=friction, cohesion=blocks.cohesion), None
+        with suppress(DidNotConverge):
+            state = limited.solve()
         tolerance = 10.0 * GEOMETRY_TOLERANCE * self.structure.size
         if state is None or abs(state.value) / len(self.structure.free) > tolerance:
-            raise _PathEnd(End.SLIDES)
+            excess = abs(rolling.forces.reshape(3, -1)[2])
+            excess = excess - shear_resistance(limited, normal_forces(rolling.forces))
+            beyond = np.isfinite(friction) & (excess > RESISTANCE_MARGIN)
+            names = (self.structure.joints[joint].name for joint in np.flatnonzero(beyond))
+            raise _PathEnd(End.SLIDES, tuple(names))
 
     def _stage(self, share: float, blocks: DisplacedBlocks, state: Optimum) -> Stage:
         """Return thrust and hinges of a state."""

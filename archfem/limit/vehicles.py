@@ -15,7 +15,7 @@ from archfem._typing import Array, Metres, Newtons, Numbers, Pascals
 from archfem._validation import check_number, check_numbers, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
-from archfem.limit.collapse import Collapse, collapse_factor
+from archfem.limit.collapse import Collapse, collapse_factor, warn_locking
 from archfem.limit.instability import DeepenedBlocks
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
@@ -486,6 +486,8 @@ def _collapse_factors(
             factors[row] = -state.value
         elif associated[row] is not None:  # the whole search, or a bound
             factors[row] = collapse_factor(stones.whole, live=list(row), **options).factor
+    if np.inf in factors.values():
+        warn_locking(stones.whole, options["friction"])
     return factors
 
 

@@ -1,12 +1,16 @@
 """Rigid-block equilibrium as a linear programme: loads, gaps, balance and crushing cuts."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from kinematics import gaps
 from mechanisms import arch
 from scipy import sparse
+from scipy.optimize import linprog
 
 import archfem as af
+from archfem.limit import linear_programme
 from archfem.limit.backfill import self_weight_programme
 from archfem.limit.linear_programme import RigidBlocks
 
@@ -43,6 +47,32 @@ def test_loads_are_forces_at_centroids():
     expected = np.outer(weights, [0.5, -1.0, 0.0])
     expected[block - 1] += [2e3, -1e3, -1e3 * x - 2e3 * y]
     assert found == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("cost", "presolved"), [(0.0, [True]), (1.0, [False])])
+def test_presolve_comes_first_where_there_is_no_cost(cost, presolved, monkeypatch):
+    tried = []
+
+    def record(*given, options):
+        tried.append((given[-1], options["presolve"]))
+        return linprog(*given, options=options)
+
+    monkeypatch.setattr(linear_programme, "linprog", record)
+    one = np.ones((1, 1)), np.ones(1)
+    found = linear_programme.solve_linear(np.array([cost]), np.array([[0.0, 2.0]]), one)
+    assert found.x == pytest.approx([1.0])
+    assert [presolve for _, presolve in tried] == presolved
+
+
+def test_the_interior_point_is_tried_where_the_simplex_method_fails(monkeypatch):
+    def fail(*given, options):
+        found = linprog(*given, options=options)
+        return SimpleNamespace(status=4, message="") if given[-1] == "highs-ds" else found
+
+    monkeypatch.setattr(linear_programme, "linprog", fail)
+    one = np.ones((1, 1)), np.ones(1)
+    found = linear_programme.solve_linear(np.ones(1), np.array([[0.0, 2.0]]), one)
+    assert found.x == pytest.approx([1.0])
 
 
 SIDEWAYS = af.BodyForce(1.0)

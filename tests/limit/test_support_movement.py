@@ -224,6 +224,73 @@ def test_a_small_movement_is_held_and_a_strut_locks():
     assert (stuck.end, stuck.largest) == (End.LOCKS, 0.0)
 
 
+LEG = np.array([(0.0, 0.0), (0.5, 0.0), (1.0, 1.5), (1.0, 2.0)])
+"""Left one of two stones that lean against each other at x = 1 m."""
+
+
+def leaning(friction):
+    """Two stones that lean against each other, on a base each."""
+    legs = LEG, (LEG * [-1.0, 1.0] + [2.0, 0.0])[::-1]
+    bases = (
+        [(left, -1.0), (right, -1.0), (right, 0.0), (left, 0.0)]
+        for left, right in ((-1.0, 0.9), (1.1, 3.0))
+    )
+    names = ("left base", "right base", "left", "right")
+    blocks = [
+        af.Block(tuple(map(tuple, points)), af.STONE, name, fixed=name.endswith("base"))
+        for name, points in zip(names, (*bases, *legs), strict=True)
+    ]
+    return af.masonry.assembled(blocks, rough(friction))
+
+
+def centroid_along(start, end):
+    """Centroid of the left stone along and across the line between its hinges, and its length."""
+    block = leaning(0.5).blocks[2]
+    line = np.subtract(end, start)
+    length = np.hypot(*line)
+    arm = block.centroid - start
+    return line @ arm / length, cross(line, arm) / length, length
+
+
+@pytest.mark.parametrize(
+    ("friction", "slides"), [(0.05, ("left base to left", "right base to right")), (0.1, None)]
+)
+def test_leaning_stones_that_part_slide_where_their_thrust_is_beyond_friction(
+    friction, slides, caplog
+):
+    """At their feet, or at the top where its face, of the left stone, has turned by arctan μ.
+
+    Hinges are at the inner feet and at the top; the thrust over the weight is that of their arms.
+    """
+    along, across, length = centroid_along(LEG[1], LEG[3])
+    # arms (along * reach - across * height) / length and height, of hinges reach apart sideways
+    slope = (friction * length + across) / along
+    feet = length * slope / np.hypot(1.0, slope)
+    top = length * np.cos(np.arctan2(*(LEG[3] - LEG[1])[::-1]) - np.arctan(friction))
+    found = largest_movement(leaning(friction), af.Settlement("left base", (-1.0, 0.0, 0.0)))
+    assert found.largest == pytest.approx(2.0 * (min(feet, top) - 0.5), abs=3.0 * TOLERANCE)
+    assert found.end is End.SLIDES
+    assert found.sliding == (slides or ("left to right",))
+    assert (feet < top) == bool(slides)
+    assert "it may survive more than this movement, sliding" in caplog.text
+
+
+@pytest.mark.parametrize(("share", "end"), [(0.8, End.SLIDES), (1.02, End.HOLDS)])
+def test_leaning_stones_pushed_together_slide_at_once_below_the_friction_of_their_thrust(
+    share, end, caplog
+):
+    """Hinges at the outer foot and the lower end of the top: H/W is the ratio of their arms."""
+    thrust = leaning(0.5).blocks[2].centroid[0] / LEG[2, 1]
+    closing = af.Settlement("left base", (0.2, 0.0, 0.0))
+    found = largest_movement(leaning(share * thrust), closing)
+    assert found.end is end
+    assert found.largest == (1.0 if end is End.HOLDS else 0.0)
+    slides = ("left base to left", "right base to right") if end is End.SLIDES else ()
+    assert found.sliding == slides
+    assert ("slides: left base to left; right base to right" in str(found)) == bool(slides)
+    assert bool(caplog.text) == bool(slides)
+
+
 def test_the_last_step_ends_at_the_given_movement(monkeypatch):
     """Steps of three tenths, and one of a tenth."""
     monkeypatch.setattr(support_movement, "MAX_MOVEMENT_STEP", 0.3)

@@ -164,12 +164,38 @@ def test_limit_analysis_of_the_pieces_finds_the_same_wedges(angle, passive):
     assert found.sliding
 
 
-def test_between_fixed_walls_pieces_that_dilate_bear_any_load():
-    """They lock; round-off keeps the solver from saying so within its usual tolerance."""
+def test_the_strength_of_stones_leaves_pieces_their_own():
+    """K_p = 3 as without it; a column on the wall tips about the middle of its crushed strip."""
+    way = af.Settlement("wall", (-1.0, 0.0, 0.0))
+    found = af.collapse_factor(smooth_box(30.0, 1, passive=True), live=way, strength=0.2e6)
+    assert abs(found.factor) / (0.5 * 18e3 * HEIGHT**2) == pytest.approx(3.0, rel=1e-8)
+    rough = af.Contact(0.3e9, 0.24e9, 1.0)
+    whole = box(2.0, rough, rough)
+    shaft = ((2.05, HEIGHT), (2.45, HEIGHT), (2.45, HEIGHT + 1.6), (2.05, HEIGHT + 1.6))
+    column = af.Block(shaft, af.STONE, "column", role="other")
+    stones = af.masonry.assembled((*whole.blocks, column), rough)
+    fill = jointed_fill(stones, 1.0, friction_angle=30.0)
+    push = af.PointLoad(2.25, (1e3, 0.0))
+    found = af.collapse_factor(fill, live=push, strength=0.1e6)
+    weight = 0.4 * 1.6 * af.STONE.unit_weight
+    strip = weight / 0.1e6
+    assert 1e3 * found.factor * 1.6 == pytest.approx(weight * (0.4 - strip) / 2.0, rel=1e-6)
+
+
+def test_between_fixed_walls_pieces_that_dilate_bear_any_load(caplog):
+    """They lock, and words say so; round-off stops the solver within its usual tolerance."""
     rough = af.Contact(0.3e9, 0.24e9, tan(radians(30.0)))
     fill = jointed_fill(box(3.0, rough, rough), 0.7, friction_angle=35.0)
-    found = af.collapse_factor(fill, live=af.PointLoad(1.5, (0.0, -1e3)))
+    load = af.PointLoad(1.5, (0.0, -1e3))
+    found = af.collapse_factor(fill, live=load)
     assert found.outcome.sentence == "this load never overturns it"
+    assert "it may lock between the stones, as soil does not" in caplog.text
+    caplog.clear()
+    af.limit.moving_load(fill, 1e3, positions=[1.5])
+    assert caplog.text.count("it may lock between the stones") == 2  # of the row, and of the worst
+    caplog.clear()
+    af.collapse_factor(fill, live=load, friction=None)
+    assert not caplog.text
 
 
 @pytest.mark.slow

@@ -144,6 +144,7 @@ def make_bodies(
     across = np.column_stack([edges[:, 1], -edges[:, 0]])
     mass = np.array([_mass(structure, block) for block in blocks])
     smallest = float(np.sqrt(min(blocks[number].area for number in structure.free)))
+    closed = min(1e-4 * smallest, 5e-5)
     inverse_mass = np.zeros((len(blocks) + 1, 2))
     inverse_mass[list(structure.free)] = 1.0 / mass[list(structure.free)]
     return Bodies(
@@ -161,8 +162,8 @@ def make_bodies(
         ground,
         # Rounding and the time steps move points of a closed face apart. Where these are taken for
         # open, impacts depend on the step; where much more is closed, hinges are.
-        max(CONTACT_TOLERANCE * structure.size, min(1e-4 * smallest, 5e-5)),
-        1e-3 * smallest,
+        max(CONTACT_TOLERANCE * structure.size, closed),
+        closed,
         _rocking_table(structure, rocking_ratio),
     )
 

@@ -248,11 +248,12 @@ class _Run:
         self._v[bodies.inverse_mass[:-1, 0] == 0.0] = 0.0
         # speed of a free fall after one step
         weight_speed = self._weight_speed = simulation.structure.gravity * dt
-        # a rebound follows from the velocities before the impact, which a foreseen contact changes
-        rebounds = simulation.restitution > 0.0 or bool(bodies.rocking.any())
+        # a rocking ratio follows from the velocities before the impact, which a foreseen contact
+        # changes
+        has_ratio = bool(bodies.rocking.any())
         self._parameters = StepParameters(
             *(dt, simulation.structure.gravity),
-            *(0.0 if rebounds else 0.5 * dt, simulation.restitution),
+            *(0.0 if has_ratio else 0.5 * dt, simulation.restitution),
             # impacts below 0.05 m/s, the speed of a fall by 0.13 mm, do not bounce
             *(0.05, 2.0 * weight_speed),
             MAX_SWEEPS * -(-len(simulation.structure.free) // 100),

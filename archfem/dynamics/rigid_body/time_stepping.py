@@ -12,7 +12,8 @@ once, solve for the impulses P, from those of the step before. They
 have momentum with restart (Nesterov, Soviet Math. Dokl. 27 (1983) 372; O'Donoghue and Candès,
 Found. Comput. Math. 15 (2015) 715), and end once no contact violates its conditions by more than a
 stated speed. Rebounds are reduced where they would add energy. Overlaps are corrected in positions.
-Without rebounds, points that would pass each other by the end of the step are contacts too.
+Points that would pass each other by the end of the step are contacts too, except beside faces with
+a rocking ratio.
 """
 
 from typing import NamedTuple
@@ -293,8 +294,11 @@ def _add_rebounds(bodies, parameters, workspace, touching):  # type: ignore
         speed = relative_speed(speeds, (a, b), normal, (rows[k, 0], rows[k, 1]))
         ratio, is_end = bodies.rocking[a, b], k > 0 and has_partner(contacts, k - 1, touching)
         if ratio == 0.0 or not (is_end or has_partner(contacts, k, touching)):
-            if speed < -parameters.min_impact_speed:
-                rows[k, 10] = -parameters.restitution * speed
+            # a point still apart rebounds where it would cross by the end of the step
+            closing = 2.0 * contacts.gap[k] / parameters.dt
+            closing = closing if contacts.gap[k] > bodies.contact_gap else 0.0
+            if parameters.restitution > 0.0 and speed < -max(closing, parameters.min_impact_speed):
+                rows[k, 10] = closing - parameters.restitution * speed
         elif not is_end:
             other = relative_speed(speeds, (a, b), normal, (rows[k + 1, 0], rows[k + 1, 1]))
             # the speed common to both ends rebounds by Newton's law

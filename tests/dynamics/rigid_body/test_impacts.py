@@ -55,6 +55,36 @@ def test_a_block_that_lands_flat_rebounds(restitution, height):
     assert np.abs([frame.poses[1, 2] for frame in frames]).max() < 1e-4  # sweeps end at 1e-5
 
 
+@pytest.mark.parametrize("restitution", [0.0, 0.3])
+@pytest.mark.parametrize("speed", [1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+def test_a_fast_block_does_not_sink_into_its_bed(speed, restitution):
+    """Steps begin up to 3 mm above the bed; 0.05 mm counts as closed, 0.1 mm as beside rebounds."""
+    structure = floor((-0.3, 0.0, 0.3, 0.3))
+    start, energy = LooseBlocks.as_built(structure), 0.5 * structure.weight / G * speed**2
+    start.poses[1, 1], start.velocities[1, 1] = 7e-3, -speed
+    falling = RigidBlockSimulation(structure, dt=5e-4, restitution=restitution)
+    bounces = 2.0 * restitution * speed / (G * (1.0 - restitution))  # a geometric series
+    frames = list(falling.frames(start, 0.05 + bounces, spacing=5e-4))
+    heights = np.array([frame.poses[1, 1] for frame in frames])
+    assert heights.min() >= -1e-4
+    assert abs(heights[-1]) <= 1e-4
+    energies = np.array([frame.energy.kinetic + frame.energy.potential for frame in frames])
+    assert np.diff(energies).max() <= 1e-12 * energy
+    assert frames[-1].energy.lost == pytest.approx(energy + 7e-3 * structure.weight, rel=2e-3)
+
+
+@pytest.mark.parametrize(("height", "rebounds"), [(2e-3, False), (4e-4, True)])
+def test_a_foreseen_impact_rebounds_where_it_would_be_in_the_step(height, rebounds):
+    """At 3 m/s a step of 0.5 ms crosses 1.5 mm: the impact has its whole speed, in that step."""
+    structure = floor((-0.3, 0.0, 0.3, 0.3))
+    start = LooseBlocks.as_built(structure)
+    start.poses[1, 1], start.velocities[1, 1] = height, -3.0
+    falling = RigidBlockSimulation(structure, dt=5e-4, restitution=0.3)
+    end = falling.final_frame(start, 5e-4)
+    speed = 0.9 if rebounds else -3.0 - G * 5e-4
+    assert end.velocities[1, 1] == pytest.approx(speed, rel=1e-4)
+
+
 def test_a_block_topples(verified):
     """From rest at 0.02 rad beyond balance to 1 rad: 1.15800 s, by quadrature."""
     structure = floor((-0.1, 0.0, 0.1, 1.0))

@@ -218,11 +218,11 @@ def test_strain_energy_lifts_blocks_out_of_compressed_joints(share):
     energy = share * weight * 2e-3
     start = replace(start, strain_energy=energy)
     end = RigidBlockSimulation(structure).final_frame(start, 0.02)
-    # the admissible overlap is a thousandth of the block
-    lift = min(2e-3 - 0.8e-3, share * 2e-3)
+    # the admissible overlap is 0.05 mm
+    lift = min(2e-3 - 5e-5, share * 2e-3)
     assert end.poses[1, 1] + 2e-3 == pytest.approx(lift, rel=0.02)
     assert end.energy.potential == pytest.approx(weight * lift, rel=0.02)
-    assert end.energy.potential <= energy
+    assert end.energy.potential <= energy * (1.0 + 1e-12)
     assert end.energy.gained < 1e-5 * energy
 
 
@@ -238,7 +238,7 @@ def _outlines(structure, poses):
 
 @pytest.mark.parametrize(("turn", "speed"), each_once((0.0, 0.01, 0.3), (1.0, 5.0)))
 def test_fast_blocks_stop_at_the_floor(speed, turn):
-    """Whenever in a step they hit it: 5 m/s are 2.5 mm in a step, and 0.2 mm are admissible."""
+    """Whenever in a step they hit it: 5 m/s are 2.5 mm in a step, and 14 μm are admissible."""
     structure = floor((-0.1, 0.0, 0.1, 0.2))
     simulation = RigidBlockSimulation(structure, dt=5e-4)
     for phase in np.linspace(0.0, 1.0, 6, endpoint=False):
