@@ -16,6 +16,7 @@
     rigid_body        free rigid blocks with impacts and friction
     schemes           time integration schemes, Rayleigh and stiffness damping
     separation        joints that let go, stones that meet, blocks that overturn
+    slip_error        error of the slip of joints in time stepping
     solvers           solvers of a time step: newton, compliance, snes
     state             State, Step, Batch
     time_history      time_history, last_state

@@ -7,7 +7,8 @@ of setting k, and n the finest,
     error of n = |P_n - P_(n-1)| / (2^p - 1),    error of k = |P_k - P_n| + error of n,
 
 for the joint with the largest difference. The first is Richardson's extrapolation. The order p is
-2, that of the scheme in the time step.
+2, that of the scheme in the time step; where a joint slides by more than the tolerance, over its
+depth, it is 1: steps in which sliding begins, ends or reverses err in proportion to their length.
 
 *Small displacements.* Where joints rotate, the thrust moves with them. This error is estimated from
 the largest rotation of a joint.
@@ -87,12 +88,13 @@ def largest_difference(first: Array, second: Array) -> float:
 
 @dataclass(frozen=True)
 class RunPeaks:
-    """Largest eccentricities and largest rotation of the joints in a run."""
+    """Largest eccentricities, rotation and slip of the joints in a run."""
 
     peaks: Array | None  # largest |e| of each assessed joint (n,) [-]; None for a failed run
     rotation: float = 0.0  # largest rotation of a joint [rad]
     times: Array = field(default_factory=lambda: np.zeros(0))  # of the peaks (n,) [s]
     states: tuple[State, ...] = ()  # at the start of the run, and at intervals of some steps
+    slip: float = 0.0  # largest slip of an assessed joint from the start, over its depth [-]
 
 
 # Parts of a run: the state at the start of each, and the time of its end [s]
@@ -110,13 +112,18 @@ def run_peaks(
         parts = [(equation.at_rest(rest.q, memory=rest.model.memory), motion.duration)]
     stepper, depths = stepper_for("auto", equation), structure.depths[structure.judged]
     peaks, times, rotation, states = np.zeros(len(depths)), np.zeros(len(depths)), 0.0, []
+    observer, slip = model.observer(), 0.0
     try:
         for start, end in parts:
             first = start_batch(stepper, start, dt)
+            at_rest = observer.faces(first.read(observer))[0, 2, structure.judged] / depths
             monitor = RunMonitor(model, first)
             for batch in chain([first], stepper.batches(start, dt, min(end, motion.duration))):
-                monitor.add(batch, batch.read(model.observer()))
+                readings = batch.read(observer)
+                monitor.add(batch, readings)
                 monitor.check_run()
+                slips = observer.faces(readings)[:, 2, structure.judged] / depths
+                slip = max(slip, float(np.abs(slips - at_rest).max()))
                 resultants = batch.resultants[:, structure.judged]
                 values = np.abs(eccentricity_and_friction(resultants, depths)[0])
                 values[np.isnan(values)] = 0.5  # joints that came apart
@@ -128,7 +135,7 @@ def run_peaks(
             rotation = max(rotation, monitor.largest_turn)
     except DidNotConverge:
         return RunPeaks(None)
-    return RunPeaks(peaks, rotation, times, tuple(states))
+    return RunPeaks(peaks, rotation, times, tuple(states), slip)
 
 
 def parts_about_peaks(run: RunPeaks, before: float = 1.0, after: float = 0.25) -> Parts:
@@ -142,17 +149,21 @@ def parts_about_peaks(run: RunPeaks, before: float = 1.0, after: float = 0.25) -
     return parts
 
 
-def estimate_errors(runs: list[RunPeaks]) -> list[float]:
-    """Return the error of each run in the largest |e| of a joint [-].
+def convergence_order(runs: Sequence[RunPeaks], tolerance: float) -> int:
+    """Return the order in the time step: 1 where a joint slides by more than the tolerance."""
+    return 1 if max(run.slip for run in runs) > tolerance else 2
+
+
+def estimate_errors(runs: Sequence[RunPeaks], order: int = 2) -> list[float]:
+    """Return the error of each run in the largest |e| of a joint, by the order of convergence [-].
 
     Each run has half the time step of the one before.
     """
-    convergence_order = 2  # of the scheme in the time step [-]
     finest = runs[-1].peaks
     if len(runs) < 2 or finest is None or runs[-2].peaks is None:
         return [np.inf] * len(runs)
     differences = [
         np.inf if run.peaks is None else largest_difference(run.peaks, finest) for run in runs
     ]
-    remaining = differences[-2] / (2.0**convergence_order - 1.0)
+    remaining = differences[-2] / (2.0**order - 1.0)
     return [difference + remaining for difference in differences]

@@ -237,7 +237,9 @@ def _try_settings(
             window = window.cut(0.0, min(parts[-1][1], window.duration))
         run = error_estimation.run_peaks(model, window, viscous, step, parts if same else None)
         trials.append(_Trial(discretisation, step, model, run, share))
-        history.append(error_estimation.estimate_errors([trial.run for trial in trials]))
+        runs = [trial.run for trial in trials]
+        order = error_estimation.convergence_order(runs, tolerance)
+        history.append(error_estimation.estimate_errors(runs, order))
         if history[-1][-1] <= tolerance or _stagnates(history):
             break
     return trials, history
@@ -255,11 +257,12 @@ def _select_trial(
     if len(trials) > 2:
         chosen = next(number for number, each in enumerate(errors) if each <= tolerance)
         return trials[chosen], errors[chosen]
-    # one model in two steps: at order 2 its error is known for all steps between, and near the
+    # one model in two steps: by its order its error is known for all steps between, and near the
     # tolerance it is that of the steps; far below, errors of plane faces and of steps cancel
-    longest = last.dt * math.sqrt(tolerance / max(error, tolerance / 4.0))
+    order = error_estimation.convergence_order([trial.run for trial in trials], tolerance)
+    longest = last.dt * (tolerance / max(error, tolerance / 2.0**order)) ** (1.0 / order)
     dt = max(last.dt, 0.0005 * math.floor(longest / 0.0005 + 1e-6))  # multiples of 0.5 ms
-    return replace(last, dt=dt), error * (dt / last.dt) ** 2
+    return replace(last, dt=dt), error * (dt / last.dt) ** order
 
 
 def _resolve_excitation(
@@ -283,7 +286,7 @@ def _stagnates(history: Sequence[Sequence[float]]) -> bool:
 
 def _doubts(prediction: Prediction, *, stagnates: bool, prescribed: bool) -> Iterator[Doubt]:
     """Yield doubts about a selection."""
-    if not prediction.is_met:
+    if prediction.error > prediction.tolerance:
         if stagnates:
             remedy = (
                 "impacts decide, or sliding: finer cells and shorter steps change the largest |e| "

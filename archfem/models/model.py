@@ -170,8 +170,8 @@ class Prediction:
 
     @property
     def is_met(self) -> bool:
-        """Whether the error of model and time step is within the tolerance."""
-        return self.error <= self.tolerance
+        """Whether both errors, of model and time step and of small displacements, are within it."""
+        return max(self.error, self.small_displacement_error) <= self.tolerance
 
     @property
     def text(self) -> str:

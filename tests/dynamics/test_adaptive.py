@@ -51,10 +51,18 @@ class Known:
         yield self.fallback_step(state, dt)
 
 
+NO_SLIP = SimpleNamespace(
+    joints=np.zeros(0, int),
+    estimate=lambda batch: np.zeros((len(batch.times), 0)),
+    add=lambda batch, errors: None,
+)
+"""Stands for the error of the slip where no joint can slide."""
+
+
 def stepped(stepper, end):
     """The adaptive stepper after a run from rest to a time, and the ends of its steps."""
     start = stepper.fallback_step(SimpleNamespace(time=-1.0), 1.0)
-    found = AdaptiveStepper(stepper, TOLERANCE, start)
+    found = AdaptiveStepper(stepper, TOLERANCE, start, NO_SLIP)
     batches = list(found.batches(af.dynamics.State(0.0, *np.zeros((3, 1))), end))
     times = np.concatenate([batch.times for batch in batches])
     lengths = np.concatenate([batch.smallest_step for batch in batches])
@@ -138,7 +146,8 @@ def test_steps_of_a_tenth_of_a_millisecond_are_taken_at_any_error(share, unmet):
 def test_the_error_of_steps_of_several_lengths_is_that_of_a_parabola():
     """Slopes between middles of steps of 5 ms, and one of 1.25 ms: the bend is 2 c exactly."""
     stepper = Known(bent(0.5, 0.005))
-    found = AdaptiveStepper(stepper, TOLERANCE, stepper.fallback_step(SimpleNamespace(time=0), 1))
+    first = stepper.fallback_step(SimpleNamespace(time=0), 1)
+    found = AdaptiveStepper(stepper, TOLERANCE, first, NO_SLIP)
     long = stepper.advance_batch(None, 0.005, 0.005 * np.arange(1, 6))
     assert found._errors(long) == pytest.approx([0.0, 0.0, *(3 * [0.5 * TOLERANCE])])
     batch, worst = found._try_steps(None, 0.005, long.times[:2], False)
@@ -150,7 +159,8 @@ def test_the_error_of_steps_of_several_lengths_is_that_of_a_parabola():
 def test_thrust_is_measured_at_half_the_compression_at_rest_at_least():
     """A joint that is barely pressed at rest is measured at half of half the mean."""
     stepper = Known(lambda time: 0.0 * time)
-    found = AdaptiveStepper(stepper, TOLERANCE, stepper.fallback_step(SimpleNamespace(time=0), 1))
+    first = stepper.fallback_step(SimpleNamespace(time=0), 1)
+    found = AdaptiveStepper(stepper, TOLERANCE, first, NO_SLIP)
     least = np.array([0.5 * 1e4, 0.25 * 5.5e3])
     resultants = np.zeros((3, 3, 3))
     resultants[:, :, 2] = 100.0

@@ -24,7 +24,7 @@ class Chosen:
         self.model = None
         self._patch = monkeypatch
 
-    def of(self, *peaks, turn=0.0, tolerance=0.01, dt=None, **given):
+    def of(self, *peaks, turn=0.0, slip=0.0, tolerance=0.01, dt=None, **given):
         """Select by runs of these largest |e|."""
         self.steps, self.built, self.ends, self.parts = [], [], [], []
         rigid = plain(BLOCK, af.models.Discretisation("rigid"))
@@ -39,7 +39,7 @@ class Chosen:
             self.ends.append(motion.duration)
             self.parts.append(parts)
             largest, start = np.array([0.1, peaks[number]]), SimpleNamespace(time=0.0)
-            return RunPeaks(largest, turn, np.array([0.5, 1.5]), (start,))
+            return RunPeaks(largest, turn, np.array([0.5, 1.5]), (start,), slip)
 
         self._patch.setattr(error_estimation, "run_peaks", run)
         self._patch.setattr(model_selection.plain, "build", build)
@@ -100,6 +100,18 @@ def test_the_longest_step_within_the_tolerance_is_taken(chosen, difference, step
     assert len(chosen.built) == 1
 
 
+@pytest.mark.parametrize(
+    ("difference", "step"), [(0.003, 5.0), (0.005, 5.0), (0.008, 3.0), (0.0099, 2.5)]
+)
+def test_where_joints_slide_errors_are_of_order_one(chosen, difference, step):
+    """What two steps differ by is left at 2.5 ms, and grows with the step."""
+    prediction = chosen.of(0.3 + difference, 0.3, slip=0.011)
+    assert 1e3 * prediction.dt == pytest.approx(step)
+    assert prediction.error == pytest.approx(difference * step / 2.5)
+    assert chosen.of(0.3 + difference, 0.3, slip=0.009).error < prediction.error
+    assert len(chosen.of(0.312, 0.3, 0.3, slip=0.011).candidates) == 3
+
+
 def test_where_none_is_good_enough_the_best_is_taken(chosen):
     prediction = chosen.of(0.45, 0.33, 0.26, 0.22)
     assert prediction.dt == 0.000625
@@ -131,6 +143,8 @@ def test_a_given_step_is_compared_with_one_twice_as_long(chosen):
 def test_large_rotations_of_joints_are_a_doubt_of_small_displacements(chosen):
     prediction = chosen.of(0.3, 0.3, turn=0.004)
     assert prediction.small_displacement_error == pytest.approx(0.012)
+    assert prediction.error == 0.0
+    assert not prediction.is_met
     assert "by the assumption of small displacements" in prediction.text
     (doubt,) = chosen.model.doubts
     assert "small errs by about 0.012" in doubt.cause
@@ -205,7 +219,8 @@ def test_a_coarser_setting_is_chosen_where_finding_it_was_the_smaller_part(count
     """
     tolerance = 0.013
     steps = (0.01, 0.005, 0.0025)[-count:] if count == 3 else (0.005, 0.0025)
-    trials = [model_selection._Trial(None, dt, None, None, share) for dt in steps]
+    run = RunPeaks(None)
+    trials = [model_selection._Trial(None, dt, None, run, share) for dt in steps]
     errors = {2: [0.02, 0.005], 3: [0.05, 0.012, 0.004]}[count]
     found, error = model_selection._select_trial(trials, errors, tolerance)
     assert found.dt == pytest.approx(chosen)

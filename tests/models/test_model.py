@@ -52,6 +52,7 @@ def test_a_prediction_in_words():
     )
     assert prediction.is_met
     assert not replace(prediction, error=0.0051).is_met
+    assert not replace(prediction, small_displacement_error=0.0051).is_met
     assert prediction.text == (
         "predicted error 0.0049 in the largest |e| by model and steps of 2.5 ms, and 0.003 by the "
         "assumption of small displacements; tolerance 0.005 (tried: rigid: 0.02; faces: 0.0049)"

@@ -1,11 +1,12 @@
-"""Steps of adaptive length, controlled by an error in the eccentricity of the joints.
+"""Steps of adaptive length, controlled by errors in the eccentricity and the slip of the joints.
 
 The mean force over a step is its value at the middle, but for ¹/₂₄ Δt² of its curvature in time. So
 the second difference of the resultants from step to step estimates the error, at no cost. It is
 taken of M / (N h), with N at least half of that under dead load; the worst joint of rings and piers
-counts. Steps with too large an error are repeated at half the length; where the error is small the
-length is doubled. Lengths are those of the record, halved or doubled: steps end between two samples
-only if they are shorter than these are apart.
+counts. The slip may err in a step by a share of the joint's depth (`dynamics.slip_error`). Steps
+with too large an error are repeated at half the length; where the error is small the length is
+doubled. Lengths are those of the record, halved or doubled: steps end between two samples only if
+they are shorter than these are apart.
 """
 
 from collections.abc import Iterator
@@ -14,8 +15,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from archfem._typing import Array
+from archfem.dynamics.slip_error import SlipError, least_compression, second_derivatives
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.state import Batch, State
+
+# Error of the slip in one step over the joint's depth, and over the tolerance on |e| [-]. A block
+# that slides under ten motions then errs by at most 0.5 % of its way to and fro
+SLIP_TOLERANCE = 4e-4
 
 
 @dataclass(eq=False)
@@ -25,6 +31,7 @@ class AdaptiveStepper:
     stepper: Stepper
     tolerance: float  # of |e| of every joint of rings and piers [-]
     first: Batch  # the start, as a batch of one
+    slip_error: SlipError  # of the steps so far
     unmet: int = 0  # shortest steps so far with a larger error
     taken: int = 0  # steps so far
     _last: list[tuple[float, Array]] = field(default_factory=list)
@@ -33,9 +40,8 @@ class AdaptiveStepper:
         structure = self.stepper.equation.model.structure
         judged = structure.judged if structure.judged.any() else np.ones_like(structure.judged)
         self._judged, self._depths = np.flatnonzero(judged), structure.depths[judged]
-        rest = self.first.resultants[0, self._judged, 0]
-        # least compression of joints in the error: half of that under dead load
-        self._least = 0.5 * np.maximum(rest, 0.5 * np.mean(np.abs(rest)))
+        self._least = least_compression(self.first.resultants[0, self._judged, 0])
+        self._slip_limits = SLIP_TOLERANCE * structure.depths[self.slip_error.joints]
 
     @property
     def unmet_share(self) -> float:
@@ -82,7 +88,9 @@ class AdaptiveStepper:
         batch = self._take_steps(state, dt, ends, last)
         if batch is None:
             return None, np.inf
-        errors = self._errors(batch)
+        slips = self.slip_error.estimate(batch)
+        of_slips = (slips / self._slip_limits).max(axis=1, initial=0.0)
+        errors = np.maximum(self._errors(batch), of_slips)
         good = len(errors) if last else int(np.argmax(np.append(errors, np.inf) > self.tolerance))
         if good == 0:
             return None, np.inf
@@ -92,7 +100,9 @@ class AdaptiveStepper:
         scaled = self._scale_moments(batch.resultants[max(good - 2, 0) : good])
         self._last += list(zip(middles[max(good - 2, 0) : good], scaled, strict=True))
         self._last = self._last[-2:]
-        return batch.cut(good), float(errors[:good].max())
+        batch = batch.cut(good)
+        self.slip_error.add(batch, slips[:good])
+        return batch, float(errors[:good].max())
 
     def _take_steps(self, state: State, dt: float, ends: Array, last: bool) -> Batch | None:
         """Return steps by the solver, or a fall-back step; None where shorter ones may converge."""
@@ -120,11 +130,8 @@ class AdaptiveStepper:
         before, values = self._last, self._scale_moments(batch.resultants)
         times = np.append([time for time, _ in before], middles)
         values = np.concatenate([*(value[None] for _, value in before), values])
-        errors = np.zeros(len(times))
-        if len(times) > 2:
-            slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
-            # the second difference is 2 to 30 times the error of the largest |e| in the rings,
-            # columns and bridge examined
-            bends = 2.0 * np.diff(slopes, axis=0) / (times[2:] - times[:-2])[:, None]
-            errors[2:] = dt**2 * np.abs(bends).max(axis=1) / 6.0
-        return errors[len(before) :]
+        # the second difference is 2 to 30 times the error of the largest |e| in the rings, columns
+        # and bridge examined
+        bends = second_derivatives(times, values)[len(before) :]
+        errors: Array = dt**2 * np.abs(bends).max(axis=1) / 6.0
+        return errors

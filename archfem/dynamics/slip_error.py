@@ -1,0 +1,98 @@
+"""Error of the slip of joints in time stepping, from the mean resultants of consecutive steps.
+
+A joint slides where its shear V is at the limit μ N. Where sliding begins or ends within a step,
+the mean shear differs from that of exact integration by a share of the curvature of V in time, or
+by what the ground's acceleration a varies within the step. The slip errs in a step Δt by
+
+    Δs = ½ Δt² c N₀ (ΔV/N - margin),   ΔV/N = max(Δt² |d²(V/N)/dt²| / 6, max |a - mean a| / g),
+
+with N₀ that at rest, and c = 1/m₁ + 1/m₂ of the two blocks, their relative acceleration by 1 N.
+The margin is what V/N lacks to its limit: below it nothing slides.
+"""
+
+import numpy as np
+
+from archfem._typing import Array
+from archfem.dynamics.state import Batch
+from archfem.masonry.structure import Structure
+from archfem.motion.motion import Motion
+
+
+def least_compression(rest: Array) -> Array:
+    """Return the least compression to which moments and shears refer: half that at rest [N]."""
+    least: Array = 0.5 * np.maximum(rest, 0.5 * np.mean(np.abs(rest)))
+    return least
+
+
+def second_derivatives(times: Array, values: Array) -> Array:
+    """Return second derivatives of values at uneven times, each with the two before (n, …)."""
+    bends = np.zeros_like(values)
+    if len(times) > 2:
+        slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
+        bends[2:] = 2.0 * np.diff(slopes, axis=0) / (times[2:] - times[:-2])[:, None]
+    return bends
+
+
+class SlipError:
+    """Sum of the errors of the slip of rings' and piers' joints over the steps of a run."""
+
+    def __init__(self, structure: Structure, motion: Motion, first: Batch) -> None:
+        judged = structure.judged if structure.judged.any() else np.ones_like(structure.judged)
+        slides = np.isfinite(structure.friction)
+        self.joints = np.flatnonzero(judged & slides)  # numbers of the joints that can slide (j,)
+        self.total = np.zeros(len(self.joints))  # sum over the steps added (j,) [m]
+        self._least = least_compression(first.resultants[0, judged, 0])[slides[judged]]
+        self._friction = structure.friction[self.joints]
+        # cohesion of bonds is lost as they break
+        cohesion = np.where(structure.tension > 0.0, 0.0, structure.cohesion)
+        self._cohesion, self._gravity = cohesion[self.joints], structure.gravity
+        # relative acceleration of the two blocks by a shear as large as N at rest (j,) [m/s²]
+        masses = np.full(len(structure.blocks), np.inf)
+        for number in structure.free:
+            block = structure.blocks[number]
+            masses[number] = structure.width * block.area * structure.density(block)
+        compliance = (1.0 / masses[structure.pairs[self.joints]]).sum(axis=1)
+        self._acceleration = 2.0 * self._least * compliance
+        self._motion, self._end = motion, float(first.times[-1])
+        # times at the middle of the last two steps [s], and their V/N and margins
+        self._middles, self._rows = np.zeros(0), np.zeros((0, 2, len(self.joints)))
+
+    def estimate(self, batch: Batch) -> Array:
+        """Return the error of the slip in each step that follows those added (steps, j) [m]."""
+        lengths = np.diff(batch.times, prepend=self._end)
+        middles = np.append(self._middles, batch.times - 0.5 * lengths)
+        rows = np.concatenate([self._rows, self._ratios(batch.resultants)])
+        bends = second_derivatives(middles, rows[:, 0])[-len(lengths) :]
+        # a step slides where it, or one of the two before, reaches the limit
+        margins = np.concatenate([rows[:1, 1], rows[:1, 1], rows[:, 1]])
+        margins = np.minimum(np.minimum(margins[2:], margins[1:-1]), margins[:-2])[-len(lengths) :]
+        squares = np.square(lengths)[:, None]
+        variation = np.maximum(squares * np.abs(bends) / 6.0, self._vary_ground(batch, lengths))
+        excess = np.maximum(variation - np.maximum(margins, 0.0), 0.0)
+        errors: Array = 0.5 * squares * self._acceleration * excess
+        return errors
+
+    def add(self, batch: Batch, errors: Array) -> None:
+        """Add steps with their errors."""
+        lengths = np.diff(batch.times, prepend=self._end)[-2:]
+        self.total = self.total + errors.sum(axis=0)
+        self._middles = np.append(self._middles, batch.times[-2:] - 0.5 * lengths)[-2:]
+        self._rows = np.concatenate([self._rows, self._ratios(batch.resultants[-2:])])[-2:]
+        self._end = float(batch.times[-1])
+
+    def _ratios(self, resultants: Array) -> Array:
+        """Return V/N and what it lacks to the limit (steps, 2, j)."""
+        normal, shear = resultants[:, self.joints, 0], resultants[:, self.joints, 1]
+        limit = self._friction * np.maximum(normal, 0.0) + self._cohesion
+        pressed = np.maximum(normal, self._least)
+        return np.stack([shear / pressed, (limit - np.abs(shear)) / pressed], axis=1)
+
+    def _vary_ground(self, batch: Batch, lengths: Array) -> Array:
+        """Return by how much the ground's acceleration leaves its mean in steps (steps, 1) [g]."""
+        count = max(1, int(np.ceil(lengths.max() / self._motion.dt - 1e-9)))
+        back = lengths[:, None] * np.linspace(1.0, 0.0, count + 1)
+        ground = self._motion.at((batch.times[:, None] - back).ravel())
+        ground = ground.reshape(len(lengths), count + 1, 2)
+        mean = 0.5 * (ground[:, 1:] + ground[:, :-1]).mean(axis=1, keepdims=True)
+        largest: Array = np.linalg.norm(ground - mean, axis=2).max(axis=1, keepdims=True)
+        return largest / self._gravity
