@@ -75,7 +75,7 @@ def test_a_study_has_the_results_of_its_cases_alone(study, tmp_path):
         ("[cases]", "has no cases"),
         ('[cases."a"]\nset = []', "names no case file"),
         ('[cases."a"]\ncase = "nothing.toml"', "there is no case file"),
-        (f'[cases."a"]\ncase = "{MESHES}/ring.toml"', "no \\[suite\\] to compare under: give it"),
+        (f'[cases."a"]\ncase = "{MESHES}/ring.toml"', "no \\[suite\\] to compare under, and no"),
         ("pears = 1", "unknown key 'pears'"),
         ("title =", "is not TOML"),
         ("cases = 3", "study.cases = 3 is not a table"),
