@@ -27,6 +27,7 @@ LONG = (
     "bridge_falls",
     "bridge_fragility",
     "bridge_history",
+    "bridge_inference",
     "bridge_range",
     "drift_and_equality",
     "energy_drift",

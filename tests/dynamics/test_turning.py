@@ -173,6 +173,7 @@ def test_a_column_that_still_topples_as_its_motion_ends_is_followed_to_the_groun
     assert run.fall.time > push.duration
 
 
+@pytest.mark.slow
 def test_the_scale_at_which_it_falls_is_between_a_run_that_stands_and_one_that_falls():
     found = af.collapse_scale(
         model(),

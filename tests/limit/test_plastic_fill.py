@@ -98,6 +98,7 @@ def test_the_mirror_image_of_a_load_has_bounds_that_agree():
         assert 0 < len(shaded.get_paths()) < one.fill_motion.sizes["triangle"]
 
 
+@pytest.mark.slow
 def test_a_narrower_gap_is_within_a_wider_one():
     load = af.PointLoad(x=3.3, force=(0.0, -1e3))
     wide, narrow = (
@@ -114,7 +115,7 @@ def test_a_stronger_fill_carries_more():
     load = af.PointLoad(x=3.3, force=(0.0, -1e3))
     weak, strong = (
         af.collapse_factor(arch_bridge(), live=load, fill=replace(FILL, **more))
-        for more in ({"cohesion": 2e3, "gap": 0.2}, {"cohesion": 20e3})
+        for more in ({"cohesion": 3e3, "gap": 0.3}, {"cohesion": 20e3, "gap": 0.2})
     )
     assert weak.upper < strong.lower
 

@@ -275,7 +275,10 @@ def test_leaning_stones_that_part_slide_where_their_thrust_is_beyond_friction(
     assert "it may survive more than this movement, sliding" in caplog.text
 
 
-@pytest.mark.parametrize(("share", "end"), [(0.8, End.SLIDES), (1.02, End.HOLDS)])
+@pytest.mark.parametrize(
+    ("share", "end"),
+    [(0.8, End.SLIDES), pytest.param(1.02, End.HOLDS, marks=pytest.mark.slow)],
+)
 def test_leaning_stones_pushed_together_slide_at_once_below_the_friction_of_their_thrust(
     share, end, caplog
 ):
