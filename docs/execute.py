@@ -22,6 +22,23 @@ FOLDER = Path(__file__).resolve().parents[1] / "notebooks"
 # Notebooks that take many minutes, shipped with the coarse settings and short motions of the tests
 QUICK = ("07_from_first_hinge_to_the_ground",)
 
+PICTURES = {
+    "06_a_roman_bridge": {
+        "bridge": "af.view.draw_instants({name: (case.structure, None)",
+        "bridge_dead_load": "af.view.draw_eccentricity(",
+        "bridge_stress": "af.view.draw_stress(",
+        "bridge_free_body": "af.view.draw_free_body(",
+        "bridge_modes": "af.view.draw_modes(",
+        "bridge_thrust": "name: (cases[name].structure, each.joints.sel(",
+        "bridge_backbones": "af.view.draw_backbones(",
+        "bridge_envelopes": "af.view.draw_envelope(paper",
+        "bridge_joint": "af.view.draw_joint(paper",
+        "bridge_rules": 'af.view.draw_envelope(\n    {"five springs"',
+        "bridge_undivided": "af.view.draw_envelope(whole",
+    }
+}
+"""Pictures of notebooks that pages show: file names, and words of the cells that draw them."""
+
 NOTE = """```{note}
 The outputs of this notebook were computed with coarse settings (`ARCHFEM_QUICK`), which take half a
 minute. Its text describes the results of the full settings, which take many minutes.
@@ -74,13 +91,26 @@ def cleaned(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
     return notebook
 
 
+def pictures(notebook: nbformat.NotebookNode, name: str) -> dict[str, bytes]:
+    """Return the PNG files that pages show, by name, from the outputs of a notebook."""
+    found = {}
+    for file, words in PICTURES.get(name, {}).items():
+        (cell,) = (each for each in notebook.cells if words in each.source)
+        shown = [o.data["image/png"] for o in cell.outputs if "image/png" in o.get("data", {})]
+        found[file] = base64.b64decode(shown[-1])
+    return found
+
+
 def main(words: list[str]) -> None:
     """Run the named scripts, or all; `--whole` uses full settings. Print the cost of each."""
     scripts = [word for word in words if word != "--whole"]
     for script in map(Path, scripts or sorted(FOLDER.glob("*.py"))):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         kept = script.with_suffix(".ipynb")
-        nbformat.write(cleaned(executed(script, "--whole" in words)), kept)
+        notebook = cleaned(executed(script, "--whole" in words))
+        nbformat.write(notebook, kept)
+        for name, png in pictures(notebook, script.stem).items():
+            (FOLDER / "figures" / f"{name}.png").write_bytes(png)
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
         cpu = used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime
         print(f"{kept.name}: {cpu:.0f} s of CPU, {kept.stat().st_size / 1e3:.0f} kB", flush=True)

@@ -71,6 +71,17 @@ def test_the_text_of_a_notebook_describes_its_output(name, words):
     assert words[1] in printed
 
 
+def test_pictures_on_pages_are_those_of_the_notebooks():
+    """`make notebooks` writes both: a picture that differs is of an earlier run."""
+    nbformat = pytest.importorskip("nbformat")
+    pytest.importorskip("nbclient")
+    execute = runpy.run_path(str(FOLDER.parent / "docs" / "execute.py"))
+    for name in execute["PICTURES"]:
+        notebook = nbformat.read(FOLDER / f"{name}.ipynb", 4)
+        for file, png in execute["pictures"](notebook, name).items():
+            assert (FOLDER / "figures" / f"{file}.png").read_bytes() == png, file
+
+
 LONG = (
     "02_how_thin_can_it_be",
     "03_a_load_finds_its_four_hinges",
