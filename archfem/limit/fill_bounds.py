@@ -492,22 +492,39 @@ def bound_factor(
     # equilateral triangles of side s have the area √3 s² / 4
     size = float(np.sqrt(4.0 / np.sqrt(3.0) * area / first))
     mesh = mesh_fill(structure, soil, size, fill.holds_ends)
+    best = None
     while True:
         filled = _load_blocks(structure, regions, live, friction, strength, fill, mesh)
-        bounds = FillBounds(filled, filled.bound_below(), filled.bound_above())
-        logger.info(
-            "plastic fill of %d triangles: factor between %.5g and %.5g",
-            *(len(mesh.triangles), bounds.below.factor, bounds.above.factor),
-        )
-        if bounds.gap <= fill.gap or len(mesh.triangles) > most:
+        try:
+            bounds = FillBounds(filled, filled.bound_below(), filled.bound_above())
+        except DidNotConverge:
+            if best is None:
+                raise
+            break
+        best, count = bounds, len(mesh.triangles)
+        below, above = bounds.below.factor, bounds.above.factor
+        logger.info("plastic fill of %d triangles: factor %.5g to %.5g", count, below, above)
+        # no equilibrium with all velocities of this mesh is none with those of a finer one
+        if bounds.gap <= fill.gap or np.isnan(above):
             return bounds
-        # the triangles that strain most, with half of all strain together
-        strains = filled.strains(bounds.above)
-        order = np.argsort(-strains)
-        total = np.cumsum(strains[order])
-        chosen = np.zeros(len(order), dtype=bool)
-        chosen[order[: np.searchsorted(total, 0.5 * total[-1]) + 1]] = True
-        mesh = mesh.refined(chosen)
+        if count > most:
+            break
+        mesh = mesh.refined(_choose_triangles(filled.strains(bounds.above)))
+    logger.warning(
+        "bounds %.4g and %.4g are further apart than the gap of %.2g: both hold, and finer meshes "
+        "than %d triangles are not solved",
+        *(best.below.factor, best.above.factor, fill.gap, len(best.filled.mesh.triangles)),
+    )
+    return best
+
+
+def _choose_triangles(strains: Array) -> Flags:
+    """Return the triangles that strain most, with half of all strain together (t,)."""
+    order = np.argsort(-strains)
+    total = np.cumsum(strains[order])
+    chosen = np.zeros(len(order), dtype=bool)
+    chosen[order[: np.searchsorted(total, 0.5 * total[-1]) + 1]] = True
+    return chosen
 
 
 def _load_blocks(

@@ -11,6 +11,8 @@ from scipy.optimize import brentq
 import archfem as af
 from archfem.errors import InvalidInput
 from archfem.limit import PlasticFill
+from archfem.limit.cone_programme import solve_cones
+from archfem.limit.fill_bounds import bound_factor
 from archfem.limit.fill_mesh import HELD, SURFACE, mesh_fill
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 
@@ -108,6 +110,25 @@ def test_a_narrower_gap_is_within_a_wider_one():
     assert wide.lower <= narrow.lower * (1.0 + ROUNDING)
     assert narrow.upper <= wide.upper * (1.0 + ROUNDING)
     assert narrow.upper - narrow.lower <= 0.04 * narrow.upper
+
+
+def test_bounds_of_the_finest_mesh_that_is_solved_are_returned(monkeypatch, caplog):
+    """A programme that does not converge loses nothing, and the gap that remains is stated."""
+    load = [af.PointLoad(x=3.3, force=(0.0, -1e3))]
+    coarse = bound_factor(arch_bridge(), load, "coulomb", None, replace(FILL, gap=0.9), first=60)
+    solved = []
+
+    def fails_later(*programme):
+        solved.append(programme)
+        return solve_cones(*programme) if len(solved) <= 2 else None
+
+    monkeypatch.setattr("archfem.limit.fill_bounds.solve_cones", fails_later)
+    found = bound_factor(arch_bridge(), load, "coulomb", None, replace(FILL, gap=1e-3), first=60)
+    assert (found.below.factor, found.above.factor) == (coarse.below.factor, coarse.above.factor)
+    assert "further apart than the gap of 0.001" in caplog.text
+    solved += [()] * 2
+    with pytest.raises(af.DidNotConverge, match="second-order cone programme"):
+        bound_factor(arch_bridge(), load, "coulomb", None, FILL, first=60)
 
 
 def test_a_stronger_fill_carries_more():
