@@ -8,7 +8,7 @@ spreads in a fan down to the stones that it meets first (Flamant).
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from math import radians, sqrt, tan
@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 from scipy import sparse
 
-from archfem._typing import Array, Degrees, Flags, Numbers, Pascals
+from archfem._typing import Array, Degrees, Flags, Metres, Numbers, Pascals
 from archfem._validation import check_choice, check_number, check_type
 from archfem.errors import InvalidInput
 from archfem.joints.rigid_kinematics import jump_rates
@@ -66,6 +66,8 @@ class Fill:
             half-plane under a line load, or "uniform", evenly on each level.
         spread: half the angle of the fan, from the vertical [degrees]. The part that Boussinesq's
             stresses would carry outside of it is distributed inside.
+        backing: level, a y coordinate, up to which masonry behind the haunches holds stones of
+            rings and piers: those with their centroid below it do not move [m]; None for none.
 
     References:
         Gilbert, RING Theory and Modelling Guide, University of Sheffield (2005). Rankine, Phil.
@@ -82,6 +84,7 @@ class Fill:
     active: float = 1.0
     dispersal: str = "boussinesq"
     spread: Degrees = 30.0
+    backing: Metres | None = None
 
     def __post_init__(self) -> None:
         """Refuse values outside their range, most of them wrong units."""
@@ -486,6 +489,26 @@ class BlocksWithFill:
         return np.asarray(self._apply_forces(block, points, forces).sum(axis=0)).ravel()
 
 
+def hold_backed(structure: Structure, level: float | None) -> Structure:
+    """Return a structure whose stones of rings and piers below a level do not move."""
+    if level is None:
+        return structure
+    check_number(level, "fill, backing")
+    stones = [n for n in structure.free if structure.blocks[n].role != "other"]
+    heights = structure.centroids[stones, 1]
+    held = {number for number, y in zip(stones, heights, strict=True) if y < level}
+    if not held or len(held) == len(stones):
+        raise InvalidInput(
+            f"fill, backing {level:.4g} m holds {'all' if held else 'none'} of the stones, whose "
+            f"centroids are {heights.min():.4g} to {heights.max():.4g} m high: give a level between"
+        )
+    blocks = [
+        replace(block, fixed=block.fixed or number in held)
+        for number, block in enumerate(structure.blocks)
+    ]
+    return replace(structure, blocks=tuple(blocks))
+
+
 def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
     """Separate the stones of a structure from its fill, and check that the fill has a strength."""
     if fill is not None and not isinstance(fill, Fill):
@@ -493,6 +516,7 @@ def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
             f"this analysis cannot take a {type(fill).__name__}: only collapse_factor bounds a "
             "plastic fill; give af.limit.Fill here"
         )
+    structure = hold_backed(structure, None if fill is None else fill.backing)
     soil = find_yielding_blocks(structure)
     names = [structure.blocks[number].name for number in soil]
     # Fill cut into pieces has the strength of its joints: its pieces are rigid as stones are.

@@ -31,7 +31,7 @@ from archfem.limit.backfill import (
 )
 from archfem.limit.fill_bounds import bound_factor
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
-from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions
+from archfem.limit.mechanism_kinematics import RigidRegions
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
 from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.loads import Action, Settlement, list_loads
@@ -372,7 +372,7 @@ def _bound_collapse(
             f"{len(bounds.filled.mesh.triangles)} triangles, no equilibrium was found and none is "
             "excluded; give the fill some cohesion, or gap = 0.1 and look at the structure"
         )
-    blocks, regions = bounds.filled.blocks, find_rigid_regions(structure)
+    blocks, regions = bounds.filled.blocks, bounds.filled.regions
     outcome = Outcome.COLLAPSES if np.isfinite(upper) else Outcome.UNBOUNDED
     outcome = Outcome.INFEASIBLE if np.isnan(upper) else outcome
     motion = blocks.motion(bounds.above.motion if np.isfinite(upper) else 0.0 * bounds.above.motion)

@@ -33,7 +33,7 @@ from scipy import sparse
 
 from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.limit.backfill import SELF_WEIGHT, BlocksWithFill, Fill
+from archfem.limit.backfill import SELF_WEIGHT, BlocksWithFill, Fill, hold_backed
 from archfem.limit.cone_programme import Rows, solve_cones
 from archfem.limit.fill_mesh import HELD, SURFACE, FillMesh, mesh_fill
 from archfem.limit.linear_programme import RigidBlocks
@@ -67,7 +67,7 @@ class FilledBlocks:
     fill: PlasticFill
     unit_weight: Array  # of each triangle (t,) [N/m³]
     place: Numbers  # of each block of the whole structure among the stones, -1 for fill
-    stones: tuple[int, ...]  # numbers of the stones in the whole structure
+    regions: RigidRegions  # the stones in the whole structure
     live: Array  # generalised forces on the free stones that grow (3 n_free,) [mean block weights]
     pull: Array  # multiple of the fill's weight that grows, along x and y (2,) [-]
     friction: Array  # coefficients of the joints, inf where they do not slide (n_joints,) [-]
@@ -428,7 +428,7 @@ class FillBounds:
         return xr.Dataset(
             {"pressure": (both, -across, pascals), "shear": (both, along, pascals)},
             {
-                "block": ("contact", np.array(filled.stones)[owner]),
+                "block": ("contact", np.array(filled.regions.blocks)[owner]),
                 "x": (both, points[..., 0], {"units": "m"}),
                 "y": (both, points[..., 1], {"units": "m"}),
             },
@@ -476,6 +476,7 @@ def bound_factor(
     Raises:
         InvalidInput: there is no fill, or the friction has no associated flow.
     """
+    structure = hold_backed(structure, fill.backing)
     regions = find_rigid_regions(structure)
     soil = tuple(number for number in structure.free if number not in regions.blocks)
     if not set(soil) & set(find_yielding_blocks(structure)):
@@ -555,7 +556,7 @@ def _load_blocks(
         fill,
         weights[mesh.owner],
         place,
-        regions.blocks,
+        regions,
         blocks.dimensionless(load),
         pull.sum(axis=0),
         regions.structure.friction if friction is not None else np.full(count, np.inf),

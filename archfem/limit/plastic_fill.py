@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import radians, tan
 
-from archfem._typing import Degrees, Pascals
+from archfem._typing import Degrees, Metres, Pascals
 from archfem._validation import check_number
 from archfem.errors import InvalidInput
 from archfem.units import in_degrees
@@ -27,6 +27,7 @@ class PlasticFill:
             free surfaces, at which a fill without cohesion does not stand.
         gap: largest distance of the two bounds, over the upper one [-].
         spread: half the angle of the fan of a load on the fill, from the vertical [degrees].
+        backing: level up to which masonry holds the stones, as for `Fill` [m].
 
     Example:
         >>> af.limit.PlasticFill(friction_angle=30.0, cohesion=5e3).roughness
@@ -40,6 +41,7 @@ class PlasticFill:
     holds_ends: bool = True
     gap: float = 0.03
     spread: Degrees = 30.0
+    backing: Metres | None = None
 
     def __post_init__(self) -> None:
         """Refuse values outside their range, most of them wrong units."""

@@ -1,5 +1,6 @@
 """Fill in limit analysis: strength, columns and fans of load, self-weight programme."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -294,3 +295,38 @@ def test_the_residual_may_be_the_rounding_of_all_blocks_that_move(free, share, s
     dead = SimpleNamespace(blocks=SimpleNamespace(structure=SimpleNamespace(free=range(free))))
     fall = SimpleNamespace(value=share * 1e-8 * free)
     assert is_balanced(fall, dead) is stands
+
+
+@pytest.mark.parametrize("law", [af.limit.Fill, af.limit.PlasticFill])
+def test_backing_holds_the_stones_below_its_level(law):
+    """As of a bridge whose lowest stones are fixed; they do not move, and it carries more."""
+    if law is af.limit.PlasticFill:
+        pytest.importorskip("clarabel")
+    structure = arch_bridge()
+    stones = [n for n in structure.free if structure.blocks[n].role == "ring"]
+    level = float(np.sort(structure.centroids[stones, 1])[7]) + 1e-3
+    held = [n for n in stones if structure.centroids[n, 1] < level]
+    assert len(held) == 8
+    fixed = replace(
+        structure,
+        blocks=tuple(
+            replace(block, fixed=block.fixed or n in held)
+            for n, block in enumerate(structure.blocks)
+        ),
+    )
+    load = af.PointLoad(x=3.6, force=(0.0, -1e3))
+    fill = law(friction_angle=35.0, cohesion=2e3)
+    free, same, backed = (
+        af.collapse_factor(each, live=load, fill=replace(fill, backing=backing))
+        for each, backing in ((structure, None), (fixed, None), (structure, level))
+    )
+    assert backed.factor == pytest.approx(same.factor, rel=1e-9)
+    assert backed.factor > 1.05 * free.upper
+    assert not backed.motion[held].any()
+
+
+@pytest.mark.parametrize(("level", "words"), [(-5.0, "holds none"), (9.0, "holds all")])
+def test_backing_that_holds_all_or_none_is_refused(level, words):
+    fill = af.limit.Fill(friction_angle=35.0, backing=level)
+    with pytest.raises(af.InvalidInput, match=f"backing {level:.4g} m {words} of the stones"):
+        af.rate(arch_bridge(), "LM1", fill=fill)
