@@ -36,7 +36,7 @@ PICTURES = {
         "bridge_joint": "af.view.draw_joint(paper",
         "bridge_rules": 'af.view.draw_envelope(\n    {"five springs"',
         "bridge_undivided": "af.view.draw_envelope(whole",
-    }
+    },
 }
 """Pictures of notebooks that pages show: file names, and words of the cells that draw them."""
 
