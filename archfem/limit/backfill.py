@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from math import radians, sqrt, tan
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -88,16 +89,7 @@ class Fill:
 
     def __post_init__(self) -> None:
         """Refuse values outside their range, most of them wrong units."""
-        for key in ("friction_angle", "spread"):
-            if isinstance(value := getattr(self, key), str) or key == "spread":
-                object.__setattr__(self, key, in_degrees(value, f"fill, {key}"))
-        for key in ("friction_angle", "cohesion", "mobilisation", "active", "spread"):
-            check_number(getattr(self, key), f"fill, {key}", minimum=0.0)
-        if not (self.friction_angle == 0.0 or 1.0 <= self.friction_angle <= 60.0):
-            raise InvalidInput(
-                f"fill, friction_angle {self.friction_angle:.4g}° is neither 0 nor between 1° and "
-                "60°: give degrees; gravel has about 35"
-            )
+        read_strength(self, "mobilisation", "active")
         if self.cohesion > 1e6:
             raise InvalidInput(
                 f"fill, cohesion {self.cohesion:.4g} Pa is above 1 MPa: give Pa; with so much it "
@@ -150,6 +142,20 @@ class Fill:
         if self.dispersal == "uniform":
             return np.asarray(0.5 + 0.5 * inside / self.edge)
         return np.asarray(0.5 + 0.5 * _flamant(inside) / _flamant(np.array(self.edge)))
+
+
+def read_strength(fill: Any, *shares: str) -> None:
+    """Convert the angles of a fill to degrees, and check its strength and some shares of it."""
+    for key in ("friction_angle", "spread"):
+        if isinstance(value := getattr(fill, key), str) or key == "spread":
+            object.__setattr__(fill, key, in_degrees(value, f"fill, {key}"))
+    for key in ("friction_angle", "cohesion", *shares, "spread"):
+        check_number(getattr(fill, key), f"fill, {key}", minimum=0.0)
+    if not (fill.friction_angle == 0.0 or 1.0 <= fill.friction_angle <= 60.0):
+        raise InvalidInput(
+            f"fill, friction_angle {fill.friction_angle:.4g}° is neither 0 nor between 1° and "
+            "60°: give degrees; gravel has about 35"
+        )
 
 
 def _flamant(slope: Array) -> Array:
@@ -360,16 +366,9 @@ class BlocksWithFill:
     rigid_regions: RigidRegions  # the stones that stand by themselves
 
     @cached_property
-    def _place(self) -> Numbers:
-        """Index of each block of `whole` in the rigid regions, -1 for the fill (n_blocks,)."""
-        place = np.full(self.rigid_regions.size, -1)
-        place[list(self.rigid_regions.blocks)] = np.arange(len(self.rigid_regions.blocks))
-        return place
-
-    @cached_property
     def _profile(self) -> FillProfile:
         """Stones and fill in strips."""
-        return FillProfile(self.whole, self._place >= 0)
+        return FillProfile(self.whole, self.rigid_regions.place >= 0)
 
     @cached_property
     def contacts(self) -> FillContacts:
@@ -381,14 +380,14 @@ class BlocksWithFill:
             stone = next((b for b in joint.blocks if b not in soil), joint.lower)
             other = joint.blocks[0] + joint.blocks[1] - stone
             out = normals[number] * (1.0 if stone == joint.lower else -1.0)
-            bare = self._place[stone] < 0 or self.whole.blocks[stone].fixed
+            bare = self.rigid_regions.place[stone] < 0 or self.whole.blocks[stone].fixed
             if bare or other not in soil or abs(out[0]) <= level or out[1] < -level:
                 continue
             along = np.linspace(0.0, 1.0, pieces + 1)[:, None]
             points = joint.ends[0] + along * np.diff(joint.ends, axis=0)
             side = float(np.sign(out[0]))
             over = np.array([self._profile.overburden(point, side) for point in points])
-            block += [self._place[stone]] * pieces
+            block += [self.rigid_regions.place[stone]] * pieces
             toward += [-side] * pieces
             ends += list(pairwise(points))
             stress += list(pairwise(over))
@@ -406,10 +405,10 @@ class BlocksWithFill:
             if self.fill is not None and isinstance(action, BodyForce):
                 block, foot, weight = self._profile.columns
                 pull = weight[:, None] * np.array([action.horizontal, action.vertical])
-                total += self._sum_forces(self._place[block], foot, pull)
+                total += self._sum_forces(self.rigid_regions.place[block], foot, pull)
             if self.fill is not None and isinstance(action, PointLoad):
                 number, point = action.place(self.whole)
-                if self._place[number] < 0:
+                if self.rigid_regions.place[number] < 0:
                     total += self._spread_load(action, point)
                     continue
             total += RigidBlocks(self.rigid_regions.structure).load([action])
@@ -426,7 +425,7 @@ class BlocksWithFill:
         assert self.fill is not None
         block, points, part = self._profile.fan(point, self.fill)
         forces = part[:, None] * np.array(load.force)
-        return self._sum_forces(self._place[block], points, forces)
+        return self._sum_forces(self.rigid_regions.place[block], points, forces)
 
     def warn_of_sliding_fill(self, actions: Sequence[BodyForce | PointLoad], factor: float) -> None:
         """Warn where a fill without cohesion would slide before the stones become a mechanism."""

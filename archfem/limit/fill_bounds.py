@@ -66,7 +66,6 @@ class FilledBlocks:
     mesh: FillMesh
     fill: PlasticFill
     unit_weight: Array  # of each triangle (t,) [N/m³]
-    place: Numbers  # of each block of the whole structure among the stones, -1 for fill
     regions: RigidRegions  # the stones in the whole structure
     live: Array  # generalised forces on the free stones that grow (3 n_free,) [mean block weights]
     pull: Array  # multiple of the fill's weight that grows, along x and y (2,) [-]
@@ -97,7 +96,7 @@ class FilledBlocks:
     def contacts(self) -> tuple[Numbers, Numbers]:
         """Sides of triangles on blocks, and the block of each among the stones (k,)."""
         on_block = self.mesh.touches >= 0
-        return self.mesh.boundary[on_block], self.place[self.mesh.touches[on_block]]
+        return self.mesh.boundary[on_block], self.regions.place[self.mesh.touches[on_block]]
 
     def bound_below(self) -> Bound:
         """Return the largest factor with stresses in equilibrium at every point."""
@@ -545,8 +544,6 @@ def _load_blocks(
     pulls = [action for action in live if isinstance(action, BodyForce)]
     points = [action for action in live if isinstance(action, PointLoad)]
     load = blocks.load(pulls) + stones.load(points)
-    place = np.full(len(structure.blocks), -1)
-    place[list(regions.blocks)] = np.arange(len(regions.blocks))
     weights = np.array([block.material.unit_weight for block in structure.blocks])
     pull = np.array([(each.horizontal, each.vertical) for each in pulls]).reshape(-1, 2)
     count = len(regions.structure.joints)
@@ -555,7 +552,6 @@ def _load_blocks(
         mesh,
         fill,
         weights[mesh.owner],
-        place,
         regions,
         blocks.dimensionless(load),
         pull.sum(axis=0),

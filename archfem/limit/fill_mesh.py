@@ -45,6 +45,7 @@ class FillMesh:
         near = CONTACT_TOLERANCE * self.structure.size
         middles, x = self.points[self.sides[self.boundary]].mean(axis=1), self.points[:, 0]
         beside = np.full(len(middles), SURFACE)
+        # points that were merged may have moved by some times the tolerance of contacts
         if self.holds_ends:
             ends = np.abs(self.normals(self.boundary)[0][:, 0]) > 1.0 - 1e-6
             outermost = np.minimum(middles[:, 0] - x.min(), x.max() - middles[:, 0]) < 4.0 * near
@@ -168,7 +169,7 @@ def mesh_fill(
         triangles.append(parts + sum(map(len, points)))
         points.append(own)
         owner += [number] * len(parts)
-    # points of neighbouring fills coincide along their joints
+    # points of neighbouring fills coincide along their joints, within rounding of both
     everywhere = np.concatenate(points)
     _, first, place = np.unique(
         np.round(everywhere / (4.0 * near)), axis=0, return_index=True, return_inverse=True
@@ -233,6 +234,7 @@ def _turn_left(points: Array, triangles: Numbers) -> Numbers:
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     twice = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     turned = np.where((twice < 0.0)[:, None], triangles[:, ::-1], triangles)
+    # points on one straight side make triangles of rounding alone
     return turned[np.abs(twice) > 1e-9 * np.abs(twice).max()]
 
 
@@ -250,6 +252,7 @@ def _points_within(outline: Array, size: float) -> Array:
     share = ((points[:, None] - start) * along).sum(axis=-1) / (along**2).sum(axis=-1)
     foot = start + np.clip(share, 0.0, 1.0)[..., None] * along
     away = np.linalg.norm(points[:, None] - foot, axis=-1).min(axis=1, initial=np.inf)
+    # nearer to the outline triangles would be flatter than half of an equilateral one
     return points[away > 0.55 * size]
 
 

@@ -50,6 +50,13 @@ class RigidRegions:
     joints: tuple[int, ...]  # numbers of its joints in the whole structure
     size: int  # number of blocks of the whole structure
 
+    @cached_property
+    def place(self) -> Numbers:
+        """Index of each block of the whole structure among its blocks, -1 for others (size,)."""
+        place = np.full(self.size, -1)
+        place[list(self.blocks)] = np.arange(len(self.blocks))
+        return place
+
     def expand_motion(self, motion: Array) -> Array:
         """Return the motion of all blocks of the whole structure, zero for the yielding ones."""
         whole = np.zeros((self.size, 3))

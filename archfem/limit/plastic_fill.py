@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from math import radians, tan
 
 from archfem._typing import Degrees, Metres, Pascals
-from archfem._validation import check_number
 from archfem.errors import InvalidInput
-from archfem.units import in_degrees
+from archfem.limit.backfill import read_strength
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +28,10 @@ class PlasticFill:
         spread: half the angle of the fan of a load on the fill, from the vertical [degrees].
         backing: level up to which masonry holds the stones, as for `Fill` [m].
 
+    References:
+        Sloan, Int. J. Numer. Anal. Meth. Geomech. 12 (1988) 61-77. Makrodimopoulos and Martin,
+        Int. J. Numer. Anal. Meth. Geomech. 31 (2007) 835-865.
+
     Example:
         >>> af.limit.PlasticFill(friction_angle=30.0, cohesion=5e3).roughness
         1.0
@@ -45,16 +48,7 @@ class PlasticFill:
 
     def __post_init__(self) -> None:
         """Refuse values outside their range, most of them wrong units."""
-        for key in ("friction_angle", "spread"):
-            if isinstance(value := getattr(self, key), str) or key == "spread":
-                object.__setattr__(self, key, in_degrees(value, f"fill, {key}"))
-        for key in ("friction_angle", "cohesion", "roughness", "adhesion", "gap", "spread"):
-            check_number(getattr(self, key), f"fill, {key}", minimum=0.0)
-        if not (self.friction_angle == 0.0 or 1.0 <= self.friction_angle <= 60.0):
-            raise InvalidInput(
-                f"fill, friction_angle {self.friction_angle:.4g}° is neither 0 nor between 1° and "
-                "60°: give degrees; gravel has about 35"
-            )
+        read_strength(self, "roughness", "adhesion", "gap")
         for key in ("roughness", "adhesion"):
             if getattr(self, key) > 1.0:
                 raise InvalidInput(

@@ -44,10 +44,10 @@ def dead_load_of(case: Case) -> DeadLoadResult:
     return result
 
 
-def first_mode(result: DeadLoadResult) -> Modes:
-    """Compute the first mode about the dead load."""
-    dead, key = result.dead, _model_key(result.case)
-    return _look_up("modes", key, lambda: modes(dead.model, 1, start=dead))
+def lowest_modes(result: DeadLoadResult, count: int = 1) -> Modes:
+    """Compute the lowest modes about the dead load."""
+    dead, key = result.dead, f"{_model_key(result.case)} {count}"
+    return _look_up("modes", key, lambda: modes(dead.model, count, start=dead))
 
 
 @validate_arguments

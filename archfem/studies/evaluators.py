@@ -22,7 +22,7 @@ from archfem.joints.criteria import assessed_joints, eccentricity_magnitude, par
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import suggest_name
 from archfem.motion.motion import Motion
-from archfem.studies.cache import dead_load_of, first_mode, ground_motion, ground_suite
+from archfem.studies.cache import dead_load_of, ground_motion, ground_suite, lowest_modes
 from archfem.studies.parameter_space import Point
 from archfem.studies.statements import capacity_findings, dead_load_findings, history_findings
 
@@ -44,7 +44,7 @@ def evaluate_dead_load(case: Case) -> Findings:
 
 def _describe_first_mode(result: DeadLoadResult) -> Findings:
     """Return frequency and mass ratio of the first mode about the dead load."""
-    first = first_mode(result)
+    first = lowest_modes(result)
     return {"frequency": float(first.frequencies[0]), "mass": float(first.mass_ratios[0, 0])}
 
 

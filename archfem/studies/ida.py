@@ -37,7 +37,7 @@ from archfem.joints.criteria import assessed_joints, with_failure_flags
 from archfem.limit.mechanism_count import Mechanism
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
-from archfem.studies.cache import dead_load_of, first_mode, ground_motion
+from archfem.studies.cache import dead_load_of, ground_motion, lowest_modes
 from archfem.studies.evaluators import Evaluator, Findings, of_history, run_motion
 from archfem.studies.fragility import Fragility, fragility
 from archfem.studies.parameter_space import PAIR_KEY, Axis, Point
@@ -97,7 +97,7 @@ def search_limit_states(
         low, high = max(gaps, key=lambda gap: gap[1] / gap[0], default=(1.0, 1.0))
         if high > 1.2 * low:
             brackets = brackets.with_run(run_scaled(sqrt(low * high)))
-    period = 1.0 / float(first_mode(result).frequencies[0])
+    period = 1.0 / float(lowest_modes(result).frequencies[0])
     measured = measure_intensity(motion)
     findings: Findings = {"period": period, "pga": measured.pga, "pgv": measured.pgv}
     findings["sa"] = float(response_spectrum(motion, np.array([period]))[0])

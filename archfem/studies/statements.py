@@ -23,8 +23,8 @@ from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints, part_roles
 from archfem.masonry.structure import Structure, suggest_name
 from archfem.masonry.survey.circle_fit import fitted_circle
-from archfem.statics.modes import modes
 from archfem.statics.pushover import pushover
+from archfem.studies.cache import lowest_modes
 from archfem.units import G, MPa
 
 Rows = Mapping[str, Mapping[str, Any]]
@@ -68,7 +68,9 @@ def read_statements(settings: Mapping[str, Any]) -> tuple[Statement, ...]:
     tables, cases = settings.get("statements", []), settings.get("cases", {})
     read = tuple(read_object(Statement, each, f"statements[{n}]") for n, each in enumerate(tables))
     if unknown := sorted({each.case for each in read} - set(cases)):
-        raise InvalidInput(f"statements are about {unknown}, but the cases are {list(cases)}")
+        raise InvalidInput(
+            f"statements are about {unknown}, but the cases are {list(cases)}: name one of these"
+        )
     return read
 
 
@@ -106,7 +108,7 @@ def dead_load_findings(result: DeadLoadResult) -> dict[str, Any]:
     joints = assessed_joints(dead.joints)
     depth = structure.depths[joints["joint"].values]
     stress = joints["N"].values / (structure.width * depth)
-    found = modes(dead.model, 3, start=dead)
+    found = lowest_modes(result, 3)
     return {
         "compression": float(np.nanmax(stress * edge_factor(joints["eccentricity"].values))),
         "dead friction": float(joints["friction"].max()),
@@ -119,6 +121,7 @@ def dead_load_findings(result: DeadLoadResult) -> dict[str, Any]:
 def edge_factor(eccentricity: Array) -> Array:
     """Return the stress at a joint's edge over its mean, of a linear or triangular distribution."""
     away = np.abs(eccentricity)
+    # the last strip has no width: its stress is large, and finite
     return np.where(away < 1.0 / 6.0, 1.0 + 6.0 * away, 2.0 / (3.0 * np.maximum(0.5 - away, 1e-9)))
 
 
