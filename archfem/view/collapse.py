@@ -227,7 +227,9 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
     left, right = figure.subplots(1, 2, width_ratios=widths)
     _draw_displaced_mechanism(left, found)
     _draw_capacity_curve(right, found)
-    add_legend_below(figure, handles=left.get_legend_handles_labels()[0])
+    # in the panels it would lie on curves
+    handles = [axes.get_legend_handles_labels()[0] for axes in (left, right)]
+    add_legend_below(figure, 3, handles=[*handles[0], *handles[1]])
     return figure
 
 
@@ -273,7 +275,6 @@ def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
     outcome = "passes" if check.passes else "fails"
     rest = ", up to which nothing moves" if check.at_rest else ""
     set_title(axes, f"{check.name}: {outcome}, ratio {check.ratio:.2f}{rest}")
-    axes.legend(frameon=False, fontsize=Size.LABEL)
 
 
 def draw_capacity(
