@@ -23,6 +23,10 @@ from archfem.statics.mechanism_assessment import (
     kinematic_assessment,
 )
 
+# Words of [limit] and [assessment]: laws of the joints, and of the fill
+FRICTION_LAWS = ("coulomb", "nonassociated", "none")
+FILL_LAWS: Mapping[str, type[Fill | PlasticFill]] = {"pressure": Fill, "plastic": PlasticFill}
+
 
 @validate_methods
 @dataclass(frozen=True)
@@ -68,13 +72,26 @@ class LimitAnalysis:
         return collapse_factor(structure, live=self.live, **self.resistance)
 
 
+def limit_keys() -> dict[str, Any]:
+    """Return the keys of [limit]."""
+    # the live load: multiples of the weight, and a force at a point
+    load = declared_keys(BodyForce) | {"point": (dict, [dict])}
+    return _keys_beside(collapse_factor, "live") | load
+
+
+def rating_keys() -> dict[str, Any]:
+    """Return the keys of [rating]; joints and fill are those of [limit]."""
+    return _keys_beside(rate, "friction", "strength", "fill")
+
+
+def assessment_keys() -> dict[str, Any]:
+    """Return the keys of [assessment]."""
+    return _keys_beside(kinematic_assessment)
+
+
 def parse_limit(table: Any) -> LimitAnalysis:
     """Return the limit analysis of a case."""
-    # the live load: multiples of the weight, and a force at a point
-    keys = (
-        _keys_beside(collapse_factor, "live") | declared_keys(BodyForce) | {"point": (dict, [dict])}
-    )
-    values = check_table(table, keys, "limit")
+    values = check_table(table, limit_keys(), "limit")
     live: list[Action] = []
     if "horizontal" in values or "vertical" in values:
         live.append(BodyForce(values.get("horizontal", 0.0), values.get("vertical", 0.0)))
@@ -88,15 +105,14 @@ def parse_limit(table: Any) -> LimitAnalysis:
 
 def _check_friction(value: Any, key: str) -> str | None:
     """Return the friction law of limit analysis; None without sliding."""
-    law = check_choice(value, ("coulomb", "nonassociated", "none"), key)
+    law = check_choice(value, FRICTION_LAWS, key)
     return None if law == "none" else law
 
 
 def _fill(table: Any) -> Fill | PlasticFill:
     """Return the strength of the fill."""
-    laws = {"pressure": Fill, "plastic": PlasticFill}
     word = table.get("law", "pressure") if isinstance(table, Mapping) else "pressure"
-    law = laws[check_choice(word, tuple(laws), "limit.fill.law")]
+    law = FILL_LAWS[check_choice(word, tuple(FILL_LAWS), "limit.fill.law")]
     fill = check_table(table, declared_keys(law) | {"law": str}, "limit.fill")
     fill.pop("law", None)
     if "friction_angle" not in fill:
@@ -120,9 +136,7 @@ def _point_load(table: Any) -> PointLoad:
 
 def parse_rating(table: Any) -> Table:
     """Return the rating of a case: the arguments of `rate` that it gives."""
-    # joints and fill are those of [limit]
-    keys = _keys_beside(rate, "friction", "strength", "fill")
-    options = check_table(table, keys, "rating")
+    options = check_table(table, rating_keys(), "rating")
     if isinstance(vehicle := options.get("vehicle"), dict):
         options["vehicle"] = read_object(Vehicle, vehicle, "rating.vehicle")
     return options
@@ -174,7 +188,7 @@ class AssessmentSettings:
 
 def parse_assessment(table: Any) -> AssessmentSettings:
     """Return the kinematic assessment of a case."""
-    options = check_table(table, _keys_beside(kinematic_assessment), "assessment")
+    options = check_table(table, assessment_keys(), "assessment")
     spectrum = None
     if "spectrum" in options:
         spectrum = build_spectrum(options.pop("spectrum"), "assessment.spectrum")
