@@ -85,6 +85,7 @@ class Collapse(ResultDisplay):
         upper: what no state of equilibrium exceeds: the factor itself, with a `PlasticFill` the
             bound from above. `factor` is the bound from below then, and `lower` another name of it.
         live: the growing actions, or the settlement.
+        dead: the actions beside self-weight that do not grow.
         structure: the analysed structure; None where the result was built by hand.
     """
 
@@ -99,6 +100,7 @@ class Collapse(ResultDisplay):
     fill_motion: xr.Dataset | None = None
     upper: float = np.nan
     live: tuple[Action | Settlement, ...] = ()
+    dead: tuple[Action, ...] = ()
     structure: Structure | None = None
 
     def __post_init__(self) -> None:
@@ -146,6 +148,7 @@ def collapse_factor(
     friction: str | None = "coulomb",
     strength: Pascals | None = None,
     fill: Fill | PlasticFill | None = None,
+    dead: Sequence[Action] = (),
 ) -> Collapse:
     """Find the factor at which live actions, over self-weight, make rigid blocks a mechanism.
 
@@ -188,6 +191,7 @@ def collapse_factor(
             stones (`Fill`), with those that rest on them, or a plastic continuum (`PlasticFill`),
             for which the result has two bounds; None where there are none, or where they are cut
             into pieces (`jointed_fill`), whose joints have that strength.
+        dead: loads that act beside self-weight and do not grow, such as that of a press.
 
     Returns:
         The factor, the outcome and the mechanism.
@@ -210,14 +214,18 @@ def collapse_factor(
     """
     structure = structure_of(structure)
     loads = live if isinstance(live, Settlement) else list_loads(live)
+    stays = tuple(list_loads(dead)) if dead != () else ()
     if isinstance(fill, PlasticFill):
-        return _bound_collapse(structure, loads, friction, strength, fill)
-    stones, dead = self_weight_programme(structure, friction, strength, fill)
-    result = _solve_collapse(stones, dead, loads, friction)
+        result = _bound_collapse(structure, loads, stays, friction, strength, fill)
+    else:
+        stones, programme = self_weight_programme(structure, friction, strength, fill, stays)
+        result = _solve_collapse(stones, programme, loads, friction)
+        if result.outcome is Outcome.COLLAPSES and not isinstance(loads, Settlement):
+            stones.warn_of_sliding_fill(loads, stays, result.factor)
     if np.isinf(result.factor):
         warn_locking(structure, friction)
     actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
-    return replace(result, live=actions, structure=structure)
+    return replace(result, live=actions, dead=stays, structure=structure)
 
 
 def stands(
@@ -341,7 +349,6 @@ def _solve_collapse(
     result = _read_result(stones, programme, bounded, scale * optimum.value, optimum, support)
     result = replace(result, solutions=solutions)
     if not isinstance(live, Settlement):
-        stones.warn_of_sliding_fill(live, result.factor)
         failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
         if friction is not None:
             warn_cohesion(structure, tuple(failing), result.joints, result.factor)
@@ -353,6 +360,7 @@ def _solve_collapse(
 def _bound_collapse(
     structure: Structure,
     live: Settlement | list[Action],
+    dead: Sequence[Action],
     friction: str | None,
     strength: float | None,
     fill: PlasticFill,
@@ -364,7 +372,7 @@ def _bound_collapse(
             "af.limit.Fill, or a load"
         )
     check_options(structure, friction, strength)
-    bounds = bound_factor(structure, live, friction, strength, fill)
+    bounds = bound_factor(structure, live, friction, strength, fill, dead)
     lower, upper = bounds.below.factor, bounds.above.factor
     if np.isnan(lower) and not np.isnan(upper):
         raise DidNotConverge(
@@ -388,8 +396,6 @@ def _bound_collapse(
         soil=bounds.contact_stress,
         fill_motion=bounds.fill_motion,
         upper=upper,
-        live=tuple(live),
-        structure=structure,
     )
 
 

@@ -31,6 +31,9 @@ from archfem.joints.rigid_kinematics import jump_rates
 from archfem.masonry.loads import BodyForce, PointLoad
 from archfem.masonry.structure import Structure, largest_displacement, rigid_motion_matrix
 
+# Round-off of a cost, relative to the largest [-]: well below the tolerances of the solver
+ROUND_OFF = 1e-12
+
 
 class NoEquilibrium(DidNotConverge):
     """The programme is infeasible: no forces within the limits balance the loads."""
@@ -376,6 +379,8 @@ class ReducedBalance:
         if programme.force_cost is not None:
             force_cost += programme.force_cost
             cost += self._map.T @ force_cost
+            # Round-off as a cost leads the simplex method through 100 000 bases of one objective.
+            cost[np.abs(cost) < ROUND_OFF * np.abs(cost).max()] = 0.0
         cost[self._count :] += programme.unknown_cost
         strength = np.tile(programme.cohesion[self._slides], 2)
         limits = Limits(self._rows, np.concatenate([np.zeros(2 * len(chains.pivots)), strength]))

@@ -217,3 +217,20 @@ def test_a_mesh_covers_its_fill_and_stays_conforming(chosen):
     assert set(mesh.touches.tolist()) == beside | {SURFACE, HELD}
     # gradients of the shapes of a triangle add up to zero
     assert np.abs(mesh.gradients.sum(axis=1)).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("live", "half"),
+    [
+        (af.PointLoad(x=3.3, force=(0.0, -1e3)), lambda f: af.PointLoad(3.3, (0.0, -500.0 * f))),
+        (af.BodyForce(1.0, 0.2), lambda f: af.BodyForce(0.5 * f, 0.1 * f)),
+    ],
+)
+def test_half_of_the_load_that_stays_is_no_longer_live(live, half):
+    """On one mesh both bounds fall by just that half."""
+    fill = replace(FILL, gap=0.9)
+    whole = af.collapse_factor(arch_bridge(), live=live, fill=fill)
+    rest = af.collapse_factor(arch_bridge(), live=live, fill=fill, dead=[half(whole.lower)])
+    size = ROUNDING * whole.upper
+    assert rest.lower == pytest.approx(0.5 * whole.lower, abs=size)
+    assert rest.upper == pytest.approx(whole.upper - 0.5 * whole.lower, abs=size)
