@@ -547,17 +547,22 @@ def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
     return BlocksWithFill(structure, fill, regions)
 
 
-def check_options(structure: Structure, friction: str | None, strength: float | None) -> None:
-    """Refuse unknown options, and joints with tensile strength, which break and do not yield."""
+def refuse_bonds(structure: Structure) -> None:
+    """Refuse joints with tensile strength, which break and do not yield."""
+    if structure.tension.any():
+        raise InvalidInput(
+            f"joints have a tensile strength of {structure.tension.max():.3g} Pa: this analysis is "
+            "for joints that yield, and bonds break; for the safe answer without them give "
+            "Contact(tension=0.0, cohesion=0.0); collapse_factor lets bonds yield, a pushover "
+            "breaks them"
+        )
+
+
+def check_options(friction: str | None, strength: float | None) -> None:
+    """Refuse unknown options."""
     check_choice(friction, "friction", ("coulomb", "nonassociated", None))
     if strength is not None and not check_number(strength, "strength [Pa]") > 0.0:
         raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
-    if structure.tension.any():
-        raise InvalidInput(
-            f"joints have a tensile strength of {structure.tension.max():.3g} Pa: limit analysis "
-            "is for joints that yield, and bonds break; for the safe answer without them give "
-            "Contact(tension=0.0, cohesion=0.0), with them follow a pushover"
-        )
 
 
 def self_weight_programme(
@@ -569,7 +574,7 @@ def self_weight_programme(
 ) -> tuple[BlocksWithFill, Programme]:
     """Return the rigid stones, and the linear programme of self-weight and other dead loads."""
     check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
-    check_options(structure, friction, strength)
+    check_options(friction, strength)
     stones = attach_fill(structure, fill)
     rigid = stones.rigid_regions.structure
     blocks = RigidBlocks(rigid)
@@ -578,10 +583,15 @@ def self_weight_programme(
     if strength is not None:
         # pieces of fill have the strength of their joints, and none of stone
         is_piece = np.array([block.grain for block in rigid.blocks])[rigid.pairs].any(axis=1)
-        crushing = strength * rigid.width * rigid.depths / blocks.force_unit
+        crushing = blocks.crushing_forces(strength)
         crushing = np.where(is_piece, np.inf, crushing)
     weight = blocks.dimensionless(stones.load([SELF_WEIGHT, *dead]) + stones.active_forces())
-    programme = Programme(blocks, weight, coefficient, blocks.cohesion, crushing=crushing)
+    # Compressions are counted from the plastic tension of bonds on: F + T/2 >= 0 at each end.
+    slope = np.where(np.isfinite(coefficient), coefficient, 0.0)
+    strengths = coefficient, blocks.cohesion - slope * blocks.tension
+    programme = Programme(
+        blocks, weight + blocks.balance @ blocks.bond, *strengths, crushing=crushing
+    )
     if fill is None:
         return stones, programme
     # further unknowns, 0 to 1: the position of each contact's pressure in its range

@@ -27,6 +27,7 @@ from archfem.limit.backfill import (
     Fill,
     check_options,
     is_balanced,
+    refuse_bonds,
     self_weight_programme,
 )
 from archfem.limit.fill_bounds import bound_factor
@@ -164,9 +165,11 @@ def collapse_factor(
     Cohesion c (`Contact.cohesion`) acts on the area A of the whole joint, depth times width, and
     not only on its closed part: the factor is an upper estimate where a joint with cohesion opens,
     a warning says so, and `closed_cohesion` reduces it to the closed part of a given state.
-    Joints with tensile strength are refused, since bonds break and do not yield. The dilatancy of
-    contacts plays no part: sliding dilates by μ ("coulomb") or not at all ("nonassociated"), and
-    a warning says so where the latter neglects it.
+    Tensile strength f_t (`Contact.tension`) yields too, over the depth h: F >= -f_t w h/2 at both
+    ends, so that a hinge resists f_t w h²/2 about its edge. Bonds break where such joints yield: a
+    warning says that the factor is an upper estimate. The dilatancy of contacts plays no part:
+    sliding dilates by μ ("coulomb") or not at all ("nonassociated"), and a warning says so where
+    the latter neglects it.
 
     A *settlement* s poses another problem: of all states of equilibrium under self-weight, the
     movement of a support selects the one that resists it least, and the factor is the work of the
@@ -198,7 +201,8 @@ def collapse_factor(
 
     Raises:
         InvalidInput: an option is unknown, an action misses the structure, joints have tensile
-            strength, or bodies too soft to be rigid are without the strength of a fill.
+            strength under a settlement, or bodies too soft to be rigid are without the strength of
+            a fill.
         DidNotConverge: the solver of linear programmes gave up.
 
     Note:
@@ -214,6 +218,8 @@ def collapse_factor(
     """
     structure = structure_of(structure)
     loads = live if isinstance(live, Settlement) else list_loads(live)
+    if isinstance(loads, Settlement):
+        refuse_bonds(structure)
     stays = tuple(list_loads(dead)) if dead != () else ()
     if isinstance(fill, PlasticFill):
         result = _bound_collapse(structure, loads, stays, friction, strength, fill)
@@ -224,6 +230,7 @@ def collapse_factor(
             stones.warn_of_sliding_fill(loads, stays, result.factor)
     if np.isinf(result.factor):
         warn_locking(structure, friction)
+    warn_bonds(structure, result)
     actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
     return replace(result, live=actions, dead=stays, structure=structure)
 
@@ -265,13 +272,15 @@ def stands(
         >>> af.stands(af.circular_arch(radius=1.0, thickness=0.05, embrace=180.0, voussoirs=11))
         False
     """
-    _, dead = self_weight_programme(structure_of(structure), friction, strength, fill)
+    structure = structure_of(structure)
+    refuse_bonds(structure)
+    _, dead = self_weight_programme(structure, friction, strength, fill)
     return is_balanced(dead.minimise_residual(), dead)
 
 
 @validate_arguments
 def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
-    """Restrict the cohesion of joints to the part that is closed in a state.
+    """Restrict the cohesion and tension of joints to the part that is closed in a state.
 
     Limit analysis of the result is that of joints which lose cohesion where they open, in this
     state: give the last one of a pushover, and compare with the limit to which that tends.
@@ -299,7 +308,8 @@ def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
     fractions = contact_fractions(structure, joints["N"].values, joints["M"].values)
     joints_closed = []
     for joint, part in zip(structure.joints, fractions, strict=True):
-        contact = replace(joint.contact, cohesion=joint.contact.cohesion * float(part))
+        bond = {key: getattr(joint.contact, key) * float(part) for key in ("tension", "cohesion")}
+        contact = replace(joint.contact, **bond)
         joints_closed.append(replace(joint, contact=contact))
     return replace(structure, joints=tuple(joints_closed))
 
@@ -350,7 +360,7 @@ def _solve_collapse(
     result = replace(result, solutions=solutions)
     if not isinstance(live, Settlement):
         failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
-        if friction is not None:
+        if friction is not None and not structure.tension.any():  # bonds that hold stay closed
             warn_cohesion(structure, tuple(failing), result.joints, result.factor)
     if friction == "coulomb":
         warn_sliding(result.sliding_names, result.factor)
@@ -371,7 +381,7 @@ def _bound_collapse(
             "a settlement and a plastic fill: the bounds are of loads that grow; give the fill as "
             "af.limit.Fill, or a load"
         )
-    check_options(structure, friction, strength)
+    check_options(friction, strength)
     bounds = bound_factor(structure, live, friction, strength, fill, dead)
     lower, upper = bounds.below.factor, bounds.above.factor
     if np.isnan(lower) and not np.isnan(upper):
@@ -422,7 +432,7 @@ def _read_result(
     elif motion.any():
         motion = motion / blocks.largest_displacement(motion)
     hinges, slides = _find_failing(blocks, regions, motion)
-    joints = _read_joints(stones.whole, blocks, regions, optimum.forces)
+    joints = _read_joints(stones.whole, blocks, regions, optimum.forces - blocks.bond)
     moved, soil = regions.expand_motion(motion), stones.pressure_dataset(optimum.unknowns)
     return Collapse(float(factor), outcome, hinges, slides, joints, moved, soil=soil)
 
@@ -480,6 +490,19 @@ def warn_locking(structure: Structure, friction: str | None) -> None:
             "an infinite factor is that of a fill in pieces which dilates by tan φ as it slides: "
             "it may lock between the stones, as soil does not. Cut smaller pieces, or give "
             "fill=af.limit.Fill(…) for the structure before it was cut"
+        )
+
+
+def warn_bonds(structure: Structure, result: Collapse) -> None:
+    """Warn of failing joints that are held by bonds, which break rather than yield."""
+    failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
+    if bonded := sorted(number for number in failing if structure.tension[number] > 0.0):
+        logger.warning(
+            "%d joints such as '%s' fail by bonds that yield, up to %.3g Pa in tension: bonds are "
+            "brittle and break one after the other, so that the factor %.4g is an upper estimate; "
+            "a pushover breaks them, and without tension and cohesion the factor is safe",
+            *(len(bonded), structure.joints[bonded[0]].name, structure.tension.max()),
+            result.upper,
         )
 
 

@@ -342,7 +342,7 @@ class FilledBlocks:
         """Add compression and friction of the joints."""
         count = len(self.friction)
         ends = first + np.arange(2 * count)
-        limits.add(ends[:, None], -1.0)
+        limits.add(ends[:, None], -1.0, self.blocks.bond[: 2 * count])
         slides = np.flatnonzero(np.isfinite(self.friction))
         columns = first + slides[:, None] + count * np.array([2, 0, 1])
         friction = self.friction[slides]
@@ -374,15 +374,15 @@ class FilledBlocks:
         """Return N² <= 2 σ w h F at both ends of the joints, by which stones crush."""
         if self.strength is None:
             return []
-        structure, count = self.blocks.structure, len(self.friction)
-        crushing = 2.0 * self.strength * structure.width * structure.depths / self.blocks.force_unit
+        count, tension = len(self.friction), self.blocks.tension
+        crushing = 2.0 * self.blocks.crushing_forces(self.strength)
         found = []
         for end in range(2):
             rows, own = Rows(), first + np.arange(count)
-            # a + F >= |(a - F, 2 N)|
-            rows.add((own + end * count)[:, None], -1.0, crushing)
-            rows.add((own + end * count)[:, None], 1.0, crushing)
-            rows.add(np.stack([own, own + count], axis=1), -2.0)
+            # a + F >= |(a - F, 2 N)|, with F and N counted from the tension of bonds on
+            rows.add((own + end * count)[:, None], -1.0, crushing + 0.5 * tension)
+            rows.add((own + end * count)[:, None], 1.0, crushing - 0.5 * tension)
+            rows.add(np.stack([own, own + count], axis=1), -2.0, 2.0 * tension)
             order = np.arange(3 * count).reshape(3, -1).T.ravel()
             found.append((rows.matrix(size)[order], rows.bounds[order]))
         return found

@@ -101,6 +101,24 @@ class RigidBlocks:
         return self.structure.cohesion / self.force_unit
 
     @cached_property
+    def tension(self) -> Array:
+        """Tensile strength T of the whole joints, f_t w h (n_joints,) [mean block weights]."""
+        structure = self.structure
+        return structure.tension * structure.width * structure.depths / self.force_unit
+
+    @property
+    def bond(self) -> Array:
+        """Plastic tension T/2 of the ends of joints, with no shear (3 n_joints,)."""
+        # Tension f_t over the whole depth turns about an edge as T at mid-depth does: it is T/2 at
+        # both ends, N = F_i + F_e >= -T and |M| <= (N + T) h/2.
+        return np.concatenate([0.5 * self.tension, 0.5 * self.tension, 0.0 * self.tension])
+
+    def crushing_forces(self, strength: float) -> Array:
+        """Return σ w h of each joint, with tension beside the stress block (n_joints,)."""
+        structure = self.structure
+        return strength * structure.width * structure.depths / self.force_unit + self.tension
+
+    @cached_property
     def rates(self) -> sparse.csr_matrix:
         """Openings of intrados and extrados ends, and slips (3 n_joints, 3 n_blocks) [-, m]."""
         structure, (intrados, extrados) = self.structure, np.moveaxis(self.structure.ends, 1, 0)

@@ -234,3 +234,22 @@ def test_half_of_the_load_that_stays_is_no_longer_live(live, half):
     size = ROUNDING * whole.upper
     assert rest.lower == pytest.approx(0.5 * whole.lower, abs=size)
     assert rest.upper == pytest.approx(whole.upper - 0.5 * whole.lower, abs=size)
+
+
+@pytest.mark.parametrize("strength", [None, 2e6])
+def test_bonds_of_a_pier_beside_the_fill_yield_as_in_linear_programmes(footing, strength):
+    """The fill has no part in it: both bounds are the factor of the pier alone."""
+    bond = replace(af.masonry.STONE_TO_STONE, cohesion=40e3, tension=20e3)
+    pier = rectangle(-6.8, 0.5, -6.2, 2.5, "pier")
+    rest = af.masonry.assembled([*footing.blocks, pier], bond, width=1.0)
+    ground = rectangle(-7.0, -3.0, -6.0, 0.5, "left", fixed=True)
+    alone = af.masonry.assembled([ground, pier], bond, width=1.0)
+    live = af.PointLoad(x=-6.8, y=2.4, force=(1e3, 0.0))
+    fill = PlasticFill(friction_angle=30.0, cohesion=1e3, gap=0.9)
+    found = af.collapse_factor(rest, live=live, fill=fill, strength=strength)
+    exact = af.collapse_factor(alone, live=live, strength=strength).factor
+    assert (found.lower, found.upper) == pytest.approx((exact, exact), rel=ROUNDING)
+    dry = af.collapse_factor(
+        af.masonry.assembled([ground, pier], af.masonry.STONE_TO_STONE, width=1.0), live=live
+    ).factor
+    assert exact > 1.1 * dry
