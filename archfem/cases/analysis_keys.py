@@ -39,12 +39,14 @@ class LimitAnalysis:
         friction: friction law, "coulomb", "nonassociated", or None without sliding.
         strength: compressive strength of the stones at the joints [Pa], or None.
         fill: strength of the fill, or None.
+        dead: loads beside self-weight that do not grow.
     """
 
     live: Sequence[Action]
     friction: str | None
     strength: float | None = None
     fill: Fill | PlasticFill | None = None
+    dead: Sequence[Action] = ()
 
     @property
     def resistance(self) -> dict[str, Any]:
@@ -69,14 +71,14 @@ class LimitAnalysis:
                 "limit has no load: give horizontal = 1.0, a multiple of each block's weight, or "
                 'point = { x = "1.4 m", force = ["0 kN", "-1 kN"] }'
             )
-        return collapse_factor(structure, live=self.live, **self.resistance)
+        return collapse_factor(structure, live=self.live, dead=self.dead, **self.resistance)
 
 
 def limit_keys() -> dict[str, Any]:
     """Return the keys of [limit]."""
     # the live load: multiples of the weight, and a force at a point
-    load = declared_keys(BodyForce) | {"point": (dict, [dict])}
-    return _keys_beside(collapse_factor, "live") | load
+    load = declared_keys(BodyForce) | {"point": (dict, [dict]), "dead": [dict]}
+    return _keys_beside(collapse_factor, "live", "dead") | load
 
 
 def rating_keys() -> dict[str, Any]:
@@ -97,10 +99,12 @@ def parse_limit(table: Any) -> LimitAnalysis:
         live.append(BodyForce(values.get("horizontal", 0.0), values.get("vertical", 0.0)))
     if "point" in values:
         points = values["point"]
-        live += map(_point_load, points if isinstance(points, list) else [points])
+        points = points if isinstance(points, list) else [points]
+        live += [_point_load(point, "limit.point") for point in points]
+    dead = [_dead_load(load) for load in values.get("dead", ())]
     friction = _check_friction(values.get("friction", "coulomb"), "limit.friction")
     fill = _fill(values["fill"]) if "fill" in values else None
-    return LimitAnalysis(tuple(live), friction, values.get("strength"), fill)
+    return LimitAnalysis(tuple(live), friction, values.get("strength"), fill, tuple(dead))
 
 
 def _check_friction(value: Any, key: str) -> str | None:
@@ -123,12 +127,20 @@ def _fill(table: Any) -> Fill | PlasticFill:
     return law(**fill)
 
 
-def _point_load(table: Any) -> PointLoad:
-    """Return a concentrated live load."""
-    point = check_table(table, declared_keys(PointLoad), "limit.point")
+def _dead_load(table: Any) -> Action:
+    """Return a load that does not grow: a force at a point, or multiples of the weight."""
+    if isinstance(table, Mapping) and {"horizontal", "vertical"} & table.keys():
+        values = check_table(table, declared_keys(BodyForce), "limit.dead")
+        return BodyForce(values.get("horizontal", 0.0), values.get("vertical", 0.0))
+    return _point_load(table, "limit.dead")
+
+
+def _point_load(table: Any, key: str) -> PointLoad:
+    """Return a concentrated load."""
+    point = check_table(table, declared_keys(PointLoad), key)
     if not {"x", "force"} <= point.keys() or len(point["force"]) != 2:
         raise InvalidInput(
-            f"limit.point = {table}: give a place and the two components of a force, e.g. "
+            f"{key} = {table}: give a place and the two components of a force, e.g. "
             '{ x = "1.4 m", force = ["0 kN", "-1 kN"] }'
         )
     return PointLoad(**point)
@@ -150,6 +162,11 @@ def rate_case(
     if "vehicle" not in options:
         raise InvalidInput(
             'a rating needs a vehicle: write [rating] with vehicle = "LM1", or give --vehicle LM1'
+        )
+    if limit is not None and limit.dead:
+        raise InvalidInput(
+            "a rating takes no loads that stay, [limit] dead: leave them out, or ask `archfem "
+            "limit` for the factor of the axles as point loads"
         )
     if limit is not None:
         options |= limit.resistance

@@ -32,6 +32,8 @@ class Material:
         unit_weight: weight per volume [N/m³].
         strength: compressive strength [Pa], or None where unknown.
         name: in tables and files.
+        stands_for: what a block of it stands for besides itself, such as "press" for a beam with
+            the weight of its load, or "floor"; then it may weigh more than any material.
     """
 
     young: Pascals
@@ -39,16 +41,22 @@ class Material:
     unit_weight: NewtonsPerCubicMetre
     strength: Pascals | None = None
     name: str = "material"
+    stands_for: str | None = None
 
     def __post_init__(self) -> None:
         """Check that the values are possible, which detects wrong units."""
         check_words(self.name, "name of a material")
-        weight_range = 1e-3, 250.0 * kN, " N/m³", "0.001 N/m³ and 250 kN/m³"
+        if self.stands_for is not None:
+            check_words(self.stands_for, f"stands_for of '{self.name}'")
+        most = 1e6 if self.stands_for else 250.0
+        weight_range = 1e-3, most * kN, " N/m³", f"0.001 N/m³ and {most:g} kN/m³"
+        heavy = "give a weight, not a density, in N/m³, e.g. 20 * kN"
+        heavy += "; a block that carries more than itself says so, stands_for='press'"
         inside = nextafter(-1.0, 0.0), nextafter(0.5, 0.0)  # the bounds of ν make no material
         for row in (
             ("young", 1e3, 1e13, " Pa", "1 kPa and 10 TPa", "give it in Pa, e.g. 30 * GPa"),
             ("poisson", *inside, "", "-1 and 0.5", "stone has about 0.2"),
-            ("unit_weight", *weight_range, "give a weight, not a density, in N/m³, e.g. 20 * kN"),
+            ("unit_weight", *weight_range, heavy),
         ):
             _check_range(self, *row)
         # no building material weighs 1 to 4 kN/m³, but soils and stones have such densities
