@@ -23,6 +23,10 @@ from archfem.statics.mechanism_assessment import (
     kinematic_assessment,
 )
 
+# Words of [limit] and [assessment]: laws of the joints, and of the fill
+FRICTION_LAWS = ("coulomb", "nonassociated", "none")
+FILL_LAWS: Mapping[str, type[Fill | PlasticFill]] = {"pressure": Fill, "plastic": PlasticFill}
+
 
 @validate_methods
 @dataclass(frozen=True)
@@ -35,12 +39,14 @@ class LimitAnalysis:
         friction: friction law, "coulomb", "nonassociated", or None without sliding.
         strength: compressive strength of the stones at the joints [Pa], or None.
         fill: strength of the fill, or None.
+        dead: loads beside self-weight that do not grow.
     """
 
     live: Sequence[Action]
     friction: str | None
     strength: float | None = None
     fill: Fill | PlasticFill | None = None
+    dead: Sequence[Action] = ()
 
     @property
     def resistance(self) -> dict[str, Any]:
@@ -65,38 +71,52 @@ class LimitAnalysis:
                 "limit has no load: give horizontal = 1.0, a multiple of each block's weight, or "
                 'point = { x = "1.4 m", force = ["0 kN", "-1 kN"] }'
             )
-        return collapse_factor(structure, live=self.live, **self.resistance)
+        return collapse_factor(structure, live=self.live, dead=self.dead, **self.resistance)
+
+
+def limit_keys() -> dict[str, Any]:
+    """Return the keys of [limit]."""
+    # the live load: multiples of the weight, and a force at a point
+    load = declared_keys(BodyForce) | {"point": (dict, [dict]), "dead": [dict]}
+    return _keys_beside(collapse_factor, "live", "dead") | load
+
+
+def rating_keys() -> dict[str, Any]:
+    """Return the keys of [rating]; joints and fill are those of [limit]."""
+    return _keys_beside(rate, "friction", "strength", "fill")
+
+
+def assessment_keys() -> dict[str, Any]:
+    """Return the keys of [assessment]."""
+    return _keys_beside(kinematic_assessment)
 
 
 def parse_limit(table: Any) -> LimitAnalysis:
     """Return the limit analysis of a case."""
-    # the live load: multiples of the weight, and a force at a point
-    keys = (
-        _keys_beside(collapse_factor, "live") | declared_keys(BodyForce) | {"point": (dict, [dict])}
-    )
-    values = check_table(table, keys, "limit")
+    values = check_table(table, limit_keys(), "limit")
     live: list[Action] = []
     if "horizontal" in values or "vertical" in values:
         live.append(BodyForce(values.get("horizontal", 0.0), values.get("vertical", 0.0)))
     if "point" in values:
         points = values["point"]
-        live += map(_point_load, points if isinstance(points, list) else [points])
+        points = points if isinstance(points, list) else [points]
+        live += [_point_load(point, "limit.point") for point in points]
+    dead = [_dead_load(load) for load in values.get("dead", ())]
     friction = _check_friction(values.get("friction", "coulomb"), "limit.friction")
     fill = _fill(values["fill"]) if "fill" in values else None
-    return LimitAnalysis(tuple(live), friction, values.get("strength"), fill)
+    return LimitAnalysis(tuple(live), friction, values.get("strength"), fill, tuple(dead))
 
 
 def _check_friction(value: Any, key: str) -> str | None:
     """Return the friction law of limit analysis; None without sliding."""
-    law = check_choice(value, ("coulomb", "nonassociated", "none"), key)
+    law = check_choice(value, FRICTION_LAWS, key)
     return None if law == "none" else law
 
 
 def _fill(table: Any) -> Fill | PlasticFill:
     """Return the strength of the fill."""
-    laws = {"pressure": Fill, "plastic": PlasticFill}
     word = table.get("law", "pressure") if isinstance(table, Mapping) else "pressure"
-    law = laws[check_choice(word, tuple(laws), "limit.fill.law")]
+    law = FILL_LAWS[check_choice(word, tuple(FILL_LAWS), "limit.fill.law")]
     fill = check_table(table, declared_keys(law) | {"law": str}, "limit.fill")
     fill.pop("law", None)
     if "friction_angle" not in fill:
@@ -107,12 +127,20 @@ def _fill(table: Any) -> Fill | PlasticFill:
     return law(**fill)
 
 
-def _point_load(table: Any) -> PointLoad:
-    """Return a concentrated live load."""
-    point = check_table(table, declared_keys(PointLoad), "limit.point")
+def _dead_load(table: Any) -> Action:
+    """Return a load that does not grow: a force at a point, or multiples of the weight."""
+    if isinstance(table, Mapping) and {"horizontal", "vertical"} & table.keys():
+        values = check_table(table, declared_keys(BodyForce), "limit.dead")
+        return BodyForce(values.get("horizontal", 0.0), values.get("vertical", 0.0))
+    return _point_load(table, "limit.dead")
+
+
+def _point_load(table: Any, key: str) -> PointLoad:
+    """Return a concentrated load."""
+    point = check_table(table, declared_keys(PointLoad), key)
     if not {"x", "force"} <= point.keys() or len(point["force"]) != 2:
         raise InvalidInput(
-            f"limit.point = {table}: give a place and the two components of a force, e.g. "
+            f"{key} = {table}: give a place and the two components of a force, e.g. "
             '{ x = "1.4 m", force = ["0 kN", "-1 kN"] }'
         )
     return PointLoad(**point)
@@ -120,9 +148,7 @@ def _point_load(table: Any) -> PointLoad:
 
 def parse_rating(table: Any) -> Table:
     """Return the rating of a case: the arguments of `rate` that it gives."""
-    # joints and fill are those of [limit]
-    keys = _keys_beside(rate, "friction", "strength", "fill")
-    options = check_table(table, keys, "rating")
+    options = check_table(table, rating_keys(), "rating")
     if isinstance(vehicle := options.get("vehicle"), dict):
         options["vehicle"] = read_object(Vehicle, vehicle, "rating.vehicle")
     return options
@@ -136,6 +162,11 @@ def rate_case(
     if "vehicle" not in options:
         raise InvalidInput(
             'a rating needs a vehicle: write [rating] with vehicle = "LM1", or give --vehicle LM1'
+        )
+    if limit is not None and limit.dead:
+        raise InvalidInput(
+            "a rating takes no loads that stay, [limit] dead: leave them out, or ask `archfem "
+            "limit` for the factor of the axles as point loads"
         )
     if limit is not None:
         options |= limit.resistance
@@ -174,7 +205,7 @@ class AssessmentSettings:
 
 def parse_assessment(table: Any) -> AssessmentSettings:
     """Return the kinematic assessment of a case."""
-    options = check_table(table, _keys_beside(kinematic_assessment), "assessment")
+    options = check_table(table, assessment_keys(), "assessment")
     spectrum = None
     if "spectrum" in options:
         spectrum = build_spectrum(options.pop("spectrum"), "assessment.spectrum")

@@ -31,6 +31,8 @@ SECTION_FIELDS: Mapping[str, tuple[str, ...]] = {
     "analysis": ("dt", "damping", "scheme", "method", "newton", "until"),
 }
 
+DEAD_LOAD_KEYS: Mapping[str, Any] = {"stages": (str, [dict]), "layers": int}
+
 
 def find_section(keyword: str) -> str:
     """Return the section of a keyword of `Analysis`, or "" if it is none."""
@@ -43,9 +45,14 @@ def complete_path(path: str) -> str:
     return f"{section}.{path}" if section else path
 
 
+def analysis_keys() -> dict[str, Any]:
+    """Return the keys of an analysis, of all sections."""
+    named = ("damping", "scheme", "until")  # by a word, or a table
+    return declared_keys(Analysis) | dict.fromkeys(named, (str, dict))
+
+
 def read_analysis(settings: Table, structure: Structure, folder: Path) -> Analysis:
     """Return the analysis of a structure that the tables of a case describe."""
-    declared = declared_keys(Analysis) | dict.fromkeys(("damping", "scheme", "until"), (str, dict))
     readers: Mapping[str, Callable[[Any], Any]] = {
         "mesh_file": lambda file: folder / file,
         "damping": _read_damping,
@@ -55,7 +62,7 @@ def read_analysis(settings: Table, structure: Structure, folder: Path) -> Analys
     }
     values: dict[str, Any] = {}
     for section, names in SECTION_FIELDS.items():
-        keys = {name: declared[name] for name in names}
+        keys = {name: analysis_keys()[name] for name in names}
         for name, value in check_table(settings.get(section, {}), keys, section).items():
             values[name] = readers[name](value) if name in readers else value
     for name, cls in (("criteria", Criteria), ("record", Record)):
@@ -165,7 +172,7 @@ def _write_event(event: StopCondition) -> Any:
 def _read_stages(table: Any, structure: Structure) -> Sequence[Stage] | None:
     """Return the construction stages of [dead_load]; None if the structure is built at once."""
     listed = isinstance(table, Mapping) and isinstance(table.get("stages"), list)
-    keys = {"stages": [dict] if listed else str, "layers": int}
+    keys = {**DEAD_LOAD_KEYS, "stages": [dict] if listed else str}
     values = check_table(table, keys, "dead_load")
     given = values.get("stages", "none")
     if listed:

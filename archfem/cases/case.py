@@ -34,6 +34,17 @@ from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 
+SECTIONS = (
+    *("structure", "materials", "contacts", "model", "motion", "suite", "analysis", "criteria"),
+    *("record", "limit", "rating", "assessment", "dead_load", "output", "report"),
+)
+OUTPUT_KEYS: Table = {"joints": [(int, str)], "animation": bool, "free_body": str}
+
+# Who signs what: the head of a report
+REPORT_KEYS: Table = dict.fromkeys(
+    ("project", "place", "author", "checked_by", "date", "norm"), str
+)
+
 
 @dataclass(frozen=True)
 class Case:
@@ -49,6 +60,7 @@ class Case:
         rating: arguments of `archfem.rate` from [rating].
         assessment: kinematic assessment; without [assessment] that of the case's motion or suite.
         output: checked keys of [output]: pictures and films.
+        report: checked keys of [report]: project, place and the like, for the head of a report.
         settings: tables of the case as they were read, changes included.
         folder: folder that relative file names start from.
     """
@@ -61,6 +73,7 @@ class Case:
     rating: Table
     assessment: AssessmentSettings
     output: dict[str, Any]
+    report: dict[str, str]
     settings: dict[str, Any] = field(repr=False)
     folder: Path = Path()
 
@@ -113,18 +126,16 @@ class Case:
         """
         if "structure" not in settings and {"case", "cases"} & set(settings):
             raise InvalidInput("this is a study of cases: compute it by `archfem study`")
-        sections = (
-            *("structure", "materials", "contacts", "model", "motion", "suite", "analysis"),
-            *("criteria", "record", "limit", "rating", "assessment", "dead_load", "output"),
-        )
-        refuse_unknown(settings, ("title", "extensions", *sections))
+        refuse_unknown(settings, ("title", "extensions", *SECTIONS))
         provenance.load_extensions_of(settings, folder)
         check_words(settings.get("title", ""), "title", 'write words in quotes: title = "…"')
-        for key in sections:
+        for key in SECTIONS:
             if not isinstance(settings.get(key, {}), dict):
                 raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
-        keys = {"joints": [(int, str)], "animation": bool, "free_body": str}
-        output = check_table(settings.get("output", {}), keys, "output")
+        output = check_table(settings.get("output", {}), OUTPUT_KEYS, "output")
+        report = check_table(settings.get("report", {}), REPORT_KEYS, "report")
+        for key, words in report.items():
+            check_words(words, f"report.{key}")
         motion, suite, limit = (settings.get(key) for key in ("motion", "suite", "limit"))
         if motion is not None and suite is not None:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
@@ -141,6 +152,7 @@ class Case:
             rating=analysis_keys.parse_rating(settings.get("rating", {})),
             assessment=analysis_keys.parse_assessment(settings.get("assessment", {})),
             output=output,
+            report=report,
             settings=dict(settings),
             folder=folder,
         )

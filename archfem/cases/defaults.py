@@ -1,23 +1,38 @@
 """Values of a case that decide and that none of its tables gives: results mark them as defaults."""
 
+from collections.abc import Iterator
+from itertools import groupby
+from typing import NamedTuple
+
 from archfem.cases.case import Case
-from archfem.cases.toml_file import Table
+from archfem.cases.toml_file import Table, format_key
 from archfem.masonry.materials import Contact, Material
 from archfem.units import GPa, MPa, kN
 
-# Values of materials and contacts that decide: name in texts, unit as number and text
+_PAPER = "table 2 of Demirel and Aldemir (2021)"
+
+# Values of materials and contacts that decide: name in texts, unit as number and text, and source
 DECIDING_VALUES = {
     "materials": {
-        "young": ("E", GPa, " GPa"),
-        "unit_weight": ("weight", kN, " kN/m³"),
-        "strength": ("strength", MPa, " MPa"),
+        "young": ("E", GPa, " GPa", f"{_PAPER}; unused where blocks are rigid"),
+        "unit_weight": ("weight", kN, " kN/m³", f"{_PAPER}; stones weigh 16 to 27 kN/m³"),
+        "strength": ("strength", MPa, " MPa", f"{_PAPER}; no motion depends on it"),
     },
     "contacts": {
-        "normal_stiffness": ("k_n", 1e9, " MPa/mm"),
-        "shear_stiffness": ("k_s", 1e9, " MPa/mm"),
-        "friction": ("μ", 1.0, ""),
+        "normal_stiffness": ("k_n", 1e9, " MPa/mm", f"{_PAPER}; measured ones differ tenfold"),
+        "shear_stiffness": ("k_s", 1e9, " MPa/mm", f"{_PAPER}; measured ones differ tenfold"),
+        "friction": ("μ", 1.0, "", "dry stone has 0.4 to 0.8; 0.6 is customary"),
     },
 }
+
+
+class Default(NamedTuple):
+    """A value that a case does not give."""
+
+    subject: str  # material or contact, or ""
+    words: str  # quantity and value
+    key: str  # of the case that gives another value
+    reason: str  # where the value is from, or what it means
 
 
 def list_default_keys(case: Case, item: Material | Contact) -> list[str]:
@@ -28,31 +43,65 @@ def list_default_keys(case: Case, item: Material | Contact) -> list[str]:
     return [key for key in keys if key not in given and getattr(item, key) is not None]
 
 
+def list_defaults(case: Case) -> list[Default]:
+    """Return the deciding values that a case does not give, with key and reason."""
+    return [*_list_properties(case), *_list_settings(case)]
+
+
+def _list_properties(case: Case) -> Iterator[Default]:
+    """List the default values of materials and contacts."""
+    structure = case.structure
+    items: list[Material | Contact] = [block.material for block in structure.blocks]
+    items += [joint.contact for joint in structure.joints]
+    for item in dict.fromkeys(items):
+        section = "materials" if isinstance(item, Material) else "contacts"
+        for key in list_default_keys(case, item):
+            word, unit, name, reason = DECIDING_VALUES[section][key]
+            words = f"{word} {getattr(item, key) / unit:g}{name}"
+            yield Default(item.name, words, f"{section}.{format_key(item.name)}.{key}", reason)
+
+
+def _list_settings(case: Case) -> Iterator[Default]:
+    """List the default settings of motion, damping, criteria and model."""
+    analysis, criteria = case.analysis, case.analysis.failure_criteria
+    if case.has_motion:
+        if _has_default_vertical(case):
+            words = "vertical motion 2/3 of the horizontal"
+            key, reason = "motion.synthetic.vertical_ratio", "the classical ratio of the peaks"
+            yield Default("", words, key, reason)
+        if analysis.damping is None:
+            reason = 'friction and impacts alone dissipate; "effective" adds 5 %'
+            yield Default("", "no damping", "analysis.damping", reason)
+    given = case.settings.get("criteria", {})
+    if "hinge" not in given:
+        reason = "8 % short of the edge, as in Demirel and Aldemir (2021)"
+        yield Default("", f"hinge at |e| {criteria.hinge:g}", "criteria.hinge", reason)
+    if "failures" not in given:
+        words, reason = f"mechanism of {criteria.failures} joints", "Heyman (1966): four hinges"
+        yield Default("", words, "criteria.failures", reason)
+    reasons = {
+        "fidelity": 'elastic blocks, all nodes; "rigid" is quicker, and blocks have no mesh',
+        "displacements": 'equilibrium where the blocks stood; "large" follows slips and falls',
+    }
+    for key, reason in reasons.items():
+        if key not in case.settings.get("model", {}):
+            yield Default("", f"{key} '{getattr(analysis, key)}'", f"model.{key}", reason)
+
+
 def describe_defaults(case: Case) -> str:
     """Describe the deciding values that a case does not give; empty if it gives all."""
-    structure, analysis = case.structure, case.analysis
-    items = dict.fromkeys(
-        [block.material for block in structure.blocks]
-        + [joint.contact for joint in structure.joints]
-    )
-    texts = []
-    for item in items:
-        section = DECIDING_VALUES["materials" if isinstance(item, Material) else "contacts"]
-        values = []
-        for key in list_default_keys(case, item):
-            word, unit, name = section[key]
-            values.append(f"{word} {getattr(item, key) / unit:g}{name}")
-        texts += [f"'{item.name}' {', '.join(values)}"] if values else []
-    if case.has_motion:
-        texts += ["vertical motion 2/3 of the horizontal"] if _has_default_vertical(case) else []
-        texts += [] if analysis.damping is not None else ["no damping"]
-    given, criteria = case.settings.get("criteria", {}), analysis.failure_criteria
-    texts += [f"hinge at |e| {criteria.hinge:g}"] if "hinge" not in given else []
-    texts += [f"mechanism of {criteria.failures} joints"] if "failures" not in given else []
-    for key in ("fidelity", "displacements"):
-        if key not in case.settings.get("model", {}):
-            texts.append(f"{key} '{getattr(analysis, key)}'")
+    texts: list[str] = []
+    # values of one material or contact stand together behind its name
+    for subject, group in groupby(list_defaults(case), lambda each: each.subject):
+        words = [each.words for each in group]
+        texts += [f"'{subject}' {', '.join(words)}"] if subject else words
     return f"defaults, where the case gives no value: {'; '.join(texts)}" if texts else ""
+
+
+def explain_defaults(case: Case) -> str:
+    """Explain each default in a line: its key, its value, and where it is from."""
+    lines = [f"  {each.key}: {each.words}: {each.reason}" for each in list_defaults(case)]
+    return "\n".join(["defaults, which the case may give instead:", *lines]) if lines else ""
 
 
 def _has_default_vertical(case: Case) -> bool:

@@ -1,11 +1,11 @@
-"""Example cases that are installed with archfem."""
+"""Example cases that are installed with archfem, and commented cases to begin with."""
 
 import re
 import shutil
 import tomllib
 from pathlib import Path
 
-from archfem._files import create_result_folder
+from archfem._files import atomic_write, create_result_folder
 from archfem.errors import InvalidInput
 
 
@@ -49,6 +49,20 @@ def copy_example(name: str, folder: Path) -> list[Path]:
     for file, copy in zip(files, copies, strict=True):
         shutil.copyfile(file, copy)
     return copies
+
+
+def list_new_cases() -> dict[str, Path]:
+    """Return the commented cases to begin with, by the kind of structure."""
+    return {path.stem: path for path in sorted(Path(__file__).with_name("new").glob("*.toml"))}
+
+
+def write_new_case(kind: str, path: Path, schema: Path) -> None:
+    """Write a commented case that runs, which names its JSON schema for editors."""
+    if path.exists():
+        raise InvalidInput(f"{path} is there already: name another file with --out")
+    text = list_new_cases()[kind].read_text(encoding="utf-8")
+    with atomic_write(path) as draft:
+        draft.write_text(f"#:schema {schema.resolve().as_uri()}\n{text}", encoding="utf-8")
 
 
 def _example_path(name: str) -> Path:

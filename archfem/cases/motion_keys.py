@@ -23,15 +23,33 @@ from archfem.motion.record_selection import RecordSelection
 from archfem.motion.suite import Suite
 
 
-def parse_motion(table: Any, section: str = "motion") -> dict[str, Any]:
-    """Return the checked keys of one motion."""
+def source_keys() -> dict[str, Any]:
+    """Return the keys of the source of a component: a file, samples, or synthetic."""
     source = declared_keys(Motion.read) | {"synthetic": dict, "samples": ["m/s**2"]}
     source["file"] = source.pop("path")
     for component in ("vertical", "transverse"):  # which has a source of its own, or is not felt
         del source[component]
+    return source
+
+
+def motion_keys() -> dict[str, Any]:
+    """Return the keys of one motion."""
     own = declared_keys(Motion.cut) | {"vertical": (str, dict), "resample": "s"}
-    own |= {"scale": "1", "reversed": bool}
-    settings = _parse_source(table, source | own, section)
+    return source_keys() | own | {"scale": "1", "reversed": bool}
+
+
+def suite_keys() -> dict[str, Any]:
+    """Return the keys of [suite]."""
+    keys = declared_keys(Suite) | {"pairs": dict, "folder": str, "target": dict}
+    keys |= {"matched": bool, "reversed": bool}
+    del keys["matches"]  # results of matching
+    return keys
+
+
+def parse_motion(table: Any, section: str = "motion") -> dict[str, Any]:
+    """Return the checked keys of one motion."""
+    source = source_keys()
+    settings = _parse_source(table, motion_keys(), section)
     if isinstance(settings.get("vertical"), dict):
         vertical = _parse_source(settings["vertical"], source, f"{section}.vertical")
         if "vertical_ratio" in vertical.get("synthetic", {}):
@@ -83,10 +101,7 @@ def write_motion(motion: Any) -> dict[str, Any]:
 
 def parse_suite(table: Any) -> dict[str, Any]:
     """Return the checked keys of a suite."""
-    keys = declared_keys(Suite) | {"pairs": dict, "folder": str, "target": dict}
-    keys |= {"matched": bool, "reversed": bool}
-    del keys["matches"]  # results of matching
-    settings = check_table(table, keys, "suite")
+    settings = check_table(table, suite_keys(), "suite")
     pairs = settings.get("pairs", {})
     if not pairs:
         raise InvalidInput(

@@ -77,13 +77,14 @@ def _hash_modules() -> str:
 
 
 def hash_inputs(settings: Table, folder: Path = Path()) -> str:
-    """Return the SHA-256 of a case, its input files and the program."""
+    """Return the SHA-256 of a case but for who signs it, its input files and the program."""
     files = [(path.name, hash_file(path)) for path in list_input_files(settings, folder)]
     files += _package_versions(settings)
     # Names without folders: a case that is moved with its files stays the same.
     # Keys are sorted, but the order of arches and piers is their order in the bridge.
     order = _tables_within(settings.get("structure"))
-    text = json.dumps([describe_version(), settings, files, order], sort_keys=True, default=str)
+    counted = {key: value for key, value in settings.items() if key != "report"}
+    text = json.dumps([describe_version(), counted, files, order], sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._files import align_columns
-from archfem.cases.defaults import describe_defaults
+from archfem.cases.defaults import describe_defaults, explain_defaults
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import Ending, History
@@ -157,9 +157,13 @@ def tabulate_matches(matches: Sequence[Match]) -> ResultTable:
     return ResultTable(head, rows)
 
 
-def describe_dead_load(result: DeadLoadResult) -> str:
-    """Describe size and fidelity of the model, and the use of joints and blocks at rest."""
+def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
+    """Describe size and fidelity of the model, and the use of joints and blocks at rest.
+
+    Defaults are named in one line, or explained in a line each.
+    """
     model, structure = result.dead.model, result.case.structure
+    defaults = explain_defaults if explain else describe_defaults
     joints = assessed_joints(result.dead.joints)
     lines = [
         f"model: {model.fidelity}, {len(structure.free)} blocks, {len(structure.joints)} joints, "
@@ -171,7 +175,7 @@ def describe_dead_load(result: DeadLoadResult) -> str:
         f"V/N ≤ {float(joints['friction'].max()):.3f}, "
         f"N ≥ {float(joints['N'].min()) / kN:.2f} kN"
     )
-    lines += filter(None, [structure.assessment, describe_defaults(result.case)])
+    lines += filter(None, [structure.assessment, defaults(result.case)])
     if result.strength_use is not None:
         lines.append(f"dead load: {strength_use_text(result.strength_use)}")
     return "\n".join([*lines, *(f"in doubt: {doubt}" for doubt in result.doubts)])

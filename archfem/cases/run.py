@@ -136,7 +136,8 @@ class DeadLoadResult:
     def softened(self) -> tuple[Analysis, Equilibrium] | None:
         """Analysis and dead load with the compliance of rigid blocks in their joints, or None."""
         structure = self.case.structure
-        if self.dead.model.fidelity != "rigid" or structure.has_own_laws:
+        stiffens = any(joint.contact.closure is not None for joint in structure.joints)
+        if self.dead.model.fidelity != "rigid" or structure.has_own_laws or stiffens:
             return None
         return self._changed(structure=soften_joints(structure))
 

@@ -67,25 +67,37 @@ def cached_structure(settings: Table, folder: Path = Path(), max_cached: int = 8
     return _recent_structures[key]
 
 
-def build_structure(settings: Table, folder: Path = Path()) -> Structure:
-    """Build the structure of a case."""
+def list_shapes() -> dict[str, Callable[..., Structure]]:
+    """Return the function of each shape of [structure], whose arguments are its keys."""
     shapes = (
         *(rings.circular_arch, rings.pointed_arch, rings.elliptical_arch, rings.flat_arch),
         *(rings.arch_along, bridges.buttressed_arch, bridges.arcade, rings.column),
         *(rings.arch_on_piers, bridges.bridge),
     )
-    functions = {shape.__name__: shape for shape in shapes} | {"outlines": surveyed}
-    table = settings.get("structure", {})
-    name = check_choice(table.get("shape"), (*functions, "blocks"), "structure.shape")
+    return {shape.__name__: shape for shape in shapes} | {"outlines": surveyed, "blocks": assembled}
+
+
+def shape_keys(name: str) -> dict[str, Any]:
+    """Return the keys of [structure] for a shape."""
+    keys = {**keys_of_part(list_shapes()[name]), "shape": str, "fill": dict}
     if name == "blocks":
-        return _read_blocks(settings)
-    keys = {**_keys_of(functions[name]), "shape": str, "fill": dict}
-    if name == "bridge":  # whose parts are tables by name
+        keys["material"] = str
+        del keys["name"], keys["fill"]  # the name is that of the case
+    elif name == "bridge":  # whose parts are tables by name
         keys |= dict.fromkeys(BRIDGE_PARTS, dict)
     elif name == "outlines":
         keys["file"] = keys.pop("path")
         del keys["materials"]  # which are those of the case
-    values = check_table(table, keys, "structure")
+    return keys
+
+
+def build_structure(settings: Table, folder: Path = Path()) -> Structure:
+    """Build the structure of a case."""
+    table, functions = settings.get("structure", {}), list_shapes()
+    name = check_choice(table.get("shape"), functions, "structure.shape")
+    if name == "blocks":
+        return _read_blocks(settings)
+    values = check_table(table, shape_keys(name), "structure")
     del values["shape"]
     fill = values.pop("fill", {})
     values = _resolve_names(functions[name], values, settings)
@@ -101,16 +113,21 @@ def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     return _divide_fill(structure, fill)
 
 
-def _keys_of(declaration: Callable[..., Any]) -> dict[str, Any]:
+def fill_keys() -> dict[str, Any]:
+    """Return the keys of structure.fill."""
+    keys = {**declared_keys(jointed_fill), "law": str}
+    del keys["structure"]
+    return keys
+
+
+def keys_of_part(declaration: Callable[..., Any]) -> dict[str, Any]:
     """Return the keys of a shape or part, where materials and contacts are names of tables."""
     return declared_keys(declaration, named=(Material, Contact))
 
 
 def _read_blocks(settings: Table) -> Structure:
     """Return a structure whose blocks and joints are listed; without joints these are found."""
-    keys = _keys_of(assembled) | {"shape": str, "material": str}
-    del keys["name"]  # that of the case
-    values = check_table(settings["structure"], keys, "structure")
+    values = check_table(settings["structure"], shape_keys("blocks"), "structure")
     shared = {"material": values.pop("material", "stone")}
     contact = values.pop("contact", "stone to stone")
     del values["shape"]
@@ -131,15 +148,13 @@ def _read_part(
     cls: Callable[..., Described], table: Table, section: str, settings: Table
 ) -> Described:
     """Return a block, joint or part of a bridge of a table."""
-    values = check_table(table, _keys_of(cls), section)
+    values = check_table(table, keys_of_part(cls), section)
     return _call(cls, section, **_resolve_names(cls, values, settings))
 
 
 def _divide_fill(structure: Structure, table: Table) -> Structure:
     """Divide the backfill of a structure into pieces, if the case says so."""
-    keys = {**declared_keys(jointed_fill), "law": str}
-    del keys["structure"]
-    fill = check_table(table, keys, "structure.fill")
+    fill = check_table(table, fill_keys(), "structure.fill")
     law = check_choice(fill.pop("law", "elastic"), ("elastic", "jointed"), "structure.fill.law")
     if law == "elastic":
         if fill:
@@ -180,7 +195,7 @@ def _outline_arguments(values: dict[str, Any], settings: Table, folder: Path) ->
     drawn["path"] = folder / drawn.pop("file")
     if "layers" in drawn:
         drawn["layers"] = {
-            name: Layer(**check_table(table, _keys_of(Layer), f"structure.layers.{name}"))
+            name: Layer(**check_table(table, keys_of_part(Layer), f"structure.layers.{name}"))
             for name, table in drawn["layers"].items()
         }
     # Stone and backfill have a contact of their own unless the case names another.
@@ -202,7 +217,7 @@ def _build_parts(part: Callable[..., Described], table: Table, section: str) -> 
         raise InvalidInput(
             f'{section} names no part: write a table [{section}."its name"] for each'
         )
-    keys = _keys_of(part)
+    keys = keys_of_part(part)
     del keys["name"]  # that of its table
     common = check_table({k: v for k, v in table.items() if k not in subtables}, keys, section)
     parts = []

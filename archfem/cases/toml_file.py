@@ -173,15 +173,15 @@ def format_tables(tables: Table, path: tuple[str, ...] = ()) -> str:
     """Return tables as TOML, one line for each value and for each table of a list."""
     own = {key: value for key, value in tables.items() if not isinstance(value, Mapping)}
     lines = [
-        f"{_format_key(key)} = {_format_value(value, rows=True)}\n" for key, value in own.items()
+        f"{format_key(key)} = {_format_value(value, rows=True)}\n" for key, value in own.items()
     ]
     if path and (own or not tables):
-        lines.insert(0, f"[{'.'.join(map(_format_key, path))}]\n")
+        lines.insert(0, f"[{'.'.join(map(format_key, path))}]\n")
     inner = [format_tables(tables[key], (*path, key)) for key in tables if key not in own]
     return "\n".join(["".join(lines)] * bool(lines) + inner)
 
 
-def _format_key(key: str) -> str:
+def format_key(key: str) -> str:
     """Return a key, in quotes where it is not bare."""
     return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _format_value(key)
 
@@ -193,7 +193,7 @@ def _format_value(value: Any, rows: bool = False) -> str:
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, Mapping):
-        items = [f"{_format_key(key)} = {_format_value(each)}" for key, each in value.items()]
+        items = [f"{format_key(key)} = {_format_value(each)}" for key, each in value.items()]
         return f"{{ {', '.join(items)} }}" if items else "{}"
     if isinstance(value, list | tuple):
         items = [_format_value(each) for each in value]

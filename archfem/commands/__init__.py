@@ -1,9 +1,10 @@
 """Command line: arguments, exit codes and printed results.
 
-    cli    argument parser, exit codes
-    run    run, check, modes, mesh, accuracy, report, motion, compile
-    study  study
-    tools  animate, examples, example, doctor
+    cli     argument parser, exit codes
+    run     run, modes, mesh, accuracy, report, motion, compile
+    schema  JSON schema of case files
+    study   study
+    tools   check, animate, examples, example, new, schema, doctor
 
 Imports all rooms. Start reading at `cli`.
 """

@@ -1,4 +1,4 @@
-"""Commands check, animate, examples, example and doctor: they write no folder of results.
+"""Commands check, animate, examples, example, new, schema and doctor, without result folders.
 
 The module does not import drawing, so that `archfem check` starts at once.
 """
@@ -18,7 +18,7 @@ from archfem import _numba, _optional
 from archfem._files import path_inside, read_listed
 from archfem.cases import result_text
 from archfem.cases.case import Case
-from archfem.cases.examples import copy_example, list_example_titles, read_example
+from archfem.cases.examples import copy_example, list_example_titles, read_example, write_new_case
 from archfem.cases.run import HISTORY_FILE, DeadLoadResult, dead_load_of_case
 from archfem.commands.cli import ExitCode
 from archfem.dynamics.history import History
@@ -37,7 +37,7 @@ def check(options: argparse.Namespace) -> int:
     # Unreadable records are errors before the dead load is computed.
     case.check_ground()
     at_rest = DeadLoadResult.of(case)
-    print(result_text.describe_dead_load(at_rest))
+    print(result_text.describe_dead_load(at_rest, explain=True))
     if case.suite is not None:
         print_motions(case.ground_suite())
     elif case.motion is not None:
@@ -138,6 +138,18 @@ class Diagnosis(NamedTuple):
     item: str
     state: str
     remedy: str = ""  # empty if all is well
+
+
+def new(options: argparse.Namespace) -> None:
+    """Write a commented case to begin with."""
+    path = Path(options.out or f"{options.kind}.toml")
+    write_new_case(options.kind, path, Path(__file__).with_name("case.schema.json"))
+    print(f"wrote {path}: `archfem check {path}` reads it, `archfem run {path} --out DIR` runs it")
+
+
+def schema(options: argparse.Namespace) -> None:
+    """Print the JSON schema of case files."""
+    print(import_module("archfem.commands.schema").format_schema(), end="")
 
 
 def doctor(options: argparse.Namespace) -> None:

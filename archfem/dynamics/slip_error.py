@@ -54,6 +54,11 @@ class SlipError:
         compliance = (1.0 / masses[structure.pairs[self.joints]]).sum(axis=1)
         self._acceleration = 2.0 * self._least * compliance
         self._motion, self._end = motion, float(first.times[-1])
+        rows = [row for row in (motion.horizontal, motion.vertical) if row is not None]
+        steepest = sum(np.abs(np.diff(row)).max(initial=0.0) for row in rows)
+        self._largest_slope = float(steepest) / motion.dt / structure.gravity  # [g/s]
+        # after its last sample a component jumps to zero
+        self._jumps = motion.dt * (np.array([len(row) for row in rows]) - 1)
         # times at the middle of the last two steps [s], and their V/N and margins
         self._middles, self._rows = np.zeros(0), np.zeros((0, 2, len(self.joints)))
 
@@ -66,9 +71,16 @@ class SlipError:
         # a step slides where it, or one of the two before, reaches the limit
         margins = np.concatenate([rows[:1, 1], rows[:1, 1], rows[:, 1]])
         margins = np.minimum(np.minimum(margins[2:], margins[1:-1]), margins[:-2])[-len(lengths) :]
-        squares = np.square(lengths)[:, None]
-        variation = np.maximum(squares * np.abs(bends) / 6.0, self._vary_ground(batch, lengths))
-        excess = np.maximum(variation - np.maximum(margins, 0.0), 0.0)
+        margins, squares = np.maximum(margins, 0.0), np.square(lengths)[:, None]
+        variation = squares * np.abs(bends) / 6.0
+        # elsewhere the ground cannot vary as much within a step as V lacks to its limit
+        near = margins.min(axis=1, initial=np.inf) < self._largest_slope * lengths
+        for jump in self._jumps:
+            near |= (batch.times - lengths <= jump) & (jump <= batch.times)
+        if near.any():
+            ground = self._vary_ground(batch.times[near], lengths[near])
+            variation[near] = np.maximum(variation[near], ground)
+        excess = np.maximum(variation - margins, 0.0)
         errors: Array = 0.5 * squares * self._acceleration * excess
         return errors
 
@@ -87,11 +99,11 @@ class SlipError:
         pressed = np.maximum(normal, self._least)
         return np.stack([shear / pressed, (limit - np.abs(shear)) / pressed], axis=1)
 
-    def _vary_ground(self, batch: Batch, lengths: Array) -> Array:
-        """Return by how much the ground's acceleration leaves its mean in steps (steps, 1) [g]."""
+    def _vary_ground(self, ends: Array, lengths: Array) -> Array:
+        """Return by how much the ground's acceleration leaves its mean in steps (k, 1) [g]."""
         count = max(1, int(np.ceil(lengths.max() / self._motion.dt - 1e-9)))
         back = lengths[:, None] * np.linspace(1.0, 0.0, count + 1)
-        ground = self._motion.at((batch.times[:, None] - back).ravel())
+        ground = self._motion.at((ends[:, None] - back).ravel())
         ground = ground.reshape(len(lengths), count + 1, 2)
         mean = 0.5 * (ground[:, 1:] + ground[:, :-1]).mean(axis=1, keepdims=True)
         largest: Array = np.linalg.norm(ground - mean, axis=2).max(axis=1, keepdims=True)

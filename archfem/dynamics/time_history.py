@@ -267,8 +267,9 @@ def _run_steps(
 ) -> tuple[Ending, str]:
     """Record steps up to an event or the end of the motion; return how and why the run ended."""
     start = recorder.state
-    duration, begun = round(end - start.time, 4), monotonic()
-    is_announced = False
+    duration, is_announced = round(end - start.time, 4), False
+    # the pace is that after the first batch, which may wait for compilation
+    begun = since = 0.0
     with tqdm(total=duration, unit="s", disable=None, leave=False) as bar:
         for batch in batches:
             ending, reason, size = _find_end(monitors, batch, recorder.state.time)
@@ -277,10 +278,12 @@ def _run_steps(
             bar.update(round(recorder.state.time - start.time - bar.n, 4))
             if reason is not None:
                 return ending, f"ended at {recorder.state.time:.4g} s by {reason}"
-            spent = monotonic() - begun
-            if not is_announced and spent > 5.0:
+            if not begun:
+                begun, since = monotonic(), recorder.state.time
+            spent, done = monotonic() - begun, recorder.state.time - since
+            if not is_announced and spent > 5.0 and done > 0.0:
                 is_announced = True
-                _announce_long_run(spent, recorder.state.time - start.time, duration)
+                _announce_long_run(spent, done, duration)
     return Ending.FINISHED, "reached the end of the motion"
 
 

@@ -7,7 +7,8 @@ only compression across, and an elastic traction limited by Coulomb friction alo
 
 with s_p the irreversible slip. The law is written with arithmetic and `abs` alone, so that one
 definition serves numbers, NumPy arrays and UFL expressions; derivatives, which UFL finds by itself,
-are for arrays only. `large.point_law` is its compiled twin.
+are for arrays only. `large.point_law` is its compiled twin. Joints that stiffen as they close have
+`closing_traction` across; its integrals and means over a step are compiled, in `large.closing_law`.
 
 Over a step opening and slip are linear in time, and tractions are averaged along this path. The
 work of the mean traction is the change of the stored energy, wherever the joint opens or closes on
@@ -34,6 +35,11 @@ ZERO_DIVISION_GUARD = 1e-300
 # nothing exceeds it and every derivative is elastic; infinity would make differences no number.
 NO_LIMIT = 1e300
 
+# Closing over δ_m at which the hyperbola ends and its tangent goes on, so that any closing has a
+# finite traction [-]. The traction is 49 k_n δ_m there, and the tangent 2500 k_n: faces that stiff
+# are closed to any program.
+LARGEST_CLOSING = 0.98
+
 # Excess over Coulomb's limit, relative to it, that counts as round-off of a point that holds [-]
 SLIP_LIMIT_TOLERANCE = 1e-9
 
@@ -58,12 +64,15 @@ class ContactLaw(NamedTuple):
     cohesion: Any  # c [Pa]
     # limit of the shear also where open: `NO_LIMIT` of joints that never slide, else 0 [Pa]
     resistance: Any = 0.0
+    closing_rate: Any = 0.0  # 1 / δ_m of joints that stiffen as they close, else 0 [1/m]
 
     @classmethod
     def of(cls, contact: Any) -> "ContactLaw":
         """Return the law of an object with parameters of a contact; others have their defaults."""
         defaults = cls._field_defaults
         law = cls(*(getattr(contact, name, defaults.get(name)) for name in cls._fields))
+        if (closure := getattr(contact, "closure", None)) is not None:
+            law = law._replace(closing_rate=1.0 / closure)
         held = law._replace(friction=0.0, cohesion=0.0, resistance=NO_LIMIT)
         return law if law.friction < inf else held
 
@@ -79,6 +88,24 @@ class ContactLaw(NamedTuple):
     def normal_traction(self, opening: Any) -> Any:
         """Return the traction across a joint that closes elastically and opens freely [Pa]."""
         return self.normal_stiffness * negative_part(opening)
+
+    def closing_traction(self, opening: Any) -> Any:
+        """Return the traction across a joint that stiffens as it closes [Pa]."""
+        share, beyond = self._closing_shares(opening)
+        pressure = share / (1.0 - share) + beyond / (1.0 - LARGEST_CLOSING) ** 2
+        return -self.normal_stiffness / self.closing_rate * pressure
+
+    def closing_energy(self, opening: Any, logarithm: Callable[[Any], Any]) -> Any:
+        """Return the energy of `closing_traction` for each area, with a function ln [J/m²]."""
+        (share, beyond), left = self._closing_shares(opening), 1.0 - LARGEST_CLOSING
+        energy = -logarithm(1.0 - share) - share
+        energy += beyond * (LARGEST_CLOSING / left + 0.5 * beyond / left**2)
+        return self.normal_stiffness / self.closing_rate**2 * energy
+
+    def _closing_shares(self, opening: Any) -> tuple[Any, Any]:
+        """Return the closing over δ_m up to `LARGEST_CLOSING`, and its rest beyond [-]."""
+        beyond = -negative_part(LARGEST_CLOSING + self.closing_rate * opening)
+        return -self.closing_rate * negative_part(opening) - beyond, beyond
 
     def normal_tangent(self, opening: Array) -> Array:
         """Return the derivative of `normal_traction` [Pa/m]."""

@@ -4,6 +4,9 @@ Two integrations of the traction across the joint have the same methods. `Spring
 quadrature point a spring, f = W t. `Facets` integrates the traction exactly along facets with
 linear opening. Along the joint every point is a spring in both.
 
+Joints that stiffen as they close press by the linear law and an excess, which `large.closing_law`
+integrates: exactly along facets at an instant, and so that it conserves energy over a step.
+
 Dilatancy and tensile bonds shift the gap of the normal law. Dilatancy, by saw teeth of the angle ψ,
 opens a joint by tan ψ |s_p|. An intact bond reaches its tensile strength f_t at the gap
 g_t = f_t / k_n, and
@@ -31,6 +34,7 @@ from archfem.joints.contact_law import (
     contact_fraction_rate,
     is_closed,
 )
+from archfem.joints.large.closing_law import excess_energies, sum_excess
 from archfem.joints.quadrature import JointPoints, Numbers, Quadrature
 
 
@@ -80,6 +84,14 @@ class NormalLaw(ABC):
         """Area of each facet or spring (f,) [m²]."""
         return self.points.weight.reshape(-1, self.end_count).sum(axis=1)
 
+    def _excess(self, start: Array, end: Array, rates: tuple[float, float]) -> tuple[Array, Array]:
+        """Return means over a step of excess tensions (p,) [N], and derivatives (m,) [N/m]."""
+        contact, count = self.contact, self.end_count
+        parameters = np.array(contact.normal_stiffness), np.array(contact.closing_rate)
+        means, pairs = sum_excess(*parameters, -start, -end, rates, count)
+        area = self.area
+        return -(area[:, None] * means).ravel(), np.asarray(area * pairs).ravel()
+
     @abstractmethod
     def divide(self, *gaps: Array) -> Places:
         """Return the places of integration, from gaps of the points (p,)."""
@@ -92,12 +104,18 @@ class NormalLaw(ABC):
         """Return `forces`, and the closed area distributed to the points (p,) [N, m²]."""
         places = self.divide(opening)
         traction, closed = self.contact.normal_traction(*places.gaps), is_closed(*places.gaps)
-        return places.integrate(traction), places.integrate(closed.astype(float))
+        forces = places.integrate(traction)
+        if self.points.stiffens:
+            forces = forces + self._excess(opening, opening, (1.0, 1.0))[0]
+        return forces, places.integrate(closed.astype(float))
 
     def stiffness(self, opening: Array) -> Array:
         """Return the derivative of `forces` for each of `coupling_pairs` (m,) [N/m]."""
         places = self.divide(opening)
-        return places.integrate_products(self.contact.normal_tangent(*places.gaps))
+        tangent = places.integrate_products(self.contact.normal_tangent(*places.gaps))
+        # at an instant the means over a step follow half of each gap
+        stiffens = self.points.stiffens
+        return tangent + self._excess(opening, opening, (1.0, 1.0))[1] if stiffens else tangent
 
     @property
     def closed_stiffness(self) -> Array:
@@ -107,23 +125,38 @@ class NormalLaw(ABC):
     def energies(self, opening: Array) -> Array:
         """Return the energies stored across the joints, distributed to the points (p,) [J]."""
         places = self.divide(opening)
-        return places.integrate(self.contact.normal_energy(*places.gaps))
+        energies = places.integrate(self.contact.normal_energy(*places.gaps))
+        return energies + self._excess_energies(opening) if self.points.stiffens else energies
+
+    def _excess_energies(self, opening: Array) -> Array:
+        """Return the energies in excess of the linear law, in equal parts to the ends (p,) [J]."""
+        contact, count = self.contact, self.end_count
+        parameters = np.array(contact.normal_stiffness), np.array(contact.closing_rate)
+        energies = self.area * excess_energies(*parameters, -opening, count)
+        return np.repeat(energies / count, count)
 
     def contact_area_rate(self, opening: Array) -> Array:
         """Return the derivative of the closed area for each of `coupling_pairs` (m,) [m]."""
         return np.zeros_like(opening)
 
-    def step_means(self, start: Array, end: Array) -> tuple[Array, Array]:
-        """Return the means over a step of `forces_and_area`, each (p,) [N, m²]."""
+    def step_means(self, start: Array, end: Array, lag: float = 0.0) -> tuple[Array, Array]:
+        """Return the means over a step of `forces_and_area`, each (p,) [N, m²].
+
+        Gaps at both ends contain their change times the lag of damping.
+        """
         places = self.divide(start, end)
         traction = self.contact.mean_normal_traction(*places.gaps)
-        return places.integrate(traction), places.integrate(contact_fraction(*places.gaps))
+        forces = places.integrate(traction)
+        if self.points.stiffens:
+            forces = forces + self._excess(start, end, (lag, 1.0 + lag))[0]
+        return forces, places.integrate(contact_fraction(*places.gaps))
 
     def mean_stiffness(self, start: Array, end: Array, rates: tuple[float, float]) -> Array:
         """Return the derivative of the mean force by a parameter, as `stiffness` (m,) [N/m]."""
         places = self.divide(start, end)
         before, after = places.gaps
-        return places.integrate_products(self.contact.mean_normal_tangent(before, after, rates))
+        tangent = places.integrate_products(self.contact.mean_normal_tangent(before, after, rates))
+        return tangent + self._excess(start, end, rates)[1] if self.points.stiffens else tangent
 
     def mean_area_rate(self, start: Array, end: Array, rates: tuple[float, float]) -> Array:
         """Return the derivative of the mean area by a parameter (m,) [m]."""

@@ -167,6 +167,11 @@ class JointPoints:
         return self.dilatancy is None and self.tension is None and not self.has_own_laws
 
     @cached_property
+    def stiffens(self) -> bool:
+        """Whether any joint stiffens as it closes."""
+        return bool(self.contact.closing_rate.any())
+
+    @cached_property
     def slides(self) -> NDArray[np.bool_]:
         """Whether each point can slide (p,)."""
         return np.asarray(self.contact.resistance == 0.0)

@@ -55,7 +55,7 @@ class StepForces:
 
     def _means(self, q: Array) -> tuple[Array, Array, Array, Array]:
         """Return mean normal force, mean shear, Coulomb's limit, shear lost by slip (p,)."""
-        normal, closed = self.operator.law.step_means(*self._gap_path(q))
+        normal, closed = self.operator.law.step_means(*self._gap_path(q), self.damping_lag)
         limit = self.operator.coulomb_limit(normal, closed)
         shear, lost = shear_over_step(*self._shear_path(q), self.damping_lag, limit)
         return normal, shear, limit, lost

@@ -24,7 +24,7 @@ from archfem.errors import InvalidInput
 from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
-from archfem.masonry.loads import BodyForce, PointLoad
+from archfem.masonry.loads import Action, BodyForce, PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 from archfem.units import in_degrees
@@ -427,16 +427,18 @@ class BlocksWithFill:
         forces = part[:, None] * np.array(load.force)
         return self._sum_forces(self.rigid_regions.place[block], points, forces)
 
-    def warn_of_sliding_fill(self, actions: Sequence[BodyForce | PointLoad], factor: float) -> None:
+    def warn_of_sliding_fill(
+        self, live: Sequence[Action], dead: Sequence[Action], factor: float
+    ) -> None:
         """Warn where a fill without cohesion would slide before the stones become a mechanism."""
-        pulls = [action for action in actions if isinstance(action, BodyForce)]
         if self.fill is None or self.fill.cohesion > 0.0:
             return
+        grown = np.array(sum_body_forces(dead)) + factor * np.array(sum_body_forces(live))
         # A column rests on the next layer by friction alone: it slides where the horizontal pull
         # exceeds tan φ times the vertical force.
         slope = tan(radians(self.fill.friction_angle))
-        sideways = factor * abs(sum(pull.horizontal for pull in pulls))
-        if sideways > slope * (1.0 - factor * sum(pull.vertical for pull in pulls)):
+        sideways = abs(float(grown[0]))
+        if sideways > slope * (1.0 - grown[1]):
             logger.warning(
                 "at a factor of %.4g the fill itself slides, at %.3g g sideways and tan φ = %.3g: "
                 "the factor is that of the stones alone, and no fill would stay to load them so",
@@ -486,6 +488,12 @@ class BlocksWithFill:
     def _sum_forces(self, block: Numbers, points: Array, forces: Array) -> Array:
         """Return the sum of the generalised forces of forces at points (3 n_free,)."""
         return np.asarray(self._apply_forces(block, points, forces).sum(axis=0)).ravel()
+
+
+def sum_body_forces(actions: Sequence[Action]) -> tuple[float, float]:
+    """Return the sum of the body forces among actions, along x and y [g]."""
+    pulls = [action for action in actions if isinstance(action, BodyForce)]
+    return sum(pull.horizontal for pull in pulls), sum(pull.vertical for pull in pulls)
 
 
 def hold_backed(structure: Structure, level: float | None) -> Structure:
@@ -539,25 +547,34 @@ def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
     return BlocksWithFill(structure, fill, regions)
 
 
-def check_options(structure: Structure, friction: str | None, strength: float | None) -> None:
-    """Refuse unknown options, and joints with tensile strength, which break and do not yield."""
-    check_choice(friction, "friction", ("coulomb", "nonassociated", None))
-    if strength is not None and not check_number(strength, "strength [Pa]") > 0.0:
-        raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
+def refuse_bonds(structure: Structure) -> None:
+    """Refuse joints with tensile strength, which break and do not yield."""
     if structure.tension.any():
         raise InvalidInput(
-            f"joints have a tensile strength of {structure.tension.max():.3g} Pa: limit analysis "
-            "is for joints that yield, and bonds break; for the safe answer without them give "
-            "Contact(tension=0.0, cohesion=0.0), with them follow a pushover"
+            f"joints have a tensile strength of {structure.tension.max():.3g} Pa: this analysis is "
+            "for joints that yield, and bonds break; for the safe answer without them give "
+            "Contact(tension=0.0, cohesion=0.0); collapse_factor lets bonds yield, a pushover "
+            "breaks them"
         )
 
 
+def check_options(friction: str | None, strength: float | None) -> None:
+    """Refuse unknown options."""
+    check_choice(friction, "friction", ("coulomb", "nonassociated", None))
+    if strength is not None and not check_number(strength, "strength [Pa]") > 0.0:
+        raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
+
+
 def self_weight_programme(
-    structure: Structure, friction: str | None, strength: float | None, fill: Fill | None
+    structure: Structure,
+    friction: str | None,
+    strength: float | None,
+    fill: Fill | None,
+    dead: Sequence[Action] = (),
 ) -> tuple[BlocksWithFill, Programme]:
-    """Return the rigid stones, and the linear programme of their self-weight without objective."""
+    """Return the rigid stones, and the linear programme of self-weight and other dead loads."""
     check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
-    check_options(structure, friction, strength)
+    check_options(friction, strength)
     stones = attach_fill(structure, fill)
     rigid = stones.rigid_regions.structure
     blocks = RigidBlocks(rigid)
@@ -566,15 +583,20 @@ def self_weight_programme(
     if strength is not None:
         # pieces of fill have the strength of their joints, and none of stone
         is_piece = np.array([block.grain for block in rigid.blocks])[rigid.pairs].any(axis=1)
-        crushing = strength * rigid.width * rigid.depths / blocks.force_unit
+        crushing = blocks.crushing_forces(strength)
         crushing = np.where(is_piece, np.inf, crushing)
-    weight = blocks.dimensionless(stones.load([SELF_WEIGHT]) + stones.active_forces())
-    dead = Programme(blocks, weight, coefficient, blocks.cohesion, crushing=crushing)
+    weight = blocks.dimensionless(stones.load([SELF_WEIGHT, *dead]) + stones.active_forces())
+    # Compressions are counted from the plastic tension of bonds on: F + T/2 >= 0 at each end.
+    slope = np.where(np.isfinite(coefficient), coefficient, 0.0)
+    strengths = coefficient, blocks.cohesion - slope * blocks.tension
+    programme = Programme(
+        blocks, weight + blocks.balance @ blocks.bond, *strengths, crushing=crushing
+    )
     if fill is None:
-        return stones, dead
+        return stones, programme
     # further unknowns, 0 to 1: the position of each contact's pressure in its range
     pressures = sparse.diags(-blocks.coordinate_units / blocks.force_unit) @ stones.passive_forces()
-    return stones, dead.with_unknowns(pressures, np.zeros(pressures.shape[1]), 1.0)
+    return stones, programme.with_unknowns(pressures, np.zeros(pressures.shape[1]), 1.0)
 
 
 def is_balanced(fall: Optimum, dead: Programme, tolerance: float = 1e-8) -> bool:

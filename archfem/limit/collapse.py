@@ -27,6 +27,7 @@ from archfem.limit.backfill import (
     Fill,
     check_options,
     is_balanced,
+    refuse_bonds,
     self_weight_programme,
 )
 from archfem.limit.fill_bounds import bound_factor
@@ -85,6 +86,7 @@ class Collapse(ResultDisplay):
         upper: what no state of equilibrium exceeds: the factor itself, with a `PlasticFill` the
             bound from above. `factor` is the bound from below then, and `lower` another name of it.
         live: the growing actions, or the settlement.
+        dead: the actions beside self-weight that do not grow.
         structure: the analysed structure; None where the result was built by hand.
     """
 
@@ -99,6 +101,7 @@ class Collapse(ResultDisplay):
     fill_motion: xr.Dataset | None = None
     upper: float = np.nan
     live: tuple[Action | Settlement, ...] = ()
+    dead: tuple[Action, ...] = ()
     structure: Structure | None = None
 
     def __post_init__(self) -> None:
@@ -146,6 +149,7 @@ def collapse_factor(
     friction: str | None = "coulomb",
     strength: Pascals | None = None,
     fill: Fill | PlasticFill | None = None,
+    dead: Sequence[Action] = (),
 ) -> Collapse:
     """Find the factor at which live actions, over self-weight, make rigid blocks a mechanism.
 
@@ -161,9 +165,11 @@ def collapse_factor(
     Cohesion c (`Contact.cohesion`) acts on the area A of the whole joint, depth times width, and
     not only on its closed part: the factor is an upper estimate where a joint with cohesion opens,
     a warning says so, and `closed_cohesion` reduces it to the closed part of a given state.
-    Joints with tensile strength are refused, since bonds break and do not yield. The dilatancy of
-    contacts plays no part: sliding dilates by μ ("coulomb") or not at all ("nonassociated"), and
-    a warning says so where the latter neglects it.
+    Tensile strength f_t (`Contact.tension`) yields too, over the depth h: F >= -f_t w h/2 at both
+    ends, so that a hinge resists f_t w h²/2 about its edge. Bonds break where such joints yield: a
+    warning says that the factor is an upper estimate. The dilatancy of contacts plays no part:
+    sliding dilates by μ ("coulomb") or not at all ("nonassociated"), and a warning says so where
+    the latter neglects it.
 
     A *settlement* s poses another problem: of all states of equilibrium under self-weight, the
     movement of a support selects the one that resists it least, and the factor is the work of the
@@ -188,13 +194,15 @@ def collapse_factor(
             stones (`Fill`), with those that rest on them, or a plastic continuum (`PlasticFill`),
             for which the result has two bounds; None where there are none, or where they are cut
             into pieces (`jointed_fill`), whose joints have that strength.
+        dead: loads that act beside self-weight and do not grow, such as that of a press.
 
     Returns:
         The factor, the outcome and the mechanism.
 
     Raises:
         InvalidInput: an option is unknown, an action misses the structure, joints have tensile
-            strength, or bodies too soft to be rigid are without the strength of a fill.
+            strength under a settlement, or bodies too soft to be rigid are without the strength of
+            a fill.
         DidNotConverge: the solver of linear programmes gave up.
 
     Note:
@@ -210,14 +218,21 @@ def collapse_factor(
     """
     structure = structure_of(structure)
     loads = live if isinstance(live, Settlement) else list_loads(live)
+    if isinstance(loads, Settlement):
+        refuse_bonds(structure)
+    stays = tuple(list_loads(dead)) if dead != () else ()
     if isinstance(fill, PlasticFill):
-        return _bound_collapse(structure, loads, friction, strength, fill)
-    stones, dead = self_weight_programme(structure, friction, strength, fill)
-    result = _solve_collapse(stones, dead, loads, friction)
+        result = _bound_collapse(structure, loads, stays, friction, strength, fill)
+    else:
+        stones, programme = self_weight_programme(structure, friction, strength, fill, stays)
+        result = _solve_collapse(stones, programme, loads, friction)
+        if result.outcome is Outcome.COLLAPSES and not isinstance(loads, Settlement):
+            stones.warn_of_sliding_fill(loads, stays, result.factor)
     if np.isinf(result.factor):
         warn_locking(structure, friction)
+    warn_bonds(structure, result)
     actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
-    return replace(result, live=actions, structure=structure)
+    return replace(result, live=actions, dead=stays, structure=structure)
 
 
 def stands(
@@ -257,13 +272,15 @@ def stands(
         >>> af.stands(af.circular_arch(radius=1.0, thickness=0.05, embrace=180.0, voussoirs=11))
         False
     """
-    _, dead = self_weight_programme(structure_of(structure), friction, strength, fill)
+    structure = structure_of(structure)
+    refuse_bonds(structure)
+    _, dead = self_weight_programme(structure, friction, strength, fill)
     return is_balanced(dead.minimise_residual(), dead)
 
 
 @validate_arguments
 def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
-    """Restrict the cohesion of joints to the part that is closed in a state.
+    """Restrict the cohesion and tension of joints to the part that is closed in a state.
 
     Limit analysis of the result is that of joints which lose cohesion where they open, in this
     state: give the last one of a pushover, and compare with the limit to which that tends.
@@ -291,7 +308,8 @@ def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
     fractions = contact_fractions(structure, joints["N"].values, joints["M"].values)
     joints_closed = []
     for joint, part in zip(structure.joints, fractions, strict=True):
-        contact = replace(joint.contact, cohesion=joint.contact.cohesion * float(part))
+        bond = {key: getattr(joint.contact, key) * float(part) for key in ("tension", "cohesion")}
+        contact = replace(joint.contact, **bond)
         joints_closed.append(replace(joint, contact=contact))
     return replace(structure, joints=tuple(joints_closed))
 
@@ -341,9 +359,8 @@ def _solve_collapse(
     result = _read_result(stones, programme, bounded, scale * optimum.value, optimum, support)
     result = replace(result, solutions=solutions)
     if not isinstance(live, Settlement):
-        stones.warn_of_sliding_fill(live, result.factor)
         failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
-        if friction is not None:
+        if friction is not None and not structure.tension.any():  # bonds that hold stay closed
             warn_cohesion(structure, tuple(failing), result.joints, result.factor)
     if friction == "coulomb":
         warn_sliding(result.sliding_names, result.factor)
@@ -353,6 +370,7 @@ def _solve_collapse(
 def _bound_collapse(
     structure: Structure,
     live: Settlement | list[Action],
+    dead: Sequence[Action],
     friction: str | None,
     strength: float | None,
     fill: PlasticFill,
@@ -363,8 +381,8 @@ def _bound_collapse(
             "a settlement and a plastic fill: the bounds are of loads that grow; give the fill as "
             "af.limit.Fill, or a load"
         )
-    check_options(structure, friction, strength)
-    bounds = bound_factor(structure, live, friction, strength, fill)
+    check_options(friction, strength)
+    bounds = bound_factor(structure, live, friction, strength, fill, dead)
     lower, upper = bounds.below.factor, bounds.above.factor
     if np.isnan(lower) and not np.isnan(upper):
         raise DidNotConverge(
@@ -388,8 +406,6 @@ def _bound_collapse(
         soil=bounds.contact_stress,
         fill_motion=bounds.fill_motion,
         upper=upper,
-        live=tuple(live),
-        structure=structure,
     )
 
 
@@ -416,7 +432,7 @@ def _read_result(
     elif motion.any():
         motion = motion / blocks.largest_displacement(motion)
     hinges, slides = _find_failing(blocks, regions, motion)
-    joints = _read_joints(stones.whole, blocks, regions, optimum.forces)
+    joints = _read_joints(stones.whole, blocks, regions, optimum.forces - blocks.bond)
     moved, soil = regions.expand_motion(motion), stones.pressure_dataset(optimum.unknowns)
     return Collapse(float(factor), outcome, hinges, slides, joints, moved, soil=soil)
 
@@ -474,6 +490,19 @@ def warn_locking(structure: Structure, friction: str | None) -> None:
             "an infinite factor is that of a fill in pieces which dilates by tan φ as it slides: "
             "it may lock between the stones, as soil does not. Cut smaller pieces, or give "
             "fill=af.limit.Fill(…) for the structure before it was cut"
+        )
+
+
+def warn_bonds(structure: Structure, result: Collapse) -> None:
+    """Warn of failing joints that are held by bonds, which break rather than yield."""
+    failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
+    if bonded := sorted(number for number in failing if structure.tension[number] > 0.0):
+        logger.warning(
+            "%d joints such as '%s' fail by bonds that yield, up to %.3g Pa in tension: bonds are "
+            "brittle and break one after the other, so that the factor %.4g is an upper estimate; "
+            "a pushover breaks them, and without tension and cohesion the factor is safe",
+            *(len(bonded), structure.joints[bonded[0]].name, structure.tension.max()),
+            result.upper,
         )
 
 

@@ -33,7 +33,7 @@ from scipy import sparse
 
 from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.limit.backfill import SELF_WEIGHT, BlocksWithFill, Fill, hold_backed
+from archfem.limit.backfill import SELF_WEIGHT, BlocksWithFill, Fill, hold_backed, sum_body_forces
 from archfem.limit.cone_programme import Rows, solve_cones
 from archfem.limit.fill_mesh import HELD, SURFACE, FillMesh, mesh_fill
 from archfem.limit.linear_programme import RigidBlocks
@@ -69,6 +69,8 @@ class FilledBlocks:
     regions: RigidRegions  # the stones in the whole structure
     live: Array  # generalised forces on the free stones that grow (3 n_free,) [mean block weights]
     pull: Array  # multiple of the fill's weight that grows, along x and y (2,) [-]
+    dead: Array  # generalised forces on the free stones that stay (3 n_free,) [mean block weights]
+    dead_pull: Array  # multiple of the fill's weight that stays, along x and y (2,) [-]
     friction: Array  # coefficients of the joints, inf where they do not slide (n_joints,) [-]
     strength: float | None  # compressive strength of the stones [Pa]
 
@@ -161,7 +163,7 @@ class FilledBlocks:
             columns = np.concatenate([start + pair[0], start + pair[1], loads], axis=1)
             pull = (self.weight * self.pull[axis])[:, None]
             values = np.concatenate([gradient[..., 0], gradient[..., 1], pull], axis=1)
-            equations.add(columns, values, self.weight if axis else 0.0)
+            equations.add(columns, values, -self.weight * self.dead_pull[axis])
 
     def _balance_edges(self, equations: Rows) -> None:
         """Add equal tractions on both sides of edges, and none on the surface."""
@@ -216,8 +218,8 @@ class FilledBlocks:
             self._add_stress(entries, corner, node, slope)
         # the weight acts on the middles alone: the shapes of corners have no mean
         for middle in middles.T:
-            np.add.at(right, (middle, 1), -load)
             for axis in range(2):
+                np.add.at(right, (middle, axis), load * self.dead_pull[axis])
                 columns = np.full(len(middle), factor)
                 entries.put(2 * middle + axis, columns, -load * self.pull[axis])
         self._add_contacts(entries, stones)
@@ -302,7 +304,7 @@ class FilledBlocks:
         blocks, count = self.blocks, len(self.friction)
         factor = first + 3 * count
         size = factor + 1
-        weight = blocks.dimensionless(blocks.load([SELF_WEIGHT]))
+        weight = self.dead
         entries = [
             np.concatenate(each or [np.empty(0, int)]) for each in (stones.row, stones.column)
         ]
@@ -340,7 +342,7 @@ class FilledBlocks:
         """Add compression and friction of the joints."""
         count = len(self.friction)
         ends = first + np.arange(2 * count)
-        limits.add(ends[:, None], -1.0)
+        limits.add(ends[:, None], -1.0, self.blocks.bond[: 2 * count])
         slides = np.flatnonzero(np.isfinite(self.friction))
         columns = first + slides[:, None] + count * np.array([2, 0, 1])
         friction = self.friction[slides]
@@ -372,15 +374,15 @@ class FilledBlocks:
         """Return N² <= 2 σ w h F at both ends of the joints, by which stones crush."""
         if self.strength is None:
             return []
-        structure, count = self.blocks.structure, len(self.friction)
-        crushing = 2.0 * self.strength * structure.width * structure.depths / self.blocks.force_unit
+        count, tension = len(self.friction), self.blocks.tension
+        crushing = 2.0 * self.blocks.crushing_forces(self.strength)
         found = []
         for end in range(2):
             rows, own = Rows(), first + np.arange(count)
-            # a + F >= |(a - F, 2 N)|
-            rows.add((own + end * count)[:, None], -1.0, crushing)
-            rows.add((own + end * count)[:, None], 1.0, crushing)
-            rows.add(np.stack([own, own + count], axis=1), -2.0)
+            # a + F >= |(a - F, 2 N)|, with F and N counted from the tension of bonds on
+            rows.add((own + end * count)[:, None], -1.0, crushing + 0.5 * tension)
+            rows.add((own + end * count)[:, None], 1.0, crushing - 0.5 * tension)
+            rows.add(np.stack([own, own + count], axis=1), -2.0, 2.0 * tension)
             order = np.arange(3 * count).reshape(3, -1).T.ravel()
             found.append((rows.matrix(size)[order], rows.bounds[order]))
         return found
@@ -458,6 +460,7 @@ def bound_factor(
     friction: str | None,
     strength: float | None,
     fill: PlasticFill,
+    dead: Sequence[Action] = (),
     first: int = 250,
     most: int = 5000,
 ) -> FillBounds:
@@ -469,6 +472,7 @@ def bound_factor(
         friction: of the joints, "coulomb" or None.
         strength: compressive strength of the stones [Pa]; None for no limit.
         fill: strength of the fill.
+        dead: actions beside self-weight that do not grow.
         first: number of triangles of the first mesh, about.
         most: number of triangles beyond which no mesh is made.
 
@@ -494,7 +498,8 @@ def bound_factor(
     mesh = mesh_fill(structure, soil, size, fill.holds_ends)
     best = None
     while True:
-        filled = _load_blocks(structure, regions, live, friction, strength, fill, mesh)
+        loads = live, [SELF_WEIGHT, *dead]
+        filled = _load_blocks(structure, regions, loads, friction, strength, fill, mesh)
         try:
             bounds = FillBounds(filled, filled.bound_below(), filled.bound_above())
         except DidNotConverge:
@@ -530,7 +535,7 @@ def _choose_triangles(strains: Array) -> Flags:
 def _load_blocks(
     structure: Structure,
     regions: RigidRegions,
-    live: Sequence[Action],
+    loads: tuple[Sequence[Action], Sequence[Action]],
     friction: str | None,
     strength: float | None,
     fill: PlasticFill,
@@ -541,11 +546,15 @@ def _load_blocks(
         structure, Fill(friction_angle=fill.friction_angle, spread=fill.spread), regions
     )
     blocks = RigidBlocks(regions.structure)
-    pulls = [action for action in live if isinstance(action, BodyForce)]
-    points = [action for action in live if isinstance(action, PointLoad)]
-    load = blocks.load(pulls) + stones.load(points)
+
+    def forces(actions: Sequence[Action]) -> tuple[Array, Array]:
+        pulls = [action for action in actions if isinstance(action, BodyForce)]
+        points = [action for action in actions if isinstance(action, PointLoad)]
+        load = blocks.dimensionless(blocks.load(pulls) + stones.load(points))
+        return load, np.array(sum_body_forces(pulls))
+
+    (live, pull), (dead, dead_pull) = map(forces, loads)
     weights = np.array([block.material.unit_weight for block in structure.blocks])
-    pull = np.array([(each.horizontal, each.vertical) for each in pulls]).reshape(-1, 2)
     count = len(regions.structure.joints)
     return FilledBlocks(
         blocks,
@@ -553,8 +562,7 @@ def _load_blocks(
         fill,
         weights[mesh.owner],
         regions,
-        blocks.dimensionless(load),
-        pull.sum(axis=0),
+        *(live, pull, dead, dead_pull),
         regions.structure.friction if friction is not None else np.full(count, np.inf),
         strength,
     )

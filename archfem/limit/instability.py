@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from archfem._typing import Array
-from archfem.limit.backfill import is_balanced, self_weight_programme
+from archfem.limit.backfill import is_balanced, refuse_bonds, self_weight_programme
 from archfem.limit.linear_programme import Programme, RigidBlocks
 from archfem.masonry.structure import Structure, join_joint_names
 
@@ -34,6 +34,7 @@ class DeepenedBlocks(RigidBlocks):
 
 def explain_instability(structure: Structure) -> str | None:
     """Return why rigid blocks cannot rest under their weight, and the remedy; None if they can."""
+    refuse_bonds(structure)
     stones, dead = self_weight_programme(structure, "coulomb", None, None)
     fall = dead.minimise_residual()
     if is_balanced(fall, dead):

@@ -31,6 +31,9 @@ from archfem.joints.rigid_kinematics import jump_rates
 from archfem.masonry.loads import BodyForce, PointLoad
 from archfem.masonry.structure import Structure, largest_displacement, rigid_motion_matrix
 
+# Round-off of a cost, relative to the largest [-]: well below the tolerances of the solver
+ROUND_OFF = 1e-12
+
 
 class NoEquilibrium(DidNotConverge):
     """The programme is infeasible: no forces within the limits balance the loads."""
@@ -96,6 +99,24 @@ class RigidBlocks:
     def cohesion(self) -> Array:
         """Cohesive shear strength c A of the whole joints (n_joints,) [mean block weights]."""
         return self.structure.cohesion / self.force_unit
+
+    @cached_property
+    def tension(self) -> Array:
+        """Tensile strength T of the whole joints, f_t w h (n_joints,) [mean block weights]."""
+        structure = self.structure
+        return structure.tension * structure.width * structure.depths / self.force_unit
+
+    @property
+    def bond(self) -> Array:
+        """Plastic tension T/2 of the ends of joints, with no shear (3 n_joints,)."""
+        # Tension f_t over the whole depth turns about an edge as T at mid-depth does: it is T/2 at
+        # both ends, N = F_i + F_e >= -T and |M| <= (N + T) h/2.
+        return np.concatenate([0.5 * self.tension, 0.5 * self.tension, 0.0 * self.tension])
+
+    def crushing_forces(self, strength: float) -> Array:
+        """Return σ w h of each joint, with tension beside the stress block (n_joints,)."""
+        structure = self.structure
+        return strength * structure.width * structure.depths / self.force_unit + self.tension
 
     @cached_property
     def rates(self) -> sparse.csr_matrix:
@@ -376,6 +397,8 @@ class ReducedBalance:
         if programme.force_cost is not None:
             force_cost += programme.force_cost
             cost += self._map.T @ force_cost
+            # Round-off as a cost leads the simplex method through 100 000 bases of one objective.
+            cost[np.abs(cost) < ROUND_OFF * np.abs(cost).max()] = 0.0
         cost[self._count :] += programme.unknown_cost
         strength = np.tile(programme.cohesion[self._slides], 2)
         limits = Limits(self._rows, np.concatenate([np.zeros(2 * len(chains.pivots)), strength]))

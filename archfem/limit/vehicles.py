@@ -14,7 +14,13 @@ from archfem._display import ResultDisplay
 from archfem._typing import Array, Metres, Newtons, Numbers, Pascals
 from archfem._validation import check_number, check_numbers, validate_arguments
 from archfem.errors import InvalidInput
-from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
+from archfem.limit.backfill import (
+    BlocksWithFill,
+    Fill,
+    is_balanced,
+    refuse_bonds,
+    self_weight_programme,
+)
 from archfem.limit.collapse import Collapse, collapse_factor, warn_locking
 from archfem.limit.instability import DeepenedBlocks
 from archfem.limit.linear_programme import Optimum, Programme
@@ -147,6 +153,7 @@ def moving_load(
         Gilbert, RING Theory and Modelling Guide, University of Sheffield (2005).
     """
     structure = structure_of(structure)
+    refuse_bonds(structure)
     stones, dead = self_weight_programme(structure, friction, strength, fill)
     vehicle = _parse_axles(axles, spacings)
     places = _vehicle_positions(structure, vehicle, positions)

@@ -225,16 +225,14 @@ class _FillAssembly:
         """Return a joint with its contact; None where the whole bodies had no joint."""
         first, second = (self.origin[number] for number in joint.blocks)
         if first == second:
-            law = self.law
-            across = along = 2.0 * self.radius / self.structure.blocks[first].material.young
+            within = self.structure.blocks[first].material.young / (2.0 * self.radius)
+            law = replace(self.law, normal_stiffness=within, shear_stiffness=within)
         else:
             joints = (j for j in self.structure.joints if set(j.blocks) == {first, second})
             if (whole := next(joints, None)) is None:
                 return None
-            law = whole.contact
             soil = sum(self._soil_compliance(joint, number) for number in joint.blocks)
-            across, along = 1.0 / law.normal_stiffness + soil, 1.0 / law.shear_stiffness + soil
-        law = replace(law, normal_stiffness=1.0 / across, shear_stiffness=1.0 / along)
+            law = whole.contact.in_series(soil, soil)
         return replace(joint, contact=law)
 
     def _soil_compliance(self, joint: Joint, number: int) -> float:

@@ -1,11 +1,11 @@
 """Block materials and joint contacts, with presets of Demirel and Aldemir (2021)."""
 
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, nextafter
 from typing import Annotated, Any
 
-from archfem._typing import Friction, NewtonsPerCubicMetre, Pascals, PascalsPerMetre
+from archfem._typing import Friction, Metres, NewtonsPerCubicMetre, Pascals, PascalsPerMetre
 from archfem._validation import check_number, check_words, is_one_of
 from archfem.errors import InvalidInput
 from archfem.units import G, GPa, MPa, kN
@@ -32,6 +32,8 @@ class Material:
         unit_weight: weight per volume [N/m³].
         strength: compressive strength [Pa], or None where unknown.
         name: in tables and files.
+        stands_for: what a block of it stands for besides itself, such as "press" for a beam with
+            the weight of its load, or "floor"; then it may weigh more than any material.
     """
 
     young: Pascals
@@ -39,16 +41,22 @@ class Material:
     unit_weight: NewtonsPerCubicMetre
     strength: Pascals | None = None
     name: str = "material"
+    stands_for: str | None = None
 
     def __post_init__(self) -> None:
         """Check that the values are possible, which detects wrong units."""
         check_words(self.name, "name of a material")
-        weight_range = 1e-3, 250.0 * kN, " N/m³", "0.001 N/m³ and 250 kN/m³"
+        if self.stands_for is not None:
+            check_words(self.stands_for, f"stands_for of '{self.name}'")
+        most = 1e6 if self.stands_for else 250.0
+        weight_range = 1e-3, most * kN, " N/m³", f"0.001 N/m³ and {most:g} kN/m³"
+        heavy = "give a weight, not a density, in N/m³, e.g. 20 * kN"
+        heavy += "; a block that carries more than itself says so, stands_for='press'"
         inside = nextafter(-1.0, 0.0), nextafter(0.5, 0.0)  # the bounds of ν make no material
         for row in (
             ("young", 1e3, 1e13, " Pa", "1 kPa and 10 TPa", "give it in Pa, e.g. 30 * GPa"),
             ("poisson", *inside, "", "-1 and 0.5", "stone has about 0.2"),
-            ("unit_weight", *weight_range, "give a weight, not a density, in N/m³, e.g. 20 * kN"),
+            ("unit_weight", *weight_range, heavy),
         ):
             _check_range(self, *row)
         # no building material weighs 1 to 4 kN/m³, but soils and stones have such densities
@@ -96,6 +104,10 @@ class Contact:
         law: law of the user in place of this one, as `archfem.joints.JointLaw`, or None. The
             stiffnesses are then those of modes and damping, and friction is that of limit analysis
             and of the criteria; cohesion, dilatancy and tension are left to the law.
+        closure: largest closing δ_m of a joint that stiffens as it closes, σ = k_n δ / (1 - δ/δ_m),
+            whose tangent is k_n (1 + σ / (k_n δ_m))²; from 98 % of δ_m on the tangent stays. k_n is
+            then the stiffness of a joint that just touches (Bandis, Lumsden and Barton 1983).
+            None closes linearly [m].
 
     Example:
         >>> af.Contact(1.48e9, 0.30e9, friction=0.6, cohesion=5e3).slides
@@ -110,6 +122,7 @@ class Contact:
     dilatancy: float = 0.0
     tension: Pascals = 0.0
     law: Annotated[Any, dict] = None
+    closure: Metres | None = None
 
     def __post_init__(self) -> None:
         """Check that the values are possible, which detects wrong units."""
@@ -136,6 +149,14 @@ class Contact:
             "give the tensile strength in Pa, up to cohesion / friction, where Coulomb's limit ends"
         )
         _check_range(self, "tension", 0.0, apex, " Pa", f"0 and {apex:.3g} Pa", remedy)
+        if self.closure is not None:
+            remedy = "give the largest closing in m, e.g. 0.1e-3, or None for a linear joint"
+            _check_range(self, "closure", 1e-7, 1.0, " m", "0.1 µm and 1 m", remedy)
+            if self.tension > 0.0:
+                raise InvalidInput(
+                    f"tension {self.tension:.3g} Pa of '{self.name}' beside a closure: a bonded "
+                    "joint closes linearly: leave out one of them"
+                )
         if self.law is not None:
             self._check_law()
 
@@ -146,12 +167,23 @@ class Contact:
                 f"law {self.law!r} of '{self.name}' is no frozen object: give an object of a class "
                 "with @dataclass(frozen=True)"
             )
-        for key in ("cohesion", "dilatancy", "tension"):
-            if getattr(self, key) != 0.0:
+        for key in ("cohesion", "dilatancy", "tension", "closure"):
+            if getattr(self, key):
                 raise InvalidInput(
                     f"{key} {getattr(self, key):.3g} of '{self.name}' beside a law: leave it out: "
                     "it is part of the law"
                 )
+
+    def in_series(self, across: float, along: float) -> "Contact":
+        """Return the contact with further compliances in series, across and along it [m/Pa]."""
+        if self.closure is not None and across > 0.0:
+            raise InvalidInput(
+                f"'{self.name}' has a closure, and stone or soil in series with it: no such law "
+                "exists: leave out the closure, or model the blocks with fidelity 'faces' or 'full'"
+            )
+        normal = 1.0 / (1.0 / self.normal_stiffness + across)
+        shear = 1.0 / (1.0 / self.shear_stiffness + along)
+        return replace(self, normal_stiffness=normal, shear_stiffness=shear)
 
     @property
     def coefficient(self) -> float:

@@ -38,16 +38,14 @@ def soften_joints(structure: Structure) -> Structure:
 
 def _soften_joint(structure: Structure, joint: Joint) -> Joint:
     """Return a joint in series with the halves of its blocks that it borders."""
-    contact = joint.contact
-    normal, shear = 1.0 / contact.normal_stiffness, 1.0 / contact.shear_stiffness
+    normal = shear = 0.0
     for block in (structure.blocks[number] for number in joint.blocks):
         if not block.fixed:
             # a bar of length L = area / depth: L / E in compression, L / G in shear
             half = 0.5 * block.area / joint.depth / block.material.young
             normal += half
             shear += 2.0 * (1.0 + block.material.poisson) * half
-    softer = replace(contact, normal_stiffness=1.0 / normal, shear_stiffness=1.0 / shear)
-    return replace(joint, contact=softer)
+    return replace(joint, contact=joint.contact.in_series(normal, shear))
 
 
 def find_soft_blocks(structure: Structure) -> tuple[int, ...]:

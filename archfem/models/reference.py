@@ -201,6 +201,12 @@ class MonolithicModel(Model):
 
     def begin_step(self, start: Array, damping_lag: float) -> ModelStep:
         """Return a time step from a state with the present joint memory."""
+        if any(joint.contact.closure is not None for joint in self.structure.joints):
+            raise InvalidInput(
+                f"contacts have a closure, of which a model '{self.fidelity}' has no means over a "
+                "time step: use scheme=af.dynamics.Newmark(), or fidelity 'full', which is the "
+                "same but for them"
+            )
         return MonolithicStep(self, StepStart(self.spread(start).copy(), self._memory, damping_lag))
 
     @property

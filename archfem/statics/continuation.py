@@ -115,12 +115,17 @@ class LoadPath(EquilibriumPath):
 
     load: GrowingLoad
     factors: list[float]  # of the load at each step [-]
+    held: GrowingLoad | None = None  # loads beside self-weight that do not grow
     units = "1"  # of the factors
     moving = "load"  # name of the moving object in messages
 
     @classmethod
     def of(
-        cls, model: Model, actions: Sequence[BodyForce | PointLoad], start: Equilibrium
+        cls,
+        model: Model,
+        actions: Sequence[BodyForce | PointLoad],
+        start: Equilibrium,
+        held: GrowingLoad | None = None,
     ) -> "LoadPath":
         """Begin at the dead load's equilibrium."""
         load = GrowingLoad.of(model, actions)
@@ -128,7 +133,19 @@ class LoadPath(EquilibriumPath):
         displacement = FIRST_DISPLACEMENT * model.structure.size
         compliance = float(live @ splu(model.tangent(start.q).tocsc()).solve(live)) / load.size
         unit, forces = (displacement, displacement / compliance), [model.resultants(start.q)]
-        return cls(model, self_weight(model), unit, [start.q], forces, [0], load, [0.0])
+        return cls(model, self_weight(model), unit, [start.q], forces, [0], load, [0.0], held)
+
+    def _permanent_load(self, q: Array) -> Array:
+        """Return the generalised forces that do not grow (n,)."""
+        return self.dead if self.held is None else self.dead + self.held.forces(q)
+
+    def _load_rate(self, x: Array) -> sparse.csr_matrix | None:
+        """Return the derivative of all loads at (q, λ) by q (n, n); None where there is none."""
+        rate = self.load.rate(x[:-1])
+        if rate is None:
+            return None
+        held = None if self.held is None else self.held.rate(x[:-1])
+        return x[-1] * rate if held is None else x[-1] * rate + held
 
     @property
     def displacements(self) -> Array:
@@ -152,6 +169,20 @@ class LoadPath(EquilibriumPath):
         # Where several joints slide or turn under the same load the tangent is singular, although
         # each step has an equilibrium: then a small part of the closed stiffness is mixed in.
         return any(self._solve_step((row, target, distance), share) for share in (0.0, 1e-3))
+
+    def advance_to_whole(self, min_share: float = 1.0 / 64.0) -> None:
+        """Add equilibria up to a factor of 1, by steps that are halved where none is found."""
+        share, force = 1.0, np.array([0.0, 1.0])
+        while self.factors[-1] < 1.0 - RESIDUAL_TOLERANCE:
+            step = min(share, 1.0 - self.factors[-1])
+            if self.advance(force, step / self.unit[1]):
+                continue
+            share /= 2.0
+            if share < min_share:
+                raise DidNotConverge(
+                    f"it carries {self.factors[-1]:.3g} of the loads that stay, dead = …, and no "
+                    "more: they alone make it fall; give smaller ones"
+                )
 
     def advance_normal(self, distance: float) -> bool:
         """Add the equilibrium in the hyperplane normal to the last step, at a distance."""
@@ -177,9 +208,9 @@ class LoadPath(EquilibriumPath):
 
     def _sense(self, model: Model, x: Array, step: Array) -> float:
         """Return 1 or -1, which changes where a path turns back, never where it bends, or 0."""
-        live, rate = self.load.forces(x[:-1]), self.load.rate(x[:-1])
+        live, rate = self.load.forces(x[:-1]), self._load_rate(x)
         tangent = model.tangent(x[:-1])
-        return _determinant_sign(tangent if rate is None else tangent - x[-1] * rate, live, step)
+        return _determinant_sign(tangent if rate is None else tangent - rate, live, step)
 
     def _last_steps(self, number: int) -> tuple[Array, Array]:
         """Return change of (q, λ) in the last step but some, and the same weighted (n + 1,)."""
@@ -196,7 +227,7 @@ class LoadPath(EquilibriumPath):
         if self.model.large_displacements:  # relaxation is for small rotations
             return False
         q, factor = self.states[-1], self.factors[-1] + increment
-        load = self.dead + factor * self.load.forces(q)
+        load = self._permanent_load(q) + factor * self.load.forces(q)
         try:
             model, solution = solve_or_relax(EquilibriumSolver(len(q)), self.model, load, q)
         except DidNotConverge:
@@ -235,11 +266,11 @@ class LoadPath(EquilibriumPath):
         """Find (q, λ) in one (n + 1,), and the number of iterations, by Newton's method."""
         row, target, distance = goal
         for iteration in range(30 if share == 0.0 else 60):
-            tangent, rate = model.tangent(x[:-1]), self.load.rate(x[:-1])
+            tangent, rate = model.tangent(x[:-1]), self._load_rate(x)
             if rate is not None:
-                tangent = tangent - x[-1] * rate
+                tangent = tangent - rate
             live = self.load.forces(x[:-1])
-            residual = self.dead + x[-1] * live - model.force(x[:-1])
+            residual = self._permanent_load(x[:-1]) + x[-1] * live - model.force(x[:-1])
             missing = target - row @ x
             on_target = abs(missing) <= RESIDUAL_TOLERANCE * distance
             if on_target and self._is_converged(residual, x, tangent):
@@ -261,7 +292,8 @@ class LoadPath(EquilibriumPath):
 
     def _is_converged(self, residual: Array, x: Array, tangent: sparse.csr_matrix) -> bool:
         """Return whether forces are in balance, up to round-off of large motions."""
-        load = load_magnitude(self.dead) + abs(x[-1]) * load_magnitude(self.load.forces(x[:-1]))
+        load = load_magnitude(self._permanent_load(x[:-1]))
+        load += abs(x[-1]) * load_magnitude(self.load.forces(x[:-1]))
         size = load_magnitude(residual)
         if size <= RESIDUAL_TOLERANCE * load or size > MAX_ROUND_OFF_RESIDUAL * load:
             return size <= RESIDUAL_TOLERANCE * load
@@ -333,14 +365,26 @@ class SupportPath(EquilibriumPath):
     moving = "support"  # name of the moving object in messages
 
     @classmethod
-    def of(cls, model: Model, settlement: Settlement, start: Equilibrium) -> "SupportPath":
+    def of(
+        cls,
+        model: Model,
+        settlement: Settlement,
+        start: Equilibrium,
+        held: GrowingLoad | None = None,
+    ) -> "SupportPath":
         """Begin at the dead load's equilibrium."""
+        if held is not None and model.large_displacements:
+            raise InvalidInput(
+                "a settlement with loads that stay, dead = …, is for small displacements: build "
+                'the model with displacements="small", or leave the loads out'
+            )
         motion = settlement.added(model.structure, np.zeros_like(model.support_motion))
         corner = RigidBlocks(model.structure).largest_displacement(motion)
         if corner == 0.0:
             raise InvalidInput(f"the settlement of '{settlement.block}' is zero: give it a motion")
         unit = FIRST_DISPLACEMENT * model.structure.size, np.inf
-        common = model, self_weight(model), unit, [start.q], [model.resultants(start.q)], [0]
+        dead = self_weight(model) if held is None else self_weight(model) + held.first
+        common = model, dead, unit, [start.q], [model.resultants(start.q)], [0]
         return cls(*common, model.support_motion, motion, corner, [0.0])
 
     @property

@@ -24,6 +24,7 @@ from archfem._threads import single_threaded
 from archfem._typing import Array
 from archfem._validation import check_type, is_one_of, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.joints.contact_law import LARGEST_CLOSING, ContactLaw
 from archfem.joints.criteria import assessed_joints
 from archfem.joints.resultants import joint_dataset, select_joint
 from archfem.limit.collapse import stands
@@ -44,7 +45,7 @@ from archfem.statics.relaxation import (
     solve_local,
     solve_or_relax,
 )
-from archfem.units import mm
+from archfem.units import MPa, mm
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -198,7 +199,7 @@ def dead_load(
     if stages is None:
         try:
             search = partial(solve_or_relax, check=_refuse_if_rigid_blocks_fall)
-            return _load_from_rest(model, self_weight(model), newton, search)
+            return _check_closings(_load_from_rest(model, self_weight(model), newton, search))
         except DidNotConverge as error:
             message = _describe_failure(model, error, newton)
             raise DidNotConverge(message, last=error.last) from error
@@ -221,7 +222,33 @@ def dead_load(
         whole = model.with_support_motion(small.support_motion).with_joint_state(built.model)
         solver, built = _create_solver(whole, newton), replace(built, model=whole)
         built = _apply_remaining_weight(solver, built, whole, "what was built")
-    return _move_supports(solver, built, self_weight(model), model.support_motion)
+    moved = _move_supports(solver, built, self_weight(model), model.support_motion)
+    return _check_closings(moved)
+
+
+def _check_closings(state: Equilibrium) -> Equilibrium:
+    """Refuse dead load that closes a joint beyond the law of joints that stiffen; else return it.
+
+    Raises:
+        InvalidInput: an edge of a joint is closed by nearly its largest closing, or more.
+    """
+    structure, observer = state.model.structure, state.model.observer()
+    largest = [joint.contact.closure or np.inf for joint in structure.joints]
+    if min(largest) == np.inf:
+        return state
+    gap, rotation, _ = observer.faces(observer.read(state.q))
+    closings = 0.5 * np.abs(rotation) * structure.depths - gap
+    worst = int(np.argmax(closings / largest))
+    if closings[worst] > LARGEST_CLOSING * largest[worst]:
+        joint, closing = structure.joints[worst], closings[worst]
+        stress = -ContactLaw.of(joint.contact).closing_traction(-closing)
+        raise InvalidInput(
+            f"dead load closes joint '{joint.name}' by {closing / mm:.3g} mm at its edge, of a "
+            f"largest closing of {largest[worst] / mm:.3g} mm, and its stress reaches "
+            f"{stress / MPa:.3g} MPa: the law ends at {LARGEST_CLOSING:.0%}: give "
+            f"'{joint.contact.name}' a larger closure or normal_stiffness"
+        )
+    return state
 
 
 def _describe_failure(model: Model, error: DidNotConverge, newton: Newton | None) -> str:

@@ -18,7 +18,7 @@ from archfem._validation import check_choice, check_fields, check_type
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria, with_failure_flags
 from archfem.joints.resultants import joint_dataset, select_joint
-from archfem.masonry.loads import BodyForce, PointLoad, Settlement, list_loads
+from archfem.masonry.loads import Action, BodyForce, PointLoad, Settlement, list_loads
 from archfem.models.model import Model
 from archfem.statics.continuation import LoadPath, SupportPath
 from archfem.statics.equilibrium import Equilibrium, Subject, resolve_start
@@ -133,6 +133,7 @@ def pushover(
     start: Equilibrium | None = None,
     stop: Stop | None = None,
     criteria: Criteria | None = None,
+    dead: Sequence[Action] = (),
 ) -> Pushover:
     """Let a load grow over the dead load, and follow the equilibrium.
 
@@ -167,6 +168,8 @@ def pushover(
         start: the dead load's equilibrium, computed first if not given.
         stop: rules that end the pushover.
         criteria: conditions of a hinge; by default the usual ones.
+        dead: loads that act beside self-weight and do not grow, such as that of a press. They are
+            applied at `start`, before the live load.
 
     Returns:
         The curve, the joints along it, and its limit.
@@ -174,7 +177,8 @@ def pushover(
     Raises:
         InvalidInput: control is unknown, or not by displacement for a settlement; the load misses
             the structure or is zero.
-        DidNotConverge: the structure does not stand under its own weight, or no first step.
+        DidNotConverge: the structure does not stand under its own weight or the other dead loads,
+            or there is no first step.
 
     References:
         Riks, Int. J. Solids Struct. 15 (1979) 529-551.
@@ -185,14 +189,19 @@ def pushover(
             check_type(value, kind, kind.__name__.lower(), f"give a {kind.__name__}")
     model, begin = resolve_start(model, start)
     assert isinstance(begin, Equilibrium)
-    model = begin.transfer_memory(model)
+    model, held = begin.transfer_memory(model), None
+    if dead != ():
+        loading = LoadPath.of(model, list_loads(dead), begin)
+        loading.advance_to_whole()
+        model, held = loading.model, loading.load
+        begin = replace(begin, model=model, q=loading.states[-1])
     path: Path
     if isinstance(live, Settlement):
         if control != "displacement":
             raise InvalidInput(f"a settlement is a displacement: control {control!r} has no force")
-        path = SupportPath.of(model, live, begin)
+        path = SupportPath.of(model, live, begin, held)
     else:
-        path = LoadPath.of(model, list_loads(live), begin)
+        path = LoadPath.of(model, list_loads(live), begin, held)
     criteria = criteria or Criteria()
     return _label_result(path, criteria, follow(path, control, stop or Stop(), criteria))
 

@@ -47,6 +47,13 @@ from archfem.studies.statements import Statement, column_label, read_statements,
 
 logger = logging.getLogger("archfem")
 
+STUDY_KEYS: Mapping[str, Any] = {
+    **{"title": str, "case": str, "cases": dict, "set": [str], "pairs": [str]},
+    **{"vary": (dict, list), "samples": dict, "compute": (str, dict), "scales": (bool, dict)},
+    **{"columns": dict, "statements": [dict]},
+}
+STUDIED_CASE_KEYS: Mapping[str, Any] = {"case": str, "set": [str]}
+
 
 @validate_methods
 class Study:
@@ -356,13 +363,8 @@ def _read_study(
     """Return the study of the tables of a file."""
     if {"structure", "base"} & set(tables):
         raise InvalidInput('this is a case: name it in the file of a study, case = "CASE.toml"')
-    keys = {
-        **{"title": str, "case": str, "cases": dict, "set": [str], "pairs": [str]},
-        **{"vary": (dict, list), "samples": dict, "compute": (str, dict), "scales": (bool, dict)},
-        **{"columns": dict, "statements": [dict]},
-    }
-    refuse_unknown(tables, keys)
-    settings = check_table(tables, keys, "study")
+    refuse_unknown(tables, STUDY_KEYS)
+    settings = check_table(tables, STUDY_KEYS, "study")
     missing = [] if {"case", "cases"} & set(settings) else ["case"]
     missing += [] if {"cases", "vary"} & set(settings) else ["vary"]
     if missing or {"case", "cases"} <= set(settings):
@@ -426,7 +428,7 @@ def _read_cases(
     columns = check_table(columns, {key: [str] for key in columns}, "columns")
     cases = {}
     for name, table in tables.items():
-        case = check_table(table, {"case": str, "set": [str]}, f"cases.{name}")
+        case = check_table(table, STUDIED_CASE_KEYS, f"cases.{name}")
         if "case" not in case:
             raise InvalidInput(f"cases.{name} names no case file")
         for column, own in columns.items():

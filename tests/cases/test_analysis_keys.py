@@ -284,3 +284,17 @@ def test_assessment_of_a_case_has_the_arguments_of_python():
 def test_refused_assessments_of_a_case(table, message):
     with pytest.raises(af.InvalidInput, match=message):
         parse_assessment(table)
+
+
+def test_loads_of_a_limit_may_stay(stack):
+    point = {"x": 0.0, "y": 1.0, "force": ["1 kN", "0 kN"]}
+    stays = [{"horizontal": 0.01}, {"x": 0.0, "force": ["0 kN", "-5 kN"]}]
+    limit = parse_limit({"point": point, "dead": stays})
+    assert limit.dead == (af.BodyForce(0.01), af.PointLoad(0.0, (0.0, -5e3)))
+    live = af.PointLoad(0.0, (1e3, 0.0), y=1.0)
+    exact = af.collapse_factor(stack, live=live, dead=limit.dead).factor
+    assert limit.solve(stack).factor == pytest.approx(exact, rel=1e-9)
+    with pytest.raises(af.InvalidInput, match=r"limit\.dead"):
+        parse_limit({"point": point, "dead": [{"x": 0.0}]})
+    with pytest.raises(af.InvalidInput, match="a rating takes no loads that stay"):
+        rate_case(stack, {"vehicle": "LM1"}, limit, {})

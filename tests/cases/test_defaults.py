@@ -2,7 +2,12 @@
 
 import archfem as af
 from archfem.cases.case import case_of
-from archfem.cases.defaults import describe_defaults, list_default_keys
+from archfem.cases.defaults import (
+    describe_defaults,
+    explain_defaults,
+    list_default_keys,
+    list_defaults,
+)
 from archfem.cases.result_text import describe_dead_load
 
 COLUMN = {"shape": "column", "breadth": 0.6, "heights": [1.2, 1.2]}
@@ -64,3 +69,18 @@ def test_python_and_files_have_the_same_defaults():
 def test_results_name_them():
     case = af.Case.of({**BARE, "model": {"fidelity": "rigid"}})
     assert describe_defaults(case) in describe_dead_load(af.cases.DeadLoadResult.of(case))
+
+
+def test_check_explains_each_default_by_its_key(tmp_path, capsys):
+    path = tmp_path / "case.toml"
+    path.write_text(af.Case.of({**BARE, "model": {"fidelity": "rigid"}}).text(), encoding="utf-8")
+    assert af.commands.main(["check", str(path)]) == 0
+    case, said = af.Case.read(path), capsys.readouterr().out
+    assert explain_defaults(case) in said
+    for each in list_defaults(case):
+        assert f"{each.key}: {each.words}: {each.reason}" in said
+    # each key is one of the case: a change of it takes the default away
+    for value in ("materials.stone.young=1e10", 'contacts."stone to stone".friction=0.5'):
+        key = value.partition("=")[0]
+        assert key in [each.key for each in list_defaults(case)]
+        assert key not in [each.key for each in list_defaults(af.Case.read(path, [value]))]

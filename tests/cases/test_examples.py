@@ -5,7 +5,14 @@ from dataclasses import replace
 import pytest
 
 import archfem as af
-from archfem.cases.examples import copy_example, list_example_titles, list_examples, read_example
+from archfem.cases.defaults import list_defaults
+from archfem.cases.examples import (
+    copy_example,
+    list_example_titles,
+    list_examples,
+    list_new_cases,
+    read_example,
+)
 
 
 def test_each_has_a_title():
@@ -48,6 +55,32 @@ def test_a_copy_includes_the_files_it_refers_to(tmp_path):
 def test_an_unknown_example_is_refused():
     with pytest.raises(af.InvalidInput, match=r"no case 'rign', but these: .*ring"):
         read_example("rign")
+
+
+@pytest.mark.parametrize("kind", ["ring", "bridge", "wall", "portal"])
+def test_a_new_case_gives_all_that_decides_and_runs(kind, tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    assert af.commands.main(["new", kind, "--out", str(path)]) == 0
+    assert path.read_text().startswith("#:schema file:///")
+    case = af.Case.read(path)
+    assert list_defaults(case) == []
+    assert case.report["project"]
+    if kind != "bridge":  # which takes half a minute
+        verdict = case.analysis.run(case.ground_motion().cut(2.0, 2.5)).verdict
+        assert (verdict.outcome.split(",")[0], verdict.doubts) == ("stands", ())
+    capsys.readouterr()
+    assert af.commands.main(["new", kind, "--out", str(path)]) == 1
+    assert "is there already: name another file with --out" in capsys.readouterr().err
+
+
+def test_the_new_cases_are_those_of_the_command():
+    assert list_new_cases().keys() == {"ring", "bridge", "wall", "portal"}
+
+
+def test_a_portal_falls_when_its_posts_overturn():
+    case = af.Case.read(list_new_cases()["portal"])
+    # posts of 0.5 m by 2 m turn about their toes, and the lintel translates: b / h
+    assert case.limit.solve(case.structure).factor == pytest.approx(0.25, rel=1e-6)
 
 
 def test_the_shipped_ring_stands_without_doubt_and_slides():

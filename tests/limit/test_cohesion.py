@@ -1,6 +1,7 @@
 """Cohesion of joints in limit analysis: on single blocks, and in joints that open."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -273,3 +274,96 @@ def test_joints_without_cohesion_are_not_named_as_cohesive(caplog):
     caplog.clear()
     warn_cohesion(structure, (0,), joints, found.factor)
     assert not caplog.records
+
+
+BREADTH, HEIGHT, TENSION = 0.6, 2.4, 20e3
+
+
+def bonded_column(**changes):
+    bond = {"friction": 0.6, "cohesion": 40e3, "tension": TENSION} | changes
+    contact = replace(af.masonry.STONE_TO_STONE, **bond)
+    return af.column(breadth=BREADTH, heights=[HEIGHT], contact=contact)
+
+
+@pytest.mark.parametrize("strength", [None, 0.2e6])
+def test_a_bond_that_yields_turns_about_the_toe(strength, caplog):
+    """Tension below the turning joint, and a block of stress at its toe: by hand."""
+    column = bonded_column()
+    found = af.collapse_factor(column, live=af.BodyForce(1.0), strength=strength)
+    weight, width = column.weight, column.width
+    # σ over a depth x at the toe, f_t over the rest: N = σ w x - f_t w (b - x) is the weight
+    moment = 0.5 * (weight + TENSION * width * BREADTH) * BREADTH
+    if strength is not None:
+        x = (weight + TENSION * width * BREADTH) / ((strength + TENSION) * width)
+        moment = 0.5 * (strength + TENSION) * width * x * (BREADTH - x)
+    assert found.factor == pytest.approx(moment / (weight * HEIGHT / 2.0), rel=1e-6)
+    assert "bonds are brittle" in caplog.text
+    # the resultants are those of the joint: nothing but the weight is above it
+    assert float(found.joints["N"][0]) == pytest.approx(weight, rel=1e-6)
+
+
+@pytest.mark.parametrize("friction", ["coulomb", "nonassociated"])
+def test_a_bond_is_pulled_off_and_sheared_by_its_strength(friction):
+    """Lifted: the weight and T. Pushed at its foot: c A + μ N, with N of the weight alone."""
+    column = bonded_column()
+    area = column.width * BREADTH
+    lifted = af.collapse_factor(column, live=af.BodyForce(0.0, 1.0), friction=friction)
+    exact = 1.0 + TENSION * area / column.weight
+    assert lifted.factor == pytest.approx(exact, rel=1e-6)
+    low = af.PointLoad(0.0, (1e3, 0.0), y=0.01)
+    pushed = af.collapse_factor(column, live=low, friction=friction)
+    assert pushed.factor == pytest.approx((40e3 * area + 0.6 * column.weight) / 1e3, rel=1e-6)
+
+
+def test_a_bond_is_without_effect_where_it_has_no_strength():
+    dry, bonded = (bonded_column(tension=tension) for tension in (0.0, 1e-3))
+    factors = [af.collapse_factor(each, live=af.BodyForce(1.0)).factor for each in (dry, bonded)]
+    assert factors[0] == pytest.approx(factors[1], rel=1e-6)
+
+
+def weakest_four_hinges(arch, live, tension):
+    """Least factor of all mechanisms of four hinges, by their velocities and dissipation."""
+    count = len(arch.joints)
+    ends = np.array([[joint.intrados, joint.extrados] for joint in arch.joints])
+    weights, x = (np.zeros(count + 1) for _ in range(2))
+    for k, block in enumerate(arch.blocks):
+        weights[k] = 0.0 if block.fixed else block.area * block.material.unit_weight * arch.width
+        x[k] = block.centroid[0]
+    loaded, point = live.place(arch)
+    plastic = 0.5 * tension * arch.width * arch.depths**2
+    best = np.inf
+    for first in (0, 1):  # face of the first hinge, then they alternate
+        for places in combinations(range(count), 4):
+            a, b, c, d = (ends[j, (first + k) % 2] for k, j in enumerate(places))
+            # turning rates of the three links: ω1 (b - a) + ω2 (c - b) + ω3 (d - c) = 0, ω1 = ±1
+            sense = -1.0 if first == 0 else 1.0
+            sides = np.column_stack([c - b, d - c])
+            if abs(np.linalg.det(sides)) < 1e-12:
+                continue
+            second, third = np.linalg.solve(sides, -sense * (b - a))
+            turns = np.diff([0.0, sense, second, third, 0.0])
+            if not (turns * turns[0] * [1, -1, 1, -1] >= 0.0).all():
+                continue  # a joint would close
+            rates = np.array([0.0, sense, second, third, 0.0])
+            link = np.searchsorted(places, np.arange(count + 1), side="left")
+            centres = np.array([a, a, b, c, d])[:, 0]
+            starts = np.cumsum([0.0, 0.0, sense * (b - a)[0], second * (c - b)[0], 0.0])
+            down = -(starts[link] + rates[link] * (x - centres[link]))
+            here = link[loaded]
+            live_power = live.force[1] * (starts[here] + rates[here] * (point[0] - centres[here]))
+            if live_power <= 0.0:
+                continue
+            held = plastic[list(places)] @ np.abs(turns)
+            best = min(best, (held - weights @ down) / live_power)
+    return best
+
+
+@pytest.mark.parametrize("tension", [0.0, 20e3])
+def test_an_arch_in_mortar_falls_by_the_weakest_of_all_four_hinges(tension):
+    mortar = replace(af.masonry.STONE_TO_STONE, friction=0.8, cohesion=1e6, tension=tension)
+    arch = af.circular_arch(
+        radius=2.0, thickness=0.12, embrace=100.0, voussoirs=14, width=0.25, contact=mortar
+    )
+    live = af.PointLoad(-0.7, (0.0, -1e3))
+    found = af.collapse_factor(arch, live=live)
+    assert found.factor == pytest.approx(weakest_four_hinges(arch, live, tension), rel=1e-6)

@@ -371,3 +371,40 @@ def test_a_mechanism_that_only_slides_has_no_hinges():
     block = af.column(breadth=1.0, heights=[0.5], contact=af.Contact(1e10, 4e9, 0.3))
     found = af.collapse_factor(block, live=af.BodyForce(1.0))
     assert "factor 0.3; hinges: none; sliding: joint" in str(found)
+
+
+def test_a_press_on_a_pier_stabilises_it():
+    """About the toe: (W + P) b/2 = λ W h; the press itself may be the weight of a block."""
+    pier = af.column(breadth=0.6, heights=[1.0, 1.0, 1.0])
+    weight = pier.weight
+    push, press = af.PointLoad(0.0, (weight, 0.0), y=1.5), af.PointLoad(0.0, (0.0, -2.0 * weight))
+    found = collapse_factor(pier, live=push, dead=[press])
+    assert found.factor == pytest.approx(0.6, abs=EXACT)
+    assert found.dead == (press,)
+    # the top block weighs seven times as much
+    heavy = replace(af.STONE, unit_weight=7.0 * af.STONE.unit_weight, stands_for="press")
+    blocks = (*pier.blocks[:-1], replace(pier.blocks[-1], material=heavy))
+    loaded = replace(pier, blocks=blocks)
+    assert loaded.weight == pytest.approx(3.0 * weight)
+    assert collapse_factor(loaded, live=push).factor == pytest.approx(0.6, abs=EXACT)
+
+
+@pytest.mark.parametrize("live", LOADS)
+def test_a_dead_part_of_the_live_load_is_no_longer_live(live):
+    whole = collapse_factor(ring(), live=live)
+    part = replace(live, **_scaled(live, 0.4 * whole.factor))
+    rest = collapse_factor(ring(), live=live, dead=[part])
+    assert rest.factor == pytest.approx(0.6 * whole.factor, rel=1e-6)
+
+
+def _scaled(action, factor):
+    if isinstance(action, af.PointLoad):
+        return {"force": tuple(factor * each for each in action.force)}
+    return {key: factor * getattr(action, key) for key in ("horizontal", "vertical")}
+
+
+def test_too_much_dead_load_is_no_collapse_factor():
+    live = af.PointLoad(1.4, (0.0, -1e3))
+    whole = collapse_factor(ring(), live=live).factor
+    beyond = af.PointLoad(1.4, (0.0, -1.01e3 * whole))
+    assert collapse_factor(ring(), live=SIDEWAYS, dead=[beyond]).outcome is Outcome.INFEASIBLE

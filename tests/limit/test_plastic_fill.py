@@ -217,3 +217,39 @@ def test_a_mesh_covers_its_fill_and_stays_conforming(chosen):
     assert set(mesh.touches.tolist()) == beside | {SURFACE, HELD}
     # gradients of the shapes of a triangle add up to zero
     assert np.abs(mesh.gradients.sum(axis=1)).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("live", "half"),
+    [
+        (af.PointLoad(x=3.3, force=(0.0, -1e3)), lambda f: af.PointLoad(3.3, (0.0, -500.0 * f))),
+        (af.BodyForce(1.0, 0.2), lambda f: af.BodyForce(0.5 * f, 0.1 * f)),
+    ],
+)
+def test_half_of_the_load_that_stays_is_no_longer_live(live, half):
+    """On one mesh both bounds fall by just that half."""
+    fill = replace(FILL, gap=0.9)
+    whole = af.collapse_factor(arch_bridge(), live=live, fill=fill)
+    rest = af.collapse_factor(arch_bridge(), live=live, fill=fill, dead=[half(whole.lower)])
+    size = ROUNDING * whole.upper
+    assert rest.lower == pytest.approx(0.5 * whole.lower, abs=size)
+    assert rest.upper == pytest.approx(whole.upper - 0.5 * whole.lower, abs=size)
+
+
+@pytest.mark.parametrize("strength", [None, 2e6])
+def test_bonds_of_a_pier_beside_the_fill_yield_as_in_linear_programmes(footing, strength):
+    """The fill has no part in it: both bounds are the factor of the pier alone."""
+    bond = replace(af.masonry.STONE_TO_STONE, cohesion=40e3, tension=20e3)
+    pier = rectangle(-6.8, 0.5, -6.2, 2.5, "pier")
+    rest = af.masonry.assembled([*footing.blocks, pier], bond, width=1.0)
+    ground = rectangle(-7.0, -3.0, -6.0, 0.5, "left", fixed=True)
+    alone = af.masonry.assembled([ground, pier], bond, width=1.0)
+    live = af.PointLoad(x=-6.8, y=2.4, force=(1e3, 0.0))
+    fill = PlasticFill(friction_angle=30.0, cohesion=1e3, gap=0.9)
+    found = af.collapse_factor(rest, live=live, fill=fill, strength=strength)
+    exact = af.collapse_factor(alone, live=live, strength=strength).factor
+    assert (found.lower, found.upper) == pytest.approx((exact, exact), rel=ROUNDING)
+    dry = af.collapse_factor(
+        af.masonry.assembled([ground, pier], af.masonry.STONE_TO_STONE, width=1.0), live=live
+    ).factor
+    assert exact > 1.1 * dry

@@ -27,6 +27,14 @@ def test_wrong_units_are_refused(make, says):
         make()
 
 
+def test_a_block_that_stands_for_a_press_may_weigh_more_than_any_material():
+    with pytest.raises(af.errors.InvalidInput, match="stands_for='press'"):
+        af.Material(30e9, 0.2, 1e6)
+    assert af.Material(30e9, 0.2, 1e6, stands_for="press").unit_weight == 1e6
+    with pytest.raises(af.errors.InvalidInput, match="and 250 kN/m³"):
+        af.Material(30e9, 0.2, 1e6, stands_for="")
+
+
 def test_tension_goes_up_to_the_apex_of_coulombs_limit():
     assert af.Contact(1e9, 1e9, 0.5, cohesion=1e3, tension=2e3).tension == 2e3
     assert af.Contact(1e9, 1e9, None, tension=5e4).tension == 5e4

@@ -471,3 +471,41 @@ def test_the_first_step_is_a_millionth_of_the_structure(load):
     found = pushover(rigid(RING), load, stop=Stop(steps=1))
     moved = found.curve["displacement"].values
     assert moved == pytest.approx([0.0, 1e-6 * RING.size], rel=1e-6)
+
+
+@pytest.mark.parametrize("displacements", ["small", "large"])
+def test_a_press_stays_while_a_pier_is_pushed(displacements):
+    """The limit of rigid blocks: (W + P) b/2 = λ W h about the toe."""
+    stiff = af.Contact(1e13, 1e13, friction=0.7)
+    pier = af.column(breadth=0.6, heights=[1.0, 1.0, 1.0], contact=stiff)
+    weight = pier.weight
+    push = af.PointLoad(0.0, (weight, 0.0), y=1.5)
+    press = af.PointLoad(0.0, (0.0, -2.0 * weight))
+    model = af.build(pier, fidelity="rigid", displacements=displacements)
+    control = "displacement" if displacements == "small" else "path"
+    found = af.pushover(model, push, dead=[press], control=control)
+    # nothing is pushed at first, and the base carries pier and press
+    assert found.joints["N"].values[0, 0] == pytest.approx(3.0 * weight)
+    # below the limit by the compression zone of stiff joints
+    assert found.factor == pytest.approx(0.6, rel=0.02)
+    assert found.factor < 0.6
+
+
+def test_a_dead_load_is_refused_where_it_makes_the_structure_fall():
+    pier = af.column(breadth=0.6, heights=[1.0, 1.0, 1.0])
+    model = af.build(pier, fidelity="rigid")
+    push = af.PointLoad(0.0, (0.5 * pier.weight, 0.0), y=1.5)
+    with pytest.raises(af.DidNotConverge, match="of the loads that stay"):
+        af.pushover(model, push, dead=[push])
+
+
+def test_a_support_spreads_below_a_press():
+    """The thrust of limit analysis under the same loads."""
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+    press, spread = af.PointLoad(0.0, (0.0, -2e4)), af.Settlement("left abutment", (-1.0, 0.0, 0.0))
+    found = af.pushover(af.build(ring, fidelity="rigid"), spread, dead=[press])
+    exact = af.collapse_factor(ring, live=spread, dead=[press]).factor
+    assert found.limit == pytest.approx(exact, abs=3.0 * found.uncertainty + 1e-3 * exact)
+    large = af.build(ring, fidelity="rigid", displacements="large")
+    with pytest.raises(af.InvalidInput, match="small displacements"):
+        af.pushover(large, spread, dead=[press])

@@ -75,7 +75,8 @@ class ComplianceSolver(StepSolver):
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
         """Return the solver, or None where anything but plain joints is nonlinear."""
-        return cls(equation) if equation.joints is not None else None
+        joints = equation.joints
+        return None if joints is None or joints.points.stiffens else cls(equation)
 
     def assemble(self, dt: float) -> ComplianceSystem:
         """Return the data of steps of one length [s]."""

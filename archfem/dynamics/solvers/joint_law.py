@@ -463,7 +463,7 @@ def open_forces(law, gap, released):  # type: ignore
                 opening, opening, points[first].share, points[first + step - 1].share
             )
             taken = joint_means(points[first], ends, 1.0, 1.0, facets)[1]
-            energy += points[first].area * released_energy(points[first], ends, taken)
+            energy += points[first].area * released_energy(points[first], ends, taken, facets)
             for end in range(step):
                 point = points[first + end]
                 force = point.area * taken[end]

@@ -44,10 +44,11 @@ def _make_solver(method: str, equation: Equation) -> StepSolver | None:
     if (solver := solvers[method].of(equation)) is None:
         raise InvalidInput(
             f"method '{method}' does not apply to this model of fidelity "
-            f"'{equation.model.fidelity}': compliance needs small displacements; both need "
-            "joints that neither dilate, nor resist tension, nor have a law of their own, and, "
-            "with Newmark's method or HHT, whose supports have not moved; neither applies to "
-            "monolithic models; use method='auto' or 'snes'"
+            f"'{equation.model.fidelity}': compliance needs small displacements, and joints that "
+            "do not stiffen as they close; both need joints that neither dilate, nor resist "
+            "tension, nor have a law of their own, and, with Newmark's method or HHT, whose "
+            "supports have not moved; neither applies to monolithic models; use method='auto' or "
+            "'snes'"
         )
     return solver
 
@@ -67,6 +68,8 @@ def select_solver(equation: Equation) -> StepSolver | None:
             logger.info("joints dilate, resist tension or have an own law: SNES solves every step")
         return None
     if equation.model.large_displacements or joints is None:
+        return newton
+    if joints.points.stiffens:  # every row is active
         return newton
     rows = len(gap_rows(joints).offset)
     # Chains of rigid stones have a half width of 5 to 11, and take 0.6 to 0.85 of the time of the

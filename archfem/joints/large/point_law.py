@@ -12,6 +12,7 @@ import numpy as np
 
 from archfem._numba import inlined_kernel
 from archfem.joints.contact_law import SLIP_LIMIT_TOLERANCE, ContactLaw
+from archfem.joints.large.closing_law import excess_means, facet_step_excess, point_step_excess
 from archfem.joints.normal_law import GAUSS_POINTS, GAUSS_WEIGHTS
 
 # Parameters of the law at one place
@@ -21,7 +22,7 @@ CONTACT_RECORD: np.dtype[Any] = np.dtype([(name, np.float64) for name in Contact
 @inlined_kernel
 def releases(contact, gaps):  # type: ignore
     """Return whether a joint releases anything on the way between gaps: where it is not linear."""
-    return max(gaps) > 0.0
+    return max(gaps) > 0.0 or contact.closing_rate > 0.0
 
 
 @inlined_kernel
@@ -33,9 +34,30 @@ def joint_means(contact, ends, first, second, facet):  # type: ignore
     that, the fraction closed, and its rate. Rates of a facet are of (1, 1), (1, 2) and (2, 2).
     """
     if facet:
-        return _facet_means(contact, ends, first, second)
-    normal, taken, rate, time, moves = _point_means(contact, ends[0], ends[2], first, second)
-    return (normal, 0.0), (taken, 0.0), (rate, 0.0, 0.0), (time, 0.0), (moves, 0.0, 0.0)
+        means = _facet_means(contact, ends, first, second)
+    else:
+        normal, taken, rate, time, moves = _point_means(contact, ends[0], ends[2], first, second)
+        means = (normal, 0.0), (taken, 0.0), (rate, 0.0, 0.0), (time, 0.0), (moves, 0.0, 0.0)
+    if contact.closing_rate > 0.0:
+        return _add_excess(contact, ends, (first, second), facet, means)
+    return means
+
+
+@inlined_kernel
+def _add_excess(contact, ends, rates, facet, means):  # type: ignore
+    """Return `joint_means` with the traction by which a joint exceeds the linear law."""
+    stiffness, rate = contact.normal_stiffness, contact.closing_rate
+    closings = -ends[0], -ends[1], -ends[2], -ends[3]
+    if facet:
+        (near, far), (k00, k01, k11) = facet_step_excess(
+            stiffness, rate, closings, rates[0], rates[1]
+        )
+    else:
+        near, k00 = point_step_excess(stiffness, rate, closings[0], closings[2], rates[0], rates[1])
+        far = k01 = k11 = 0.0
+    normal, taken, slopes, time, moves = means
+    normal, taken = (normal[0] - near, normal[1] - far), (taken[0] + near, taken[1] + far)
+    return normal, taken, (slopes[0] - k00, slopes[1] - k01, slopes[2] - k11), time, moves
 
 
 @inlined_kernel
@@ -124,7 +146,8 @@ def _uniform_means(contact, ends, rate):  # type: ignore
 @inlined_kernel
 def mean_tractions(contact, ends, lag, facet):  # type: ignore
     """Return means of the traction as `joint_means`, and their derivatives by gaps at the end."""
-    if min(ends) > 0.0:  # open during the whole step
+    # open during the whole step; what a joint presses beyond the linear law has no lag
+    if min(ends) > 0.0 and contact.closing_rate == 0.0:
         return (0.0, 0.0), (0.0, 0.0, 0.0)
     # the derivative is that of a spring which is never open, less that of the release
     normal, _, rates, _, _ = joint_means(contact, ends, lag, 1.0 + lag, facet)
@@ -151,20 +174,40 @@ def point_energy(contact, gap):  # type: ignore
     """Return the energy stored at a place, and its derivative, the traction."""
     gap = min(gap, 0.0)
     traction = contact.normal_stiffness * gap
-    return 0.5 * traction * gap, traction
+    energy = 0.5 * traction * gap
+    if contact.closing_rate > 0.0:
+        mean, (near, far), _ = _excess_between(contact, gap, gap)
+        return energy + mean, traction - near - far
+    return energy, traction
 
 
 @inlined_kernel
-def released_energy(contact, gaps, taken):  # type: ignore
+def _excess_between(contact, first, last):  # type: ignore
+    """Return `excess_means` between two gaps."""
+    return excess_means(contact.normal_stiffness, contact.closing_rate, -first, -last)
+
+
+@inlined_kernel
+def released_energy(contact, gaps, taken, facet):  # type: ignore
     """Return the energy that a joint does not store at the gaps of its ends, from the release."""
-    return 0.5 * (gaps[0] * taken[0] + gaps[1] * taken[1])
+    half = 0.5 * (gaps[0] * taken[0] + gaps[1] * taken[1])
+    if contact.closing_rate > 0.0:
+        # half the work of the release is the energy of the linear part alone
+        first, last = gaps[0], gaps[1] if facet else gaps[0]
+        mean, (near, far), _ = _excess_between(contact, first, last)
+        return half - 0.5 * (first * near + last * far) - mean
+    return half
 
 
 @inlined_kernel
 def facet_energy(contact, first, last):  # type: ignore
     """Return the energy of a facet of unit length, its force, and its moment about the middle."""
     near, far = joint_means(contact, (first, last, first, last), 1.0, 1.0, True)[0]
-    return 0.5 * (first * near + last * far), near + far, 0.5 * (far - near)
+    energy = 0.5 * (first * near + last * far)
+    if contact.closing_rate > 0.0:
+        mean, (one, other), _ = _excess_between(contact, first, last)
+        energy += 0.5 * (first * one + last * other) + mean
+    return energy, near + far, 0.5 * (far - near)
 
 
 @inlined_kernel

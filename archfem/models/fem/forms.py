@@ -104,9 +104,15 @@ class ContactFaces:
         limit, closed = self._limit(fixed), self._is_closed(fixed)
         return self._tractions(u, SLIP_LIMIT_TOLERANCE * limit + CONTACT_PERTURBATION * closed)
 
+    def _normal_traction(self, u: Any) -> Any:
+        """Traction across the joint [Pa]."""
+        law = self._law
+        stiffens = self.patch.contact.closure is not None
+        return (law.closing_traction if stiffens else law.normal_traction)(self._gap(u))
+
     def _tractions(self, u: Any, reserve: Any) -> Fields:
         """Tractions with Coulomb's limit raised by `reserve` [Pa]."""
-        normal = self._law.normal_traction(self._gap(u))
+        normal = self._normal_traction(u)
         return normal, clip_to_friction(self._trial_shear(u), self._limit(u) + reserve)
 
     def _is_closed(self, u: Any) -> Any:
@@ -115,12 +121,13 @@ class ContactFaces:
 
     def _limit(self, u: Any) -> Any:
         """Coulomb's limit at the normal traction that a displacement causes [Pa]."""
-        normal = self._law.normal_traction(self._gap(u))
-        return self._law.shear_limit(normal, self._is_closed(u))
+        return self._law.shear_limit(self._normal_traction(u), self._is_closed(u))
 
     def energy(self, u: Any) -> Any:
         """Return the energy stored per area without further slip [J/m²]."""
         along = 0.5 * self._trial_shear(u) ** 2 / self._law.shear_stiffness
+        if self.patch.contact.closure is not None:
+            return self._law.closing_energy(self.opening(u), ufl.ln) + along
         return self._law.normal_energy(self.opening(u)) + along
 
     def add_slip(self, u: Any) -> Any:

@@ -1,0 +1,305 @@
+"""JSON schema of case and study files, from the declarations by which they are read.
+
+Editors complete and check keys by it. `case.schema.json` beside this module is the output of
+`archfem schema`.
+"""
+
+import inspect
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from archfem._typing import NumberOrWord
+from archfem._validation import declared_keys, is_number
+from archfem.cases import analysis_keys, analysis_tables, case, motion_keys, structure_keys
+from archfem.dynamics import schemes
+from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.events import EVENTS
+from archfem.dynamics.recorder import Record
+from archfem.joints.criteria import Criteria
+from archfem.limit.collapse import collapse_factor
+from archfem.limit.vehicles import VEHICLES, Vehicle, rate
+from archfem.masonry.block import Block
+from archfem.masonry.construction import Stage
+from archfem.masonry.loads import AttachedLoad, BodyForce, PointLoad
+from archfem.masonry.materials import Contact, Material
+from archfem.masonry.parts import PART_ROLES
+from archfem.masonry.shapes.bridge_parts import Backfill, Paving
+from archfem.masonry.structure import Joint
+from archfem.masonry.survey.outlines import Layer
+from archfem.models.discretisation import MODEL_FIDELITIES
+from archfem.motion.design_spectra import registered_spectra
+from archfem.motion.motion import Motion
+from archfem.motion.suite import Suite
+from archfem.statics.mechanism_assessment import LimitState, kinematic_assessment
+from archfem.statics.newton import Newton
+from archfem.studies.statements import Statement
+from archfem.studies.study import STUDIED_CASE_KEYS, STUDY_KEYS
+
+Schema = dict[str, Any]
+
+_MOTION, _SPECTRUM, _CRITERIA = (
+    {"$ref": f"#/definitions/{name}"} for name in ("motion", "spectrum", "criteria")
+)
+
+
+def format_schema() -> str:
+    """Return the schema as text, as the shipped file has it."""
+    return json.dumps(build_schema(), indent=1, ensure_ascii=False) + "\n"
+
+
+def build_schema() -> Schema:
+    """Return the schema (draft 7) of case and study files."""
+    study: Schema = {"cases": _named(_table(STUDIED_CASE_KEYS)), "columns": {"type": "object"}}
+    study["statements"] = {"type": "array", "items": _table_of(Statement)}
+    top = {key: _value(kind) for key, kind in STUDY_KEYS.items()} | study
+    top |= {"title": {"type": "string", "description": "title of the case, or of the study"}}
+    top |= {"extensions": _strings(), "base": {"type": "string"}, "remove": _strings()}
+    return {
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": "case or study of archfem",
+        "type": "object",
+        "properties": top | _case_sections(),
+        "additionalProperties": False,
+        "definitions": {
+            "motion": _motion(),
+            "spectrum": _any(_spectrum(code) for code in _list_own_spectra()),
+            "criteria": _table_of(Criteria),
+        },
+    }
+
+
+def _case_sections() -> dict[str, Schema]:
+    """Return the schema of each section of a case."""
+    analysis = _analysis_sections()
+    return analysis | {
+        "structure": _any([*map(_shape, structure_keys.list_shapes()), _partial_structure()]),
+        "materials": _named(_table_of(Material)),
+        "contacts": _named(_table_of(Contact)),
+        "motion": _MOTION,
+        "suite": _suite(),
+        "criteria": _CRITERIA,
+        "record": _table_of(Record),
+        "limit": _limit(),
+        "rating": _rating(),
+        "assessment": _assessment(),
+        "dead_load": _dead_load(),
+        "output": _table(case.OUTPUT_KEYS),
+        "report": _table(case.REPORT_KEYS),
+    }
+
+
+def _shape(name: str) -> Schema:
+    """Return the schema of [structure] for a shape."""
+    own = {"shape": {"const": name}, **_parts_of_structure(name)}
+    schema = _table(structure_keys.shape_keys(name), structure_keys.list_shapes()[name], **own)
+    return {"title": name, **schema, "required": ["shape"]}
+
+
+def _parts_of_structure(name: str) -> dict[str, Schema]:
+    """Return the schemas of the tables in [structure]."""
+    if name == "blocks":
+        rows = {"blocks": Block, "joints": Joint}
+        return {key: {"type": "array", "items": _part(cls)} for key, cls in rows.items()}
+    fill = _choice("elastic", "jointed")
+    parts: dict[str, Schema] = {"fill": _table(structure_keys.fill_keys(), law=fill)}
+    if name == "outlines":
+        parts |= {"layers": _named(_part(Layer)), "contacts": {"type": "object"}}
+    elif name == "bridge":
+        for key, part in structure_keys.BRIDGE_PARTS.items():
+            # common keys of all parts, and a table for each under its name
+            schema = _part(part)
+            parts[key] = {**schema, "additionalProperties": schema}
+        parts |= {"backfill": _part(Backfill), "paving": _part(Paving)}
+    return parts
+
+
+def _part(declaration: Callable[..., Any]) -> Schema:
+    """Return the schema of a block, joint or part of a bridge."""
+    keys = structure_keys.keys_of_part(declaration)
+    role = {"role": _choice(*PART_ROLES)} if "role" in keys else {}
+    return _table(keys, declaration, **role)
+
+
+def _partial_structure() -> Schema:
+    """Return the schema of a [structure] that changes that of a base: keys of any shape."""
+    merged: dict[str, Schema] = {}
+    for name in structure_keys.list_shapes():
+        merged |= _shape(name)["properties"]
+    del merged["shape"]
+    return {"title": "changes of a base", **_object(merged)}
+
+
+def _analysis_sections() -> dict[str, Schema]:
+    """Return the schemas of [model] and [analysis]."""
+    keys = analysis_tables.analysis_keys()
+    kinds = (schemes.EffectiveDamping, schemes.StiffnessDamping, schemes.Rayleigh)
+    damping = _merged(kinds, modes=_choice("effective"))
+    own: dict[str, Schema] = {
+        "fidelity": _any([_choice(*MODEL_FIDELITIES, "auto"), {"type": "object"}]),
+        "displacements": _choice("small", "large"),
+        "damping": _any([_choice("effective"), damping]),
+        "scheme": _named_object(schemes.SCHEMES),
+        "until": _named_object(EVENTS, criteria=_CRITERIA),
+        "newton": _table_of(Newton),
+    }
+    return {
+        section: _table({name: keys[name] for name in names}, Analysis, **_present(own, names))
+        for section, names in analysis_tables.SECTION_FIELDS.items()
+    }
+
+
+def _named_object(known: Mapping[str, type], **own: Schema) -> Schema:
+    """Return the schema of a word, or a table with this word as its name."""
+    table = _merged(known.values(), name=_choice(*known), **own)
+    return _any([_choice(*known), table])
+
+
+def _motion() -> Schema:
+    """Return the schema of one motion."""
+    synthetic = _table_of(Motion.synthetic)
+    vertical = _table(motion_keys.source_keys(), Motion.read, synthetic=synthetic)
+    own = {"synthetic": synthetic, "vertical": _any([{"type": "string"}, vertical])}
+    return _table(motion_keys.motion_keys(), Motion.read, **own)
+
+
+def _suite() -> Schema:
+    """Return the schema of [suite]."""
+    return _table(motion_keys.suite_keys(), Suite, pairs=_named(_MOTION), target=_SPECTRUM)
+
+
+def _list_own_spectra() -> list[str]:
+    """Return the codes of the spectra that no module of the user has registered."""
+    return [code for code, cls in registered_spectra.items() if "archfem" in cls.__module__]
+
+
+def _spectrum(code: str) -> Schema:
+    """Return the schema of the design spectrum of a code."""
+    spectrum: Any = registered_spectra[code]
+    schema = _table(declared_keys(spectrum), spectrum)
+    schema["properties"]["code"] = {"const": code}
+    return {"title": code, **schema, "required": ["code"]}
+
+
+def _limit() -> Schema:
+    """Return the schema of [limit]."""
+    point = _table_of(PointLoad)
+    return _table(
+        analysis_keys.limit_keys(),
+        (collapse_factor, BodyForce),
+        point=_any([point, {"type": "array", "items": point}]),
+        friction=_choice(*analysis_keys.FRICTION_LAWS),
+        fill=_merged(analysis_keys.FILL_LAWS.values(), law=_choice(*analysis_keys.FILL_LAWS)),
+    )
+
+
+def _rating() -> Schema:
+    """Return the schema of [rating]; names of vehicles are read in any case of letters."""
+    vehicle = _any([{"type": "string", "examples": [*VEHICLES]}, _table_of(Vehicle)])
+    return _table(analysis_keys.rating_keys(), rate, vehicle=vehicle)
+
+
+def _assessment() -> Schema:
+    """Return the schema of [assessment]."""
+    return _table(
+        analysis_keys.assessment_keys(),
+        kinematic_assessment,
+        spectrum=_SPECTRUM,
+        friction=_choice(*analysis_keys.FRICTION_LAWS),
+        loads={"type": "array", "items": _table_of(AttachedLoad)},
+        limit_state=_any([{"type": "string"}, _table_of(LimitState)]),
+    )
+
+
+def _dead_load() -> Schema:
+    """Return the schema of [dead_load]."""
+    stages = _any([_choice("none", "usual"), {"type": "array", "items": _table_of(Stage)}])
+    return _table(analysis_tables.DEAD_LOAD_KEYS, stages=stages)
+
+
+def _table_of(declaration: Callable[..., Any]) -> Schema:
+    """Return the schema of a table whose keys a class or function declares."""
+    return _table(declared_keys(declaration), declaration)
+
+
+def _merged(declarations: Iterable[Callable[..., Any]], **own: Schema) -> Schema:
+    """Return the schema of a table that has the keys of one of several declarations."""
+    merged = dict(own)
+    for each in declarations:
+        merged = _table_of(each)["properties"] | merged
+    return _object(merged)
+
+
+def _table(keys: Mapping[str, Any], declarations: Any = (), **own: Schema) -> Schema:
+    """Return the schema of a table; texts and defaults are those of the declarations."""
+    unpacked = declarations if isinstance(declarations, tuple) else (declarations,)
+    texts = {key: text for each in unpacked for key, text in _describe_keys(each).items()}
+    values = {key: own.get(key) or _value(kind) for key, kind in keys.items()}
+    return _object({key: value | texts.get(key, {}) for key, value in values.items()})
+
+
+def _describe_keys(declaration: Callable[..., Any]) -> dict[str, Schema]:
+    """Return description and default of each argument, from the docstring and the signature."""
+    lines = (inspect.getdoc(declaration) or "").split("\n")
+    parameters = inspect.signature(declaration).parameters.values()
+    found: dict[str, Schema] = {
+        each.name: {"default": each.default}
+        for each in parameters
+        if isinstance(each.default, str | bool) or is_number(each.default)
+    }
+    name = ""
+    for line in lines:
+        if match := re.match(r"    (\w+): (.*)", line):
+            name = match[1]
+            found.setdefault(name, {})["description"] = match[2]
+        elif name and line.startswith(" " * 8):
+            found[name]["description"] += f" {line.strip()}"
+        else:
+            name = ""
+    return found
+
+
+def _value(kind: Any) -> Schema:
+    """Return the schema of a value of a kind of `check_table`."""
+    if isinstance(kind, str):
+        # a quantity begins with its number, which a unit follows
+        return {"type": ["number", "string"], "pattern": r"^\s*[-+.]?\d"}
+    if isinstance(kind, NumberOrWord):
+        return _any([_value(kind.unit), {"const": kind.word}])
+    if isinstance(kind, list):
+        return {"type": "array", "items": _value(kind[0])}
+    if isinstance(kind, tuple):
+        return _any(map(_value, kind))
+    types = {int: "integer", str: "string", bool: "boolean", dict: "object", list: "array"}
+    return {"type": types[kind]}
+
+
+def _any(schemas: Iterable[Schema]) -> Schema:
+    """Return the schema of a value that one of several describes."""
+    return {"anyOf": list(schemas)}
+
+
+def _choice(*words: str) -> Schema:
+    """Return the schema of one of some words."""
+    return {"enum": list(words)}
+
+
+def _strings() -> Schema:
+    """Return the schema of a list of words."""
+    return {"type": "array", "items": {"type": "string"}}
+
+
+def _named(schema: Schema) -> Schema:
+    """Return the schema of a table of tables by name."""
+    return {"type": "object", "additionalProperties": schema}
+
+
+def _object(properties: dict[str, Schema]) -> Schema:
+    """Return the schema of a table that has no other keys."""
+    return {"type": "object", "properties": properties, "additionalProperties": False}
+
+
+def _present(schemas: Mapping[str, Schema], names: Iterable[str]) -> dict[str, Schema]:
+    """Return the schemas of the keys of a section."""
+    return {name: schemas[name] for name in names if name in schemas}

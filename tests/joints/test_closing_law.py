@@ -1,0 +1,169 @@
+"""Joints that stiffen as they close, against quadrature, differences, closed forms and energy."""
+
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+from kernels import from_python
+from scipy.integrate import quad
+
+import archfem as af
+from archfem.joints.contact_law import LARGEST_CLOSING, ContactLaw
+from archfem.joints.large import closing_law
+from archfem.joints.normal_law import Facets, Springs
+from archfem.joints.quadrature import JointPoints
+from archfem.units import GPa, mm
+
+STIFFNESS, CLOSURE = 3.0 * GPa, 0.1 * mm
+"""k_n [Pa/m] and δ_m [m], p_0 = 0.3 MPa."""
+
+LAW = ContactLaw.of(af.Contact(STIFFNESS, 1e9, 0.6, closure=CLOSURE))
+
+excess_means = from_python(closing_law.excess_means)
+facet_step_excess = from_python(closing_law.facet_step_excess)
+point_step_excess = from_python(closing_law.point_step_excess)
+
+PROFILES = [
+    (-0.1, 0.2),
+    (0.01, 0.3),
+    (0.2, 0.21),
+    (0.2, 0.29),
+    (-0.3, 0.97),
+    (0.9, 1.2),
+    (1.1, 1.2),
+]
+"""Closings of both ends over δ_m: open, closed, nearly equal, beyond the end of the law."""
+
+
+def excess(closing):
+    """The traction in excess of the linear law, by its formula [Pa]."""
+    share = max(closing / CLOSURE, 0.0)
+    inside = min(share, LARGEST_CLOSING)
+    slope = 1.0 / (1.0 - LARGEST_CLOSING) ** 2
+    pressure = inside / (1.0 - inside) + slope * (share - inside)
+    return STIFFNESS * CLOSURE * (pressure - share)
+
+
+@pytest.mark.parametrize(("first", "last"), PROFILES)
+def test_means_along_a_facet_are_those_of_quadrature(first, last):
+    first, last = first * CLOSURE, last * CLOSURE
+    breaks = [place for place in (0.0, LARGEST_CLOSING * CLOSURE) if first < place < last]
+    breaks = [(place - first) / (last - first) for place in breaks]
+
+    def mean(weight):
+        def integrand(x):
+            return excess(first + x * (last - first)) * weight(x)
+
+        return quad(integrand, 0.0, 1.0, points=breaks or None, epsabs=0.0, epsrel=1e-11)[0]
+
+    _, (near, far), _ = excess_means(STIFFNESS, 1.0 / CLOSURE, first, last)
+    assert near == pytest.approx(mean(lambda x: 1.0 - x), rel=1e-9)
+    assert far == pytest.approx(mean(lambda x: x), rel=1e-9)
+
+
+@pytest.mark.parametrize(("first", "last"), PROFILES)
+def test_means_and_tangents_are_derivatives(first, last):
+    ends, step = np.array([first, last]) * CLOSURE, 1e-6 * CLOSURE
+
+    def differences(part):
+        values = []
+        for move in step * np.eye(2):
+            low, high = (
+                np.atleast_1d(excess_means(STIFFNESS, 1.0 / CLOSURE, *(ends + sign * move))[part])
+                for sign in (-1.0, 1.0)
+            )
+            values.append((high - low) / (2.0 * step))
+        return np.array(values)
+
+    _, means, (first_pair, mixed, last_pair) = excess_means(STIFFNESS, 1.0 / CLOSURE, *ends)
+    # central differences of values that round by 1e-15 of the largest
+    tolerance = {"rtol": 1e-6, "atol": 1e-8 * STIFFNESS}
+    np.testing.assert_allclose(differences(0).ravel(), means, **tolerance)
+    np.testing.assert_allclose(
+        differences(1), [[first_pair, mixed], [mixed, last_pair]], **tolerance
+    )
+
+
+STEPS = [
+    (0.2, 0.1, 0.25, 0.13),
+    (-0.1, 0.3, 0.2, 0.4),
+    (0.5, -0.2, 0.9, -0.6),
+    (0.2, 0.2, 0.95, 1.1),
+]
+"""Closings of both ends over δ_m before a step, then after it."""
+
+
+@pytest.mark.parametrize("ends", STEPS)
+def test_mean_of_a_step_does_the_work_of_the_energy(ends):
+    ends = np.array(ends) * CLOSURE
+    (near, far), _ = facet_step_excess(STIFFNESS, 1.0 / CLOSURE, tuple(ends), 0.0, 1.0)
+    stored = [excess_means(STIFFNESS, 1.0 / CLOSURE, *pair)[0] for pair in (ends[:2], ends[2:])]
+    work = near * (ends[2] - ends[0]) + far * (ends[3] - ends[1])
+    assert work == pytest.approx(stored[1] - stored[0], rel=1e-12)
+    place, _ = point_step_excess(STIFFNESS, 1.0 / CLOSURE, ends[0], ends[2], 0.0, 1.0)
+    stored = [excess_means(STIFFNESS, 1.0 / CLOSURE, end, end)[0] for end in ends[::2]]
+    assert place * (ends[2] - ends[0]) == pytest.approx(stored[1] - stored[0], rel=1e-10)
+
+
+@pytest.mark.parametrize("ends", STEPS)
+def test_tangent_of_a_step_is_nearly_the_derivative(ends):
+    """Its off-diagonal entries are made equal; the others are exact."""
+    lag, step = 0.1, 1e-6 * CLOSURE
+    rates = lag * np.ones(4) + [0.0, 0.0, 1.0, 1.0]
+
+    def means(*moves):
+        moved = np.array(ends) * CLOSURE + rates * np.tile(moves, 2)
+        means, _ = facet_step_excess(STIFFNESS, 1.0 / CLOSURE, tuple(moved), lag, 1.0 + lag)
+        return np.array(means)
+
+    found = [(means(*move) - means(*-move)) / (2.0 * step) for move in step * np.eye(2)]
+    scaled = tuple(np.array(ends) * CLOSURE)
+    _, (first, mixed, last) = facet_step_excess(STIFFNESS, 1.0 / CLOSURE, scaled, lag, 1.0 + lag)
+    size = abs(first) + abs(last)
+    assert [found[0][0], found[1][1]] == pytest.approx([first, last], abs=1e-5 * size)
+    assert mixed == pytest.approx(0.5 * (found[0][1] + found[1][0]), abs=1e-5 * size)
+    # this error is about the factor by which each iteration of Newton's method converges
+    assert abs(found[0][1] - found[1][0]) < 0.2 * size
+
+
+@pytest.mark.parametrize("kind", [Springs, Facets])
+def test_definition_of_weak_forms_is_that_of_compiled_code(kind):
+    """The traction by arithmetic, as UFL has it, where every place has the same gap."""
+    gaps = CLOSURE * np.array([0.1, 0.0, -0.2, -0.6, -0.97, -0.99, -1.5])
+    law = ContactLaw(*(np.full(2 * len(gaps), value) for value in LAW))
+    points = JointPoints(np.arange(2 * len(gaps)) // 2, np.zeros(14), np.ones(14), law, len(gaps))
+    openings = np.repeat(gaps, 2)
+    expected = law.closing_traction(openings)
+    assert kind(points).forces(openings) == pytest.approx(expected, rel=1e-9)
+    energy = law.closing_energy(openings, np.log)
+    assert kind(points).energies(openings) == pytest.approx(energy, rel=1e-9, abs=1e-12)
+
+
+def closing_under(pressure):
+    """The closing under a pressure, by the law solved for it [m]."""
+    return pressure / STIFFNESS / (1.0 + pressure / (STIFFNESS * CLOSURE))
+
+
+def stack(closure=CLOSURE, heights=(1.2, 1.2), **options):
+    """A column of two blocks, 0.6 m broad."""
+    contact = af.Contact(STIFFNESS, 1e9, 0.6, closure=closure)
+    return af.column(breadth=0.6, heights=list(heights), contact=contact, **options)
+
+
+@pytest.mark.parametrize("displacements", ["small", "large"])
+@pytest.mark.parametrize("quadrature", ["exact", "lobatto"])
+def test_column_settles_by_the_law(displacements, quadrature):
+    model = af.build(stack(), fidelity="rigid", quadrature=quadrature, displacements=displacements)
+    lower, both = closing_under(48e3), closing_under(24e3)
+    # 28.8 and 14.4 kN on 0.6 m
+    dead = af.dead_load(model)
+    assert dead.q[[1, 4]] == pytest.approx([-lower, -lower - both], rel=1e-9)
+
+
+def test_modes_have_the_tangent_of_the_law():
+    model = af.build(stack(heights=[1.2]), fidelity="rigid")
+    pressure = 24e3
+    tangent = STIFFNESS * (1.0 + pressure / (STIFFNESS * CLOSURE)) ** 2
+    mass = pressure / af.units.G
+    bounce = sqrt(tangent / mass) / (2.0 * pi)
+    assert np.min(np.abs(af.modes(model, 3).frequencies - bounce)) < 1e-6 * bounce
