@@ -1,10 +1,10 @@
 """Arch of rigid stones on joints that close along a hyperbola, explicit in time.
 
 A formulation of its own, which imports nothing of archfem. A closing u has the pressure
-σ = k u / (1 - u / c), and from 0.98 c on goes on along its tangent. Joints are integrated by
-Gauss's rule on the closed part of their faces, where the pressure is smooth. Damping proportional
-to stiffness is the law at u + b u'. Shear is that of a spring and a slider over the closed part of
-the face. Forces follow from the virtual power of opening, slip and rotation.
+σ = k u / (1 - u / c), and follows its tangent from 0.98 c on. Joints are integrated by Gauss's
+rule on the closed part of their faces, where the pressure is smooth. Damping proportional to k is
+the linear part of the law at u + b u'. Shear is that of a spring and a slider over the closed part
+of the face. Forces follow from the virtual power of opening, slip and rotation.
 """
 
 import json
@@ -26,7 +26,7 @@ class Law:
     shear: float = 1e10  # [Pa/m]
     friction: float = 0.70021
     share: float = 0.98  # closing over c beyond which the law is linear
-    lag: float = 0.0  # b of damping proportional to stiffness [s]
+    lag: float = 0.0  # b of damping proportional to k [s]
 
     @property
     def numbers(self):
@@ -90,17 +90,26 @@ def _measure(outline):
 
 
 @numba.njit(cache=True)
-def pressure(closing, law):
-    """Pressure of a closing, and its derivative."""
-    k, c, end = law[0], law[1], law[2]
-    if closing <= 0.0:
-        return 0.0, 0.0
-    if c == 0.0:
-        return k * closing, k
-    inside = min(closing, end)
+def excess(closing, law):
+    """Pressure of a closing in excess of the linear one, and its derivative."""
+    k, c = law[0], law[1]
+    inside = min(closing, law[2])
     rest = 1.0 - inside / c
     tangent = k / rest**2
-    return k * inside / rest + tangent * (closing - inside), tangent
+    return k * inside / rest + tangent * (closing - inside) - k * closing, tangent - k
+
+
+@numba.njit(cache=True)
+def closed_part(middle, slope, depth):
+    """Ends of the part of a face on which middle + slope y is above 0, y from its middle."""
+    low, high = -0.5 * depth, 0.5 * depth
+    if slope > 0.0:
+        low = min(max(low, -middle / slope), high)
+    elif slope < 0.0:
+        high = max(min(high, -middle / slope), low)
+    elif middle <= 0.0:
+        high = low
+    return low, high
 
 
 @numba.njit(cache=True)
@@ -109,28 +118,28 @@ def press(middle, slope, rate, turning, depth, law):
 
     The closing is middle + slope y, and its rate rate + turning y, y from the middle outward.
     """
-    low, high = -0.5 * depth, 0.5 * depth
-    if slope > 0.0:
-        low = max(low, -middle / slope)
-    elif slope < 0.0:
-        high = min(high, -middle / slope)
-    elif middle <= 0.0:
-        high = low
-    force, moment, stiffness = 0.0, 0.0, 0.0
-    # the law has a kink at its limit: each side by its own rule
-    bend = low if slope == 0.0 else min(max((law[2] - middle) / slope, low), high)
-    for start, stop in ((low, bend), (bend, high)):
-        half = 0.5 * (stop - start)
-        if half > 0.0:
-            for k in range(len(NODES)):
-                y = start + half * (1.0 + NODES[k])
-                closing = middle + slope * y + law[5] * (rate + turning * y)
-                traction, tangent = pressure(closing, law)
-                weight = half * WEIGHTS[k]
-                force += weight * traction
-                moment += weight * traction * y
-                stiffness += weight * tangent
-    return force, moment, stiffness, max(high - low, 0.0)
+    # linear law at the lagged closing
+    middle_late, slope_late = middle + law[5] * rate, slope + law[5] * turning
+    low, high = closed_part(middle_late, slope_late, depth)
+    first, second, third = high - low, (high**2 - low**2) / 2.0, (high**3 - low**3) / 3.0
+    force = law[0] * (middle_late * first + slope_late * second)
+    moment = law[0] * (middle_late * second + slope_late * third)
+    low, high = closed_part(middle, slope, depth)
+    stiffness = law[0] * max(first, high - low)
+    if law[1] > 0.0 and high > low:
+        # the excess has a kink at its limit: each side by its own rule
+        bend = low if slope == 0.0 else min(max((law[2] - middle) / slope, low), high)
+        for start, stop in ((low, bend), (bend, high)):
+            half = 0.5 * (stop - start)
+            if half > 0.0:
+                for k in range(len(NODES)):
+                    y = start + half * (1.0 + NODES[k])
+                    traction, tangent = excess(middle + slope * y, law)
+                    weight = half * WEIGHTS[k]
+                    force += weight * traction
+                    moment += weight * traction * y
+                    stiffness += weight * tangent
+    return force, moment, stiffness, high - low
 
 
 @numba.njit(cache=True)
@@ -225,8 +234,8 @@ def march(places, inertia, motion, numbers, end):
                 q[b, k] += dt * v[b, k]
         time += dt
         # two stones that turn about the ends of a face have a quarter of the mass of one
-        square = 4.0 * stiffest / mass.min()
-        dt = min(2e-5, 0.5 / (np.sqrt(square) + law[5] * square + 1.0))
+        damped = law[5] * 4.0 * law[0] * places[3].max() / mass.min()
+        dt = min(2e-5, 0.5 / (np.sqrt(4.0 * stiffest / mass.min()) + damped))
         if q[:, 1].min() < -0.5:
             break
     return time, largest
