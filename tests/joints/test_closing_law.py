@@ -8,6 +8,8 @@ from kernels import from_python
 from scipy.integrate import quad
 
 import archfem as af
+from archfem.dynamics.solvers.equation import Equation
+from archfem.dynamics.solvers.selection import stepper_for
 from archfem.joints.contact_law import LARGEST_CLOSING, ContactLaw
 from archfem.joints.large import closing_law
 from archfem.joints.normal_law import Facets, Springs
@@ -144,10 +146,10 @@ def closing_under(pressure):
     return pressure / STIFFNESS / (1.0 + pressure / (STIFFNESS * CLOSURE))
 
 
-def stack(closure=CLOSURE, heights=(1.2, 1.2), **options):
+def stack(closure=CLOSURE, heights=(1.2, 1.2), friction=0.6):
     """A column of two blocks, 0.6 m broad."""
-    contact = af.Contact(STIFFNESS, 1e9, 0.6, closure=closure)
-    return af.column(breadth=0.6, heights=list(heights), contact=contact, **options)
+    contact = af.Contact(STIFFNESS, 1e9, friction, closure=closure)
+    return af.column(breadth=0.6, heights=list(heights), contact=contact)
 
 
 @pytest.mark.parametrize("displacements", ["small", "large"])
@@ -167,3 +169,87 @@ def test_modes_have_the_tangent_of_the_law():
     mass = pressure / af.units.G
     bounce = sqrt(tangent / mass) / (2.0 * pi)
     assert np.min(np.abs(af.modes(model, 3).frequencies - bounce)) < 1e-6 * bounce
+
+
+def shaken(displacements, *, method="auto", damping=None, end=0.6, quadrature="exact"):
+    """A thin ring that rocks: history of coordinates, and energies of each step."""
+    contact = af.Contact(STIFFNESS, 1e9, 0.6, closure=CLOSURE)
+    ring = af.circular_arch(radius=4.0, thickness=0.5, embrace=180.0, voussoirs=7, contact=contact)
+    model = af.build(ring, fidelity="rigid", displacements=displacements, quadrature=quadrature)
+    rest = af.dead_load(model)
+    times = np.arange(0.0, end, 0.005)
+    motion = af.Motion(4.0 * np.sin(4.0 * pi * times) * (times < 0.25), 0.005)
+    equation = Equation(rest.model, motion, damping)
+    start = equation.at_rest(rest.q, memory=rest.model.memory)
+    energies, coordinates = [equation.energy(start)], [start.q]
+    for batch in stepper_for(method, equation).batches(start, 0.002, end):
+        energies += list(batch.energy)
+        coordinates += [batch.state(k).q for k in range(len(batch.times))]
+    return np.array(coordinates), np.array(energies)
+
+
+@pytest.mark.parametrize("quadrature", ["exact", "lobatto"])
+@pytest.mark.parametrize("damping", [None, af.StiffnessDamping(0.05, 11.0)])
+@pytest.mark.parametrize("displacements", ["small", "large"])
+def test_steps_conserve_energy(displacements, damping, quadrature):
+    """Kinetic and stored energy change by the work of the ground and of gravity, less the loss."""
+    states, energies = shaken(displacements, damping=damping, quadrature=quadrature)
+    kinetic, stored, work, lost = energies.T
+    balance = kinetic + stored - np.cumsum(work) + np.cumsum(lost)
+    assert np.ptp(states) > 0.01  # it rocks
+    assert np.ptp(balance) < 1e-8 * np.cumsum(np.abs(work))[-1]
+    assert lost[1:].min() > -1e-12 * np.abs(work).max()
+
+
+def test_compiled_steps_are_those_of_snes():
+    damping = af.StiffnessDamping(0.05, 11.0)
+    compiled, _ = shaken("small", damping=damping, end=0.3)
+    found, _ = shaken("small", method="snes", damping=damping, end=0.3)
+    # impacts magnify the tolerance of SNES, 1e-10 of the loads
+    assert np.abs(compiled - found).max() < 1e-6 * np.ptp(found)
+
+
+def test_a_large_closure_is_linear():
+    linear = af.dead_load(af.build(stack(closure=None), fidelity="rigid"))
+    nearly = af.dead_load(af.build(stack(closure=1.0), fidelity="rigid"))
+    # σ / p_0 is 48 kPa / 3 GPa
+    assert nearly.q[1] == pytest.approx(linear.q[1], rel=2e-5)
+    assert nearly.q[1] > linear.q[1]
+
+
+def test_dead_load_beyond_the_law_is_refused():
+    with pytest.raises(af.InvalidInput, match=r"closes joint 'joint 0' by .* 2\.4 MPa: the law"):
+        af.dead_load(af.build(stack(closure=1e-7, heights=[60.0, 60.0]), fidelity="rigid"))
+
+
+@pytest.mark.parametrize("closure", [0.0, -1e-4, np.nan, 2.0, "small"])
+def test_an_impossible_closure_is_refused(closure):
+    with pytest.raises(af.InvalidInput, match="closure"):
+        af.Contact(STIFFNESS, 1e9, 0.6, closure=closure)
+
+
+def test_bonds_and_laws_of_the_user_have_no_closure():
+    with pytest.raises(af.InvalidInput, match="beside a closure"):
+        af.Contact(STIFFNESS, 1e9, 0.6, cohesion=1e5, tension=1e5, closure=CLOSURE)
+
+
+def test_compliance_method_is_refused():
+    with pytest.raises(af.InvalidInput, match="stiffen"):
+        shaken("small", method="compliance")
+
+
+def test_a_monolithic_model_has_it_at_instants_only():
+    pytest.importorskip("dolfinx")
+    held = stack(friction=None)
+    model = af.build(held, fidelity="monolithic", cells=(1, 1), quadrature="gauss")
+    full = af.build(held, fidelity="full", cells=(1, 1), quadrature="gauss")
+    assert af.dead_load(model).q == pytest.approx(af.dead_load(full).q, rel=1e-8, abs=1e-14)
+    motion = af.Motion(np.ones(10), 0.01)
+    with pytest.raises(af.InvalidInput, match="closure"):
+        af.time_history(model, motion, dt=0.01)
+    runs = [
+        af.time_history(each, motion, dt=0.01, scheme=af.dynamics.Newmark(), method="snes")
+        for each in (model, full)
+    ]
+    first, second = (run.joints["M"].values for run in runs)
+    assert first == pytest.approx(second, rel=1e-6, abs=1e-6 * np.abs(second).max())
