@@ -40,6 +40,7 @@ from .limit.vehicles import moving_load as moving_load
 from .limit.vehicles import rate as rate
 from .masonry import shapes as shapes
 from .masonry.block import Block as Block
+from .masonry.joint_closing import joint_stiffness as joint_stiffness
 from .masonry.loads import BodyForce as BodyForce
 from .masonry.loads import PointLoad as PointLoad
 from .masonry.loads import Settlement as Settlement
@@ -69,7 +70,6 @@ from .studies.collapse_risk import CollapseRisk as CollapseRisk
 from .studies.collapse_risk import collapse_risk as collapse_risk
 from .studies.convergence import mesh_sensitivity as mesh_sensitivity
 from .studies.ida import ida as ida
-from .studies.joint_stiffness import joint_stiffness as joint_stiffness
 from .studies.study import Study as Study
 from .studies.variations import verdict_range as verdict_range
 

@@ -4,6 +4,7 @@
     backfill         backfill cut into pieces with joints
     block            Block, plane geometry, overlap checks
     construction     construction stages
+    joint_closing    stiffness and closure of joints, by finish or by a test
     loads            BodyForce, PointLoad, Settlement
     materials        Material, Contact, presets
     parts            roles and axes of rings and piers

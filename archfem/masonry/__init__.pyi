@@ -4,6 +4,10 @@ from .backfill import jointed_fill as jointed_fill
 from .block import Block as Block
 from .construction import Stage as Stage
 from .construction import usual_stages as usual_stages
+from .joint_closing import ClosingFit as ClosingFit
+from .joint_closing import JointStiffness as JointStiffness
+from .joint_closing import face_closing as face_closing
+from .joint_closing import fit_closing as fit_closing
 from .loads import AttachedLoad as AttachedLoad
 from .loads import BodyForce as BodyForce
 from .loads import PointLoad as PointLoad

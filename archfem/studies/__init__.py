@@ -8,7 +8,7 @@
     fork_server      loads what workers share
     fragility        fragility functions
     ida              incremental dynamic analysis
-    joint_stiffness  k_n and k_s from block and joint data
+    joint_stiffness  influence of joint stiffness on findings
     parameter_space  products, samples, points
     process_pool     workers on this machine
     result_store     rows on disk, progress, dataset

@@ -51,6 +51,7 @@ MASONRY = {
     "assembly.assembled": STRUCTURE,
     "block.Block.drawn": {"pieces": 16},
     "backfill.jointed_fill": {"cohesion": 0.0},
+    "joint_closing.joint_stiffness": {"strength": 56e6, "stress": 5e4, "poisson": 0.2},
     "materials.Contact": {"friction": 0.6, "cohesion": 0.0, "dilatancy": 0.0, "tension": 0.0},
     "shapes.bridges.buttressed_arch": PIERS | STRUCTURE,
     "shapes.bridges.arcade": PIERS | STRUCTURE,
@@ -112,7 +113,6 @@ BOOTSTRAP = {"resamples": 500, "seed": 0}
 
 STUDIES = {
     "convergence.mesh_sensitivity": {"cells": (2, 4, 8), "steps": STEPS["steps"]},
-    "joint_stiffness.joint_stiffness": {"strength": 56e6, "stress": 5e4, "poisson": 0.2},
     "fragility.fragility": BOOTSTRAP,
     "fragility.stripe_fragility": BOOTSTRAP,
     "fragility.Fragility.band": {"share": 0.9},

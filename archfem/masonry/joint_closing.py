@@ -1,0 +1,403 @@
+"""How dry joints close: their stiffness and largest closing, by the finish of faces or by a test.
+
+Faces touch at their asperities. Joints are therefore softer than stone, and stiffen as they close:
+
+    σ = k_i δ / (1 - δ/δ_m),   dσ/dδ = k_i (1 + σ/p_0)²,   p_0 = k_i δ_m,
+
+the law of `Contact` with a `closure`. k_i and δ_m follow from the roughness and strength of the
+faces by relations of mated rock joints. Faces of voussoirs are cut separately and do not mate. Such
+a joint closes further by one factor at any stress: k_i is divided by it, δ_m multiplied, and p_0 is
+that of mated faces. By walls of sawn granite the factor is 1, by those of sandstone 3 to 4; Bandis,
+Lumsden and Barton have about 2. The range here is from 1 to 4.
+
+Judgements, not taken from publications on masonry, are roughness and strength of the faces for each
+finish. Measurements are to be preferred: `fit_closing` takes them.
+
+References:
+    Bandis, Lumsden and Barton, Int. J. Rock Mech. Min. Sci. 20 (1983) 249-268: closure, initial
+    stiffness, joints that do not match. Barton and Bandis, Proc. 23rd US Symp. Rock Mech. (1982)
+    739-760: aperture. Barton and Choubey, Rock Mech. 10 (1977) 1-54: shear stiffness to the peak,
+    and profiles of JRC 0.4, 2.8, 5.8, 6.7, 9.5, 10.8, 12.8, 14.5, 16.7 and 18.7, with which the eye
+    compares a face. Vanin, Zaganelli, Penna and Beyer, Bull. Earthquake Eng. 15 (2017) 5435: moduli
+    of the walls of Vasconcelos and Lourenço (2009) and Lourenço et al. (2005) by their stress.
+    Lourenço, Computational strategies for masonry structures, Delft (1996): k_s by elasticity.
+    Demirel and Aldemir, Buildings 11 (2021): 1.48 and 0.30 MPa/mm.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import log10, radians, sqrt, tan
+
+import numpy as np
+
+from archfem._files import align_columns
+from archfem._typing import Array
+from archfem._validation import (
+    check_array,
+    check_choice,
+    check_number,
+    validate_arguments,
+    validate_methods,
+)
+from archfem.errors import InvalidInput
+from archfem.masonry.materials import Contact
+from archfem.units import GPa, MPa, mm
+
+# Least and largest joint roughness coefficient JRC, and strength of the faces over that of the
+# stone. Judgement: sawn faces are between profiles 1 and 3 of Barton and Choubey (1977), dressed
+# ones between 2 and 5; hewn ones are weaker and between 3 and 7; weathered have a third.
+FINISHES = {
+    "sawn": (2.0, 4.0, 1.0),
+    "dressed": (4.0, 8.0, 1.0),
+    "hewn": (6.0, 12.0, 0.6),
+    "weathered": (6.0, 12.0, 0.33),
+}
+
+# Factor on the closing of mated faces, from sawn granite to the sandstone that closes furthest [-]
+MISMATCH = 1.0, 4.0
+
+# Young's modulus of weak lime mortar [Pa] and thickness of its bed [m]: judgement
+MORTAR_MODULUS = 0.1 * GPa, 1.0 * GPa
+BED_THICKNESS = 10.0 * mm
+
+
+@validate_methods
+@dataclass(frozen=True)
+class JointStiffness:
+    """Low, usual and high value of the stiffness and closure of a joint.
+
+    Attributes:
+        normal: normal stiffness k_n at the given stress [Pa/m].
+        shear: shear stiffness k_s [Pa/m].
+        initial: normal stiffness k_i of a joint that just touches [Pa/m].
+        closure: largest closing δ_m [m]; infinite for mortar, which closes linearly. The softest
+            joint closes furthest.
+        sources: sources of the relations.
+    """
+
+    normal: tuple[float, float, float]
+    shear: tuple[float, float, float]
+    initial: tuple[float, float, float]
+    closure: tuple[float, float, float]
+    sources: tuple[str, ...] = (
+        "k_i and δ_m: Bandis, Lumsden and Barton (1983), aperture by Barton and Bandis (1982)",
+        "faces that do not mate: 1 to 4 times their closing, by walls of granite and sandstone",
+        "JRC and strength of the faces by their condition: judgement",
+        "k_s, low: Barton and Choubey (1977), secant to the peak at 1 % of the length",
+        "k_s, high: k_n / (2 (1 + ν)), Lourenço (1996); usual: 0.2 k_n, Demirel and Aldemir (2021)",
+    )
+
+    def contact(self, friction: float | None = 0.6, name: str = "stone to stone") -> Contact:
+        """Return a linear contact with the usual stiffness at the given stress.
+
+        Args:
+            friction: coefficient of friction [-].
+            name: name of the contact.
+        """
+        return Contact(self.normal[1], self.shear[1], friction, name)
+
+    def closing_contact(
+        self, friction: float | None = 0.6, name: str = "stone to stone"
+    ) -> Contact:
+        """Return a contact with the usual stiffness, which stiffens as it closes.
+
+        Args:
+            friction: coefficient of friction [-].
+            name: name of the contact.
+        """
+        closure = self.closure[1] if np.isfinite(self.closure[1]) else None
+        return Contact(self.initial[1], self.shear[1], friction, name, closure=closure)
+
+    def table(self) -> str:
+        """Return the ranges in MPa/mm and mm, and their sources, as text."""
+        ranges = {"k_n": self.normal, "k_s": self.shear, "k_i": self.initial}
+        rows = [[key, *(f"{value * mm / MPa:.3g}" for value in ranges[key])] for key in ranges]
+        rows.append(["δ_m [mm]", *(f"{value / mm:.3g}" for value in self.closure)])
+        return "\n".join([align_columns(["MPa/mm", "low", "usual", "high"], rows), *self.sources])
+
+
+@validate_methods
+@dataclass(frozen=True)
+class ClosingFit:
+    """Law of closing fitted to a test.
+
+    Attributes:
+        stiffness: stiffness k_i of a joint that just touches [Pa/m].
+        closure: largest closing δ_m [m].
+        misfit: largest difference of the law from the test, relative to the test [-].
+        stresses: least and largest stress of the test; below and above the law extrapolates [Pa].
+    """
+
+    stiffness: float
+    closure: float
+    misfit: float
+    stresses: tuple[float, float]
+
+    def contact(
+        self, shear_stiffness: float, friction: float | None = 0.6, name: str = "stone to stone"
+    ) -> Contact:
+        """Return a contact with this law.
+
+        Args:
+            shear_stiffness: k_s [Pa/m].
+            friction: coefficient of friction [-].
+            name: name of the contact.
+        """
+        return Contact(self.stiffness, shear_stiffness, friction, name, closure=self.closure)
+
+    def __str__(self) -> str:
+        """Law, misfit and range of the test."""
+        low, high = (stress / MPa for stress in self.stresses)
+        return (
+            f"k_i = {self.stiffness / GPa:.3g} GPa/m, δ_m = {self.closure / mm:.3g} mm; largest "
+            f"misfit {self.misfit:.1%} from {low:.3g} to {high:.3g} MPa"
+        )
+
+
+@validate_arguments
+def face_closing(
+    roughness: float,
+    face_strength: float,
+    aperture: float | None = None,
+    *,
+    strength: float | None = None,
+) -> tuple[float, float]:
+    """Return the stiffness and the closure of mated faces from their roughness and strength.
+
+    With JRC the roughness, JCS the strength of the faces, σ_c that of the stone [MPa] and a the
+    aperture without load [mm],
+
+        a = JRC / 5 (0.2 σ_c / JCS - 0.1),   k_i = -7.15 + 1.75 JRC + 0.02 JCS / a [GPa/m],
+        δ_m = -0.1032 - 0.0074 JRC + 1.135 (JCS / a)^-0.251 [mm],
+
+    cut off at 0.1 GPa/m and 1 µm. The regressions are of joints that were loaded three times.
+
+    Args:
+        roughness: joint roughness coefficient JRC, 0.4 to 20 [-].
+        face_strength: compressive strength of the faces JCS [Pa].
+        aperture: aperture without load, or None for that of the first relation [m].
+        strength: compressive strength of the stone σ_c; by default that of the faces [Pa].
+
+    Returns:
+        k_i [Pa/m] and δ_m [m].
+
+    Raises:
+        InvalidInput: a value is out of range.
+
+    Reference:
+        Bandis, Lumsden and Barton (1983); Barton and Bandis (1982).
+
+    Example:
+        >>> stiffness, closure = af.masonry.face_closing(4.0, 50e6)
+        >>> round(stiffness / 1e9, 2), round(closure * 1e3, 3)
+        (12.35, 0.093)
+    """
+    check_number(roughness, "roughness", minimum=0.4, maximum=20.0)
+    stone = _check_above_zero(face_strength if strength is None else strength, "strength") / MPa
+    jcs = _check_above_zero(face_strength, "face_strength") / MPa
+    if aperture is None:
+        gap = 0.2 * roughness * (0.2 * stone / jcs - 0.1)  # [mm]
+        if gap <= 0.0:
+            raise InvalidInput(
+                f"face_strength {face_strength:.3g} Pa is at least twice the strength of the "
+                f"stone, {strength:.3g} Pa: the relation gives no aperture: give it in m"
+            )
+    else:
+        gap = _check_above_zero(aperture, "aperture") / mm
+    # the regressions are limited to positive values
+    initial = max(-7.15 + 1.75 * roughness + 0.02 * jcs / gap, 0.1)  # [MPa/mm]
+    closure = max(-0.1032 - 0.0074 * roughness + 1.135 * (jcs / gap) ** -0.251, 1e-3)  # [mm]
+    return initial * MPa / mm, closure * mm
+
+
+@validate_arguments
+def joint_stiffness(
+    young: float,
+    spacing: float,
+    condition: str = "dressed",
+    *,
+    strength: float = 56.0 * MPa,
+    stress: float = 0.05 * MPa,
+    poisson: float = 0.2,
+    rigid: bool = False,
+) -> JointStiffness:
+    """Estimate the range of stiffness and closure of joints from stone, finish and stress.
+
+    JRC is 2 to 4 for sawn faces, 4 to 8 for dressed and 6 to 12 for hewn and weathered ones, JCS
+    over σ_c is 1, 1, 0.6 and 0.33: judgement. `face_closing` gives the law of mated faces, and
+    others close 1 to 4 times as far. The usual law is the geometric mean of the softest and the
+    stiffest at the stress. A bed of weak mortar fills the aperture: 0.1 to 1 GPa on 10 mm, linear.
+
+    A joint between rigid blocks also includes the flexibility of the stone up to the next joint, in
+    series: 1 / k = 1 / k_n + spacing / E. Such a joint follows no hyperbola: k_i and δ_m are those
+    with its tangents without stress and at the stress.
+
+    Args:
+        young: Young's modulus of the blocks [Pa].
+        spacing: spacing of the joints, also taken for the length of their faces [m].
+        condition: finish of the faces, "sawn", "dressed", "hewn" or "weathered", or "mortar".
+        strength: compressive strength of the stone [Pa].
+        stress: compressive stress normal to the joints, as under dead load [Pa].
+        poisson: Poisson's ratio of the blocks [-].
+        rigid: whether the model has rigid blocks, so that joints include their flexibility.
+
+    Returns:
+        Ranges and their sources. They are wide: `stiffness_report` computes their influence.
+
+    Raises:
+        InvalidInput: the condition is unknown, or a value is out of range.
+
+    Example:
+        >>> low, usual, high = af.joint_stiffness(30e9, 0.5, "weathered").normal
+        >>> low < usual < high
+        True
+    """
+    check_choice(condition, "condition", [*FINISHES, "mortar"])
+    for name, value in (("young", young), ("spacing", spacing), ("strength", strength)):
+        _check_above_zero(value, name)
+    if not 0.0 < check_number(stress, "stress") < strength:
+        raise InvalidInput(
+            f"stress {stress!r} Pa is not between 0 and the strength {strength!r} Pa"
+        )
+    check_number(poisson, "poisson", minimum=0.0, maximum=0.499)
+    elastic = 2.0 * (1.0 + poisson)  # E / G, and k_n / k_s of an elastic layer
+    flexibility = spacing / young if rigid else 0.0
+    if condition == "mortar":
+        return _mortar_bed(elastic, flexibility)
+    laws = _finish_laws(condition, strength, stress)
+    low, usual, high = (_tangent(k, closing, stress) for k, closing in laws)
+    least, most, weathering = FINISHES[condition]
+    shear = [_shear(jrc, strength * weathering, stress, spacing) for jrc in (least, most)]
+    ratio = 0.2  # usual k_s / k_n, as 0.30 / 1.48 in Demirel and Aldemir (2021)
+    shears = [min(*shear, ratio * low), ratio * usual, high / elastic]
+    initial = [_in_series(law[0], flexibility) for law in laws]
+    normal = [_in_series(k, flexibility) for k in (low, usual, high)]
+    # of the law with both tangents: k = k_i (1 + σ / (k_i δ_m))²
+    closure = [
+        stress / (k * (sqrt(tangent / k) - 1.0)) for k, tangent in zip(initial, normal, strict=True)
+    ]
+    shears = [_in_series(k, elastic * flexibility) for k in shears]
+    return JointStiffness(_three(normal), _three(shears), _three(initial), _three(closure))
+
+
+@validate_arguments
+def fit_closing(
+    stresses: Sequence[float] | Array,
+    closings: Sequence[float] | Array | None = None,
+    *,
+    secants: Sequence[float] | Array | None = None,
+    tangents: Sequence[float] | Array | None = None,
+) -> ClosingFit:
+    """Fit the law of closing to a test of a joint.
+
+    Secants from the unloaded joint σ/δ = k_i + σ/δ_m, and roots of tangents √k = √k_i (1 + σ/p_0),
+    are straight over the stress: least squares of relative differences.
+
+    Args:
+        stresses: compressive stresses (n,) [Pa].
+        closings: closing of the joint from no stress, without that of the stone (n,) [m].
+        secants: stiffness from no stress, in place of closings (n,) [Pa/m].
+        tangents: stiffness at the stress, in place of closings (n,) [Pa/m].
+
+    Returns:
+        Law and misfit.
+
+    Raises:
+        InvalidInput: not one of closings, secants and tangents is given, a value is not above 0, or
+            the joint does not stiffen.
+
+    Example:
+        >>> fit = af.masonry.fit_closing([0.5e6, 0.875e6, 1.25e6], secants=[26.2e9, 34e9, 41.1e9])
+        >>> str(fit)
+        'k_i = 16.3 GPa/m, δ_m = 0.05 mm; largest misfit 0.7% from 0.5 to 1.25 MPa'
+    """
+    given = {"closings": closings, "secants": secants, "tangents": tangents}
+    named = {name: values for name, values in given.items() if values is not None}
+    if len(named) != 1:
+        raise InvalidInput(f"{len(named)} of {list(given)} are given: give one of them")
+    ((name, values),) = named.items()
+    stress, measured = check_array(stresses, "stresses"), check_array(values, name)
+    if stress.ndim != 1 or stress.shape != measured.shape or len(np.unique(stress)) < 2:
+        raise InvalidInput(
+            f"stresses {stress.shape} and {name} {measured.shape}: give as many of both, at two "
+            "stresses or more"
+        )
+    if min(stress.min(), measured.min()) <= 0.0:
+        raise InvalidInput(f"stresses or {name} are not above 0: leave out the unloaded joint")
+    if name == "tangents":
+        line = np.sqrt(measured)
+    else:
+        line = stress / measured if name == "closings" else measured
+    rows = np.stack([np.ones_like(stress), stress], axis=1) / line[:, None]
+    (start, slope), *_ = np.linalg.lstsq(rows, np.ones_like(stress), rcond=None)
+    # a growth of a millionth over the test is round-off of a linear joint
+    linear = slope * stress.max() < 1e-6 * abs(start)
+    if linear or start <= 0.0:
+        remedy = "it closes linearly: leave out the closure" if linear else "add low stresses"
+        raise InvalidInput(
+            f"{name} over stresses give k_i or 1/δ_m below 0 ({start:.3g}, {slope:.3g}): {remedy}"
+        )
+    stiffness = float(start**2 if name == "tangents" else start)
+    closure = float(1.0 / (start * slope) if name == "tangents" else 1.0 / slope)
+    ratio = rows @ (start, slope)
+    if name != "secants":
+        ratio = 1.0 / ratio if name == "closings" else ratio**2
+    misfit = float(abs(ratio - 1.0).max())
+    return ClosingFit(stiffness, closure, misfit, (float(stress.min()), float(stress.max())))
+
+
+def _check_above_zero(value: float, name: str) -> float:
+    """Return a number above 0."""
+    if check_number(value, name, minimum=0.0) == 0.0:
+        raise InvalidInput(f"{name} = {value!r} is not above 0: give it in SI")
+    return value
+
+
+def _finish_laws(condition: str, strength: float, stress: float) -> list[tuple[float, float]]:
+    """Return k_i and δ_m of the softest joint at a stress, the usual and the stiffest."""
+    least, most, weathering = FINISHES[condition]
+    # the stiffness is not monotonic in the roughness
+    mated = [
+        face_closing(float(jrc), strength * weathering, strength=strength)
+        for jrc in np.linspace(least, most, 21)
+    ]
+    mated.sort(key=lambda law: _tangent(law[0], law[1], stress))
+    soft, stiff = mated[0], mated[-1]
+    closest, furthest = MISMATCH
+    laws = [(soft[0] / furthest, soft[1] * furthest), (stiff[0] / closest, stiff[1] * closest)]
+    usual = sqrt(laws[0][0] * laws[1][0]), sqrt(laws[0][1] * laws[1][1])
+    return [laws[0], usual, laws[1]]
+
+
+def _tangent(stiffness: float, closure: float, stress: float) -> float:
+    """Return the tangent of the law of closing at a stress [Pa/m]."""
+    return stiffness * (1.0 + stress / (stiffness * closure)) ** 2
+
+
+def _in_series(stiffness: float, flexibility: float) -> float:
+    """Return a stiffness in series with a flexibility [Pa/m]."""
+    return 1.0 / (1.0 / stiffness + flexibility)
+
+
+def _mortar_bed(elastic: float, flexibility: float) -> JointStiffness:
+    """Return the range of a bed of weak mortar, an elastic layer."""
+    low, high = (modulus / BED_THICKNESS for modulus in MORTAR_MODULUS)
+    layers = low, sqrt(low * high), high
+    normal = [_in_series(k, flexibility) for k in layers]
+    shear = [_in_series(k / elastic, elastic * flexibility) for k in layers]
+    sources = ("k_n: 0.1 to 1 GPa of weak mortar on 10 mm, judgement; k_s: an elastic layer",)
+    linear = np.inf, np.inf, np.inf
+    return JointStiffness(_three(normal), _three(shear), _three(normal), linear, sources)
+
+
+def _three(values: Sequence[float]) -> tuple[float, float, float]:
+    """Return three values as a tuple of that length."""
+    low, usual, high = values
+    return low, usual, high
+
+
+def _shear(roughness: float, faces: float, stress: float, length: float) -> float:
+    """Return the shear stiffness as the secant to the peak, at a hundredth of the length [Pa/m]."""
+    residual_angle = 30.0  # of flat faces [degree]
+    angle = min(roughness * log10(faces / stress) + residual_angle, 70.0)
+    return stress * tan(radians(angle)) * 100.0 / length
