@@ -77,10 +77,12 @@ def follow_fall(
     states: tuple[State, State],
     motion: Motion,
     rocking_ratio: float | None,
+    whole: bool = True,
 ) -> History:
     """Add the fall of loose or overturning blocks, and the state of collapse, to a history.
 
     The states are those at the start, from which displacements count, and at the end of the run.
+    Not whole, the fall ends with the first lost block, and is not compared with rigid blocks.
     """
     (start, state), structure, ending = states, model.structure, history.ending
     origin, _ = model.rigid_motions(start.q, start.velocity)
@@ -88,7 +90,7 @@ def follow_fall(
     doubts: list[Doubt] = []
     if tilts or ending in (Ending.PARTED, Ending.MET):
         try:
-            dataset, frames = simulate_fall(model, state, motion, rocking_ratio)
+            dataset, frames = simulate_fall(model, state, motion, rocking_ratio, whole)
         except DidNotConverge as error:
             error.history = history
             raise
@@ -101,15 +103,21 @@ def follow_fall(
         resting = is_resting(model, state, shaken=ending is not Ending.FINISHED)
         fall = replace(classify_collapse(structure, [frame], origin), resting=resting)
     doubts += doubt_collapse(structure, fall)
-    if fall.kind in FALLEN_STATES:
+    if fall.kind in FALLEN_STATES and whole:
         doubts += _doubt_joints(structure, motion, start.time)
     return with_fall(history, fall).with_doubts((*history.doubts, *doubts))
 
 
 def simulate_fall(
-    model: Model, state: State, motion: Motion, rocking_ratio: float | None = None
+    model: Model,
+    state: State,
+    motion: Motion,
+    rocking_ratio: float | None = None,
+    whole: bool = True,
 ) -> tuple[xr.Dataset, list[FallFrame]]:
     """Follow loose blocks until they rest, or until 20 s after the motion has ended.
+
+    Not whole, they are followed by one length of step until the first block is lost.
 
     The ratio is that of `RigidBlockSimulation`, for the joints where it has an effect.
     """
@@ -120,9 +128,14 @@ def simulate_fall(
     if rocking_ratio is not None and (unkept := find_unkept_ratios(loose, rocking_ratio)):
         names = {joint.name for joint in loose.joints} - unkept.keys()
         ratios = dict.fromkeys(names, rocking_ratio)
-    simulation = RigidBlockSimulation(loose, rocking_ratio=ratios)
+    dt = None if whole else TRIED_STEPS[0]
+    simulation = RigidBlockSimulation(loose, dt=dt, rocking_ratio=ratios)
     try:
-        frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
+        frames = []
+        for frame in simulation.frames(released.start, end, motion, spacing=0.02):
+            frames.append(frame)
+            if not whole and classify_collapse(model.structure, [frame]).blocks:
+                break
     except DidNotConverge as error:
         raise DidNotConverge(
             f"{error}; compare with another dt of time_history, or with "

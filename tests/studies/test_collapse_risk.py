@@ -25,7 +25,7 @@ def risk_of(capacity, record, alternative=None, width=0.01):
     samples = {
         "lower": capacity * (1.0 - 0.5 * width),
         "upper": capacity * (1.0 + 0.5 * width),
-        "record": np.asarray(record),
+        "record_number": np.asarray(record),
         "alternative": np.array(["as given"] * count if alternative is None else alternative),
         "runs": np.full(count, 4),
         "error": np.array([""] * count),
