@@ -13,12 +13,18 @@ from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults, list_default_keys
 from archfem.cases.provenance import hash_file
-from archfem.cases.report.report_data import ReportData, build_player, missing_note
+from archfem.cases.report.report_data import (
+    ReportData,
+    build_live_page,
+    build_player,
+    missing_note,
+)
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import SIGN_CONVENTION, History
 from archfem.dynamics.recorder import library_versions
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.dynamics.verdict import Verdict
+from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.structure import Structure
@@ -42,6 +48,7 @@ def build_sections(data: ReportData) -> list[Section]:
         *build_run_sections(data),
         build_check_section(data),
         build_source_section(data),
+        *build_live_sections(data),
     ]
 
 
@@ -523,6 +530,19 @@ def _describe_model(data: ReportData) -> list[tuple[str, str]]:
     cells = ("cells at least", f"{through} through the thickness, {along} along each block")
     elements = ("elements", f"{discretisation.cell}s of degree {discretisation.degree}")
     return [*rows, cells, elements, rule]
+
+
+def build_live_sections(data: ReportData) -> list[Section]:
+    """Build the section with the arch to shake, where stones are rigid and no fill acts."""
+    try:
+        live = build_live_page(data)
+    except InvalidInput:
+        return []
+    text = (
+        "Change the arch, and shake it: rigid stones fall to the ground. `archfem page FOLDER` "
+        "writes this as a page of its own."
+    )
+    return [Section("Try it", [TextBlock(text), live])]
 
 
 def build_source_section(data: ReportData) -> Section:
