@@ -190,6 +190,7 @@ def describe_ring(structure: Structure) -> dict[str, Any] | None:
     mass = sum(structure.density(block) * block.area for block in stones) * structure.width
     return {
         "ends": ends.tolist(),
+        "kept": 0.5,
         "stones": len(stones),
         "thickness": round(float(structure.depths.min()), 4),
         "density": mass / sum(block.area for block in stones),

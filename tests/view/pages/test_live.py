@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from chromium import browser, complaints
-from live_scripts import run_in_node
+from live_scripts import run_in_node, wait_for_runs
 
 import archfem as af
 from archfem.dynamics.rigid_body.bodies import make_bodies
+from archfem.masonry.materials import STONE_TO_STONE
 from archfem.view.pages import live
 
 RING = {"radius": 2.95, "embrace": 159.0}
@@ -104,7 +105,7 @@ def test_a_ring_is_cut_as_python_cuts_it(thickness, stones):
         # masses are by chords of a sixteenth of a stone: 25 mrad, whose square over 3 is 2e-4
         assert np.array(found[key]) == pytest.approx(expected[key], rel=3e-4, abs=1e-4), key
     centres = np.array(found["centre"])[:-1]
-    assert centres == pytest.approx(expected["centre"][:-1], abs=1e-4)
+    assert centres == pytest.approx(expected["centre"][:-1], abs=3e-4)
     for key in ("friction", "cohesion", "rocking"):
         assert (np.array(found[key]) == expected[key]).all(), key
     # the ground does not rise with the feet of a thinner ring
@@ -136,7 +137,7 @@ def test_fill_bonds_and_many_stones_are_refused_in_words():
     many = af.circular_arch(**RING, thickness=0.55, voussoirs=61)
     with pytest.raises(af.errors.InvalidInput, match="61 stones: a page of more than 60"):
         live.describe_arch(many)
-    contact = replace(af.STONE_TO_STONE, tension=1e5)
+    contact = replace(STONE_TO_STONE, tension=1e5)
     bonded = af.circular_arch(**RING, thickness=0.55, voussoirs=7, contact=contact)
     with pytest.raises(af.errors.InvalidInput, match="tensile strength"):
         live.describe_arch(bonded)
@@ -182,20 +183,10 @@ def read_text(driver, name):
     return driver.find_element("css selector", f"#{name}").text
 
 
-def open_page(driver, path, runs=1):
-    """Open a page and wait for its first runs."""
-    from selenium.webdriver.support.ui import WebDriverWait
-
+def open_page(driver, path):
+    """Open a page and wait for its first run."""
     driver.get(path.resolve().as_uri())
-    wait_for_runs(driver, runs)
-    return WebDriverWait(driver, 60)
-
-
-def wait_for_runs(driver, runs):
-    from selenium.webdriver.support.ui import WebDriverWait
-
-    done = "return Number(document.querySelector('.arch').dataset.runs ?? 0)"
-    WebDriverWait(driver, 120, poll_frequency=0.05).until(lambda d: d.execute_script(done) >= runs)
+    wait_for_runs(driver, 1)
 
 
 @pytest.mark.slow

@@ -108,8 +108,11 @@ function farthest(poses, before, reach) {
   return most;
 }
 
-/** Shake an arch: frames of poses every 20 ms until all rest; a stone is lost as in archfem's CollapseState. */
-function shake(engine, arch, motion, scale) {
+/**
+ * Shake an arch: frames of poses every 20 ms until all rest; a stone is lost as in archfem's CollapseState.
+ * A generator, which yields after each tenth of a run or so, so that a worker can end it.
+ */
+function* shake(engine, arch, motion, scale) {
   const fall = new Fall(engine, arch), { reach } = arch.bodies, step = fall.argument("parameters.dt");
   const end = (motion.x.length - 1) * motion.dt, poses = () => fall.view("state.q").slice();
   const frames = [poses()], lost = new Set();
@@ -117,6 +120,7 @@ function shake(engine, arch, motion, scale) {
   while (time < end + EXTRA_TIME && (time <= end || time - since < 0.5)) {
     fall.advance(sampleGround(motion, (frames.length - 1) * FRAME_STEPS, FRAME_STEPS, step, scale));
     time = frames.length * FRAME_STEPS * step;
+    if (frames.length % 20 === 0) yield;
     const now = poses();
     frames.push(now);
     reach.forEach((_, body) => { if (now[3 * body + 1] < -0.5 * arch.sizes[body] || Math.abs(now[3 * body + 2]) > Math.PI / 4) lost.add(body); });
@@ -125,4 +129,11 @@ function shake(engine, arch, motion, scale) {
     if (time <= end || farthest(now, anchor, reach) > 5e-4) [anchor, since] = [now, time];
   }
   return { frames, spacing: FRAME_STEPS * step, lost: lost.size, fell, displacement: Math.max(...frames.map((each) => farthest(each, frames[0], reach))) };
+}
+/** The result of a generator. */
+function finish(steps) {
+  for (;;) {
+    const { done, value } = steps.next();
+    if (done) return value;
+  }
 }

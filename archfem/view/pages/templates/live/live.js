@@ -53,18 +53,19 @@ class Live {
     return strength ?? Math.min(Math.max(Math.round(100 * often * this.factor) / 100, 0.05), 2);
   }
   /** Begin with an arch as it was given. */
-  open(given) {
+  open(given, changes = {}, box = null) {
     const { ring } = this.given = given;
     this.design = { thickness: ring?.thickness ?? null, stones: ring?.stones ?? null, strength: 0 };
     this.factor = new Equilibrium(given).weakest().factor;
     this.design.strength = this.suggest(this.data.motions[0]);
     this.design.friction = Math.min(...given.joints.map((joint) => joint.friction));
     this.original = { ...this.design };
+    Object.assign(this.design, changes);
+    this.stage.handles = [];
     this.find("motion").value = 0;
     for (const name of ["thickness", "stones"]) this.find(name).closest("label").hidden = !ring;
     if (ring) Object.assign(this.find("thickness"), { min: (0.2 * ring.thickness).toPrecision(2), max: (2 * ring.thickness).toPrecision(2), step: 0.005 });
-    this.stage.fit(given);
-    this.find("stage").style.aspectRatio = (this.stage.box[2] - this.stage.box[0]) / (this.stage.box[3] - this.stage.box[1]);
+    this.stage.fit(given, box);
     this.change();
   }
   /** The design changed: arch, statics and runs anew. */
@@ -147,7 +148,7 @@ class Live {
   tell() {
     const done = this.runs.filter(Boolean), answers = done.filter((run) => !run.failure), fallen = answers.filter((run) => run.fell !== null).length, [own] = this.runs;
     const all = done.length === RUNS, share = `${fallen} of ${answers.length}`;
-    this.say("share", all ? share : `${share} so far`);
+    this.say("share", all ? share : answers.length ? `${share} so far` : "…");
     this.say("verdict", !own ? "Shaking …" : own.failure ? `It cannot be followed: ${own.failure}` : `${own.fell === null ? `This arch stands; a stone moved by up to ${(1e3 * own.displacement).toFixed(0)} mm.` : `This arch falls: the first stone is lost at ${own.fell.toFixed(2)} s.`} Of ${answers.length} slightly different arches${all ? "" : " so far"}, ${fallen === 0 ? "none" : fallen === answers.length ? "all" : fallen} ${fallen === 1 ? "falls" : "fall"}.`);
     this.root.dataset.runs = done.length;
   }
@@ -193,13 +194,14 @@ class Live {
   }
 }
 
-(async () => {
+const ready = (async () => {
   const root = document.querySelector(".arch");
   try {
     const data = JSON.parse(new TextDecoder().decode(await inflate(root.querySelector("#data").textContent)));
     data.wasm = await inflate(data.wasm);
     root.live = new Live(root, data);
     root.dataset.ready = "yes";
+    return root.live;
   } catch (error) {
     root.querySelector("#verdict").textContent = typeof DecompressionStream === "undefined" ? "This browser is too old for the page (it has no DecompressionStream)." : `The page failed: ${error.message}`;
     throw error;

@@ -6,8 +6,11 @@ const FINE = 16; // chords of a stone for its mass, at least
 const turnOf = ([x, y], [u, v]) => Math.atan2(x * v - y * u, x * u + y * v);
 const mix = (one, other, share) => one.map((value, k) => (1 - share) * value + share * other[k]);
 
-/** Joint at a place along a ring, 0 to 1: between neighbours it turns about the point where they meet. */
-function sectionAt(ends, place, factor) {
+/**
+ * Joint at a place along a ring, 0 to 1: between neighbours it turns about the point where they meet.
+ * Its depth is scaled about a share of it: 0.5 keeps the centre line, 0 the intrados.
+ */
+function sectionAt({ ends, kept }, place, factor) {
   const last = ends.length - 2, k = Math.min(Math.floor(place * (last + 1) + 1e-9), last), share = place * (last + 1) - k;
   const [[a, b], [c, d]] = [ends[k], ends[k + 1]], one = [b[0] - a[0], b[1] - a[1]], other = [d[0] - c[0], d[1] - c[1]];
   const cross = one[0] * other[1] - one[1] * other[0];
@@ -18,8 +21,8 @@ function sectionAt(ends, place, factor) {
     const angle = Math.atan2(one[1], one[0]) + share * turnOf(one, other), radii = mix([a, b].map((p) => radius(p, one)), [c, d].map((p) => radius(p, other)), share);
     section = radii.map((r) => [pole[0] + r * Math.cos(angle), pole[1] + r * Math.sin(angle)]);
   }
-  const middle = mix(...section, 0.5);
-  return section.map((point) => mix(middle, point, factor));
+  const still = mix(...section, kept);
+  return section.map((point) => mix(still, point, factor));
 }
 
 /** Area, centroid and polar moment of convex pieces together. */
@@ -38,9 +41,9 @@ function measure(pieces) {
   return { area, centre, moment: moment - area * (centre[0] ** 2 + centre[1] ** 2) };
 }
 
-/** Stones of a ring {ends, density, level}, first and last joint on supports, as `make_bodies` of archfem makes them. */
+/** Stones of a ring {ends, kept, density, level}, first and last joint on supports, as `make_bodies` of archfem makes them. */
 function cutRing(ring, { factor, stones, friction }, parameters) {
-  const at = (place) => sectionAt(ring.ends, place, factor), faces = [...new Array(stones + 1).keys()].map((k) => at(k / stones));
+  const at = (place) => sectionAt(ring, place, factor), faces = [...new Array(stones + 1).keys()].map((k) => at(k / stones));
   const tangents = faces.map(([[x, y], [u, v]]) => [u - x, v - y]);
   const turn = Math.max(...tangents.slice(1).map((tangent, k) => Math.abs(turnOf(tangents[k], tangent))));
   const chords = Math.max(1, Math.ceil(turn / MAX_CHORD - 1e-9));
@@ -56,28 +59,28 @@ function cutRing(ring, { factor, stones, friction }, parameters) {
   const ends = [support(faces[0], -1), support(faces[stones], 1)], numbers = [...new Array(stones).keys()];
   const shapes = [ends[0], ...numbers.map((k) => split(k, chords)), ends[1]];
   const exact = [measure(ends[0]), ...numbers.map((k) => measure(split(k, FINE))), measure(ends[1])];
-  const bodies = makeBodies(shapes, exact, ring, friction);
+  const bodies = makeBodies(shapes, exact, [0, stones + 1], ring, friction);
   const joints = faces.map((face, k) => ({ blocks: [k, k + 1], ends: face, friction, cohesion: 0 }));
   return { bodies, joints, sizes: exact.map(({ area }) => Math.sqrt(area)), parameters };
 }
 
 /** Arrays of bodies: masses, and the vertices and outward normals of their pieces. */
-function makeBodies(shapes, exact, ring, friction) {
-  const last = shapes.length - 1, centre = exact.map((each) => each.centre), owner = [], starts = [0], arms = [], normals = [], outer = [];
+function makeBodies(shapes, exact, fixed, ring, friction) {
+  const centre = exact.map((each) => each.centre), owner = [], starts = [0], arms = [], normals = [], outer = [];
   shapes.forEach((pieces, body) => pieces.forEach((points, piece) => {
     owner.push(body);
     points.forEach(([x, y], k) => {
       const [u, v] = points[(k + 1) % points.length], length = Math.hypot(u - x, v - y);
       arms.push([x - centre[body][0], y - centre[body][1]]);
       normals.push([(v - y) / length, (x - u) / length]);
-      outer.push([true, piece === pieces.length - 1, true, piece === 0][k]); // not where a stone is cut into pieces
+      outer.push(pieces.length === 1 || [true, piece === pieces.length - 1, true, piece === 0][k]); // not where a stone is cut into pieces
     });
     starts.push(arms.length);
   }));
   const bodyOf = owner.flatMap((body, piece) => new Array(starts[piece + 1] - starts[piece]).fill(body));
-  const mass = exact.map(({ area, moment }, body) => (body % last ? [ring.density * area, ring.density * moment] : [0, 0]));
-  const level = Math.min(ring.level, ...[shapes[0], shapes[last]].flat(2).map(([, y]) => y));
-  const closed = Math.min(...exact.slice(1, last).map(({ area }) => 1e-4 * Math.sqrt(area)), 5e-5);
+  const mass = exact.map(({ area, moment }, body) => (fixed.includes(body) ? [0, 0] : [ring.density * area, ring.density * moment]));
+  const level = Math.min(ring.level, ...fixed.flatMap((body) => shapes[body].flat()).map(([, y]) => y));
+  const closed = Math.min(...exact.filter((_, body) => !fixed.includes(body)).map(({ area }) => 1e-4 * Math.sqrt(area)), 5e-5);
   const table = (value) => mass.concat([0]).map((_, __, all) => all.map(() => value));
   return {
     inverse_mass: [...mass.map((each) => each.map((value) => (value ? 1 / value : 0))), [0, 0]], mass, centre: [...centre, [0, level]],

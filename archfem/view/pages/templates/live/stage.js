@@ -2,16 +2,18 @@
 "use strict";
 class Stage {
   constructor(canvas) {
-    Object.assign(this, { canvas, pen: canvas.getContext("2d"), picture: null, backdrop: null });
+    Object.assign(this, { canvas, pen: canvas.getContext("2d"), picture: null, backdrop: null, handles: [] });
     new ResizeObserver(() => this.draw()).observe(canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
   /** Fit an arch: what is in view is its box with room for stones that fall. */
-  fit(arch) {
+  fit(arch, box) {
     const { centre, arms, owner, piece_starts: starts, level } = arch.bodies;
     const points = owner.flatMap((body, piece) => arms.slice(starts[piece], starts[piece + 1]).map(([x, y]) => [x + centre[body][0], y + centre[body][1]]));
     const [xs, ys] = [0, 1].map((k) => points.map((point) => point[k])), room = 0.12 * (Math.max(...xs) - Math.min(...xs));
-    this.box = [Math.min(...xs) - room, Math.min(level, ...ys) - 0.3 * room, Math.max(...xs) + room, Math.max(...ys) + 0.6 * room];
+    this.box = box ?? [Math.min(...xs) - room, Math.min(level, ...ys) - 0.3 * room, Math.max(...xs) + room, Math.max(...ys) + 0.6 * room];
+    if (!box) this.backdrop = null;
+    this.canvas.style.aspectRatio = (this.box[2] - this.box[0]) / (this.box[3] - this.box[1]);
   }
   /** Show a picture {arch, poses, ghosts, lines, hinges}; without one, the last again. */
   draw(picture = this.picture) {
@@ -23,8 +25,13 @@ class Stage {
     this.scale = Math.min(canvas.width / (right - left), canvas.height / (high - low));
     this.origin = [0.5 * canvas.width - 0.5 * this.scale * (left + right), canvas.height + this.scale * low];
     const style = getComputedStyle(canvas), colour = (name) => style.getPropertyValue(`--${name}`).trim();
-    const { arch, poses, ghosts, lines, hinges } = picture, width = 1.2 * ratio;
+    const { arch, hinges } = picture;
     if (this.backdrop) this.drawBackdrop();
+    if (arch) this.drawArch(this.picture, colour, ratio);
+    for (const point of [...hinges, ...this.handles]) this.dot(this.place(point), 6 * ratio, colour("hinge"), colour("paper"));
+  }
+  drawArch({ arch, poses, ghosts, lines }, colour, ratio) {
+    const { canvas, pen } = this, width = 1.2 * ratio;
     const [, ground] = this.place([0, arch.bodies.level]);
     this.stroke([[0, ground], [canvas.width, ground]], colour("edge"), width);
     pen.globalAlpha = 0.16;
@@ -36,7 +43,6 @@ class Stage {
       this.stroke(points.map((point) => this.place(point)), colour("paper"), 4.6 * width);
       this.stroke(points.map((point) => this.place(point)), colour(kind), 2.2 * width);
     }
-    for (const point of hinges) this.dot(this.place(point), 6 * ratio, colour("hinge"), colour("paper"));
   }
   place([x, y]) { return [this.origin[0] + this.scale * x, this.origin[1] - this.scale * y]; }
   /** The point of the ground plan at a pointer. */

@@ -9,10 +9,16 @@ onmessage = async ({ data: { start, job, runs, motion } }) => {
   }
   latest = job;
   for (const { number, arch, scale } of runs) {
-    await pause();
-    if (job !== latest) return;
     try {
-      postMessage({ job, number, run: shake(engine, arch, motion, scale) });
+      const steps = shake(engine, arch, motion, scale);
+      for (let step = steps.next(); ; step = steps.next()) {
+        await pause();
+        if (job !== latest) return;
+        if (step.done) {
+          postMessage({ job, number, run: step.value });
+          break;
+        }
+      }
     } catch (error) {
       postMessage({ job, number, failure: error.message });
     }
