@@ -68,6 +68,7 @@ class LivePage:
             digest=layout["digest"],
             step=1e3 * TRIED_STEPS[0],
             has_ring=any(arch["ring"] for arch in self.arches),
+            has_thrust=any(arch["thrust"] for arch in self.arches),
         )
 
     def save(self, path: str | Path) -> Path:

@@ -164,6 +164,7 @@ class Live {
   show(time) {
     this.time = time;
     this.find("time").value = time;
+    if (this.isMarking) return; // a reader places points on a photo
     const at = ({ frames, spacing }) => frames[Math.min(Math.round(time / spacing), frames.length - 1)];
     const still = new Float64Array(3 * this.arch.bodies.mass.length), shaken = this.view === "shake", ready = this.runs.filter((run) => run?.frames);
     const poses = shaken && this.runs[0]?.frames ? at(this.runs[0]) : still, begins = time === 0;

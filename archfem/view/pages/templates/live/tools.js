@@ -50,6 +50,7 @@ class Tools {
       ring.level = arch.bodies.level;
     }
     this.source = source;
+    this.live.isMarking = false;
     if (!source.drawn) Object.assign(this, { marks: [], mode: null });
     const box = this.live.stage.backdrop && source.drawn ? this.live.stage.box : null;
     this.live.open(arch, design, box);
@@ -80,7 +81,10 @@ class Tools {
     this.say(mode === "scale" ? "Click two points whose distance you know." : `Click ${MARKS[0]}.`);
     this.drawMarks();
   }
-  drawMarks() { this.live.stage.draw({ arch: null, ghosts: [], lines: [], hinges: this.mode === "scale" ? this.scaleMarks : this.marks }); }
+  drawMarks() {
+    this.live.isMarking = true;
+    this.live.stage.draw({ arch: null, ghosts: [], lines: [], hinges: this.mode === "scale" ? this.scaleMarks : this.marks });
+  }
   press(event) {
     const { stage } = this.live, point = stage.pointAt(event);
     if (this.mode === "scale" && this.scaleMarks.length < 2) {
