@@ -21,7 +21,7 @@ DEBIAN13 := /var/tmp/archfem-debian13
 # One worker a core; idle workers take over tests from others.
 SPREAD := -n auto --dist worksteal
 
-.PHONY: help setup demo test test-slow test-debian13 hard bench archbench archbench-quick docs notebooks verification fuzz mutants lint clean
+.PHONY: help setup demo test test-slow test-debian13 hard bench archbench archbench-quick wasm docs notebooks verification fuzz mutants lint clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -73,6 +73,10 @@ archbench: .venv/compiled  ## every program on every scene of Arch-Bench, its ta
 
 archbench-quick: .venv/compiled  ## archfem on the scenes of Arch-Bench against its stored answers
 	$(PYTHON) -m archbench.run --quick
+
+wasm: .venv/ready  ## the kernels of pages, as WebAssembly (2 min); after a change of their sources
+	$(PYTHON) -m archfem.view.pages.wasm.exporter
+	$(PYTHON) docs/try_page.py
 
 .venv/bench: .venv/ready
 	$(PIP) -e '.[dev,bench]'

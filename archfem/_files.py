@@ -45,7 +45,7 @@ SAFE_FLAGS = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 _is_junction = getattr(os.path, "isjunction", lambda _: False)
 
 # Results that are written from those of another command, and vanish when these are replaced
-DERIVED = {"run": "report", "study": "study summary"}
+DERIVED = {"run": ("report", "page"), "study": ("study summary",)}
 
 
 def check_file(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) -> Path:
@@ -454,7 +454,7 @@ def publish_draft(folder: Path, command: str, inputs: str) -> None:
     files = {p.relative_to(draft).as_posix(): hash_content(p) for p in list_files(draft)}
     listed = intact_file_list(folder)
     same = command in listed and listed[command].files == files
-    replaced = {command} if same else {command, DERIVED.get(command)}
+    replaced = {command} if same else {command, *DERIVED.get(command, ())}
     groups: dict[str, Any] = {command: {"inputs": inputs, "files": files}}
     for name, group in listed.items():
         if name not in replaced:
@@ -495,7 +495,8 @@ def _move_finished(finished: Path, folder: Path) -> None:
 def describe_deleted(folder: Path) -> str:
     """Say which listed files of a result folder are missing; "" if none is."""
     # an earlier report may have been deleted, for it is written anew
-    groups = (group for name, group in read_file_list(folder).items() if name != "report")
+    listed = read_file_list(folder).items()
+    groups = (group for name, group in listed if name not in DERIVED["run"])
     names = [n for group in groups for n in group.files if not path_inside(folder, n).is_file()]
     if not names:
         return ""

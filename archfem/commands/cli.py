@@ -207,7 +207,7 @@ def _add_own_code(add_argument: AddArgument) -> None:
 
 
 def _add_result_commands(commands: Any) -> None:
-    """Add `archfem report` and `archfem study`."""
+    """Add `archfem report`, `archfem page` and `archfem study`."""
     text = "Write one self-contained HTML page of a result folder, or of a history alone."
     about = "one HTML page of a result folder, to print"
     add = _add_command(commands, "report", about, "run", description=text)
@@ -219,6 +219,15 @@ def _add_result_commands(commands: Any) -> None:
     )
     add("--inputs", metavar="DIR", help="folder of a mesh that the case names (FOLDER)")
     add("--pdf", action="store_true", help="also print it, by Chromium or Chrome")
+    _add_own_code(add)
+    text = (
+        "Write one HTML page that shakes the arch of a result folder, and lets readers change it."
+    )
+    about = "one HTML page that shakes the arch, down to the ground"
+    add = _add_command(commands, "page", about, "run", description=text)
+    add("folder", metavar="FOLDER", help="that `archfem run` has written")
+    add("--out", metavar="FILE.html", help="the page (FOLDER/page.html)")
+    add("--inputs", metavar="DIR", help="folder of a mesh that the case names (FOLDER)")
     _add_own_code(add)
     about = "many cases: a table of results, on all cores or a cluster"
     add = _add_command(commands, "study", about, "study", description=about)

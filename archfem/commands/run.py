@@ -233,6 +233,12 @@ def report(options: argparse.Namespace) -> None:
         print(f"wrote {print_page(path, path.with_suffix('.pdf'))}")
 
 
+def page(options: argparse.Namespace) -> None:
+    """Write the page that shakes the structure of a result folder."""
+    path = results.open_results(options.folder, inputs=options.inputs).page(options.out)
+    print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
 def motion(options: argparse.Namespace) -> None:
     """Print the measures of records and draw them."""
     folder = create_result_folder(options.out)

@@ -123,7 +123,7 @@ def simulate_fall(
     """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + 20.0
-    loose = _with_sliding_joints(model.structure)
+    loose = with_sliding_joints(model.structure)
     ratios: float | dict[str, float] | None = rocking_ratio
     if rocking_ratio is not None and (unkept := find_unkept_ratios(loose, rocking_ratio)):
         names = {joint.name for joint in loose.joints} - unkept.keys()
@@ -183,7 +183,7 @@ def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterato
     is_rigid = is_rigid and not find_yielding_blocks(structure)
     if not is_rigid or len(structure.free) > MAX_COMPARED_BLOCKS:
         return
-    simulation = RigidBlockSimulation(_with_sliding_joints(structure), dt=TRIED_STEPS[0])
+    simulation = RigidBlockSimulation(with_sliding_joints(structure), dt=TRIED_STEPS[0])
     at_rest, end = LooseBlocks.as_built(structure, start), motion.duration + 2.0
     with suppress(DidNotConverge):  # then there is nothing to compare with
         frames = simulation.frames(at_rest, end, motion, spacing=0.02)
@@ -194,7 +194,7 @@ def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterato
             )
 
 
-def _with_sliding_joints(structure: Structure) -> Structure:
+def with_sliding_joints(structure: Structure) -> Structure:
     """Return the structure with friction, and no cohesion, in joints that never slide."""
     joints = list(structure.joints)
     for number, joint in enumerate(joints):
@@ -226,7 +226,7 @@ def _doubt_fall(structure: Structure, dataset: xr.Dataset, ratio: float | None) 
             f"half the step changes how far a block falls or moves by {change:.0%}",
             "state a range, `verdict_range`",
         )
-    unkept = {} if ratio is None else find_unkept_ratios(_with_sliding_joints(structure), ratio)
+    unkept = {} if ratio is None else find_unkept_ratios(with_sliding_joints(structure), ratio)
     if unkept:
         yield Doubt(
             f"the damping was to give a restitution of {ratio:g}, but loose blocks keep at least "

@@ -489,12 +489,15 @@ class CollapseRisk(ResultDisplay):
 
     def table(self) -> str:
         """Return a line for each alternative: samples, rate, interval, probability in 50 years."""
-        rows = []
-        for label in [None, *sorted(set(self._of_answered("alternative")))]:
-            count = int(np.sum(self._of_answered("alternative") == label)) if label else 0
-            count = count or len(self.answered)
-            if count >= FIRST_ROUND:
-                rows.append([label or "all", str(count), str(self.rate(label))])
+        labels = self._of_answered("alternative")
+        counts = {None: len(labels)}
+        if len(set(labels)) > 1:
+            counts |= {label: int(np.sum(labels == label)) for label in sorted(set(labels))}
+        rows = [
+            [label or "all", str(count), str(self.rate(label))]
+            for label, count in counts.items()
+            if count >= FIRST_ROUND
+        ]
         return align_columns(["alternative", "samples", "falls"], rows)
 
     def __str__(self) -> str:

@@ -19,6 +19,8 @@ from .motions import draw_motion as draw_motion
 from .motions import draw_selection as draw_selection
 from .motions import draw_spectra as draw_spectra
 from .motions import draw_suite as draw_suite
+from .pages.live import LivePage as LivePage
+from .pages.live import page as page
 from .pages.player import Player as Player
 from .pages.player import player as player
 from .springs import draw_mesh as draw_mesh
