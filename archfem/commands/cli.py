@@ -188,6 +188,8 @@ def _add_case_commands(commands: Any) -> None:
     add_to = add("verdict", about, "folder for table and picture (none)", required=False)
     add_to("--workers", type=int, default=1, help="processes for the runs (1)")
     add_to("--samples", type=int, default=26, help="runs of the sample (26)")
+    add_to = add("risk", "annual rate of collapse, from the hazard and the sampling of [risk]")
+    add_to("--workers", type=int, default=1, help="processes for the runs (1)")
     add_to = add("accuracy", "speed against error over fidelities, meshes, quadratures and steps")
     add_to("--workers", type=int, default=1, help="processes for settings (1)")
 

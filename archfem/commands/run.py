@@ -199,6 +199,32 @@ def accuracy(options: argparse.Namespace) -> None:
     _write_results("accuracy", case, options.out, lambda: files)
 
 
+def risk(options: argparse.Namespace) -> None:
+    """Compute the annual rate at which the structure of a case falls, by its [risk]."""
+    from archfem.studies.collapse_risk import collapse_risk
+
+    case = Case.read(options.case, options.changes)
+    if case.risk is None:
+        raise InvalidInput(f"{options.case} has no [risk]: give it a hazard, and a [suite]")
+    folder = create_result_folder(options.out)
+    print(case.title)
+    alternatives = {
+        label: (weight, Case.read(options.case, [*options.changes, *changes]).analysis)
+        for label, (weight, changes) in case.risk.alternatives.items()
+    }
+    motions = case.ground_suite() if case.suite is not None else [case.ground_motion()]
+    found = collapse_risk(
+        *(case.analysis, motions, case.risk.hazard),
+        alternatives=alternatives or None,
+        workers=options.workers,
+        out=path_inside(folder, "risk_samples.nc"),
+        **case.risk.options,
+    )
+    print(found)
+    files: Files = {"risk.txt": str(found), "risk.nc": found.save, "risk.png": found.plot()}
+    _write_results("risk", case, options.out, lambda: files)
+
+
 def verdict(options: argparse.Namespace) -> None:
     """Run a case over joint rules, stiffness, friction and damping: how often does it fall?"""
     from archfem.studies.cache import ground_motion

@@ -36,6 +36,7 @@ from .structure import draw_instants as draw_instants
 from .structure import draw_names as draw_names
 from .structure import draw_structure as draw_structure
 from .studies import draw_accuracy as draw_accuracy
+from .studies import draw_collapse_risk as draw_collapse_risk
 from .studies import draw_convergence as draw_convergence
 from .studies import draw_findings as draw_findings
 from .studies import draw_fragility as draw_fragility

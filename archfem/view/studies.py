@@ -14,6 +14,7 @@ from archfem._validation import validate_arguments
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import InvalidInput
+from archfem.motion.hazard import MEASURES, Hazard
 from archfem.view.style import (
     Colour,
     Size,
@@ -38,6 +39,24 @@ class FragilityCurve(Protocol):
 
     def band(self, intensity: Any) -> tuple[Array, Array]:
         """Return the lower and the upper end of the confidence band at intensities."""
+
+
+class RiskCurves(Protocol):
+    """Result of `collapse_risk`, as far as it is drawn."""
+
+    @property
+    def hazard(self) -> Hazard:
+        """Hazard curve of the site."""
+
+    @property
+    def sentence(self) -> str:
+        """The rate, and what it rests on."""
+
+    def fragility(self) -> FragilityCurve:
+        """Return the fragility over the intensity of the hazard."""
+
+    def disaggregation(self) -> tuple[Array, Array]:
+        """Return edges of bins of intensity, and the share of the rate in each."""
 
 
 class ConvergencePaths(Protocol):
@@ -368,6 +387,37 @@ def draw_tornado(
     axes.set_yticks(range(len(order)), order)
     axes.margins(x=0.08)
     add_legend_below(figure, 2)
+    return figure
+
+
+@validate_arguments
+def draw_collapse_risk(risk: RiskCurves) -> Figure:
+    """Draw the fragility with its band, the hazard, and where in intensity the rate comes from.
+
+    Args:
+        risk: result of `archfem.collapse_risk`.
+
+    Returns:
+        The figure, a panel for each.
+    """
+    curve, hazard = risk.fragility(), risk.hazard
+    label = f"{hazard.measure} [{MEASURES[hazard.measure]}]"
+    figure = new_figure(Size.PAGE, 2.6)
+    first, second, third = figure.subplots(1, 3)
+    x = np.linspace(0.0, 2.5 * curve.median, 301)[1:]
+    style_axes(first, label, "probability of a fall [-]")
+    first.fill_between(x, *curve.band(x), color=Colour.LINES[0], alpha=0.2, lw=0.0)
+    first.plot(x, curve.probability(x), color=Colour.LINES[0], lw=1.8)
+    first.set(xlim=(0.0, x[-1]), ylim=(0.0, 1.0))
+    style_axes(second, label, "annual rate of exceedance [1/year]")
+    reach = np.geomspace(0.05 * curve.median, 2.5 * curve.median, 101)
+    second.loglog(reach, hazard.rate_of(reach), color=Colour.LINES[1], lw=1.8)
+    style_axes(third, label, "share of the rate of falls [-]")
+    edges, shares = risk.disaggregation()
+    third.bar(edges[:-1], shares, np.diff(edges), align="edge", color=Colour.LINES[2], lw=0.0)
+    for axes, title in zip((first, second, third), ("fragility", "hazard", "rate"), strict=True):
+        set_title(axes, title)
+    figure.suptitle(risk.sentence, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
     return figure
 
 
