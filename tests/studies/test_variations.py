@@ -79,8 +79,33 @@ def test_contacts_motion_and_step_reach_the_run(column, motion, calls):
         )
     assert moved.horizontal == pytest.approx(-3.0 * motion.horizontal)
     assert dt == 0.0025
+    evaluate(column, motion, finish="hewn", k_n=2.0)
+    (finished, *_) = calls.pop()
+    usual = af.joint_stiffness(30e9, 0.4, "hewn", strength=56e6)
+    for new, old in zip(finished.joints, column.joints, strict=True):
+        assert new.contact == replace(
+            old.contact,
+            normal_stiffness=2.0 * usual.initial[1],
+            shear_stiffness=usual.shear[1],
+            closure=usual.closure[1],
+        )
+    # soil has no finish
+    soft = tuple(replace(block, material=af.masonry.BACKFILL) for block in column.blocks)
+    evaluate(replace(column, blocks=soft), motion, finish="hewn")
+    (same, *_) = calls.pop()
+    assert [joint.contact for joint in same.joints] == [joint.contact for joint in column.joints]
     evaluate(column, motion, friction=-5.0)
     assert calls.pop()[0].joints[0].contact.coefficient == 0.05
+
+
+def test_finishes_are_alternatives_of_a_range(column, motion, calls):
+    vary = {**HELD, "finish": ("sawn", "weathered")}
+    found = af.verdict_range(column, motion, vary=vary, samples=8, seed=1)
+    drawn = set(found.dataset["finish"].values[found.dataset["sampled"].values])
+    assert drawn == {"sawn", "weathered"}
+    assert len({structure.joints[0].contact for structure, *_ in calls}) == 3
+    with pytest.raises(af.InvalidInput, match=r"finish = .* give some of"):
+        af.verdict_range(column, motion, vary={"finish": ("polished",)}, samples=1)
 
 
 def test_joint_rules_select_the_method(column, motion, monkeypatch):
