@@ -56,6 +56,7 @@ from .masonry.structure import Structure as Structure
 from .masonry.survey.outlines import read_outlines as read_outlines
 from .motion.design_spectra import Eurocode8 as Eurocode8
 from .motion.design_spectra import Tbec2018 as Tbec2018
+from .motion.hazard import Hazard as Hazard
 from .motion.matching import matched as matched
 from .motion.motion import Motion as Motion
 from .motion.record_selection import select_records as select_records
@@ -65,6 +66,8 @@ from .statics.equilibrium import dead_load as dead_load
 from .statics.mechanism_assessment import kinematic_assessment as kinematic_assessment
 from .statics.modes import modes as modes
 from .statics.pushover import pushover as pushover
+from .studies.collapse_risk import CollapseRisk as CollapseRisk
+from .studies.collapse_risk import collapse_risk as collapse_risk
 from .studies.convergence import mesh_sensitivity as mesh_sensitivity
 from .studies.ida import ida as ida
 from .studies.study import Study as Study

@@ -364,6 +364,11 @@ def read_file_list(folder: Path) -> dict[str, FileGroup]:
         raise InvalidInput(f"{path} is no list of results, but another file: run again") from error
 
 
+def group_of(groups: Mapping[str, FileGroup], name: str) -> FileGroup | None:
+    """Return the group that has a file, or None."""
+    return next((group for group in groups.values() if name in group.files), None)
+
+
 def read_listed(folder: Path, name: str) -> bytes:
     """Read a file of a result folder, which must be the one that archfem wrote there."""
     path = path_inside(folder, name)

@@ -133,9 +133,7 @@ class Case:
             if not isinstance(settings.get(key, {}), dict):
                 raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
         output = check_table(settings.get("output", {}), OUTPUT_KEYS, "output")
-        report = check_table(settings.get("report", {}), REPORT_KEYS, "report")
-        for key, words in report.items():
-            check_words(words, f"report.{key}")
+        report = _read_report(settings)
         motion, suite, limit = (settings.get(key) for key in ("motion", "suite", "limit"))
         if motion is not None and suite is not None:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
@@ -269,6 +267,25 @@ class Case:
         # materials of the case under other names than theirs
         return format_tables(self.settings | blocks)
 
+    def signed(self, changes: Sequence[str]) -> "Case":
+        """Return the case with other values of [report], which change no result.
+
+        Args:
+            changes: "report.key=words" each.
+
+        Returns:
+            The changed copy.
+
+        Raises:
+            InvalidInput: a change is of another section, or of no key of [report].
+        """
+        settings = deepcopy(self.settings)
+        for path, words in map(parse_change, changes):
+            if not path.startswith("report."):
+                raise InvalidInput(f"'{path}' changes results: run the case again with it")
+            set_value(settings, path, str(words))
+        return replace(self, report=_read_report(settings), settings=settings)
+
     def hash_inputs(self, *, presentation: bool = True) -> str:
         """Return the SHA-256 of the case, its input files and the program.
 
@@ -286,6 +303,14 @@ class Case:
             left_out: keys of these that do not count.
         """
         return provenance.hash_sections(self.settings, self.folder, sections, left_out)
+
+
+def _read_report(settings: Table) -> dict[str, str]:
+    """Return the keys of [report]."""
+    report = check_table(settings.get("report", {}), REPORT_KEYS, "report")
+    for key, words in report.items():
+        check_words(words, f"report.{key}")
+    return report
 
 
 def case_of(subject: Case | Analysis, motion: Any = None, folder: Path | None = None) -> Case:

@@ -41,7 +41,7 @@ logger = logging.getLogger("archfem")
 @validate_methods
 @dataclass(frozen=True, eq=False)
 class ResultFolder(CaseResult):
-    """A folder that `archfem run` has written, opened again.
+    """A folder that `archfem run`, `limit`, `rate` or `assess` has written, opened again.
 
     Attributes:
         folder: the folder.
@@ -66,7 +66,9 @@ class ResultFolder(CaseResult):
         """
         if path is not None:
             return super().report(path)
-        inputs = _files.read_file_list(self.folder)["run"].inputs
+        group = _files.group_of(_files.read_file_list(self.folder), CASE_FILE)
+        assert group is not None
+        inputs = group.inputs
         with _files.replace_results(self.folder, "report", inputs) as draft:
             super().report(draft / "report.html")
         return self.folder / "report.html"
@@ -74,7 +76,7 @@ class ResultFolder(CaseResult):
 
 @validate_arguments
 def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> ResultFolder:
-    """Open a folder that `archfem run` has written.
+    """Open a folder that `archfem run`, `limit`, `rate` or `assess` has written.
 
     Args:
         folder: the folder.
@@ -115,8 +117,8 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
 def _check_files(place: Path) -> Collection[str]:
     """Return the names of the files of the run in a folder; refuse files that are not as listed."""
     groups = _files.read_file_list(place)
-    run = groups.get("run")
-    if run is None:
+    owner = _files.group_of(groups, CASE_FILE)
+    if owner is None:
         raise InvalidInput(
             f"{place} has no finished run, whose files `archfem run` lists in {_files.LIST_FILE}: "
             "run the case again"
@@ -127,7 +129,7 @@ def _check_files(place: Path) -> Collection[str]:
         path = _files.path_inside(place, name)
         if path.is_file() and path.name != HISTORY_FILE:
             _files.read_listed(place, name)
-    return run.files
+    return owner.files
 
 
 def _missing_case_message(place: Path) -> str:

@@ -208,11 +208,15 @@ def _add_own_code(add_argument: AddArgument) -> None:
 
 def _add_result_commands(commands: Any) -> None:
     """Add `archfem report` and `archfem study`."""
-    text = "Write one self-contained HTML page of what a result folder holds."
+    text = "Write one self-contained HTML page of a result folder, or of a history alone."
     about = "one HTML page of a result folder, to print"
     add = _add_command(commands, "report", about, "run", description=text)
-    add("folder", metavar="FOLDER", help="that `archfem run` has written")
+    add("folder", metavar="FOLDER", help="that `archfem run` has written, or a history.nc")
     add("--out", metavar="FILE.html", help="the page (FOLDER/report.html)")
+    about = "who signs what, as in report.author=NAME; repeatable"
+    add(
+        "--set", action="append", default=[], metavar="report.KEY=WORDS", dest="changes", help=about
+    )
     add("--inputs", metavar="DIR", help="folder of a mesh that the case names (FOLDER)")
     add("--pdf", action="store_true", help="also print it, by Chromium or Chrome")
     _add_own_code(add)

@@ -2,6 +2,7 @@
 
 import argparse
 import io
+import logging
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -10,13 +11,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from archfem._files import DRAFT_PREFIX, create_result_folder, path_inside, replace_results
+from archfem._files import (
+    DRAFT_PREFIX,
+    create_result_folder,
+    intact_file_list,
+    path_inside,
+    replace_results,
+)
 from archfem.cases import result_folder as results
 from archfem.cases import result_text
 from archfem.cases.analysis_keys import rate_case
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults
-from archfem.cases.run import DeadLoadResult, Result, Run, carry_out, replace_run
+from archfem.cases.run import CASE_FILE, DeadLoadResult, Result, Run, carry_out, replace_run
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions
 from archfem.dynamics.history import Ending, History
@@ -27,6 +34,8 @@ from archfem.motion.suite import Suite
 from archfem.statics.modes import Modes
 from archfem.view.motions import draw_spectra, draw_suite
 from archfem.view.style import Files, write_files
+
+logger = logging.getLogger("archfem")
 
 # Modules that import pyvista or studies, which are slow, are imported where they are needed.
 
@@ -80,8 +89,11 @@ def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
 def _write_results(command: str, case: Case, out: str | None, draw: Callable[[], Files]) -> None:
     """Write the results of a command to its folder, if one is given."""
     if out is not None:
-        with _replace_results(command, case, create_result_folder(out)) as draft:
-            write(draw(), draft)
+        with _replace_results(command, case, folder := create_result_folder(out)) as draft:
+            files = draw()
+            if "run" not in intact_file_list(folder):  # which has the case of the folder
+                files = {CASE_FILE: case.text().rstrip("\n"), **files}
+            write(files, draft)
 
 
 def _name_published_files(text: str, folder: Path, command: str) -> str:
@@ -92,6 +104,19 @@ def _name_published_files(text: str, folder: Path, command: str) -> str:
     lines = text.replace(str(draft), str(folder)).splitlines(keepends=True)
     # a draft that failed may have been deleted
     return "".join(x for x in lines if x[:6] != "wrote " or Path(x[6:].strip()).exists())
+
+
+@contextmanager
+def _record_doubts() -> Iterator[list[str]]:
+    """Yield a list of the warnings of a block, which results repeat as doubts."""
+    doubts: list[str] = []
+    handler = logging.Handler(logging.WARNING)
+    handler.emit = lambda record: doubts.append(f"in doubt: {record.getMessage()}")  # type: ignore[method-assign]
+    logger.addHandler(handler)
+    try:
+        yield doubts
+    finally:
+        logger.removeHandler(handler)
 
 
 def modes(options: argparse.Namespace) -> None:
@@ -113,8 +138,9 @@ def limit(options: argparse.Namespace) -> None:
     case = Case.read(options.case, options.changes)
     if case.limit is None:
         raise InvalidInput(f"{options.case} has no [limit]: give horizontal = 1.0, or a point load")
-    found = case.limit.solve(case.structure)
-    text = result_text.describe_collapse(case.structure, found)
+    with _record_doubts() as doubts:
+        found = case.limit.solve(case.structure)
+    text = "\n".join([result_text.describe_collapse(case.structure, found), *doubts])
     print(f"{case.title}\n{text}")
     _write_results("limit", case, options.out, lambda: results.limit_files(found, text))
 
@@ -124,8 +150,10 @@ def assess(options: argparse.Namespace) -> None:
     case = Case.read(options.case, options.changes)
     motion = case.ground_motion() if case.motion is not None else None
     demand = case.target if case.target is not None else motion
-    found = case.assessment.solve(case.structure, demand, options.parts)
-    text = "\n\n".join(f"{name}: {result}" for name, result in found.items())
+    with _record_doubts() as doubts:
+        found = case.assessment.solve(case.structure, demand, options.parts)
+    texts = [f"{name}: {result}" for name, result in found.items()]
+    text = "\n\n".join([*texts, *filter(None, ["\n".join(doubts)])])
     print(f"{case.title}\n{text}")
 
     def draw() -> Files:
@@ -141,9 +169,11 @@ def rate(options: argparse.Namespace) -> None:
     case = Case.read(options.case, options.changes)
     keys = ("vehicle", "live", "impact", "dead", "width")
     given = {key: value for key in keys if (value := getattr(options, key)) is not None}
-    found = rate_case(case.structure, case.rating, case.limit, given)
-    print(f"{case.title}\n{found}")
-    texts = {"rating.txt": str(found), "rating.csv": found.table()}
+    with _record_doubts() as doubts:
+        found = rate_case(case.structure, case.rating, case.limit, given)
+    text = "\n".join([str(found), *doubts])
+    print(f"{case.title}\n{text}")
+    texts = {"rating.txt": text, "rating.csv": found.table()}
     _write_results("rate", case, options.out, lambda: {**texts, "rating.png": found.plot()})
 
 
@@ -190,8 +220,12 @@ def verdict(options: argparse.Namespace) -> None:
 
 
 def report(options: argparse.Namespace) -> None:
-    """Write the report of a result folder."""
-    path = results.open_results(options.folder, inputs=options.inputs).report(options.out)
+    """Write the report of a result folder, or of a history alone."""
+    if (history := Path(options.folder)).is_file():
+        path = History.read(history).report(options.out or history.with_suffix(".html"))
+    else:
+        found = results.open_results(options.folder, inputs=options.inputs)
+        path = replace(found, case=found.case.signed(options.changes)).report(options.out)
     print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
     if options.pdf:
         from archfem.view.pages.document import print_page
@@ -302,25 +336,27 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     """Print results, write their files, and return the verdict and whether any is in doubt."""
     # `carry_out` yields limit analysis, dead load, suite and runs in this order.
     runs: dict[str, History] = {}
-    for result in found:
-        if isinstance(result, Collapse):
-            text = result_text.describe_collapse(case.structure, result)
-            print(text)
-            write(results.limit_files(result, text), folder)
-        elif isinstance(result, DeadLoadResult):
-            at_rest = result
-            print(result_text.describe_dead_load(at_rest))
-            write(results.dead_load_files(at_rest), folder)
-            if case.has_motion:
-                _print_first_modes(at_rest, folder)
-        elif isinstance(result, Suite):
-            suite = result
-            print_motions(suite)
-            write({"spectra.png": draw_suite(suite, case.target)}, folder)
-        else:
-            print(f"{result.motion.name}: {result.history.outcome}", file=sys.stderr)
-            _print_run(result, at_rest)
-            runs[result.motion.name] = result.history
+    with _record_doubts() as doubts:
+        for result in found:
+            if isinstance(result, Collapse):
+                text = result_text.describe_collapse(case.structure, result)
+                text = "\n".join([text, *doubts])  # of limit analysis, which comes first
+                print(text)
+                write(results.limit_files(result, text), folder)
+            elif isinstance(result, DeadLoadResult):
+                at_rest = result
+                print(result_text.describe_dead_load(at_rest))
+                write(results.dead_load_files(at_rest), folder)
+                if case.has_motion:
+                    _print_first_modes(at_rest, folder)
+            elif isinstance(result, Suite):
+                suite = result
+                print_motions(suite)
+                write({"spectra.png": draw_suite(suite, case.target)}, folder)
+            else:
+                print(f"{result.motion.name}: {result.history.outcome}", file=sys.stderr)
+                _print_run(result, at_rest)
+                runs[result.motion.name] = result.history
     if case.suite is not None:
         _print_pairs(suite, runs, at_rest, folder)
     verdict = result_text.describe_verdicts(runs.values()) if runs else ""

@@ -20,6 +20,7 @@ from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.examples import copy_example, list_example_titles, read_example, write_new_case
 from archfem.cases.run import HISTORY_FILE, DeadLoadResult, dead_load_of_case
+from archfem.cases.toml_file import parse_tables
 from archfem.commands.cli import ExitCode
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput, NotInstalled
@@ -81,6 +82,8 @@ def _read_case(path: Path, name: str = "case.toml") -> Case:
             except InvalidInput as error:
                 # such as a drawing, which lies beside the case that was run
                 raise InvalidInput(f"{error}; or give that case, --case CASE.toml") from error
+    if text := History.read(path).dataset.attrs.get("case"):  # a history that was moved alone
+        return Case.of(parse_tables(text))
     raise InvalidInput(
         f"there is no {name} beside {path}, as `archfem run` writes one: give the case of the "
         "run, --case CASE.toml"

@@ -175,12 +175,12 @@ def fragility(
         )
     with np.errstate(divide="ignore"):
         ends = np.log(np.array([low, high]))
-    mean, deviation = _fit_normal(ends[:, None, :])
+    mean, deviation = fit_brackets(ends[:, None, :])
     median, dispersion = float(np.exp(mean[0])), float(deviation[0])
     misfit = float(_distance(ends[:, None, :], mean, deviation)[0])
     random = np.random.default_rng(check_integer(seed, "seed", minimum=0))
     drawn = random.integers(len(high), size=(check_integer(resamples, "resamples"), len(high)))
-    means, deviations = _fit_normal(ends[:, drawn])
+    means, deviations = fit_brackets(ends[:, drawn])
     # Goodness of fit by simulation (Lilliefors): samples of the fitted curve are fitted in turn.
     samples = _bracket(random.normal(mean[0], deviation[0], size=drawn.shape), ends)
     middle = samples.mean(axis=0)
@@ -254,7 +254,7 @@ def _curve(intensity: Array, median: Any, dispersion: Any) -> Array:
         return np.asarray(ndtr((np.log(intensity) - np.log(median)) / dispersion))
 
 
-def _fit_normal(ends: Array) -> tuple[Array, Array]:
+def fit_brackets(ends: Array) -> tuple[Array, Array]:
     """Mean and deviation (samples,) of normal data in brackets (2, samples, n), by EM."""
     low, high = ends
     # initial guess: the middle of a bracket, or the end of an unbounded one

@@ -5,8 +5,9 @@ and all together, by a Latin hypercube. The result is the share of runs in which
 falls, and the properties that decide it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -141,27 +142,15 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
         DidNotConverge: the structure as given does not stand under dead load.
     """
     check_integer(samples, "samples")
-    if isinstance(structure, Structure):
-        structure = Analysis(structure, fidelity="rigid", damping="effective")
-    analysis = replace(
-        structure,
-        fidelity=fidelity or ("rigid" if structure.selects_model else structure.fidelity),
-        damping=interpret_damping(damping) or structure.damping,
-        dt=dt or structure.dt or 0.005,
-        displacements="large",
-        scheme=Conserving(),
-        # the whole motion, of which nothing but the outcome is kept
-        until=None,
-        record=Record(),
-    )
+    analysis = as_falling(structure, fidelity, damping, dt)
     rest = analysis.dead_load(motion)  # a structure that does not stand is refused before any run
     viscous, _ = resolve_effective_damping(analysis.damping, rest.model, rest)
     defaults = DEFAULT_RANGES
     if viscous is None:
         defaults = {name: defaults[name] for name in defaults if not name.startswith("damping")}
-    ranges = _check_ranges({**defaults, **(vary or {})})
+    ranges = check_ranges({**defaults, **(vary or {})})
     neutral = {**NEUTRAL, "damping_kind": damping_kind(viscous)}
-    changes = [*_single_changes(ranges, neutral), *_sample_changes(ranges, samples, seed)]
+    changes = [*_single_changes(ranges, neutral), *sample_changes(ranges, samples, seed)]
     variations = [Variation(analysis, motion, _resolve_labels(ranges, each)) for each in changes]
     points, evaluator = list(enumerate(variations)), Evaluator(evaluate_variation)
     finished = evaluate_points(points, evaluator, workers)
@@ -172,6 +161,27 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
     dataset.attrs["k_s"] = float(np.mean([contact.shear_stiffness for contact in contacts]))
     return VerdictRange(dataset)
+
+
+def as_falling(
+    structure: Structure | Analysis,
+    fidelity: str | None = None,
+    damping: Viscous | EffectiveDamping | str | None = None,
+    dt: float | None = None,
+) -> Analysis:
+    """Return an analysis with large displacements, which keeps nothing but the outcome of a run."""
+    if isinstance(structure, Structure):
+        structure = Analysis(structure, fidelity="rigid", damping="effective")
+    return replace(
+        structure,
+        fidelity=fidelity or ("rigid" if structure.selects_model else structure.fidelity),
+        damping=interpret_damping(damping) or structure.damping,
+        dt=dt or structure.dt or 0.005,
+        displacements="large",
+        scheme=Conserving(),
+        until=None,
+        record=Record(),
+    )
 
 
 def verdict_range_of_bracket(
@@ -188,7 +198,7 @@ def verdict_range_of_bracket(
     return verdict_range(structure, motion.scaled(bracket.lower), vary=vary, **options)
 
 
-def _check_ranges(ranges: Mapping[str, Any]) -> dict[str, Any]:
+def check_ranges(ranges: Mapping[str, Any]) -> dict[str, Any]:
     """Return the ranges, or refuse unknown names and values."""
     checked: dict[str, Any] = {}
     for name, values in ranges.items():
@@ -228,7 +238,7 @@ def _single_changes(ranges: Mapping[str, Any], neutral: Mapping[str, Any]) -> li
     return changes
 
 
-def _sample_changes(ranges: Mapping[str, Any], samples: int, seed: int) -> list[dict[str, Any]]:
+def sample_changes(ranges: Mapping[str, Any], samples: int, seed: int) -> list[dict[str, Any]]:
     """Return a Latin hypercube over all properties."""
     shares = qmc.LatinHypercube(d=len(ranges), seed=seed).random(samples)
     return [
@@ -269,19 +279,39 @@ def evaluate_variation(variation: Variation) -> dict[str, Any]:
     motion = motion.scaled(changes["scale"])
     if changes["sign"] == "reversed":
         motion = motion.reversed()
-    assert analysis.dt is not None
-    dt = analysis.dt * (0.5 if changes["dt"] == "half" else 1.0)
-    analysis = replace(analysis, structure=_vary_contacts(structure, changes), dt=dt)
-    if changes["joint_rule"] == "rigid":
-        state = _run_rigid_blocks(analysis.structure, motion, dt)
-    else:
-        state = _run_elastic_joints(analysis, motion, changes)
+    state = prepare_runs(replace(analysis, structure=structure), changes)(motion)
     return {
         "outcome": state.kind,
         "displacement": state.displacement,
         "residual": state.residual,
         "time": np.nan if state.time is None else state.time,
     }
+
+
+def prepare_runs(
+    analysis: Analysis, changes: Mapping[str, Any]
+) -> Callable[[Motion], CollapseState]:
+    """Return a function from motions to the states of collapse of a changed structure."""
+    changes = {**NEUTRAL, **changes}
+    assert analysis.dt is not None
+    dt = analysis.dt * (0.5 if changes["dt"] == "half" else 1.0)
+    analysis = replace(analysis, structure=_vary_contacts(analysis.structure, changes), dt=dt)
+    if changes["joint_rule"] == "rigid":
+        return partial(_run_rigid_blocks, analysis.structure, dt=dt)
+    three = changes["joint_rule"] == "three points"
+    rule: Any = {"quadrature": "trapezoidal", "quadrature_points": 3} if three else {}
+    analysis = replace(analysis, **{"quadrature": "exact", "quadrature_points": None, **rule})
+    rest = analysis.dead_load()
+    kind, factor = changes.get("damping_kind"), changes["damping_ratio"]
+    damping = vary_damping(analysis.damping, rest.model, rest, kind, factor)
+
+    def run(motion: Motion) -> CollapseState:
+        history = time_history(analysis, motion, start=rest, damping=damping)
+        if history.fall is None:
+            raise DidNotConverge(f"the run {history.outcome}", last=None)
+        return history.fall
+
+    return run
 
 
 def _vary_contacts(structure: Structure, changes: Mapping[str, Any]) -> Structure:
@@ -316,23 +346,7 @@ def _finished_contact(structure: Structure, joint: Joint, finish: str) -> Contac
     )
 
 
-def _run_elastic_joints(
-    analysis: Analysis, motion: Motion, changes: Mapping[str, Any]
-) -> CollapseState:
-    """Run a model with elastic joints, and return its state of collapse."""
-    three = changes["joint_rule"] == "three points"
-    rule: Any = {"quadrature": "trapezoidal", "quadrature_points": 3} if three else {}
-    analysis = replace(analysis, **{"quadrature": "exact", "quadrature_points": None, **rule})
-    rest = analysis.dead_load(motion)
-    kind, factor = changes.get("damping_kind"), changes["damping_ratio"]
-    damping = vary_damping(analysis.damping, rest.model, rest, kind, factor)
-    run = time_history(analysis, motion, start=rest, damping=damping)
-    if run.fall is None:
-        raise DidNotConverge(f"the run {run.outcome}", last=None)
-    return run.fall
-
-
-def _run_rigid_blocks(structure: Structure, motion: Motion, dt: float) -> CollapseState:
+def _run_rigid_blocks(structure: Structure, motion: Motion, *, dt: float) -> CollapseState:
     """Run rigid blocks in contact, and return their state of collapse."""
     # impulses need shorter steps than elastic joints
     simulation = RigidBlockSimulation(structure, dt=min(dt / 2.5, 2e-3))

@@ -1,9 +1,13 @@
 """Cases whose displacements may be large: refused settings, and all files of a run."""
 
+import tomllib
+
 import pytest
 
 import archfem as af
-from archfem.cases.report.sections import _build_mechanism, _verdict_facts
+from archfem.cases.report.conclusion import build_conclusion, summarise_outcomes
+from archfem.cases.report.report_data import ReportData
+from archfem.cases.report.sections import _build_mechanism
 from archfem.cases.result_text import tabulate_runs
 from archfem.commands.run import run as run_command
 from archfem.dynamics.history import with_fall
@@ -92,17 +96,19 @@ def held(path):
 def test_a_run_that_stands_is_reported_so(held):
     assert held.verdict.headline.startswith("stands")
     assert "largest displacement of a corner " in str(held.verdict)
-    assert _verdict_facts([held])[0] == ("verdict", held.verdict.headline)
+    assert summarise_outcomes([held]) == held.verdict.headline
 
 
 def test_a_report_begins_with_the_number_of_lost_stones_and_lists_all_below(held):
     names = [f"stone {number}" for number in range(1, 13)]
     fall = af.dynamics.CollapseState("fallen", 1.25, tuple(names), 2.0, 2.0, True)
     run = with_fall(held, fall)
-    outcome, lost, *_ = _verdict_facts([run])
-    assert outcome == ("verdict", "fallen; no doubts")
+    assert summarise_outcomes([run]) == "fallen; no doubts"
+    data = ReportData(af.Case.of(tomllib.loads(CASE)), {"shake": run})
+    text = build_conclusion(data).pieces[0].text
     short = "stone 1, stone 2, stone 3, …"
-    assert lost == ("lost", f"12 blocks, the first at 1.25 s: {short}")
-    first, second, *_ = [block.text for block in _build_mechanism(run)]
-    assert first == "Fallen; no doubts."
+    assert text.startswith("The structure falls under the motion 'shake'.")
+    assert f"Under 'shake' it loses 12 blocks, the first at 1.25 s: {short}." in text
+    first, second, *_ = [b.text for b in _build_mechanism(run) if hasattr(b, "text")]
+    assert first == "Outcome: fallen; no doubts."
     assert second == f"Lost: 12 blocks, the first at 1.25 s: {', '.join(names)}."

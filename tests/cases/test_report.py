@@ -1,6 +1,7 @@
-"""Reports: they contain all files of the folder, and name missing results."""
+"""Reports: they contain all files of the folder, and leave out what was not computed."""
 
 import logging
+import re
 import shutil
 import tomllib
 from dataclasses import replace
@@ -13,8 +14,10 @@ from pages import read_page
 
 import archfem as af
 from archfem._files import read_file_list, replace_results
-from archfem.cases.defaults import describe_defaults
+from archfem.cases.defaults import describe_defaults, list_defaults
 from archfem.cases.report import report, report_data
+from archfem.cases.report.conclusion import build_conclusion
+from archfem.cases.report.inputs import tabulate_inputs
 from archfem.cases.report.sections import supported_weight_ratio
 from archfem.cases.run import carry_out, replace_run
 
@@ -66,9 +69,10 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert "a column <b>& more</b> under two pairs" in words
     assert "mode 1 at 3.14 Hz" in words
     assert "Ground motions" in words
-    assert "Not among the results: stress in the blocks, for they are rigid" in words
-    assert "Not among the results: a target spectrum" in words
-    assert "Not among the results: a predicted error of the model" in words
+    assert "Not among the results" not in words
+    assert "Not computed: limit analysis, a rating for a vehicle, a kinematic assess" in words
+    assert "The structure forms no mechanism under all 2 motions." in words
+    assert "Not varied: one set of properties, one model and time step." in words
     assert "another case" not in words
     case = af.Case.read(kept / "case.toml")
     assert sha256(case.text().encode()).hexdigest() in words
@@ -121,9 +125,9 @@ def test_a_run_in_memory_has_a_report_and_a_player(small, unplotted, undoubted, 
     case = af.Case.read(small, ["analysis.damping={ratio=0.05, frequency=5.0}"])
     *_, run = af.cases.run_case(case, pairs=["first"])
     words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
-    assert "5 % of critical at 5 Hz, proportional to stiffness" in words
+    assert "5 % of critical, joints closed" in words
+    assert "5 Hz, proportional to stiffness" in words
     assert "contains no displacements" in run.player().scene.data["note"]
-    assert "Not among the results: a predicted error of the model" in words
     assert "Ground motions" not in words
     assert "The run is not complete" not in words
     data = report_data.ReportData(case, {"first": run.history})
@@ -156,9 +160,10 @@ def test_a_case_without_motion_has_a_report_too(small, unplotted, tmp_path):
     with replace_run(case, folder) as draft:
         (draft / "limit.txt").write_text("it stands")
     words = " ".join(read_page(af.cases.open_results(folder).report().read_text()).words)
-    assert "Not among the results: the dead load" in words
-    assert "Not among the results: a run." in words
-    assert "it stands" in words
+    assert "It stands." in words  # the conclusion
+    # sections that would only say what is missing are left out
+    for title in ("Dead load", "Ground motion", "Response", "Modes", "Mechanism and collapse"):
+        assert title not in words
 
 
 def test_supports_bear_the_weight(ring, caplog):
@@ -239,3 +244,161 @@ def test_results_need_no_drawing_beside_them(name, unplotted, undoubted, tmp_pat
     assert af.History.read(place / "history.nc").report(tmp_path / "alone.html").is_file()
     # the case of the folder is one to run
     assert af.Case.read(place / "case.toml").structure.weight == pytest.approx(pier.weight)
+
+
+def words_of(path):
+    """The text of a page."""
+    return " ".join(read_page(Path(path).read_text(encoding="utf-8")).words)
+
+
+def test_who_signs_is_in_the_head_and_changes_no_result(kept, unplotted, capsys):
+    given = ["--set", "report.author=A. Mason", "--set", "report.norm=NTC 2018"]
+    assert af.commands.main(["report", str(kept), *given]) == 0
+    words = words_of(kept / "report.html")
+    head = words.partition("Conclusion")[0]
+    assert "A. Mason" in head
+    assert "NTC 2018" in head
+    # the results are those of the case without it
+    case = af.Case.read(kept / "case.toml")
+    assert case.signed(["report.author=A. Mason"]).hash_inputs() == case.hash_inputs()
+    capsys.readouterr()
+    assert af.commands.main(["report", str(kept), "--set", "structure.breadth=2"]) == 1
+    assert "'structure.breadth' changes results: run the case again" in capsys.readouterr().err
+    assert af.commands.main(["report", str(kept), "--set", "report.autor=me"]) == 1
+    assert "did you mean 'author'" in capsys.readouterr().err
+
+
+def test_captions_are_numbered_without_a_gap(carried_out, tmp_path):
+    words = words_of(af.cases.open_results(carried_out).report(tmp_path / "page.html"))
+    for kind in ("Figure", "Table"):
+        numbers = [int(number) for number in re.findall(rf"{kind} (\d+)\. [A-Z]", words)]
+        assert numbers == list(range(1, len(numbers) + 1))
+        assert len(numbers) > 3
+
+
+def test_every_input_has_its_mark():
+    tables = tomllib.loads(CASE) | {
+        "materials": {"stone": {"young": "5 GPa"}},
+        "contacts": {"stone to stone": {"cohesion": "2 kPa"}},
+        "criteria": {"hinge": 0.45},
+        "analysis": {"damping": "effective"},
+    }
+    rows = tabulate_inputs(report_data.ReportData(af.Case.of(tables), {})).rows
+    marks = {name: (value, mark) for name, value, mark in rows}
+    assert {mark for _, mark in marks.values()} == {"given", "default", "inferred"}
+    expected = {
+        "breadth": ("1 m", "given"),
+        "gravity": ("9.81 m/s²", "default"),
+        "stone: E": ("5 GPa", "given"),
+        "stone: weight": ("20 kN/m³", "default"),
+        "stone to stone: μ": ("0.6", "default"),
+        "stone to stone: cohesion": ("2 kPa", "given"),
+        "reduction factor R": ("2.0", "given"),
+        "scale of the motions": ("1.0", "default"),
+        "fidelity": ("rigid", "given"),
+        "displacements": ("small", "default"),
+        "time step": ("by an error of 0.005 in |e|", "inferred"),
+        "damped at": ("the effective modes about dead load, stiffness", "inferred"),
+        "a joint hinges where": ("|e| ≥ 0.45", "given"),
+        "mechanism by count": ("4 joints of rings and piers that fail at once", "default"),
+    }
+    assert {name: marks[name] for name in expected} == expected
+    # what is marked as a default is what all other results name
+    defaults = {each.words for each in list_defaults(af.Case.of(tables))}
+    assert {"weight 20 kN/m³", "μ 0.6", "mechanism of 4 joints"} <= defaults
+    assert "E 5 GPa" not in defaults
+
+
+BRIDGE = """
+title = "a small bridge"
+[structure]
+shape = "bridge"
+width = 3.0
+[structure.arches]
+"arch" = { span = "4 m", rise = "1.5 m", thickness = "0.5 m", voussoirs = 9 }
+[structure.sidewalls]
+length = "1.5 m"
+height = "1 m"
+above = "1 m"
+course = "0.5 m"
+"left" = { state = "fixed" }
+"right" = { state = "fixed" }
+[structure.backfill]
+cover = "0.4 m"
+[model]
+fidelity = "rigid"
+[limit]
+fill = { friction_angle = "35 degree" }
+[assessment]
+spectrum = { code = "NTC-2018", ag = 0.25, f0 = 2.4, tc_star = 0.32, site = "B" }
+[suite.pairs]
+first = { synthetic = { seed = 1 } }
+"""
+
+
+@pytest.mark.parametrize(
+    ("command", "given", "found"),
+    [
+        ("rate", ["--vehicle", "LM1"], "Rating of 'a small bridge' for LM1: factor"),
+        ("limit", ["--set", "limit.horizontal=1.0"], "Limit analysis: the load turns it into a m"),
+    ],
+)
+def test_a_result_without_a_time_history_has_a_report(command, given, found, tmp_path, capsys):
+    path, folder = tmp_path / "case.toml", tmp_path / "out"
+    path.write_text(BRIDGE, encoding="utf-8")
+    assert af.commands.main([command, str(path), "--out", str(folder), *given]) == 0
+    said = capsys.readouterr().out
+    assert af.commands.main(["report", str(folder)]) == 0
+    words = words_of(folder / "report.html")
+    conclusion = words.split("Inputs and assumptions")[1]  # between the contents and the heading
+    assert found in conclusion
+    assert "In doubt: joints slide (arch, joint" in conclusion
+    factor = re.search(r"factor (?:of )?([\d.]+)", said)[1]
+    assert f"{factor}" in words
+    assert "Response" not in words
+    assert "runs of first" not in words
+    # a run takes the folder over
+    assert "case.toml" in read_file_list(folder)[command].files
+    with replace_run(af.Case.read(path), folder):
+        pass
+    listed = read_file_list(folder)
+    assert "case.toml" in listed["run"].files
+    assert "case.toml" not in listed[command].files
+
+
+def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path):
+    path, folder = tmp_path / "case.toml", tmp_path / "out"
+    spectrum = BRIDGE.partition("[assessment]")[2].partition("[suite")[0]
+    path.write_text(f"{CASE.partition('[suite]')[0]}[assessment]{spectrum}", encoding="utf-8")
+    assert af.commands.main(["assess", str(path), "--out", str(folder)]) == 0
+    assert af.commands.main(["report", str(folder)]) == 0
+    conclusion = words_of(folder / "report.html").split("Inputs and assumptions")[1]
+    assert "Kinematic assessment, right: NTC-2018 SLV: capacity" in conclusion
+    assert "ag 0.25" in words_of(folder / "report.html").split("Norms and methods")[2]
+
+
+def test_a_history_alone_has_a_report_and_a_film_by_the_command_line(
+    kept, unplotted, tmp_path, capsys
+):
+    path = Path(shutil.move(kept / "first" / "history.nc", tmp_path / "moved.nc"))
+    assert af.commands.main(["report", str(path)]) == 0
+    assert "The structure forms no mechanism under the motion 'first'." in words_of(
+        tmp_path / "moved.html"
+    )
+    given = ["--out", str(tmp_path / "film.gif"), "--size", "480x320", "--fps", "5"]
+    assert af.commands.main(["animate", str(path), *given]) == 0
+    assert (tmp_path / "film.gif").is_file()
+
+
+def test_the_conclusion_states_outcomes_falls_and_the_range(kept, unplotted):
+    found = af.cases.open_results(kept)
+    data = report_data.ReportData(found.case, found.runs, found.folder)
+    verdicts = {name: run.verdict for name, run in found.runs.items()}
+    vars(found.runs["second"])["verdict"] = replace(
+        verdicts["second"], outcome="fallen", doubts=(af.models.model.Doubt("it leaks", "mend it"),)
+    )
+    text = " ".join(piece.text for piece in build_conclusion(data).pieces)
+    assert "The structure forms no mechanism under 1 of 2 motions: first." in text
+    assert "The structure falls under 1 of 2 motions: second." in text
+    assert "In doubt: 1 of 2 runs: it leaks; mend it." in text
+    assert "raise no doubt" not in text

@@ -10,7 +10,7 @@ from portals import DRY, box, portal
 
 import archfem as af
 from archfem.cases import result_text
-from archfem.cases.report import sections
+from archfem.cases.report import conclusion, sections
 from archfem.dynamics.verdict import doubt_unassessed_joints
 from archfem.joints.criteria import describe_assessed_joints
 from archfem.studies.evaluators import of_history
@@ -172,8 +172,8 @@ def test_tables_state_what_is_assessed(other, ring):
         table = result_text.describe_pairs({"one": run, "two": run})
         assert (SENTENCE in table.splitlines()) == said
         assert (of_history(run).get("assessed") == SENTENCE) == said
-        case = SimpleNamespace(structure=model.structure)
-        facts = sections.list_facts(SimpleNamespace(runs={"one": run}, case=case))
+        case = SimpleNamespace(structure=model.structure, report={})
+        facts = conclusion.list_facts(SimpleNamespace(runs={"one": run}, case=case))
         assert (("joints", SENTENCE) in facts) == said
         grid = sections._shorten_joint_table(
             result_text.tabulate_joints(run.joints), run.verdict.assessed

@@ -294,9 +294,10 @@ def test_joints_that_never_slide_are_linear_along_to_the_last_digit():
 
 def test_a_parameter_of_contacts_is_one_of_points_records_and_forms():
     """Whatever the law depends on reaches every place by its name alone."""
-    stone = af.column(breadth=1.0, heights=[1.0], contact=af.Contact(2e9, 1e9, 0.5, cohesion=3e3))
+    contact = af.Contact(2e9, 1e9, 0.5, cohesion=3e3, closure=1e-3)
+    stone = af.column(breadth=1.0, heights=[1.0], contact=contact)
     points = af.build(stone, fidelity="rigid").operator.points
     law = ContactLaw.of(stone.joints[0].contact)
-    assert law == (2e9, 1e9, 0.5, 3e3, 0.0)
+    assert law == (2e9, 1e9, 0.5, 3e3, 0.0, 1e3)
     assert [set(values) for values in points.contact] == [{value} for value in law]
     assert CONTACT_RECORD.names == contact_law.ContactLaw._fields

@@ -1,11 +1,11 @@
 """HTML reports of cases, result folders and single histories."""
 
-from hashlib import sha256
 from pathlib import Path
 
 from archfem.cases.case import Case
+from archfem.cases.report.conclusion import describe_origin, list_facts
 from archfem.cases.report.report_data import ReportData, build_player
-from archfem.cases.report.sections import build_sections, list_facts
+from archfem.cases.report.sections import build_sections
 from archfem.cases.result_folder import ResultFolder
 from archfem.cases.run import Run
 from archfem.cases.toml_file import parse_tables
@@ -18,12 +18,12 @@ from archfem.view.pages.player import Player, write_page
 def write_report(data: ReportData, path: str | Path) -> Path:
     """Write a report atomically."""
     case = data.case
-    subtitle = f"archfem report · case {sha256(case.text().encode()).hexdigest()[:12]}"
     footer = (
         "Written by archfem from the results named above; figures and numbers are theirs. On paper "
         "a player shows the instant and the joint that it showed on the screen."
     )
-    document = Document(case.title, subtitle, list_facts(data), build_sections(data), footer)
+    head = case.title, describe_origin(data), list_facts(data)
+    document = Document(*head, build_sections(data), footer)
     return write_page(path, document.page)
 
 

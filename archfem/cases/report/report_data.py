@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from archfem._files import check_listed, describe_deleted, path_inside, read_file_list
+from archfem._files import check_listed, describe_deleted, group_of, path_inside, read_file_list
 from archfem.cases.case import Case
+from archfem.cases.run import CASE_FILE
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError
 from archfem.models.builder import build
@@ -43,23 +44,27 @@ class ReportData:
         """Ground motions as applied, from the recorded accelerations."""
         return {name: rebuild_motion(run, name) for name, run in self.runs.items()}
 
-    def read_result(
-        self, text: str, figure: str, caption: str, what: str, remedy: str
-    ) -> list[Any]:
-        """Return table and picture of a command in the folder, or a note if they are missing."""
+    @cached_property
+    def fidelity(self) -> str:
+        """Fidelity of the runs, which "auto" has selected; without runs that of the case."""
+        recorded = {str(run.dataset.attrs.get("fidelity", "")) for run in self.runs.values()}
+        return ", ".join(sorted(recorded)) or self.case.analysis.discretisation.name
+
+    def read_result(self, name: str, caption: str, figure: str = "") -> list[Any]:
+        """Return text and picture of a command in the folder, or an empty list."""
         # a report shows what other commands left in the folder, and computes nothing itself
-        lines = self.read_text(text)
+        lines = self.read_text(f"{name}.txt")
         if lines is None:
-            return [missing_note(what, remedy)]
-        return [TextBlock(lines, "lines"), *self.read_figure(figure, caption)]
+            return []
+        return [TextBlock(lines, "lines"), *self.read_figure(figure or f"{name}.png", caption)]
 
     @cached_property
     def files(self) -> dict[str, Path]:
-        """Files of the folder by name that have the inputs of its run; the others are left out."""
+        """Files of the folder by name that have the inputs of its case; the others are left out."""
         listed = {} if self.folder is None else read_file_list(self.folder)
-        if self.folder is None or "run" not in listed:
+        if self.folder is None or (owner := group_of(listed, CASE_FILE)) is None:
             return {}
-        groups = [group for group in listed.values() if group.inputs == listed["run"].inputs]
+        groups = [group for group in listed.values() if group.inputs == owner.inputs]
         names = [name for group in groups for name in sorted(group.files)]
         paths = {name: path_inside(self.folder, name) for name in names}
         return {name: path for name, path in paths.items() if path.is_file()}

@@ -1,4 +1,4 @@
-"""Sections of a report: case, dead load, ground motion, response, checks, sources."""
+"""Sections of a report: inputs, dead load, ground motion, response, checks, methods, sources."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -11,63 +11,96 @@ import xarray as xr
 
 from archfem.cases import result_text
 from archfem.cases.case import Case
-from archfem.cases.defaults import describe_defaults, list_default_keys
-from archfem.cases.provenance import hash_file
+from archfem.cases.report.conclusion import (
+    build_conclusion,
+    describe_lost,
+    describe_mechanism,
+    sentence,
+    summarise_outcomes,
+)
+from archfem.cases.report.inputs import describe_value, tabulate_inputs
 from archfem.cases.report.report_data import ReportData, build_player, missing_note
-from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import SIGN_CONVENTION, History
 from archfem.dynamics.recorder import library_versions
-from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
-from archfem.dynamics.verdict import Verdict
 from archfem.joints.criteria import assessed_joints
-from archfem.masonry.materials import Contact, Material
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.stress import utilisation_text
-from archfem.units import MPa, kN
+from archfem.units import kN
 from archfem.view.collapse import draw_fall
 from archfem.view.histories import draw_envelopes
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
 from archfem.view.structure import draw_names, draw_structure
 
+# Failed joints that each definition of a mechanism needs, in the number of the criteria
+_DEFINITIONS = {
+    "any joints at once": "of any rings and piers together",
+    "one part at once": "of one ring or one pier",
+    "ring and pier at once": "of a ring and a pier together",
+    "one part over the record": "of one ring or one pier, each from its first failure on",
+    "verified": "that permit a motion of the blocks",
+    "Demirel and Aldemir": "of one ring, as that paper words it",
+}
+
+# Files of further commands, and what they hold
+_FURTHER_RESULTS = {
+    "modes.txt": "modes",
+    "limit.txt": "limit analysis",
+    "rating.txt": "a rating for a vehicle",
+    "assessment.txt": "a kinematic assessment",
+    "accuracy.txt": "a comparison of models and time steps",
+    "verdict_range.txt": "the range of the verdict over uncertain properties",
+}
+
+# References of the methods, with the file of the result that was made by each
+_METHODS = (
+    ("", "joints, criteria", "Demirel and Aldemir, Buildings 11 (2021)"),
+    ("", "mechanisms", "Heyman, Int. J. Solids Struct. 2 (1966) 249-279"),
+    ("limit.txt", "limit analysis", "Livesley, Int. J. Numer. Meth. Eng. 12 (1978) 1853-1871"),
+    ("rating.txt", "rating", "Heyman, The Masonry Arch, Ellis Horwood (1982)"),
+    ("assessment.txt", "assessment", "NTC 2018, with its Circolare 7/2019, C8.7.1.2"),
+    ("verdict_range.txt", "range", "Clopper and Pearson, Biometrika 26 (1934) 404-413"),
+)
+
 
 def build_sections(data: ReportData) -> list[Section]:
-    """Build all sections of a report."""
-    return [
-        *build_case_sections(data),
+    """Build all sections of a report; those without any result are left out."""
+    sections = [
+        build_conclusion(data),
+        build_input_section(data),
+        Section("Structure", _build_geometry(data.case)),
         *build_dead_load_sections(data),
         build_ground_section(data),
         *build_run_sections(data),
         build_check_section(data),
+        build_method_section(data),
         build_source_section(data),
     ]
+    # a heading of subsections has no pieces of its own
+    followed = [*(section.level for section in sections[1:]), 2]
+    kept = [s for s, level in zip(sections, followed, strict=True) if s.pieces or level > s.level]
+    return number_captions(kept)
 
 
-def build_case_sections(data: ReportData) -> list[Section]:
-    """Build the sections on assumptions, units, signs and geometry."""
-    case = data.case
-    assumptions = Grid((), _list_assumptions(data), "Assumptions of the analysis")
-    signs = [
-        ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
-        ("signs", SIGN_CONVENTION),
-        ("e", "eccentricity M / (N h), h the depth of the joint: ±0.5 at its edges"),
-        ("V / N", "mobilised friction |V| / N: at its limit μ, with c A / N added, it slides"),
-    ]
-    return [
-        Section("Case and assumptions", [assumptions]),
-        Section("Units and signs", [Grid((), signs)]),
-        Section("Geometry and materials", _build_geometry(case)),
-    ]
+def number_captions(sections: Sequence[Section]) -> list[Section]:
+    """Return sections whose figures and tables with captions are numbered through."""
+    counts: Counter[str] = Counter()
+
+    def number(piece: Any) -> Any:
+        word = {"plate": "Figure", "grid": "Table"}.get(piece.kind)
+        if word is None or not piece.caption:
+            return piece
+        counts[word] += 1
+        return replace(piece, caption=f"{word} {counts[word]}. {sentence(piece.caption)}")
+
+    return [replace(each, pieces=[number(piece) for piece in each.pieces]) for each in sections]
 
 
-def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
-    """List the assumptions of the analysis."""
-    case, criteria = data.case, data.case.analysis.failure_criteria
-    # Runs record the fidelity that "auto" selected.
-    recorded = {str(run.dataset.attrs.get("fidelity", "")) for run in data.runs.values()}
-    fidelity = ", ".join(sorted(recorded)) if recorded else case.analysis.discretisation.name
+def build_input_section(data: ReportData) -> Section:
+    """Build the section on inputs, assumptions, units and signs."""
+    fidelity = data.fidelity
     blocks = {
         "rigid": "rigid; all compliance is in the joints",
         "faces": "elastic; each face of a joint moves as a plane, the rest is condensed statically",
@@ -75,57 +108,35 @@ def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
         "full": "elastic finite elements, all nodes kept",
         "monolithic": "elastic finite elements, all nodes kept, weak forms of joints",
     }
-    large = case.analysis.discretisation.displacements == "large"
-    own_limit = "its own limit, μ + c A / N"
-    sliding = own_limit if criteria.friction is None else f"{criteria.friction:g}"
-    count = (
-        f"{criteria.failures} joints of rings and piers that hinge or slide at once, for "
-        f"{criteria.duration:g} s at least"
-    )
-    dt = case.analysis.dt
-    step = "steps of a length that the error chooses" if dt is None else f"steps of {1e3 * dt:g} ms"
-    return [
+    large = data.case.analysis.discretisation.displacements == "large"
+    assumptions = [
         ("structure", "plane; forces are those of the whole width"),
         ("blocks", blocks.get(fidelity, f"by part: {fidelity}")),
         ("joints", "dry: no tension but where a bond is given; Coulomb friction; no crushing"),
         ("displacements", "of any size" if large else "small: equilibrium where blocks stood"),
         ("ground", "rigid, moves as one; abutments and foundations are fixed to it"),
-        ("damping", _describe_damping(case)),
-        ("time steps", f"{type(case.analysis.scheme).__name__.lower()} scheme, {step}"),
-        ("a joint hinges", f"where |e| ≥ {criteria.hinge:g}"),
-        ("a joint slides", f"where |V| / N reaches {sliding}"),
-        ("a mechanism by count", count),
-        ("defaults", describe_defaults(case) or "none: the case gives all that decides"),
+        ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
+        ("signs", SIGN_CONVENTION),
+        ("e", "eccentricity M / (N h), h the depth of the joint: ±0.5 at its edges"),
+        ("V / N", "mobilised friction |V| / N: at its limit μ, with c A / N added, it slides"),
     ]
-
-
-def _describe_damping(case: Case) -> str:
-    """Describe the damping of a case."""
-    damping = interpret_damping(case.analysis.damping)
-    if damping is None:
-        return "none but that of friction"
-    ratio, joints = f"{100.0 * damping.ratio:g} % of critical", f"joints {damping.joints}"
-    if isinstance(damping, EffectiveDamping):
-        return f"{ratio} at the effective modes, {damping.kind}, {joints}"
-    if isinstance(damping, Rayleigh):
-        low, high = damping.frequencies
-        return f"{ratio} at {low:.3g} and {high:.3g} Hz (Rayleigh), {joints}"
-    return f"{ratio} at {damping.frequency:.3g} Hz, proportional to stiffness, {joints}"
+    table = Grid((), assumptions, "Assumptions, units and signs")
+    return Section("Inputs and assumptions", [tabulate_inputs(data), table])
 
 
 def _build_geometry(case: Case) -> list[Any]:
-    """Build extent, figure with joint names, and tables of parts, materials and contacts."""
+    """Build extent, figure with joint names, and table of parts."""
     structure = case.structure
-    caption = "The structure, and the numbers of the joints that are judged."
+    caption = "The structure, and the numbers of the joints that are assessed."
     points = np.concatenate([block.drawn() for block in structure.blocks])
     length, height = np.ptp(points, axis=0)
     extent = (
         f"{length:.3g} m long, {height:.3g} m high and {structure.width:g} m wide; "
         f"{len(structure.free)} blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
-        f"{len(structure.joints)} joints. Gravity is {structure.gravity:g} m/s²."
+        f"{len(structure.joints)} joints."
     )
     figure = FigureBlock.of(draw_names(structure), caption)
-    return [TextBlock(extent), figure, _tabulate_parts(structure), *_tabulate_materials(case)]
+    return [TextBlock(extent), figure, _tabulate_parts(structure)]
 
 
 def _tabulate_parts(structure: Structure) -> Grid:
@@ -145,54 +156,15 @@ def _tabulate_parts(structure: Structure) -> Grid:
     return Grid(head, rows, "Parts; the last column is the depth of their joints")
 
 
-def _tabulate_materials(case: Case) -> list[Grid]:
-    """Tabulate the materials of blocks and the contacts of joints, with defaults marked."""
-    structure = case.structure
-
-    def mark(item: Material | Contact, key: str, text: str) -> str:
-        return f"{text} (default)" if key in list_default_keys(case, item) else text
-
-    materials, contacts = [], []
-    for material in dict.fromkeys(block.material for block in structure.blocks):
-        row = [material.name, mark(material, "young", f"{material.young / MPa:.6g}")]
-        row.append(f"{material.poisson:g}")
-        row.append(mark(material, "unit_weight", f"{material.unit_weight / kN:g}"))
-        strength = "not known"
-        if material.strength is not None:
-            strength = mark(material, "strength", f"{material.strength / MPa:g}")
-        materials.append([*row, strength])
-    for contact in dict.fromkeys(joint.contact for joint in structure.joints):
-        row = [contact.name if contact.law is None else f"{contact.name}: {contact.law}"]
-        row.append(mark(contact, "normal_stiffness", f"{contact.normal_stiffness / 1e9:.3g}"))
-        row.append(mark(contact, "shear_stiffness", f"{contact.shear_stiffness / 1e9:.3g}"))
-        friction = mark(contact, "friction", f"{contact.coefficient:g}")
-        row.append(friction if contact.slides else "never slides")
-        row += [f"{contact.cohesion / 1e3:g}", f"{contact.tension / 1e3:g}"]
-        contacts.append([*row, f"{contact.dilatancy:g}"])
-    material_head = ["material", "E [MPa]", "ν [–]", "weight [kN/m³]", "strength [MPa]"]
-    contact_head = ["contact", "normal [MPa/mm]", "shear [MPa/mm]", "μ [–]", "c [kPa]"]
-    contact_head += ["tension [kPa]", "dilatancy [–]"]
-    return [Grid(material_head, materials, "Blocks"), Grid(contact_head, contacts, "Joints")]
-
-
 def build_dead_load_sections(data: ReportData) -> list[Section]:
     """Build the sections on dead load, modes, limit analysis, rating and assessment."""
-    caption = "Shapes of the modes about dead load."
-    remedy = "`archfem modes CASE.toml --out FOLDER` adds them to the folder."
-    modes = data.read_result("modes.txt", "modes.png", caption, "modes", remedy)
-    remedy = "A case with a load in its table [limit] includes it."
-    if data.case.limit is not None and data.case.limit.live:
-        remedy = "The case includes it: `archfem limit CASE.toml --out FOLDER` finds it."
-    caption = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
-    limit = data.read_result("limit.txt", "collapse.png", caption, "limit analysis", remedy)
-    remedy = "`archfem rate CASE.toml --vehicle LM1 --out FOLDER` adds it to the folder."
-    caption = "Factor along the bridge, and mechanism at the worst place."
-    rating = data.read_result("rating.txt", "rating.png", caption, "a rating", remedy)
+    collapse = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
+    rating = "Factor along the bridge, and mechanism at the worst place."
     return [
         Section("Dead load", _build_dead_load(data)),
-        Section("Modes", modes),
-        Section("Limit analysis", limit),
-        Section("Rating for a vehicle", rating),
+        Section("Modes", data.read_result("modes", "Shapes of the modes about dead load.")),
+        Section("Limit analysis", data.read_result("limit", collapse, "collapse.png")),
+        Section("Rating for a vehicle", data.read_result("rating", rating)),
         Section("Kinematic assessment", _build_assessment(data)),
     ]
 
@@ -207,20 +179,10 @@ def _build_dead_load(data: ReportData) -> list[Any]:
     if data.dead is not None:
         figure = draw_structure(case.structure, data.dead, criteria=case.analysis.failure_criteria)
         blocks += [FigureBlock.of(figure, thrust), _tabulate_dead_load(assessed_joints(data.dead))]
-    elif drawn := data.read_figure("dead.png", thrust):
-        blocks += drawn
     else:
-        remedy = "`archfem run CASE.toml --out FOLDER` finds it."
-        blocks.append(missing_note("the dead load", remedy))
-    if (stress := data.read_text("dead_stress.txt")) is not None:
-        blocks += data.read_figure("dead_stress.png", "Principal compression under dead load.")
-        blocks.append(TextBlock(stress, "lines"))
-    elif case.analysis.fidelity == "rigid":
-        remedy = 'A run with fidelity = "faces" or "full" has it.'
-        blocks.append(missing_note("stress in the blocks, for they are rigid", remedy))
-    else:
-        remedy = "A folder that `archfem run` wrote has it, unless rigid."
-        blocks.append(missing_note("stress in the blocks", remedy))
+        blocks += data.read_figure("dead.png", thrust)
+    caption = "Principal compression under dead load."
+    blocks += data.read_result("dead_stress", caption)
     caption = "A block cut free: forces on it, and their closing."
     return blocks + data.read_figure("free_body.png", caption)
 
@@ -244,10 +206,8 @@ def _tabulate_dead_load(joints: xr.Dataset) -> Grid:
 
 def _build_assessment(data: ReportData) -> list[Any]:
     """Build text and pictures of kinematic assessments from the files of the folder."""
-    text = data.read_text("assessment.txt")
-    if text is None:
-        remedy = "`archfem assess CASE.toml --out FOLDER` adds it to the folder."
-        return [missing_note("a kinematic assessment", remedy)]
+    if (text := data.read_text("assessment.txt")) is None:
+        return []
     caption = "Mechanism at the displacement capacity, and capacity curve with demand."
     names = sorted(name for name in data.files if name.startswith("assessment_"))
     figures = [figure for name in names for figure in data.read_figure(name, caption)]
@@ -258,9 +218,7 @@ def build_ground_section(data: ReportData) -> Section:
     """Build the section on ground motions and spectra."""
     motions = list(data.motions.values())
     if not motions:
-        shaken = data.case.has_motion
-        remedy = "`archfem run` shakes the structure." if shaken else "The case has none."
-        return Section("Ground motion", [missing_note("a motion of the ground", remedy)])
+        return Section("Ground motion", [])
     caption = "Measures of the motions as applied, read at the steps that the runs recorded."
     blocks: list[Any] = [Grid(*result_text.tabulate_motions(motions), caption)]
     if data.case.suite is None:
@@ -273,9 +231,7 @@ def build_ground_section(data: ReportData) -> Section:
 def _build_spectra(case: Case, motions: list[Motion]) -> list[Any]:
     """Build the response spectra, beside the target spectrum if there is one."""
     if case.suite is None:
-        caption = "Response spectra, 5 % damped, as applied."
-        figure = FigureBlock.of(draw_spectra(motions), caption)
-        return [figure, missing_note("a target spectrum", "A [suite] of motions may have one.")]
+        return [FigureBlock.of(draw_spectra(motions), "Response spectra, 5 % damped, as applied.")]
     scale, reduction = case.suite.get("scale", 1.0), case.suite.get("reduction", 1.0)
     # The suite multiplies by scale and divides by R; recorded motions are as applied.
     pairs = tuple(motion.scaled(reduction / scale) for motion in motions)
@@ -285,22 +241,17 @@ def _build_spectra(case: Case, motions: list[Motion]) -> list[Any]:
         f"R = {reduction:g}; motions were applied divided by it."
     )
     blocks: list[Any] = [FigureBlock.of(draw_suite(suite, case.target), caption)]
-    if case.target is None:
-        remedy = "suite.target = { code = …, … } gives one."
-        blocks.append(missing_note("a target spectrum", remedy))
-    elif not case.suite.get("matched", False):
-        text = "The motions were not matched to the target: suite.matched = false."
-        blocks.append(TextBlock(text))
+    if case.target is not None and not case.suite.get("matched", False):
+        blocks.append(TextBlock("The motions were not matched to the target."))
     return blocks
 
 
 def build_run_sections(data: ReportData) -> list[Section]:
     """Build the sections on the response of one run, or of all pairs and of each."""
     remedy = "`archfem run` again runs the pairs that are left."
-    missing = [missing_note(f"runs of {', '.join(data.missing)}", remedy)] if data.missing else []
     if not data.runs:
-        none = [missing_note("a run", "A case with [motion] or [suite] has one.")]
-        return [Section("Response", missing or none)]
+        return []
+    missing = [missing_note(f"runs of {', '.join(data.missing)}", remedy)] if data.missing else []
     if data.case.suite is None:
         (name,) = data.runs
         return [
@@ -329,7 +280,7 @@ def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
         blocks += _build_envelopes(data)
     table = result_text.tabulate_joints(run.joints, data.dead)
     blocks.append(_shorten_joint_table(table, run.verdict.assessed))
-    blocks.append(TextBlock(_sentence(utilisation_text(case.structure, run.joints))))
+    blocks.append(TextBlock(sentence(utilisation_text(case.structure, run.joints))))
     return blocks
 
 
@@ -351,20 +302,32 @@ def _shorten_joint_table(table: result_text.ResultTable, assessed: str) -> Grid:
         "when and how long at most the joint hinged, slid and was open."
     )
     caption = " ".join([caption, *(note for flag, note in notes.items() if flag in empty)])
-    caption += f" {_sentence(assessed)}" if assessed else ""
+    caption += f" {sentence(assessed)}" if assessed else ""
     return Grid([head[k] for k in filled], [[row[k] for k in filled] for row in rows], caption)
 
 
 def _build_mechanism(run: History) -> list[Any]:
-    """Build the verdict, and the fall of a run with large displacements."""
-    lines = str(_without_lost(run.verdict)).splitlines()
-    if run.fall is not None and run.fall.blocks:
-        lines.insert(1, f"lost: {_describe_lost(run.fall, len(run.fall.blocks))}")
-    blocks: list[Any] = [TextBlock(_sentence(line)) for line in lines]
-    if run.fall is None:
-        what = "what happens after blocks come loose, for displacements were taken as small"
-        blocks.append(missing_note(what, 'model.displacements = "large" follows them.'))
-    elif "fall_pose" in run.dataset:
+    """Build verdict and mechanism in a line each, the definitions, and the fall of a run."""
+    verdict, fall = run.verdict, run.verdict.fall
+    lines = [
+        f"Outcome: {summarise_outcomes([run])}",
+        *(f"In doubt: {doubt}" for doubt in verdict.doubts),
+    ]
+    lines += (
+        [f"lost: {describe_lost(fall, len(fall.blocks))}"]
+        if fall is not None and fall.blocks
+        else []
+    )
+    blocks: list[Any] = [TextBlock(sentence(line)) for line in lines]
+    blocks.append(TextBlock(sentence(f"Mechanism: {describe_mechanism(verdict)}")))
+    blocks += [TextBlock(sentence(line)) for line in verdict.remarks]
+    caption = "Definitions of a mechanism: failed joints that it needs, and the first one"
+    rows = [
+        [name, _DEFINITIONS[name], "none" if found is None else str(found)]
+        for name, found in verdict.mechanisms.items()
+    ]
+    blocks.append(Grid((), rows, caption))
+    if run.fall is not None and "fall_pose" in run.dataset:
         caption = "Blocks on their way to the ground, over where they stood."
         blocks.append(FigureBlock.of(draw_fall(run), caption))
     return blocks
@@ -387,64 +350,6 @@ def _build_suite_response(data: ReportData) -> list[Any]:
     ]
 
 
-def list_facts(data: ReportData) -> list[tuple[str, str]]:
-    """List the principal results by name, which the report shows first."""
-    runs, structure = list(data.runs.values()), data.case.structure
-    blocks = [("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")]
-    blocks += [("joints", structure.assessment)] if structure.assessment else []
-    if not runs:
-        return [*blocks, ("runs", "none")]
-    facts = [*_verdict_facts(runs), *blocks]
-    # Files of older versions have the acceleration at their steps alone.
-    pga = max(
-        run.dataset.attrs.get("pga", float(np.abs(run.dataset["ground"].values[:, 0]).max()))
-        for run in runs
-    )
-    joints = [assessed_joints(run.joints) for run in runs]
-    eccentricity = max(float(abs(each["eccentricity"]).max()) for each in joints)
-    opened = " (joints came apart)" if any(bool(each["open"].any()) for each in joints) else ""
-    friction = max(float(each["friction"].max()) for each in joints)
-    sizes = [("PGA", f"{pga:.2f} m/s²"), ("largest |e|", f"{eccentricity:.3f}{opened}")]
-    return [*facts, *sizes, ("largest V / N", result_text.format_ratio(friction))]
-
-
-def _verdict_facts(runs: Sequence[History]) -> list[tuple[str, str]]:
-    """Return outcome and doubts of a run, or how many of several runs have each."""
-    verdicts = [run.verdict for run in runs]
-    if len(verdicts) == 1:
-        verdict, fall = verdicts[0], verdicts[0].fall
-        facts = [("verdict", _without_lost(verdict).headline)]
-        facts += [("lost", _describe_lost(fall))] if fall is not None and fall.blocks else []
-        return [*facts, *(("in doubt", str(doubt)) for doubt in verdict.doubts)]
-    facts = [("verdict", result_text.describe_verdicts(runs))]
-    reasons = Counter(str(doubt) for verdict in verdicts for doubt in verdict.doubts)
-    facts += [
-        ("in doubt", f"{count} of {len(verdicts)} runs: {text}") for text, count in reasons.items()
-    ]
-    for name in verdicts[0].mechanisms:
-        met = sum(verdict.mechanisms.get(name) is not None for verdict in verdicts)
-        facts.append((f"mechanism by {name}", f"{met} of {len(verdicts)} runs"))
-    return facts
-
-
-def _without_lost(verdict: Verdict) -> Verdict:
-    """Return a verdict that does not list the lost blocks."""
-    fall = verdict.fall
-    return verdict if fall is None else replace(verdict, fall=replace(fall, time=None))
-
-
-def _describe_lost(fall: CollapseState, max_names: int = 3) -> str:
-    """Return the number of lost blocks, the time of the first, and the first names."""
-    names = ", ".join([*fall.blocks[:max_names], *(["…"] if fall.blocks[max_names:] else [])])
-    return f"{len(fall.blocks)} blocks, the first at {fall.time:.2f} s: {names}"
-
-
-def _sentence(text: str) -> str:
-    """Return a text with a capital at its beginning and a full stop at its end."""
-    text = text.strip()
-    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
-
-
 def build_check_section(data: ReportData) -> Section:
     """Build the section on predicted error, energy balance and model."""
     blocks: list[Any] = [TextBlock(data.deleted, "missing")] if data.deleted else []
@@ -457,21 +362,13 @@ def build_check_section(data: ReportData) -> Section:
             "of the supports under dead load, and most Newton iterations between two records"
         )
         blocks.append(Grid(head, rows, caption))
-    else:
-        blocks.append(missing_note("a run to check", "A case with [motion] or [suite] has one."))
-    blocks.append(Grid((), _describe_model(data), "Model and mesh"))
-    if not any("predicted_error" in run.dataset.attrs for run in data.runs.values()):
-        remedy = 'fidelity = "auto" predicts one.'
-        blocks.append(missing_note("a predicted error of the model", remedy))
     caption = "Speed against error over fidelities, meshes and steps."
-    remedy = "`archfem accuracy CASE.toml --out FOLDER` adds it to the folder."
-    what = "a comparison of meshes and steps"
-    blocks += data.read_result("accuracy.txt", "accuracy.png", caption, what, remedy)
+    blocks += data.read_result("accuracy", caption)
     caption = "Residual displacement over each property; falls are above the line."
-    what = "the range of the verdict"
-    remedy = "`archfem verdict CASE.toml --out FOLDER` adds it to the folder."
-    blocks += data.read_result("verdict_range.txt", "verdict_range.png", caption, what, remedy)
-    return Section("Predicted error, checks and range of the verdict", blocks)
+    blocks += data.read_result("verdict_range", caption)
+    if absent := [what for name, what in _FURTHER_RESULTS.items() if name not in data.files]:
+        blocks.append(TextBlock(f"Not computed: {', '.join(absent)}."))
+    return Section("Checks of the numbers, and range of the verdict", blocks)
 
 
 def _check_row(case: Case, name: str, run: History) -> list[str]:
@@ -504,29 +401,21 @@ def supported_weight_ratio(structure: Structure, joints: xr.Dataset) -> float:
     return float(reaction / structure.weight)
 
 
-def _describe_model(data: ReportData) -> list[tuple[str, str]]:
-    """Describe fidelity, mesh and quadrature."""
-    discretisation, rows = data.case.analysis.discretisation, []
-    for run in list(data.runs.values())[:1]:  # all runs have the same model
-        attrs, unknown = run.dataset.attrs, "unknown"
-        rows = [
-            ("fidelity of the model", str(attrs.get("fidelity", unknown))),
-            ("coordinates", str(run.dataset.sizes.get("coordinate", unknown))),
-            ("solver of the steps", str(attrs.get("method", unknown))),
-        ]
-    if data.case.analysis.selects_model:
-        return [*rows, ("mesh", "selected with the fidelity, and not saved in the results")]
-    rule = ("quadrature on joints", discretisation.rule.rule)
-    if discretisation.fidelity == "rigid":
-        return [*rows, ("mesh", "none, for blocks are rigid"), rule]
-    through, along = discretisation.cells
-    cells = ("cells at least", f"{through} through the thickness, {along} along each block")
-    elements = ("elements", f"{discretisation.cell}s of degree {discretisation.degree}")
-    return [*rows, cells, elements, rule]
+def build_method_section(data: ReportData) -> Section:
+    """Build the section on norms and methods."""
+    norm = [("norm", data.case.report["norm"])] if data.case.report.get("norm") else []
+    sources = (("suite", "target"), ("assessment", "spectrum"))
+    spectra = [
+        ("design spectrum", describe_value(table[key]))
+        for section, key in sources
+        if key in (table := data.case.settings.get(section, {}))
+    ]
+    used = [row[1:] for row in _METHODS if not row[0] or row[0] in data.files]
+    return Section("Norms and methods", [Grid((), [*norm, *spectra, *used])])
 
 
 def build_source_section(data: ReportData) -> Section:
-    """Build the section on versions, digests of inputs and files, and the case itself."""
+    """Build the section on versions, digests of inputs, and the case itself."""
     runs = data.runs.items()
     # Usually one line: all runs were computed with the same versions.
     made = sorted({str(run.dataset.attrs.get("versions", "unknown")) for _, run in runs})
@@ -538,12 +427,5 @@ def build_source_section(data: ReportData) -> Section:
         if "inputs" in run.dataset.attrs
     ]
     rows.append(("SHA-256 of the case", sha256(data.case.text().encode()).hexdigest()))
-    blocks: list[Any] = [Grid((), rows)]
-    if data.folder is not None:
-        table = []
-        for name, path in sorted(data.files.items()):
-            table.append([name, f"{path.stat().st_size / 1e3:.1f}", hash_file(path)[:16]])
-        caption = "Files of the folder that have the inputs of the run"
-        blocks.append(Grid(["file", "kB", "SHA-256"], table, caption))
-    blocks.append(TextBlock(data.case.text(), "lines"))
-    return Section("Versions, hashes and the case as a file", blocks)
+    blocks = [Grid((), rows), TextBlock(data.case.text(), "lines")]
+    return Section("Versions, digests and the case as a file", blocks)

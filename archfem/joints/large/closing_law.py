@@ -49,37 +49,55 @@ def _unit_rule(count: int) -> tuple[Array, Array]:
 
 
 SPACE_POINTS, SPACE_WEIGHTS = _unit_rule(6)
-TIME_POINTS, TIME_WEIGHTS = _unit_rule(3)
+TIME_POINTS, TIME_WEIGHTS = _unit_rule(2)
+
+# Coefficients 1 / n and 1 / (n (n + 1)) of the series of Φ_e and Ψ_e, the highest power first
+SERIES_POWERS = np.arange(22.0, 2.0, -1.0)
+ENERGY_SERIES, SUM_SERIES = 1.0 / SERIES_POWERS, 1.0 / (SERIES_POWERS * (SERIES_POWERS + 1.0))
 
 
 @kernel
-def closing_excess(stiffness, rate, closing):  # type: ignore
-    """Return σ_e, its derivative, Φ_e and Ψ_e at a closing; the rate is 1/δ_m."""
-    if closing <= 0.0:
-        return 0.0, 0.0, 0.0, 0.0
-    share, beyond = rate * closing, 0.0
+def split_closing(rate, closing):  # type: ignore
+    """Return the share of δ_m up to the end of the hyperbola, and the closing beyond it [m]."""
+    share = rate * closing
     if share > LARGEST_CLOSING:
-        share, beyond = LARGEST_CLOSING, closing - LARGEST_CLOSING / rate
-    left = 1.0 - share
+        return LARGEST_CLOSING, closing - LARGEST_CLOSING / rate
+    return share, 0.0
+
+
+@kernel
+def excess_traction(stiffness, rate, closing):  # type: ignore
+    """Return σ_e and its derivative at a closing; the rate is 1/δ_m."""
+    if closing <= 0.0:
+        return 0.0, 0.0
+    share, beyond = split_closing(rate, closing)
+    slope = 1.0 / (1.0 - share)
+    tangent = stiffness * (slope * slope - 1.0)
+    return stiffness / rate * share * share * slope + beyond * tangent, tangent
+
+
+@kernel
+def excess_energy(stiffness, rate, closing):  # type: ignore
+    """Return Φ_e and Ψ_e at a closing."""
+    if closing <= 0.0:
+        return 0.0, 0.0
+    share, beyond = split_closing(rate, closing)
     if share < SERIES_CLOSING:
-        # Σ x^n / n and Σ x^(n+1) / (n (n+1)) from n = 3 on
         single = double = 0.0
-        for n in range(22, 2, -1):
-            single = single * share + 1.0 / n
-            double = double * share + 1.0 / (n * (n + 1.0))
+        for k in range(len(ENERGY_SERIES)):
+            single = single * share + ENERGY_SERIES[k]
+            double = double * share + SUM_SERIES[k]
         single, double = single * share**3, double * share**4
     else:
         logarithm = math.log1p(-share)
         single = -logarithm - share - 0.5 * share**2
-        double = left * logarithm + share - 0.5 * share**2 - share**3 / 6.0
-    traction = stiffness / rate * share**2 / left
-    tangent = stiffness * (1.0 / left**2 - 1.0)
-    energy, sum_of_energy = stiffness * single / rate**2, stiffness * double / rate**3
+        double = (1.0 - share) * logarithm + share - 0.5 * share**2 - share**3 / 6.0
+    energy, total = stiffness * single / rate**2, stiffness * double / rate**3
     if beyond > 0.0:
-        sum_of_energy += beyond * (energy + beyond * (0.5 * traction + beyond * tangent / 6.0))
+        traction, tangent = excess_traction(stiffness, rate, LARGEST_CLOSING / rate)
+        total += beyond * (energy + beyond * (0.5 * traction + beyond * tangent / 6.0))
         energy += beyond * (traction + 0.5 * beyond * tangent)
-        traction += beyond * tangent
-    return traction, tangent, energy, sum_of_energy
+    return energy, total
 
 
 @kernel
@@ -99,8 +117,11 @@ def excess_means(stiffness, rate, first, last):  # type: ignore
     if are_close(rate, first, last, CLOSE_ENDS):
         return _gauss_means(stiffness, rate, first, last)
     change = last - first
-    t0, _, e0, sum0 = closing_excess(stiffness, rate, first)
-    t1, _, e1, sum1 = closing_excess(stiffness, rate, last)
+    t0, t1 = excess_traction(stiffness, rate, first)[0], excess_traction(stiffness, rate, last)[0]
+    (e0, sum0), (e1, sum1) = (
+        excess_energy(stiffness, rate, first),
+        excess_energy(stiffness, rate, last),
+    )
     mean = (sum1 - sum0) / change
     near, far = (mean - e0) / change, (e1 - mean) / change
     pairs = (2.0 * near - t0) / change, (far - near) / change, (t1 - 2.0 * far) / change
@@ -110,17 +131,17 @@ def excess_means(stiffness, rate, first, last):  # type: ignore
 @kernel
 def _gauss_means(stiffness, rate, first, last):  # type: ignore
     """Return `excess_means` by Gauss's rule."""
-    mean = near = far = first_pair = mixed = last_pair = 0.0
+    near = far = first_pair = mixed = last_pair = 0.0
     for k in range(len(SPACE_POINTS)):
         b, weight = SPACE_POINTS[k], SPACE_WEIGHTS[k]
         a = 1.0 - b
-        traction, tangent, energy, _ = closing_excess(stiffness, rate, a * first + b * last)
-        mean += weight * energy
+        traction, tangent = excess_traction(stiffness, rate, a * first + b * last)
         near += weight * a * traction
         far += weight * b * traction
         first_pair += weight * a * a * tangent
         mixed += weight * a * b * tangent
         last_pair += weight * b * b * tangent
+    mean = excess_energy(stiffness, rate, first)[0] + (last - first) * near
     return mean, (near, far), (first_pair, mixed, last_pair)
 
 

@@ -38,6 +38,7 @@ from archfem._numba import inlined_kernel
 from archfem._typing import Array
 from archfem.joints.large.point_law import (
     closed_means,
+    damping_tractions,
     facet_energy,
     limit_rate,
     mean_tractions,
@@ -277,10 +278,10 @@ def _sum_points(law, segment, ends, overlap, lag, memory):  # type: ignore
         lagged = a + p, c + q, b + p, d + q
         pressed = mean_tractions(contact, lagged, lag, law.facets)
         (n0, n1), (k00, k01, k11) = pressed
-        # loss by damping: lagged less unlagged mean, on the change of the gap
+        # loss by damping, on the change of the gap
         if lag > 0.0:
-            m0, m1 = mean_tractions(contact, (a, c, b, d), 0.0, law.facets)[0]
-            lost += share * ((n0 - m0) * (b - a) + (n1 - m1) * (d - c))
+            m0, m1 = damping_tractions(contact, (a, c, b, d), lag, law.facets)
+            lost += share * (m0 * (b - a) + m1 * (d - c))
         # sums of f, x f, and of their derivatives by the gap: 1, x, x²
         near, far = k00 + k01, k01 + k11
         total += share * (n0 + n1)

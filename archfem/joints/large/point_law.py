@@ -33,14 +33,19 @@ def joint_means(contact, ends, first, second, facet):  # type: ignore
     `second`; a place moves from a to b. The means are of the traction, of the release, the rate of
     that, the fraction closed, and its rate. Rates of a facet are of (1, 1), (1, 2) and (2, 2).
     """
-    if facet:
-        means = _facet_means(contact, ends, first, second)
-    else:
-        normal, taken, rate, time, moves = _point_means(contact, ends[0], ends[2], first, second)
-        means = (normal, 0.0), (taken, 0.0), (rate, 0.0, 0.0), (time, 0.0), (moves, 0.0, 0.0)
+    means = linear_means(contact, ends, first, second, facet)
     if contact.closing_rate > 0.0:
         return _add_excess(contact, ends, (first, second), facet, means)
     return means
+
+
+@inlined_kernel
+def linear_means(contact, ends, first, second, facet):  # type: ignore
+    """Return `joint_means` of the linear law."""
+    if facet:
+        return _facet_means(contact, ends, first, second)
+    normal, taken, rate, time, moves = _point_means(contact, ends[0], ends[2], first, second)
+    return (normal, 0.0), (taken, 0.0), (rate, 0.0, 0.0), (time, 0.0), (moves, 0.0, 0.0)
 
 
 @inlined_kernel
@@ -158,10 +163,20 @@ def mean_tractions(contact, ends, lag, facet):  # type: ignore
 
 
 @inlined_kernel
+def damping_tractions(contact, ends, lag, facet):  # type: ignore
+    """Return means of what the lag of damping adds to the traction, from gaps without it."""
+    a, c, b, d = ends
+    p, q = lag * (b - a), lag * (d - c)
+    n0, n1 = linear_means(contact, (a + p, c + q, b + p, d + q), lag, 1.0 + lag, facet)[0]
+    m0, m1 = linear_means(contact, ends, 0.0, 1.0, facet)[0]
+    return n0 - m0, n1 - m1
+
+
+@inlined_kernel
 def closed_means(contact, ends, lag, facet):  # type: ignore
     """Return means of the closed fraction as `joint_means`, and their derivatives."""
     a, c, _, _ = ends
-    _, _, _, time, rates = joint_means(contact, ends, lag, 1.0 + lag, facet)
+    _, _, _, time, rates = linear_means(contact, ends, lag, 1.0 + lag, facet)
     # at an instant the end of the closed part of a facet moves
     low, high, _ = _zero_crossings(ends)
     if facet and low == high and 0.0 < low < 1.0:

@@ -1,0 +1,180 @@
+"""Inputs of a report: each value with its mark given, default or inferred."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from archfem.cases.defaults import DECIDING_VALUES, list_default_keys
+from archfem.cases.report.report_data import ReportData
+from archfem.cases.structure_keys import shape_keys
+from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
+from archfem.masonry.materials import Contact, Material
+from archfem.view.pages.document import Grid
+
+Row = tuple[str, str, str]  # quantity, value, mark
+
+_STATIC_SECTIONS = ("limit", "rating", "assessment")
+_CAPTION = (
+    "Inputs. Given: the case states it. Default: archfem's, since the case does not. Inferred: it "
+    "follows from the others."
+)
+
+
+def tabulate_inputs(data: ReportData) -> Grid:
+    """Tabulate all inputs with their marks."""
+    rows = [*_structure_rows(data), *_property_rows(data), *_static_rows(data)]
+    if data.runs or not any(f"{name}.txt" in data.files for name in _STATIC_SECTIONS):
+        rows += [*_motion_rows(data), *_model_rows(data), *_criteria_rows(data)]
+    return Grid((), rows, _CAPTION)
+
+
+def _mark(given: bool) -> str:
+    """Return the mark of a value that is given, or a default."""
+    return "given" if given else "default"
+
+
+def _structure_rows(data: ReportData) -> Iterator[Row]:
+    """Yield the keys of [structure]; width and gravity also where they are defaults."""
+    table, structure = data.case.settings.get("structure", {}), data.case.structure
+    kinds = shape_keys(table["shape"])
+    for key, value in table.items():
+        if key not in ("material", "contact", "width", "gravity"):
+            unit = kinds.get(key) if isinstance(value, int | float) else ""
+            unit = f" {unit}" if isinstance(unit, str) and unit not in ("", "1") else ""
+            yield key.replace("_", " "), f"{describe_value(value)}{unit}", "given"
+    yield "width", f"{structure.width:g} m", _mark("width" in table)
+    yield "gravity", f"{structure.gravity:g} m/s²", _mark("gravity" in table)
+    if "joints" not in table and table["shape"] in ("blocks", "outlines"):
+        yield "joints", f"{len(structure.joints)}, where outlines touch", "inferred"
+
+
+def describe_value(value: Any) -> str:
+    """Return a value of a case in words; long lists by their number."""
+    if isinstance(value, Mapping):
+        own = [f"{key} {describe_value(each)}" for key, each in value.items()]
+        return "; ".join(own) or "as all"
+    if isinstance(value, list):
+        return ", ".join(map(describe_value, value)) if len(value) < 7 else f"{len(value)} values"
+    return f"{value:g}" if isinstance(value, float) else str(value).replace("**2", "²")
+
+
+def _property_rows(data: ReportData) -> Iterator[Row]:
+    """Yield the values of materials and contacts."""
+    case = data.case
+    others: dict[str, dict[str, tuple[str, float, str]]] = {
+        "materials": {"poisson": ("ν", 1.0, "")},
+        "contacts": {
+            "cohesion": ("cohesion", 1e3, " kPa"),
+            "tension": ("tensile strength", 1e3, " kPa"),
+            "dilatancy": ("dilatancy", 1.0, ""),
+        },
+    }
+    items: list[Material | Contact] = [block.material for block in case.structure.blocks]
+    items += [joint.contact for joint in case.structure.joints]
+    for item in dict.fromkeys(items):
+        section = "materials" if isinstance(item, Material) else "contacts"
+        defaults = list_default_keys(case, item)
+        for key, (word, unit, name, *_) in DECIDING_VALUES[section].items():
+            value = getattr(item, key)
+            text = "not known" if value is None else f"{value / unit:.6g}{name}"
+            text = "never slides" if text == "inf" else text
+            yield f"{item.name}: {word}", text, _mark(key not in defaults and value is not None)
+        given = case.settings.get(section, {}).get(item.name, {})
+        for key, (word, unit, name) in others[section].items():
+            if key in given or getattr(item, key):
+                text = f"{getattr(item, key) / unit:g}{name}"
+                yield f"{item.name}: {word}", text, _mark(key in given)
+        if isinstance(item, Contact) and item.law is not None:
+            yield f"{item.name}: law", str(item.law), "given"
+
+
+def _static_rows(data: ReportData) -> Iterator[Row]:
+    """Yield the keys of limit analysis, rating and assessment, where these are in the report."""
+    for section in _STATIC_SECTIONS:
+        table = data.case.settings.get(section, {})
+        # a rating has joints and fill of [limit]
+        users = ("limit", "rating") if section == "limit" else (section,)
+        if not any(f"{name}.txt" in data.files for name in users):
+            continue
+        for key, value in table.items():
+            yield f"{section}: {key.replace('_', ' ')}", describe_value(value), "given"
+        if section == "limit" and "friction" not in table:
+            yield "limit: friction", "coulomb, associated", "default"
+
+
+def _motion_rows(data: ReportData) -> Iterator[Row]:
+    """Yield the source of the motion, its vertical component and its factors."""
+    # as the case writes them, with their units
+    motion, suite = (data.case.settings.get(key) for key in ("motion", "suite"))
+    if suite is not None:
+        yield "motions", f"{len(suite['pairs'])} pairs: {', '.join(suite['pairs'])}", "given"
+        target = suite.get("target")
+        yield "target spectrum", describe_value(target) if target else "none", _mark(bool(target))
+        matched = "matched to the target" if suite.get("matched") else "as they are"
+        yield "motions are", matched, _mark("matched" in suite)
+        for key, name in (("scale", "scale of the motions"), ("reduction", "reduction factor R")):
+            yield name, str(suite.get(key, 1.0)), _mark(key in suite)
+    elif motion is not None:
+        for source in ("file", "synthetic", "samples"):
+            if source in motion:
+                yield "motion", f"{source}: {describe_value(motion[source])}", "given"
+        ratio = motion.get("synthetic", {}).get("vertical_ratio")
+        if "vertical" in motion:
+            yield "vertical motion", describe_value(motion["vertical"]), "given"
+        elif "synthetic" in motion:
+            text = "2/3 of the horizontal" if ratio is None else f"{ratio} of the horizontal"
+            yield "vertical motion", text, _mark(ratio is not None)
+        yield "scale of the motion", str(motion.get("scale", 1.0)), _mark("scale" in motion)
+
+
+def _model_rows(data: ReportData) -> Iterator[Row]:
+    """Yield fidelity, mesh, time steps and damping."""
+    analysis, settings = data.case.analysis, data.case.settings
+    model, own = settings.get("model", {}), settings.get("analysis", {})
+    selected = analysis.selects_model and bool(data.runs)
+    yield "fidelity", data.fidelity, "inferred" if selected else _mark("fidelity" in model)
+    yield "displacements", analysis.displacements, _mark("displacements" in model)
+    if not analysis.selects_model:
+        yield "quadrature", analysis.discretisation.rule.rule, _mark("quadrature" in model)
+        if analysis.discretisation.fidelity != "rigid":
+            through, along = analysis.discretisation.cells
+            yield "cells a block", f"{through} through, {along} along", _mark("cells" in model)
+    if not data.case.has_motion:
+        return
+    scheme = type(analysis.scheme).__name__.lower()
+    yield "scheme", scheme, _mark("scheme" in own)
+    if analysis.dt is None:
+        yield "time step", f"by an error of {analysis.tolerance:g} in |e|", "inferred"
+    else:
+        yield "time step", f"{1e3 * analysis.dt:g} ms", "given"
+    yield from _damping_rows(data, "damping" in own)
+
+
+def _damping_rows(data: ReportData, given: bool) -> Iterator[Row]:
+    """Yield damping ratio and frequencies; those of modes are inferred."""
+    damping = interpret_damping(data.case.analysis.damping)
+    if damping is None:
+        yield "damping", "none but that of friction", _mark(given)
+        return
+    yield "damping", f"{100.0 * damping.ratio:g} % of critical, joints {damping.joints}", "given"
+    if isinstance(damping, EffectiveDamping):
+        yield "damped at", f"the effective modes about dead load, {damping.kind}", "inferred"
+    elif isinstance(damping, Rayleigh):
+        low, high = damping.frequencies
+        yield "damped at", f"{low:.3g} and {high:.3g} Hz (Rayleigh)", "given"
+    else:
+        yield "damped at", f"{damping.frequency:.3g} Hz, proportional to stiffness", "given"
+
+
+def _criteria_rows(data: ReportData) -> Iterator[Row]:
+    """Yield the criteria of failure."""
+    criteria, settings = data.case.analysis.failure_criteria, data.case.settings
+    until = settings.get("analysis", {}).get("until")
+    own = until.get("criteria", {}) if isinstance(until, Mapping) else {}
+    given = settings.get("criteria", own) or {}
+    yield "a joint hinges where", f"|e| ≥ {criteria.hinge:g}", _mark("hinge" in given)
+    limit = "its own limit, μ + c A / N"
+    limit = limit if criteria.friction is None else f"{criteria.friction:g}"
+    yield "a joint slides where |V| / N reaches", limit, _mark("friction" in given)
+    count = f"{criteria.failures} joints of rings and piers that fail at once"
+    yield "mechanism by count", count, _mark("failures" in given)
+    yield "failure lasts for", f"{1e3 * criteria.duration:g} ms", _mark("duration" in given)

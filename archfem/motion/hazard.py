@@ -1,0 +1,139 @@
+"""Seismic hazard of a site: the annual rate at which an intensity is exceeded.
+
+Rates are straight lines in double logarithm between the points that are given, and beyond them
+along the last lines. Probabilities in a time T are those of a Poisson process, 1 - exp(-rate T).
+"""
+
+import csv
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from archfem._typing import Array
+from archfem._validation import check_array, check_choice, check_numbers, validate_methods
+from archfem.errors import InvalidInput
+
+# Intensity measures, with their units
+MEASURES = {"pga": "m/s²", "pgv": "m/s", "sa": "m/s²", "sa_avg": "m/s²"}
+
+# Names that OpenQuake gives to measures, and their unit in ours
+OPENQUAKE_UNITS = {"PGA": ("pga", 9.80665), "PGV": ("pgv", 0.01), "SA": ("sa", 9.80665)}
+
+
+@validate_methods
+@dataclass(frozen=True, eq=False)
+class Hazard:
+    """A hazard curve.
+
+    Attributes:
+        intensity: intensities, ascending (n,) [m/s² or m/s].
+        rate: annual rates at which they are exceeded, descending (n,) [1/year].
+        measure: "pga", "pgv", "sa" at `period`, or "sa_avg", the geometric mean of Sa over periods
+            from 0.2 to 3 times that of the structure (Eads, Miranda and Lignos, Earthq. Eng.
+            Struct. Dyn. 44 (2015) 2057-2073).
+        period: of "sa" [s]; None takes that of the structure.
+
+    Raises:
+        InvalidInput: fewer than two points, or they do not ascend and descend, or are not above 0.
+
+    Example:
+        >>> site = af.Hazard.from_return_periods({475.0: 4.0, 2475.0: 7.0})
+        >>> round(1.0 / float(site.rate_of(4.0)))
+        475
+    """
+
+    intensity: Array
+    rate: Array
+    measure: str = field(default="pga", kw_only=True)
+    period: float | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Check that the curve falls."""
+        check_choice(self.measure, "measure", tuple(MEASURES))
+        x = np.array(check_numbers(self.intensity, "intensity"), float)
+        y = np.array(check_numbers(self.rate, "rate", len(x)), float)
+        falls = len(x) > 1 and (np.diff(x) > 0.0).all() and (np.diff(y) < 0.0).all()
+        if not falls or min(x.min(), y.min()) <= 0.0:
+            raise InvalidInput(
+                f"hazard with intensities {x.tolist()} and rates {y.tolist()}: give two points or "
+                "more above 0, intensities ascending, annual rates descending"
+            )
+        object.__setattr__(self, "intensity", x)
+        object.__setattr__(self, "rate", y)
+
+    @classmethod
+    def power(cls, factor: float, exponent: float, **options: object) -> "Hazard":
+        """Return the curve rate = factor · intensity^(-exponent).
+
+        Args:
+            factor: annual rate at intensity 1 in SI units [1/year].
+            exponent: slope in double logarithm, above 0; 2 to 4 at most sites [-].
+            options: `measure` and `period`.
+        """
+        if not (factor > 0.0 and exponent > 0.0):
+            raise InvalidInput(f"hazard {factor} · a^-{exponent}: give two numbers above 0")
+        ends = np.array([0.01, 100.0])
+        return cls(ends, factor * ends**-exponent, **options)  # type: ignore[arg-type]
+
+    @classmethod
+    def from_return_periods(cls, points: Mapping[float, float], **options: object) -> "Hazard":
+        """Return the curve through intensities of return periods, as codes give them.
+
+        Args:
+            points: intensity by return period [year]; two or more.
+            options: `measure` and `period`.
+        """
+        periods = sorted(points)
+        if not periods or min(periods) <= 0.0:
+            raise InvalidInput(f"return periods {periods}: give two or more above 0")
+        intensities = np.array([points[period] for period in periods])
+        return cls(intensities, 1.0 / np.array(periods), **options)  # type: ignore[arg-type]
+
+    @classmethod
+    def read(cls, path: str | Path, site: int = 0) -> "Hazard":
+        """Read a hazard curve of OpenQuake, a CSV file of probabilities of exceedance.
+
+        Args:
+            path: file whose first line names `investigation_time` and `imt`, and whose columns
+                `poe-…` are the probabilities at intensities, of a site in each row.
+            site: number of the row.
+
+        Raises:
+            InvalidInput: there is no such file, row, or column.
+        """
+        try:
+            lines = Path(path).read_text(encoding="utf-8").splitlines()
+        except OSError as error:
+            raise InvalidInput(f"hazard curve {path}: {error.strerror}: give a file") from error
+        head = " ".join(line for line in lines if line.startswith("#"))
+        years = re.search(r"investigation_time=([\d.]+)", head)
+        measure = re.search(r"imt='?\"?(PGA|PGV|SA)(?:\(([\d.]+)\))?", head)
+        rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+        if years is None or measure is None or not 0 <= site < len(rows):
+            raise InvalidInput(
+                f"hazard curve {path}: no row {site}, or its first line does not name "
+                "investigation_time and imt (PGA, PGV or SA(…)): export it by OpenQuake as CSV"
+            )
+        name, unit = OPENQUAKE_UNITS[measure.group(1)]
+        found = {key[4:]: value for key, value in rows[site].items() if key.startswith("poe-")}
+        x, poe = np.array([*found], float) * unit, np.array([*found.values()], float)
+        # a rate of zero has no logarithm, and equal probabilities are those of all intensities
+        rates = -np.log1p(-np.minimum(poe, 1.0 - 1e-12)) / float(years.group(1))
+        kept = (rates > 0.0) & (np.diff(rates, prepend=np.inf) < 0.0)
+        period = measure.group(2)
+        return cls(x[kept], rates[kept], measure=name, period=float(period) if period else None)
+
+    def rate_of(self, intensity: float | Sequence[float] | Array) -> Array:
+        """Return the annual rate at which intensities are exceeded [1/year].
+
+        Args:
+            intensity: above 0, of any shape.
+        """
+        x = np.log(check_array(intensity, "intensity"))
+        points, values = np.log(self.intensity), np.log(self.rate)
+        piece = np.clip(np.searchsorted(points, x) - 1, 0, len(points) - 2)
+        slopes = np.diff(values) / np.diff(points)
+        return np.asarray(np.exp(values[piece] + slopes[piece] * (x - points[piece])))

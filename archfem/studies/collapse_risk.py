@@ -1,0 +1,537 @@
+"""Annual rate of collapse of a structure, from capacities under sampled properties and a hazard.
+
+Each sample pairs properties of the structure with a record, and brackets the scale of that record
+at which the structure falls. A lognormal fragility is fitted to the brackets, and integrated with
+the hazard curve of the site. Intervals are by the bootstrap over records, with all samples of each.
+
+References:
+    Cornell, Jalayer, Hamburger and Foutch, J. Struct. Eng. 128 (2002) 526-533, for the rate.
+    Porter, Kennedy and Bachman, Earthq. Spectra 23 (2007) 471-489, for the fragility.
+"""
+
+import json
+import logging
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from math import inf, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.special import ndtr
+from tqdm import tqdm
+
+from archfem._display import ResultDisplay
+from archfem._files import align_columns
+from archfem._netcdf import read_dataset, write_dataset
+from archfem._typing import Array
+from archfem._validation import (
+    check_integer,
+    check_number,
+    check_type,
+    validate_arguments,
+    validate_methods,
+)
+from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.collapse_state import FALLEN_STATES
+from archfem.dynamics.motion_scaling import admissible_range
+from archfem.errors import InvalidInput
+from archfem.masonry.structure import Structure
+from archfem.motion.hazard import MEASURES, Hazard
+from archfem.motion.motion import Motion
+from archfem.motion.response_spectra import measure_intensity, response_spectrum
+from archfem.motion.suite import Suite
+from archfem.statics.modes import modes
+from archfem.studies.evaluators import Evaluator
+from archfem.studies.fragility import Fragility, fit_brackets, fragility
+from archfem.studies.process_pool import evaluate_points
+from archfem.studies.variations import (
+    DEFAULT_RANGES,
+    as_falling,
+    check_ranges,
+    prepare_runs,
+    sample_changes,
+)
+
+logger = logging.getLogger("archfem")
+
+# Properties that are varied by default; the alternatives of joint rules are for `alternatives`
+VARIED = ("k_n", "k_s", "friction", "damping_ratio")
+
+# Number of samples before the others begin their search at the median of these [-]
+FIRST_ROUND = 8
+
+# Factor between the scales that are tried until the fall is bracketed, and the most runs of one [-]
+SEARCH_FACTOR, MOST_RUNS = 1.6, 12
+
+# Samples of the bootstrap
+RESAMPLES = 400
+
+
+@dataclass(frozen=True, eq=False)
+class RiskSample:
+    """One structure and record, and how its capacity is searched."""
+
+    analysis: Analysis = field(repr=False)
+    motion: Motion = field(repr=False)
+    changes: tuple[tuple[str, Any], ...]
+    begin: float  # first scale [-]
+    between: tuple[float, float]  # smallest and largest scale [-]
+    precision: float  # relative width of the bracket [-]
+
+    @property
+    def case(self) -> "RiskSample":
+        """The sample itself, as evaluators take it."""
+        return self
+
+    @property
+    def model_key(self) -> str:
+        """Empty: each sample has a model of its own."""
+        return ""
+
+
+def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
+    """Return the largest scale that stands below the smallest that falls, that one, and runs."""
+    run = prepare_runs(sample.analysis, dict(sample.changes))
+    smallest, largest = admissible_range(sample.between, sample.motion)
+    stands, falls, runs = 0.0, inf, 0
+    scale = min(max(sample.begin, smallest), largest)
+    while runs < MOST_RUNS:
+        runs += 1
+        if run(sample.motion.scaled(scale)).kind in FALLEN_STATES:
+            falls = scale
+        else:
+            stands = scale
+        if falls <= smallest or stands >= largest or falls <= (1.0 + sample.precision) * stands:
+            break
+        if falls == inf:
+            scale = min(SEARCH_FACTOR * stands, largest)
+        elif stands == 0.0:
+            scale = max(falls / SEARCH_FACTOR, smallest)
+        else:
+            scale = sqrt(stands * falls)
+    return {"lower": stands, "upper": falls, "runs": runs}
+
+
+@validate_arguments
+def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that may vary)
+    analysis: Analysis | Structure,
+    motions: Suite | Iterable[Motion],
+    hazard: Hazard,
+    *,
+    samples: int = 80,
+    vary: Mapping[str, Any] | None = None,
+    alternatives: Mapping[str, tuple[float, Any]] | None = None,
+    precision: float = 0.25,
+    between: tuple[float, float] = (0.05, 20.0),
+    seed: int = 0,
+    workers: int = 1,
+    out: str | Path | None = None,
+) -> "CollapseRisk":
+    """Compute the annual rate at which a structure falls, from sampled properties and records.
+
+    Properties are a Latin hypercube over their ranges, alternatives are drawn by their weights, and
+    records are dealt in turn. Each sample is scaled until its fall is bracketed.
+
+    Args:
+        analysis: settings of all runs, which have large displacements; or a structure, of rigid
+            stones with 5 % of damping.
+        motions: records; their own scales do not matter.
+        hazard: of the site.
+        samples: number of samples, at least 8.
+        vary: as for `verdict_range`; by default "k_n", "k_s", "friction" and "damping_ratio".
+        alternatives: by label, a weight and an analysis or a structure, such as joints of other
+            finish or another thickness, in place of `analysis`; weights need not add up to 1.
+        precision: relative width of the brackets [-].
+        between: smallest and largest scale; no ground motion may exceed 5 g.
+        seed: of the random numbers.
+        workers: number of processes.
+        out: file that keeps the samples so far; a call with the same arguments continues it.
+
+    Returns:
+        Capacities, fragility, rate and their intervals.
+
+    Raises:
+        InvalidInput: an argument is out of range, or `out` is of other arguments.
+        DidNotConverge: a structure does not stand under dead load.
+    """
+    check_type(hazard, Hazard, "hazard", "give an archfem.Hazard")
+    check_integer(samples, "samples", minimum=FIRST_ROUND)
+    width = check_number(precision, "precision", minimum=0.01, maximum=1.0)
+    records = list(motions.motions if isinstance(motions, Suite) else motions)
+    if len(records) < 2:
+        raise InvalidInput(f"{len(records)} motion: give several records, seven or more at best")
+    tree = _resolve_alternatives(analysis, alternatives)
+    ranges = check_ranges({name: DEFAULT_RANGES[name] for name in VARIED} | dict(vary or {}))
+    draws = sample_changes(ranges, samples, seed)
+    random = np.random.default_rng(seed)
+    labels = _draw_labels({label: weight for label, (weight, _) in tree.items()}, samples, random)
+    order = np.concatenate(
+        [random.permutation(len(records)) for _ in range(-(-samples // len(records)))]
+    )[:samples]
+    table = _describe_samples(ranges, draws, labels, order)
+    table = table.assign(_measure_records(tree, records, hazard))
+    inputs = [each.fingerprint for _, each in tree.values()]
+    table.attrs |= {
+        "hazard": json.dumps(_write_hazard(hazard)),
+        "inputs": json.dumps([*inputs, width, list(between), seed]),
+    }
+    table = _continue_file(out, table)
+    for begin, end in ((0, FIRST_ROUND), (FIRST_ROUND, samples)):
+        todo = [k for k in range(begin, end) if not table["runs"].values[k]]
+        scales = _first_scales(table, hazard.measure, begin)
+        points = [
+            (
+                k,
+                RiskSample(
+                    *(tree[labels[k]][1], records[order[k]], tuple(draws[k].items())),
+                    *(float(scales[order[k]]), between, width),
+                ),
+            )
+            for k in todo
+        ]
+        finished = evaluate_points(points, Evaluator(bracket_capacity), workers)
+        for k, row in tqdm(finished, total=len(todo), unit="sample", disable=None, leave=False):
+            _store_row(table, k, row)
+            if out is not None:
+                write_dataset(table, Path(out), {})
+    return CollapseRisk(table)
+
+
+def _resolve_alternatives(
+    analysis: Analysis | Structure, alternatives: Mapping[str, tuple[float, Any]] | None
+) -> dict[str, tuple[float, Analysis]]:
+    """Return weight and analysis of each alternative, weights adding up to 1."""
+    given = dict(alternatives or {"as given": (1.0, analysis)})
+    weights = [check_number(weight, "weight", minimum=0.0) for weight, _ in given.values()]
+    if not sum(weights) > 0.0:
+        raise InvalidInput(f"weights {weights} of alternatives: give one above 0")
+    tree = {}
+    for (label, (_, each)), weight in zip(given.items(), weights, strict=True):
+        if isinstance(each, Structure) and isinstance(analysis, Analysis):
+            each = replace(analysis, structure=each)
+        falling = as_falling(each)
+        falling.dead_load()  # a structure that does not stand is refused before any run
+        tree[label] = weight / sum(weights), falling
+    return tree
+
+
+def _draw_labels(weights: Mapping[str, float], count: int, random: np.random.Generator) -> Any:
+    """Return alternatives in proportion to their weights, in random order (count,)."""
+    shares = (random.permutation(count) + random.random(count)) / count
+    places = np.searchsorted(np.cumsum([*weights.values()])[:-1], shares, side="right")
+    return np.array([*weights])[places]
+
+
+def _measure_records(
+    tree: Mapping[str, tuple[float, Analysis]], records: Sequence[Motion], hazard: Hazard
+) -> dict[str, Any]:
+    """Return the intensities of the records, unscaled, by measure, each over `record`."""
+    rest = next(iter(tree.values()))[1].dead_load()
+    period = 1.0 / float(modes(rest.model, 1, rest).frequencies[0])
+    band = np.geomspace(0.2 * period, 3.0 * period, 10)
+    rows = []
+    for record in records:
+        measured, spectrum = measure_intensity(record), response_spectrum(record, band)
+        at_period = response_spectrum(record, np.array([hazard.period or period]))
+        mean = float(np.exp(np.log(spectrum).mean()))
+        rows.append((measured.pga, measured.pgv, float(at_period[0]), mean))
+    columns = np.array(rows).T
+    return {
+        f"unscaled_{name}": ("record", column, {"units": MEASURES[name]})
+        for name, column in zip(MEASURES, columns, strict=True)
+    }
+
+
+def _describe_samples(
+    ranges: Mapping[str, Any], draws: Sequence[Mapping[str, Any]], labels: Any, order: Any
+) -> xr.Dataset:
+    """Return the table of all samples, without results."""
+    count = len(draws)
+    columns: dict[str, Any] = {name: ("sample", [row[name] for row in draws]) for name in ranges}
+    columns |= {"alternative": ("sample", labels), "record": ("sample", order)}
+    columns |= {"lower": ("sample", np.zeros(count)), "upper": ("sample", np.full(count, inf))}
+    columns |= {
+        "runs": ("sample", np.zeros(count, int)),
+        "error": ("sample", np.array([""] * count, dtype=object)),
+    }
+    return xr.Dataset(columns, attrs={"properties": json.dumps(list(ranges))})
+
+
+def _continue_file(out: str | Path | None, table: xr.Dataset) -> xr.Dataset:
+    """Return the table of a file if it is of the same arguments, else the new one."""
+    if out is None or not Path(out).exists():
+        return table
+    kept = read_dataset(out, "file of a risk")
+    same = all(
+        key in kept and np.array_equal(kept[key].values, table[key].values)
+        for key in table
+        if key not in ("lower", "upper", "runs", "error")
+    )
+    if not same or any(kept.attrs.get(key) != value for key, value in table.attrs.items()):
+        raise InvalidInput(
+            f"{out} has samples of other arguments: name another file, or delete this one"
+        )
+    return kept.load()
+
+
+def _first_scales(table: xr.Dataset, measure: str, begin: int) -> Array:
+    """Return the scale of each record to begin with: the median capacity so far, or 1 m/s²."""
+    name = measure if begin else "pga"
+    unscaled = table[f"unscaled_{name}"].values
+    if not begin:
+        return np.asarray(2.0 / unscaled)
+    found = CollapseRisk(table.isel(sample=slice(begin)))
+    low, high = found.capacities(name)
+    middle = np.where(np.isfinite(high), np.sqrt(np.maximum(low, high / 4.0) * high), 2.0 * low)
+    return np.asarray(float(np.median(middle)) / unscaled)
+
+
+def _store_row(table: xr.Dataset, number: int, row: Mapping[str, Any]) -> None:
+    """Store the bracket of a sample, or the text of its error."""
+    for name in ("lower", "upper", "runs"):
+        if name in row["found"]:
+            table[name].values[number] = row["found"][name]
+    table["error"].values[number] = str(row["error"])
+
+
+def _write_hazard(hazard: Hazard) -> dict[str, Any]:
+    """Return a hazard curve as values of JSON."""
+    values = asdict(hazard)
+    return values | {name: values[name].tolist() for name in ("intensity", "rate")}
+
+
+@dataclass(frozen=True)
+class Rate:
+    """An annual rate of collapse.
+
+    Attributes:
+        rate: mean annual rate [1/year].
+        low: lower end of the 90 % interval [1/year].
+        high: its upper end [1/year].
+    """
+
+    rate: float
+    low: float
+    high: float
+
+    def probability(self, years: float = 50.0) -> tuple[float, float, float]:
+        """Return the probability of collapse in a time, with the ends of its interval [-].
+
+        Args:
+            years: the time [year].
+        """
+        rates = np.array([self.rate, self.low, self.high])
+        return tuple(float(each) for each in -np.expm1(-rates * years))  # type: ignore[return-value]
+
+    def __str__(self) -> str:
+        """Rate with its interval, and the probability in 50 years."""
+        chance = self.probability()
+        return (
+            f"{self.rate:.2g} a year ({self.low:.2g} to {self.high:.2g} at 90 %), "
+            f"{chance[0]:.2g} in 50 years ({chance[1]:.2g} to {chance[2]:.2g})"
+        )
+
+
+@validate_methods
+@dataclass(frozen=True, eq=False, repr=False)
+class CollapseRisk(ResultDisplay):
+    """Capacities of sampled structures under records, and the annual rate at which they fall.
+
+    Attributes:
+        dataset: over `sample`: the varied properties, the `alternative`, the number of the
+            `record`, `lower` and `upper` scale of the bracket, `runs`, and `error`; over `record`
+            the intensities of the unscaled records, `unscaled_pga` and others.
+    """
+
+    dataset: xr.Dataset
+
+    @property
+    def hazard(self) -> Hazard:
+        """Hazard curve of the site."""
+        values = json.loads(self.dataset.attrs["hazard"])
+        return Hazard(values.pop("intensity"), values.pop("rate"), **values)
+
+    @cached_property
+    def answered(self) -> Any:
+        """Numbers of the samples with a capacity (n,)."""
+        return np.flatnonzero((self.dataset["runs"] > 0) & (self.dataset["error"] == ""))
+
+    def capacities(self, measure: str | None = None) -> tuple[Array, Array]:
+        """Return the brackets of the intensity at which each answered sample falls, each (n,).
+
+        Args:
+            measure: "pga", "pgv", "sa" or "sa_avg"; by default that of the hazard.
+        """
+        rows = self.dataset.isel(sample=self.answered)
+        name = f"unscaled_{measure or self.hazard.measure}"
+        unscaled = self.dataset[name].values[rows["record"].values]
+        return unscaled * rows["lower"].values, unscaled * rows["upper"].values
+
+    def fragility(self, measure: str | None = None) -> Fragility:
+        """Return the lognormal fragility over all alternatives.
+
+        Args:
+            measure: as for `capacities`.
+
+        Raises:
+            InvalidInput: more than half of the samples never fall.
+        """
+        low, high = self.capacities(measure)
+        return fragility(high, low)
+
+    @property
+    def best_measure(self) -> str:
+        """Intensity measure with the least dispersion, which predicts falls best."""
+        return min(MEASURES, key=lambda name: self.fragility(name).dispersion)
+
+    @cached_property
+    def _resampled(self) -> Any:
+        """Answered samples of the bootstrap, whole records at a time (RESAMPLES, n)."""
+        random, records = np.random.default_rng(0), self._of_answered("record")
+        members = [np.flatnonzero(records == record) for record in np.unique(records)]
+        drawn = np.empty((RESAMPLES, len(records)), int)
+        for row in drawn:
+            chosen = random.integers(len(members), size=2 * len(members) + len(records))
+            row[:] = np.concatenate([members[k] for k in chosen])[: len(records)]
+        return drawn
+
+    def _of_answered(self, name: str) -> Any:
+        """Return a variable of the answered samples (n,)."""
+        return self.dataset[name].values[self.answered]
+
+    def _rates(self, drawn: Any) -> Array:
+        """Return the annual rates of resampled samples (k, n), each of a lognormal fit (k,)."""
+        with np.errstate(divide="ignore"):
+            ends = np.log(np.array(self.capacities()))
+        means, deviations = fit_brackets(ends[:, drawn])
+        x = np.exp(means[:, None] + deviations[:, None] * np.linspace(-6.0, 6.0, 241))
+        rates = self.hazard.rate_of(x)
+        middle = np.sqrt(x[:, 1:] * x[:, :-1])
+        falls = ndtr((np.log(middle) - means[:, None]) / deviations[:, None])
+        # beyond the last intensity all fall
+        return np.asarray((falls * -np.diff(rates, axis=1)).sum(axis=1) + rates[:, -1])
+
+    def rate(self, alternative: str | None = None) -> Rate:
+        """Return the annual rate of collapse with its 90 % interval.
+
+        Args:
+            alternative: label of one alternative; by default all by their weights.
+
+        Raises:
+            InvalidInput: there is no such alternative, or it has fewer than 8 answered samples.
+        """
+        labels = self._of_answered("alternative")
+        own = np.flatnonzero(labels == alternative) if alternative else np.arange(len(labels))
+        if len(own) < FIRST_ROUND:
+            raise InvalidInput(
+                f"alternative {alternative!r} has {len(own)} answered samples: name one of "
+                f"{sorted(set(labels))} with at least {FIRST_ROUND}, or take more samples"
+            )
+        if alternative is None:
+            drawn = self._resampled
+        else:
+            random = np.random.default_rng(0)
+            drawn = own[random.integers(len(own), size=(RESAMPLES, len(own)))]
+        (mean,), spread = self._rates(own[None]), self._rates(drawn)
+        return Rate(float(mean), *(float(each) for each in np.quantile(spread, [0.05, 0.95])))
+
+    def dispersions(self) -> dict[str, float]:
+        """Return the dispersion of the capacity in total, by records, alternatives, and the rest.
+
+        Parts are components of variance of a one-way analysis each (Searle, Casella and McCulloch,
+        Variance components, 1992, section 3.6); the rest is of properties, and chance.
+        """
+        low, high = self.capacities()
+        logs = np.log(np.where(np.isfinite(high), np.sqrt(np.maximum(low, 0.1 * high) * high), low))
+        total = float(np.var(logs, ddof=1))
+        parts = {
+            name: _variance_component(logs, self._of_answered(name))
+            for name in ("record", "alternative")
+        }
+        rest = max(total - sum(parts.values()), 0.0)
+        return {
+            "total": sqrt(total),
+            "records": sqrt(parts["record"]),
+            "alternatives": sqrt(parts["alternative"]),
+            "properties": sqrt(rest),
+        }
+
+    def disaggregation(self, bins: int = 12) -> tuple[Array, Array]:
+        """Return the edges of bins of intensity (bins + 1,), and the share of the rate in each.
+
+        Args:
+            bins: number of bins.
+        """
+        curve = self.fragility()
+        spread = np.linspace(-3.5, 2.5, bins + 1)
+        edges = curve.median * np.exp(curve.dispersion * spread)
+        middle = np.sqrt(edges[1:] * edges[:-1])
+        shares = curve.probability(middle) * -np.diff(self.hazard.rate_of(edges))
+        return edges, shares / shares.sum()
+
+    @property
+    def sentence(self) -> str:
+        """The rate, and what it rests on."""
+        curve, parts = self.fragility(), self.dispersions()
+        failed = len(self.dataset["sample"]) - len(self.answered)
+        text = (
+            f"falls at {self.rate()}; median {curve.median:.3g} "
+            f"{MEASURES[self.hazard.measure]} of {self.hazard.measure}, dispersion "
+            f"{curve.dispersion:.2f} (records {parts['records']:.2f}, alternatives "
+            f"{parts['alternatives']:.2f}, properties {parts['properties']:.2f}); "
+            f"{self.best_measure} has the least dispersion"
+        )
+        return text + (f"; {failed} samples have no answer" if failed else "")
+
+    def table(self) -> str:
+        """Return a line for each alternative: samples, rate, interval, probability in 50 years."""
+        rows = []
+        for label in [None, *sorted(set(self._of_answered("alternative")))]:
+            count = int(np.sum(self._of_answered("alternative") == label)) if label else 0
+            count = count or len(self.answered)
+            if count >= FIRST_ROUND:
+                rows.append([label or "all", str(count), str(self.rate(label))])
+        return align_columns(["alternative", "samples", "falls"], rows)
+
+    def __str__(self) -> str:
+        """Sentence and table."""
+        return f"{self.sentence}\n{self.table()}"
+
+    def _summary(self) -> str:
+        return f"CollapseRisk: {self.sentence}"
+
+    def save(self, path: str | Path) -> Path:
+        """Write all samples to a NetCDF file, which `read` reads.
+
+        Args:
+            path: file to write; folders are created.
+        """
+        return write_dataset(self.dataset, Path(path), {})
+
+    @classmethod
+    def read(cls, path: str | Path) -> "CollapseRisk":
+        """Read a file written by `save`, or kept by `collapse_risk(…, out=…)`.
+
+        Args:
+            path: file to read.
+
+        Raises:
+            InvalidInput: there is no such file, or it is damaged.
+        """
+        return cls(read_dataset(path, "file of a risk"))
+
+
+def _variance_component(values: Array, groups: Any) -> float:
+    """Return the variance between groups by a one-way analysis of variance, at least 0."""
+    kinds, place = np.unique(groups, return_inverse=True)
+    counts = np.bincount(place)
+    if len(kinds) < 2 or len(values) <= len(kinds):
+        return 0.0
+    means = np.bincount(place, values) / counts
+    within = float(np.sum((values - means[place]) ** 2)) / (len(values) - len(kinds))
+    between = float(np.sum(counts * (means - values.mean()) ** 2)) / (len(kinds) - 1)
+    size = (len(values) - float(np.sum(counts**2)) / len(values)) / (len(kinds) - 1)
+    return max((between - within) / size, 0.0)

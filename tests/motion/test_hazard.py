@@ -1,0 +1,51 @@
+"""Hazard curves: power laws are straight in double logarithm, and files of OpenQuake are read."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+
+
+def test_a_power_law_is_that_law():
+    site = af.Hazard.power(2e-3, 2.5)
+    x = np.array([1e-3, 0.3, 1.0, 7.0, 500.0])  # also beyond the points
+    assert site.rate_of(x) == pytest.approx(2e-3 * x**-2.5, rel=1e-12)
+
+
+def test_return_periods_are_met_and_joined_in_logarithms():
+    site = af.Hazard.from_return_periods({2475.0: 7.0, 475.0: 4.0}, measure="sa", period=0.2)
+    assert site.rate_of([4.0, 7.0]) == pytest.approx([1 / 475, 1 / 2475], rel=1e-12)
+    assert site.rate_of(np.sqrt(28.0)) == pytest.approx((475 * 2475) ** -0.5, rel=1e-12)
+    assert (site.measure, site.period) == ("sa", 0.2)
+
+
+def test_a_file_of_openquake_is_read(tmp_path):
+    path = tmp_path / "hazard_curve-mean-PGA.csv"
+    path.write_text(
+        "#,,,\"generated_by='OpenQuake engine 3.16', kind='mean', investigation_time=50.0, "
+        "imt='SA(0.3)'\"\n"
+        "lon,lat,depth,poe-0.1,poe-0.2,poe-0.4,poe-0.8\n"
+        "31.16,40.84,0.0,6.3212056E-01,2.2119922E-01,4.8770576E-02,0.0\n"
+    )
+    site = af.Hazard.read(path)
+    # probabilities 1 - exp(-1), 1 - exp(-1/4), 1 - exp(-1/20) in 50 years; the last is zero
+    assert site.rate_of(9.80665 * np.array([0.1, 0.2, 0.4])) == pytest.approx(
+        [1 / 50, 1 / 200, 1 / 1000], rel=1e-6
+    )
+    assert (site.measure, site.period, len(site.rate)) == ("sa", 0.3, 3)
+    with pytest.raises(af.InvalidInput, match="no row 1"):
+        af.Hazard.read(path, site=1)
+
+
+@pytest.mark.parametrize(
+    ("intensity", "rate"),
+    [([1.0], [0.1]), ([1.0, 2.0], [0.1, 0.2]), ([2.0, 1.0], [0.2, 0.1]), ([0.0, 1.0], [0.2, 0.1])],
+)
+def test_a_curve_that_does_not_fall_is_refused(intensity, rate):
+    with pytest.raises(af.InvalidInput, match="hazard with intensities"):
+        af.Hazard(intensity, rate)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(af.InvalidInput, match=r"nothing\.csv"):
+        af.Hazard.read(tmp_path / "nothing.csv")

@@ -1,0 +1,128 @@
+"""Rates of collapse: closed form of a lognormal capacity, intervals, parts, continued files."""
+
+import json
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.optimize import brentq
+from scipy.stats import norm
+
+import archfem as af
+from archfem.studies.collapse_risk import CollapseRisk
+
+SITE = af.Hazard.power(2e-3, 2.5)
+
+
+def risk_of(capacity, record, alternative=None, width=0.01):
+    """A risk whose samples fall in brackets about given capacities, PGA in m/s²."""
+    count, records = len(capacity), int(np.max(record)) + 1
+    values = asdict(SITE)
+    values |= {name: values[name].tolist() for name in ("intensity", "rate")}
+    unscaled = {f"unscaled_{name}": ("record", np.ones(records)) for name in ("pga", "pgv")}
+    unscaled |= {f"unscaled_{name}": ("record", np.ones(records)) for name in ("sa", "sa_avg")}
+    samples = {
+        "lower": capacity * (1.0 - 0.5 * width),
+        "upper": capacity * (1.0 + 0.5 * width),
+        "record": np.asarray(record),
+        "alternative": np.array(["as given"] * count if alternative is None else alternative),
+        "runs": np.full(count, 4),
+        "error": np.array([""] * count),
+    }
+    columns = {name: ("sample", each) for name, each in samples.items()} | unscaled
+    return CollapseRisk(xr.Dataset(columns, attrs={"hazard": json.dumps(values)}))
+
+
+def test_rate_of_a_lognormal_capacity_is_that_of_cornell():
+    """For rates k a^-b, the rate is k m^-b exp(b² β² / 2)."""
+    median, dispersion = 5.0, 0.4
+    shares = (np.arange(2000) + 0.5) / 2000
+    capacity = median * np.exp(dispersion * norm.ppf(shares))
+    risk = risk_of(capacity, np.arange(2000) % 20)
+    exact = 2e-3 * median**-2.5 * np.exp(0.5 * (2.5 * dispersion) ** 2)
+    # quantiles at the middle of 2000 shares lack 0.1 % of the variance, and brackets add 1e-5
+    assert risk.rate().rate == pytest.approx(exact, rel=2e-3)
+    chance = risk.rate().probability(50.0)[0]
+    assert chance == pytest.approx(1.0 - np.exp(-50.0 * risk.rate().rate), rel=1e-12)
+    edges, shares = risk.disaggregation(60)
+    assert shares.sum() == pytest.approx(1.0)
+    # Φ(z) x^-b is largest where φ / Φ is b β
+    z = brentq(lambda z: norm.pdf(z) / norm.cdf(z) - 2.5 * dispersion, -5.0, 5.0)
+    peak = np.sqrt(edges[1:] * edges[:-1])[np.argmax(shares)]
+    assert peak == pytest.approx(median * np.exp(dispersion * z), rel=0.04)  # a bin is 4 %
+
+
+def test_the_interval_holds_the_rate_as_often_as_it_says():
+    """Each record has one sample: ln λ varies by b² β² / n (1 + b² β² / 2)."""
+    random, inside, widths = np.random.default_rng(1), 0, []
+    exact = 2e-3 * 5.0**-2.5 * np.exp(0.5 * (2.5 * 0.3) ** 2)
+    for _ in range(40):
+        risk = risk_of(5.0 * np.exp(0.3 * random.standard_normal(60)), np.arange(60))
+        rate = risk.rate()
+        inside += rate.low <= exact <= rate.high
+        widths.append(np.log(rate.high / rate.low))
+    # binomial of 40 at 0.9: 31 or more in 97 %
+    assert inside >= 31
+    expected = 2.0 * 1.645 * 0.75 * np.sqrt((1.0 + 0.5 * 0.75**2) / 60)
+    assert np.mean(widths) == pytest.approx(expected, rel=0.1)
+
+
+def test_dispersion_is_split_into_its_parts():
+    random = np.random.default_rng(2)
+    record, alternative = np.arange(1200) % 30, (np.arange(1200) // 30) % 2
+    logs = 0.3 * random.standard_normal(30)[record] + 0.2 * (2.0 * alternative - 1.0)
+    logs += 0.1 * random.standard_normal(1200)
+    labels = np.array(["sawn", "hewn"])[alternative]
+    parts = risk_of(5.0 * np.exp(logs), record, labels).dispersions()
+    # of thirty records the deviation is known to 13 %; two alternatives ± 0.2 have 0.28
+    assert parts["records"] == pytest.approx(0.3, rel=0.4)
+    assert parts["alternatives"] == pytest.approx(0.2 * np.sqrt(2.0), rel=0.1)
+    total = parts["total"] ** 2
+    assert total == pytest.approx(0.3**2 + 0.2**2 + 0.1**2, rel=0.4)
+    rates = {
+        label: risk_of(5.0 * np.exp(logs), record, labels).rate(label) for label in set(labels)
+    }
+    assert rates["sawn"].rate > rates["hewn"].rate
+
+
+def tilted_block():
+    """A slender block, which one run decides in milliseconds, and short motions."""
+    block = af.column(breadth=0.25, heights=[1.5], contact=af.Contact(1e9, 5e8, 0.7))
+    analysis = af.Analysis(block, fidelity="rigid", damping="effective", dt=0.005)
+    motions = [af.Motion.synthetic(duration=2.0, pga=3.0, seed=seed) for seed in range(3)]
+    return analysis, motions
+
+
+def test_samples_are_kept_and_continued(tmp_path, monkeypatch):
+    analysis, motions = tilted_block()
+    options = {"samples": 10, "out": tmp_path / "risk.nc", "precision": 0.5}
+    whole = af.collapse_risk(analysis, motions, SITE, samples=10, precision=0.5)
+    calls = []
+    store = af.studies.collapse_risk._store_row
+
+    def interrupted(table, number, row):
+        store(table, number, row)
+        calls.append(number)
+        if len(calls) == 5:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(af.studies.collapse_risk, "_store_row", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        af.collapse_risk(analysis, motions, SITE, **options)
+    found = af.collapse_risk(analysis, motions, SITE, **options)
+    assert len(calls) == 11  # the one that was ended before it was kept, again
+    xr.testing.assert_identical(
+        found.dataset[["lower", "upper", "runs"]], whole.dataset[["lower", "upper", "runs"]]
+    )
+    low, high = found.capacities()
+    assert (low < high).all()
+    assert "falls at" in str(CollapseRisk.read(options["out"]))
+    with pytest.raises(af.InvalidInput, match="other arguments"):
+        af.collapse_risk(analysis, motions, SITE, **options | {"seed": 1})
+
+
+def test_too_few_records_are_refused():
+    analysis, motions = tilted_block()
+    with pytest.raises(af.InvalidInput, match="several records"):
+        af.collapse_risk(analysis, motions[:1], SITE)
