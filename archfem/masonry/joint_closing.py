@@ -18,7 +18,7 @@ References:
     stiffness, joints that do not match. Barton and Bandis, Proc. 23rd US Symp. Rock Mech. (1982)
     739-760: aperture. Barton and Choubey, Rock Mech. 10 (1977) 1-54: shear stiffness to the peak,
     and profiles of JRC 0.4, 2.8, 5.8, 6.7, 9.5, 10.8, 12.8, 14.5, 16.7 and 18.7, with which the eye
-    compares a face. Vanin, Zaganelli, Penna and Beyer, Bull. Earthquake Eng. 15 (2017) 5435: moduli
+    compares a face. Vanin, Zaganelli, Penna and Beyer (2017), doi 10.1007/s10518-017-0188-5: moduli
     of the walls of Vasconcelos and Lourenço (2009) and Lourenço et al. (2005) by their stress.
     Lourenço, Computational strategies for masonry structures, Delft (1996): k_s by elasticity.
     Demirel and Aldemir, Buildings 11 (2021): 1.48 and 0.30 MPa/mm.

@@ -28,7 +28,9 @@ from archfem.dynamics.schemes import Conserving, EffectiveDamping, Viscous, inte
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.masonry.structure import Structure
+from archfem.masonry.joint_closing import FINISHES, joint_stiffness
+from archfem.masonry.materials import Contact
+from archfem.masonry.structure import Joint, Structure
 from archfem.motion.motion import Motion
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.process_pool import evaluate_points
@@ -46,9 +48,19 @@ DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
     "dt": ("as given", "half"),
 }
 
+# What is varied on request: finish of the faces, whose usual law of closing replaces that given
+FINISH_RANGE = {"finish": ("as given", *FINISHES)}
+
+# Strength of stones for which none is given [Pa]
+USUAL_STRENGTH = 56e6
+
+# Blocks softer than this are soil, whose faces have no finish [Pa]
+LEAST_STONE_MODULUS = 1e9
+
 # Values at which a run is as given
 NEUTRAL: dict[str, Any] = {
     "joint_rule": "exact",
+    "finish": "as given",
     "k_n": 1.0,
     "k_s": 1.0,
     "friction": 0.0,
@@ -114,8 +126,10 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
         fidelity: fidelity of the blocks with elastic joints; by default that of the analysis, or
             "rigid" for a structure and in place of "auto".
         vary: values by name, for those of the default ranges: numbers are the ends of a range, and
-            a single value holds a property there. Also "scale", factors on the motion, and any
-            other name with a mapping from labels to structures or to motions.
+            a single value holds a property there. Also "finish", some of "as given", "sawn",
+            "dressed", "hewn" and "weathered", whose usual law of closing all joints of stones then
+            have (`joint_stiffness`, by strength and modulus of the stone); "scale", factors on the
+            motion; and any other name with a mapping from labels to structures or to motions.
         samples: number of runs of the Latin hypercube.
         seed: seed of its random numbers.
         workers: number of processes.
@@ -203,10 +217,11 @@ def check_ranges(ranges: Mapping[str, Any]) -> dict[str, Any]:
                 "labels to structures or to motions"
             )
         values = (values,) if isinstance(values, str | float | int) else tuple(values)
-        if name in DEFAULT_RANGES and isinstance(DEFAULT_RANGES[name][0], str):
-            unknown = [value for value in values if value not in DEFAULT_RANGES[name]]
+        labels = {**DEFAULT_RANGES, **FINISH_RANGE}.get(name, (0.0,))
+        if isinstance(labels[0], str):
+            unknown = [value for value in values if value not in labels]
             if unknown or not values:
-                raise InvalidInput(f"{name} = {values!r}: give some of {DEFAULT_RANGES[name]}")
+                raise InvalidInput(f"{name} = {values!r}: give some of {labels}")
         else:
             values = tuple(float(check_number(value, name)) for value in values)
             if not values or (name != "friction" and min(values) <= 0.0):
@@ -300,17 +315,35 @@ def prepare_runs(
 
 
 def _vary_contacts(structure: Structure, changes: Mapping[str, Any]) -> Structure:
-    """Return the structure with other stiffness and friction of its joints."""
+    """Return the structure with other laws of closing, stiffness and friction of its joints."""
     joints = []
     for joint in structure.joints:
+        given = _finished_contact(structure, joint, changes["finish"])
         contact = replace(
-            joint.contact,
-            normal_stiffness=changes["k_n"] * joint.contact.normal_stiffness,
-            shear_stiffness=changes["k_s"] * joint.contact.shear_stiffness,
-            friction=max(joint.contact.coefficient + changes["friction"], 0.05),
+            given,
+            normal_stiffness=changes["k_n"] * given.normal_stiffness,
+            shear_stiffness=changes["k_s"] * given.shear_stiffness,
+            friction=max(given.coefficient + changes["friction"], 0.05),
         )
         joints.append(replace(joint, contact=contact))
     return replace(structure, joints=tuple(joints))
+
+
+def _finished_contact(structure: Structure, joint: Joint, finish: str) -> Contact:
+    """Return the contact of a joint, of stones with the usual law of a finish."""
+    stones = [structure.blocks[number].material for number in joint.blocks]
+    weakest = min(stones, key=lambda stone: stone.young)
+    if finish == "as given" or weakest.young < LEAST_STONE_MODULUS:
+        return joint.contact
+    strength = weakest.strength or USUAL_STRENGTH
+    law = joint_stiffness(weakest.young, joint.depth, finish, strength=strength)
+    contact = law.closing_contact()
+    return replace(
+        joint.contact,
+        normal_stiffness=contact.normal_stiffness,
+        shear_stiffness=contact.shear_stiffness,
+        closure=contact.closure,
+    )
 
 
 def _run_rigid_blocks(structure: Structure, motion: Motion, *, dt: float) -> CollapseState:

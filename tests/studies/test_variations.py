@@ -38,15 +38,15 @@ def calls(monkeypatch):
     """Structure, motion, step and analysis of the runs, which are not computed."""
     calls, stands = [], CollapseState("stands", None, (), 0.02, 0.01, True)
 
-    def elastic(analysis, motion, changes):
+    def elastic(analysis, motion, **options):
         calls.append((analysis.structure, motion, analysis.dt, analysis))
-        return stands
+        return SimpleNamespace(fall=stands)
 
-    def rigid(structure, motion, dt):
+    def rigid(structure, motion, *, dt):
         calls.append((structure, motion, dt, None))
         return stands
 
-    monkeypatch.setattr(variations, "_run_elastic_joints", elastic)
+    monkeypatch.setattr(variations, "time_history", elastic)
     monkeypatch.setattr(variations, "_run_rigid_blocks", rigid)
     return calls
 
@@ -79,8 +79,33 @@ def test_contacts_motion_and_step_reach_the_run(column, motion, calls):
         )
     assert moved.horizontal == pytest.approx(-3.0 * motion.horizontal)
     assert dt == 0.0025
+    evaluate(column, motion, finish="hewn", k_n=2.0)
+    (finished, *_) = calls.pop()
+    usual = af.joint_stiffness(30e9, 0.4, "hewn", strength=56e6)
+    for new, old in zip(finished.joints, column.joints, strict=True):
+        assert new.contact == replace(
+            old.contact,
+            normal_stiffness=2.0 * usual.initial[1],
+            shear_stiffness=usual.shear[1],
+            closure=usual.closure[1],
+        )
+    # soil has no finish
+    soft = tuple(replace(block, material=af.masonry.BACKFILL) for block in column.blocks)
+    evaluate(replace(column, blocks=soft), motion, finish="hewn")
+    (same, *_) = calls.pop()
+    assert [joint.contact for joint in same.joints] == [joint.contact for joint in column.joints]
     evaluate(column, motion, friction=-5.0)
     assert calls.pop()[0].joints[0].contact.coefficient == 0.05
+
+
+def test_finishes_are_alternatives_of_a_range(column, motion, calls):
+    vary = {**HELD, "finish": ("sawn", "weathered")}
+    found = af.verdict_range(column, motion, vary=vary, samples=8, seed=1)
+    drawn = set(found.dataset["finish"].values[found.dataset["sampled"].values])
+    assert drawn == {"sawn", "weathered"}
+    assert len({structure.joints[0].contact for structure, *_ in calls}) == 3
+    with pytest.raises(af.InvalidInput, match=r"finish = .* give some of"):
+        af.verdict_range(column, motion, vary={"finish": ("polished",)}, samples=1)
 
 
 def test_joint_rules_select_the_method(column, motion, monkeypatch):
@@ -94,7 +119,9 @@ def test_joint_rules_select_the_method(column, motion, monkeypatch):
 
     monkeypatch.setattr(analysis, "build", note)
     monkeypatch.setattr(
-        variations, "_run_rigid_blocks", lambda *given: rigid.append(given) or run(*given)
+        variations,
+        "_run_rigid_blocks",
+        lambda *given, **step: rigid.append(given) or run(*given, **step),
     )
     exact = evaluate(column, motion)
     springs = evaluate(column, motion, joint_rule="three points")
@@ -122,7 +149,7 @@ def test_rigid_blocks_have_shorter_steps_and_time_to_settle(column, motion, monk
     standing = CollapseState("stands", None, (), 0.0, 0.0, True)
     monkeypatch.setattr(variations, "RigidBlockSimulation", Simulation)
     monkeypatch.setattr(variations, "classify_collapse", lambda structure, frames: standing)
-    variations._run_rigid_blocks(column, motion, dt)
+    variations._run_rigid_blocks(column, motion, dt=dt)
     assert given == {"dt": pytest.approx(steps), "end": motion.duration + 20.0, "spacing": 0.05}
 
 
@@ -358,7 +385,9 @@ def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, unplotte
     path.write_text(CASE)
     assert af.commands.main(["verdict", str(path), "--out", str(out), "--samples", "2"]) == 0
     said = capsys.readouterr().out
-    names = {"archfem.json", "verdict_range.nc", "verdict_range.txt", "verdict_range.png"}
+    names = {"archfem.json", "case.toml"} | {
+        f"verdict_range.{kind}" for kind in ("nc", "txt", "png")
+    }
     assert names == {each.name for each in out.iterdir()}
     found = af.dynamics.VerdictRange.read(out / "verdict_range.nc")
     assert str(found) in said
