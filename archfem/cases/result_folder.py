@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from archfem import _files
+from archfem._optional import can_film
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
@@ -217,7 +218,7 @@ def run_files(run: Run, at_rest: DeadLoadResult, text: str) -> Files:
     }
     if "fall_pose" in history.dataset:
         files["fall.png"] = draw_fall(history)
-    if case.output.get("animation", False):
+    if case.output.get("animation", False) and can_film():
         from archfem.view.films.film import film  # pyvista and the encoder are slow to import
 
         # a small film, which takes no longer than the rest; `archfem animate` writes larger ones

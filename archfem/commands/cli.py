@@ -4,13 +4,13 @@ import argparse
 import gc
 import logging
 import os
-import resource
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from enum import IntEnum
 from importlib import import_module
+from importlib.util import find_spec
 from io import TextIOWrapper
 from typing import Any
 
@@ -89,6 +89,9 @@ def _interrupt_on_sigterm() -> Iterator[list[int]]:
 
 def _check_memory(min_bytes: int = 3 * 2**29) -> None:
     """Refuse a memory limit at which libraries crash or block while they are imported."""
+    if find_spec("resource") is None:  # Windows
+        return
+    resource = import_module("resource")
     # 1.5 GiB is the address space of a run of a small ring, libraries included.
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < min_bytes:

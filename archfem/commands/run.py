@@ -18,6 +18,7 @@ from archfem._files import (
     path_inside,
     replace_results,
 )
+from archfem._optional import can_film
 from archfem.cases import result_folder as results
 from archfem.cases import result_text
 from archfem.cases.analysis_keys import rate_case
@@ -121,8 +122,6 @@ def _record_doubts() -> Iterator[list[str]]:
 
 def modes(options: argparse.Namespace) -> None:
     """Compute the modes of a case about its dead load: table, picture, film of the first two."""
-    from archfem.view.films.film import film_modes
-
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     print(case.title)
     with _replace_results("modes", case, folder) as draft:
@@ -130,7 +129,10 @@ def modes(options: argparse.Namespace) -> None:
         print(result_text.describe_dead_load(at_rest))
         computed = print_modes(at_rest, options.count, draft)
         first = range(1, min(len(computed.frequencies), 2) + 1)
-        write({"modes.gif": lambda path: film_modes(computed, path, first)}, draft)
+        if can_film():
+            from archfem.view.films.film import film_modes
+
+            write({"modes.gif": lambda path: film_modes(computed, path, first)}, draft)
 
 
 def limit(options: argparse.Namespace) -> None:

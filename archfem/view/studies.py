@@ -1,7 +1,7 @@
 """Figures of studies: IDA, fragility, sensitivity, convergence, and accuracy over time."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import product
+from itertools import islice, product
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -429,9 +429,9 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         verdicts: runs, as by `archfem.verdict_range`.
 
     Returns:
-        The figure, with a panel for each property, that which explains most of the damage first.
+        The figure, with panels of the properties that explain most of the damage, the first most.
     """
-    rows = verdicts.answers
+    rows, max_panels = verdicts.answers, 6
     falls, residual = verdicts.falls[verdicts.answered], 1e3 * rows["residual"].values
     standing = residual[~falls]
     top = 3.0 * float(standing.max(initial=1.0))
@@ -446,23 +446,27 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         "sign": "sign of the motion",
         "scale": "scale of the motion [-]",
     }
+    others = list(shares.values())[max_panels:]
+    shares = dict(islice(shares.items(), max_panels))
     columns = min(3, len(shares))
     lines = -(-len(shares) // columns)
     figure = new_figure(Size.PAGE, 0.7 + 2.1 * lines)
     panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()
     for axes in panels[len(shares) :]:
         axes.set_visible(False)
-    for axes, (name, share) in zip(panels, shares.items(), strict=False):
+    for letter, axes, (name, share) in zip("abcdef", panels, shares.items(), strict=False):
         first = axes in panels[::columns]
         label = labels.get(name, name.replace("_", " "))
         style_axes(axes, label, "residual displacement [mm]" if first else "")
-        set_title(axes, f"explains {share:.0%}")
+        set_title(axes, f"({letter}) explains {share:.0%}")
         _draw_property(axes, rows[name].values, heights, falls)
         axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set_yscale("log")
         axes.set_ylim(0.7e-3 * top, 4.0 * top)
     add_legend_below(figure, 2, handles=panels[0].get_legend_handles_labels()[0])
-    figure.suptitle(verdicts.sentence, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
+    text = verdicts.sentence
+    text += f"\neach other property explains {max(others):.0%} at most" if others else ""
+    figure.suptitle(text, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
     return figure
 
 
