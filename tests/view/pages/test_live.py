@@ -102,7 +102,7 @@ def test_a_ring_is_cut_as_python_cuts_it(thickness, stones):
     structure = af.circular_arch(**RING, thickness=thickness, voussoirs=stones)
     expected = make_bodies(structure)._asdict()
     for key in ("inverse_mass", "mass", "reach"):
-        # masses are by chords of a sixteenth of a stone: 25 mrad, whose square over 3 is 2e-4
+        # masses are by chords of 20 mrad, whose square over 3 is 1.3e-4
         assert np.array(found[key]) == pytest.approx(expected[key], rel=3e-4, abs=1e-4), key
     centres = np.array(found["centre"])[:-1]
     assert centres == pytest.approx(expected["centre"][:-1], abs=3e-4)

@@ -30,10 +30,10 @@ class Live {
   find(name) { return this.root.querySelector(`#${name}`); }
   say(name, words) { this.find(name).textContent = words; }
 
-  /** Runs go to workers, so that the page stays alive; one core is left to the page. */
+  /** Runs go to workers, so that the page stays alive. */
   startWorkers() {
     const text = ["engine", "worker"].map((name) => document.querySelector(`#${name}-script`).textContent).join("\n");
-    const address = URL.createObjectURL(new Blob([text], { type: "text/javascript" })), count = Math.min(Math.max(navigator.hardwareConcurrency - 1, 1), 4);
+    const address = URL.createObjectURL(new Blob([text], { type: "text/javascript" })), count = Math.min(navigator.hardwareConcurrency || 1, 4);
     const receive = ({ data: { job, number, run, failure } }) => {
       if (job !== this.job) return;
       this.runs[number] = run ?? { failure };

@@ -1,7 +1,7 @@
 // Rings cut into stones anew: joints along a ring, stones between them, their masses and pieces.
 "use strict";
 const MAX_CHORD = Math.PI / 12; // of an arc, as in archfem: chords deviate by 0.9 % of the radius
-const FINE = 16; // chords of a stone for its mass, at least
+const FINE_CHORD = 0.02; // of an arc for masses, whose error is a third of its square
 
 const turnOf = ([x, y], [u, v]) => Math.atan2(x * v - y * u, x * u + y * v);
 const mix = (one, other, share) => one.map((value, k) => (1 - share) * value + share * other[k]);
@@ -47,10 +47,10 @@ function cutRing(ring, { factor, stones, friction }, parameters) {
   const tangents = faces.map(([[x, y], [u, v]]) => [u - x, v - y]);
   const turn = Math.max(...tangents.slice(1).map((tangent, k) => Math.abs(turnOf(tangents[k], tangent))));
   const chords = Math.max(1, Math.ceil(turn / MAX_CHORD - 1e-9));
-  const split = (k, parts) => [...new Array(parts).keys()].map((i) => {
-    const [[a, b], [c, d]] = [at((k + i / parts) / stones), at((k + (i + 1) / parts) / stones)];
-    return [a, c, d, b]; // anticlockwise, for rings from left to right
-  });
+  const split = (k, parts) => {
+    const cuts = [...new Array(parts + 1).keys()].map((i) => at((k + i / parts) / stones));
+    return cuts.slice(1).map(([c, d], i) => [cuts[i][0], c, d, cuts[i][1]]); // anticlockwise, for rings from left to right
+  };
   /** A support behind a joint, half as deep as that is long. */
   const support = ([inner, outer], side) => {
     const behind = ([x, y]) => [x + side * 0.5 * (outer[1] - inner[1]), y - side * 0.5 * (outer[0] - inner[0])];
@@ -58,7 +58,7 @@ function cutRing(ring, { factor, stones, friction }, parameters) {
   };
   const ends = [support(faces[0], -1), support(faces[stones], 1)], numbers = [...new Array(stones).keys()];
   const shapes = [ends[0], ...numbers.map((k) => split(k, chords)), ends[1]];
-  const exact = [measure(ends[0]), ...numbers.map((k) => measure(split(k, FINE))), measure(ends[1])];
+  const exact = [measure(ends[0]), ...numbers.map((k) => measure(split(k, Math.max(1, Math.ceil(turn / FINE_CHORD))))), measure(ends[1])];
   const bodies = makeBodies(shapes, exact, [0, stones + 1], ring, friction);
   const joints = faces.map((face, k) => ({ blocks: [k, k + 1], ends: face, friction, cohesion: 0 }));
   return { bodies, joints, sizes: exact.map(({ area }) => Math.sqrt(area)), parameters };
@@ -77,14 +77,14 @@ function makeBodies(shapes, exact, fixed, ring, friction) {
     });
     starts.push(arms.length);
   }));
-  const bodyOf = owner.flatMap((body, piece) => new Array(starts[piece + 1] - starts[piece]).fill(body));
+  const reach = shapes.map(() => 0);
+  owner.forEach((body, piece) => arms.slice(starts[piece], starts[piece + 1]).forEach(([x, y]) => { reach[body] = Math.max(reach[body], Math.hypot(x, y)); }));
   const mass = exact.map(({ area, moment }, body) => (fixed.includes(body) ? [0, 0] : [ring.density * area, ring.density * moment]));
   const level = Math.min(ring.level, ...fixed.flatMap((body) => shapes[body].flat()).map(([, y]) => y));
   const closed = Math.min(...exact.filter((_, body) => !fixed.includes(body)).map(({ area }) => 1e-4 * Math.sqrt(area)), 5e-5);
   const table = (value) => mass.concat([0]).map((_, __, all) => all.map(() => value));
   return {
-    inverse_mass: [...mass.map((each) => each.map((value) => (value ? 1 / value : 0))), [0, 0]], mass, centre: [...centre, [0, level]],
-    reach: mass.map((_, body) => Math.max(...arms.map(([x, y], k) => (bodyOf[k] === body ? Math.hypot(x, y) : 0)))),
+    inverse_mass: [...mass.map((each) => each.map((value) => (value ? 1 / value : 0))), [0, 0]], mass, centre: [...centre, [0, level]], reach,
     friction: table(friction), cohesion: table(0), rocking: table(0), owner, piece_starts: starts, arms, normals, outer,
     level, contact_gap: closed, slop: closed,
   };
