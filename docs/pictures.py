@@ -5,7 +5,6 @@ shaken ring take a minute. The two studies of the bridge take hours; their resul
 beside the pictures, and are only drawn here. `make studies` computes them anew.
 """
 
-import sys
 from pathlib import Path
 
 import archfem as af
