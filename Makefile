@@ -88,6 +88,10 @@ docs: .venv/docs  ## the documentation as pages: docs/build/html/index.html
 notebooks: .venv/docs .venv/compiled  ## run the notebooks, and save their outputs
 	$(PYTHON) docs/execute.py
 
+pictures: .venv/docs .venv/compiled  ## the pictures of the pages: of notebooks 5 and 6, a fall, a film
+	$(PYTHON) docs/execute.py notebooks/05_speed_against_error.py notebooks/06_a_roman_bridge.py
+	$(PYTHON) docs/pictures.py
+
 verification: .venv/compiled  ## the verification table of the documentation, written by the tests
 	$(PYTHON) -m pytest $(SPREAD) -m "" --verified=docs/verification.json
 
