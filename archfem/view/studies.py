@@ -401,18 +401,19 @@ def draw_collapse_risk(risk: RiskCurves) -> Figure:
         The figure, a panel for each.
     """
     curve, hazard = risk.fragility(), risk.hazard
-    label = f"{hazard.measure} [{MEASURES[hazard.measure]}]"
-    figure = new_figure(Size.PAGE, 2.6)
+    word = {"pga": "PGA", "pgv": "PGV", "sa": "Sa", "sa_avg": "mean Sa"}[hazard.measure]
+    label = f"{word} [{MEASURES[hazard.measure]}]"
+    figure = new_figure(Size.PAGE, 2.8)
     first, second, third = figure.subplots(1, 3)
     x = np.linspace(0.0, 2.5 * curve.median, 301)[1:]
     style_axes(first, label, "probability of a fall [-]")
     first.fill_between(x, *curve.band(x), color=Colour.LINES[0], alpha=0.2, lw=0.0)
     first.plot(x, curve.probability(x), color=Colour.LINES[0], lw=1.8)
     first.set(xlim=(0.0, x[-1]), ylim=(0.0, 1.0))
-    style_axes(second, label, "annual rate of exceedance [1/year]")
+    style_axes(second, label, "rate of exceedance [1/year]")
     reach = np.geomspace(0.05 * curve.median, 2.5 * curve.median, 101)
     second.loglog(reach, hazard.rate_of(reach), color=Colour.LINES[1], lw=1.8)
-    style_axes(third, label, "share of the rate of falls [-]")
+    style_axes(third, label, "share of the rate [-]")
     edges, shares = risk.disaggregation()
     third.bar(edges[:-1], shares, np.diff(edges), align="edge", color=Colour.LINES[2], lw=0.0)
     for axes, title in zip((first, second, third), ("fragility", "hazard", "rate"), strict=True):
