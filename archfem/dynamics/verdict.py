@@ -44,6 +44,10 @@ PUBLISHED_DEFINITION = "Demirel and Aldemir"
 ALL_DEFINITIONS = (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
 
 
+# What a run without doubts still leaves open
+NO_RANGE = "one motion, one set of properties: range not computed"
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Verdict:
     """Assessment of a run, from which all summaries are written.
@@ -81,7 +85,7 @@ class Verdict:
     def headline(self) -> str:
         """Outcome and number of doubts, in one line."""
         count = len(self.doubts)
-        doubt = f"{count} doubt{'s' if count > 1 else ''}" if count else "no doubts"
+        doubt = f"{count} doubt{'s' if count > 1 else ''}" if count else NO_RANGE
         broken_off = f", but the run {self.incomplete}" if self.incomplete else ""
         return f"{self._outcome_text}{broken_off}; {doubt}"
 

@@ -80,7 +80,9 @@ def test_a_run_writes_all_its_files_and_begins_with_the_verdict(path, tmp_path, 
     assert written | {"history.nc"} <= names
     summary = (Given.out / "summary.txt").read_text(encoding="utf-8")
     assert summary.startswith("fallen, first at ")
-    assert summary.splitlines()[0].endswith("; no doubts")
+    assert summary.splitlines()[0].endswith(
+        "; one motion, one set of properties: range not computed"
+    )
     history = af.dynamics.History.read(Given.out / "history.nc", af.Case.read(path).structure)
     assert history.fall.kind == "fallen"
     assert tabulate_runs({"pair": history}).rows[0][1] == "fallen"
@@ -103,12 +105,14 @@ def test_a_report_begins_with_the_number_of_lost_stones_and_lists_all_below(held
     names = [f"stone {number}" for number in range(1, 13)]
     fall = af.dynamics.CollapseState("fallen", 1.25, tuple(names), 2.0, 2.0, True)
     run = with_fall(held, fall)
-    assert summarise_outcomes([run]) == "fallen; no doubts"
+    assert (
+        summarise_outcomes([run]) == "fallen; one motion, one set of properties: range not computed"
+    )
     data = ReportData(af.Case.of(tomllib.loads(CASE)), {"shake": run})
     text = build_conclusion(data).pieces[0].text
     short = "stone 1, stone 2, stone 3, …"
     assert text.startswith("The structure falls under the motion 'shake'.")
     assert f"Under 'shake' it loses 12 blocks, the first at 1.25 s: {short}." in text
     first, second, *_ = [b.text for b in _build_mechanism(run) if hasattr(b, "text")]
-    assert first == "Outcome: fallen; no doubts."
+    assert first == "Outcome: fallen; one motion, one set of properties: range not computed."
     assert second == f"Lost: 12 blocks, the first at 1.25 s: {', '.join(names)}."
