@@ -21,7 +21,7 @@ DEBIAN13 := /var/tmp/archfem-debian13
 # One worker a core; idle workers take over tests from others.
 SPREAD := -n auto --dist worksteal
 
-.PHONY: help setup demo test test-slow test-debian13 hard bench archbench archbench-quick docs notebooks verification fuzz mutants lint clean
+.PHONY: help setup demo test test-slow test-debian13 hard bench archbench archbench-quick wasm docs notebooks verification fuzz mutants lint clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -74,6 +74,10 @@ archbench: .venv/compiled  ## every program on every scene of Arch-Bench, its ta
 archbench-quick: .venv/compiled  ## archfem on the scenes of Arch-Bench against its stored answers
 	$(PYTHON) -m archbench.run --quick
 
+wasm: .venv/ready  ## the kernels of pages, as WebAssembly (2 min); after a change of their sources
+	$(PYTHON) -m archfem.view.pages.wasm.exporter
+	$(PYTHON) docs/try_page.py
+
 .venv/bench: .venv/ready
 	$(PIP) -e '.[dev,bench]'
 	@touch $@
@@ -83,6 +87,10 @@ docs: .venv/docs  ## the documentation as pages: docs/build/html/index.html
 
 notebooks: .venv/docs .venv/compiled  ## run the notebooks, and save their outputs
 	$(PYTHON) docs/execute.py
+
+pictures: .venv/docs .venv/compiled  ## the pictures of the pages: of notebooks 5 and 6, a fall, a film
+	$(PYTHON) docs/execute.py notebooks/05_speed_against_error.py notebooks/06_a_roman_bridge.py
+	$(PYTHON) docs/pictures.py
 
 verification: .venv/compiled  ## the verification table of the documentation, written by the tests
 	$(PYTHON) -m pytest $(SPREAD) -m "" --verified=docs/verification.json

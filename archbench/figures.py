@@ -12,8 +12,14 @@ from archbench.table import PROGRAMS, ROOT, Row, rows
 
 FOLDER = ROOT / "docs" / "figures"
 
-COLOURS = dict(zip(PROGRAMS, ("C0", "C5", "C1", "C2", "C3", "C4"), strict=True))
+# Names as the programs write them; colours that differ in grey too, by Okabe and Ito
+NAMES = dict(
+    zip(PROGRAMS, ("archfem", "HybriDFEM", "LMGC90", "OpenSees", "rbe", "Siconos"), strict=True)
+)
+HUES = ("#0072b2", "#7a5195", "#e69f00", "#009e73", "#d55e00", "#56b4e9")
+COLOURS = dict(zip(PROGRAMS, HUES, strict=True))
 MARKERS = dict(zip(PROGRAMS, "oP^sDv", strict=True))
+DASHES = dict(zip(PROGRAMS, ("-", "-.", "--", ":", "-", "--"), strict=True))
 
 
 def measured(found: list[Row]) -> Figure:
@@ -48,7 +54,7 @@ def measured(found: list[Row]) -> Figure:
     axes.set_xlabel("answer over measured value")
     names = [name for name in PROGRAMS if any(row.numbers(name) for row in shown)]
     for name in names:
-        axes.plot([], [], MARKERS[name], color=COLOURS[name], label=name)
+        axes.plot([], [], MARKERS[name], color=COLOURS[name], label=NAMES[name])
     figure.legend(loc="outside upper center", ncols=len(names), frameon=False)
     return figure
 
@@ -76,12 +82,16 @@ def crown(found: list[Row]) -> Figure:
     axes = figure.subplot_mosaic([["programs", "rules"], ["fall", "fall"]], height_ratios=(3, 2))
     for name in PROGRAMS:
         if run := first_run(row, name):
-            axes["programs"].plot(*_series(run), color=COLOURS[name], label=name)
-    for variant, text in RULES.items():
+            style = {"color": COLOURS[name], "ls": DASHES[name]}
+            axes["programs"].plot(*_series(run), **style, label=NAMES[name])
+    for (variant, text), dash, hue in zip(
+        RULES.items(), ("-", "--", ":", "-."), HUES, strict=False
+    ):
         if run := first_run(row, "archfem", variant):
-            axes["rules"].plot(*_series(run), label=text)
+            axes["rules"].plot(*_series(run), color=hue, ls=dash, label=text)
     peaks = {v.quantity: v.number for v in read_references("S05")}
-    for key, title in (("programs", "by program"), ("rules", "by archfem's joint rules")):
+    titles = ("programs", "(a) by program"), ("rules", "(b) by archfem's joint rules")
+    for key, title in titles:
         for level in (peaks["peak"], -peaks["rebound"]):
             axes[key].axhline(level, color="k", lw=0.8, ls=":")
         axes[key].set(title=title, xlabel="time [s]", ylabel="crown [mm]", ylim=(-12, 30))
@@ -89,11 +99,12 @@ def crown(found: list[Row]) -> Figure:
         axes[key].legend(frameon=False, fontsize=8)
     axes["programs"].text(1.98, peaks["peak"], "3DEC", ha="right", va="bottom", fontsize=8)
     bars = [(f"archfem, {text}", first_run(fall, "archfem", v)) for v, text in RULES.items()]
-    bars += [(name, first_run(fall, name)) for name in PROGRAMS[1:]]
+    bars += [(NAMES[name], first_run(fall, name)) for name in PROGRAMS[1:]]
     known = [(text, run["values"]["scale"]) for text, run in bars if run]
     axes["fall"].barh([text for text, _ in known], [value for _, value in known], color="0.6")
     axes["fall"].axvline(0.15, color="k", lw=0.8, ls=":")
     axes["fall"].text(0.15, 1.0, "3DEC stands at 0.15 g ", ha="right", va="center", fontsize=8)
+    axes["fall"].set_title("(c) the fall")
     axes["fall"].invert_yaxis()
     axes["fall"].set_xlabel("least peak of the half sine under which it falls [g]")
     return figure
@@ -116,10 +127,11 @@ def column(found: list[Row]) -> Figure:
         axes.plot(
             durations,
             values,
-            ls="--",
+            ls=("-", "--", ":")[place],
             lw=1,
-            color="0.5",
+            color=("0.2", "0.45", "0.6")[place],
             marker="x+1"[place],
+            ms=8,
             label=f"{name}, published",
         )
     for name in PROGRAMS:
@@ -128,7 +140,11 @@ def column(found: list[Row]) -> Figure:
         if points:
             values = [numbers[0] for _, numbers in points]
             axes.plot(
-                [t for t, _ in points], values, MARKERS[name], color=COLOURS[name], label=name
+                [t for t, _ in points],
+                values,
+                MARKERS[name],
+                color=COLOURS[name],
+                label=NAMES[name],
             )
             for t, numbers in points:
                 axes.plot([t, t], [min(numbers), max(numbers)], color=COLOURS[name])
@@ -136,7 +152,7 @@ def column(found: list[Row]) -> Figure:
         (t, first_run(row, "archfem", "rigid")) for t, row in zip(durations, shown, strict=True)
     ]
     known = [(t, run["values"]["scale"]) for t, run in rigid if run]
-    axes.plot(*np.array(known).T, "o", mfc="none", color=COLOURS["archfem"], label="archfem, rigid")
+    axes.plot(*np.array(known).T, "s", mfc="none", ms=8, color="k", label="archfem, rigid")
     axes.set(
         yscale="log", xlabel="duration of the first rectangle [s]", ylabel="least amplitude [g]"
     )

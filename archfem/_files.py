@@ -9,19 +9,22 @@ links; `SECURITY.md` says what is promised.
 """
 
 import errno
-import fcntl
 import hashlib
 import json
 import os
+import platform
 import shutil
 import stat
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from glob import escape
+from importlib import import_module
 from numbers import Real
 from pathlib import Path, PurePath
+from time import sleep
 from typing import IO, Any, NamedTuple
 
 from archfem._validation import short_repr
@@ -45,7 +48,7 @@ SAFE_FLAGS = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 _is_junction = getattr(os.path, "isjunction", lambda _: False)
 
 # Results that are written from those of another command, and vanish when these are replaced
-DERIVED = {"run": "report", "study": "study summary"}
+DERIVED = {"run": ("report", "page"), "study": ("study summary",)}
 
 
 def check_file(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) -> Path:
@@ -123,7 +126,7 @@ def atomic_write(path: Path) -> Iterator[Path]:
     An error or a kill leaves the old file or the new one, never a part of it.
     """
     _refuse_null(path)
-    machine = os.uname().nodename
+    machine = platform.node()
     draft = path.with_name(f".{path.stem}.{machine}.{os.getpid()}.part{path.suffix}")
     pattern = f".{escape(path.stem)}.{machine}.*.part{escape(path.suffix)}"
     try:
@@ -160,6 +163,8 @@ def _explain_write_errors(path: Path) -> Iterator[None]:
 
 def _is_running(process: str) -> bool:
     """Return whether there is a process of this number."""
+    if sys.platform == "win32":  # where os.kill ends processes, whatever the signal
+        return True
     try:
         os.kill(int(process), 0)
     except PermissionError:  # of another user
@@ -240,6 +245,31 @@ class FileGroup(NamedTuple):
     files: Mapping[str, str]  # SHA-256 by path relative to the folder
 
 
+def lock_file(file: IO[bytes], *, wait: bool) -> None:
+    """Lock a file until it is closed, or its process ends; a BlockingIOError without waiting."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        _lock_byte(file, wait)
+    else:
+        fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+
+
+def _lock_byte(file: IO[bytes], wait: bool) -> None:
+    """Lock a byte of a file far beyond its content, which others may read meanwhile."""
+    msvcrt: Any = import_module("msvcrt")
+    while True:
+        file.seek(2**30)
+        try:
+            return msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError as error:
+            if not wait:
+                raise BlockingIOError(*error.args) from error
+        finally:
+            file.seek(0, os.SEEK_END)
+        sleep(0.1)
+
+
 @contextmanager
 def lock_folder(folder: Path) -> Iterator[None]:
     """Refuse other commands that write to a folder while this one does."""
@@ -252,8 +282,7 @@ def lock_folder(folder: Path) -> Iterator[None]:
                 f"{folder} cannot be written to ({error.strerror}): name another folder"
             ) from error
         try:
-            # the kernel releases the lock of a process that is killed
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_file(lock, wait=False)
         except BlockingIOError as error:
             lock.seek(0)
             with lock:
@@ -269,11 +298,12 @@ def lock_folder(folder: Path) -> Iterator[None]:
     with lock:
         with suppress(OSError):  # a full disk; the lock needs no content
             lock.truncate(0)
-            lock.write(f"process {os.getpid()} on {os.uname().nodename}".encode())
+            lock.write(f"process {os.getpid()} on {platform.node()}".encode())
         try:
             yield
         finally:
-            path.unlink(missing_ok=True)
+            with suppress(PermissionError):  # Windows deletes no open file
+                path.unlink(missing_ok=True)
 
 
 def _open_lock(folder: Path, mode: str) -> IO[bytes]:
@@ -293,7 +323,7 @@ def is_locked(folder: Path) -> bool:
     """Return whether a command writes to a folder."""
     try:
         with _open_lock(folder, "rb") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_file(lock, wait=False)
     except FileNotFoundError:
         return False
     except BlockingIOError:
@@ -454,7 +484,7 @@ def publish_draft(folder: Path, command: str, inputs: str) -> None:
     files = {p.relative_to(draft).as_posix(): hash_content(p) for p in list_files(draft)}
     listed = intact_file_list(folder)
     same = command in listed and listed[command].files == files
-    replaced = {command} if same else {command, DERIVED.get(command)}
+    replaced = {command} if same else {command, *DERIVED.get(command, ())}
     groups: dict[str, Any] = {command: {"inputs": inputs, "files": files}}
     for name, group in listed.items():
         if name not in replaced:
@@ -495,7 +525,8 @@ def _move_finished(finished: Path, folder: Path) -> None:
 def describe_deleted(folder: Path) -> str:
     """Say which listed files of a result folder are missing; "" if none is."""
     # an earlier report may have been deleted, for it is written anew
-    groups = (group for name, group in read_file_list(folder).items() if name != "report")
+    listed = read_file_list(folder).items()
+    groups = (group for name, group in listed if name not in DERIVED["run"])
     names = [n for group in groups for n in group.files if not path_inside(folder, n).is_file()]
     if not names:
         return ""

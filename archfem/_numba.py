@@ -11,7 +11,6 @@ Each file ends with a checksum: a function whose file is damaged is compiled ane
 processes that need the same code, one compiles it, and the others wait and load it.
 """
 
-import fcntl
 import hashlib
 import io
 import logging
@@ -27,6 +26,8 @@ from typing import Any, NamedTuple
 
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+from archfem._files import lock_file
 
 # mypy: disable-error-code="no-untyped-call"
 
@@ -70,6 +71,12 @@ class CheckedCacheFile(IndexDataCacheFile):
         yield content
         with super()._open_for_write(filepath) as file:
             file.write(content.getvalue() + hashlib.sha256(content.getvalue()).digest())
+
+
+def _delete_lock(path: Path) -> None:
+    """Delete the file of a lock, which Windows does only when no process has it open."""
+    with suppress(PermissionError):
+        path.unlink(missing_ok=True)
 
 
 class NotStored(Exception):
@@ -122,8 +129,8 @@ class HealingCache(FunctionCache):
         """Wait until no other process compiles for a signature, and let others wait for this."""
         path = Path(self._cache_path) / f"{self._impl.filename_base}-{digest}.lock"
         file = self.lock.enter_context(path.open("ab"))
-        self.lock.callback(path.unlink, missing_ok=True)
-        fcntl.flock(file, fcntl.LOCK_EX)  # the kernel releases that of a killed process
+        self.lock.callback(_delete_lock, path)
+        lock_file(file, wait=True)
 
     def _load(self, sig: Any, target_context: Any) -> Any:
         """Return the code for a signature, or None; what cannot be loaded is discarded."""

@@ -1,13 +1,15 @@
 """Optional packages: which features require them, and the command that installs them.
 
-pip installs everything but FEniCSx, which has no wheels.
+FEniCSx has no wheels. What is large or seldom needed is an extra of archfem, as `archfem[film]`.
 """
 
+import logging
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from ctypes import CDLL
+from importlib.util import find_spec
 from typing import NamedTuple
 
 from archfem.errors import NotInstalled
@@ -43,9 +45,11 @@ OPTIONAL_PACKAGES = {
         "pyvista's viewer of a run", "'apt-get install libegl1 libgl1', elsewhere Mesa's libEGL"
     ),
     "trame": Requirement("pyvista's HTML pages", "pip install 'archfem[notebooks]'"),
+    "imageio": Requirement("films", "pip install 'archfem[film]'"),
+    "pyvista": Requirement("its viewer and its films", "pip install 'archfem[film]'"),
     "gmsh": Requirement(
         "meshes",
-        "'pip install gmsh'; where libGLU or another library is missing, 'apt-get install "
+        "pip install 'archfem[mesh]'; where libGLU or another library is missing, 'apt-get install "
         "libglu1-mesa libgl1 libopengl0 libxcursor1 libxft2 libxinerama1 libxrender1 "
         "libfontconfig1'",
     ),
@@ -71,6 +75,15 @@ def missing_package_message(name: str, reason: str) -> str:
         f"{name} cannot be loaded by {sys.executable} ({reason}); {package.feature} need it: "
         f"{package.remedy}"
     )
+
+
+def can_film() -> bool:
+    """Return whether films can be written; warn where they cannot."""
+    if find_spec("imageio") is not None:
+        return True
+    message = missing_package_message("imageio", "no film is written")
+    logging.getLogger("archfem").warning(message)
+    return False
 
 
 def check_drawing() -> None:

@@ -1,10 +1,11 @@
 """Sphinx configuration of the documentation: `make docs`."""
 
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "extensions"))
+
+import rooms
 
 import archfem
 
@@ -46,11 +47,7 @@ napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 toc_object_entries = False
-autodoc_mock_imports = [
-    name
-    for name in ("dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "gmsh")
-    if find_spec(name) is None
-]
+autodoc_mock_imports = rooms.MISSING
 
 templates_path = ["templates"]
 html_theme = "pydata_sphinx_theme"

@@ -1,5 +1,6 @@
 """Every notebook runs, and arrives at its number."""
 
+import json
 import os
 import runpy
 from pathlib import Path
@@ -81,6 +82,14 @@ def test_pictures_on_pages_are_those_of_the_notebooks():
         notebook = nbformat.read(FOLDER / f"{name}.ipynb", 4)
         for file, png in execute["pictures"](notebook, name).items():
             assert (FOLDER / "figures" / f"{file}.png").read_bytes() == png, file
+
+
+def test_other_pictures_on_pages_are_as_new_as_the_code_that_draws_them():
+    """`make pictures` draws them."""
+    pictures = runpy.run_path(str(FOLDER.parent / "docs" / "pictures.py"))
+    known = json.loads(pictures["DIGESTS"].read_text(encoding="utf-8"))
+    for name in pictures["SOURCES"]:
+        assert known[name] == pictures["digest"](name), name
 
 
 LONG = (

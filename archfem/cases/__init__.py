@@ -10,6 +10,7 @@
     report           HTML report of the results of a case
     result_folder    result folders written and opened again
     result_text      results as text
+    risk_keys        [risk]: hazard, sampling, alternatives
     run              carry out a case, resume, result classes
     structure_keys   [structure], [materials] and [contacts]: read and written
     toml_file        reading, writing, merging, overriding TOML tables

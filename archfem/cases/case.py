@@ -16,6 +16,7 @@ from archfem._validation import check_words, validate_arguments
 from archfem.cases import analysis_keys, motion_keys, provenance
 from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis
 from archfem.cases.analysis_tables import complete_path, read_analysis, write_analysis_tables
+from archfem.cases.risk_keys import RiskSettings, parse_risk
 from archfem.cases.structure_keys import cached_structure, write_structure
 from archfem.cases.toml_file import (
     Table,
@@ -36,7 +37,7 @@ from archfem.motion.suite import Suite
 
 SECTIONS = (
     *("structure", "materials", "contacts", "model", "motion", "suite", "analysis", "criteria"),
-    *("record", "limit", "rating", "assessment", "dead_load", "output", "report"),
+    *("record", "limit", "rating", "assessment", "risk", "dead_load", "output", "report"),
 )
 OUTPUT_KEYS: Table = {"joints": [(int, str)], "animation": bool, "free_body": str}
 
@@ -59,6 +60,7 @@ class Case:
         limit: limit analysis, or None.
         rating: arguments of `archfem.rate` from [rating].
         assessment: kinematic assessment; without [assessment] that of the case's motion or suite.
+        risk: hazard, alternatives and sampling of `archfem.collapse_risk`, or None.
         output: checked keys of [output]: pictures and films.
         report: checked keys of [report]: project, place and the like, for the head of a report.
         settings: tables of the case as they were read, changes included.
@@ -72,6 +74,7 @@ class Case:
     limit: LimitAnalysis | None
     rating: Table
     assessment: AssessmentSettings
+    risk: RiskSettings | None
     output: dict[str, Any]
     report: dict[str, str]
     settings: dict[str, Any] = field(repr=False)
@@ -149,6 +152,7 @@ class Case:
             limit=None if limit is None else analysis_keys.parse_limit(limit),
             rating=analysis_keys.parse_rating(settings.get("rating", {})),
             assessment=analysis_keys.parse_assessment(settings.get("assessment", {})),
+            risk=None if (risk := settings.get("risk")) is None else parse_risk(risk, folder),
             output=output,
             report=report,
             settings=dict(settings),

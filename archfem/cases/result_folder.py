@@ -4,12 +4,13 @@ The files of a run appear in its folder together, when all of them exist (`archf
 """
 
 import logging
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from archfem import _files
+from archfem._optional import can_film
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
@@ -64,14 +65,33 @@ class ResultFolder(CaseResult):
         Returns:
             The file.
         """
+        return self._write("report", super().report, path)
+
+    def page(self, path: str | Path | None = None) -> Path:
+        """Write a page on which a reader changes the arch and shakes it, in any browser.
+
+        Args:
+            path: the file, .html; by default page.html in the folder.
+
+        Returns:
+            The file.
+
+        Raises:
+            InvalidInput: stones are not rigid and dry, or too many.
+        """
+        return self._write("page", super().page, path)
+
+    def _write(
+        self, name: str, write: Callable[[str | Path], Path], path: str | Path | None
+    ) -> Path:
+        """Write a page to a path, or into the folder in place of an earlier one."""
         if path is not None:
-            return super().report(path)
+            return write(path)
         group = _files.group_of(_files.read_file_list(self.folder), CASE_FILE)
         assert group is not None
-        inputs = group.inputs
-        with _files.replace_results(self.folder, "report", inputs) as draft:
-            super().report(draft / "report.html")
-        return self.folder / "report.html"
+        with _files.replace_results(self.folder, name, group.inputs) as draft:
+            write(draft / f"{name}.html")
+        return self.folder / f"{name}.html"
 
 
 @validate_arguments
@@ -124,7 +144,8 @@ def _check_files(place: Path) -> Collection[str]:
             "run the case again"
         )
     # histories are checked as they are read, and an earlier report is replaced
-    written = [group for command, group in groups.items() if command != "report"]
+    derived = _files.DERIVED["run"]
+    written = [group for command, group in groups.items() if command not in derived]
     for name in (name for group in written for name in group.files):
         path = _files.path_inside(place, name)
         if path.is_file() and path.name != HISTORY_FILE:
@@ -197,7 +218,7 @@ def run_files(run: Run, at_rest: DeadLoadResult, text: str) -> Files:
     }
     if "fall_pose" in history.dataset:
         files["fall.png"] = draw_fall(history)
-    if case.output.get("animation", False):
+    if case.output.get("animation", False) and can_film():
         from archfem.view.films.film import film  # pyvista and the encoder are slow to import
 
         # a small film, which takes no longer than the rest; `archfem animate` writes larger ones

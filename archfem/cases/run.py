@@ -66,6 +66,20 @@ class CaseResult:
         """
         return call_late_bound("CaseResult.report", self, path)
 
+    def page(self, path: str | Path) -> Path:
+        """Write a page on which a reader changes the arch and shakes it, in any browser.
+
+        Args:
+            path: the file, .html; missing folders are created.
+
+        Returns:
+            The file.
+
+        Raises:
+            InvalidInput: stones are not rigid and dry, or too many.
+        """
+        return call_late_bound("CaseResult.page", self, path)
+
     def player(self, run: str | None = None) -> "Player":
         """Return the player of a run, which displays in notebooks and can be saved as a page.
 

@@ -4,13 +4,13 @@ import argparse
 import gc
 import logging
 import os
-import resource
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from enum import IntEnum
 from importlib import import_module
+from importlib.util import find_spec
 from io import TextIOWrapper
 from typing import Any
 
@@ -89,6 +89,9 @@ def _interrupt_on_sigterm() -> Iterator[list[int]]:
 
 def _check_memory(min_bytes: int = 3 * 2**29) -> None:
     """Refuse a memory limit at which libraries crash or block while they are imported."""
+    if find_spec("resource") is None:  # Windows
+        return
+    resource = import_module("resource")
     # 1.5 GiB is the address space of a run of a small ring, libraries included.
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < min_bytes:
@@ -188,6 +191,8 @@ def _add_case_commands(commands: Any) -> None:
     add_to = add("verdict", about, "folder for table and picture (none)", required=False)
     add_to("--workers", type=int, default=1, help="processes for the runs (1)")
     add_to("--samples", type=int, default=26, help="runs of the sample (26)")
+    add_to = add("risk", "annual rate of collapse, from the hazard and the sampling of [risk]")
+    add_to("--workers", type=int, default=1, help="processes for the runs (1)")
     add_to = add("accuracy", "speed against error over fidelities, meshes, quadratures and steps")
     add_to("--workers", type=int, default=1, help="processes for settings (1)")
 
@@ -207,7 +212,7 @@ def _add_own_code(add_argument: AddArgument) -> None:
 
 
 def _add_result_commands(commands: Any) -> None:
-    """Add `archfem report` and `archfem study`."""
+    """Add `archfem report`, `archfem page` and `archfem study`."""
     text = "Write one self-contained HTML page of a result folder, or of a history alone."
     about = "one HTML page of a result folder, to print"
     add = _add_command(commands, "report", about, "run", description=text)
@@ -219,6 +224,15 @@ def _add_result_commands(commands: Any) -> None:
     )
     add("--inputs", metavar="DIR", help="folder of a mesh that the case names (FOLDER)")
     add("--pdf", action="store_true", help="also print it, by Chromium or Chrome")
+    _add_own_code(add)
+    text = (
+        "Write one HTML page that shakes the arch of a result folder, and lets readers change it."
+    )
+    about = "one HTML page that shakes the arch, down to the ground"
+    add = _add_command(commands, "page", about, "run", description=text)
+    add("folder", metavar="FOLDER", help="that `archfem run` has written")
+    add("--out", metavar="FILE.html", help="the page (FOLDER/page.html)")
+    add("--inputs", metavar="DIR", help="folder of a mesh that the case names (FOLDER)")
     _add_own_code(add)
     about = "many cases: a table of results, on all cores or a cluster"
     add = _add_command(commands, "study", about, "study", description=about)

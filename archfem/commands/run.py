@@ -18,6 +18,7 @@ from archfem._files import (
     path_inside,
     replace_results,
 )
+from archfem._optional import can_film
 from archfem.cases import result_folder as results
 from archfem.cases import result_text
 from archfem.cases.analysis_keys import rate_case
@@ -121,8 +122,6 @@ def _record_doubts() -> Iterator[list[str]]:
 
 def modes(options: argparse.Namespace) -> None:
     """Compute the modes of a case about its dead load: table, picture, film of the first two."""
-    from archfem.view.films.film import film_modes
-
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     print(case.title)
     with _replace_results("modes", case, folder) as draft:
@@ -130,7 +129,10 @@ def modes(options: argparse.Namespace) -> None:
         print(result_text.describe_dead_load(at_rest))
         computed = print_modes(at_rest, options.count, draft)
         first = range(1, min(len(computed.frequencies), 2) + 1)
-        write({"modes.gif": lambda path: film_modes(computed, path, first)}, draft)
+        if can_film():
+            from archfem.view.films.film import film_modes
+
+            write({"modes.gif": lambda path: film_modes(computed, path, first)}, draft)
 
 
 def limit(options: argparse.Namespace) -> None:
@@ -199,6 +201,32 @@ def accuracy(options: argparse.Namespace) -> None:
     _write_results("accuracy", case, options.out, lambda: files)
 
 
+def risk(options: argparse.Namespace) -> None:
+    """Compute the annual rate at which the structure of a case falls, by its [risk]."""
+    from archfem.studies.collapse_risk import collapse_risk
+
+    case = Case.read(options.case, options.changes)
+    if case.risk is None:
+        raise InvalidInput(f"{options.case} has no [risk]: give it a hazard, and a [suite]")
+    folder = create_result_folder(options.out)
+    print(case.title)
+    alternatives = {
+        label: (weight, Case.read(options.case, [*options.changes, *changes]).analysis)
+        for label, (weight, changes) in case.risk.alternatives.items()
+    }
+    motions = case.ground_suite() if case.suite is not None else [case.ground_motion()]
+    found = collapse_risk(
+        *(case.analysis, motions, case.risk.hazard),
+        alternatives=alternatives or None,
+        workers=options.workers,
+        out=path_inside(folder, "risk_samples.nc"),
+        **case.risk.options,
+    )
+    print(found)
+    files: Files = {"risk.txt": str(found), "risk.nc": found.save, "risk.png": found.plot()}
+    _write_results("risk", case, options.out, lambda: files)
+
+
 def verdict(options: argparse.Namespace) -> None:
     """Run a case over joint rules, stiffness, friction and damping: how often does it fall?"""
     from archfem.studies.cache import ground_motion
@@ -231,6 +259,12 @@ def report(options: argparse.Namespace) -> None:
         from archfem.view.pages.document import print_page
 
         print(f"wrote {print_page(path, path.with_suffix('.pdf'))}")
+
+
+def page(options: argparse.Namespace) -> None:
+    """Write the page that shakes the structure of a result folder."""
+    path = results.open_results(options.folder, inputs=options.inputs).page(options.out)
+    print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
 def motion(options: argparse.Namespace) -> None:

@@ -12,7 +12,14 @@ from typing import Any
 
 from archfem._typing import NumberOrWord
 from archfem._validation import declared_keys, is_number
-from archfem.cases import analysis_keys, analysis_tables, case, motion_keys, structure_keys
+from archfem.cases import (
+    analysis_keys,
+    analysis_tables,
+    case,
+    motion_keys,
+    risk_keys,
+    structure_keys,
+)
 from archfem.dynamics import schemes
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.events import EVENTS
@@ -30,6 +37,7 @@ from archfem.masonry.structure import Joint
 from archfem.masonry.survey.outlines import Layer
 from archfem.models.discretisation import MODEL_FIDELITIES
 from archfem.motion.design_spectra import registered_spectra
+from archfem.motion.hazard import MEASURES
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.mechanism_assessment import LimitState, kinematic_assessment
@@ -84,6 +92,7 @@ def _case_sections() -> dict[str, Schema]:
         "limit": _limit(),
         "rating": _rating(),
         "assessment": _assessment(),
+        "risk": _risk(),
         "dead_load": _dead_load(),
         "output": _table(case.OUTPUT_KEYS),
         "report": _table(case.REPORT_KEYS),
@@ -210,6 +219,13 @@ def _assessment() -> Schema:
         loads={"type": "array", "items": _table_of(AttachedLoad)},
         limit_state=_any([{"type": "string"}, _table_of(LimitState)]),
     )
+
+
+def _risk() -> Schema:
+    """Return the schema of [risk]."""
+    hazard = _table(risk_keys.HAZARD_KEYS, measure=_choice(*MEASURES))
+    alternatives = _named(_table(risk_keys.ALTERNATIVE_KEYS))
+    return _table(risk_keys.RISK_KEYS, hazard=hazard, alternatives=alternatives)
 
 
 def _dead_load() -> Schema:

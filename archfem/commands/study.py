@@ -36,7 +36,7 @@ def study(options: argparse.Namespace) -> int:
         print(f"{errors.count(error)} ended in {error}")
     # of this very table
     inputs = hash_content(folder / RESULT_FILES[0])
-    with replace_results(folder, DERIVED["study"], inputs) as draft:
+    with replace_results(folder, DERIVED["study"][0], inputs) as draft:
         _write_results(definition, table, draft)
     for name in ("study.txt", "study.png", *RESULT_FILES):
         if (folder / name).is_file():

@@ -178,12 +178,17 @@ def diagnose_installation() -> Iterator[Diagnosis]:
     yield Diagnosis("Python", f"{sys.version.split()[0]}, {sys.executable}")
     yield from _diagnose_requirements()
     yield from _diagnose_fenicsx()
-    found = _optional.can_draw()
-    remedy = "" if found else _optional.OPTIONAL_PACKAGES["EGL"].remedy
-    yield Diagnosis("library of the viewer", "found" if found else "missing", remedy)
-    yield _diagnose_ffmpeg()
+    if find_spec("pyvista") is not None:
+        found = _optional.can_draw()
+        remedy = "" if found else _optional.OPTIONAL_PACKAGES["EGL"].remedy
+        yield Diagnosis("library of the viewer", "found" if found else "missing", remedy)
+    if find_spec("imageio") is not None:
+        yield _diagnose_ffmpeg()
     yield _diagnose_compiled_code()
     optional = {
+        "gmsh": ("mesh", "only meshes of elastic stones need it"),
+        "imageio": ("film", "only films need it"),
+        "pyvista": ("film", "only its viewer and its films need it"),
         "distributed": ("cluster", "only clusters need it"),
         "openpyxl": ("tables", "only tables of studies for Excel need it"),
         "trame": ("notebooks", "only pyvista's pages and its viewer in notebooks need it"),
@@ -214,7 +219,7 @@ def _diagnose_package(name: str, min_version: str) -> Diagnosis:
         if _numbers(version) < _numbers(min_version):
             return Diagnosis(name, f"{version}, older than {min_version}", remedy)
         # these are also imported, since libraries of the system may be missing
-        if name in ("numba", "gmsh", "netCDF4", "matplotlib"):
+        if name in ("numba", "netCDF4", "matplotlib"):
             import_module("matplotlib.figure" if name == "matplotlib" else name)
     except metadata.PackageNotFoundError:
         return Diagnosis(name, "missing", remedy)

@@ -288,6 +288,21 @@ class Analysis:
         """
         return call_late_bound("Analysis.mesh_sensitivity", self, motion=motion, **options)
 
+    def page(self, path: str | Path | None = None, **options: Any) -> Any:
+        """Return a page on which a reader changes the arch and shakes it, in any browser.
+
+        Args:
+            path: file to write, .html; None writes none.
+            options: as for `archfem.view.page`, such as `motions`.
+
+        Returns:
+            The page, which a notebook shows, a `view.LivePage`.
+
+        Raises:
+            InvalidInput: stones are not rigid and dry, or too many.
+        """
+        return call_late_bound("Analysis.page", self, path, **options)
+
     def write(self, path: str | Path) -> Path:
         """Write the analysis as a case file, which `archfem.Case.read` reads.
 

@@ -77,10 +77,12 @@ def follow_fall(
     states: tuple[State, State],
     motion: Motion,
     rocking_ratio: float | None,
+    whole: bool = True,
 ) -> History:
     """Add the fall of loose or overturning blocks, and the state of collapse, to a history.
 
     The states are those at the start, from which displacements count, and at the end of the run.
+    Not whole, the fall ends with the first lost block, and is not compared with rigid blocks.
     """
     (start, state), structure, ending = states, model.structure, history.ending
     origin, _ = model.rigid_motions(start.q, start.velocity)
@@ -88,7 +90,7 @@ def follow_fall(
     doubts: list[Doubt] = []
     if tilts or ending in (Ending.PARTED, Ending.MET):
         try:
-            dataset, frames = simulate_fall(model, state, motion, rocking_ratio)
+            dataset, frames = simulate_fall(model, state, motion, rocking_ratio, whole)
         except DidNotConverge as error:
             error.history = history
             raise
@@ -101,28 +103,39 @@ def follow_fall(
         resting = is_resting(model, state, shaken=ending is not Ending.FINISHED)
         fall = replace(classify_collapse(structure, [frame], origin), resting=resting)
     doubts += doubt_collapse(structure, fall)
-    if fall.kind in FALLEN_STATES:
+    if fall.kind in FALLEN_STATES and whole:
         doubts += _doubt_joints(structure, motion, start.time)
     return with_fall(history, fall).with_doubts((*history.doubts, *doubts))
 
 
 def simulate_fall(
-    model: Model, state: State, motion: Motion, rocking_ratio: float | None = None
+    model: Model,
+    state: State,
+    motion: Motion,
+    rocking_ratio: float | None = None,
+    whole: bool = True,
 ) -> tuple[xr.Dataset, list[FallFrame]]:
     """Follow loose blocks until they rest, or until 20 s after the motion has ended.
+
+    Not whole, they are followed by one length of step until the first block is lost.
 
     The ratio is that of `RigidBlockSimulation`, for the joints where it has an effect.
     """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + 20.0
-    loose = _with_sliding_joints(model.structure)
+    loose = with_sliding_joints(model.structure)
     ratios: float | dict[str, float] | None = rocking_ratio
     if rocking_ratio is not None and (unkept := find_unkept_ratios(loose, rocking_ratio)):
         names = {joint.name for joint in loose.joints} - unkept.keys()
         ratios = dict.fromkeys(names, rocking_ratio)
-    simulation = RigidBlockSimulation(loose, rocking_ratio=ratios)
+    dt = None if whole else TRIED_STEPS[0]
+    simulation = RigidBlockSimulation(loose, dt=dt, rocking_ratio=ratios)
     try:
-        frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
+        frames = []
+        for frame in simulation.frames(released.start, end, motion, spacing=0.02):
+            frames.append(frame)
+            if not whole and classify_collapse(model.structure, [frame]).blocks:
+                break
     except DidNotConverge as error:
         raise DidNotConverge(
             f"{error}; compare with another dt of time_history, or with "
@@ -170,7 +183,7 @@ def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterato
     is_rigid = is_rigid and not find_yielding_blocks(structure)
     if not is_rigid or len(structure.free) > MAX_COMPARED_BLOCKS:
         return
-    simulation = RigidBlockSimulation(_with_sliding_joints(structure), dt=TRIED_STEPS[0])
+    simulation = RigidBlockSimulation(with_sliding_joints(structure), dt=TRIED_STEPS[0])
     at_rest, end = LooseBlocks.as_built(structure, start), motion.duration + 2.0
     with suppress(DidNotConverge):  # then there is nothing to compare with
         frames = simulation.frames(at_rest, end, motion, spacing=0.02)
@@ -181,7 +194,7 @@ def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterato
             )
 
 
-def _with_sliding_joints(structure: Structure) -> Structure:
+def with_sliding_joints(structure: Structure) -> Structure:
     """Return the structure with friction, and no cohesion, in joints that never slide."""
     joints = list(structure.joints)
     for number, joint in enumerate(joints):
@@ -213,7 +226,7 @@ def _doubt_fall(structure: Structure, dataset: xr.Dataset, ratio: float | None) 
             f"half the step changes how far a block falls or moves by {change:.0%}",
             "state a range, `verdict_range`",
         )
-    unkept = {} if ratio is None else find_unkept_ratios(_with_sliding_joints(structure), ratio)
+    unkept = {} if ratio is None else find_unkept_ratios(with_sliding_joints(structure), ratio)
     if unkept:
         yield Doubt(
             f"the damping was to give a restitution of {ratio:g}, but loose blocks keep at least "

@@ -31,10 +31,13 @@ class Record:
         every: interval of steps at which joint resultants are recorded.
         fields_every: interval of steps at which coordinates q are recorded, for pictures of the
             whole structure and for stress; None for none.
+        whole_fall: whether loose blocks are followed until they rest, and their fall is doubted as
+            it must; else a run ends with its first lost block.
     """
 
     every: int = 1
     fields_every: int | None = None
+    whole_fall: bool = True
 
     def __post_init__(self) -> None:
         """Refuse intervals below one."""

@@ -220,7 +220,7 @@ def collapse_factor(
     loads = live if isinstance(live, Settlement) else list_loads(live)
     if isinstance(loads, Settlement):
         refuse_bonds(structure)
-    stays = tuple(list_loads(dead)) if dead != () else ()
+    stays = tuple(list_loads(dead)) if dead else ()
     if isinstance(fill, PlasticFill):
         result = _bound_collapse(structure, loads, stays, friction, strength, fill)
     else:

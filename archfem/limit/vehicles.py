@@ -25,6 +25,7 @@ from archfem.limit.collapse import Collapse, collapse_factor, warn_locking
 from archfem.limit.instability import DeepenedBlocks
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
+from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.structure import HasStructure, Structure, structure_of
 
@@ -119,7 +120,7 @@ def moving_load(
     positions: Sequence[float] | None = None,
     friction: str | None = "coulomb",
     strength: float | None = None,
-    fill: Fill | None = None,
+    fill: Fill | PlasticFill | None = None,
 ) -> MovingLoad:
     """Find the collapse factor of a vehicle at every place on a bridge, and the worst place.
 
@@ -135,10 +136,12 @@ def moving_load(
         axles: weight of each axle over the bridge's whole width, from the front [N].
         spacings: distances between the axles, one fewer [m].
         positions: x of the vehicle's middle, halfway between first and last axle (n,) [m]; by
-            default 101, from where it drives onto the structure to where it is off it again.
+            default 101, from where it drives onto the structure to where it is off it again, or 21
+            with a plastic fill.
         friction: as for `collapse_factor`.
         strength: as for `collapse_factor` [Pa].
-        fill: as for `collapse_factor`.
+        fill: as for `collapse_factor`. A plastic fill takes some seconds at each place; factors
+            are its lower bounds.
 
     Returns:
         Factors over both directions and all positions: infinite where the vehicle never makes a
@@ -154,33 +157,36 @@ def moving_load(
     """
     structure = structure_of(structure)
     refuse_bonds(structure)
-    stones, dead = self_weight_programme(structure, friction, strength, fill)
-    vehicle = _parse_axles(axles, spacings)
-    places = _vehicle_positions(structure, vehicle, positions)
+    vehicle, count = _parse_axles(axles, spacings), 21 if isinstance(fill, PlasticFill) else 101
+    places = _vehicle_positions(structure, vehicle, positions, count)
     rows = [
         [_axles_on_structure(structure, vehicle, direction, x) for x in places]
         for direction in DRIVING_DIRECTIONS
     ]
-    count = np.array([[len(row) for row in rows_one_way] for rows_one_way in rows])
-    if not count.any():
+    on_bridge = np.array([[len(row) for row in rows_one_way] for rows_one_way in rows])
+    if not on_bridge.any():
         raise InvalidInput(
             f"the vehicle is nowhere on the structure: positions are from {places.min():.4g} to "
             f"{places.max():.4g} m; move them onto it"
         )
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
-    factors = np.full(count.shape, np.nan)
-    if is_balanced(dead.minimise_residual(), dead):
-        distinct = tuple(dict.fromkeys((*rows[0], *rows[1])))
-        factor_of = _collapse_factors(stones, dead, distinct, options)
-        factors[:] = [[factor_of[row] for row in rows_one_way] for rows_one_way in rows]
-    direction, place = _find_worst(factors, count)
+    distinct = tuple(dict.fromkeys((*rows[0], *rows[1])))
+    if isinstance(fill, PlasticFill):
+        factor_of = _bound_factors(structure, distinct, options)
+    else:
+        stones, dead = self_weight_programme(structure, friction, strength, fill)
+        factor_of = dict.fromkeys(distinct, np.nan)
+        if is_balanced(dead.minimise_residual(), dead):
+            factor_of = _collapse_factors(stones, dead, distinct, options)
+    factors = np.array([[factor_of[row] for row in rows_one_way] for rows_one_way in rows])
+    direction, place = _find_worst(factors, on_bridge)
     worst = collapse_factor(structure, live=list(rows[direction][place]), **options)
     if friction == "nonassociated":
         factors[direction, place] = worst.factor  # by the whole search: may be a weaker state
     dims = ("direction", "position")
     variables = {
         "factor": (dims, factors, {"units": "1", "long_name": "factor at collapse"}),
-        "axles": (dims, count, {"units": "1", "long_name": "axles on the structure"}),
+        "axles": (dims, on_bridge, {"units": "1", "long_name": "axles on the structure"}),
     }
     position = ("position", places, {"units": "m"})
     coordinates = {"direction": list(DRIVING_DIRECTIONS), "position": position}
@@ -204,7 +210,7 @@ class Rating(ResultDisplay):
         geometric: geometric factor of safety at the worst place [-]: depth of the joints over the
             least share of it, about their middles, that carries the factored vehicle; below 1 where
             only deeper joints would. Undefined (NaN) where joints of any depth do not carry it,
-            infinite where hinges alone do.
+            infinite where hinges alone do. Not searched, and NaN, with a plastic fill.
     """
 
     structure: Structure
@@ -284,6 +290,8 @@ class Rating(ResultDisplay):
 
     def _geometric_text(self) -> str:
         """Return the geometric factor of safety, in words where it is below 1."""
+        if self.moving.worst.fill_motion is not None:
+            return "not searched with a plastic fill"
         if np.isnan(self.geometric):
             return "none, joints of any depth do not carry the vehicle: they slide or crush"
         text = f"{self.geometric:.3g}"
@@ -303,15 +311,15 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     width: Metres | None = None,
     friction: str | None = "coulomb",
     strength: Pascals | None = None,
-    fill: Fill | None = None,
+    fill: Fill | PlasticFill | None = None,
 ) -> Rating:
     """Rate a bridge for a vehicle: the multiple of it, with partial factors, at collapse.
 
     The vehicle drives over the bridge in both directions (`moving_load`), from on to off in steps
-    of 1/100 of the bridge's length. Its axles spread through a fill along the bridge; across it
-    they spread evenly over `width`. The geometric factor of safety is Heyman's: all joints are
-    narrowed about their middles, at unchanged weights and with the vehicle at its worst place,
-    until it is carried no longer; or deepened until it is carried.
+    of 1/100 of the bridge's length, or 1/20 with a plastic fill. Its axles spread through a fill
+    along the bridge; across it they spread evenly over `width`. The geometric factor of safety is
+    Heyman's: all joints are narrowed about their middles, at unchanged weights and with the vehicle
+    at its worst place, until it is carried no longer; or deepened until it is carried.
 
     Args:
         structure: the bridge, or an `archfem.Analysis` of it.
@@ -351,10 +359,12 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     # the structure is modelled over its whole width, of which a vehicle loads a part
     axles = [live * impact * structure.width / width * weight for weight in driven.axles]
     weighted = _scale_weights(structure, dead)
+    is_plastic = isinstance(fill, PlasticFill)
     positions = _places_along(weighted, _parse_axles(axles, driven.spacings))
+    positions = positions[::5] if is_plastic else positions
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
     moving = moving_load(weighted, axles, spacings=driven.spacings, positions=positions, **options)
-    geometric = _geometric_factor(weighted, moving, options)
+    geometric = np.nan if is_plastic else _geometric_factor(weighted, moving, options)
     return Rating(structure, driven, live, impact, dead, width, moving, geometric)
 
 
@@ -496,6 +506,16 @@ def _collapse_factors(
     if np.inf in factors.values():
         warn_locking(stones.whole, options["friction"])
     return factors
+
+
+def _bound_factors(
+    structure: Structure, rows: Sequence[AxleRow], options: dict[str, Any]
+) -> dict[AxleRow, float]:
+    """Return the lower bound of each row of axles with a plastic fill."""
+    return {
+        row: collapse_factor(structure, live=list(row), **options).lower if row else np.inf
+        for row in rows
+    }
 
 
 def _search_nonassociated(

@@ -6,6 +6,7 @@
     motion                  Motion: a ground acceleration
     record_selection        selection of records by the rules of codes
     records                 files of recorded ground motions, one module for each format
+    hazard                  hazard curves of a site
     response_spectra        response spectra; PGA, Arias, CAV, duration
     signal_processing       filters, integration, baseline, resampling, artificial accelerograms
     suite                   Suite of motions

@@ -190,7 +190,7 @@ def pushover(
     model, begin = resolve_start(model, start)
     assert isinstance(begin, Equilibrium)
     model, held = begin.transfer_memory(model), None
-    if dead != ():
+    if dead:
         loading = LoadPath.of(model, list_loads(dead), begin)
         loading.advance_to_whole()
         model, held = loading.model, loading.load

@@ -2,6 +2,7 @@
 
     cache            models, motions and solvers reused between points
     cluster          evaluation on a Dask cluster
+    collapse_risk    annual rate of collapse
     comparison       cases side by side: findings and tables
     convergence      order, limit and error bar; accuracy of a case
     evaluators       functions from a case to a flat table

@@ -37,6 +37,7 @@ from archfem._validation import (
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.motion_scaling import admissible_range
+from archfem.dynamics.recorder import Record
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.motion.hazard import MEASURES, Hazard
@@ -212,7 +213,7 @@ def _resolve_alternatives(
     for (label, (_, each)), weight in zip(given.items(), weights, strict=True):
         if isinstance(each, Structure) and isinstance(analysis, Analysis):
             each = replace(analysis, structure=each)
-        falling = as_falling(each)
+        falling = replace(as_falling(each), record=Record(whole_fall=False))
         falling.dead_load()  # a structure that does not stand is refused before any run
         tree[label] = weight / sum(weights), falling
     return tree
@@ -251,7 +252,7 @@ def _describe_samples(
     """Return the table of all samples, without results."""
     count = len(draws)
     columns: dict[str, Any] = {name: ("sample", [row[name] for row in draws]) for name in ranges}
-    columns |= {"alternative": ("sample", labels), "record": ("sample", order)}
+    columns |= {"alternative": ("sample", labels), "record_number": ("sample", order)}
     columns |= {"lower": ("sample", np.zeros(count)), "upper": ("sample", np.full(count, inf))}
     columns |= {
         "runs": ("sample", np.zeros(count, int)),
@@ -341,9 +342,9 @@ class CollapseRisk(ResultDisplay):
     """Capacities of sampled structures under records, and the annual rate at which they fall.
 
     Attributes:
-        dataset: over `sample`: the varied properties, the `alternative`, the number of the
-            `record`, `lower` and `upper` scale of the bracket, `runs`, and `error`; over `record`
-            the intensities of the unscaled records, `unscaled_pga` and others.
+        dataset: over `sample`: the varied properties, the `alternative`, the
+            `record_number`, `lower` and `upper` scale of the bracket, `runs`, and `error`; over
+            `record` the intensities of the unscaled records, `unscaled_pga` and others.
     """
 
     dataset: xr.Dataset
@@ -367,7 +368,7 @@ class CollapseRisk(ResultDisplay):
         """
         rows = self.dataset.isel(sample=self.answered)
         name = f"unscaled_{measure or self.hazard.measure}"
-        unscaled = self.dataset[name].values[rows["record"].values]
+        unscaled = self.dataset[name].values[rows["record_number"].values]
         return unscaled * rows["lower"].values, unscaled * rows["upper"].values
 
     def fragility(self, measure: str | None = None) -> Fragility:
@@ -390,7 +391,7 @@ class CollapseRisk(ResultDisplay):
     @cached_property
     def _resampled(self) -> Any:
         """Answered samples of the bootstrap, whole records at a time (RESAMPLES, n)."""
-        random, records = np.random.default_rng(0), self._of_answered("record")
+        random, records = np.random.default_rng(0), self._of_answered("record_number")
         members = [np.flatnonzero(records == record) for record in np.unique(records)]
         drawn = np.empty((RESAMPLES, len(records)), int)
         for row in drawn:
@@ -449,12 +450,12 @@ class CollapseRisk(ResultDisplay):
         total = float(np.var(logs, ddof=1))
         parts = {
             name: _variance_component(logs, self._of_answered(name))
-            for name in ("record", "alternative")
+            for name in ("record_number", "alternative")
         }
         rest = max(total - sum(parts.values()), 0.0)
         return {
             "total": sqrt(total),
-            "records": sqrt(parts["record"]),
+            "records": sqrt(parts["record_number"]),
             "alternatives": sqrt(parts["alternative"]),
             "properties": sqrt(rest),
         }
@@ -488,12 +489,15 @@ class CollapseRisk(ResultDisplay):
 
     def table(self) -> str:
         """Return a line for each alternative: samples, rate, interval, probability in 50 years."""
-        rows = []
-        for label in [None, *sorted(set(self._of_answered("alternative")))]:
-            count = int(np.sum(self._of_answered("alternative") == label)) if label else 0
-            count = count or len(self.answered)
-            if count >= FIRST_ROUND:
-                rows.append([label or "all", str(count), str(self.rate(label))])
+        labels = self._of_answered("alternative")
+        counts = {None: len(labels)}
+        if len(set(labels)) > 1:
+            counts |= {label: int(np.sum(labels == label)) for label in sorted(set(labels))}
+        rows = [
+            [label or "all", str(count), str(self.rate(label))]
+            for label, count in counts.items()
+            if count >= FIRST_ROUND
+        ]
         return align_columns(["alternative", "samples", "falls"], rows)
 
     def __str__(self) -> str:

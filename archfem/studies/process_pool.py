@@ -19,7 +19,14 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from itertools import islice
-from multiprocessing import Pipe, current_process, forkserver, get_context, parent_process
+from multiprocessing import (
+    Pipe,
+    current_process,
+    forkserver,
+    get_all_start_methods,
+    get_context,
+    parent_process,
+)
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -46,6 +53,9 @@ Row = dict[str, Any]
 
 # A point is reported as failed when so many workers have died while they computed it.
 MAX_DEATHS_PER_POINT = 3
+
+# Windows starts each worker anew
+START_METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
 
 _evaluation_lock = threading.Lock()
 
@@ -207,7 +217,8 @@ class Worker:
     def __init__(self, log: str, shared: Path | None) -> None:
         self.pipe, remote = Pipe()
         arguments = remote, log, shared
-        self._process = get_context("forkserver").Process(target=_serve, args=arguments)
+        context: Any = get_context(START_METHOD)
+        self._process = context.Process(target=_serve, args=arguments)
         with remote:  # the end of the worker then closes the pipe
             _start(self._process)
         self.task: Task | None = None
@@ -255,12 +266,13 @@ class WorkerPool:
     ) -> None:
         # gmsh restores the default action of SIGPIPE, by which a send to a dead worker would end
         # this process; signals can be set in the main thread alone.
-        with suppress(ValueError):
+        with suppress(ValueError, AttributeError):  # which Windows has not
             signal.signal(signal.SIGPIPE, signal.SIG_IGN)
-        forkserver.set_forkserver_preload(["archfem.studies.fork_server"])
-        _make_socket_folder()
-        with _isolate_start():
-            forkserver.ensure_running()
+        if START_METHOD == "forkserver":
+            forkserver.set_forkserver_preload(["archfem.studies.fork_server"])
+            _make_socket_folder()
+            with _isolate_start():
+                forkserver.ensure_running()
         self._tasks, self._max_workers, self._log, self._shared = tasks, max_workers, log, shared
         self._workers: list[Worker] = []
         self._deaths: Counter[int] = Counter()

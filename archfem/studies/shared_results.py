@@ -4,14 +4,13 @@ Each is a file in a folder of the study, named by the digest of its inputs. A wo
 computes it under a lock, and another one that needs it meanwhile waits and reads it.
 """
 
-import fcntl
 import hashlib
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from archfem._files import read_sealed_json, write_sealed_json
+from archfem._files import lock_file, read_sealed_json, write_sealed_json
 from archfem.cases.provenance import describe_version
 from archfem.errors import InvalidInput
 
@@ -71,6 +70,7 @@ def _lock(path: Path) -> Iterator[None]:
         with suppress(OSError):
             lock.parent.mkdir(parents=True, exist_ok=True)
             file = stack.enter_context(lock.open("ab"))
-            fcntl.flock(file, fcntl.LOCK_EX)  # the kernel releases that of a killed worker
+            lock_file(file, wait=True)
+            stack.push(suppress(PermissionError))  # Windows deletes no open file
             stack.callback(lock.unlink, missing_ok=True)
         yield

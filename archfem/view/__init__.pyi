@@ -19,6 +19,8 @@ from .motions import draw_motion as draw_motion
 from .motions import draw_selection as draw_selection
 from .motions import draw_spectra as draw_spectra
 from .motions import draw_suite as draw_suite
+from .pages.live import LivePage as LivePage
+from .pages.live import page as page
 from .pages.player import Player as Player
 from .pages.player import player as player
 from .springs import draw_mesh as draw_mesh
@@ -34,6 +36,7 @@ from .structure import draw_instants as draw_instants
 from .structure import draw_names as draw_names
 from .structure import draw_structure as draw_structure
 from .studies import draw_accuracy as draw_accuracy
+from .studies import draw_collapse_risk as draw_collapse_risk
 from .studies import draw_convergence as draw_convergence
 from .studies import draw_findings as draw_findings
 from .studies import draw_fragility as draw_fragility

@@ -1,7 +1,7 @@
 """Figures of studies: IDA, fragility, sensitivity, convergence, and accuracy over time."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import product
+from itertools import islice, product
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -14,6 +14,7 @@ from archfem._validation import validate_arguments
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import InvalidInput
+from archfem.motion.hazard import MEASURES, Hazard
 from archfem.view.style import (
     Colour,
     Size,
@@ -38,6 +39,24 @@ class FragilityCurve(Protocol):
 
     def band(self, intensity: Any) -> tuple[Array, Array]:
         """Return the lower and the upper end of the confidence band at intensities."""
+
+
+class RiskCurves(Protocol):
+    """Result of `collapse_risk`, as far as it is drawn."""
+
+    @property
+    def hazard(self) -> Hazard:
+        """Hazard curve of the site."""
+
+    @property
+    def sentence(self) -> str:
+        """The rate, and what it rests on."""
+
+    def fragility(self) -> FragilityCurve:
+        """Return the fragility over the intensity of the hazard."""
+
+    def disaggregation(self) -> tuple[Array, Array]:
+        """Return edges of bins of intensity, and the share of the rate in each."""
 
 
 class ConvergencePaths(Protocol):
@@ -372,6 +391,37 @@ def draw_tornado(
 
 
 @validate_arguments
+def draw_collapse_risk(risk: RiskCurves) -> Figure:
+    """Draw the fragility with its band, the hazard, and where in intensity the rate comes from.
+
+    Args:
+        risk: result of `archfem.collapse_risk`.
+
+    Returns:
+        The figure, a panel for each.
+    """
+    curve, hazard = risk.fragility(), risk.hazard
+    label = f"{hazard.measure} [{MEASURES[hazard.measure]}]"
+    figure = new_figure(Size.PAGE, 2.6)
+    first, second, third = figure.subplots(1, 3)
+    x = np.linspace(0.0, 2.5 * curve.median, 301)[1:]
+    style_axes(first, label, "probability of a fall [-]")
+    first.fill_between(x, *curve.band(x), color=Colour.LINES[0], alpha=0.2, lw=0.0)
+    first.plot(x, curve.probability(x), color=Colour.LINES[0], lw=1.8)
+    first.set(xlim=(0.0, x[-1]), ylim=(0.0, 1.0))
+    style_axes(second, label, "annual rate of exceedance [1/year]")
+    reach = np.geomspace(0.05 * curve.median, 2.5 * curve.median, 101)
+    second.loglog(reach, hazard.rate_of(reach), color=Colour.LINES[1], lw=1.8)
+    style_axes(third, label, "share of the rate of falls [-]")
+    edges, shares = risk.disaggregation()
+    third.bar(edges[:-1], shares, np.diff(edges), align="edge", color=Colour.LINES[2], lw=0.0)
+    for axes, title in zip((first, second, third), ("fragility", "hazard", "rate"), strict=True):
+        set_title(axes, title)
+    figure.suptitle(risk.sentence, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
+    return figure
+
+
+@validate_arguments
 def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     """Draw the residual displacement over each varied property; falls lie above a line.
 
@@ -379,9 +429,9 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         verdicts: runs, as by `archfem.verdict_range`.
 
     Returns:
-        The figure, with a panel for each property, that which explains most of the damage first.
+        The figure, with panels of the properties that explain most of the damage, the first most.
     """
-    rows = verdicts.answers
+    rows, max_panels = verdicts.answers, 6
     falls, residual = verdicts.falls[verdicts.answered], 1e3 * rows["residual"].values
     standing = residual[~falls]
     top = 3.0 * float(standing.max(initial=1.0))
@@ -396,23 +446,27 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         "sign": "sign of the motion",
         "scale": "scale of the motion [-]",
     }
+    others = list(shares.values())[max_panels:]
+    shares = dict(islice(shares.items(), max_panels))
     columns = min(3, len(shares))
     lines = -(-len(shares) // columns)
     figure = new_figure(Size.PAGE, 0.7 + 2.1 * lines)
     panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()
     for axes in panels[len(shares) :]:
         axes.set_visible(False)
-    for axes, (name, share) in zip(panels, shares.items(), strict=False):
+    for letter, axes, (name, share) in zip("abcdef", panels, shares.items(), strict=False):
         first = axes in panels[::columns]
         label = labels.get(name, name.replace("_", " "))
         style_axes(axes, label, "residual displacement [mm]" if first else "")
-        set_title(axes, f"explains {share:.0%}")
+        set_title(axes, f"({letter}) explains {share:.0%}")
         _draw_property(axes, rows[name].values, heights, falls)
         axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set_yscale("log")
         axes.set_ylim(0.7e-3 * top, 4.0 * top)
     add_legend_below(figure, 2, handles=panels[0].get_legend_handles_labels()[0])
-    figure.suptitle(verdicts.sentence, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
+    text = verdicts.sentence
+    text += f"\neach other property explains {max(others):.0%} at most" if others else ""
+    figure.suptitle(text, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
     return figure
 
 

@@ -131,7 +131,7 @@ def test_a_fall_that_cannot_be_followed_keeps_the_history_up_to_it(monkeypatch):
 def test_loose_stones_rub_as_their_joints_did_or_by_six_tenths():
     for friction, rubs, bond in ((0.45, 0.45, 1e4), (None, 0.6, 0.0)):
         contact = af.Contact(1e9, 4e8, friction, cohesion=1e4)
-        loose = fall._with_sliding_joints(af.column(breadth=1.0, heights=[1.0], contact=contact))
+        loose = fall.with_sliding_joints(af.column(breadth=1.0, heights=[1.0], contact=contact))
         assert [joint.contact.friction for joint in loose.joints] == [rubs]
         assert [joint.contact.cohesion for joint in loose.joints] == [bond]
 

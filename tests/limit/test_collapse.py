@@ -395,6 +395,7 @@ def test_a_dead_part_of_the_live_load_is_no_longer_live(live):
     part = replace(live, **_scaled(live, 0.4 * whole.factor))
     rest = collapse_factor(ring(), live=live, dead=[part])
     assert rest.factor == pytest.approx(0.6 * whole.factor, rel=1e-6)
+    assert collapse_factor(ring(), live=live, dead=[]).factor == whole.factor
 
 
 def _scaled(action, factor):

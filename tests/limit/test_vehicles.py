@@ -9,6 +9,7 @@ import pytest
 from backfilled import SOIL, fill_of
 
 import archfem as af
+from archfem.limit import vehicles
 from archfem.limit.linear_programme import Programme
 from archfem.limit.vehicles import _find_worst, _search_nonassociated
 
@@ -261,3 +262,21 @@ def test_the_weakest_solution_at_a_place_is_kept(monkeypatch):
         (2, []),
         (1, ["0.3"]),
     ]
+
+
+def test_a_plastic_fill_bounds_the_vehicle_at_each_place(monkeypatch):
+    """Each place is one pair of bounds; the rating has the least of them."""
+    pytest.importorskip("clarabel")
+    fill = af.limit.PlasticFill(friction_angle=30.0, cohesion=5e3, gap=0.9)
+    moving = af.moving_load(arch_bridge(), [1e4], positions=[3.3], fill=fill)
+    factors = moving.factors["factor"].sel(direction="right").values
+    load = af.PointLoad(3.3, (0.0, -1e4))
+    alone = af.collapse_factor(arch_bridge(), live=load, fill=fill)
+    assert factors[0] == pytest.approx(alone.lower, rel=1e-6)
+    assert moving.worst.upper == pytest.approx(alone.upper, rel=1e-6)
+    # a rating takes every fifth of its places: one here
+    monkeypatch.setattr(vehicles, "_places_along", lambda *_: (3.3, *[4.5] * 4))
+    rating = af.rate(arch_bridge(), vehicles.Vehicle("axle", (1e4,)), fill=fill)
+    assert rating.factor == pytest.approx(factors[0], rel=1e-6)
+    assert np.isnan(rating.geometric)
+    assert "not searched with a plastic fill" in str(rating)

@@ -1,7 +1,9 @@
 """Rates of collapse: closed form of a lognormal capacity, intervals, parts, continued files."""
 
 import json
+import tomllib
 from dataclasses import asdict
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,8 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 import archfem as af
+from archfem.cases import risk_keys
+from archfem.commands.cli import main
 from archfem.studies.collapse_risk import CollapseRisk
 
 SITE = af.Hazard.power(2e-3, 2.5)
@@ -25,7 +29,7 @@ def risk_of(capacity, record, alternative=None, width=0.01):
     samples = {
         "lower": capacity * (1.0 - 0.5 * width),
         "upper": capacity * (1.0 + 0.5 * width),
-        "record": np.asarray(record),
+        "record_number": np.asarray(record),
         "alternative": np.array(["as given"] * count if alternative is None else alternative),
         "runs": np.full(count, 4),
         "error": np.array([""] * count),
@@ -126,3 +130,47 @@ def test_too_few_records_are_refused():
     analysis, motions = tilted_block()
     with pytest.raises(af.InvalidInput, match="several records"):
         af.collapse_risk(analysis, motions[:1], SITE)
+
+
+def test_a_case_file_gives_the_same_rate(tmp_path, capsys):
+    path = tmp_path / "block.toml"
+    path.write_text(
+        """
+title = "Slender block"
+[structure]
+shape = "column"
+breadth = 0.25
+heights = [1.5]
+[model]
+fidelity = "rigid"
+[suite]
+name = "short"
+pairs.a = { synthetic = { seed = 0, duration = 2.0, pga = 3.0 } }
+pairs.b = { synthetic = { seed = 1, duration = 2.0, pga = 3.0 } }
+[analysis]
+dt = 0.005
+damping = { ratio = 0.05, modes = "effective" }
+[risk]
+samples = 16
+precision = 0.5
+hazard = { rates = [0.02, 0.001], intensities = ["1 m/s**2", "0.4 g_0"] }
+alternatives.slender = {}
+alternatives.slenderer = { weight = 1.0, set = ["structure.breadth=0.22"] }
+"""
+    )
+    main(["risk", str(path), "--out", str(tmp_path / "out")])
+    printed = capsys.readouterr().out
+    found = CollapseRisk.read(tmp_path / "out" / "risk.nc")
+    assert str(found) in printed
+    assert found.rate("slenderer").rate > found.rate("slender").rate
+    assert found.hazard.rate_of([1.0, 0.4 * 9.80665]) == pytest.approx([0.02, 0.001])
+    assert (tmp_path / "out" / "risk.png").exists()
+
+
+@pytest.mark.parametrize(
+    "hazard",
+    ["{ rates = [0.1] }", "{ factor = 1.0 }", "{ file = 'none.csv', period = 0.2 }", "{}"],
+)
+def test_a_hazard_that_is_none_is_refused(hazard):
+    with pytest.raises(af.InvalidInput, match="hazard"):
+        risk_keys.parse_hazard(tomllib.loads(f"h = {hazard}")["h"], Path())

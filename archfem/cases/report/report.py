@@ -4,7 +4,7 @@ from pathlib import Path
 
 from archfem.cases.case import Case
 from archfem.cases.report.conclusion import describe_origin, list_facts
-from archfem.cases.report.report_data import ReportData, build_player
+from archfem.cases.report.report_data import ReportData, build_live_page, build_player
 from archfem.cases.report.sections import build_sections
 from archfem.cases.result_folder import ResultFolder
 from archfem.cases.run import Run
@@ -30,6 +30,11 @@ def write_report(data: ReportData, path: str | Path) -> Path:
 def write_report_of_case(result: Run | ResultFolder, path: str | Path) -> Path:
     """Write the report of the results of a case."""
     return write_report(_collect_data(result), path)
+
+
+def write_page_of_case(result: Run | ResultFolder, path: str | Path) -> Path:
+    """Write the page that shakes the structure of a case."""
+    return build_live_page(_collect_data(result)).save(path)
 
 
 def write_report_of_history(run: History, path: str | Path) -> Path:

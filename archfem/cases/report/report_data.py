@@ -19,6 +19,7 @@ from archfem.models.discretisation import Discretisation
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
 from archfem.view.pages.document import FigureBlock, TextBlock
+from archfem.view.pages.live import LivePage, describe_arch, list_motions
 from archfem.view.pages.player import Player
 from archfem.view.pages.player_data import MAX_PACKED_BYTES, Scene
 
@@ -110,6 +111,13 @@ def build_player(case: Case, run: History, title: str, players: int = 1) -> Play
     # Players of one page share its size, but each stays legible.
     max_bytes = max(MAX_PACKED_BYTES // players, 800_000)
     return Player(Scene(case.structure, run, model, title, max_bytes, reason))
+
+
+def build_live_page(data: ReportData) -> LivePage:
+    """Return the page that shakes the structure of a case, under the motions of its runs."""
+    thrust = None if data.dead is None else data.dead["eccentricity"].values
+    arch = describe_arch(data.case.structure, thrust)
+    return LivePage(data.case.title, [arch], list_motions([*data.motions.values()]))
 
 
 def _rebuild_model(case: Case, run: History) -> tuple[Model | None, str]:

@@ -19,9 +19,15 @@ from archfem.cases.report.conclusion import (
     summarise_outcomes,
 )
 from archfem.cases.report.inputs import describe_value, tabulate_inputs
-from archfem.cases.report.report_data import ReportData, build_player, missing_note
+from archfem.cases.report.report_data import (
+    ReportData,
+    build_live_page,
+    build_player,
+    missing_note,
+)
 from archfem.dynamics.history import SIGN_CONVENTION, History
 from archfem.dynamics.recorder import library_versions
+from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
@@ -77,6 +83,7 @@ def build_sections(data: ReportData) -> list[Section]:
         build_check_section(data),
         build_method_section(data),
         build_source_section(data),
+        *build_live_sections(data),
     ]
     # a heading of subsections has no pieces of its own
     followed = [*(section.level for section in sections[1:]), 2]
@@ -412,6 +419,19 @@ def build_method_section(data: ReportData) -> Section:
     ]
     used = [row[1:] for row in _METHODS if not row[0] or row[0] in data.files]
     return Section("Norms and methods", [Grid((), [*norm, *spectra, *used])])
+
+
+def build_live_sections(data: ReportData) -> list[Section]:
+    """Build the section with the arch to shake, where stones are rigid and no fill acts."""
+    try:
+        live = build_live_page(data)
+    except InvalidInput:
+        return []
+    text = (
+        "Change the arch, and shake it: rigid stones fall to the ground. `archfem page FOLDER` "
+        "writes this as a page of its own."
+    )
+    return [Section("Try it", [TextBlock(text), live])]
 
 
 def build_source_section(data: ReportData) -> Section:

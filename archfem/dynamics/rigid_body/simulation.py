@@ -238,6 +238,38 @@ class RigidBlockSimulation:
             raise InvalidInput(f"spacing {spacing:g} s is below the step {step:g} s")
 
 
+def prepare_steps(
+    simulation: RigidBlockSimulation, dt: float
+) -> tuple[StepParameters, StepWorkspace]:
+    """Return parameters and workspace of the time steps of a length [s]."""
+    structure, bodies = simulation.structure, simulation.bodies
+    weight_speed = structure.gravity * dt
+    # a rocking ratio follows from velocities before the impact, which foreseen contacts change
+    has_ratio = bool(bodies.rocking.any())
+    parameters = StepParameters(
+        *(dt, structure.gravity, 0.0 if has_ratio else 0.5 * dt, simulation.restitution),
+        # impacts below 0.05 m/s, the speed of a fall by 0.13 mm, do not bounce
+        *(0.05, 2.0 * weight_speed),
+        MAX_SWEEPS * -(-len(structure.free) // 100),
+        SETTLED * weight_speed,
+        ENERGY_GAIN_NOISE * structure.weight * structure.size,
+    )
+    contacts, count = allocate_contacts(len(bodies.owner)), len(bodies.mass)
+    workspace = StepWorkspace(
+        allocate_pieces(bodies),
+        contacts,
+        allocate_stored_impulses(contacts),
+        np.empty((count, 3)),
+        np.empty((len(contacts.key), 15)),
+        np.zeros((count + 1, 3)),
+        *(
+            SweepResult(np.zeros((count + 1, 3)), np.zeros((len(contacts.key), 2)))
+            for _ in range(2)
+        ),
+    )
+    return parameters, workspace
+
+
 class _Run:
     """State and workspace of a simulation."""
 
@@ -247,33 +279,9 @@ class _Run:
         self._v = np.array(start.velocities, dtype=float)
         self._v[bodies.inverse_mass[:-1, 0] == 0.0] = 0.0
         # speed of a free fall after one step
-        weight_speed = self._weight_speed = simulation.structure.gravity * dt
-        # a rocking ratio follows from the velocities before the impact, which a foreseen contact
-        # changes
-        has_ratio = bool(bodies.rocking.any())
-        self._parameters = StepParameters(
-            *(dt, simulation.structure.gravity),
-            *(0.0 if has_ratio else 0.5 * dt, simulation.restitution),
-            # impacts below 0.05 m/s, the speed of a fall by 0.13 mm, do not bounce
-            *(0.05, 2.0 * weight_speed),
-            MAX_SWEEPS * -(-len(simulation.structure.free) // 100),
-            SETTLED * weight_speed,
-            ENERGY_GAIN_NOISE * simulation.structure.weight * simulation.structure.size,
-        )
+        self._weight_speed = simulation.structure.gravity * dt
+        self._parameters, self._workspace = prepare_steps(simulation, dt)
         self._is_first = True
-        contacts = allocate_contacts(len(bodies.owner))
-        self._workspace = StepWorkspace(
-            allocate_pieces(bodies),
-            contacts,
-            allocate_stored_impulses(contacts),
-            np.empty_like(self._q),
-            np.empty((len(contacts.key), 15)),
-            np.zeros((len(self._q) + 1, 3)),
-            *(
-                SweepResult(np.zeros((len(self._q) + 1, 3)), np.zeros((len(contacts.key), 2)))
-                for _ in range(2)
-            ),
-        )
         # fields of FallEnergy, then the largest loss and the largest energy exchanged so far, and
         # what is left of the strain energy [J]
         kinetic = kinetic_energy(bodies, self._v)

@@ -7,13 +7,14 @@ are damaged raise errors of any class there.
 
 import json
 import re
-import resource
 from cmath import rect
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
 from itertools import islice, pairwise
 from math import acos, atan, ceil, dist, radians, tau
 from pathlib import Path
@@ -89,10 +90,12 @@ def _foreign_reader(library: str, kind: str) -> Iterator[None]:
 def _limit_memory(more: int = 2**30) -> Iterator[None]:
     """Limit the additional memory of the process [bytes]."""
     # a damaged number of nodes makes meshio fill arrays of any size, and the kernel kills
-    limits, statistics = resource.getrlimit(resource.RLIMIT_AS), Path("/proc/self/statm")
-    if not statistics.exists():  # elsewhere than on Linux
+    statistics = Path("/proc/self/statm")
+    if not statistics.exists() or find_spec("resource") is None:  # elsewhere than on Linux
         yield
         return
+    resource = import_module("resource")
+    limits = resource.getrlimit(resource.RLIMIT_AS)
     taken = int(statistics.read_text().split()[0]) * resource.getpagesize()
     allowed = min(each for each in (taken + more, *limits) if each != resource.RLIM_INFINITY)
     resource.setrlimit(resource.RLIMIT_AS, (allowed, limits[1]))

@@ -5,12 +5,15 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-import imageio.v2 as imageio
 import numpy as np
 from numpy.typing import NDArray
 
 from archfem._files import atomic_write
+from archfem._optional import require_package
 from archfem.errors import InvalidInput
+
+with require_package("imageio"):
+    import imageio.v2 as imageio
 
 Image = NDArray[np.uint8]
 

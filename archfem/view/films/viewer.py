@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 
 from archfem._files import atomic_write
 from archfem._optional import check_drawing, require_package
@@ -25,6 +24,9 @@ from archfem.view.films.settings import Setup, check_film
 from archfem.view.pages.document import render
 from archfem.view.positions import decisive_instant, fields_at, recorded_fields
 from archfem.view.style import Colour
+
+with require_package("pyvista"):
+    import pyvista as pv
 
 
 class Scene:

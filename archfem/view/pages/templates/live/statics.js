@@ -1,0 +1,170 @@
+// Statics of rigid stones: forces in joints, thrust line, least thickness, collapse acceleration.
+"use strict";
+const SMALL = 1e-9;
+
+/** Subtract multiples of a row of a table from all others, so that a column is that of a unit. */
+function pivot(table, row, column) {
+  const line = table[row], factor = 1 / line[column];
+  for (let k = 0; k < line.length; k++) line[k] *= factor;
+  for (const other of table) {
+    const times = other[column];
+    if (other === line || times === 0) continue;
+    for (let k = 0; k < line.length; k++) other[k] -= times * line[k];
+  }
+}
+
+/**
+ * Maximise c·y over free y under rows·y <= limits, by the simplex method on the dual,
+ * min limits·u under rowsᵀ u = c, u >= 0. Returns the value, y and u; null where no y is possible,
+ * and the value Infinity where nothing limits it.
+ */
+function maximise(c, rows, limits) {
+  const n = c.length, m = rows.length, signs = c.map((value) => (value < 0 ? -1 : 1)), basis = c.map((_, k) => m + k);
+  const table = c.map((value, k) => {
+    const line = new Float64Array(m + n + 1);
+    rows.forEach((row, i) => { line[i] = signs[k] * row[k]; });
+    line[m + k] = 1;
+    line[m + n] = Math.abs(value);
+    return line;
+  });
+  /** Pivot until no column lowers the cost; return the reduced costs, or null without a minimum. */
+  const minimise = (costs, columns) => {
+    const reduced = Float64Array.from([...costs, 0]);
+    basis.forEach((own, k) => table[k].forEach((value, j) => { reduced[j] -= costs[own] * value; }));
+    for (let round = 0; ; round++) {
+      let column = -1;
+      // the steepest column first; the first one later, which cannot go round in circles (Bland)
+      for (let j = 0; j < columns && (round < 200 || column < 0); j++) if (reduced[j] < -SMALL && (column < 0 || reduced[j] < reduced[column])) column = j;
+      if (column < 0 || round > 2000) return reduced;
+      let row = -1, least = Infinity;
+      table.forEach((line, k) => {
+        const isSpare = basis[k] >= m && columns === m && Math.abs(line[column]) > SMALL;
+        const ratio = isSpare ? 0 : line[column] > SMALL ? line[m + n] / line[column] : Infinity;
+        if (ratio < least - 1e-14 || (ratio === least && row >= 0 && basis[k] < basis[row])) [row, least] = [k, ratio];
+      });
+      if (row < 0) return null;
+      pivot([...table, reduced], row, column);
+      basis[row] = column;
+    }
+  };
+  const spare = [...new Array(m).fill(0), ...new Array(n).fill(1)];
+  if (-minimise(spare, m + n)[m + n] > 1e-7) return { value: Infinity, y: null, u: null };
+  const reduced = minimise([...limits, ...new Array(n).fill(0)], m);
+  if (reduced === null) return null;
+  const u = new Float64Array(m);
+  basis.forEach((own, k) => { if (own < m) u[own] = table[k][m + n]; });
+  return { value: -reduced[m + n], y: signs.map((sign, k) => -sign * reduced[m + k]), u };
+}
+
+/** Forces N, V, M of joints in equilibrium: those of weight, of 1 g sideways, and what is left free. */
+class Equilibrium {
+  constructor({ bodies, joints, parameters }) {
+    const { mass, centre, inverse_mass } = bodies, free = mass.flatMap((_, body) => (inverse_mass[body][0] > 0 ? [body] : []));
+    const count = 3 * joints.length, rowOf = new Map(free.map((body, k) => [body, 3 * k]));
+    this.weight = parameters.gravity * free.reduce((sum, body) => sum + mass[body][0], 0);
+    this.joints = joints.map((joint) => makeJoint(joint, centre));
+    // rows: forces along x and y and moment of each free stone; columns: forces, weight, push
+    const table = free.flatMap(() => [0, 1, 2].map(() => new Float64Array(count + 2)));
+    this.joints.forEach(({ blocks, normal: [nx, ny], tangent: [tx, ty], middle: [x, y] }, j) => blocks.forEach((body, side) => {
+      const row = rowOf.get(body), sign = side ? 1 : -1;
+      if (row === undefined) return;
+      const armX = x - centre[body][0], armY = y - centre[body][1];
+      [[nx, ny, armX * ny - armY * nx], [tx, ty, armX * ty - armY * tx], [0, 0, tx * ny - ty * nx]].forEach((column, k) => column.forEach((value, i) => { table[row + i][3 * j + k] = sign * value; }));
+    }));
+    for (const [body, row] of rowOf) {
+      const own = (parameters.gravity * mass[body][0]) / this.weight;
+      table[row + 1][count] = own;
+      table[row][count + 1] = -own;
+    }
+    const solved = [];
+    table.forEach((line, row) => {
+      let column = 0;
+      for (let k = 1; k < count; k++) if (Math.abs(line[k]) > Math.abs(line[column])) column = k;
+      if (Math.abs(line[column]) < 1e-10) return; // stones that nothing holds: no equilibrium
+      pivot(table, row, column);
+      solved[column] = row;
+    });
+    const left = [...new Array(count).keys()].filter((column) => solved[column] === undefined);
+    /** Coefficients of each force: of the free ones, of the weight and of the push. */
+    this.forces = [...new Array(count).keys()].map((column) => {
+      const line = table[solved[column]];
+      return line ? [...left.map((k) => -line[k]), line[count], line[count + 1]] : [...left.map((k) => (k === column ? 1 : 0)), 0, 0];
+    });
+    this.size = left.length;
+  }
+  /** Rows of |M| <= share N h / 2 and |V| <= μ N + c A, over the free forces and the push. */
+  conditions(share) {
+    const rows = [], limits = [], weights = [], signs = [-1, 1];
+    const add = (sign, [one, other], factor, constant, kind) => {
+      const row = other.map((value, k) => sign * one[k] - factor * value), weight = row.splice(this.size, 1)[0];
+      const scale = 1 / Math.max(...row.map(Math.abs), SMALL);
+      rows.push(row.map((value) => scale * value));
+      limits.push(scale * (constant - weight));
+      weights.push({ ...kind, sign, scale });
+    };
+    this.joints.forEach(({ depth, friction, cohesion }, joint) => {
+      const [normal, shear, moment] = [0, 1, 2].map((k) => this.forces[3 * joint + k]);
+      for (const sign of signs) add(sign, [moment, normal], 0.5 * share * depth, 0, { joint, hinge: true });
+      if (friction !== null) for (const sign of signs) add(sign, [shear, normal], friction, cohesion / this.weight, { joint, hinge: false });
+    });
+    return { rows, limits, kinds: weights };
+  }
+  /** Largest push to one side, +1 or -1, in g, with the joints that give way; null: it does not stand. */
+  collapse(side) {
+    const { rows, limits, kinds } = this.conditions(1);
+    const found = maximise([...new Array(this.size).fill(0), side], rows, limits);
+    if (found === null) return null;
+    const failing = found.u ? kinds.filter((_, k) => found.u[k] > 1e-7) : [];
+    return { factor: found.value, side, y: found.y, hinges: failing.filter((each) => each.hinge), slides: failing.filter((each) => !each.hinge) };
+  }
+  /** Whether any state of equilibrium holds under its weight. */
+  stands() {
+    const { rows, limits } = this.conditions(1);
+    return maximise(new Array(this.size).fill(0), rows.map((row) => row.slice(0, this.size)), limits) !== null;
+  }
+  /** The push that brings it down, the weaker side; a factor below zero where it does not stand. */
+  weakest() {
+    const [one, other] = [this.collapse(1), this.collapse(-1)];
+    if (!one || !other) return { factor: -1, side: 1, hinges: [], slides: [] };
+    return one.factor <= other.factor * (1 + 1e-9) ? one : other;
+  }
+  /** N, V and M of all joints, from free forces and a push [1/weight]. */
+  read(y) {
+    const all = [...y.slice(0, this.size), 1, y[this.size]];
+    const values = this.forces.map((row) => row.reduce((sum, value, k) => sum + value * all[k], 0));
+    return this.joints.map((_, j) => values.slice(3 * j, 3 * j + 3));
+  }
+  /** e of the thrust line that stays farthest from the faces under a push in g: the least max |e|. */
+  thrust(push) {
+    let share = 1, weights = this.joints.map(({ depth }) => 0.5 * depth), best = null;
+    for (let round = 0; round < 12; round++) {
+      // Dinkelbach: the largest reserve at a share, then the share that this line has
+      const { rows, limits, kinds } = this.conditions(share), size = this.size;
+      const reserve = rows.map((row, k) => [...row.slice(0, size), kinds[k].hinge ? kinds[k].scale * weights[kinds[k].joint] : 0]);
+      const found = maximise([...new Array(size).fill(0), 1], reserve, limits.map((limit, k) => limit - push * rows[k][size]));
+      if (!found?.y) return best;
+      const forces = this.read([...found.y.slice(0, size), push]);
+      const lines = forces.map(([normal, , moment], j) => (normal > SMALL ? moment / normal / this.joints[j].depth : NaN));
+      if (lines.some(Number.isNaN)) return best;
+      const next = 2 * Math.max(...lines.map(Math.abs));
+      if (best && next > share - 1e-10) return best;
+      best = lines;
+      share = next;
+      weights = forces.map(([normal], j) => 0.5 * normal * this.joints[j].depth);
+    }
+    return best;
+  }
+}
+
+/** Geometry of a joint: its normal points from its lower block to its higher one. */
+function makeJoint({ blocks, ends: [inner, outer], friction, cohesion }, centre) {
+  const depth = Math.hypot(outer[0] - inner[0], outer[1] - inner[1]), tangent = [0, 1].map((k) => (outer[k] - inner[k]) / depth);
+  const middle = [0, 1].map((k) => 0.5 * (inner[k] + outer[k])), [low, high] = blocks.map((body) => centre[body]);
+  let normal = [tangent[1], -tangent[0]];
+  if (normal[0] * (high[0] - low[0]) + normal[1] * (high[1] - low[1]) < 0) normal = normal.map((value) => -value);
+  return { blocks, ends: [inner, outer], depth, tangent, normal, middle, friction, cohesion };
+}
+/** Where a thrust line crosses a joint. */
+const crossing = ({ middle, tangent, depth }, e) => [0, 1].map((k) => middle[k] + e * depth * tangent[k]);
+/** The end of a joint about which it turns: extrados for M > 0. */
+const hingePoint = (joint, sign) => joint.ends[sign > 0 ? 1 : 0];

@@ -1,0 +1,135 @@
+"""A plain run needs no call that Windows or macOS lacks, and none of the large packages."""
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import archfem as af
+from archfem import _files
+
+ROOT = Path(af.__file__).parents[1]
+
+CASE = """
+title = "a column"
+[structure]
+shape = "column"
+breadth = 1.0
+heights = [1.0, 1.0]
+[model]
+fidelity = "rigid"
+displacements = "large"
+[motion]
+synthetic = { seed = 1, duration = 0.5, pga = 1.0 }
+[analysis]
+dt = "5 ms"
+[output]
+animation = true
+"""
+
+WITHOUT = """
+import os, signal, subprocess, sys  # subprocess takes msvcrt for Windows
+from types import SimpleNamespace
+for name in {missing}:
+    sys.modules[name] = None
+if "fcntl" in {missing}:
+    sys.modules["msvcrt"] = SimpleNamespace(LK_NBLCK=2, locking=lambda *_: None)
+    for name in ("fork", "getuid", "getpgid", "killpg"):
+        delattr(os, name)
+    del signal.SIGKILL, signal.SIGPIPE
+import archfem
+sys.exit(archfem.commands.main({words}))
+"""
+
+POSIX = ["fcntl", "resource", "pwd", "grp"]
+LARGE = ["gmsh", "pyvista", "vtkmodules", "imageio", "imageio_ffmpeg", "dolfinx", "petsc4py"]
+LARGE += ["mpi4py", "meshio", "distributed"]
+
+
+def run_without(missing, *words):
+    """Run a command in a process without some modules, and those of POSIX without its calls."""
+    code = WITHOUT.format(missing=missing, words=list(map(str, words)))
+    given = {"cwd": ROOT, "text": True, "capture_output": True, "check": False}
+    return subprocess.run([sys.executable, "-c", code], **given)
+
+
+@pytest.fixture(scope="module")
+def carried_out(tmp_path_factory):
+    """Folder and process of a run without calls of POSIX and without large packages."""
+    folder = tmp_path_factory.mktemp("portable")
+    (folder / "case.toml").write_text(CASE, encoding="utf-8")
+    words = ("run", folder / "case.toml", "--out", folder / "out")
+    return folder / "out", run_without(POSIX + LARGE, *words)
+
+
+def test_a_run_needs_no_calls_of_posix_and_no_large_package(carried_out):
+    folder, ran = carried_out
+    assert ran.returncode == 0, ran.stderr
+    assert "a column: stands" in ran.stdout
+    assert {"history.nc", "dead.png", "summary.txt"} <= {path.name for path in folder.iterdir()}
+    # the film is left out, which is said with the remedy
+    assert "no film is written" in ran.stderr
+    assert "pip install 'archfem[film]'" in ran.stderr
+    assert not (folder / "hinges.mp4").exists()
+
+
+def test_its_history_is_that_of_this_system(carried_out):
+    run = af.History.read(carried_out[0] / "history.nc")
+    case = af.Case.read(carried_out[0] / "case.toml")
+    here = case.analysis.run(case.ground_motion())
+    # its dead load is found by SciPy, and here by PETSc if that is there: to their tolerances
+    expected = here.joints["N"].values
+    assert abs(run.joints["N"].values - expected).max() < 1e-6 * abs(expected).max()
+
+
+@pytest.mark.parametrize(
+    ("missing", "words", "remedy"),
+    [
+        (["imageio"], ("animate", "history.nc"), "pip install 'archfem[film]'"),
+        (["pyvista"], ("animate", "history.nc", "--renderer", "pyvista"), "'archfem[film]'"),
+        (["gmsh"], ("mesh", "case.toml", "--out", "a.msh"), "pip install 'archfem[mesh]'"),
+    ],
+)
+def test_what_a_missing_package_is_for_is_said_in_one_line(carried_out, missing, words, remedy):
+    folder = carried_out[0]
+    words = [folder / word if "." in word else word for word in words]
+    if words[0] == "mesh":
+        pytest.importorskip("dolfinx")
+        words += ["--set", "model.fidelity=full", "--set", "model.displacements=small"]
+    ran = run_without(missing, *words)
+    assert ran.returncode == 1
+    assert "Traceback" not in ran.stderr
+    assert f"{missing[0]} cannot be loaded" in ran.stderr
+    assert remedy in ran.stderr.splitlines()[-1]
+
+
+def test_locks_of_windows_exclude_and_leave_the_content_readable(monkeypatch, tmp_path):
+    held = set()
+
+    def lock(number, mode, count):
+        place = os.fstat(number).st_ino, os.lseek(number, 0, os.SEEK_CUR)
+        if place in held:
+            raise OSError(errno.EACCES, "locked")
+        held.add(place)
+
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    monkeypatch.setitem(sys.modules, "msvcrt", SimpleNamespace(LK_NBLCK=2, locking=lock))
+    with _files.lock_folder(tmp_path):
+        ((_, offset),) = held
+        assert offset > len((tmp_path / ".lock").read_bytes()) > 0
+        with (
+            pytest.raises(af.InvalidInput, match=f"another driver runs.*process {os.getpid()}"),
+            _files.lock_folder(tmp_path),
+        ):
+            pass
+    # a lock that is waited for is taken as soon as it is free
+    held.clear()
+    with (tmp_path / "file").open("ab+") as first, (tmp_path / "file").open("ab+") as second:
+        _files.lock_file(first, wait=True)
+        monkeypatch.setattr(_files, "sleep", lambda _: held.clear())
+        _files.lock_file(second, wait=True)
+        assert len(held) == 1

@@ -1,0 +1,245 @@
+"""The page that starts from examples, photos and drawings: against Python, and by clicks."""
+
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chromium import browser, complaints
+from live_scripts import run_in_node, wait_for_runs
+from PIL import Image
+
+import archfem as af
+from archfem.view.pages import live
+
+DOCS = Path(__file__).parents[3] / "docs"
+SHAPES = {
+    "circle": af.circular_arch,
+    "ellipse": af.shapes.elliptical_arch,
+    "pointed": af.shapes.pointed_arch,
+}
+DRAWN = """
+(() => {
+  const ring = drawRing(given.drawn), design = { factor: 1, stones: given.stones, friction: 0.6 };
+  const arch = cutRing(ring, design, given.parameters);
+  return { mass: arch.bodies.mass, factor: new Equilibrium(arch).weakest().factor };
+})()
+"""
+READ = """
+(() => {
+  const read = given.dxf ? readDxf : readGeoJson;
+  const arch = assembleOutlines(read(given.text), given.unit ?? 1, given.parameters);
+  return { joints: arch.joints.length, factor: new Equilibrium(arch).weakest().factor };
+})()
+"""
+WRONG = "(() => { try { %s; } catch (error) { return error.message; } })()"
+
+
+@pytest.fixture(scope="module")
+def parameters():
+    ring = af.circular_arch(radius=3.0, thickness=0.5, embrace=150.0, voussoirs=5)
+    return live.describe_arch(ring)["parameters"]
+
+
+def weakest(structure):
+    live_loads = [af.BodyForce(side, 0.0) for side in (1.0, -1.0)]
+    return min(af.collapse_factor(structure, live=each).factor for each in live_loads)
+
+
+@pytest.mark.parametrize(("kind", "rise"), [("circle", 1.5), ("ellipse", 2.4), ("pointed", 3.2)])
+def test_a_drawn_arch_is_that_of_its_shape(parameters, kind, rise):
+    size = {"span": 5.0, "rise": rise, "thickness": 0.5}
+    drawn = size | {"kind": kind, "left": [1.0, 2.0]}
+    found = run_in_node({"drawn": drawn, "stones": 14, "parameters": parameters}, DRAWN)
+    options = {} if kind == "circle" else {"chords": 16}
+    structure = SHAPES[kind](**size, voussoirs=14, **options)
+    masses = [structure.density(b) * b.area * structure.width for b in structure.blocks]
+    free = [mass for mass, block in zip(masses, structure.blocks, strict=True) if not block.fixed]
+    # a curve is kept at 25 joints, between which it is a circle; stones of a pointed arch are cut
+    # along the middle here, and along the intrados there
+    near = {"circle": 1e-3, "ellipse": 0.01, "pointed": 0.03}[kind]
+    assert sum(m for m, _ in found["mass"]) == pytest.approx(sum(free), rel=near)
+    assert found["factor"] == pytest.approx(weakest(structure), rel=near)
+
+
+def test_outlines_of_a_drawing_have_the_joints_that_archfem_finds(parameters, tmp_path):
+    structure = af.arch_on_piers(
+        radius=2.5, thickness=0.5, voussoirs=9, pier_breadth=1.4, courses=[0.8, 0.8], chords=1
+    )
+    af.masonry.write_outlines(structure, path := tmp_path / "arch.geojson")
+    given = {"text": path.read_text(), "parameters": parameters}
+    found = run_in_node(given, READ)
+    assert found["joints"] == len(structure.joints)
+    assert found["factor"] == pytest.approx(weakest(structure), rel=1e-4)
+
+
+def dxf(*rings):
+    """Closed polylines as DXF."""
+    lines = ["0", "SECTION", "2", "ENTITIES"]
+    for ring in rings:
+        lines += ["0", "LWPOLYLINE", "8", "STONES", "70", "1"]
+        lines += [word for x, y in ring for word in ("10", str(x), "20", str(y))]
+    return "\n".join([*lines, "0", "ENDSEC", "0", "EOF"])
+
+
+def box(left, low, right, high):
+    return (left, low), (right, low), (right, high), (left, high)
+
+
+def test_a_column_in_dxf_falls_at_its_slenderness(parameters):
+    text = dxf(box(-1, -1, 2, 0), box(0, 0, 0.5, 1), box(0, 1, 0.5, 2))
+    found = run_in_node({"text": text, "dxf": True, "parameters": parameters}, READ)
+    assert found == {"joints": 2, "factor": pytest.approx(0.25, rel=1e-9)}  # breadth over height
+
+
+@pytest.mark.parametrize(
+    ("rings", "words"),
+    [
+        ([box(0, 0, 1, 1)], "has no closed outlines"),
+        ([box(0, 0, 1, 1), ((0, 1), (1, 2), (1, 1), (0, 2.2))], "outline 2 crosses itself"),
+        ([box(0, 0, 2, 1), ((0, 1), (2, 1), (2, 3), (1, 1.5), (0, 3))], "is not convex"),
+        ([box(0, 0, 1, 1), box(0, 0.5, 1, 2)], "are in each other by 500 mm"),
+        ([box(0, 0, 1, 1), box(0, 1.5, 1, 2)], "outline 2 touches no other"),
+        ([box(0, 0, 1000, 1), box(0, 1, 1000, 2)], "choose its unit"),
+    ],
+)
+def test_bad_drawings_get_words(parameters, rings, words):
+    given = {"text": dxf(*rings), "parameters": parameters}
+    program = WRONG % "assembleOutlines(readDxf(given.text), 1, given.parameters)"
+    assert words in run_in_node(given, program)
+
+
+@pytest.mark.parametrize(
+    ("drawn", "words"),
+    [
+        ({"kind": "circle", "span": 4.0, "rise": 3.0}, "choose a pointed arch or an ellipse"),
+        ({"kind": "pointed", "span": 4.0, "rise": 1.0}, "choose a circle or an ellipse"),
+        ({"kind": "circle", "span": 4.0, "rise": -1.0}, "the crown above them"),
+    ],
+)
+def test_marks_that_are_no_arch_get_words(drawn, words):
+    drawn |= {"thickness": 0.4, "left": [0.0, 0.0]}
+    assert words in run_in_node({"drawn": drawn}, WRONG % "drawRing(given.drawn)")
+
+
+def test_records_are_read_as_archfem_reads_them(at2, tmp_path):
+    samples = 0.3 * np.sin(np.arange(200) * 0.2)
+    at2(path := tmp_path / "record.AT2", samples, 0.01)
+    columns = "\n".join(f"{0.01 * k:.2f} {value:.6f}" for k, value in enumerate(samples))
+    expected = af.Motion.read(path)
+    for text in (path.read_text(), columns):
+        found = run_in_node({"text": text}, 'readRecord(given.text, "a record")')
+        assert found["dt"] == pytest.approx(expected.dt)
+        # this page has g = 9.81 m/s², and archfem 9.80665
+        assert found["x"] == pytest.approx(expected.horizontal.tolist(), abs=2e-3)
+    program = WRONG % 'readRecord(given.text, "a record")'
+    assert "give two columns" in run_in_node({"text": "no record\n" * 20}, program)
+
+
+def test_the_page_of_the_documentation_is_that_of_the_scripts():
+    """All but the packed examples, which take seconds to compute."""
+    sys.path.insert(0, str(DOCS))
+    try:
+        import try_page
+    finally:
+        sys.path.remove(str(DOCS))
+    stored = try_page.PAGE.read_text(encoding="utf-8")
+    written = try_page.build_page([{"ring": {"stones": 1}, "thrust": None}])
+    bare = [re.sub(r'(id="data">)[^<]*', r"\1", text) for text in (stored, written)]
+    assert bare[0] == bare[1], "run `make wasm`, and commit what it writes"
+    assert len(stored) < 0.5e6
+
+
+@pytest.mark.slow
+def test_an_arch_is_drawn_on_a_photo_and_taken_away(tmp_path):
+    """Photo, scale, three marks; then the case, and the link."""
+    photo = tmp_path / "photo.png"
+    Image.new("RGB", (400, 300), "grey").save(photo)
+    (tmp_path / "large.png").write_bytes(b"0" * 21_000_000)
+    (tmp_path / "none.png").write_bytes(b"no picture")
+    find = "css selector"
+    with browser(wide=1280) as driver:
+        from selenium.webdriver import ActionChains
+
+        def message():
+            return driver.find_element(find, "#message").text
+
+        def click(x, y):
+            """Click at shares of the picture, from its left and its top."""
+            stage = driver.find_element(find, "#stage")
+            wide, high = stage.size["width"], stage.size["height"]
+            drawn = min(wide, high * 4 / 3), min(high, wide * 3 / 4)
+            offset = round((x - 0.5) * drawn[0]), round(high / 2 - (1.0 - y) * drawn[1])
+            ActionChains(driver).move_to_element_with_offset(stage, *offset).click().perform()
+
+        driver.get((DOCS / "try" / "index.html").resolve().as_uri())
+        wait_for_runs(driver, 1)
+        for details in driver.find_elements(find, ".live-start summary"):
+            details.click()
+        driver.find_element(find, "#mark").click()
+        assert message() == "place a photo or an elevation first"
+        for name, words in (("large", "has 21 MB"), ("none", "is no picture")):
+            driver.find_element(find, "#photo").send_keys(str(tmp_path / f"{name}.png"))
+            wait(driver, lambda words=words: words in message())
+        driver.find_element(find, "#photo").send_keys(str(photo))
+        wait(driver, lambda: "Click two points" in message())
+        driver.find_element(find, "#mark").click()
+        assert "no scale yet" in message()
+        driver.find_element(find, "#scale").click()
+        click(0.2, 0.8)
+        click(0.8, 0.8)
+        driver.find_element(find, "#length").send_keys("6\n")
+        for x, y in ((0.2, 0.8), (0.8, 0.8), (0.5, 0.5)):
+            click(x, y)
+        wait(driver, lambda: "Drag the three points" in message())
+        script = "return document.querySelector('.arch').live.tools.source.drawn"
+        drawn = driver.execute_script(script)
+        # a pixel is 2 cm
+        assert [drawn["span"], drawn["rise"]] == pytest.approx([6.0, 2.25], abs=0.05)
+        case = driver.execute_script(
+            "return document.querySelector('.arch').live.tools.writeCase()"
+        )
+        (tmp_path / "arch.toml").write_text(case)
+        structure = af.Case.read(tmp_path / "arch.toml").structure
+        shown = float(driver.find_element(find, "#collapse").text.split()[0])
+        assert shown == pytest.approx(weakest(structure), abs=2e-3)
+        driver.find_element(find, "#link").click()
+        wait(driver, lambda: "holds the arch" in message())
+        address = driver.current_url
+        driver.get("about:blank")
+        driver.get(address)
+        wait_for_runs(driver, 1)
+        wait(driver, lambda: driver.execute_script(script) == drawn)
+        assert float(driver.find_element(find, "#collapse").text.split()[0]) == shown
+        driver.save_screenshot(str(tmp_path / "drawn.png"))
+        assert complaints(driver) == []
+
+
+def wait(driver, condition):
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    WebDriverWait(driver, 60, poll_frequency=0.05).until(lambda _: condition())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(9))
+def test_every_example_is_a_case_that_archfem_reads(tmp_path, number):
+    with browser(wide=390) as driver:
+        driver.get((DOCS / "try" / "index.html").resolve().as_uri())
+        wait_for_runs(driver, 1)
+        driver.execute_script(
+            "const e = document.querySelector('#example'); e.value = arguments[0];"
+            "e.dispatchEvent(new Event('change'))",
+            number,
+        )
+        case = driver.execute_script(
+            "return document.querySelector('.arch').live.tools.writeCase()"
+        )
+        (tmp_path / "arch.toml").write_text(case)
+        read = af.Case.read(tmp_path / "arch.toml")
+        shown = float(driver.find_element("css selector", "#collapse").text.split()[0])
+        assert shown == pytest.approx(weakest(read.structure), abs=2e-3)
+        assert read.ground_motion().pga > 0.0
+        assert driver.execute_script("return document.documentElement.scrollWidth") <= 390
+        assert complaints(driver) == []
