@@ -332,6 +332,32 @@ def overturned_column() -> Iterator[Scene]:
         )
 
 
+def pressed_stack() -> Iterator[Scene]:
+    """S40: stones of the dry granite walls of Vasconcelos and Lourenço, stacked and pressed."""
+    breadth, height, density = 0.2, 0.15, 2000.0
+    corners = [(0.0, -height), (breadth, -height), (breadth, 0.0), (0.0, 0.0)]
+    blocks = [block("base", corners, density, fixed=True)]
+    for k in range(1, 9):
+        outline = [(x, y + k * height) for x, y in corners]
+        blocks.append(block(f"stone {k}", outline, density))
+    joints = [joint(k, k + 1, (0.0, k * height), (breadth, k * height)) for k in range(8)]
+    yield scene(
+        "S40",
+        "modulus of dry sawn granite under 0.5 MPa",
+        (blocks, joints),
+        {
+            "kind": "closing",
+            "pressure": 5e5,
+            "finish": "sawn",
+            "young": 2.02e10,
+            "strength": 69.2e6,
+        },
+        {"modulus": ("MPa", "pressure over the mean strain from no pressure")},
+        laws=law(0.65),
+        note="Stiffness of the joints is part of the question. Weight is negligible.",
+    )
+
+
 def wall(courses: Sequence[Sequence[float]]) -> tuple[list[Scene], list[Scene]]:
     """Return a wall of courses from below, in blocks of 0.4 m; negative lengths are openings."""
     length, height, density = 0.4, 0.175, 1000.0
@@ -655,7 +681,7 @@ def scenes() -> Iterator[Scene]:
     """Yield all scenes."""
     for group in (
         *(least_thickness, sideways, arches_in_motion, overturned_column, walls, rocking),
-        *(spreading, bridges, elliptical_bridge, point_load, mortared_arches),
+        *(spreading, bridges, elliptical_bridge, point_load, mortared_arches, pressed_stack),
     ):
         yield from group()
 

@@ -23,6 +23,8 @@ ACTIONS: dict[str, set[str]] = {
     "motion": {"times", "accelerations", "end"},
     "scaled motion": {"times", "accelerations", "end", "between"},
     "rocking": {"tilt", "impacts", "ratio"},
+    # pressure on a stack of a finish, modulus and strength of its stone
+    "closing": {"pressure", "finish", "young", "strength"},
 }
 
 KINDS = {"E": "measured", "A": "closed form", "P": "program"}

@@ -51,6 +51,8 @@ settings: dict[str, list[dict[str, Any]]] = {
         {"joints": "rigid", "dt": 5e-4, "width": 0.01, "variant": "rigid"},
     ],
     "rocking": [{"dt": 2e-4}, {"dt": 4e-4}],
+    # which law of the range of a finish, from the softest to the stiffest
+    "closing": [{"law": 1}, {"law": 0}, {"law": 2}],
 }
 
 cannot = {
@@ -308,6 +310,26 @@ def find_rocking(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, A
     return {"values": {name: find[name]() for name in scene["quantities"]}, "said": "rigid impacts"}
 
 
+def find_modulus(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]:
+    """Press a stack of rigid stones with the law of closing of its finish; add their own strain."""
+    stack, action, number = structure(scene), scene["action"], settings["law"]
+    pressure, depth = action["pressure"], stack.joints[0].depth
+    given = {"strength": action["strength"], "stress": pressure}
+    laws = af.joint_stiffness(action["young"], depth, action["finish"], **given)
+    friction, closure = stack.joints[0].contact.friction, laws.closure[number]
+    contact = af.Contact(laws.initial[number], laws.shear[number], friction, closure=closure)
+    joints = tuple(replace(joint, contact=contact) for joint in stack.joints)
+    top = stack.blocks[-1]
+    weight = pressure * depth / top.area
+    press = replace(top.material, unit_weight=weight, stands_for="press")
+    blocks = (*stack.blocks[:-1], replace(top, material=press))
+    dead = af.dead_load(af.build(replace(stack, blocks=blocks, joints=joints), fidelity="rigid"))
+    shortening = -float(dead.q[-2])  # of the centroid of the highest stone
+    height = len(joints) * top.area / depth
+    modulus = pressure / (shortening / height + pressure / action["young"])
+    return {"values": {"modulus": modulus / 1e6}, "said": f"law {number} of its finish"}
+
+
 QUESTIONS = {
     "thickness": find_thickness,
     "sideways": find_factor,
@@ -316,4 +338,5 @@ QUESTIONS = {
     "motion": find_displacement,
     "scaled motion": find_scale,
     "rocking": find_rocking,
+    "closing": find_modulus,
 }
