@@ -187,7 +187,7 @@ def bonded(stones: af.Structure, strength: float) -> af.Structure:
     """Return a structure whose joints have a tensile strength, and at least its cohesion [Pa]."""
     joints = []
     for joint in stones.joints:
-        cohesion = max(1.0, joint.contact.friction) * strength
+        cohesion = max(1.0, joint.contact.coefficient) * strength
         bond = replace(joint.contact, tension=strength, cohesion=cohesion)
         joints.append(replace(joint, contact=bond))
     return replace(stones, joints=tuple(joints))
