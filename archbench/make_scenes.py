@@ -358,9 +358,13 @@ def pressed_stack() -> Iterator[Scene]:
     )
 
 
-def wall(courses: Sequence[Sequence[float]]) -> tuple[list[Scene], list[Scene]]:
-    """Return a wall of courses from below, in blocks of 0.4 m; negative lengths are openings."""
-    length, height, density = 0.4, 0.175, 1000.0
+def wall(
+    courses: Sequence[Sequence[float]],
+    length: float = 0.4,
+    height: float = 0.175,
+    density: float = 1000.0,
+) -> tuple[list[Scene], list[Scene]]:
+    """Return a wall of courses from below, in blocks of a length; negative ones are openings."""
     width = length * sum(map(abs, courses[0]))
     blocks = [
         block("base", [(0.0, -height), (width, -height), (width, 0.0), (0.0, 0.0)], density, True)
@@ -437,6 +441,78 @@ def walls() -> Iterator[Scene]:
             meanings,
             laws=law(0.65),
         )
+
+
+# Joints of the granite walls [Pa/m], from the modulus of the walls at their first loading
+GRANITE_STIFFNESS = {40: 26.2e9, 100: 26.2e9, 175: 34.0e9, 250: 41.1e9}
+
+
+def granite_walls() -> Iterator[Scene]:
+    """S32: dry walls of granite under a press, pushed at their top beam."""
+    courses = [[1.0] * 5, [0.5, 1.0, 1.0, 1.0, 1.0, 0.5]] * 4
+    length, top, push, thickness = 1.0, 1.2, 1.325, 0.2
+    for press, stiffness in GRANITE_STIFFNESS.items():
+        # 20 kN/m³, as in the data base
+        blocks, joints = wall(courses, 0.2, 0.15, 20e3 / G)
+        beam = [(0.0, top), (length, top), (length, 2.0 * push - top), (0.0, 2.0 * push - top)]
+        weight = 20e3 * length * 2.0 * (push - top) * thickness
+        ends = [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, length]
+        joints += [
+            joint(len(blocks) - 6 + k, len(blocks), (ends[k], top), (ends[k + 1], top))
+            for k in range(6)
+        ]
+        blocks.append(block("beam", beam, 20e3 / G))
+        capacity = "largest force at the top beam, where the load was raised"
+        quantities = {"monotonic": ("kN", f"{capacity} once")}
+        if press > 40:
+            quantities["cyclic"] = ("kN", f"{capacity} to and fro, mean of both ways")
+        yield scene(
+            f"S32_{press:03d}",
+            f"dry granite wall under {press} kN, pushed in its plane",
+            (blocks, joints),
+            {
+                "kind": "push",
+                "point": [0.0, push],
+                "force": [1e3, 0.0],
+                "dead": [{"point": [0.5, push], "force": [0.0, round(weight - 1e3 * press, 6)]}],
+                "displacements": {},
+            },
+            quantities,
+            width=thickness,
+            laws=law(0.62, stiffness, 0.4 * stiffness),
+            note="The beam is a block that weighs 1 kN of the load. It may turn and rise. Friction "
+            "is assumed; 0.65 changes the load by 0.1 kN.",
+        )
+
+
+def wall_out_of_plane() -> Iterator[Scene]:
+    """S33: wall 12 of Griffith et al., held at its head, pushed at mid-height."""
+    thickness, height, courses, density = 0.11, 1.5, 18, 1800.0
+    blocks, joints = wall([[1.0]] * courses, thickness, height / courses, density)
+    stop = [(thickness, 1.48), (0.16, 1.48), (0.16, height), (thickness, height)]
+    # from the intrados to the extrados, upwards as the other joints are from the left
+    side = joint(courses, courses + 1, (thickness, 1.48), (thickness, height))
+    blocks.append(block("stop", stop, density, fixed=True))
+    weight = round(thickness * height * density * G, 6)
+    places = {"at 0.08": 0.0752, "at 0.19": 0.1889, "at 0.36": 0.3621, "at 0.55": 0.5507}
+    yield scene(
+        "S33",
+        "brick wall held at its head, pushed out of its plane",
+        (blocks, [*joints, {**side, "law": "smooth"}]),
+        {
+            "kind": "push",
+            "point": [0.0, 0.5 * height],
+            "force": [weight, 0.0],
+            "dead": [],
+            "displacements": {k: round(share * thickness, 9) for k, share in places.items()},
+        },
+        {
+            key: ("weights", f"force where mid-height has moved by {share:g} of the thickness")
+            for key, share in places.items()
+        },
+        laws={**law(0.7, 2e10, 8e9), "smooth": law(1e-6, 2e10, 8e9)["dry"]},
+        note="Joints are dry; their stiffness, 20 GPa/m, is assumed.",
+    )
 
 
 def rocking_block(breadth: float, height: float) -> tuple[list[Scene], list[Scene]]:
@@ -538,7 +614,7 @@ def bridges() -> Iterator[Scene]:
     from_memory = {"S20": ["cover"], "S22": ["span", *LENGTHS], "S21_cr155": LENGTHS[1:]}
     for name, (place, span, rise, thickness, width, cover, density, share) in BRIDGES.items():
         x = (share - 0.5) * span
-        notes = {"S20": "Densities and strength as published."}
+        notes = {"S20": "Densities, strength and fill as published."}
         known = "Densities, strength and fill assumed."
         skew = " The skew of 29° is neglected." if name == "S21_barlae" else ""
         yield scene(
@@ -552,6 +628,7 @@ def bridges() -> Iterator[Scene]:
                     "surface": round(rise + thickness + cover, 6),
                     "density": 2040.0,
                     "friction_angle": 30.0 if name == "S20" else 37.0,
+                    "cohesion": 5e3 if name == "S20" else 0.0,
                 },
                 "strength": 4.5e6 if name == "S20" else 5e6,
             },
@@ -577,6 +654,7 @@ def elliptical_bridge() -> Iterator[Scene]:
                 "surface": round(rise + thickness + cover, 6),
                 "density": 2040.0,
                 "friction_angle": 37.0,
+                "cohesion": 0.0,
             },
             "strength": 5e6,
         },
@@ -681,7 +759,8 @@ def scenes() -> Iterator[Scene]:
     """Yield all scenes."""
     for group in (
         *(least_thickness, sideways, arches_in_motion, overturned_column, walls, rocking),
-        *(spreading, bridges, elliptical_bridge, point_load, mortared_arches, pressed_stack),
+        *(granite_walls, wall_out_of_plane, pressed_stack),
+        *(spreading, bridges, elliptical_bridge, point_load, mortared_arches),
     ):
         yield from group()
 

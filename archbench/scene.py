@@ -20,6 +20,7 @@ ACTIONS: dict[str, set[str]] = {
     "sideways": set(),
     "spread": {"block", "direction"},
     "load": {"patch", "fill", "strength"},
+    "push": {"point", "force", "dead", "displacements"},
     "motion": {"times", "accelerations", "end"},
     "scaled motion": {"times", "accelerations", "end", "between"},
     "rocking": {"tilt", "impacts", "ratio"},

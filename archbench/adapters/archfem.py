@@ -28,13 +28,26 @@ settings: dict[str, list[dict[str, Any]]] = {
     # solved exactly by a linear programme, in which nothing but physics is set
     "sideways": [{}],
     "spread": [{"tolerance": 1e-5}, {"tolerance": 1e-3}],
-    # mobilised share of passive pressure and cohesion of the fill [Pa]
+    # mobilised share of passive pressure and cohesion of the fill [Pa]; share of the ring's
+    # thickness; change of the cover [m]; share of the strength
     "load": [
-        {"mobilisation": 0.3333, "cohesion": 0.0},
+        {"mobilisation": 0.3333},
         {"mobilisation": 0.0, "cohesion": 0.0},
         {"mobilisation": 1.0, "cohesion": 0.0},
         {"mobilisation": 1.0, "cohesion": 7e3},
-        {"mobilisation": 0.3333, "cohesion": 0.0, "crushing": False, "variant": "no crushing"},
+        {"mobilisation": 0.3333, "thickness": 0.9},
+        {"mobilisation": 0.3333, "thickness": 1.1},
+        {"mobilisation": 0.3333, "cover": -0.1},
+        {"mobilisation": 0.3333, "cover": 0.1},
+        {"mobilisation": 0.3333, "strength": 0.5},
+        {"plastic": True, "cohesion": 5e3, "gap": 0.1},
+        {"mobilisation": 0.3333, "crushing": False, "variant": "no crushing"},
+        {"mobilisation": 0.3333, "bond": 5e4, "variant": "bond of 50 kPa"},
+    ],
+    # joints as stiff as in the scene and half of that; sliding with and without dilatancy
+    "push": [
+        {"stiffness": 1.0, "friction": "coulomb"},
+        {"stiffness": 0.5, "friction": "nonassociated"},
     ],
     "motion": [
         {"joints": "points", "dt": 1e-3},
@@ -140,22 +153,103 @@ def find_spread(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, An
 
 def find_load(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]:
     """Find the largest load on a patch of the road, over a fill or on the bare ring."""
-    given = scene["action"]["fill"]
-    fill = None
+    given, fill = scene["action"]["fill"], None
+    if given:
+        scene = with_lengths(scene, settings.get("thickness", 1.0), settings.get("cover", 0.0))
+        fill = fill_of(given, settings)
     stones = structure(scene)
     if given:
-        fill = af.limit.Fill(
-            friction_angle=given["friction_angle"],
-            mobilisation=settings["mobilisation"],
-            cohesion=settings["cohesion"],
-        )
-        stones = with_fill(stones, given, scene["gravity"])
+        stones = with_fill(stones, scene["action"]["fill"], scene["gravity"])
+    elif "bond" in settings:
+        stones = bonded(stones, settings["bond"])
     left, right = scene["action"]["patch"]
     count = 7 if right > left else 1
     live = [af.PointLoad(x, (0.0, -1e3 / count)) for x in np.linspace(left, right, count)]
     strength = scene["action"]["strength"] if settings.get("crushing", True) else None
+    strength = strength and strength * settings.get("strength", 1.0)
     found = af.collapse_factor(stones, live=live, fill=fill, strength=strength)
-    return {"values": {"load": found.factor}, "said": str(found)}
+    brackets = {"brackets": {"load": (found.lower, found.upper)}} if "gap" in settings else {}
+    return {"values": {"load": found.factor}, "said": str(found), **brackets}
+
+
+def fill_of(
+    given: dict[str, Any], settings: dict[str, Any]
+) -> af.limit.Fill | af.limit.PlasticFill:
+    """Return the strength of a fill."""
+    angle = given["friction_angle"]
+    cohesion = settings.get("cohesion", given["cohesion"])
+    if settings.get("plastic"):
+        gap = settings["gap"]
+        return af.limit.PlasticFill(friction_angle=angle, cohesion=cohesion, gap=gap)
+    mobilisation = settings["mobilisation"]
+    return af.limit.Fill(friction_angle=angle, mobilisation=mobilisation, cohesion=cohesion)
+
+
+def bonded(stones: af.Structure, strength: float) -> af.Structure:
+    """Return a structure whose joints have a tensile strength, and at least its cohesion [Pa]."""
+    joints = []
+    for joint in stones.joints:
+        cohesion = max(1.0, joint.contact.coefficient) * strength
+        bond = replace(joint.contact, tension=strength, cohesion=cohesion)
+        joints.append(replace(joint, contact=bond))
+    return replace(stones, joints=tuple(joints))
+
+
+def with_lengths(scene: dict[str, Any], thickness: float, cover: float) -> dict[str, Any]:
+    """Return a ring whose extrados is moved to a share of its thickness, and its cover changed."""
+    moved = {}
+    for joint in scene["joints"]:
+        (x, y), (u, v) = joint["ends"]
+        moved[u, v] = [x + thickness * (u - x), y + thickness * (v - y)]
+
+    def place(points: list[list[float]]) -> list[list[float]]:
+        return [moved.get((x, y), [x, y]) for x, y in points]
+
+    rise = max(v for _, v in moved.values()) - max(v for _, v in moved)
+    action, fill = scene["action"], scene["action"]["fill"]
+    fill = {**fill, "surface": fill["surface"] + rise + cover}
+    blocks = [{**block, "outline": place(block["outline"])} for block in scene["blocks"]]
+    joints = [{**joint, "ends": place(joint["ends"])} for joint in scene["joints"]]
+    return {**scene, "blocks": blocks, "joints": joints, "action": {**action, "fill": fill}}
+
+
+def find_push(scene: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]:
+    """Find the largest multiple of a force, and that at displacements of its point."""
+    action, blocks = scene["action"], structure(scene)
+    (x, y), dead = action["point"], [point_load(**load) for load in action["dead"]]
+    live = af.PointLoad(x, tuple(action["force"]), y=y)
+    values, places = {}, action["displacements"]
+    if places:
+        joints = tuple(
+            replace(joint, contact=stiffened(joint.contact, settings["stiffness"]))
+            for joint in blocks.joints
+        )
+        blocks = replace(blocks, joints=joints)
+        model = af.build(blocks, fidelity="rigid", displacements="large")
+        stop = af.statics.Stop(displacement=1.1 * max(places.values()) / blocks.size)
+        path = af.pushover(model, live, dead=dead, stop=stop).curve
+        moved, factors = path["displacement"].values, path["factor"].values
+        # beyond the end of the path there is no answer
+        values = {
+            name: float(np.interp(place, moved, factors, right=np.nan))
+            for name, place in places.items()
+        }
+    others = [name for name in scene["quantities"] if name not in places]
+    if others:
+        found = af.collapse_factor(blocks, live=live, dead=dead, friction=settings["friction"])
+        values |= dict.fromkeys(others, found.factor)
+    return {"values": values, "said": "pushed" if places else str(found)}
+
+
+def point_load(point: list[float], force: list[float]) -> af.PointLoad:
+    """Return a load of a scene."""
+    return af.PointLoad(point[0], (force[0], force[1]), y=point[1])
+
+
+def stiffened(contact: af.Contact, factor: float) -> af.Contact:
+    """Return a contact with stiffnesses times a factor."""
+    normal, shear = factor * contact.normal_stiffness, factor * contact.shear_stiffness
+    return replace(contact, normal_stiffness=normal, shear_stiffness=shear)
 
 
 def with_fill(ring: af.Structure, given: dict[str, Any], gravity: float) -> af.Structure:
@@ -335,6 +429,7 @@ QUESTIONS = {
     "sideways": find_factor,
     "spread": find_spread,
     "load": find_load,
+    "push": find_push,
     "motion": find_displacement,
     "scaled motion": find_scale,
     "rocking": find_rocking,

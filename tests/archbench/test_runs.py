@@ -4,11 +4,13 @@ import json
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pytest
 
 from archbench import figures, run, table
 from archbench.programs import Program, programs, read_manifest
 from archbench.scene import BenchError, read_references, read_scene, scene_names
+from archbench.worker import load
 
 SCENE = read_scene("S04")
 PROGRAMS = {program.name: program for program in programs()}
@@ -242,7 +244,7 @@ def test_no_length_from_memory_is_shown_without_its_mark(rows):
         shown = table.markdown([row], ["archfem"]).splitlines()[-1]
         memory = read_scene(row.scene).get("from_memory")
         assert ("**g**" in shown) == bool(memory)
-        if row.kind == "E" and row.numbers("archfem") and row.grade != "m":
+        if (row.scene, row.quantity) in table.HEAD:
             assert ("**g**" in table.head([row]).splitlines()[-1]) == bool(memory)
         if memory:
             assert f"{row.scene}: {', '.join(memory)} from memory" in table.sources([row])
@@ -274,3 +276,32 @@ def test_a_row_counts_answers_inside_the_uncertainty(rows):
 def test_stored_answers_are_of_scenes_that_are_there():
     for path in run.RESULTS.glob("*.json"):
         assert set(json.loads(path.read_text(encoding="utf-8"))) <= set(scene_names())
+
+
+def test_an_answer_on_a_bridge_is_a_range_that_meets_that_of_the_test(rows):
+    (row,) = (row for row in rows if row.scene == "S20")
+    middle, half = row.reference
+    for low, high, inside in (
+        (0.5 * middle, middle - 1.01 * half, False),
+        (0.5 * middle, middle - 0.99 * half, True),
+        (middle + 0.99 * half, 2.0 * middle, True),
+        (middle + 1.01 * half, 2.0 * middle, False),
+    ):
+        runs = [{"settings": {}, "values": {"load": load}} for load in (low, high)]
+        assert replace(row, answers={"toy": {"runs": runs}}).is_inside("toy") is inside
+
+
+def test_a_ring_of_other_lengths_keeps_its_intrados_and_its_cover():
+    scene = read_scene("S20")
+    adapter = load(run.HERE / "adapters" / "archfem.py")
+    assert adapter.with_lengths(scene, 1.0, 0.0) == scene
+    thin = adapter.with_lengths(scene, 0.9, -0.1)
+    for joint, other in zip(scene["joints"], thin["joints"], strict=True):
+        (start, end), (same, moved) = np.array(joint["ends"]), np.array(other["ends"])
+        assert (same == start).all()
+        assert moved - same == pytest.approx(0.9 * (end - start))
+    covers = [
+        each["action"]["fill"]["surface"] - max(joint["ends"][1][1] for joint in each["joints"])
+        for each in (scene, thin)
+    ]
+    assert covers[1] == pytest.approx(covers[0] - 0.1, abs=1e-6)

@@ -23,7 +23,7 @@ def test_scenes_and_references_belong_together():
     assert sorted(path.stem for path in (HERE / "references").glob("*.toml")) == NAMES
     assert {name[:3] for name in NAMES} >= {
         *("S01", "S02", "S03", "S04", "S05", "S06", "S07", "S08", "S10", "S11", "S12"),
-        *("S15", "S20", "S21", "S22"),
+        *("S15", "S20", "S21", "S22", "S32", "S33"),
     }
 
 
@@ -51,6 +51,27 @@ def test_at_least_eight_measured_rows_were_read_in_a_source():
         if value.kind == "E" and value.grade in ("a", "b")
     ]
     assert len(read) >= 8
+
+
+def test_at_least_six_measured_rows_of_lateral_action_were_read():
+    lateral = [
+        value
+        for name in NAMES
+        if read_scene(name)["action"]["kind"] in ("push", "sideways")
+        for value in read_references(name)
+        if value.kind == "E" and value.grade in ("a", "b")
+    ]
+    assert len(lateral) >= 6
+
+
+def test_a_granite_wall_weighs_what_its_data_base_says():
+    """4.8 kN and the press at the base, of which the beam is 1 kN."""
+    for name, press in (("S32_040", 40.0), ("S32_250", 250.0)):
+        scene = read_scene(name)
+        area = sum(signed_area(b["outline"]) * b["density"] for b in scene["blocks"][1:])
+        (dead,) = scene["action"]["dead"]
+        weight = 1e-3 * scene["width"] * scene["gravity"] * area
+        assert weight - 1e-3 * dead["force"][1] == pytest.approx(4.8 + press, rel=1e-6)
 
 
 def test_bridges_name_the_lengths_that_were_not_read():
