@@ -82,8 +82,8 @@ def crown(found: list[Row]) -> Figure:
     axes = figure.subplot_mosaic([["programs", "rules"], ["fall", "fall"]], height_ratios=(3, 2))
     for name in PROGRAMS:
         if run := first_run(row, name):
-            style = {"color": COLOURS[name], "ls": DASHES[name]}
-            axes["programs"].plot(*_series(run), **style, label=NAMES[name])
+            times, u = _series(run)
+            axes["programs"].plot(times, u, color=COLOURS[name], ls=DASHES[name], label=NAMES[name])
     for (variant, text), dash, hue in zip(
         RULES.items(), ("-", "--", ":", "-."), HUES, strict=False
     ):

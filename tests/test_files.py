@@ -1,5 +1,6 @@
 """Files are written in one stroke: there is the old one or the new one, never half of it."""
 
+import fcntl
 import json
 import os
 import subprocess
@@ -266,7 +267,7 @@ def test_a_folder_has_one_writer(tmp_path):
 
 def test_a_lock_whose_file_its_owner_deletes_is_taken_anew(tmp_path, monkeypatch):
     """The owner may end between opening and locking of the file by the next one."""
-    flock, files = _files.fcntl.flock, []
+    flock, files = fcntl.flock, []
 
     def delete_first(file, operation):
         flock(file, operation)
@@ -274,7 +275,7 @@ def test_a_lock_whose_file_its_owner_deletes_is_taken_anew(tmp_path, monkeypatch
         if len(files) == 1:
             (tmp_path / ".lock").unlink()
 
-    monkeypatch.setattr(_files.fcntl, "flock", delete_first)
+    monkeypatch.setattr(fcntl, "flock", delete_first)
     with _files.lock_folder(tmp_path):
         assert len(files) == 2
         assert (tmp_path / ".lock").read_bytes().startswith(b"process")
