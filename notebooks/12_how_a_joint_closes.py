@@ -63,6 +63,9 @@ def draw_laws():
         axes[1].plot(at / MPa, secants / GPa, "o", color=line.get_color(), label=f"walls, {name}")
     axes[0].set(xlabel="closing [mm]", ylabel="pressure [MPa]", xlim=(0.0, 0.4))
     axes[1].set(xlabel="pressure [MPa]", ylabel="secant stiffness [GPa/m]", yscale="log")
+    marks = [4, 6, 10, 20, 40]
+    axes[1].set_yticks(marks, [f"{mark}" for mark in marks])
+    axes[1].minorticks_off()
     for ax in axes:
         ax.legend(frameon=False, fontsize=8)
         ax.grid(alpha=0.3)
@@ -209,6 +212,7 @@ def draw_answers():
     axes[0].axhline(0.19, color="#d7261e", lw=1.0, label="rigid")
     axes[1].axhline(0.1056, color="#d7261e", lw=1.0, label="rigid")
     axes[0].set_ylabel("pulse that fells Lemos' arch [g]")
+    axes[0].set_ylim(0.0, 0.26)
     axes[1].set_ylabel("thinnest semicircle, t/R")
     for ax in axes:
         ax.set_xticks(place, list(laws))
