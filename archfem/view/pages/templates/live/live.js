@@ -149,7 +149,10 @@ class Live {
     const done = this.runs.filter(Boolean), answers = done.filter((run) => !run.failure), fallen = answers.filter((run) => run.fell !== null).length, [own] = this.runs;
     const all = done.length === RUNS, share = `${fallen} of ${answers.length}`;
     this.say("share", all ? share : answers.length ? `${share} so far` : "…");
-    this.say("verdict", !own ? "Shaking …" : own.failure ? `It cannot be followed: ${own.failure}` : `${own.fell === null ? `This arch stands; a stone moved by up to ${(1e3 * own.displacement).toFixed(0)} mm.` : `This arch falls: the first stone is lost at ${own.fell.toFixed(2)} s.`} Of ${answers.length} slightly different arches${all ? "" : " so far"}, ${fallen === 0 ? "none" : fallen === answers.length ? "all" : fallen} ${fallen === 1 ? "falls" : "fall"}.`);
+    const fate = own && (own.fell === null ? `This arch stands; a stone moved by up to ${(1e3 * own.displacement).toFixed(0)} mm.` : `This arch falls: the first stone is lost at ${own.fell?.toFixed(2)} s.`);
+    const how = fallen === 0 ? "none fall" : fallen === answers.length ? "all fall" : `${fallen} ${fallen === 1 ? "falls" : "fall"}`;
+    const others = answers.length < 2 ? "Shaking slightly different ones …" : `Of ${answers.length} slightly different arches${all ? "" : " so far"}, ${how}.`;
+    this.say("verdict", !own ? "Shaking …" : own.failure ? `It cannot be followed: ${own.failure}` : `${fate} ${others}`);
     this.root.dataset.runs = done.length;
   }
   drawGround({ dt, x }, scale) {
@@ -169,7 +172,7 @@ class Live {
     const still = new Float64Array(3 * this.arch.bodies.mass.length), shaken = this.view === "shake", ready = this.runs.filter((run) => run?.frames);
     const poses = shaken && this.runs[0]?.frames ? at(this.runs[0]) : still, begins = time === 0;
     const lines = (this.view === "push" ? this.statics.push : this.view === "weight" || begins ? this.statics.weight : []).map((points) => ({ points, kind: "thrust" }));
-    this.stage.draw({ arch: this.arch, poses, ghosts: shaken && !begins ? ready.slice(1).map(at) : [], lines, hinges: this.view === "push" ? this.statics.hinges : [] });
+    this.stage.draw({ arch: this.arch, poses, ghosts: shaken && !begins ? ready.slice(1).map(at) : [], lines, hinges: this.view === "push" ? this.statics.hinges : [], handles: begins ? this.stage.handles : [] });
     this.say("clock", shaken ? `t = ${time.toFixed(2)} s` : "");
     this.find("cursor").setAttribute("x", (1000 * time) / this.end);
     this.find("stage").setAttribute("aria-label", `the arch ${{ shake: `at ${time.toFixed(2)} s`, weight: "under its own weight, with its thrust line", push: "at the push that brings it down, with its hinges" }[this.view]}`);

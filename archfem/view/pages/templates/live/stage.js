@@ -15,7 +15,7 @@ class Stage {
     if (!box) this.backdrop = null;
     this.canvas.style.aspectRatio = (this.box[2] - this.box[0]) / (this.box[3] - this.box[1]);
   }
-  /** Show a picture {arch, poses, ghosts, lines, hinges}; without one, the last again. */
+  /** Show a picture {arch, poses, ghosts, lines, hinges, handles}; without one, the last again. */
   draw(picture = this.picture) {
     this.picture = picture;
     if (!picture || !this.canvas.clientWidth) return;
@@ -25,10 +25,10 @@ class Stage {
     this.scale = Math.min(canvas.width / (right - left), canvas.height / (high - low));
     this.origin = [0.5 * canvas.width - 0.5 * this.scale * (left + right), canvas.height + this.scale * low];
     const style = getComputedStyle(canvas), colour = (name) => style.getPropertyValue(`--${name}`).trim();
-    const { arch, hinges } = picture;
+    const { arch, hinges, handles } = picture;
     if (this.backdrop) this.drawBackdrop();
     if (arch) this.drawArch(this.picture, colour, ratio);
-    for (const point of [...hinges, ...this.handles]) this.dot(this.place(point), 6 * ratio, colour("hinge"), colour("paper"));
+    for (const [points, kind] of [[hinges, "hinge"], [handles, "chosen"]]) for (const point of points) this.dot(this.place(point), 6 * ratio, colour(kind), colour("paper"));
   }
   drawArch({ arch, poses, ghosts, lines }, colour, ratio) {
     const { canvas, pen } = this, width = 1.2 * ratio;

@@ -83,7 +83,7 @@ class Tools {
   }
   drawMarks() {
     this.live.isMarking = true;
-    this.live.stage.draw({ arch: null, ghosts: [], lines: [], hinges: this.mode === "scale" ? this.scaleMarks : this.marks });
+    this.live.stage.draw({ arch: null, ghosts: [], lines: [], hinges: [], handles: this.mode === "scale" ? this.scaleMarks : this.marks });
   }
   press(event) {
     const { stage } = this.live, point = stage.pointAt(event);
