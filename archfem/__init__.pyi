@@ -66,7 +66,6 @@ from .statics.equilibrium import dead_load as dead_load
 from .statics.mechanism_assessment import kinematic_assessment as kinematic_assessment
 from .statics.modes import modes as modes
 from .statics.pushover import pushover as pushover
-from .studies.collapse_risk import CollapseRisk as CollapseRisk
 from .studies.collapse_risk import collapse_risk as collapse_risk
 from .studies.convergence import mesh_sensitivity as mesh_sensitivity
 from .studies.ida import ida as ida

@@ -167,11 +167,12 @@ def _add_case_commands(commands: Any) -> None:
             add_argument("--out", required=required, metavar="DIR", help=folder)
         return add_argument
 
-    add_to = add("run", "dead load, time histories, tables and pictures")
-    add_to("--workers", type=int, default=1, help="processes for pairs of a suite (1)")
+    add("run", "dead load, time histories, tables and pictures")(
+        "--workers", type=int, default=1, help="processes for pairs of a suite (1)"
+    )
     add("check", "read a case, build its model and find its dead load", "", module="tools")
-    add_to = add("modes", "frequencies, masses and shapes of vibrations about dead load")
-    add_to("--count", type=int, default=6, help="how many modes (6)")
+    about = "frequencies, masses and shapes of vibrations about dead load"
+    add("modes", about)("--count", type=int, default=6, help="how many modes (6)")
     about = "collapse factor and mechanism by limit analysis of the case alone"
     add("limit", about, "folder for text, table and picture (none)", required=False)
     about = "kinematic assessment of the collapse mechanism against a design spectrum"
@@ -185,16 +186,17 @@ def _add_case_commands(commands: Any) -> None:
     add_to("--dead", type=float, help="partial factor on the weights (1)")
     add_to("--width", type=float, help="width that carries one vehicle [m] (all)")
     add_to("--out", metavar="DIR", help="folder for text, table and picture (none)")
-    add_to = add("mesh", "write the mesh of a case as a gmsh file", "")
-    add_to("--out", required=True, metavar="FILE.msh", help="the mesh file")
+    add("mesh", "write the mesh of a case as a gmsh file", "")(
+        "--out", required=True, metavar="FILE.msh", help="the mesh file"
+    )
     about = "does it fall, whatever its uncertain properties are?"
     add_to = add("verdict", about, "folder for table and picture (none)", required=False)
     add_to("--workers", type=int, default=1, help="processes for the runs (1)")
     add_to("--samples", type=int, default=26, help="runs of the sample (26)")
-    add_to = add("risk", "annual rate of collapse, from the hazard and the sampling of [risk]")
-    add_to("--workers", type=int, default=1, help="processes for the runs (1)")
-    add_to = add("accuracy", "speed against error over fidelities, meshes, quadratures and steps")
-    add_to("--workers", type=int, default=1, help="processes for settings (1)")
+    about = "annual rate of collapse, from the hazard and the sampling of [risk]"
+    add("risk", about)("--workers", type=int, default=1, help="processes for the runs (1)")
+    about = "speed against error over fidelities, meshes, quadratures and steps"
+    add("accuracy", about)("--workers", type=int, default=1, help="processes for settings (1)")
 
 
 def _add_changes(add_argument: AddArgument) -> None:

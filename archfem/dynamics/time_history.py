@@ -155,8 +155,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     if not model.large_displacements or ending is Ending.INTERRUPTED:
         return history
     ratio = viscous.restitution if isinstance(viscous, StiffnessDamping) else None
-    whole = recorder.record.whole_fall
-    return follow_fall(history, model, (start, recorder.state), motion, ratio, whole)
+    settings = motion, ratio, recorder.record.whole_fall
+    return follow_fall(history, model, (start, recorder.state), *settings)
 
 
 def _resolve_start(

@@ -35,8 +35,8 @@ ZERO_DIVISION_GUARD = 1e-300
 # nothing exceeds it and every derivative is elastic; infinity would make differences no number.
 NO_LIMIT = 1e300
 
-# Closing over δ_m at which the hyperbola ends and its tangent goes on, so that any closing has a
-# finite traction [-]. The traction is 49 k_n δ_m there, and the tangent 2500 k_n: faces that stiff
+# Closing over δ_m from which on the law follows its tangent, so that any closing has a finite
+# traction [-]. The traction is 49 k_n δ_m there, and the tangent 2500 k_n: faces that stiff
 # are closed to any program.
 LARGEST_CLOSING = 0.98
 

@@ -1,3 +1,4 @@
+from .collapse_risk import CollapseRisk as CollapseRisk
 from .cache import dead_load_of as dead_load_of
 from .cache import ground_motion as ground_motion
 from .comparison import Finding as Finding

@@ -169,9 +169,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
     draws = sample_changes(ranges, samples, seed)
     random = np.random.default_rng(seed)
     labels = _draw_labels({label: weight for label, (weight, _) in tree.items()}, samples, random)
-    order = np.concatenate(
-        [random.permutation(len(records)) for _ in range(-(-samples // len(records)))]
-    )[:samples]
+    order = _deal_records(len(records), samples, random)
     table = _describe_samples(ranges, draws, labels, order)
     table = table.assign(_measure_records(tree, records, hazard))
     inputs = [each.fingerprint for _, each in tree.values()]
@@ -224,6 +222,12 @@ def _draw_labels(weights: Mapping[str, float], count: int, random: np.random.Gen
     shares = (random.permutation(count) + random.random(count)) / count
     places = np.searchsorted(np.cumsum([*weights.values()])[:-1], shares, side="right")
     return np.array([*weights])[places]
+
+
+def _deal_records(records: int, count: int, random: np.random.Generator) -> Any:
+    """Return the record of each sample, all of them in random order before any again (count,)."""
+    rounds = -(-count // records)
+    return np.concatenate([random.permutation(records) for _ in range(rounds)])[:count]
 
 
 def _measure_records(
@@ -526,6 +530,13 @@ class CollapseRisk(ResultDisplay):
             InvalidInput: there is no such file, or it is damaged.
         """
         return cls(read_dataset(path, "file of a risk"))
+
+
+def draw_risk_result(found: CollapseRisk) -> Any:
+    """Draw fragility, hazard, and the intensities of the falls."""
+    from archfem.view.studies import draw_collapse_risk  # matplotlib is slow to import
+
+    return draw_collapse_risk(found)
 
 
 def _variance_component(values: Array, groups: Any) -> float:

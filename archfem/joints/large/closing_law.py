@@ -6,7 +6,7 @@ Min. Sci. 20 (1983) 249-268)
     σ = k_n δ / (1 - δ/δ_m),
 
 so that the tangent is k_n (1 + σ/p_0)² with p_0 = k_n δ_m. Beyond `LARGEST_CLOSING` of δ_m the law
-goes on along its tangent. The excess over the linear law is
+follows its tangent. The excess over the linear law is
 
     σ_e = σ - k_n δ,   Φ_e = ∫ σ_e dδ,   Ψ_e = ∫ Φ_e dδ.
 
