@@ -1,5 +1,6 @@
 """Results show themselves: a picture, a line or two, and the same for notebooks."""
 
+import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -22,9 +23,25 @@ def things():
     with pytest.MonkeyPatch.context() as patch:
         # the runs of the range, which other tests compute, take most of the time
         stands = CollapseState("stands", None, (), 0.02, 0.01, True)
-        patch.setattr(variations, "_run_elastic_joints", lambda *_: stands)
+        patch.setattr(variations, "prepare_runs", lambda *_: lambda _: stands)
         patch.setattr(vehicles, "_places_along", partial(vehicles._places_along, steps=20))
         yield one_of_each()
+
+
+def risk_of_two():
+    """A risk of eight samples under two records."""
+    hazard = {"intensity": [1.0, 10.0], "rate": [0.1, 0.001], "measure": "pga", "period": None}
+    low = np.linspace(2.0, 4.0, 8)
+    samples = {"lower": low, "upper": 1.1 * low, "record_number": np.arange(8) % 2}
+    samples |= {"runs": np.ones(8, int), "error": [""] * 8, "alternative": ["as given"] * 8}
+    records = {f"unscaled_{name}": np.array([1.0, 1.2]) for name in ("pga", "pgv", "sa", "sa_avg")}
+    return af.studies.CollapseRisk(
+        xr.Dataset(
+            {name: ("sample", values) for name, values in samples.items()}
+            | {name: ("record", values) for name, values in records.items()},
+            attrs={"hazard": json.dumps(hazard)},
+        )
+    )
 
 
 def one_of_each():
@@ -45,6 +62,7 @@ def one_of_each():
         af.moving_load(stones, 1e3, positions=[0.0]),
         af.rate(stones, af.limit.Vehicle("lorry", (5e3,), ())),
         af.verdict_range(stones, motion, samples=2, vary={"joint_rule": "exact"}),
+        risk_of_two(),
         af.studies.Ida(
             xr.Dataset(
                 {

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from enum import IntEnum
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from io import TextIOWrapper
@@ -149,24 +150,27 @@ def _add_command(
     return parser.add_argument
 
 
+def _add_case_command(
+    commands: Any,
+    name: str,
+    about: str,
+    folder: str = "folder for the results",
+    required: bool = True,
+    module: str = "run",
+) -> AddArgument:
+    """Add a command that takes a case file."""
+    texts = {"description": about, "epilog": EXIT_CODES}
+    add_argument = _add_command(commands, name, about, module, **texts)
+    add_argument("case", metavar="CASE.toml", help="the case file")
+    _add_changes(add_argument)
+    if folder:
+        add_argument("--out", required=required, metavar="DIR", help=folder)
+    return add_argument
+
+
 def _add_case_commands(commands: Any) -> None:
     """Add the commands that take a case file."""
-
-    def add(
-        name: str,
-        about: str,
-        folder: str = "folder for the results",
-        required: bool = True,
-        module: str = "run",
-    ) -> AddArgument:
-        texts = {"description": about, "epilog": EXIT_CODES}
-        add_argument = _add_command(commands, name, about, module, **texts)
-        add_argument("case", metavar="CASE.toml", help="the case file")
-        _add_changes(add_argument)
-        if folder:
-            add_argument("--out", required=required, metavar="DIR", help=folder)
-        return add_argument
-
+    add = partial(_add_case_command, commands)
     add("run", "dead load, time histories, tables and pictures")(
         "--workers", type=int, default=1, help="processes for pairs of a suite (1)"
     )

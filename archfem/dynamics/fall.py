@@ -28,6 +28,7 @@ from archfem.dynamics.rigid_body.simulation import (
     RigidBlockSimulation,
 )
 from archfem.dynamics.rigid_body.time_stepping import MAX_ENERGY_GAIN
+from archfem.dynamics.schemes import StiffnessDamping, Viscous
 from archfem.dynamics.separation import is_overturning, is_resting
 from archfem.dynamics.state import State
 from archfem.errors import DidNotConverge
@@ -76,7 +77,7 @@ def follow_fall(
     model: Model,
     states: tuple[State, State],
     motion: Motion,
-    rocking_ratio: float | None,
+    damping: Viscous | None,
     whole: bool = True,
 ) -> History:
     """Add the fall of loose or overturning blocks, and the state of collapse, to a history.
@@ -85,6 +86,7 @@ def follow_fall(
     Not whole, the fall ends with the first lost block, and is not compared with rigid blocks.
     """
     (start, state), structure, ending = states, model.structure, history.ending
+    rocking_ratio = damping.restitution if isinstance(damping, StiffnessDamping) else None
     origin, _ = model.rigid_motions(start.q, start.velocity)
     tilts = ending is Ending.FINISHED and is_overturning(model, state)
     doubts: list[Doubt] = []

@@ -28,7 +28,6 @@ from archfem.dynamics.schemes import (
     EffectiveDamping,
     Newmark,
     Scheme,
-    StiffnessDamping,
     Viscous,
     check_large_displacement_scheme,
     check_time_step,
@@ -154,9 +153,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         history = history.with_doubts((*history.doubts, doubt))
     if not model.large_displacements or ending is Ending.INTERRUPTED:
         return history
-    ratio = viscous.restitution if isinstance(viscous, StiffnessDamping) else None
-    settings = motion, ratio, recorder.record.whole_fall
-    return follow_fall(history, model, (start, recorder.state), *settings)
+    whole = recorder.record.whole_fall
+    return follow_fall(history, model, (start, recorder.state), motion, viscous, whole)
 
 
 def _resolve_start(

@@ -1,6 +1,6 @@
-from .collapse_risk import CollapseRisk as CollapseRisk
 from .cache import dead_load_of as dead_load_of
 from .cache import ground_motion as ground_motion
+from .collapse_risk import CollapseRisk as CollapseRisk
 from .comparison import Finding as Finding
 from .comparison import study_table as study_table
 from .convergence import Convergence as Convergence

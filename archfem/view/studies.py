@@ -52,10 +52,10 @@ class RiskCurves(Protocol):
     def sentence(self) -> str:
         """The rate, and what it rests on."""
 
-    def fragility(self) -> FragilityCurve:
-        """Return the fragility over the intensity of the hazard."""
+    def fragility(self, measure: str | None = None) -> Any:
+        """Return the fragility over an intensity, by default that of the hazard."""
 
-    def disaggregation(self) -> tuple[Array, Array]:
+    def disaggregation(self, bins: int = 12) -> tuple[Array, Array]:
         """Return edges of bins of intensity, and the share of the rate in each."""
 
 

@@ -169,7 +169,7 @@ def test_an_option_that_is_left_out_has_the_value_in_its_help(monkeypatch):
         af.commands.main(["--version"])
     own = {name: each for name, each in stated.items() if each[1] is not None}
     assert set(stated) - set(own) == {"archfem rate --dead", "archfem animate --fps"}
-    assert len(own) == 7
+    assert len(own) == 8
     for numbers, default in own.values():
         # help has three digits
         assert numbers == pytest.approx(np.atleast_1d(default).tolist(), rel=1e-2)
