@@ -90,7 +90,10 @@ def test_its_history_is_that_of_this_system(carried_out):
     ("missing", "words", "remedy"),
     [
         (["imageio"], ("animate", "history.nc"), "pip install 'archfem[film]'"),
-        (["pyvista"], ("animate", "history.nc", "--renderer", "pyvista"), "'archfem[film]'"),
+        pytest.param(
+            *(["pyvista"], ("animate", "history.nc", "--renderer", "pyvista"), "'archfem[film]'"),
+            marks=pytest.mark.slow,
+        ),
         (["gmsh"], ("mesh", "case.toml", "--out", "a.msh"), "pip install 'archfem[mesh]'"),
     ],
 )

@@ -82,7 +82,8 @@ def solve_cones(
     nothing = sparse.csc_matrix((len(cost), len(cost)))
     # cones have no scale: unknowns of order one, and a last column of order one for the factor
     columns = np.ones(len(cost))
-    columns[-1] = 1.0 / abs(matrix[:, [-1]]).max()
+    # a load that does not reach the structure has an empty one
+    columns[-1] = 1.0 / (abs(matrix[:, [-1]]).max() or 1.0)
     unit = np.abs(right).max()
     scaled = (matrix @ sparse.diags(columns)).tocsc()
     solver = clarabel.DefaultSolver(nothing, cost, scaled, right / unit, listed, settings)

@@ -375,6 +375,11 @@ class CollapseRisk(ResultDisplay):
         unscaled = self.dataset[name].values[rows["record_number"].values]
         return unscaled * rows["lower"].values, unscaled * rows["upper"].values
 
+    @cached_property
+    def _known_curves(self) -> dict[str, Fragility]:
+        """Fragility curves that were fitted, by intensity measure."""
+        return {}
+
     def fragility(self, measure: str | None = None) -> Fragility:
         """Return the lognormal fragility over all alternatives.
 
@@ -384,13 +389,21 @@ class CollapseRisk(ResultDisplay):
         Raises:
             InvalidInput: more than half of the samples never fall.
         """
-        low, high = self.capacities(measure)
-        return fragility(high, low)
+        name = measure or self.hazard.measure
+        if name not in self._known_curves:
+            low, high = self.capacities(name)
+            self._known_curves[name] = fragility(high, low)
+        return self._known_curves[name]
 
-    @property
+    @cached_property
     def best_measure(self) -> str:
         """Intensity measure with the least dispersion, which predicts falls best."""
-        return min(MEASURES, key=lambda name: self.fragility(name).dispersion)
+        return min(MEASURES, key=lambda name: float(fit_brackets(self._log_brackets(name))[1][0]))
+
+    def _log_brackets(self, measure: str | None = None) -> Array:
+        """Return the logarithms of the brackets of capacity (2, 1, n)."""
+        with np.errstate(divide="ignore"):
+            return np.log(np.array(self.capacities(measure)))[:, None, :]
 
     @cached_property
     def _resampled(self) -> Any:
@@ -409,15 +422,18 @@ class CollapseRisk(ResultDisplay):
 
     def _rates(self, drawn: Any) -> Array:
         """Return the annual rates of resampled samples (k, n), each of a lognormal fit (k,)."""
-        with np.errstate(divide="ignore"):
-            ends = np.log(np.array(self.capacities()))
-        means, deviations = fit_brackets(ends[:, drawn])
+        means, deviations = fit_brackets(self._log_brackets()[:, 0, drawn])
         x = np.exp(means[:, None] + deviations[:, None] * np.linspace(-6.0, 6.0, 241))
         rates = self.hazard.rate_of(x)
         middle = np.sqrt(x[:, 1:] * x[:, :-1])
         falls = ndtr((np.log(middle) - means[:, None]) / deviations[:, None])
         # beyond the last intensity all fall
         return np.asarray((falls * -np.diff(rates, axis=1)).sum(axis=1) + rates[:, -1])
+
+    @cached_property
+    def _known_rates(self) -> dict[str | None, Rate]:
+        """Rates that were computed, by alternative; None is all."""
+        return {}
 
     def rate(self, alternative: str | None = None) -> Rate:
         """Return the annual rate of collapse with its 90 % interval.
@@ -428,6 +444,8 @@ class CollapseRisk(ResultDisplay):
         Raises:
             InvalidInput: there is no such alternative, or it has fewer than 8 answered samples.
         """
+        if alternative in self._known_rates:
+            return self._known_rates[alternative]
         labels = self._of_answered("alternative")
         own = np.flatnonzero(labels == alternative) if alternative else np.arange(len(labels))
         if len(own) < FIRST_ROUND:
@@ -441,7 +459,9 @@ class CollapseRisk(ResultDisplay):
             random = np.random.default_rng(0)
             drawn = own[random.integers(len(own), size=(RESAMPLES, len(own)))]
         (mean,), spread = self._rates(own[None]), self._rates(drawn)
-        return Rate(float(mean), *(float(each) for each in np.quantile(spread, [0.05, 0.95])))
+        rate = Rate(float(mean), *(float(each) for each in np.quantile(spread, [0.05, 0.95])))
+        self._known_rates[alternative] = rate
+        return rate
 
     def dispersions(self) -> dict[str, float]:
         """Return the dispersion of the capacity in total, by records, alternatives, and the rest.

@@ -27,7 +27,8 @@ def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypat
     calls = []
 
     class Simulation:
-        def __init__(self, structure, *, rocking_ratio):
+        def __init__(self, structure, *, dt, rocking_ratio):
+            assert dt is None  # steps are halved until that changes nothing
             calls.append(structure)
 
         def frames(self, start, end, motion, *, spacing):
@@ -114,7 +115,7 @@ def test_a_fall_of_which_rigid_blocks_know_nothing_is_doubted(stiffness, push, d
 def test_a_fall_that_cannot_be_followed_keeps_the_history_up_to_it(monkeypatch):
     """A column that topples under 0.4 g for 1 s comes loose before the motion ends."""
 
-    def refuse(model, state, motion, ratio):
+    def refuse(model, state, motion, ratio, whole):
         raise af.DidNotConverge("made to fail")
 
     monkeypatch.setattr(fall, "simulate_fall", refuse)

@@ -297,7 +297,9 @@ def test_the_residual_may_be_the_rounding_of_all_blocks_that_move(free, share, s
     assert is_balanced(fall, dead) is stands
 
 
-@pytest.mark.parametrize("law", [af.limit.Fill, af.limit.PlasticFill])
+@pytest.mark.parametrize(
+    "law", [af.limit.Fill, pytest.param(af.limit.PlasticFill, marks=pytest.mark.slow)]
+)
 def test_backing_holds_the_stones_below_its_level(law):
     """As of a bridge whose lowest stones are fixed; they do not move, and it carries more."""
     if law is af.limit.PlasticFill:

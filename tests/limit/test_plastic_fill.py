@@ -188,8 +188,6 @@ def test_analyses_that_have_no_bounds_are_refused():
         )
     with pytest.raises(InvalidInput, match="only collapse_factor bounds a plastic fill"):
         af.stands(arch_bridge(), fill=FILL)
-    with pytest.raises(InvalidInput, match="is a PlasticFill: give Fill or None"):
-        af.rate(arch_bridge(), "LM1", fill=FILL)
     with pytest.raises(InvalidInput, match="need associated flow"):
         af.collapse_factor(arch_bridge(), live=load, fill=FILL, friction="nonassociated")
     with pytest.raises(InvalidInput, match="a settlement and a plastic fill"):

@@ -98,7 +98,35 @@ def tilted_block():
     return analysis, motions
 
 
-def test_samples_are_kept_and_continued(tmp_path, monkeypatch):
+@pytest.fixture
+def quick_runs(monkeypatch):
+    """Structures that fall where the ground is stronger than their breadth over their height."""
+
+    def prepare(analysis, changes):
+        block = analysis.structure.blocks[-1]
+        width, height = np.ptp(np.array(block.points), axis=0)
+        limit = 9.81 * width / height * (1.0 + changes["friction"])
+
+        def run(motion):
+            kind = "fallen" if motion.pga > limit else "stands"
+            return af.dynamics.CollapseState(kind, None, (), 0.0, 0.0, True)
+
+        return run
+
+    monkeypatch.setattr(af.studies.collapse_risk, "prepare_runs", prepare)
+
+
+@pytest.mark.slow
+def test_a_block_falls_between_what_tilts_it_and_what_any_pulse_needs():
+    analysis, motions = tilted_block()
+    found = af.collapse_risk(analysis, motions, SITE, samples=8, precision=0.5)
+    low, high = found.capacities()
+    assert (low < high).all()
+    # peaks above b/h g lift it
+    assert (high > 9.81 * 0.25 / 1.5).all()
+
+
+def test_samples_are_kept_and_continued(tmp_path, monkeypatch, quick_runs):
     analysis, motions = tilted_block()
     options = {"samples": 10, "out": tmp_path / "risk.nc", "precision": 0.5}
     whole = af.collapse_risk(analysis, motions, SITE, samples=10, precision=0.5)
@@ -132,7 +160,7 @@ def test_too_few_records_are_refused():
         af.collapse_risk(analysis, motions[:1], SITE)
 
 
-def test_a_case_file_gives_the_same_rate(tmp_path, capsys):
+def test_a_case_file_gives_the_same_rate(tmp_path, capsys, quick_runs):
     path = tmp_path / "block.toml"
     path.write_text(
         """

@@ -143,6 +143,7 @@ def test_fill_bonds_and_many_stones_are_refused_in_words():
         live.describe_arch(bonded)
 
 
+@pytest.mark.slow
 def test_a_result_folder_has_its_page(small, tmp_path, capsys):
     out = tmp_path / "out"
     assert af.commands.main(["run", str(small), "--out", str(out)]) in (0, 3)
