@@ -94,7 +94,10 @@ def test_its_history_is_that_of_this_system(carried_out):
             *(["pyvista"], ("animate", "history.nc", "--renderer", "pyvista"), "'archfem[film]'"),
             marks=pytest.mark.slow,
         ),
-        (["gmsh"], ("mesh", "case.toml", "--out", "a.msh"), "pip install 'archfem[mesh]'"),
+        pytest.param(
+            *(["gmsh"], ("mesh", "case.toml", "--out", "a.msh"), "pip install 'archfem[mesh]'"),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_what_a_missing_package_is_for_is_said_in_one_line(carried_out, missing, words, remedy):

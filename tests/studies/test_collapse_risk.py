@@ -128,8 +128,8 @@ def test_a_block_falls_between_what_tilts_it_and_what_any_pulse_needs():
 
 def test_samples_are_kept_and_continued(tmp_path, monkeypatch, quick_runs):
     analysis, motions = tilted_block()
-    options = {"samples": 10, "out": tmp_path / "risk.nc", "precision": 0.5}
-    whole = af.collapse_risk(analysis, motions, SITE, samples=10, precision=0.5)
+    options = {"samples": 10, "out": tmp_path / "risk.nc", "precision": 0.02}
+    whole = af.collapse_risk(analysis, motions, SITE, samples=10, precision=0.02)
     calls = []
     store = af.studies.collapse_risk._store_row
 
@@ -180,7 +180,7 @@ dt = 0.005
 damping = { ratio = 0.05, modes = "effective" }
 [risk]
 samples = 16
-precision = 0.5
+precision = 0.02
 hazard = { rates = [0.02, 0.001], intensities = ["1 m/s**2", "0.4 g_0"] }
 alternatives.slender = {}
 alternatives.slenderer = { weight = 1.0, set = ["structure.breadth=0.22"] }
