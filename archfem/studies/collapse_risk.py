@@ -14,7 +14,7 @@ import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from math import inf, sqrt
+from math import inf, nan, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -466,6 +466,7 @@ class CollapseRisk(ResultDisplay):
     def dispersions(self) -> dict[str, float]:
         """Return the dispersion of the capacity in total, by records, alternatives, and the rest.
 
+        Not a number are parts that the samples do not separate, as where each record has only one.
         Parts are components of variance of a one-way analysis each (Searle, Casella and McCulloch,
         Variance components, 1992, section 3.6); the rest is of properties, and chance.
         """
@@ -476,7 +477,7 @@ class CollapseRisk(ResultDisplay):
             name: _variance_component(logs, self._of_answered(name))
             for name in ("record_number", "alternative")
         }
-        rest = max(total - sum(parts.values()), 0.0)
+        rest = float(np.maximum(total - sum(parts.values()), 0.0))  # nan remains
         return {
             "total": sqrt(total),
             "records": sqrt(parts["record_number"]),
@@ -502,12 +503,12 @@ class CollapseRisk(ResultDisplay):
         """The rate, and what it rests on."""
         curve, parts = self.fragility(), self.dispersions()
         failed = len(self.dataset["sample"]) - len(self.answered)
+        known = ", ".join(f"{name} {x:.2f}" for name, x in parts.items() if name != "total")
+        shares = "its parts unknown, with one sample a record" if "nan" in known else known
         text = (
             f"falls at {self.rate()}; median {curve.median:.3g} "
             f"{MEASURES[self.hazard.measure]} of {self.hazard.measure}, dispersion "
-            f"{curve.dispersion:.2f} (records {parts['records']:.2f}, alternatives "
-            f"{parts['alternatives']:.2f}, properties {parts['properties']:.2f}); "
-            f"{self.best_measure} has the least dispersion"
+            f"{curve.dispersion:.2f} ({shares}); {self.best_measure} has the least dispersion"
         )
         return text + (f"; {failed} samples have no answer" if failed else "")
 
@@ -560,11 +561,13 @@ def draw_risk_result(found: CollapseRisk) -> Any:
 
 
 def _variance_component(values: Array, groups: Any) -> float:
-    """Return the variance between groups by a one-way analysis of variance, at least 0."""
+    """Return the variance between groups by a one-way analysis of variance, at least 0 or nan."""
     kinds, place = np.unique(groups, return_inverse=True)
     counts = np.bincount(place)
-    if len(kinds) < 2 or len(values) <= len(kinds):
+    if len(kinds) < 2:
         return 0.0
+    if len(values) <= len(kinds):
+        return nan
     means = np.bincount(place, values) / counts
     within = float(np.sum((values - means[place]) ** 2)) / (len(values) - len(kinds))
     between = float(np.sum(counts * (means - values.mean()) ** 2)) / (len(kinds) - 1)
