@@ -119,9 +119,8 @@ def simulate_fall(
 ) -> tuple[xr.Dataset, list[FallFrame]]:
     """Follow loose blocks until they rest, or until 20 s after the motion has ended.
 
-    Not whole, they are followed by one length of step until the first block is lost.
-
-    The ratio is that of `RigidBlockSimulation`, for the joints where it has an effect.
+    Not whole, they are followed by one length of step until the first block is lost. The ratio is
+    that of `RigidBlockSimulation`, for the joints where it has an effect.
     """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + 20.0

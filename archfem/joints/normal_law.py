@@ -84,11 +84,15 @@ class NormalLaw(ABC):
         """Area of each facet or spring (f,) [m²]."""
         return self.points.weight.reshape(-1, self.end_count).sum(axis=1)
 
+    @cached_property
+    def _closing_parameters(self) -> tuple[Array, Array]:
+        """k_n and 1/δ_m of each facet or spring, each in one piece of memory (f,)."""
+        contact = self.contact
+        return np.array(contact.normal_stiffness), np.array(contact.closing_rate)
+
     def _excess(self, start: Array, end: Array, rates: tuple[float, float]) -> tuple[Array, Array]:
         """Return means over a step of excess tensions (p,) [N], and derivatives (m,) [N/m]."""
-        contact, count = self.contact, self.end_count
-        parameters = np.array(contact.normal_stiffness), np.array(contact.closing_rate)
-        means, pairs = sum_excess(*parameters, -start, -end, rates, count)
+        means, pairs = sum_excess(*self._closing_parameters, -start, -end, rates, self.end_count)
         area = self.area
         return -(area[:, None] * means).ravel(), np.asarray(area * pairs).ravel()
 
@@ -113,9 +117,9 @@ class NormalLaw(ABC):
         """Return the derivative of `forces` for each of `coupling_pairs` (m,) [N/m]."""
         places = self.divide(opening)
         tangent = places.integrate_products(self.contact.normal_tangent(*places.gaps))
-        # at an instant the means over a step follow half of each gap
-        stiffens = self.points.stiffens
-        return tangent + self._excess(opening, opening, (1.0, 1.0))[1] if stiffens else tangent
+        if self.points.stiffens:  # a path without length, whose both ends follow the gap
+            tangent = tangent + self._excess(opening, opening, (1.0, 1.0))[1]
+        return tangent
 
     @property
     def closed_stiffness(self) -> Array:
@@ -130,9 +134,8 @@ class NormalLaw(ABC):
 
     def _excess_energies(self, opening: Array) -> Array:
         """Return the energies in excess of the linear law, in equal parts to the ends (p,) [J]."""
-        contact, count = self.contact, self.end_count
-        parameters = np.array(contact.normal_stiffness), np.array(contact.closing_rate)
-        energies = self.area * excess_energies(*parameters, -opening, count)
+        count = self.end_count
+        energies = self.area * excess_energies(*self._closing_parameters, -opening, count)
         return np.repeat(energies / count, count)
 
     def contact_area_rate(self, opening: Array) -> Array:

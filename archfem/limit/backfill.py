@@ -521,7 +521,7 @@ def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
     if fill is not None and not isinstance(fill, Fill):
         raise InvalidInput(
             f"this analysis cannot take a {type(fill).__name__}: only collapse_factor bounds a "
-            "plastic fill; give af.limit.Fill here"
+            "plastic fill, and moving_load and rate by it; give af.limit.Fill here"
         )
     structure = hold_backed(structure, None if fill is None else fill.backing)
     soil = find_yielding_blocks(structure)

@@ -12,7 +12,7 @@ References:
 import json
 import logging
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from math import inf, nan, sqrt
 from pathlib import Path
@@ -50,6 +50,7 @@ from archfem.studies.fragility import Fragility, fit_brackets, fragility
 from archfem.studies.process_pool import evaluate_points
 from archfem.studies.variations import (
     DEFAULT_RANGES,
+    Variation,
     as_falling,
     check_ranges,
     prepare_runs,
@@ -64,6 +65,9 @@ VARIED = ("k_n", "k_s", "friction", "damping_ratio")
 # Number of samples before the others begin their search at the median of these [-]
 FIRST_ROUND = 8
 
+# Peak acceleration at which those begin [m/s²]
+FIRST_PEAK = 2.0
+
 # Factor between the scales that are tried until the fall is bracketed, and the most runs of one [-]
 SEARCH_FACTOR, MOST_RUNS = 1.6, 12
 
@@ -72,25 +76,12 @@ RESAMPLES = 400
 
 
 @dataclass(frozen=True, eq=False)
-class RiskSample:
+class RiskSample(Variation):
     """One structure and record, and how its capacity is searched."""
 
-    analysis: Analysis = field(repr=False)
-    motion: Motion = field(repr=False)
-    changes: tuple[tuple[str, Any], ...]
     begin: float  # first scale [-]
     between: tuple[float, float]  # smallest and largest scale [-]
     precision: float  # relative width of the bracket [-]
-
-    @property
-    def case(self) -> "RiskSample":
-        """The sample itself, as evaluators take it."""
-        return self
-
-    @property
-    def model_key(self) -> str:
-        """Empty: each sample has a model of its own."""
-        return ""
 
 
 def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
@@ -283,11 +274,11 @@ def _continue_file(out: str | Path | None, table: xr.Dataset) -> xr.Dataset:
 
 
 def _first_scales(table: xr.Dataset, measure: str, begin: int) -> Array:
-    """Return the scale of each record to begin with: the median capacity so far, or 1 m/s²."""
+    """Return the scale of each record to begin with: to `FIRST_PEAK`, or the median capacity."""
     name = measure if begin else "pga"
     unscaled = table[f"unscaled_{name}"].values
     if not begin:
-        return np.asarray(2.0 / unscaled)
+        return np.asarray(FIRST_PEAK / unscaled)
     found = CollapseRisk(table.isel(sample=slice(begin)))
     low, high = found.capacities(name)
     middle = np.where(np.isfinite(high), np.sqrt(np.maximum(low, high / 4.0) * high), 2.0 * low)

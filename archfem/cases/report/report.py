@@ -11,8 +11,8 @@ from archfem.cases.run import Run
 from archfem.cases.toml_file import parse_tables
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.view.pages.document import Document
-from archfem.view.pages.player import Player, write_page
+from archfem.view.pages.document import Document, write_page
+from archfem.view.pages.player import Player
 
 
 def write_report(data: ReportData, path: str | Path) -> Path:

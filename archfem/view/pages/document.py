@@ -1,9 +1,11 @@
 """HTML documents of sections with text, tables, figures and players."""
 
+from abc import ABC, abstractmethod
 from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from html import escape
 from io import BytesIO
 from pathlib import Path
 from re import sub
@@ -18,6 +20,7 @@ from matplotlib.figure import Figure
 
 from archfem._files import atomic_write, temporary_folder
 from archfem._optional import missing_package_message
+from archfem._validation import validate_methods
 from archfem.errors import InvalidInput, NotInstalled
 from archfem.view.style import disable_math
 
@@ -146,3 +149,49 @@ def _typeset(cell: str) -> str:
 def _uri(media: str, content: bytes) -> str:
     """Return a data URI."""
     return f"data:{media};base64,{b64encode(content).decode('ascii')}"
+
+
+def write_page(path: str | Path, text: str) -> Path:
+    """Write a page atomically."""
+    target = Path(path)
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise InvalidInput(
+            f"{target} has suffix '{target.suffix}': a page is .html, which --pdf prints"
+        )
+    with atomic_write(target) as draft:
+        draft.write_text(text, encoding="utf-8")
+    return target
+
+
+@validate_methods
+class StandalonePage(ABC):
+    """A page that is one file, shown in a notebook or written by `save`."""
+
+    @property
+    @abstractmethod
+    def page(self) -> str:
+        """The complete page (HTML), without references to other files."""
+
+    @property
+    @abstractmethod
+    def frame_height(self) -> float:
+        """Height of the page in a notebook [pixels]."""
+
+    def save(self, path: str | Path) -> Path:
+        """Write the page to a file atomically.
+
+        Args:
+            path: of the file, .html; missing folders are created.
+
+        Returns:
+            The path of the file.
+
+        Raises:
+            InvalidInput: the suffix is not that of a page.
+        """
+        return write_page(path, self.page)
+
+    def _repr_html_(self) -> str:
+        """The page in a frame, which keeps its style apart from that of a notebook."""
+        style = f"width:100%;height:{self.frame_height:.0f}px;border:0"
+        return f'<iframe srcdoc="{escape(self.page)}" style="{style}"></iframe>'

@@ -5,14 +5,13 @@ import zlib
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import validate_arguments, validate_methods
+from archfem._validation import validate_arguments
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.fall import with_sliding_joints
 from archfem.dynamics.rigid_body.simulation import (
@@ -25,17 +24,15 @@ from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.units import G
-from archfem.view.pages.document import render
-from archfem.view.pages.player import write_page
+from archfem.view.pages.document import StandalonePage, render
 from archfem.view.pages.wasm.exporter import LAYOUT, WASM
 
 # Stones above which a page would take minutes for its runs
 MAX_STONES = 60
 
 
-@validate_methods
 @dataclass(frozen=True, eq=False)
-class LivePage:
+class LivePage(StandalonePage):
     """Page of an arch that a reader changes and shakes, shown in a notebook or written by `save`.
 
     Attributes:
@@ -50,6 +47,7 @@ class LivePage:
     motions: Sequence[Mapping[str, Any]]
 
     kind = "live"
+    frame_height = 1080.0
 
     @property
     def page(self) -> str:
@@ -70,25 +68,6 @@ class LivePage:
             has_ring=any(arch["ring"] for arch in self.arches),
             has_thrust=any(arch["thrust"] for arch in self.arches),
         )
-
-    def save(self, path: str | Path) -> Path:
-        """Write the page to a file atomically.
-
-        Args:
-            path: of the file, .html; missing folders are created.
-
-        Returns:
-            The path of the file.
-
-        Raises:
-            InvalidInput: the suffix is not that of a page.
-        """
-        return write_page(path, self.page)
-
-    def _repr_html_(self) -> str:
-        """The page in a frame, which keeps its style apart from that of a notebook."""
-        style = "width:100%;height:1080px;border:0"
-        return f'<iframe srcdoc="{escape(self.page)}" style="{style}"></iframe>'
 
 
 @validate_arguments

@@ -1,21 +1,17 @@
 """Player of a run in a browser or a notebook, with a slider over time."""
 
 from dataclasses import dataclass
-from html import escape
-from pathlib import Path
 
-from archfem._files import atomic_write
-from archfem._validation import validate_arguments, validate_methods
+from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.models.model import Model
-from archfem.view.pages.document import render
+from archfem.view.pages.document import StandalonePage, render
 from archfem.view.pages.player_data import Scene
 
 
-@validate_methods
 @dataclass(frozen=True, eq=False)
-class Player:
+class Player(StandalonePage):
     """Interactive page of a run, shown in a notebook or written by `save`.
 
     It shows the structure with its thrust line, hinges, sliding and open joints; sliders for the
@@ -36,27 +32,13 @@ class Player:
         """The complete page (HTML), without references to other files."""
         return render("player_page.html", title=self.scene.data["title"], player=self)
 
-    def save(self, path: str | Path) -> Path:
-        """Write the page to a file atomically.
-
-        Args:
-            path: of the file, .html; missing folders are created.
-
-        Returns:
-            The path of the file.
-
-        Raises:
-            InvalidInput: the suffix is not that of a page.
-        """
-        return write_page(path, self.page)
-
-    def _repr_html_(self) -> str:
-        """The page in a frame, which keeps its style apart from that of a notebook."""
+    @property
+    def frame_height(self) -> float:
+        """Height of the page in a notebook [pixels]."""
         low, high = self.scene.box
         # a notebook is about 900 pixels wide; the controls and diagrams take 550 in height
         picture = min(540.0, 900.0 * float((high[1] - low[1]) / (high[0] - low[0])))
-        style = f"width:100%;height:{picture + 550.0:.0f}px;border:0"
-        return f'<iframe srcdoc="{escape(self.page)}" style="{style}"></iframe>'
+        return picture + 550.0
 
 
 @validate_arguments
@@ -89,15 +71,3 @@ def player(run: History, model: Model | None = None, *, title: str = "") -> Play
     structure = model.structure if model is not None else run.structure
     assert structure is not None
     return Player(Scene(structure, run, model, title))
-
-
-def write_page(path: str | Path, text: str) -> Path:
-    """Write a page atomically."""
-    target = Path(path)
-    if target.suffix.lower() not in (".html", ".htm"):
-        raise InvalidInput(
-            f"{target} has suffix '{target.suffix}': a page is .html, which --pdf prints"
-        )
-    with atomic_write(target) as draft:
-        draft.write_text(text, encoding="utf-8")
-    return target
