@@ -38,7 +38,7 @@ from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.motion_scaling import admissible_range
 from archfem.dynamics.recorder import Record
-from archfem.errors import InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.motion.hazard import MEASURES, Hazard
 from archfem.motion.motion import Motion
@@ -133,7 +133,8 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
         motions: records; their own scales do not matter.
         hazard: of the site.
         samples: number of samples, at least 8.
-        vary: as for `verdict_range`; by default "k_n", "k_s", "friction" and "damping_ratio".
+        vary: as for `verdict_range`, of properties alone; by default "k_n", "k_s", "friction" and
+            "damping_ratio".
         alternatives: by label, a weight and an analysis or a structure, such as joints of other
             finish or another thickness, in place of `analysis`; weights need not add up to 1.
         precision: relative width of the brackets [-].
@@ -147,7 +148,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
 
     Raises:
         InvalidInput: an argument is out of range, or `out` is of other arguments.
-        DidNotConverge: a structure does not stand under dead load.
+        DidNotConverge: a structure does not stand under dead load, or no run has an answer.
     """
     check_type(hazard, Hazard, "hazard", "give an archfem.Hazard")
     check_integer(samples, "samples", minimum=FIRST_ROUND)
@@ -156,7 +157,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
     if len(records) < 2:
         raise InvalidInput(f"{len(records)} motion: give several records, seven or more at best")
     tree = _resolve_alternatives(analysis, alternatives)
-    ranges = check_ranges({name: DEFAULT_RANGES[name] for name in VARIED} | dict(vary or {}))
+    ranges = _check_varied(vary or {})
     draws = sample_changes(ranges, samples, seed)
     random = np.random.default_rng(seed)
     labels = _draw_labels({label: weight for label, (weight, _) in tree.items()}, samples, random)
@@ -188,6 +189,18 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
             if out is not None:
                 write_dataset(table, Path(out), {})
     return CollapseRisk(table)
+
+
+def _check_varied(vary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the ranges of properties, or refuse what is none of the structure."""
+    ranges = check_ranges({name: DEFAULT_RANGES[name] for name in VARIED} | dict(vary))
+    for name, values in ranges.items():
+        if name in ("scale", "sign") or isinstance(values, Mapping):
+            raise InvalidInput(
+                f"{name!r} cannot be varied here: scales are searched; give reversed motions among "
+                "the records, and structures as alternatives"
+            )
+    return ranges
 
 
 def _resolve_alternatives(
@@ -280,6 +293,11 @@ def _first_scales(table: xr.Dataset, measure: str, begin: int) -> Array:
     if not begin:
         return np.asarray(FIRST_PEAK / unscaled)
     found = CollapseRisk(table.isel(sample=slice(begin)))
+    if not len(found.answered):
+        raise DidNotConverge(
+            f"none of the first {begin} samples has a capacity: {table['error'].values[0]}",
+            last=None,
+        )
     low, high = found.capacities(name)
     middle = np.where(np.isfinite(high), np.sqrt(np.maximum(low, high / 4.0) * high), 2.0 * low)
     return np.asarray(float(np.median(middle)) / unscaled)

@@ -154,6 +154,23 @@ def test_samples_are_kept_and_continued(tmp_path, monkeypatch, quick_runs):
         af.collapse_risk(analysis, motions, SITE, **options | {"seed": 1})
 
 
+@pytest.mark.parametrize("name", ["sign", "scale", "width"])
+def test_what_is_no_property_is_refused(name):
+    analysis, motions = tilted_block()
+    values = {"sign": "reversed", "scale": (1.0, 2.0), "width": {"one": analysis.structure}}
+    with pytest.raises(af.InvalidInput, match=f"'{name}' cannot be varied here"):
+        af.collapse_risk(analysis, motions, SITE, vary={name: values[name]})
+
+
+def test_runs_without_any_answer_are_an_error(monkeypatch):
+    def fail(*_):
+        raise af.DidNotConverge("made to fail", last=None)
+
+    monkeypatch.setattr(af.studies.collapse_risk, "prepare_runs", fail)
+    with pytest.raises(af.DidNotConverge, match=r"first 8 samples has a capacity.*made to fail"):
+        af.collapse_risk(*tilted_block(), SITE, samples=9)
+
+
 def test_too_few_records_are_refused():
     analysis, motions = tilted_block()
     with pytest.raises(af.InvalidInput, match="several records"):
