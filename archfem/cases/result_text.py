@@ -12,7 +12,7 @@ from archfem.cases.defaults import describe_defaults, explain_defaults
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import Ending, History
-from archfem.dynamics.verdict import ALL_DEFINITIONS
+from archfem.dynamics.verdict import ALL_DEFINITIONS, DOUBT_MARK
 from archfem.joints.criteria import (
     assessed_joints,
     envelope,
@@ -178,7 +178,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     lines += filter(None, [structure.assessment, defaults(result.case)])
     if result.strength_use is not None:
         lines.append(f"dead load: {strength_use_text(result.strength_use)}")
-    return "\n".join([*lines, *(f"in doubt: {doubt}" for doubt in result.doubts)])
+    return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in result.doubts)])
 
 
 def describe_collapse(structure: Structure, collapse: Collapse) -> str:

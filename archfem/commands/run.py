@@ -28,6 +28,7 @@ from archfem.cases.run import CASE_FILE, DeadLoadResult, Result, Run, carry_out,
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions
 from archfem.dynamics.history import Ending, History
+from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.limit.collapse import Collapse
 from archfem.motion.motion import Motion
@@ -112,7 +113,7 @@ def _record_doubts() -> Iterator[list[str]]:
     """Yield a list of the warnings of a block, which results repeat as doubts."""
     doubts: list[str] = []
     handler = logging.Handler(logging.WARNING)
-    handler.emit = lambda record: doubts.append(f"in doubt: {record.getMessage()}")  # type: ignore[method-assign]
+    handler.emit = lambda record: doubts.append(f"{DOUBT_MARK}{record.getMessage()}")  # type: ignore[method-assign]
     logger.addHandler(handler)
     try:
         yield doubts

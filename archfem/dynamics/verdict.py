@@ -44,6 +44,9 @@ PUBLISHED_DEFINITION = "Demirel and Aldemir"
 ALL_DEFINITIONS = (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
 
 
+# Begin of a line with a doubt, in texts and result files
+DOUBT_MARK = "in doubt: "
+
 # What a run without doubts still leaves open
 NO_RANGE = "one motion, one set of properties: range not computed"
 
@@ -104,7 +107,7 @@ class Verdict:
 
     def __str__(self) -> str:
         """Verdict in words: outcome, doubts, displacements, and a line for each mechanism."""
-        lines = [self.headline, *(f"in doubt: {doubt}" for doubt in self.doubts)]
+        lines = [self.headline, *(f"{DOUBT_MARK}{doubt}" for doubt in self.doubts)]
         lines += [self.assessed] if self.assessed else []
         if not np.isnan(self.displacement):
             lines.append(

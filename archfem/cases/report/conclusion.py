@@ -14,6 +14,7 @@ from archfem.cases import result_text
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import History
+from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.joints.criteria import assessed_joints
 from archfem.units import format_mm
@@ -153,7 +154,7 @@ def list_doubts(data: ReportData) -> list[str]:
         doubts = [f"{count} of {len(verdicts)} runs: {text}" for text, count in reasons.items()]
     for name in ("limit.txt", "rating.txt", "assessment.txt"):
         lines = (data.read_text(name) or "").splitlines()
-        doubts += [line[10:] for line in lines if line.startswith("in doubt: ")]
+        doubts += [line.removeprefix(DOUBT_MARK) for line in lines if line.startswith(DOUBT_MARK)]
     return list(dict.fromkeys(doubts))
 
 
