@@ -25,7 +25,12 @@ from time import perf_counter
 from typing import Any, NamedTuple
 
 import numba
+from numba._dynfunc import make_function
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import LoweringPass, register_pass
+from numba.core.typed_passes import NativeLowering
 
 from archfem._files import lock_file
 
@@ -202,10 +207,58 @@ entry: Any = store_compiled(numba.njit(**KERNEL_OPTIONS))
 # Compiles a function that may allocate arrays, and stores it on disk.
 allocating_entry: Any = store_compiled(numba.njit())
 
-# Kernels that only kernels call are part of the callers' code. They need no wrappers for Python,
-# which would convert every array of their arguments and take a fifth of the compile time. A call
-# from Python is an error.
-INNER_OPTIONS: Any = KERNEL_OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+class InnerLibrary(JITCodeLibrary):
+    """Intermediate code of a kernel, which is optimised in its callers and not by itself."""
+
+    def finalize(self) -> None:
+        """Link the kernels that are called; no machine code is generated."""
+        for library in dict.fromkeys(self._linking_libraries):
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class DeclareInnerKernel(LoweringPass):
+    """Declare a kernel to its callers, by a function that Python cannot call."""
+
+    _name = "declare_inner_kernel"
+
+    def __init__(self) -> None:
+        super().__init__()
+
+    def run_pass(self, state: Any) -> bool:
+        """Declare it after its lowering to intermediate code."""
+        lowered = state.cr
+        name, module = lowered.fndesc.qualname, lowered.fndesc.lookup_module()
+        function = make_function(module, name, "", 0, lowered.env, (state.library,))
+        state.targetctx.insert_user_function(function, lowered.fndesc, [state.library])
+        state.cr = lowered._replace(cfunc=function)
+        return True
+
+
+class InnerCompiler(CompilerBase):
+    """Compiles a kernel to intermediate code only."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the passes of numba, which end at the lowering to intermediate code."""
+        state = self.state
+        name = state.func_id.func_qualname
+        state.library = InnerLibrary(state.targetctx.codegen(), name)
+        state.flags.no_compile = True
+        passes = DefaultPassBuilder.define_nopython_pipeline(state)
+        passes.add_pass_after(DeclareInnerKernel, NativeLowering)
+        passes.finalize()
+        return [passes]
+
+
+# Kernels that only kernels call are part of the callers' code. Machine code and optimisation of
+# their own, and wrappers for Python, would double the compile time. A call from Python is an error.
+INNER_OPTIONS: Any = KERNEL_OPTIONS | {
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": InnerCompiler,
+}
 
 # Compiles a function that allocates no arrays.
 kernel: Any = numba.njit(**INNER_OPTIONS)
@@ -251,10 +304,10 @@ def _announce_compilation(name: str) -> None:
     # what is compiled at once, by a word of its first kernel, and its time as a multiple of that
     # of the reference function
     parts = {
-        "rigid_body.time_stepping": ("fall of loose blocks", 270.0),
-        "solvers.supernodal_lu": ("steps of elastic blocks", 290.0),
-        "joints.large": ("time steps of large displacements", 225.0),
-        "SmallSystem": ("time steps", 150.0),  # of rigid blocks with small displacements
+        "rigid_body.time_stepping": ("fall of loose blocks", 185.0),
+        "solvers.supernodal_lu": ("steps of elastic blocks", 160.0),
+        "joints.large": ("time steps of large displacements", 190.0),
+        "SmallSystem": ("time steps", 115.0),  # of rigid blocks with small displacements
     }
     part, multiple = next((parts[word] for word in parts if word in name), ("", 0.0))
     if not part or part in _announced:

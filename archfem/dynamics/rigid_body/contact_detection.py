@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem._numba import allocating_entry, entry
+from archfem._numba import allocating_entry, entry, kernel
 from archfem._typing import Array
 from archfem.dynamics.rigid_body.bodies import Bodies
 
@@ -109,7 +109,7 @@ def place_pieces(bodies, q, world):  # type: ignore
     _sort(world)
 
 
-@entry
+@kernel
 def _sort(world):  # type: ignore
     """Sort the pieces by their smallest x."""
     order, boxes = world.order, world.boxes
@@ -155,7 +155,7 @@ def find_contacts(bodies, world, contacts, motion):  # type: ignore
     return _keep_crossing(bodies, motion, contacts, count) if margin > bodies.contact_gap else count
 
 
-@entry
+@kernel
 def _largest_gap(bodies, motion):  # type: ignore
     """Return the largest gap that a contact can have [m]."""
     _, speeds, foresight = motion
@@ -166,7 +166,7 @@ def _largest_gap(bodies, motion):  # type: ignore
     return max(bodies.contact_gap, 2.0 * foresight * fastest - bodies.slop)
 
 
-@entry
+@kernel
 def _will_cross(bodies, motion, pair, place, gap):  # type: ignore
     """Return whether two points will be too deep in each other if nothing stops them."""
     (middle, speeds, foresight), (a, b), (point, normal) = motion, pair, place
@@ -175,7 +175,7 @@ def _will_cross(bodies, motion, pair, place, gap):  # type: ignore
     return gap + foresight * relative_speed(speeds, pair, normal, arms) < -bodies.slop
 
 
-@entry
+@kernel
 def _keep_crossing(bodies, motion, contacts, count):  # type: ignore
     """Drop points that neither touch nor will cross; return the number of the others.
 
@@ -200,7 +200,7 @@ def _keep_crossing(bodies, motion, contacts, count):  # type: ignore
     return kept
 
 
-@entry
+@kernel
 def _touch_ground(bodies, world, piece, motion, contacts, count):  # type: ignore
     """Add the outermost vertices of a piece that touch the ground, one or two."""
     left, right = -1, -1
@@ -230,7 +230,7 @@ def _touch_ground(bodies, world, piece, motion, contacts, count):  # type: ignor
     return count
 
 
-@entry
+@kernel
 def _edge_distance(bodies, world, edge, piece):  # type: ignore
     """Return the distance of a piece's nearest vertex from the line of an edge, outward [m]."""
     nx, ny = world.normals[edge, 0], world.normals[edge, 1]
@@ -240,7 +240,7 @@ def _edge_distance(bodies, world, edge, piece):  # type: ignore
     return nearest - (nx * world.points[edge, 0] + ny * world.points[edge, 1])
 
 
-@entry
+@kernel
 def _separation(bodies, world, one, two, margin):  # type: ignore
     """Return the largest separation of two pieces along normals of the first, and its edge."""
     best, edge = -np.inf, -1
@@ -254,7 +254,7 @@ def _separation(bodies, world, one, two, margin):  # type: ignore
     return best, edge
 
 
-@entry
+@kernel
 def _touch(bodies, world, pieces, margin, contacts, count):  # type: ignore
     """Add the contact points of two pieces."""
     one, two = pieces
@@ -270,13 +270,13 @@ def _touch(bodies, world, pieces, margin, contacts, count):  # type: ignore
     return _clip(bodies, world, (one, edge, two, 1.0), margin, contacts, count)
 
 
-@entry
+@kernel
 def _next_vertex(bodies, piece, k):  # type: ignore
     """Return the vertex after one of a piece."""
     return k + 1 if k + 1 < bodies.piece_starts[piece + 1] else bodies.piece_starts[piece]
 
 
-@entry
+@kernel
 def _clip(bodies, world, reference, margin, contacts, count):  # type: ignore
     """Add the end points of the incident edge, clipped to the reference edge, that touch it."""
     one, edge, two, sign = reference
@@ -320,7 +320,7 @@ def _clip(bodies, world, reference, margin, contacts, count):  # type: ignore
     return count
 
 
-@entry
+@kernel
 def store_impulses(bodies, q, contacts, count, stored):  # type: ignore
     """Store the impulses of a step."""
     slots = stored.slots
@@ -337,7 +337,7 @@ def store_impulses(bodies, q, contacts, count, stored):  # type: ignore
         slots[slot] = k
 
 
-@entry
+@kernel
 def restore_impulses(bodies, q, contacts, count, stored):  # type: ignore
     """Set impulses to those of the nearest contacts of the same pieces, each used once."""
     slots = stored.slots
@@ -358,14 +358,14 @@ def restore_impulses(bodies, q, contacts, count, stored):  # type: ignore
             stored.key[best] = -1
 
 
-@entry
+@kernel
 def _hash_slot(key, size):  # type: ignore
     """Return the first slot of a key, by multiplicative hashing."""
     # the multiplier is 2³² over the golden ratio
     return ((key * 0x9E3779B1) >> 16) & (size - 1)
 
 
-@entry
+@kernel
 def _tangential_position(bodies, q, contacts, k):  # type: ignore
     """Return the position of a contact along its tangent, from the first body's centroid [m]."""
     body = contacts.bodies[k, 0]
@@ -374,7 +374,7 @@ def _tangential_position(bodies, q, contacts, k):  # type: ignore
     return ry * contacts.normal[k, 0] - rx * contacts.normal[k, 1]
 
 
-@entry
+@kernel
 def prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
     """Compute the rows of H, their inverse effective masses, and the target velocities."""
     contacts, rows = workspace.contacts, workspace.rows
@@ -418,7 +418,7 @@ def prepare_rows(bodies, parameters, workspace, touching):  # type: ignore
             rows[k, 13] = 1.0 / determinant
 
 
-@entry
+@kernel
 def _bond_impulse(bodies, parameters, contacts, k):  # type: ignore
     """Return the limit by cohesion at each of the two points of a face in a step [N s]."""
     cohesion = bodies.cohesion[contacts.bodies[k, 0], contacts.bodies[k, 1]]
@@ -431,7 +431,7 @@ def _bond_impulse(bodies, parameters, contacts, k):  # type: ignore
     return 0.5 * parameters.dt * cohesion * np.sqrt(x**2 + y**2)
 
 
-@entry
+@kernel
 def _arm(bodies, q, point, body):  # type: ignore
     """Return the vector from a body's centroid to a point; zero for the ground, which is fixed."""
     if body == len(q):
@@ -440,7 +440,7 @@ def _arm(bodies, q, point, body):  # type: ignore
     return x, point[1] - bodies.centre[body, 1] - q[body, 1]
 
 
-@entry
+@kernel
 def relative_speed(speeds, pair, direction, arms):  # type: ignore
     """Return the velocity of the second body relative to the first along a direction."""
     one, two = speeds[pair[0]], speeds[pair[1]]
@@ -448,7 +448,7 @@ def relative_speed(speeds, pair, direction, arms):  # type: ignore
     return translation + arms[1] * two[2] - arms[0] * one[2]
 
 
-@entry
+@kernel
 def _apply_impulse(bodies, speeds, pair, direction, arms, impulse):  # type: ignore
     """Apply an impulse along a direction to the second body, and its reaction to the first."""
     for side in range(2):
@@ -459,7 +459,7 @@ def _apply_impulse(bodies, speeds, pair, direction, arms, impulse):  # type: ign
         body[2] += inertia * arms[side] * signed
 
 
-@entry
+@kernel
 def apply_initial_impulses(bodies, workspace, touching):  # type: ignore
     """Apply the impulses of the step before, as initial guess of the sweeps."""
     contacts, speeds = workspace.contacts, workspace.speeds
@@ -471,13 +471,13 @@ def apply_initial_impulses(bodies, workspace, touching):  # type: ignore
         _apply_impulse(bodies, speeds, (a, b), (-ny, nx), (ta, tb), contacts.impulse[k, 1])
 
 
-@entry
+@kernel
 def has_partner(contacts, k, touching):  # type: ignore
     """Return whether a contact and the next one are the two points of one face."""
     return k + 1 < touching and contacts.key[k] == contacts.key[k + 1]
 
 
-@entry
+@kernel
 def measure_residual(bodies, workspace, touching):  # type: ignore
     """Return the largest violation of a contact's condition, as a velocity [m/s]."""
     contacts, speeds = workspace.contacts, workspace.speeds
@@ -498,7 +498,7 @@ def measure_residual(bodies, workspace, touching):  # type: ignore
     return worst
 
 
-@entry
+@kernel
 def solve_face(inverse, old, gap):  # type: ignore
     """Return the normal impulses of a face's two points that meet the conditions of both."""
     one, two, coupling, factor = inverse
@@ -515,7 +515,7 @@ def solve_face(inverse, old, gap):  # type: ignore
     return 0.0, max(-free2 / two, 0.0)
 
 
-@entry
+@kernel
 def _widest_gap(bodies, world, one, two):  # type: ignore
     """Return a lower bound of the distance of two pieces; negative, their depth of overlap [m]."""
     widest = -np.inf

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from archfem._numba import allocating_entry, entry
+from archfem._numba import allocating_entry, entry, kernel
 from archfem._typing import Array
 from archfem.dynamics.rigid_body.contact_detection import (
     Contacts,
@@ -141,7 +141,7 @@ def advance_steps(bodies, parameters, workspace, state):  # type: ignore
     return overlap, False
 
 
-@entry
+@kernel
 def _exchange(bodies, parameters, moved, ground):  # type: ignore
     """Return the rise of potential energy by displacements, and the work of inertia forces [J]."""
     rise, work = 0.0, 0.0
@@ -276,7 +276,7 @@ def _separate(bodies, parameters, workspace, touching):  # type: ignore
     return True
 
 
-@entry
+@kernel
 def _add_rebounds(bodies, parameters, workspace, touching):  # type: ignore
     """Add the rebounds of impacts to the target velocities; return whether there are any.
 
@@ -313,7 +313,7 @@ def _add_rebounds(bodies, parameters, workspace, touching):  # type: ignore
     return any_rebound
 
 
-@entry
+@kernel
 def _impulse_work(bodies, parameters, before, after, ground):  # type: ignore
     """Return the work of the impulses of a step, and the kinetic energy after it [J]."""
     work = kinetic = 0.0
@@ -356,7 +356,7 @@ def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # typ
     return max_sweeps, measure_residual(bodies, workspace, touching)
 
 
-@entry
+@kernel
 def _add_momentum(workspace, touching, share):  # type: ignore
     """Continue the change between two sweeps by a share of it (Nesterov)."""
     speeds, impulse, last = workspace.speeds, workspace.contacts.impulse, workspace.last
@@ -373,7 +373,7 @@ def _add_momentum(workspace, touching, share):  # type: ignore
             last.impulse[k, axis] = new
 
 
-@entry
+@kernel
 def _sweep_contacts(bodies, workspace, touching):  # type: ignore
     """Sweep once over the faces; return the largest violation of a contact found [m/s]."""
     # single elements are read, since views of rows cost more than the arithmetic
@@ -422,7 +422,7 @@ def _sweep_contacts(bodies, workspace, touching):  # type: ignore
     return worst
 
 
-@entry
+@kernel
 def _sweep_friction(rows, impulse, points, speeds, inverse_mass):  # type: ignore
     """Solve for friction at the points of a face; return its change, both spins, and the slip."""
     (along, wa, wb, worst), (m, ia, ib) = speeds, inverse_mass

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numba.extending import overload
 
-from archfem._numba import KERNEL_OPTIONS, kernel
+from archfem._numba import INNER_OPTIONS, kernel
 from archfem.dynamics.solvers.active_compliance import ActiveRows, begin_problem, clear_problem
 from archfem.dynamics.solvers.active_rows import (
     check_active_rows,
@@ -105,7 +105,7 @@ class ComplianceSolver(StepSolver):
         return {id(old): ActiveRows.of(len(old.full), segments, len(old.derivatives[1]))}
 
 
-@overload(solve_contact, jit_options=KERNEL_OPTIONS)
+@overload(solve_contact, jit_options=INNER_OPTIONS)
 def _solve_contact(system):  # type: ignore
     return _solve_by_compliance if is_system(system, ComplianceSystem) else None
 

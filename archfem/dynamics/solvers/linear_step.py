@@ -17,7 +17,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem._numba import KERNEL_OPTIONS, kernel, summing_kernel
+from archfem._numba import INNER_OPTIONS, kernel, summing_kernel
 from archfem._typing import Array
 from archfem.dynamics.solvers.base import evaluate_step, solve_step, start_run
 from archfem.dynamics.solvers.equation import Equation
@@ -159,17 +159,17 @@ def _is_linear(system: Any) -> bool:
     return "linear" in getattr(system, "fields", ())
 
 
-@overload(start_run, jit_options=KERNEL_OPTIONS)
+@overload(start_run, jit_options=INNER_OPTIONS)
 def _start_run(system, state, memory):  # type: ignore
     return _start_linear_run if _is_linear(system) else None
 
 
-@overload(solve_step, jit_options=KERNEL_OPTIONS)
+@overload(solve_step, jit_options=INNER_OPTIONS)
 def _solve_step(system, step, states, ground):  # type: ignore
     return _solve_linear_step if _is_linear(system) else None
 
 
-@overload(evaluate_step, jit_options=KERNEL_OPTIONS)
+@overload(evaluate_step, jit_options=INNER_OPTIONS)
 def _evaluate_step(system, step, states, ground, results, memory):  # type: ignore
     return _evaluate_linear_step if _is_linear(system) else None
 

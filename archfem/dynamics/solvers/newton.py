@@ -18,7 +18,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numba.extending import overload
 
-from archfem._numba import KERNEL_OPTIONS, kernel
+from archfem._numba import INNER_OPTIONS, kernel
 from archfem._typing import Array
 from archfem.dynamics.solvers.base import (
     StepSolver,
@@ -302,7 +302,7 @@ _solve_small = newton_driver(
 )
 
 
-@overload(solve_contact, jit_options=KERNEL_OPTIONS)
+@overload(solve_contact, jit_options=INNER_OPTIONS)
 def _solve_contact(system):  # type: ignore
     return _solve_small_step if is_system(system, SmallSystem) else None
 
@@ -372,17 +372,17 @@ class LargeStepWorkspace(NamedTuple):
     constant: Array  # forces that do not depend on the end of the step
 
 
-@overload(start_run, jit_options=KERNEL_OPTIONS)
+@overload(start_run, jit_options=INNER_OPTIONS)
 def _start_run(system, state, memory):  # type: ignore
     return _start_large_run if is_system(system, LargeSystem) else None
 
 
-@overload(solve_step, jit_options=KERNEL_OPTIONS)
+@overload(solve_step, jit_options=INNER_OPTIONS)
 def _solve_step(system, step, states, ground):  # type: ignore
     return _solve_large_step if is_system(system, LargeSystem) else None
 
 
-@overload(evaluate_step, jit_options=KERNEL_OPTIONS)
+@overload(evaluate_step, jit_options=INNER_OPTIONS)
 def _evaluate_step(system, step, states, ground, results, memory):  # type: ignore
     return _evaluate_large_step if is_system(system, LargeSystem) else None
 
