@@ -145,14 +145,16 @@ class Tools {
 
   /** The case as `archfem run` reads it. */
   writeCase() {
-    const { design, data } = this.live, { drawn, outlines, unit, file } = this.source, motion = data.motions[this.find("motion").value];
+    const { live } = this, { design, data } = live, { drawn, outlines, unit, file } = this.source, motion = data.motions[this.find("motion").value];
     const shapes = { circle: "circular_arch", ellipse: "elliptical_arch", pointed: "pointed_arch" };
     const model = '\n[model]\nfidelity = "rigid"\ndisplacements = "large"\n\n[analysis]\ndamping = { ratio = 0.05, modes = "effective" }\n';
     let text = data.arches[this.source.example ?? 0].case;
     if (drawn) text = `title = "a drawn arch"\n\n[structure]\nshape = "${shapes[drawn.kind]}"\nspan = ${drawn.span.toFixed(4)}\nrise = ${drawn.rise.toFixed(4)}\nthickness = 0\nvoussoirs = 0\n${model}`;
     if (outlines) text = `title = "a drawing"\n\n[structure]\nshape = "outlines"\nfile = "${file}"  # beside this file\nunit = "${{ 1: "m", 0.01: "cm", 0.001: "mm" }[unit]}"\nsnap = "3 mm"\n${model}`;
     if (design.stones) text = text.replace(/^thickness = .*$/m, `thickness = ${design.thickness}`).replace(/^voussoirs = .*$/m, `voussoirs = ${design.stones}`);
+    const law = live.finishes.find(({ name }) => name === design.finish);
     text += `\n[contacts."stone to stone"]\nfriction = ${design.friction}\n`;
+    if (law) text += `normal_stiffness = ${law.stiffness}  # ${law.name}\nshear_stiffness = ${law.shear}\nclosure = ${law.closure}\n`;
     const seed = motion.name.match(/^earthquake (\d)$/);
     if (seed) return `${text}\n[motion]\nsynthetic = { seed = ${seed[1]}, duration = 8.0, dt = 0.01, pga = ${(design.strength * G).toFixed(4)} }\n`;
     return `${text}\n# moved by "${motion.name}", ${design.strength} g at most: give your own record in [motion]\n`;
