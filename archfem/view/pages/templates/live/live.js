@@ -65,7 +65,7 @@ class Live {
     this.finishes = given.finishes ?? this.data.arches[0].finishes;
     this.find("finish").replaceChildren(new Option(given.thrust ? "as archfem computed it" : "hard: they do not close", ""), ...this.finishes.map(({ name }) => new Option(name, name)));
     this.stage.handles = [];
-    this.find("motion").value = 0;
+    if (!("strength" in changes)) this.find("motion").value = 0;
     for (const name of ["thickness", "stones"]) this.find(name).closest("label").hidden = !ring;
     if (ring) Object.assign(this.find("thickness"), { min: (0.2 * ring.thickness).toPrecision(2), max: (2 * ring.thickness).toPrecision(2), step: 0.005 });
     this.stage.fit(given, box);
