@@ -279,7 +279,7 @@ def test_stones_are_moved_by_a_finger_and_by_keys(tmp_path):
         stage = driver.find_element("css selector", "#stage")
         before = run("return tools.source.outlines")
         centre = np.mean(before[9]["points"], axis=0)
-        there = [b - a for a, b in zip(pixels(centre), pixels(centre + [0.0, 0.1]), strict=True)]
+        there = np.subtract(pixels((centre[0], centre[1] + 0.1)), pixels(centre)).tolist()
         drag = ActionChains(driver).move_to_element_with_offset(stage, *pixels(centre))
         drag.click_and_hold().move_by_offset(*there).release().perform()
         after = run("return tools.source.outlines")

@@ -63,7 +63,7 @@ class Live {
     this.original = { ...this.design };
     Object.assign(this.design, changes);
     this.finishes = given.finishes ?? this.data.arches[0].finishes;
-    this.find("finish").replaceChildren(new Option(given.thrust ? "as archfem computed it" : "hard: they do not close", ""), ...this.finishes.map(({ name }) => new Option(name, name)));
+    this.find("finish").replaceChildren(new Option(given.thrust ? "as given" : "hard: they do not close", ""), ...this.finishes.map(({ name }) => new Option(name, name)));
     this.stage.handles = [];
     if (!("strength" in changes)) this.find("motion").value = 0;
     for (const name of ["thickness", "stones"]) this.find(name).closest("label").hidden = !ring;
@@ -119,7 +119,7 @@ class Live {
     this.say("collapse", !stands ? "it does not stand by itself" : weakest.factor === Infinity ? "none: it leans on nothing" : `${weakest.factor.toFixed(3)} g, pushed to the ${weakest.side > 0 ? "right" : "left"}`);
     this.say("line", percent >= 0 ? `${percent} % of half the thickness is left (max |e| = ${most.toFixed(3)})` : "it leaves the stones: this arch falls by its own weight");
     this.say("mechanism", [`${weakest.hinges.length} hinges at joints ${weakest.hinges.map(({ joint }) => joint).join(", ")}`, weakest.slides.length ? `${weakest.slides.length} joints slide` : ""].filter(Boolean).join("; "));
-    this.say("closing", settled ? `under its own weight joints close by up to ${(1e3 * settled.closing).toFixed(3)} mm, and stones move by up to ${(1e3 * farthest(settled.q, settled.q.map(() => 0), arch.bodies.reach)).toFixed(2)} mm` : law ? "on joints that close this arch slides or falls by its own weight; hard joints are shown" : "hard");
+    this.say("closing", settled ? `under its own weight joints close by up to ${(1e3 * settled.closing).toFixed(3)} mm, and stones move by up to ${(1e3 * farthest(settled.q, settled.q.map(() => 0), arch.bodies.reach)).toFixed(2)} mm` : law ? "on joints that close this arch slides or falls by its own weight; hard joints are shown" : own && given.thrust ? "as in the analysis of archfem" : "hard: they do not close");
     if (given.ring) {
       const factor = leastThickness(given.ring, { stones: design.stones, friction: design.friction }, given.parameters);
       this.say("least", Number.isNaN(factor) ? "it does not stand at any" : `${(factor * given.ring.thickness).toFixed(3)} m`);
