@@ -28,6 +28,7 @@ from archfem._validation import short_repr
 from archfem.errors import InvalidInput
 from archfem.masonry.block import measure_polygon
 from archfem.masonry.structure import suggest_name
+from archfem.masonry.survey.assemblies import is_assembly, read_plane_assembly
 from archfem.units import in_unit
 
 # Entities of a DXF file that are read, and those that draw no stone; all others may draw one
@@ -128,14 +129,20 @@ def _check_sizes(outlines: list[Outline]) -> None:
 
 
 def _read_geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
-    """Read the polygons of a GeoJSON file."""
+    """Read the polygons of a GeoJSON file, or the blocks of a plane assembly of compas."""
     try:
         found = json.loads(read_text(path, "drawing"))
     except (ValueError, RecursionError) as error:
         raise InvalidInput(f"it is not JSON: {error}") from error
+    factor = in_unit(f"1 {unit or 'm'}", "m", "unit")
+    if is_assembly(found):
+        for name, points, fixed in read_plane_assembly(found):
+            if "blocks" not in ignored:
+                points = _check_polygon(points, f"'{name}'", factor)
+                yield Outline(points, name, "blocks", fixed=fixed)
+        return
     if not isinstance(found, dict) or not isinstance(found.get("features"), list):
         raise InvalidInput("it is no GeoJSON FeatureCollection: export the outlines as one")
-    factor = in_unit(f"1 {unit or 'm'}", "m", "unit")
     for number, feature in enumerate(found["features"], 1):
         outline = _read_feature(_as_table(feature, f"feature {number}"), number, factor)
         if outline.layer not in ignored:
