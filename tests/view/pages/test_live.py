@@ -245,6 +245,21 @@ def test_the_page_fits_its_screen_and_can_be_read(tmp_path, wide, scheme):
 
 
 @pytest.mark.slow
+def test_the_page_runs_in_the_frame_of_a_notebook_cell(tmp_path):
+    cell = tmp_path / "cell.html"
+    cell.write_text(f"<!DOCTYPE html><body>{make_page()._repr_html_()}", encoding="utf-8")
+    with browser(wide=900) as driver:
+        driver.get(cell.as_uri())
+        driver.switch_to.frame(0)
+        wait_for_runs(driver, 20)
+        assert "Of 20 slightly different arches" in read_text(driver, "verdict")
+        # no second bar to scroll beside that of the notebook
+        high = driver.execute_script("return document.querySelector('.live-columns').offsetHeight")
+        assert high < 1080
+        assert complaints(driver) == []
+
+
+@pytest.mark.slow
 def test_a_change_redraws_and_the_shaken_arch_falls(tmp_path):
     path = make_page().save(tmp_path / "page.html")
     with browser(wide=1280) as driver:

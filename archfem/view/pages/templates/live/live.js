@@ -199,7 +199,8 @@ class Live {
     let last = performance.now();
     const tick = (now) => {
       if (!this.playing) return;
-      this.show(Math.min(this.time + ((now - last) / 1e3) * Number(this.find("speed").value), end));
+      // the time of a frame may be before the click that started it
+      this.show(Math.min(this.time + (Math.max(now - last, 0) / 1e3) * Number(this.find("speed").value), end));
       last = now;
       if (this.time >= end) this.pause(); else requestAnimationFrame(tick);
     };
