@@ -15,9 +15,15 @@ ROOT = Path(__file__).resolve().parents[1]
 FIGURES = ROOT / "notebooks" / "figures"
 DIGESTS = FIGURES / "digests.json"
 
+LIVE = [
+    str(path.relative_to(ROOT))
+    for path in sorted((ROOT / "archfem/view/pages/templates/live").iterdir())
+]
+
 SOURCES = {
     "falls.png": ("archfem/view/collapse.py", "archfem/view/style.py"),
     "hinges.gif": ("archfem/view/films/frames.py", "archfem/view/films/film.py"),
+    "page.gif": ("docs/page_film.py", "archfem/view/pages/live.py", *LIVE),
 }
 """Pictures, and the modules that draw them; this script draws all."""
 
@@ -46,11 +52,20 @@ def draw_hinges(path: Path) -> None:
     af.view.film(analysis.model, run, path, **options)
 
 
+def draw_page(path: Path) -> None:
+    """Film the page that shakes an arch, which needs Chromium."""
+    from page_film import film_page
+
+    film_page(path)
+
+
 def main() -> None:
     """Draw all pictures, or those that are named."""
     digests = json.loads(DIGESTS.read_text(encoding="utf-8")) if DIGESTS.exists() else {}
     for name in sys.argv[1:] or SOURCES:
-        {"falls.png": draw_falls, "hinges.gif": draw_hinges}[name](FIGURES / name)
+        {"falls.png": draw_falls, "hinges.gif": draw_hinges, "page.gif": draw_page}[name](
+            FIGURES / name
+        )
         digests[name] = digest(name)
         print(FIGURES / name)
     DIGESTS.write_text(json.dumps(digests, indent=1) + "\n", encoding="utf-8")

@@ -17,7 +17,7 @@ def run_in_node(given, program):
     """The value of a program, an expression or a promise of JavaScript, with the data `given`."""
     if NODE is None:
         pytest.skip("there is no node: apt-get install nodejs")
-    names = ("engine", "statics", "shapes", "outlines")
+    names = ("engine", "statics", "closing", "shapes", "outlines")
     scripts = "\n".join((SCRIPTS / f"{name}.js").read_text() for name in names)
     source = f"{scripts}\nconst given = {json.dumps(given)};\n"
     source += f"Promise.resolve({program.strip()}).then((r) => console.log(JSON.stringify(r)));"

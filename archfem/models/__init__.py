@@ -9,6 +9,7 @@
     large           models with large displacements, in corotational coordinates
     linear_blocks   linear or rigid blocks between joints, and what is read from them
     model           protocol Model, Prediction, cells for drawing
+    programs        input of OpenSees and 3DEC
     reference       all nodes; reference model: UFL forms of joints assembled anew
 
 Imports `masonry`, `joints` and the support modules. Start reading at `model`, then at

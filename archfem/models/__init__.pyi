@@ -6,3 +6,4 @@ from .model import Cells as Cells
 from .model import Model as Model
 from .model import Observer as Observer
 from .model import Prediction as Prediction
+from .programs import write_model as write_model

@@ -1,6 +1,8 @@
-"""Structures from surveyed outlines in GeoJSON, DXF or gmsh files.
+"""Structures from surveyed outlines in GeoJSON, DXF, SVG or gmsh files, or of compas assemblies.
 
+assemblies  outlines of plane assemblies of compas_assembly and compas_dem
 circle_fit  least-squares circle through surveyed points
 drawings    outlines in GeoJSON, DXF and tagged gmsh files
 outlines    blocks and structure from surveyed outlines, with small gaps closed
+svg         closed shapes of SVG files
 """

@@ -1,4 +1,4 @@
-"""Drawings with one closed outline for each block: GeoJSON, DXF and tagged gmsh files.
+"""Drawings with one closed outline for each block: GeoJSON, DXF, SVG and tagged gmsh files.
 
 A drawing is an elevation: x to the right, y upwards. ezdxf reads DXF files and meshio gmsh files;
 nothing in them is executed. Only calls of these two are within `_foreign_reader`, since files that
@@ -28,6 +28,8 @@ from archfem._validation import short_repr
 from archfem.errors import InvalidInput
 from archfem.masonry.block import measure_polygon
 from archfem.masonry.structure import suggest_name
+from archfem.masonry.survey.assemblies import is_assembly, read_plane_assembly
+from archfem.masonry.survey.svg import read_svg
 from archfem.units import in_unit
 
 # Entities of a DXF file that are read, and those that draw no stone; all others may draw one
@@ -58,9 +60,9 @@ def read_drawing(
     """Read the closed polygons of a drawing, without ignored layers; arcs stray by half of snap."""
     path = Path(path)
     readers = {".geojson": _read_geojson, ".json": _read_geojson, ".msh": _read_msh}
-    readers[".dxf"] = partial(_read_dxf, snap=snap)
+    readers |= {".dxf": partial(_read_dxf, snap=snap), ".svg": partial(_read_svg, snap=snap)}
     if (read := readers.get(path.suffix.lower())) is None:
-        raise InvalidInput(f"{path} is no drawing: give a .geojson, a .dxf or a .msh file")
+        raise InvalidInput(f"{path} is no drawing: give a .geojson, .dxf, .svg or .msh file")
     check_file(path, "drawing", max_bytes=2**25)
     try:
         outlines = list(read(path, unit, ignored))
@@ -128,14 +130,20 @@ def _check_sizes(outlines: list[Outline]) -> None:
 
 
 def _read_geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
-    """Read the polygons of a GeoJSON file."""
+    """Read the polygons of a GeoJSON file, or the blocks of a plane assembly of compas."""
     try:
         found = json.loads(read_text(path, "drawing"))
     except (ValueError, RecursionError) as error:
         raise InvalidInput(f"it is not JSON: {error}") from error
+    factor = in_unit(f"1 {unit or 'm'}", "m", "unit")
+    if is_assembly(found):
+        for name, points, fixed in read_plane_assembly(found):
+            if "blocks" not in ignored:
+                points = _check_polygon(points, f"'{name}'", factor)
+                yield Outline(points, name, "blocks", fixed=fixed)
+        return
     if not isinstance(found, dict) or not isinstance(found.get("features"), list):
         raise InvalidInput("it is no GeoJSON FeatureCollection: export the outlines as one")
-    factor = in_unit(f"1 {unit or 'm'}", "m", "unit")
     for number, feature in enumerate(found["features"], 1):
         outline = _read_feature(_as_table(feature, f"feature {number}"), number, factor)
         if outline.layer not in ignored:
@@ -375,6 +383,20 @@ def _check_coordinates(given: Any, name: str, factor: float) -> Array:
             "drawing, or give its unit"
         )
     return factor * points
+
+
+def _read_svg(
+    path: Path, unit: str | None, ignored: Collection[str], snap: float
+) -> Iterator[Outline]:
+    """Read the closed shapes of an SVG file."""
+    if unit is None:
+        raise InvalidInput(
+            "an SVG file has the size on paper alone: give what a unit of its coordinates is at "
+            'the building, e.g. unit = "mm"'
+        )
+    factor = in_unit(f"1 {unit}", "m", "unit")
+    for name, layer, points in read_svg(read_text(path, "drawing"), 0.5 * snap / factor, ignored):
+        yield Outline(_check_polygon(points, f"'{name}'", factor), name, layer)
 
 
 def _read_msh(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:

@@ -100,8 +100,10 @@ def read_outlines(
     are those along a ring or pier, otherwise the longer ones.
 
     Args:
-        path: GeoJSON file, DXF file or gmsh mesh of an elevation, y upwards.
-        unit: unit of the coordinates; by default that of the DXF file, and metres otherwise.
+        path: GeoJSON, DXF or SVG file or gmsh mesh of an elevation, y upwards; or a plane assembly
+            of compas_assembly or compas_dem (.json), whose blocks are on the layer "blocks".
+        unit: unit of the coordinates; by default that of the DXF file, and metres otherwise. An SVG
+            file needs one.
         snap: vertices and edges nearer than this are made to touch; chords stand for arcs, to half
             of it [m].
         layers: properties of all layers of the drawing by name. Role, material and fixed of a

@@ -20,6 +20,7 @@ from archfem.dynamics.rigid_body.simulation import (
     prepare_steps,
 )
 from archfem.errors import InvalidInput
+from archfem.masonry.joint_closing import FINISHES, joint_stiffness
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
@@ -82,7 +83,9 @@ def page(
     It needs no connection: stones fall by the time steps of `dynamics.RigidBlockSimulation`,
     compiled for browsers. About twenty slightly different arches are shaken, and their share of
     falls is shown. A single ring between two supports can be cut into other stones, and thinner or
-    thicker ones; other structures are shaken as they are.
+    thicker ones; other structures are shaken as they are. Joints of a finish close in statics: in
+    the thrust line under dead load, and in the largest push at large displacements. Those of the
+    shaking are hard.
 
     Args:
         analysis: the analysis; of it the structure, and the thrust line under dead load.
@@ -147,9 +150,24 @@ def describe_arch(structure: Structure, thrust: Array | None = None) -> dict[str
         "parameters": parameters._asdict(),
         "joints": joints,
         "sizes": [float(np.sqrt(block.area)) for block in structure.blocks],
+        "finishes": list_finishes(structure),
         "thrust": np.asarray(thrust).tolist() if has_thrust else None,
         "ring": describe_ring(structure),
     }
+
+
+def list_finishes(structure: Structure) -> list[dict[str, Any]]:
+    """Return the usual laws of joints between the softest stones, by finish."""
+    stones = [structure.blocks[k] for k in structure.free]
+    softest = min((stone.material for stone in stones), key=lambda material: material.young)
+    spacing = float(np.mean([np.sqrt(stone.area) for stone in stones]))
+    known = {} if softest.strength is None else {"strength": softest.strength}
+    found = []
+    for finish in FINISHES:
+        law = joint_stiffness(softest.young, spacing, finish, rigid=True, **known)
+        usual = {"stiffness": law.initial[1], "shear": law.shear[1], "closure": law.closure[1]}
+        found.append({"name": finish, "width": structure.width} | usual)
+    return found
 
 
 def describe_ring(structure: Structure) -> dict[str, Any] | None:

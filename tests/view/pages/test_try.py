@@ -1,9 +1,11 @@
 """The page that starts from examples, photos and drawings: against Python, and by clicks."""
 
+import itertools
 import re
 import sys
 from pathlib import Path
 
+import ezdxf
 import numpy as np
 import pytest
 from chromium import browser, complaints
@@ -30,7 +32,9 @@ READ = """
 (() => {
   const read = given.dxf ? readDxf : readGeoJson;
   const arch = assembleOutlines(read(given.text), given.unit ?? 1, given.parameters);
-  return { joints: arch.joints.length, factor: new Equilibrium(arch).weakest().factor };
+  const areas = arch.bodies.mass.map(([mass]) => mass / STONE);
+  const area = areas.reduce((sum, each) => sum + each);
+  return { joints: arch.joints.length, area, factor: new Equilibrium(arch).weakest().factor };
 })()
 """
 WRONG = "(() => { try { %s; } catch (error) { return error.message; } })()"
@@ -90,7 +94,43 @@ def box(left, low, right, high):
 def test_a_column_in_dxf_falls_at_its_slenderness(parameters):
     text = dxf(box(-1, -1, 2, 0), box(0, 0, 0.5, 1), box(0, 1, 0.5, 2))
     found = run_in_node({"text": text, "dxf": True, "parameters": parameters}, READ)
-    assert found == {"joints": 2, "factor": pytest.approx(0.25, rel=1e-9)}  # breadth over height
+    assert found["joints"] == 2
+    assert found["factor"] == pytest.approx(0.25, rel=1e-9)  # breadth over height
+
+
+@pytest.mark.parametrize("way", ["bulges", "heavy", "lines and arcs"])
+def test_arcs_of_a_drawing_are_those_of_the_ring(parameters, tmp_path, way):
+    """Stones of a ring as polylines with arcs, or as lines and arcs that stones share."""
+    radii, angles = (2.7, 3.3), np.radians(np.linspace(165.0, 15.0, 12))
+    places = np.array([[[r * np.cos(a), r * np.sin(a)] for r in radii] for a in angles])
+    bulge = np.tan(np.radians(150.0 / 11.0) / 4.0)
+    document = ezdxf.new()
+    drawn = document.modelspace()
+    for k, ((a, b), (c, d)) in enumerate(itertools.pairwise(places)):
+        corners = [(*a, -bulge), (*c, 0.0), (*d, bulge), (*b, 0.0)]
+        if way == "bulges":
+            drawn.add_lwpolyline(corners, format="xyb", close=True)
+        elif way == "heavy":
+            drawn.add_polyline2d(corners, format="xyb", close=True)
+        else:
+            for radius in radii:
+                drawn.add_arc((0, 0), radius, *np.degrees(angles[[k + 1, k]]))
+            drawn.add_line(a, b)
+    if way == "lines and arcs":
+        drawn.add_line(*places[-1])
+    for (a, b), side in ((places[0], -1.0), (places[-1], 1.0)):
+        back = 0.3 * side * (b - a)[::-1] * [1.0, -1.0]
+        support = [a, b, b + back, a + back]
+        drawn.add_lwpolyline(support, close=True, dxfattribs={"layer": "supports"})
+    document.saveas(path := tmp_path / "ring.dxf")
+    given = {"text": path.read_text(), "dxf": True, "parameters": parameters}
+    found = run_in_node(given, READ)
+    ring = af.circular_arch(radius=3.0, embrace=150.0, thickness=0.6, voussoirs=11)
+    assert found["joints"] == 12
+    # arcs of chords of 3 degrees
+    area = sum(block.area for block in ring.blocks if not block.fixed)
+    assert found["area"] == pytest.approx(area, rel=1e-3)
+    assert found["factor"] == pytest.approx(weakest(ring), rel=2e-3)
 
 
 @pytest.mark.parametrize(
@@ -213,6 +253,59 @@ def test_an_arch_is_drawn_on_a_photo_and_taken_away(tmp_path):
         wait(driver, lambda: driver.execute_script(script) == drawn)
         assert float(driver.find_element(find, "#collapse").text.split()[0]) == shown
         driver.save_screenshot(str(tmp_path / "drawn.png"))
+        assert complaints(driver) == []
+
+
+@pytest.mark.slow
+def test_stones_are_moved_by_a_finger_and_by_keys(tmp_path):
+    """A drag and keys move a stone with its neighbours' corners; blocks that cross get words."""
+    with browser(wide=1280) as driver:
+        from selenium.webdriver import ActionChains, Keys
+
+        def run(expression, *given):
+            script = "const live = document.querySelector('.arch').live, { tools, stage } = live;"
+            return driver.execute_script(script + expression, *given)
+
+        def pixels(point):
+            """Offset of a point of the drawing from the middle of the canvas."""
+            script = "const [x, y] = stage.place(arguments[0]), c = stage.canvas;"
+            script += "return [(x - c.width / 2) / devicePixelRatio,"
+            script += " (y - c.height / 2) / devicePixelRatio];"
+            return [round(each) for each in run(script, [float(value) for value in point])]
+
+        driver.get((DOCS / "try" / "index.html").resolve().as_uri())
+        wait_for_runs(driver, 1)
+        driver.find_element("css selector", "#stones-move").click()
+        stage = driver.find_element("css selector", "#stage")
+        before = run("return tools.source.outlines")
+        centre = np.mean(before[9]["points"], axis=0)
+        there = np.subtract(pixels((centre[0], centre[1] + 0.1)), pixels(centre)).tolist()
+        drag = ActionChains(driver).move_to_element_with_offset(stage, *pixels(centre))
+        drag.click_and_hold().move_by_offset(*there).release().perform()
+        after = run("return tools.source.outlines")
+        moved = np.subtract(after[9]["points"], before[9]["points"])
+        scale = run("return stage.scale / devicePixelRatio")
+        assert moved == pytest.approx(np.tile([0.0, 0.1], (4, 1)), abs=1.1 / scale)
+        assert after[0] == before[0]
+        assert sum(a != b for a, b in zip(after, before, strict=True)) == 3  # and its neighbours
+        # the fourth choice is stone 4; by 2 cm to the right
+        stage.send_keys(Keys.ENTER * 4 + Keys.ARROW_RIGHT * 2)
+        by_keys = np.subtract(run("return tools.source.outlines[3].points"), after[3]["points"])
+        assert by_keys == pytest.approx(np.tile([0.02, 0.0], (4, 1)), abs=1e-9)
+        # archfem reads the stones, and finds the same push
+        (tmp_path / "arch.toml").write_text(run("return tools.writeCase()"))
+        (tmp_path / "stones.geojson").write_text(run("return writeGeoJson(tools.source.outlines)"))
+        structure = af.Case.read(tmp_path / "arch.toml").structure
+        shown = float(driver.find_element("css selector", "#collapse").text.split()[0])
+        assert shown == pytest.approx(weakest(structure), abs=2e-3)
+        # a corner dragged through its stone
+        kept = run("return tools.source.outlines")
+        (x, y), far = kept[3]["points"][0], np.mean(kept[5]["points"], axis=0)
+        start, end = pixels((x, y)), pixels(far)
+        drag = ActionChains(driver).move_to_element_with_offset(stage, *start).click_and_hold()
+        drag.move_by_offset(*np.subtract(end, start).tolist()).release().perform()
+        words = driver.find_element("css selector", "#message").text
+        assert re.search(r"crosses itself|is not convex|in each other by", words), words
         assert complaints(driver) == []
 
 

@@ -19,7 +19,7 @@ class Live {
     this.stage = new Stage(this.find("stage"));
     this.startWorkers();
     data.motions.forEach(({ name }, k) => this.find("motion").append(new Option(name, k)));
-    for (const name of ["thickness", "stones", "friction", "strength"]) this.find(name).addEventListener("input", () => this.change(name));
+    for (const name of ["thickness", "stones", "friction", "strength", "finish"]) this.find(name).addEventListener("input", () => this.change(name));
     this.find("motion").addEventListener("input", () => { this.design.strength = this.suggest(data.motions[this.find("motion").value]); this.change("motion"); });
     this.find("reset").addEventListener("click", () => this.open(this.given));
     this.find("time").addEventListener("input", () => { this.pause(); this.show(Number(this.find("time").value)); });
@@ -32,10 +32,11 @@ class Live {
 
   /** Runs go to workers, so that the page stays alive. */
   startWorkers() {
-    const text = ["engine", "worker"].map((name) => document.querySelector(`#${name}-script`).textContent).join("\n");
+    const text = ["engine", "statics", "worker"].map((name) => document.querySelector(`#${name}-script`).textContent).join("\n");
     const address = URL.createObjectURL(new Blob([text], { type: "text/javascript" })), count = Math.min(navigator.hardwareConcurrency || 1, 4);
-    const receive = ({ data: { job, number, run, failure } }) => {
+    const receive = ({ data: { job, number, run, failure, push } }) => {
       if (job !== this.job) return;
+      if (push) return this.tellPush(push);
       this.runs[number] = run ?? { failure };
       this.tell();
       this.show(this.time);
@@ -55,14 +56,16 @@ class Live {
   /** Begin with an arch as it was given. */
   open(given, changes = {}, box = null) {
     const { ring } = this.given = given;
-    this.design = { thickness: ring?.thickness ?? null, stones: ring?.stones ?? null, strength: 0 };
+    this.design = { thickness: ring?.thickness ?? null, stones: ring?.stones ?? null, strength: 0, finish: "" };
     this.factor = new Equilibrium(given).weakest().factor;
     this.design.strength = this.suggest(this.data.motions[0]);
     this.design.friction = Math.min(...given.joints.map((joint) => joint.friction));
     this.original = { ...this.design };
     Object.assign(this.design, changes);
+    this.finishes = given.finishes ?? this.data.arches[0].finishes;
+    this.find("finish").replaceChildren(new Option(given.thrust ? "as given" : "hard: they do not close", ""), ...this.finishes.map(({ name }) => new Option(name, name)));
     this.stage.handles = [];
-    this.find("motion").value = 0;
+    if (!("strength" in changes)) this.find("motion").value = 0;
     for (const name of ["thickness", "stones"]) this.find(name).closest("label").hidden = !ring;
     if (ring) Object.assign(this.find("thickness"), { min: (0.2 * ring.thickness).toPrecision(2), max: (2 * ring.thickness).toPrecision(2), step: 0.005 });
     this.stage.fit(given, box);
@@ -70,7 +73,7 @@ class Live {
   }
   /** The design changed: arch, statics and runs anew. */
   change(name) {
-    if (name && name !== "motion") this.design[name] = Number(this.find(name).value);
+    if (name && name !== "motion") this.design[name] = name === "finish" ? this.find(name).value : Number(this.find(name).value);
     this.pause();
     this.time = 0;
     this.arch = this.build(this.design);
@@ -93,6 +96,7 @@ class Live {
   }
   showDesign() {
     const { design } = this, words = { thickness: (value) => `${value.toFixed(3)} m`, stones: String, friction: (value) => value.toFixed(2), strength: (value) => `${value.toFixed(2)} g` };
+    this.find("finish").value = design.finish;
     for (const [name, say] of Object.entries(words)) {
       if (design[name] === null) continue;
       this.find(name).value = design[name];
@@ -104,21 +108,28 @@ class Live {
 
   /** Thrust lines, collapse acceleration and least thickness. */
   solveStatics() {
-    const { design, given, arch } = this, own = this.isAsGiven(["thickness", "stones", "friction"]);
+    const { design, given, arch } = this, own = this.isAsGiven(["thickness", "stones", "friction"]), law = this.finishes.find(({ name }) => name === design.finish);
     const equilibrium = new Equilibrium(arch), weakest = equilibrium.weakest(), stands = weakest.factor >= 0;
     const trace = (values) => equilibrium.joints.map((joint, j) => crossing(joint, values[j]));
-    const resting = own && given.thrust ? given.thrust : equilibrium.thrust(0), pushed = stands && weakest.factor < Infinity ? equilibrium.thrust(weakest.side * weakest.factor) : null;
+    const settled = law ? new ClosingJoints(arch, law).rest() : null, hard = own && given.thrust && !law ? given.thrust : equilibrium.thrust(0);
+    const resting = settled?.lines ?? hard, pushed = stands && weakest.factor < Infinity ? equilibrium.thrust(weakest.side * weakest.factor) : null;
     const links = (values) => (values ? this.chains(equilibrium.joints).map((chain) => chain.map((j) => trace(values)[j])) : []);
-    this.statics = { stands, factor: weakest.factor, weight: links(resting), push: links(pushed), hinges: weakest.hinges.map(({ joint, sign }) => hingePoint(equilibrium.joints[joint], sign)) };
+    this.statics = { stands, settled, law, factor: weakest.factor, weight: links(resting), push: links(pushed), hinges: weakest.hinges.map(({ joint, sign }) => hingePoint(equilibrium.joints[joint], sign)) };
     const most = resting ? Math.max(...resting.map(Math.abs)) : NaN, percent = Math.round(100 * (1 - 2 * most));
     this.say("collapse", !stands ? "it does not stand by itself" : weakest.factor === Infinity ? "none: it leans on nothing" : `${weakest.factor.toFixed(3)} g, pushed to the ${weakest.side > 0 ? "right" : "left"}`);
     this.say("line", percent >= 0 ? `${percent} % of half the thickness is left (max |e| = ${most.toFixed(3)})` : "it leaves the stones: this arch falls by its own weight");
     this.say("mechanism", [`${weakest.hinges.length} hinges at joints ${weakest.hinges.map(({ joint }) => joint).join(", ")}`, weakest.slides.length ? `${weakest.slides.length} joints slide` : ""].filter(Boolean).join("; "));
+    this.say("closing", settled ? `under its own weight joints close by up to ${(1e3 * settled.closing).toFixed(3)} mm, and stones move by up to ${(1e3 * farthest(settled.q, settled.q.map(() => 0), arch.bodies.reach)).toFixed(2)} mm` : law ? "on joints that close this arch slides or falls by its own weight; hard joints are shown" : own && given.thrust ? "as in the analysis of archfem" : "hard: they do not close");
     if (given.ring) {
       const factor = leastThickness(given.ring, { stones: design.stones, friction: design.friction }, given.parameters);
       this.say("least", Number.isNaN(factor) ? "it does not stand at any" : `${(factor * given.ring.thickness).toFixed(3)} m`);
     }
     this.find("least").parentElement.hidden = !given.ring;
+  }
+  /** The push that joints of a finish bear, beside that of hard ones. */
+  tellPush(pushes) {
+    const { factor } = this.statics, weaker = pushes[0] <= pushes[1] ? 0 : 1;
+    this.say("collapse", `${pushes[weaker].toFixed(3)} g, pushed to the ${weaker ? "left" : "right"}; ${factor.toFixed(3)} g with hard joints`);
   }
   /** Joints in rows from stone to stone, along which a thrust line is drawn. */
   chains(joints) {
@@ -138,6 +149,8 @@ class Live {
     });
     this.runs = [];
     this.job += 1;
+    const { law, settled, factor } = this.statics;
+    if (settled && factor < Infinity) this.workers[0].postMessage({ job: this.job, closing: { arch: this.arch, law, q: settled.q, factor } });
     this.workers.forEach((worker, k) => worker.postMessage({ job: this.job, runs: runs.filter(({ number }) => number % this.workers.length === k), motion }));
     const peak = this.statics.factor * G, first = motion.x.findIndex((value) => Math.abs(value * scale) >= peak);
     this.say("critical", first < 0 ? "The ground never pushes that hard." : `The ground first pushes that hard at ${(first * motion.dt).toFixed(2)} s; it must do so long enough for the hinges to open.`);
@@ -186,7 +199,8 @@ class Live {
     let last = performance.now();
     const tick = (now) => {
       if (!this.playing) return;
-      this.show(Math.min(this.time + ((now - last) / 1e3) * Number(this.find("speed").value), end));
+      // the time of a frame may be before the click that started it
+      this.show(Math.min(this.time + (Math.max(now - last, 0) / 1e3) * Number(this.find("speed").value), end));
       last = now;
       if (this.time >= end) this.pause(); else requestAnimationFrame(tick);
     };

@@ -3,6 +3,8 @@
 const STONE = 20e3 / 9.81; // kg per m² of outline, 1 m wide
 const DRAWN_JOINTS = 24; // along a drawn curve, before it is cut into stones
 const TOUCHING = 3e-3; // distance of outlines that touch [m]
+const ARC_CHORD = Math.PI / 60; // of arcs of a drawing, whose sagitta is then 0.03 % of the radius
+const DXF_PLACES = { 10: 0, 20: 1, 21: 1, 42: 2 }; // of x, y and bulge in a point, by group code
 
 /** Say what is wrong, and what helps. */
 const refuse = (words) => { throw new Error(words); };
@@ -42,24 +44,90 @@ function readGeoJson(text) {
     return parts.map(([ring]) => ({ points: ring.map(([x, y]) => [x, y]), fixed: properties?.fixed === true }));
   });
 }
-/** Closed polylines of a DXF file; those in layers of supports are fixed. */
+/** Points of an arc by its bulge, the tangent of a quarter of its angle, without its end. */
+function bendLine([x, y, bulge], [u, v]) {
+  const turn = 4 * Math.atan(bulge), parts = Math.max(1, Math.ceil(Math.abs(turn) / ARC_CHORD)), away = bulge ? (1 - bulge ** 2) / (4 * bulge) : 0;
+  const [cx, cy] = [0.5 * (x + u) - away * (v - y), 0.5 * (y + v) + away * (u - x)];
+  return [...new Array(parts).keys()].map((k) => {
+    const [c, s] = [Math.cos((k * turn) / parts), Math.sin((k * turn) / parts)];
+    return k ? [cx + c * (x - cx) - s * (y - cy), cy + s * (x - cx) + c * (y - cy)] : [x, y];
+  });
+}
+/** Outlines of a DXF file: closed polylines, and what lines and arcs enclose; those in layers of supports are fixed. */
 function readDxf(text) {
-  const lines = text.split(/\r?\n/), outlines = [];
-  let current = null;
-  for (let k = 0; k + 1 < lines.length; k += 2) {
-    const [code, value] = [Number(lines[k]), lines[k + 1].trim()];
-    if (code === 0 && value !== "VERTEX") {
-      current = value === "LWPOLYLINE" || value === "POLYLINE" ? { points: [], fixed: false, isHead: value === "POLYLINE" } : null;
-      if (current) outlines.push(current);
-    } else if (code === 0) current.isHead = false;
-    else if (current && code === 8 && /support|abut|found|rock|fixed/i.test(value)) current.fixed = true;
-    else if (current && code === 10 && !current.isHead) current.points.push([Number(value), 0]);
-    else if (current && code === 20 && current.points.length && !current.isHead) current.points.at(-1)[1] = Number(value);
+  const start = text.search(/^ENTITIES\s*$/m), lines = text.slice(start).split(/\r?\n/), parts = [], outlines = [], paths = [];
+  if (start < 0) refuse("no DXF as text");
+  for (let k = 1; k + 1 < lines.length; k += 2) {
+    const [code, value] = [Number(lines[k]), lines[k + 1].trim()], part = parts.at(-1), number = Number(value);
+    if (code === 0 && value === "VERTEX") part.points.push([0, 0, 0]);
+    else if (code === 0) parts.push({ kind: value, points: value === "POLYLINE" ? [] : [[0, 0, 0]], layer: "", flags: 0 });
+    else if (!part) continue;
+    else if (code === 8 && !part.layer) part.layer = value;
+    else if (code === 70 && !part.flags) part.flags = number;
+    else if (code === 10 && part.kind === "LWPOLYLINE") part.points.push([number, 0, 0]);
+    else if (code === 11) part.points.push([number, 0, 0]);
+    else if (part.points.length && DXF_PLACES[code] !== undefined) part.points.at(-1)[DXF_PLACES[code]] = number;
+    else if (code === 40 || code === 50 || code === 51) part[code] = number;
   }
-  return outlines.filter(({ points }) => points.length > 2);
+  for (const { kind, points: all, layer, flags, 40: radius, 50: from, 51: to } of parts) {
+    const fixed = /support|abut|found|rock|fixed/i.test(layer), points = kind === "LWPOLYLINE" ? all.slice(1) : all;
+    if (/^(LW)?POLYLINE$/.test(kind) && points.length > 1) {
+      const isClosed = flags % 2 === 1 || Math.hypot(points[0][0] - points.at(-1)[0], points[0][1] - points.at(-1)[1]) === 0;
+      const bent = points.flatMap((point, k) => (k + 1 < points.length || isClosed ? bendLine(point, points[(k + 1) % points.length]) : [point.slice(0, 2)]));
+      if (isClosed) outlines.push({ points: bent, fixed }); else paths.push({ points: bent, fixed });
+    } else if (kind === "LINE") paths.push({ points: points.map((point) => point.slice(0, 2)), fixed });
+    else if (kind === "ARC") {
+      const turn = ((((to - from) % 360) + 360) % 360) * (Math.PI / 180), [start, end] = [from, to].map((angle) => [0, 1].map((k) => points[0][k] + radius * Math.cos((angle * Math.PI) / 180 - (k * Math.PI) / 2)));
+      paths.push({ points: [...bendLine([...start, Math.tan(turn / 4)], end), end], fixed });
+    }
+  }
+  return [...outlines.filter(({ points }) => points.length > 2), ...traceFaces(paths)];
+}
+/** What lines enclose together: the bounded faces of their plane graph, each anticlockwise. */
+function traceFaces(paths) {
+  const values = paths.flatMap(({ points }) => points.flat()), near = 1e-5 * values.reduce((most, value) => Math.max(most, Math.abs(value)), 0), nodes = [];
+  const nodeAt = ([x, y]) => { const k = nodes.findIndex(([u, v]) => Math.hypot(x - u, y - v) <= near); return k < 0 ? nodes.push([x, y]) - 1 : k; };
+  const links = new Map(); // both ways along each line, once where it is drawn twice
+  for (const { points, fixed } of paths) for (const own of [points, [...points].reverse()]) {
+    const [from, to] = [nodeAt(own[0]), nodeAt(own.at(-1))], middle = own[Math.floor(own.length / 2)].map((value) => Math.round(value / near / 100));
+    if (from !== to) links.set(`${from} ${to} ${own.length > 2 ? middle : ""}`, { from, to, points: own, fixed, angle: Math.atan2(own[1][1] - own[0][1], own[1][0] - own[0][0]), back: Math.atan2(own.at(-2)[1] - own.at(-1)[1], own.at(-2)[0] - own.at(-1)[0]) });
+  }
+  /** The next line on the left: from the way back, the first one clockwise. */
+  const follow = ({ to, back }) => {
+    const turn = ({ angle }) => { const by = (((back - angle) % (2 * Math.PI)) + 2 * Math.PI) % (2 * Math.PI); return by > 1e-9 && by < 2 * Math.PI - 1e-9 ? by : 2 * Math.PI; };
+    return [...links.values()].filter(({ from }) => from === to).reduce((best, link) => (turn(link) < turn(best) ? link : best));
+  };
+  const seen = new Set(), faces = [];
+  for (const first of links.values()) {
+    const own = [];
+    for (let link = first; !seen.has(link); link = follow(link)) { seen.add(link); own.push(link); }
+    const points = own.flatMap((link) => link.points.slice(0, -1));
+    if (points.length > 2 && measure([points]).area > 0) faces.push({ points, fixed: 2 * own.filter(({ fixed }) => fixed).length > own.length });
+  }
+  return faces;
 }
 
-/** An outline in metres, anticlockwise, without points that repeat; convex, or refused in words. */
+/** The convex hull of points, anticlockwise (Andrew's monotone chain). */
+function findHull(points) {
+  const sorted = [...points].sort(([x, y], [u, v]) => x - u || y - v), half = (own) => own.reduce((chain, point) => {
+    while (chain.length > 1 && turnOf([0, 1].map((k) => chain.at(-1)[k] - chain.at(-2)[k]), [0, 1].map((k) => point[k] - chain.at(-1)[k])) <= 1e-9) chain.pop();
+    return [...chain, point];
+  }, []);
+  return [half(sorted), half(sorted.reverse())].flatMap((chain) => chain.slice(0, -1));
+}
+/** Outlines of the stones of an arch, {points, fixed}, by their hulls. */
+function traceStones({ bodies: { mass, centre, owner, piece_starts: starts, arms, inverse_mass } }) {
+  const points = mass.map((_, body) => owner.flatMap((own, piece) => (own === body ? arms.slice(starts[piece], starts[piece + 1]) : [])));
+  return points.map((own, body) => ({ fixed: inverse_mass[body][0] === 0, points: findHull(own).map(([x, y]) => [centre[body][0] + x, centre[body][1] + y]) }));
+}
+/** Outlines with corners, pairs of outline and corner, moved. */
+const moveCorners = (outlines, corners, [dx, dy]) => outlines.map((each, k) => ({ ...each, points: each.points.map(([x, y], i) => (corners.some(([a, b]) => a === k && b === i) ? [x + dx, y + dy] : [x, y])) }));
+/** All corners of outlines at points, as pairs of outline and corner: neighbours share them. */
+const findCorners = (outlines, points) => outlines.flatMap(({ points: own }, k) => own.flatMap(([x, y], i) => (points.some(([u, v]) => Math.hypot(x - u, y - v) < TOUCHING) ? [[k, i]] : [])));
+/** Outlines as GeoJSON, as archfem reads them. */
+const writeGeoJson = (outlines) => JSON.stringify({ type: "FeatureCollection", features: outlines.map(({ points, fixed }, k) => ({ type: "Feature", properties: { name: `stone ${k + 1}`, fixed }, geometry: { type: "Polygon", coordinates: [[...points, points[0]]] } })) });
+
+/** An outline in metres, anticlockwise, without points that repeat, and its hull; others than nearly convex ones are refused in words. */
 function tidyOutline({ points, fixed }, number, unit) {
   const far = ([x, y], [u, v]) => Math.hypot(x - u, y - v) > TOUCHING;
   let ring = points.map((point) => point.map((value) => value * unit));
@@ -69,8 +137,10 @@ function tidyOutline({ points, fixed }, number, unit) {
   const edges = ring.map(([x, y], k) => [ring[(k + 1) % ring.length][0] - x, ring[(k + 1) % ring.length][1] - y]);
   const turns = edges.map((edge, k) => turnOf(edge, edges[(k + 1) % edges.length]));
   if (Math.abs(turns.reduce((sum, turn) => sum + turn) - 2 * Math.PI) > 1e-6) refuse(`outline ${number} crosses itself: draw it anew`);
-  if (Math.min(...turns) < -0.01) refuse(`outline ${number} is not convex: cut the stone into convex ones, or run the drawing with archfem`);
-  return { ring, fixed };
+  // stones touch by their hulls, and have the mass of their outline
+  const hull = findHull(ring);
+  if (measure([hull]).area > 1.03 * measure([ring]).area) refuse(`outline ${number} is not convex: cut the stone into convex ones, or run the drawing with archfem`);
+  return { ring, hull, fixed };
 }
 /** Where two outlines touch along an edge: the ends of the joint, or null. */
 function findJoint(one, other) {
@@ -97,7 +167,7 @@ function findOverlap(one, other) {
 function assembleOutlines(outlines, unit, parameters, friction = 0.6) {
   if (outlines.length < 2) refuse("the drawing has no closed outlines: draw each stone as a closed polyline (DXF) or a Polygon (GeoJSON)");
   if (outlines.length > 70) refuse(`${outlines.length} outlines: a page takes up to 60 stones; run the drawing with archfem`);
-  const tidy = outlines.map((each, k) => tidyOutline(each, k + 1, unit)), rings = tidy.map(({ ring }) => ring), foot = (ring) => Math.min(...ring.map(([, y]) => y));
+  const tidy = outlines.map((each, k) => tidyOutline(each, k + 1, unit)), rings = tidy.map(({ hull }) => hull), foot = (ring) => Math.min(...ring.map(([, y]) => y));
   const low = Math.min(...rings.map(foot)), size = Math.max(...rings.flat(2)) - Math.min(...rings.flat(2));
   if (size > 500) refuse(`the drawing is ${size.toFixed(0)} m large: choose its unit`);
   const given = tidy.some(({ fixed }) => fixed), fixed = tidy.flatMap((each, k) => ((given ? each.fixed : foot(each.ring) < low + 0.02 * size) ? [k] : []));
@@ -110,7 +180,7 @@ function assembleOutlines(outlines, unit, parameters, friction = 0.6) {
   }));
   const alone = rings.findIndex((_, k) => !fixed.includes(k) && !joints.some(({ blocks }) => blocks.includes(k)));
   if (alone >= 0) refuse(`outline ${alone + 1} touches no other: draw it within 3 mm of its neighbours`);
-  const shapes = rings.map((ring) => [ring]), exact = shapes.map(measure);
+  const shapes = rings.map((ring) => [ring]), exact = tidy.map(({ ring }) => measure([ring]));
   const bodies = makeBodies(shapes, exact, fixed, { density: STONE, level: low }, friction);
   return { name: "a drawing", bodies, joints, sizes: exact.map(({ area }) => Math.sqrt(area)), parameters, thrust: null, ring: null };
 }

@@ -5,7 +5,7 @@ const MARKS = ["the left springing, on the inner side", "the right springing, on
 
 class Tools {
   constructor(live) {
-    Object.assign(this, { live, source: { example: 0 }, marks: [], scaleMarks: [], mode: null, dragged: -1 });
+    Object.assign(this, { live, source: { example: 0 }, marks: [], scaleMarks: [], mode: null, dragged: -1, chosen: [], grip: null });
     this.find = (name) => document.querySelector(`#${name}`);
     live.data.arches.forEach(({ name }, k) => this.find("example").append(new Option(name, k)));
     const actions = {
@@ -15,11 +15,12 @@ class Tools {
     };
     for (const [name, action] of Object.entries(actions)) this.find(name).addEventListener("change", () => this.attempt(() => action(this.find(name).files?.[0])));
     for (const mode of ["scale", "mark"]) this.find(mode).addEventListener("click", () => this.attempt(() => this.begin(mode)));
-    for (const [name, action] of [["case", this.saveCase], ["png", this.savePicture], ["link", this.makeLink]]) this.find(name).addEventListener("click", () => this.attempt(() => action.call(this)));
+    for (const [name, action] of [["stones-move", this.beginMoving], ["case", this.saveCase], ["png", this.savePicture], ["link", this.makeLink]]) this.find(name).addEventListener("click", () => this.attempt(() => action.call(this)));
     const canvas = live.stage.canvas;
     canvas.addEventListener("pointerdown", (event) => this.attempt(() => this.press(event)));
     canvas.addEventListener("pointermove", (event) => this.attempt(() => this.drag(event)));
-    for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => { this.dragged = -1; });
+    for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => Object.assign(this, { dragged: -1, grip: null }));
+    canvas.addEventListener("keydown", (event) => this.attempt(() => this.pressKey(event)));
     if (location.hash.length > 1) this.attempt(() => this.openLink());
   }
   /** Do something; what is wrong stands in words below the buttons. */
@@ -51,8 +52,9 @@ class Tools {
     }
     this.source = source;
     this.live.isMarking = false;
-    if (!source.drawn) Object.assign(this, { marks: [], mode: null });
-    const box = this.live.stage.backdrop && source.drawn ? this.live.stage.box : null;
+    if (!source.drawn) Object.assign(this, { marks: [], mode: source.moved ? this.mode : null });
+    const { stage } = this.live, isMoving = this.mode === "stones", box = isMoving || (stage.backdrop && source.drawn) ? stage.box : null;
+    Object.assign(stage.canvas, { tabIndex: isMoving ? 0 : -1 }).style.touchAction = isMoving || source.drawn ? "none" : "";
     this.live.open(arch, design, box);
     this.say(`${arch.name}: ${arch.joints.length} joints`);
   }
@@ -85,8 +87,47 @@ class Tools {
     this.live.isMarking = true;
     this.live.stage.draw({ arch: null, ghosts: [], lines: [], hinges: [], handles: this.mode === "scale" ? this.scaleMarks : this.marks });
   }
+  /** Let the reader move stones and corners; those of neighbours go along. */
+  beginMoving() {
+    this.mode = "stones";
+    this.chosen = [];
+    this.showMoved(traceStones(this.live.arch));
+    this.live.stage.canvas.focus();
+    this.say("Drag a stone or a corner. Keys: Enter chooses the next stone, arrows move it by 1 cm.");
+  }
+  showMoved(outlines) {
+    const { design: { friction, finish, strength }, stage } = this.live;
+    this.startFrom({ outlines, unit: 1, file: "stones.geojson", moved: true }, { friction, finish, strength });
+    stage.handles = this.chosen.map(([k, i]) => outlines[k].points[i]);
+    this.live.show(0);
+  }
+  /** Choose the corner or the stone at a point. */
+  choose(point) {
+    const { outlines } = this.source, far = ([x, y]) => this.live.stage.scale * Math.hypot(x - point[0], y - point[1]);
+    const corner = outlines.flatMap(({ points }) => points).reduce((best, each) => (far(each) < far(best) ? each : best));
+    const isInside = ({ points }) => points.every(([x, y], k) => { const [u, v] = points[(k + 1) % points.length]; return (u - x) * (point[1] - y) >= (v - y) * (point[0] - x); });
+    this.chosen = findCorners(outlines, far(corner) < 16 * devicePixelRatio ? [corner] : outlines.find(isInside)?.points ?? []);
+    this.grip = { point, outlines };
+  }
+  pressKey(event) {
+    if (this.mode !== "stones") return;
+    const { outlines } = this.source, move = { ArrowLeft: [-0.01, 0], ArrowRight: [0.01, 0], ArrowUp: [0, 0.01], ArrowDown: [0, -0.01] }[event.key];
+    if (!move && event.key !== "Enter") return;
+    event.preventDefault();
+    if (move) return this.showMoved(moveCorners(outlines, this.chosen, move));
+    this.number = ((this.number ?? -1) + 1) % outlines.length;
+    this.chosen = findCorners(outlines, outlines[this.number].points);
+    this.showMoved(outlines);
+    this.say(`stone ${this.number + 1} is chosen`);
+  }
   press(event) {
     const { stage } = this.live, point = stage.pointAt(event);
+    if (this.mode === "stones") {
+      this.choose(point);
+      stage.canvas.setPointerCapture(event.pointerId);
+      this.showMoved(this.source.outlines);
+      return;
+    }
     if (this.mode === "scale" && this.scaleMarks.length < 2) {
       this.scaleMarks.push(point);
       this.say(this.scaleMarks.length < 2 ? "Click the second point." : "Give their distance in metres, and press Enter.");
@@ -102,8 +143,10 @@ class Tools {
     }
   }
   drag(event) {
+    const point = this.live.stage.pointAt(event);
+    if (this.grip) this.showMoved(moveCorners(this.grip.outlines, this.chosen, point.map((value, k) => value - this.grip.point[k])));
     if (this.dragged < 0) return;
-    this.marks[this.dragged] = this.live.stage.pointAt(event);
+    this.marks[this.dragged] = point;
     this.drawMarked();
   }
   setScale() {
@@ -145,19 +188,25 @@ class Tools {
 
   /** The case as `archfem run` reads it. */
   writeCase() {
-    const { design, data } = this.live, { drawn, outlines, unit, file } = this.source, motion = data.motions[this.find("motion").value];
+    const { live } = this, { design, data } = live, { drawn, outlines, unit, file } = this.source, motion = data.motions[this.find("motion").value];
     const shapes = { circle: "circular_arch", ellipse: "elliptical_arch", pointed: "pointed_arch" };
     const model = '\n[model]\nfidelity = "rigid"\ndisplacements = "large"\n\n[analysis]\ndamping = { ratio = 0.05, modes = "effective" }\n';
     let text = data.arches[this.source.example ?? 0].case;
     if (drawn) text = `title = "a drawn arch"\n\n[structure]\nshape = "${shapes[drawn.kind]}"\nspan = ${drawn.span.toFixed(4)}\nrise = ${drawn.rise.toFixed(4)}\nthickness = 0\nvoussoirs = 0\n${model}`;
     if (outlines) text = `title = "a drawing"\n\n[structure]\nshape = "outlines"\nfile = "${file}"  # beside this file\nunit = "${{ 1: "m", 0.01: "cm", 0.001: "mm" }[unit]}"\nsnap = "3 mm"\n${model}`;
     if (design.stones) text = text.replace(/^thickness = .*$/m, `thickness = ${design.thickness}`).replace(/^voussoirs = .*$/m, `voussoirs = ${design.stones}`);
+    const law = live.finishes.find(({ name }) => name === design.finish);
     text += `\n[contacts."stone to stone"]\nfriction = ${design.friction}\n`;
+    if (law) text += `normal_stiffness = ${law.stiffness}  # ${law.name}\nshear_stiffness = ${law.shear}\nclosure = ${law.closure}\n`;
     const seed = motion.name.match(/^earthquake (\d)$/);
     if (seed) return `${text}\n[motion]\nsynthetic = { seed = ${seed[1]}, duration = 8.0, dt = 0.01, pga = ${(design.strength * G).toFixed(4)} }\n`;
     return `${text}\n# moved by "${motion.name}", ${design.strength} g at most: give your own record in [motion]\n`;
   }
-  saveCase() { this.save(new Blob([this.writeCase()], { type: "text/plain" }), "arch.toml"); }
+  saveCase() {
+    const { moved, outlines, file } = this.source;
+    if (moved) this.save(new Blob([writeGeoJson(outlines)], { type: "application/geo+json" }), file);
+    this.save(new Blob([this.writeCase()], { type: "text/plain" }), "arch.toml");
+  }
   savePicture() { this.live.stage.canvas.toBlob((blob) => this.save(blob, "arch.png")); }
   save(blob, name) {
     const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: name });

@@ -1,0 +1,195 @@
+"""Structures as input of other programs: OpenSees in Python, and geometry of 3DEC."""
+
+from pathlib import Path
+
+import numpy as np
+
+from archfem._files import atomic_write
+from archfem._typing import Array
+from archfem._validation import check_choice, check_integer, validate_arguments
+from archfem.errors import InvalidInput
+from archfem.joints.quadrature import Quadrature
+from archfem.masonry.block import Block
+from archfem.masonry.structure import Structure
+from archfem.units import G
+
+# A corner of a polyhedron [m]
+Corner = tuple[float, float, float]
+
+OPENSEES = '''"""{name}: {blocks} rigid blocks and {joints} joints, written by archfem.
+
+SI units, x to the right, y upwards. Blocks are nodes at their centroids, from 1. A joint is
+a row of springs without tension between points that are rigidly linked to both blocks; where joints
+slide, they are bearings with Coulomb friction. Displacements are small.
+"""
+
+import openseespy.opensees as ops
+
+# x, y [m], mass [kg], moment of inertia [kg m2], whether the block is fixed
+BLOCKS = [
+{block_rows}
+]
+
+# lower and higher block, x, y [m], normal x and y, normal and shear stiffness [N/m], friction
+SPRINGS = [
+{spring_rows}
+]
+
+
+def build():
+    """Build blocks and springs."""
+    ops.wipe()
+    ops.model("basic", "-ndm", 2, "-ndf", 3)
+    for tag, (x, y, mass, inertia, fixed) in enumerate(BLOCKS, 1):
+        ops.node(tag, x, y)
+        if fixed:
+            ops.fix(tag, 1, 1, 1)
+        else:
+            ops.mass(tag, mass, mass, inertia)
+    for number, (lower, higher, x, y, nx, ny, normal, shear, friction) in enumerate(SPRINGS, 1):
+        pair = [len(BLOCKS) + 2 * number - 1, len(BLOCKS) + 2 * number]
+        for point, block in zip(pair, (lower, higher)):
+            ops.node(point, x, y)
+            ops.rigidLink("beam", block, point)
+        across = len(SPRINGS) + number
+        ops.uniaxialMaterial("ENT", number, normal)
+        axes = ["-orient", nx, ny, 0.0, -ny, nx, 0.0]
+        if friction is None:
+            ops.uniaxialMaterial("Elastic", across, shear)
+            ops.element("zeroLength", number, *pair, "-mat", number, across, "-dir", 1, 2, *axes)
+        else:
+            ops.frictionModel("Coulomb", number, friction)
+            ops.uniaxialMaterial("Elastic", across, 0.0)
+            springs = ["-P", number, "-Mz", across]
+            ops.element("flatSliderBearing", number, *pair, number, shear, *springs, *axes)
+
+
+def load_dead(steps=10):
+    """Apply the weight of the blocks in steps; return whether equilibrium was found."""
+    ops.timeSeries("Linear", 1)
+    ops.pattern("Plain", 1, 1)
+    free = [(tag, mass) for tag, (_, _, mass, _, fixed) in enumerate(BLOCKS, 1) if not fixed]
+    weights = {{tag: {gravity} * mass for tag, mass in free}}
+    for tag, weight in weights.items():
+        ops.load(tag, 0.0, -weight, 0.0)
+    ops.constraints("Transformation")
+    ops.numberer("RCM")
+    ops.system("UmfPack")
+    ops.test("NormUnbalance", 1e-8 * sum(weights.values()), 50)
+    ops.algorithm("Newton")
+    ops.integrator("LoadControl", 1.0 / steps)
+    ops.analysis("Static", "-noWarnings")
+    return ops.analyze(steps) == 0
+
+
+if __name__ == "__main__":
+    build()
+    print("stands under its weight" if load_dead() else "no equilibrium was found")
+    for tag in range(1, len(BLOCKS) + 1):
+        print(tag, *ops.nodeDisp(tag))
+'''
+
+
+@validate_arguments
+def write_model(structure: Structure, path: str | Path, *, points: int = 5) -> Path:
+    """Write a structure as input of another program, by the suffix of the file.
+
+    *.py is a script of OpenSeesPy: rigid blocks, joints without tension and with Coulomb friction,
+    self-weight. Its `build` and `load_dead` can be imported, to be followed by a motion. *.3ddat
+    has the commands of 3DEC 7 for the geometry: blocks of the width, with z upwards, in groups by
+    their parts, supports fixed; arcs become chords. Stiffness and friction are there in comments.
+
+    Args:
+        structure: dry, with joints that close linearly.
+        path: of the file, .py or .3ddat.
+        points: springs of each joint for OpenSees, at Lobatto's points, 2 to 16.
+
+    Returns:
+        The file.
+
+    Raises:
+        InvalidInput: the suffix is another, joints have cohesion, tension, dilatancy, closure or a
+            law of the user, or 3DEC would refuse a block that is not convex.
+    """
+    path = Path(path)
+    check_choice(path.suffix, "suffix of the file", [".py", ".3ddat"])
+    check_integer(points, "points", minimum=2, maximum=16)
+    text = _write_opensees(structure, points) if path.suffix == ".py" else _write_3dec(structure)
+    with atomic_write(path) as draft:
+        draft.write_text(text, encoding="utf-8")
+    return path
+
+
+def _write_opensees(structure: Structure, points: int) -> str:
+    """Return the script of OpenSees."""
+    springs = []
+    places, weights = Quadrature("lobatto", points).on_facet(1)
+    for joint, normal in zip(structure.joints, structure.normals, strict=True):
+        contact = joint.contact
+        for key in ("cohesion", "dilatancy", "tension", "closure", "law"):
+            if getattr(contact, key):
+                raise InvalidInput(
+                    f"joint '{joint.name}' has {key} = {getattr(contact, key)!r}, which the "
+                    "springs of OpenSees do not follow: give a dry joint that closes linearly"
+                )
+        friction = contact.friction if contact.slides else None
+        for place, weight in zip(places, weights, strict=True):
+            x, y = joint.middle + (place - 0.5) * joint.depth * joint.tangent
+            area = float(weight) * joint.depth * structure.width
+            stiffness = contact.normal_stiffness * area, contact.shear_stiffness * area
+            ends = joint.lower + 1, joint.higher + 1
+            springs.append((*ends, *map(float, (x, y, *normal, *stiffness)), friction))
+    blocks = []
+    for block in structure.blocks:
+        density = structure.density(block) * structure.width
+        numbers = *block.centroid, density * block.area, density * block.polar_moment
+        blocks.append((*map(float, numbers), block.fixed))
+    return OPENSEES.format(
+        # of the docstring of the script
+        name=structure.name.replace("\\", "/").replace('"', "'"),
+        blocks=len(blocks),
+        joints=len(structure.joints),
+        block_rows="\n".join(f"    {row!r}," for row in blocks),
+        spring_rows="\n".join(f"    {row!r}," for row in springs),
+        gravity=G,
+    )
+
+
+def _write_3dec(structure: Structure) -> str:
+    """Return the commands of 3DEC."""
+    contacts = {joint.contact for joint in structure.joints}
+    lines = [
+        f"; {structure.name}: written by archfem, in m; elevation in x and z, width along y",
+        *sorted(
+            f"; contact '{each.name}': normal {each.normal_stiffness:g} Pa/m, shear "
+            f"{each.shear_stiffness:g} Pa/m, friction coefficient {each.friction:g}"
+            for each in contacts
+        ),
+        "model new",
+    ]
+    for block in structure.blocks:
+        group = "supports" if block.fixed else block.part or "blocks"
+        lines.append(f"; {block.name}: {block.material.name}, {structure.density(block):g} kg/m3")
+        faces = _polyhedron(block, structure.width)
+        vertices = (" ".join(",".join(f"{v:.9g}" for v in p) for p in face) for face in faces)
+        command = "block create polyhedron group '{}' ...\n{}"
+        body = " ...\n".join(f"  face {each}" for each in vertices)
+        lines.append(command.format(group.replace("'", ""), body))
+    lines.append("block fix range group 'supports'")
+    return "\n".join(lines) + "\n"
+
+
+def _polyhedron(block: Block, width: float) -> list[list[Corner]]:
+    """Return the faces of a block, each clockwise as it is seen from outside."""
+    points: Array = block.points
+    edges = np.roll(points, -1, axis=0) - points
+    after = np.roll(edges, -1, axis=0)
+    if np.any(edges[:, 0] * after[:, 1] < edges[:, 1] * after[:, 0] - 1e-9 * block.area):
+        raise InvalidInput(
+            f"block '{block.name}' is not convex, and polyhedra of 3DEC are: divide it"
+        )
+    front, back = ([(float(x), y, float(z)) for x, z in points] for y in (0.0, width))
+    pairs = list(zip(front, back, strict=True))
+    sides = zip(pairs, [*pairs[1:], pairs[0]], strict=True)
+    # the elevation is seen from y < 0, where its outline is anticlockwise
+    return [front[::-1], back, *([a, b, d, c] for (a, c), (b, d) in sides)]

@@ -1,0 +1,102 @@
+// Joints that close by the finish of their faces: equilibrium of rigid stones at large displacements.
+"use strict";
+const LARGEST_CLOSING = 0.98; // over δ_m, beyond which the law follows its tangent, as in archfem
+const GAUSS = [[-0.906179845938664, 0.236926885056189], [-0.538469310105683, 0.478628670499366], [0, 0.568888888888889], [0.538469310105683, 0.478628670499366], [0.906179845938664, 0.236926885056189]];
+const SMALL_MOVE = 1e-8; // by which forces are differentiated [m or rad]
+
+/** Force for each depth of a joint that closes: σ w = k δ / (1 - δ/δ_m). */
+function pressOn({ stiffness, closure }, closing) {
+  if (closing <= 0) return 0;
+  const share = Math.min(closing / closure, LARGEST_CLOSING), slope = 1 / (1 - share);
+  return stiffness * (closure * share * slope + (closing - share * closure) * slope ** 2);
+}
+
+/** Stones on joints that press by a law {stiffness, shear, closure, width} and do not slide. */
+class ClosingJoints {
+  constructor({ bodies, joints, parameters }, law) {
+    const { mass, centre, inverse_mass } = bodies;
+    const joint = (each) => { const made = makeJoint(each, centre); return { ...made, arms: made.blocks.map((body) => made.middle.map((value, k) => value - centre[body][k])) }; };
+    Object.assign(this, { law: { ...law, stiffness: law.stiffness * law.width, shear: law.shear * law.width }, joints: joints.map(joint), rows: mass.flatMap((_, body) => (inverse_mass[body][0] > 0 ? [3 * body, 3 * body + 1, 3 * body + 2] : [])) });
+    this.weights = mass.map(([own]) => own * parameters.gravity);
+    this.still = new Float64Array(3 * mass.length);
+    this.reach = Math.max(...centre.flat()) - Math.min(...centre.flat());
+    this.tolerance = 1e-8 * this.rows.reduce((sum, row) => sum + this.weights[Math.floor(row / 3)] / 3, 0);
+  }
+  /** Forces on the coordinates of both blocks of a joint in poses q, e and the largest closing. */
+  press({ blocks, arms, depth, normal: [nx, ny], tangent: [tx, ty] }, q) {
+    const turns = blocks.map((body) => q[3 * body + 2]), half = 0.5 * (turns[0] + turns[1]), [c, s] = [Math.cos(half), Math.sin(half)];
+    // arms in the poses; the jump from the lower face to the higher, from displacements for accuracy
+    const placed = arms.map(([x, y], side) => { const [u, v] = [Math.cos(turns[side]), Math.sin(turns[side])]; return [u * x - v * y, v * x + u * y]; });
+    const jump = [0, 1].map((k) => q[3 * blocks[1] + k] - q[3 * blocks[0] + k] + placed[1][k] - arms[1][k] - placed[0][k] + arms[0][k]);
+    const n = [c * nx - s * ny, s * nx + c * ny], t = [c * tx - s * ty, s * tx + c * ty], sense = tx * ny - ty * nx;
+    const opening = n[0] * jump[0] + n[1] * jump[1], slip = t[0] * jump[0] + t[1] * jump[1], turn = sense * (turns[1] - turns[0]);
+    // the part of the depth that closes, from the intrados at -h/2
+    const ends = [opening - 0.5 * turn * depth, opening + 0.5 * turn * depth], edge = -opening / turn;
+    const [low, high] = [ends[0] > 0 ? Math.min(edge, 0.5 * depth) : -0.5 * depth, ends[1] > 0 ? Math.max(edge, -0.5 * depth) : 0.5 * depth];
+    let force = 0, moment = 0;
+    if (Math.min(...ends) < 0) for (const [place, weight] of GAUSS) {
+      const x = 0.5 * (low + high + place * (high - low)), own = 0.5 * (high - low) * weight * pressOn(this.law, -opening - turn * x);
+      force += own;
+      moment += own * x;
+    }
+    const shear = this.law.shear * depth * slip, along = [0, 1].map((k) => shear * t[k] - force * n[k]);
+    // by the mean rotation the normal and the tangent turn: dn = ez × n, dt = ez × t
+    const swing = 0.5 * (-force * (n[0] * jump[1] - n[1] * jump[0]) + shear * (t[0] * jump[1] - t[1] * jump[0]));
+    const own = [-1, 1].flatMap((sign, side) => [sign * along[0], sign * along[1], sign * (placed[side][0] * along[1] - placed[side][1] * along[0]) + swing - sign * sense * moment]);
+    return { own, e: force > 0 ? moment / force / depth : NaN, closing: -Math.min(...ends), shear: Math.abs(shear), force };
+  }
+  /** Forces out of balance at the free coordinates, under a push in g; with their derivatives if wanted. */
+  assemble(q, push, isTangent) {
+    const size = q.length, residual = new Float64Array(size), table = isTangent ? this.rows.map(() => new Float64Array(size + 1)) : null;
+    this.weights.forEach((weight, body) => { residual[3 * body] -= push * weight; residual[3 * body + 1] += weight; });
+    const rowOf = new Map(this.rows.map((row, k) => [row, k]));
+    for (const joint of this.joints) {
+      const places = joint.blocks.flatMap((body) => [3 * body, 3 * body + 1, 3 * body + 2]);
+      this.press(joint, q).own.forEach((value, k) => { residual[places[k]] += value; });
+      if (isTangent) for (const column of places.filter((place) => rowOf.has(place))) {
+        const before = q[column], sides = [1, -1].map((sign) => { q[column] = before + sign * SMALL_MOVE; return this.press(joint, q).own; });
+        q[column] = before;
+        places.forEach((place, k) => { if (rowOf.has(place)) table[rowOf.get(place)][column] += (sides[0][k] - sides[1][k]) / (2 * SMALL_MOVE); });
+      }
+    }
+    return { residual, table, error: Math.max(...this.rows.map((row) => Math.abs(residual[row]))) };
+  }
+  /** Poses in equilibrium near others, by Newton's method; null where there are none. */
+  settle(start, push) {
+    let q = start, state = this.assemble(q, push, true);
+    for (let round = 0; round < 12; round++) {
+      if (state.error < this.tolerance) return q;
+      const { table, residual } = state, size = q.length, columns = [];
+      this.rows.forEach((row, k) => { table[k][size] = -residual[row]; });
+      table.forEach((line, k) => {
+        columns[k] = this.rows.reduce((best, row) => (Math.abs(line[row]) > Math.abs(line[best]) ? row : best));
+        pivot(table, k, columns[k]);
+      });
+      let share = 1, trial;
+      do {
+        trial = q.slice();
+        columns.forEach((column, k) => { trial[column] += share * table[k][size]; });
+        share /= 2;
+      } while (share > 0.01 && !(this.assemble(trial, push, false).error < 2 * state.error));
+      q = trial;
+      if (!q.every((value) => Math.abs(value) < 0.05 * this.reach)) return null;
+      state = this.assemble(q, push, true);
+    }
+    return null;
+  }
+  /** Poses, e of the joints and the largest closing under the weight; null where it does not stand, or slides. */
+  rest() {
+    const q = this.settle(this.still, 0), found = q ? this.joints.map((joint) => this.press(joint, q)) : [];
+    if (!q || found.some(({ force, shear }, j) => !(force > 0) || shear > (this.joints[j].friction ?? Infinity) * force)) return null;
+    return { q, lines: found.map(({ e }) => e), closing: Math.max(...found.map(({ closing }) => closing)) };
+  }
+  /** The largest push to a side that has an equilibrium, to 0.1 % of that with hard joints. */
+  peak(q, side, hard) {
+    let push = 0;
+    for (let step = 0.1 * hard; step > 1e-3 * hard && push < 1.5 * hard;) {
+      const next = this.settle(q, side * (push + step));
+      if (next) [q, push] = [next, push + step]; else step /= 3;
+    }
+    return push;
+  }
+}
