@@ -89,7 +89,10 @@ def test_its_history_is_that_of_this_system(carried_out):
 @pytest.mark.parametrize(
     ("missing", "words", "remedy"),
     [
-        (["imageio"], ("animate", "history.nc"), "pip install 'archfem[film]'"),
+        pytest.param(
+            *(["imageio"], ("animate", "history.nc"), "pip install 'archfem[film]'"),
+            marks=pytest.mark.slow,
+        ),
         pytest.param(
             *(["pyvista"], ("animate", "history.nc", "--renderer", "pyvista"), "'archfem[film]'"),
             marks=pytest.mark.slow,
