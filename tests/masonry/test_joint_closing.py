@@ -240,7 +240,7 @@ def test_a_finish_gives_the_law_of_the_weaker_stone():
     assert chosen.joints[1:] == mixed.joints[1:]
     with pytest.raises(af.InvalidInput, match="'joint 3' of 'stone to stone' is a joint of soil"):
         af.masonry.with_finish(wall, "hewn", wall.joints[3].contact)
-    with pytest.raises(af.InvalidInput, match="finish = 'polished'"):
+    with pytest.raises(af.InvalidInput, match="finish 'polished' is not known"):
         af.masonry.with_finish(wall, "polished")
 
 
