@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 from archfem.cases.case import Case
 from archfem.cases.toml_file import Table, format_key
+from archfem.masonry.joint_closing import FINISHED_KEYS, finish_range
 from archfem.masonry.materials import Contact, Material
-from archfem.units import GPa, MPa, kN
+from archfem.units import GPa, MPa, kN, mm
 
 _PAPER = "table 2 of Demirel and Aldemir (2021)"
 
@@ -40,6 +41,8 @@ def list_default_keys(case: Case, item: Material | Contact) -> list[str]:
     section = "materials" if isinstance(item, Material) else "contacts"
     given = case.settings.get(section, {}).get(item.name, {})
     keys = DECIDING_VALUES[section]
+    if "finish" in given:
+        given = dict.fromkeys((*given, *FINISHED_KEYS))
     return [key for key in keys if key not in given and getattr(item, key) is not None]
 
 
@@ -101,7 +104,30 @@ def describe_defaults(case: Case) -> str:
 def explain_defaults(case: Case) -> str:
     """Explain each default in a line: its key, its value, and where it is from."""
     lines = [f"  {each.key}: {each.words}: {each.reason}" for each in list_defaults(case)]
-    return "\n".join(["defaults, which the case may give instead:", *lines]) if lines else ""
+    lines = ["defaults, which the case may give instead:", *lines] if lines else []
+    return "\n".join([*lines, *_explain_finishes(case)])
+
+
+def _explain_finishes(case: Case) -> Iterator[str]:
+    """Explain each finish of the case in a line: its key, its law with the range, and sources."""
+    structure, tables = case.structure, case.settings.get("contacts", {})
+    for contact, joint in {joint.contact: joint for joint in structure.joints}.items():
+        if (finish := tables.get(contact.name, {}).get("finish")) is None:
+            continue
+        law = finish_range(structure, joint, finish)
+        values = [f"k_n {_range_text(law.initial, 1e9)} MPa/mm at first"]
+        values += [f"closing {_range_text(law.closure, mm)} mm at most"] if contact.closure else []
+        values.append(f"k_s {_range_text(law.shear, 1e9)} MPa/mm")
+        yield (
+            f'contacts.{format_key(contact.name)}.finish = "{finish}": {", ".join(values)}; '
+            f"{'; '.join(law.sources[:3])}"
+        )
+
+
+def _range_text(values: tuple[float, float, float], unit: float) -> str:
+    """Return the usual value and the range in a unit."""
+    low, usual, high = (f"{value / unit:.2g}" for value in sorted(values))
+    return f"{usual} ({low} to {high})"
 
 
 def _has_default_vertical(case: Case) -> bool:

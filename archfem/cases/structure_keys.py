@@ -26,16 +26,20 @@ from archfem.joints.own_law import JointLaw, build_registered_law, registered_la
 from archfem.masonry.assembly import assembled
 from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.block import Block
+from archfem.masonry.joint_closing import CONDITIONS, FINISHED_KEYS, usual_law, with_finish
 from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, Contact, Material
 from archfem.masonry.shapes import bridges, rings
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
-from archfem.masonry.structure import Joint, Structure
+from archfem.masonry.structure import Joint, Structure, join_names
 from archfem.masonry.survey.outlines import Layer, surveyed
 
 Described = TypeVar("Described")
 
 # Parts of which a bridge has several, from left to right, each under its name
 BRIDGE_PARTS: Table = {"arches": Arch, "piers": Pier, "sidewalls": Sidewall}
+
+# Keys of a contact: its fields, or the finish of the faces in place of stiffnesses and closure
+CONTACT_KEYS = {**declared_keys(Contact), "finish": str}
 
 # Materials and contacts that no table need describe, by section
 _PRESETS: Mapping[str, Mapping[str, Any]] = {
@@ -92,7 +96,17 @@ def shape_keys(name: str) -> dict[str, Any]:
 
 
 def build_structure(settings: Table, folder: Path = Path()) -> Structure:
-    """Build the structure of a case."""
+    """Build the structure of a case; joints by a finish follow from their stones."""
+    structure = _build_shape(settings, folder)
+    for name, table in settings.get("contacts", {}).items():
+        if "finish" in table:
+            contact = _resolve_preset(settings, "contacts", name)
+            structure = with_finish(structure, table["finish"], contact)
+    return structure
+
+
+def _build_shape(settings: Table, folder: Path) -> Structure:
+    """Build the structure of a case by its shape."""
     table, functions = settings.get("structure", {}), list_shapes()
     name = check_choice(table.get("shape"), functions, "structure.shape")
     if name == "blocks":
@@ -251,12 +265,25 @@ def _resolve_preset(settings: Table, section: str, name: str) -> Any:
             f'name one of them or write a table [{section}."{name}"]'
         )
     # A table changes a preset of its name key by key.
-    keys = declared_keys(cls)
+    keys, place = declared_keys(cls), f"{section}.{name}"
     values = {key: getattr(presets[name], key) for key in keys} if name in presets else {}
-    values |= check_table(tables.get(name, {}), keys, f"{section}.{name}")
+    given = check_table(tables.get(name, {}), CONTACT_KEYS if cls is Contact else keys, place)
+    if "finish" in given:
+        values |= _read_finish(given, place)
+    values |= given
     if values.get("law") is not None:
         values["law"] = _joint_law(values["law"], f"{section}.{name}.law")
     return _call(cls, f"{section}.{name}", **{"name": name, **values})
+
+
+def _read_finish(table: Table, section: str) -> dict[str, Any]:
+    """Take the finish from the table of a contact, and return its law for usual stone."""
+    finish = check_choice(table.pop("finish"), CONDITIONS, f"{section}.finish")
+    if both := sorted({*FINISHED_KEYS, "law"}.intersection(table)):
+        raise InvalidInput(
+            f"{section} has a finish and {join_names(both)}, which follows from it: leave out one"
+        )
+    return {key: getattr(usual_law(finish), key) for key in FINISHED_KEYS}
 
 
 def _joint_law(table: Table, section: str) -> JointLaw:

@@ -29,6 +29,7 @@ from archfem.limit.collapse import collapse_factor
 from archfem.limit.vehicles import VEHICLES, Vehicle, rate
 from archfem.masonry.block import Block
 from archfem.masonry.construction import Stage
+from archfem.masonry.joint_closing import CONDITIONS
 from archfem.masonry.loads import AttachedLoad, BodyForce, PointLoad
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.parts import PART_ROLES
@@ -84,7 +85,9 @@ def _case_sections() -> dict[str, Schema]:
     return analysis | {
         "structure": _any([*map(_shape, structure_keys.list_shapes()), _partial_structure()]),
         "materials": _named(_table_of(Material)),
-        "contacts": _named(_table_of(Contact)),
+        "contacts": _named(
+            _table(structure_keys.CONTACT_KEYS, Contact, finish=_choice(*CONDITIONS))
+        ),
         "motion": _MOTION,
         "suite": _suite(),
         "criteria": _CRITERIA,

@@ -36,6 +36,7 @@ from archfem.limit.mechanism_kinematics import (
     first_verified_mechanism,
     verified_mechanism,
 )
+from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Model
 
@@ -287,6 +288,8 @@ class History(ResultDisplay):
         remarks += brief_mechanism_remarks(joints, self.structure, mechanisms)
         if mechanisms["any joints at once"] is not None:
             remarks.append(total_duration_remark(joints))
+        if self.structure is not None and (law := describe_closing(self.structure)):
+            remarks.append(f"{law}, which was not varied")
         broken_off = not (finished or self.ending.is_complete)
         return Verdict(
             outcome=outcome,

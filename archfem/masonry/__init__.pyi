@@ -8,6 +8,7 @@ from .joint_closing import ClosingFit as ClosingFit
 from .joint_closing import JointStiffness as JointStiffness
 from .joint_closing import face_closing as face_closing
 from .joint_closing import fit_closing as fit_closing
+from .joint_closing import with_finish as with_finish
 from .loads import AttachedLoad as AttachedLoad
 from .loads import BodyForce as BodyForce
 from .loads import PointLoad as PointLoad

@@ -25,7 +25,8 @@ References:
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from math import log10, radians, sqrt, tan
 
 import numpy as np
@@ -40,7 +41,8 @@ from archfem._validation import (
     validate_methods,
 )
 from archfem.errors import InvalidInput
-from archfem.masonry.materials import Contact
+from archfem.masonry.materials import Contact, Material
+from archfem.masonry.structure import Joint, Structure, join_names
 from archfem.units import GPa, MPa, mm
 
 # Least and largest joint roughness coefficient JRC, and strength of the faces over that of the
@@ -56,9 +58,21 @@ FINISHES = {
 # Factor on the closing of mated faces, from sawn granite to the sandstone that closes furthest [-]
 MISMATCH = 1.0, 4.0
 
+# Parameters of a contact that follow from a finish
+FINISHED_KEYS = "normal_stiffness", "shear_stiffness", "closure"
+
+# Strength of stones for which none is given [Pa]
+USUAL_STRENGTH = 56.0 * MPa
+
+# Blocks softer than this are soil, whose faces have no finish [Pa]
+LEAST_STONE_MODULUS = 1.0 * GPa
+
 # Young's modulus of weak lime mortar [Pa] and thickness of its bed [m]: judgement
 MORTAR_MODULUS = 0.1 * GPa, 1.0 * GPa
 BED_THICKNESS = 10.0 * mm
+
+# Finishes of faces, and a bed that fills their gap
+CONDITIONS = *FINISHES, "mortar"
 
 
 @validate_methods
@@ -216,7 +230,7 @@ def joint_stiffness(
     spacing: float,
     condition: str = "dressed",
     *,
-    strength: float = 56.0 * MPa,
+    strength: float = USUAL_STRENGTH,
     stress: float = 0.05 * MPa,
     poisson: float = 0.2,
     rigid: bool = False,
@@ -252,7 +266,7 @@ def joint_stiffness(
         >>> low < usual < high
         True
     """
-    check_choice(condition, "condition", [*FINISHES, "mortar"])
+    check_choice(condition, "condition", CONDITIONS)
     for name, value in (("young", young), ("spacing", spacing), ("strength", strength)):
         _check_above_zero(value, name)
     if not 0.0 < check_number(stress, "stress") < strength:
@@ -278,6 +292,116 @@ def joint_stiffness(
     ]
     shears = [_in_series(k, elastic * flexibility) for k in shears]
     return JointStiffness(_three(normal), _three(shears), _three(initial), _three(closure))
+
+
+@validate_arguments
+def with_finish(structure: Structure, finish: str, contact: Contact | None = None) -> Structure:
+    """Return a structure whose joints of stones have the usual law of closing of a finish.
+
+    Stiffnesses and closure are those of `joint_stiffness` at 0.05 MPa by the strength of the weaker
+    stone of a joint, 56 MPa where none is given. All else of its contact stays.
+
+    Args:
+        structure: structure of the joints.
+        finish: "sawn", "dressed", "hewn" or "weathered", or "mortar", a linear bed.
+        contact: contact of the joints that are changed; None changes all joints of stones.
+
+    Raises:
+        InvalidInput: the finish is unknown, or a joint of the contact is one of soil.
+
+    Example:
+        >>> ring = af.circular_arch(radius=2.95, embrace=159.0, thickness=0.55, voussoirs=17)
+        >>> contact = af.masonry.with_finish(ring, "dressed").joints[0].contact
+        >>> round(contact.normal_stiffness / 1e9, 2), round(contact.closure * 1e3, 3)
+        (6.62, 0.181)
+    """
+    check_choice(finish, "finish", CONDITIONS)
+    laws: dict[Contact, set[Contact]] = {}
+    joints = list(structure.joints)
+    for number, joint in enumerate(joints):
+        if joint.contact == contact or (contact is None and _weaker_stone(structure, joint)):
+            law = finished_contact(structure, joint, finish)
+            laws.setdefault(joint.contact, set()).add(law)
+            joints[number] = replace(joint, contact=law)
+    origin = structure.origin
+    if origin is not None:  # files name the shape, where its contact has one law
+        single = {given: law for given, (law, *others) in laws.items() if not others}
+        given = {k: single.get(v, v) if isinstance(v, Contact) else v for k, v in origin[1].items()}
+        origin = origin[0], given
+    return replace(structure, joints=tuple(joints), origin=origin)
+
+
+def finished_contact(structure: Structure, joint: Joint, finish: str) -> Contact:
+    """Return the contact of a joint of stones with the usual law of a finish."""
+    stone = _weaker_stone(structure, joint)
+    if stone is None:
+        raise InvalidInput(
+            f"'{joint.name}' of '{joint.contact.name}' is a joint of soil, below "
+            f"{LEAST_STONE_MODULUS / GPa:g} GPa, which has no finish: give its stiffnesses"
+        )
+    law = usual_law(finish, stone.strength or USUAL_STRENGTH)
+    stiffnesses = {key: getattr(law, key) for key in FINISHED_KEYS}
+    return replace(joint.contact, **stiffnesses)
+
+
+@cache
+def usual_law(finish: str, strength: float = USUAL_STRENGTH) -> Contact:
+    """Return the contact with the usual law of a finish."""
+    # modulus and spacing serve the range of k_s and rigid blocks alone
+    return joint_stiffness(30.0 * GPa, 0.5, finish, strength=strength).closing_contact()
+
+
+def _weaker_stone(structure: Structure, joint: Joint) -> Material | None:
+    """Return the weaker stone at a joint; None where one of its blocks is soil."""
+    stones = [structure.blocks[number].material for number in joint.blocks]
+    if min(stone.young for stone in stones) < LEAST_STONE_MODULUS:
+        return None
+    return min(stones, key=lambda stone: stone.strength or USUAL_STRENGTH)
+
+
+def find_finish(structure: Structure, joint: Joint) -> str | None:
+    """Return the finish whose usual law a joint of stones has, or None."""
+    stone, contact = _weaker_stone(structure, joint), joint.contact
+    if stone is None or contact.law is not None:
+        return None
+    for name in CONDITIONS:
+        law = usual_law(name, stone.strength or USUAL_STRENGTH)
+        if all(getattr(law, key) == getattr(contact, key) for key in FINISHED_KEYS):
+            return name
+    return None
+
+
+def finish_range(structure: Structure, joint: Joint, finish: str) -> JointStiffness:
+    """Return the range of the law of a finish by the stones of a joint."""
+    stone = _weaker_stone(structure, joint)
+    assert stone is not None  # a joint of soil has no finish
+    strength = stone.strength or USUAL_STRENGTH
+    return joint_stiffness(stone.young, joint.depth, finish, strength=strength)
+
+
+def describe_closing(structure: Structure) -> str:
+    """Say in one sentence how joints of stones close, which decides whether thin arches fall."""
+    texts: dict[str, list[str]] = {}
+    for joint in structure.joints:
+        if _weaker_stone(structure, joint) is not None:
+            words = _describe_law(joint.contact, find_finish(structure, joint))
+            names = texts.setdefault(words, [])
+            names += [] if joint.contact.name in names else [joint.contact.name]
+    if len(texts) == 1:
+        return f"joints close {next(iter(texts))}"
+    laws = [f"'{join_names(names)}' {words}" for words, names in texts.items()]
+    return f"joints close: {'; '.join(laws)}" if laws else ""
+
+
+def _describe_law(contact: Contact, finish: str | None) -> str:
+    """Describe the law of closing of a contact as an adverb."""
+    if contact.law is not None:
+        return "by a law of the user"
+    stiffness = f"{contact.normal_stiffness / GPa:.3g} GPa/m"
+    if contact.closure is None:
+        return f"linearly with {stiffness}{', of a bed of mortar' if finish else ''}"
+    law = f"the law of {finish} faces" if finish else "a law that stiffens"
+    return f"by {law} ({stiffness} at first, {contact.closure / mm:.2g} mm at most)"
 
 
 @validate_arguments

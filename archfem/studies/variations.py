@@ -28,9 +28,8 @@ from archfem.dynamics.schemes import Conserving, EffectiveDamping, Viscous, inte
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.masonry.joint_closing import FINISHES, joint_stiffness
-from archfem.masonry.materials import Contact
-from archfem.masonry.structure import Joint, Structure
+from archfem.masonry.joint_closing import FINISHES, with_finish
+from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.process_pool import evaluate_points
@@ -50,12 +49,6 @@ DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
 
 # What is varied on request: finish of the faces, whose usual law of closing replaces that given
 FINISH_RANGE = {"finish": ("as given", *FINISHES)}
-
-# Strength of stones for which none is given [Pa]
-USUAL_STRENGTH = 56e6
-
-# Blocks softer than this are soil, whose faces have no finish [Pa]
-LEAST_STONE_MODULUS = 1e9
 
 # Values at which a run is as given
 NEUTRAL: dict[str, Any] = {
@@ -316,9 +309,11 @@ def prepare_runs(
 
 def _vary_contacts(structure: Structure, changes: Mapping[str, Any]) -> Structure:
     """Return the structure with other laws of closing, stiffness and friction of its joints."""
+    if changes["finish"] != "as given":
+        structure = with_finish(structure, changes["finish"])
     joints = []
     for joint in structure.joints:
-        given = _finished_contact(structure, joint, changes["finish"])
+        given = joint.contact
         contact = replace(
             given,
             normal_stiffness=changes["k_n"] * given.normal_stiffness,
@@ -327,23 +322,6 @@ def _vary_contacts(structure: Structure, changes: Mapping[str, Any]) -> Structur
         )
         joints.append(replace(joint, contact=contact))
     return replace(structure, joints=tuple(joints))
-
-
-def _finished_contact(structure: Structure, joint: Joint, finish: str) -> Contact:
-    """Return the contact of a joint, of stones with the usual law of a finish."""
-    stones = [structure.blocks[number].material for number in joint.blocks]
-    weakest = min(stones, key=lambda stone: stone.young)
-    if finish == "as given" or weakest.young < LEAST_STONE_MODULUS:
-        return joint.contact
-    strength = weakest.strength or USUAL_STRENGTH
-    law = joint_stiffness(weakest.young, joint.depth, finish, strength=strength)
-    contact = law.closing_contact()
-    return replace(
-        joint.contact,
-        normal_stiffness=contact.normal_stiffness,
-        shear_stiffness=contact.shear_stiffness,
-        closure=contact.closure,
-    )
 
 
 def _run_rigid_blocks(structure: Structure, motion: Motion, *, dt: float) -> CollapseState:

@@ -84,3 +84,18 @@ def test_check_explains_each_default_by_its_key(tmp_path, capsys):
         key = value.partition("=")[0]
         assert key in [each.key for each in list_defaults(case)]
         assert key not in [each.key for each in list_defaults(af.Case.read(path, [value]))]
+
+
+def test_check_explains_a_finish_with_its_range_in_place_of_defaults():
+    contact = {"stone to stone": {"finish": "hewn"}}
+    case = af.Case.of({**BARE, "model": {"fidelity": "rigid"}, "contacts": contact})
+    keys = [each.key for each in list_defaults(case)]
+    assert 'contacts."stone to stone".friction' in keys
+    assert not any(key.endswith("stiffness") for key in keys)
+    stone, depth = case.structure.blocks[1].material, case.structure.joints[0].depth
+    law = af.joint_stiffness(stone.young, depth, "hewn", strength=stone.strength)
+    (line,) = [each for each in explain_defaults(case).splitlines() if "finish" in each]
+    for values, unit in ((law.initial, 1e9), (law.shear, 1e9), (law.closure, 1e-3)):
+        low, usual, high = (f"{value / unit:.2g}" for value in sorted(values))
+        assert f"{usual} ({low} to {high})" in line
+    assert "Bandis" in line

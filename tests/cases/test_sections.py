@@ -109,6 +109,18 @@ def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
     assert "verdict" not in dict(conclusion.list_facts(none))
 
 
+def test_the_conclusion_names_the_law_of_the_joints(piers, monkeypatch):
+    data = report_data.ReportData(SimpleNamespace(structure=piers), {"first": None})
+    (words,) = conclusion._conclude_joints(data)
+    assert words == "Joints close linearly with 1.48 GPa/m, which was not varied."
+    ranged = SimpleNamespace(**vars(data) | {"files": {"verdict_range.nc": "file"}})
+    for properties, varied in ((("damping_ratio",), "not varied"), (("finish",), "varied")):
+        computed = SimpleNamespace(properties=properties)
+        monkeypatch.setattr(conclusion.VerdictRange, "read", lambda _, found=computed: found)
+        (words,) = conclusion._conclude_joints(ranged)
+        assert words.endswith(f"which was {varied}.")
+
+
 def test_the_pga_of_older_files_is_that_at_their_steps(piers, runs):
     old = af.History(runs["first"].dataset.drop_attrs(), piers)
     old.dataset.attrs |= {k: v for k, v in runs["first"].dataset.attrs.items() if k != "pga"}

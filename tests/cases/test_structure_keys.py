@@ -7,7 +7,7 @@ import pytest
 
 import archfem as af
 from archfem._validation import declared_keys
-from archfem.cases.structure_keys import build_structure
+from archfem.cases.structure_keys import build_structure, write_structure
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 BRIDGES = [
@@ -197,3 +197,35 @@ def test_stages_of_a_cases_own():
 def test_invalid_input_is_refused(fill, dead_load, words):
     with pytest.raises(af.InvalidInput, match=words):
         case(fill, dead_load=dead_load)
+
+
+RING_OF_20_MPA = {
+    "structure": {"shape": "circular_arch", "span": 5.0, "rise": 1.8}
+    | {"thickness": 0.5, "voussoirs": 7},
+    "materials": {"stone": {"strength": "20 MPa"}},
+}
+
+
+def test_a_finish_is_read_and_written():
+    """Beside friction; the stones decide, and the shape is written with the law."""
+    contact = {"stone to stone": {"finish": "dressed", "friction": 0.7}}
+    ring = build_structure({**RING_OF_20_MPA, "contacts": contact})
+    law = af.joint_stiffness(30e9, 0.5, "dressed", strength=20e6).closing_contact(0.7)
+    assert {joint.contact for joint in ring.joints} == {law}
+    assert build_structure(RING_OF_20_MPA).joints[0].contact.closure is None
+    tables = write_structure(ring)
+    assert tables["structure"]["shape"] == "circular_arch"
+    assert build_structure(tables) == ring
+
+
+@pytest.mark.parametrize(
+    ("contact", "says"),
+    [
+        ({"finish": "polished"}, "finish.* 'polished'"),
+        ({"finish": "hewn", "closure": 1e-4}, "has a finish and closure, which follows from it"),
+        ({"finish": "hewn", "shear_stiffness": 1e9}, "has a finish and shear_stiffness"),
+    ],
+)
+def test_a_finish_is_refused_beside_what_follows_from_it(contact, says):
+    with pytest.raises(af.InvalidInput, match=says):
+        build_structure({**RING_OF_20_MPA, "contacts": {"stone to stone": contact}})

@@ -7,6 +7,7 @@ from glued import glued
 import archfem as af
 from archfem.dynamics import MECHANISM_DEFINITIONS
 from archfem.limit import mechanism_over_record
+from archfem.masonry.joint_closing import describe_closing
 
 
 def failed_joints(run):
@@ -27,6 +28,7 @@ def test_the_words_are_written_from_the_fields(run):
     for name, found in verdict.mechanisms.items():
         (line,) = [text for text in lines if name in text.split(":")[0]]
         assert line.endswith(str(found) if found else "none")
+    assert f"{describe_closing(run.structure)}, which was not varied" in lines
     assert repr(verdict) == f"Verdict({first!r})"
     assert verdict.headline in repr(run)
 

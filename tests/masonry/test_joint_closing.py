@@ -3,6 +3,7 @@
 In MPa and mm, with stiffness per mm of closing.
 """
 
+from dataclasses import replace
 from math import log10, radians, tan
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import archfem as af
 from archfem.masonry import joint_closing
+from archfem.masonry.joint_closing import describe_closing
 
 MPA_PER_MM = 1e9
 
@@ -212,3 +214,50 @@ def test_invalid_faces_are_refused():
             joint_closing.face_closing(*given)
     with pytest.raises(af.InvalidInput, match="at least twice"):
         joint_closing.face_closing(4.0, 9e7, strength=4e7)
+
+
+def wall_of(*stones):
+    """A column of blocks of these materials on a base of the first."""
+    column = af.column(breadth=0.5, heights=[0.4] * len(stones))
+    materials = (stones[0], *stones)
+    blocks = (replace(b, material=m) for b, m in zip(column.blocks, materials, strict=True))
+    return replace(column, blocks=tuple(blocks))
+
+
+def test_a_finish_gives_the_law_of_the_weaker_stone():
+    hard, weak = (af.Material(20e9, 0.2, 22e3, 1e6 * strength) for strength in (80.0, 20.0))
+    wall = wall_of(hard, weak, replace(hard, strength=None), af.masonry.BACKFILL)
+    changed = af.masonry.with_finish(wall, "hewn")
+    for joint, strength in zip(changed.joints, (80.0, 20.0, 20.0), strict=False):
+        law = af.joint_stiffness(20e9, 0.5, "hewn", strength=1e6 * strength)
+        assert joint.contact == law.closing_contact()  # with friction and name of the preset
+    assert changed.joints[3] == wall.joints[3]  # of soil
+    assert af.masonry.with_finish(wall_of(hard), "mortar").joints[0].contact.closure is None
+    other = replace(wall.joints[0].contact, friction=0.4)
+    mixed = replace(wall, joints=(replace(wall.joints[0], contact=other), *wall.joints[1:]))
+    chosen = af.masonry.with_finish(mixed, "hewn", other)
+    assert chosen.joints[0].contact == replace(changed.joints[0].contact, friction=0.4)
+    assert chosen.joints[1:] == mixed.joints[1:]
+    with pytest.raises(af.InvalidInput, match="'joint 3' of 'stone to stone' is a joint of soil"):
+        af.masonry.with_finish(wall, "hewn", wall.joints[3].contact)
+    with pytest.raises(af.InvalidInput, match="finish 'polished' is not known"):
+        af.masonry.with_finish(wall, "polished")
+
+
+def test_the_law_of_joints_is_described_in_a_sentence():
+    stone = af.Material(20e9, 0.2, 22e3, 40e6)
+    wall = wall_of(stone, stone)
+    assert describe_closing(wall) == "joints close linearly with 1.48 GPa/m"
+    dressed = af.masonry.with_finish(wall, "dressed")
+    law = af.joint_stiffness(20e9, 0.5, "dressed", strength=40e6)
+    stiffness, closure = f"{law.initial[1] / 1e9:.3g}", f"{1e3 * law.closure[1]:.2g}"
+    words = f"by the law of dressed faces ({stiffness} GPa/m at first, {closure} mm at most)"
+    assert describe_closing(dressed) == f"joints close {words}"
+    # a law of other numbers has no finish, whatever it was made from
+    softer = replace(dressed.joints[1].contact, closure=2e-3, name="bed")
+    both = replace(dressed, joints=(dressed.joints[0], replace(wall.joints[1], contact=softer)))
+    other = f"'bed' by a law that stiffens ({stiffness} GPa/m at first, 2 mm at most)"
+    assert describe_closing(both) == f"joints close: 'stone to stone' {words}; {other}"
+    bed = describe_closing(af.masonry.with_finish(wall, "mortar"))
+    assert bed == "joints close linearly with 31.6 GPa/m, of a bed of mortar"
+    assert describe_closing(wall_of(af.masonry.BACKFILL)) == ""

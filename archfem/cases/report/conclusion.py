@@ -17,6 +17,7 @@ from archfem.dynamics.history import History
 from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.joints.criteria import assessed_joints
+from archfem.masonry.joint_closing import describe_closing
 from archfem.units import format_mm
 from archfem.view.pages.document import Section, TextBlock
 
@@ -72,7 +73,8 @@ def summarise_outcomes(runs: Sequence[History]) -> str:
 
 def build_conclusion(data: ReportData) -> Section:
     """Build the section on outcome, margin and range in sentences, with the doubts beside them."""
-    sentences = [*_conclude_runs(data), *_conclude_range(data), *_conclude_statics(data)]
+    sentences = [*_conclude_runs(data), *_conclude_joints(data), *_conclude_range(data)]
+    sentences += _conclude_statics(data)
     blocks = [TextBlock(" ".join(sentences))] if sentences else []
     blocks += [TextBlock(f"In doubt: {text}.", "doubt") for text in list_doubts(data)]
     blocks += [TextBlock(text) for text in filter(None, [describe_what_is_not_varied(data)])]
@@ -123,6 +125,16 @@ def describe_lost(fall: CollapseState, max_names: int = 3) -> str:
     """Return the number of lost blocks, the time of the first, and the first names."""
     names = ", ".join([*fall.blocks[:max_names], *(["…"] if fall.blocks[max_names:] else [])])
     return f"{len(fall.blocks)} blocks, the first at {fall.time:.2f} s: {names}"
+
+
+def _conclude_joints(data: ReportData) -> Iterator[str]:
+    """Yield the sentence on the law by which joints close, if runs depend on it."""
+    law = describe_closing(data.case.structure)
+    if data.runs and law:
+        path = data.files.get("verdict_range.nc")
+        properties = () if path is None else VerdictRange.read(path).properties
+        varied = {"joint_rule", "k_n", "finish"}.intersection(properties)
+        yield sentence(f"{law}, which was {'varied' if varied else 'not varied'}")
 
 
 def _conclude_range(data: ReportData) -> Iterator[str]:
