@@ -335,8 +335,8 @@ def _stop_rocking(bodies, workspace, touching):  # type: ignore
         if opening - closing <= rows[k, 10] or closing < -rows[k, 10]:
             continue
         body = a if bodies.inverse_mass[a, 0] > 0.0 else b
-        x = contacts.point[other, 0] - workspace.middle[body, 0]
-        y = contacts.point[other, 1] - workspace.middle[body, 1]
+        x = contacts.point[other, 0] - bodies.centre[body, 0] - workspace.middle[body, 0]
+        y = contacts.point[other, 1] - bodies.centre[body, 1] - workspace.middle[body, 1]
         lost = speeds[body, 2] * (1.0 - rows[k, 10] / (opening - closing))
         # the velocity of the closing end, v + ω × r, stays
         vx, vy, spin = (

@@ -139,19 +139,19 @@ def test_gravity_is_that_of_the_structure():
 
 
 @pytest.mark.parametrize(
-    ("ratio", "restitution"), [(0.936, 0.0), (0.97, 0.5), (0.85, 0.0), (0.611, 0.0)]
+    ("ratio", "restitution", "last"),
+    [(0.936, 0.0, 7), (0.97, 0.5, 7), (0.85, 0.0, 4), (0.611, 0.0, 3)],
 )
-def test_a_rocking_block_keeps_the_ratio_given(ratio, restitution, verified):
-    """Granite of 0.25 x 1.0 m: each of four impacts within 0.5 %, and the seventh at its time.
+def test_a_rocking_block_keeps_the_ratio_given(ratio, restitution, last, verified):
+    """Granite of 0.25 x 1.0 m: each of four impacts within 0.5 %, and the last at its time.
 
-    Housner's ratio is 0.912: others keep more, or less, down to 0.67 of it as on rubber.
-
-    The times between impacts are those of Housner's block, linear in the tilt, to 1 %.
+    Housner's ratio is 0.912: some keep more, others less, down to 0.67 of it as on rubber. The
+    times between impacts are those of Housner's block, linear in the tilt, to 1 %.
     """
     structure = floor((-0.125, 0.0, 0.125, 1.0), friction=5.0, floor=(-4.0, 4.0))
     tilt, rate = np.arctan(0.25), np.sqrt(1.5 * G / np.hypot(0.25, 1.0))
     share, exact = 0.5, np.arccosh(2.0) / rate
-    for _ in range(6):
+    for _ in range(last - 1):
         share = 1.0 - np.sqrt(1.0 - ratio**2 * (1.0 - (1.0 - share) ** 2))
         exact += 2.0 * np.arccosh(1.0 / (1.0 - share)) / rate
     joint = {"joint 1": ratio}
@@ -159,17 +159,17 @@ def test_a_rocking_block_keeps_the_ratio_given(ratio, restitution, verified):
     frames = list(falling.frames(tilted(structure, 0.5 * tilt), 1.05 * exact, spacing=2e-3))
     turn, speed = np.array([(frame.poses[1, 2], frame.velocities[1, 2]) for frame in frames]).T
     impacts = np.flatnonzero(turn[1:] * turn[:-1] < 0.0)
-    assert frames[impacts[6]].time == pytest.approx(exact, rel=0.01)
+    assert frames[impacts[last - 1]].time == pytest.approx(exact, rel=0.01)
     tops = np.flatnonzero(speed[1:] * speed[:-1] < 0.0)
     peaks = np.abs([0.5 * tilt, *turn[tops]])
-    peaks = peaks[peaks > 0.1 * tilt][:5]
+    peaks = peaks[peaks > 0.04 * tilt][:5]
     kept = np.sqrt(
         (np.cos(tilt - peaks[1:]) - np.cos(tilt)) / (np.cos(tilt - peaks[:-1]) - np.cos(tilt))
     )
     assert kept == pytest.approx(ratio, rel=0.005)
     assert frames[-1].energy.gained < 1e-4 * frames[-1].energy.lost
-    case = f"rocking block with a ratio of {ratio:g}: time of its seventh impact [s]"
-    verified(case, exact, "Housner (1963)", frames[impacts[6]].time)
+    case = f"rocking block with a ratio of {ratio:g}: time of its impact {last} [s]"
+    verified(case, exact, "Housner (1963)", frames[impacts[last - 1]].time)
 
 
 def test_rebounds_that_would_add_energy_are_reduced():
