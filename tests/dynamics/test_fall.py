@@ -161,7 +161,7 @@ def test_friction_that_loose_stones_are_given_is_doubted(contact, words):
 def test_a_fall_whose_impulses_did_not_settle_is_doubted(share, count):
     dataset = xr.Dataset(attrs={"fall_unsettled": share, "fall_violation": 0.2} | BALANCED)
     column = af.column(breadth=0.5, heights=[0.5], contact=af.Contact(1e9, 4e8, 0.6))
-    doubts = list(fall._doubt_fall(column, dataset, None))
+    doubts = list(fall._doubt_fall(column, dataset))
     assert len(doubts) == count
     assert all(
         f"did not settle in {share:.0%} of the steps" in doubt.cause
