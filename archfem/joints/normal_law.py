@@ -278,12 +278,12 @@ class CrackedLaw:
     def step_means(self, start: Array, end: Array, lag: float = 0.0) -> tuple[Array, Array]:
         """Return means over a step, as `NormalLaw.step_means`."""
         means = self.law.step_means
-        forces = self._sum(lambda *gaps: means(*gaps, lag)[0], start, end)
+        forces = self._sum(lambda a, b: means(a, b, lag)[0], start, end)
         return forces, means(start, end, lag)[1]
 
     def mean_stiffness(self, start: Array, end: Array, rates: tuple[float, float]) -> Array:
         """Return the derivative of the mean force, as `NormalLaw.mean_stiffness`."""
-        return self._sum(lambda *gaps: self.law.mean_stiffness(*gaps, rates), start, end)
+        return self._sum(lambda a, b: self.law.mean_stiffness(a, b, rates), start, end)
 
 
 @dataclass(frozen=True, eq=False)
