@@ -121,7 +121,7 @@ def in_si_unit(values: Sequence[Any]) -> tuple[list[Any], str]:
     The unit is empty where all values are plain numbers, or one is text that is no quantity.
     """
     # "g" is gravity, as no key of a case is a mass; a pure number is no angle
-    units = ("m", "m/s**2", "Pa", "Pa/m", "N/m**3", "s", "Hz", "N", "1", "degree")
+    units = ("m", "m/s**2", "Pa", "Pa/m", "N/m**3", "N/m", "s", "Hz", "N", "1", "degree")
     texts = [value for value in values if isinstance(value, str)]
     if not texts or not all(re.match(r"\s*[-+]?\.?\d", text) for text in texts):
         return list(values), ""

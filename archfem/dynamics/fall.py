@@ -18,7 +18,6 @@ from archfem.dynamics.history import Ending, History, with_fall
 from archfem.dynamics.rigid_body.bodies import (
     FallFrame,
     LooseBlocks,
-    find_unkept_ratios,
     make_bodies,
 )
 from archfem.dynamics.rigid_body.simulation import (
@@ -99,7 +98,7 @@ def follow_fall(
         fall = classify_collapse(structure, frames, origin)
         attrs = history.dataset.attrs | dataset.attrs
         history = replace(history, dataset=history.dataset.merge(dataset).assign_attrs(attrs))
-        doubts += _doubt_fall(structure, dataset, rocking_ratio)
+        doubts += _doubt_fall(structure, dataset)
     else:
         frame = LooseBlocks(state.time, *model.rigid_motions(state.q, state.velocity))
         resting = is_resting(model, state, shaken=ending is not Ending.FINISHED)
@@ -120,17 +119,13 @@ def simulate_fall(
     """Follow loose blocks until they rest, or until 20 s after the motion has ended.
 
     Not whole, they are followed by one length of step until the first block is lost. The ratio is
-    that of `RigidBlockSimulation`, for the joints where it has an effect.
+    that of `RigidBlockSimulation`.
     """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + 20.0
     loose = with_sliding_joints(model.structure)
-    ratios: float | dict[str, float] | None = rocking_ratio
-    if rocking_ratio is not None and (unkept := find_unkept_ratios(loose, rocking_ratio)):
-        names = {joint.name for joint in loose.joints} - unkept.keys()
-        ratios = dict.fromkeys(names, rocking_ratio)
     dt = None if whole else TRIED_STEPS[0]
-    simulation = RigidBlockSimulation(loose, dt=dt, rocking_ratio=ratios)
+    simulation = RigidBlockSimulation(loose, dt=dt, rocking_ratio=rocking_ratio)
     try:
         frames = []
         for frame in simulation.frames(released.start, end, motion, spacing=0.02):
@@ -205,7 +200,7 @@ def with_sliding_joints(structure: Structure) -> Structure:
     return replace(structure, joints=tuple(joints))
 
 
-def _doubt_fall(structure: Structure, dataset: xr.Dataset, ratio: float | None) -> Iterator[Doubt]:
+def _doubt_fall(structure: Structure, dataset: xr.Dataset) -> Iterator[Doubt]:
     """Yield doubts of a fall: unsettled impulses, energy gained, steps, and other properties.
 
     Loose blocks may keep more at impacts, and slide otherwise, than the joints of the model.
@@ -226,13 +221,6 @@ def _doubt_fall(structure: Structure, dataset: xr.Dataset, ratio: float | None) 
         yield Doubt(
             f"half the step changes how far a block falls or moves by {change:.0%}",
             "state a range, `verdict_range`",
-        )
-    unkept = {} if ratio is None else find_unkept_ratios(with_sliding_joints(structure), ratio)
-    if unkept:
-        yield Doubt(
-            f"the damping was to give a restitution of {ratio:g}, but loose blocks keep at least "
-            f"{min(unkept.values()):.4g} at {join_names(sorted(unkept))} (Housner)",
-            "give `restitution_damping` at least that",
         )
     joints = [structure.joints[k] for k in np.flatnonzero(mark_stone_joints(structure))]
     if held := [joint.name for joint in joints if not joint.contact.slides]:

@@ -22,8 +22,8 @@ class State:
         q: coordinates (n,).
         velocity: rates of the coordinates (n,).
         acceleration: rates of the velocities (n,).
-        memory: irreversible slip of each joint point (p,) [m], followed by flags of broken bonds
-            where any joint has tensile strength (2 p,), as `Model.memory`; None for no slip.
+        memory: irreversible slip of each joint point (p,) [m], followed by damage and openings of
+            bonds where joints have any, as `Model.memory`; None for no slip.
         structure: `fingerprint` of the structure; None if unknown.
     """
 

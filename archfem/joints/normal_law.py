@@ -17,9 +17,17 @@ is linear elastic up to f_t and stays there until the bond is declared broken; t
 the true traction, μ |t_n| + c. The law of dry joints therefore holds, also averaged over a step,
 with a shifted gap, a constant pull and another cohesion. Along a facet between an intact and a
 broken end the bond decreases linearly.
+
+Of a softening bond with the damage D both strengths are 1 - D of these, and it pulls from its
+irreversible opening κ on:
+
+    t_n = k_n (<g>_- - <g - κ>_- + <g - κ - g_t>_-) + (1 - D) f_t,    g_t = (1 - D) f_t / k_n.
+
+Three dry laws with shifted gaps therefore add up to it, at an instant and over a step.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -243,42 +251,109 @@ def dilatancy_opening(points: JointPoints, slip: Array) -> Array | None:
 
 
 @dataclass(frozen=True, eq=False)
+class CrackedLaw:
+    """Normal forces of softening bonds without their pull, from gaps less `Bonds.shift`."""
+
+    law: NormalLaw
+    shift: Array  # irreversible opening and stretch of the bonds (p,) [m]
+    stretch: Array  # of the bonds (p,) [m]
+
+    def _sum(self, evaluate: Callable[..., Array], *gaps: Array) -> Array:
+        """Return the sum of the three dry laws."""
+        faces, crack = ([gap + each for gap in gaps] for each in (self.shift, self.stretch))
+        return evaluate(*gaps) + evaluate(*faces) - evaluate(*crack)
+
+    def forces_and_area(self, gaps: Array) -> tuple[Array, Array]:
+        """Return forces, and the area closed to the bond, as `NormalLaw.forces_and_area`."""
+        return self._sum(self.law.forces, gaps), self.law.forces_and_area(gaps)[1]
+
+    def stiffness(self, gaps: Array) -> Array:
+        """Return the derivative of forces, as `NormalLaw.stiffness`."""
+        return self._sum(self.law.stiffness, gaps)
+
+    def energies(self, gaps: Array) -> Array:
+        """Return the stored energies, as `NormalLaw.energies`."""
+        return self._sum(self.law.energies, gaps)
+
+    def step_means(self, start: Array, end: Array, lag: float = 0.0) -> tuple[Array, Array]:
+        """Return means over a step, as `NormalLaw.step_means`."""
+        means = self.law.step_means
+        forces = self._sum(lambda a, b: means(a, b, lag)[0], start, end)
+        return forces, means(start, end, lag)[1]
+
+    def mean_stiffness(self, start: Array, end: Array, rates: tuple[float, float]) -> Array:
+        """Return the derivative of the mean force, as `NormalLaw.mean_stiffness`."""
+        return self._sum(lambda a, b: self.law.mean_stiffness(a, b, rates), start, end)
+
+
+@dataclass(frozen=True, eq=False)
 class Bonds:
-    """Intact and broken bonds of the joint points."""
+    """Intact, damaged and broken bonds of the joint points."""
 
     law: NormalLaw  # normal forces from gaps
-    broken: Array  # 1 where a bond is broken, else 0 (p,)
+    damage: Array  # D, the lost share of the strengths: 1 where a bond is broken (p,) [-]
+    crack: Array  # κ, irreversible opening of softening bonds (p,) [m]
 
     @cached_property
     def intact(self) -> NDArray[np.bool_]:
-        """Whether each point has an intact bond (p,)."""
-        return (self._strength > 0.0) & (self.broken == 0.0)
+        """Whether each point has a bond that is not broken (p,)."""
+        return (self._strength > 0.0) & (self.damage < 1.0)
+
+    @cached_property
+    def softens(self) -> NDArray[np.bool_]:
+        """Whether each point has a softening bond that is not broken (p,)."""
+        rate = self.law.points.damage_by_opening
+        return np.zeros_like(self.intact) if rate is None else self.intact & (rate > 0.0)
 
     @cached_property
     def stretch(self) -> Array:
-        """Gap at the tensile strength, f_t / k_n; 0 without bond (p,) [m]."""
-        return np.where(self.intact, self._strength, 0.0) / self.law.points.contact.normal_stiffness
+        """Elastic gap at the tensile strength, (1 - D) f_t / k_n; 0 without bond (p,) [m]."""
+        strength = np.where(self.intact, (1.0 - self.damage) * self._strength, 0.0)
+        return strength / self.law.points.contact.normal_stiffness
+
+    @cached_property
+    def shift(self) -> Array:
+        """Gap at which the tensile strength is reached, κ + `stretch` (p,) [m]."""
+        return self.stretch + np.where(self.intact, self.crack, 0.0)
+
+    @cached_property
+    def normal_law(self) -> NormalLaw | CrackedLaw:
+        """Normal law without `pull`, from gaps less `shift`."""
+        cracked = bool(self.softens.any() and self.crack.any())
+        return CrackedLaw(self.law, self.shift, self.stretch) if cracked else self.law
 
     @cached_property
     def pull(self) -> Array:
-        """Force of each point at the gap `stretch`, f_t times its area (p,) [N]."""
+        """Force of each point at its strength, (1 - D) f_t times its area (p,) [N]."""
         return normal_forces(self.law, self.stretch)
 
     @cached_property
     def cohesion(self) -> Array:
-        """Cohesion for gaps less `stretch`: c - μ f_t if bonded, 0 if broken (p,) [Pa]."""
-        contact = self.law.points.contact
-        lowered = contact.cohesion - contact.friction * self._strength
-        bonded = np.where(self.intact, np.maximum(lowered, 0.0), 0.0)
-        return np.where(self._strength > 0.0, bonded, contact.cohesion)
+        """Cohesion for gaps less `shift`: c - μ f_t of brittle bonds, 0 if broken (p,) [Pa]."""
+        bonded = np.where(self.intact & ~self.softens, self._lowered_cohesion, 0.0)
+        return np.where(self._strength > 0.0, bonded, self.law.points.contact.cohesion)
 
-    def energy_of_pull(self, gaps: Array) -> Array:
-        """Return the energy of the forces `pull`, from gaps less `stretch` (p,) [J]."""
-        return self.pull * (gaps + 0.5 * self.stretch)
+    @cached_property
+    def resistance(self) -> Array:
+        """Shear limit of softening bonds for gaps less `shift`, also at their strength (p,) [N]."""
+        points, share = self.law.points, 1.0 - self.damage
+        softening = share * self._lowered_cohesion * points.weight
+        return np.where(self.softens & points.slides, softening, points.contact.resistance)
+
+    @property
+    def _lowered_cohesion(self) -> Array:
+        """Cohesion of whole bonds for gaps less `shift`, c - μ f_t (p,) [Pa]."""
+        contact = self.law.points.contact
+        return np.maximum(contact.cohesion - contact.friction * self._strength, 0.0)
+
+    def energies(self, gaps: Array) -> Array:
+        """Return the stored energies across the joints, from gaps less `shift` (p,) [J]."""
+        return self.normal_law.energies(gaps) + self.pull * (gaps + 0.5 * self.stretch)
 
     def find_exceeded(self, gaps: Array) -> NDArray[np.bool_]:
-        """Return which bonds are pulled beyond their strength, from gaps less `stretch` (p,)."""
-        return self.intact & (gaps > BOND_STRENGTH_TOLERANCE * self.stretch)
+        """Return which bonds are pulled beyond their strength, from gaps less `shift` (p,)."""
+        stretch = self._strength / self.law.points.contact.normal_stiffness
+        return self.intact & (gaps > BOND_STRENGTH_TOLERANCE * stretch)
 
     def most_exceeded(self, gaps: Array) -> NDArray[np.bool_]:
         """Return the bonds beyond their strength at the largest gap of each joint (p,)."""
@@ -288,18 +363,31 @@ class Bonds:
         # points with gaps equal but for round-off break together
         return exceeded & (gaps >= (1.0 - 1e-6) * largest[joint])
 
-    def broken_after(self, exceeded: NDArray[np.bool_], excess: Array, limit: Array) -> Array:
-        """Return the flags of broken bonds at the end of a step, as `broken` (p,)."""
+    def after(
+        self, gaps: Array, exceeded: NDArray[np.bool_], excess: Array, limit: Array
+    ) -> tuple[Array, Array]:
+        """Return damage and irreversible opening at the end of a step, as they are stored."""
         points = self.law.points
         tolerance = BOND_STRENGTH_TOLERANCE * (limit + points.contact.cohesion * points.weight)
-        # a bond also breaks once its point slides
-        broken = self.intact & (exceeded | (np.abs(excess) > tolerance))
-        return np.where(broken, 1.0, self.broken)
+        # a brittle bond also breaks once its point slides
+        slid = np.where(np.abs(excess) > tolerance, np.abs(excess), 0.0)
+        broken = self.intact & ~self.softens & (exceeded | (slid > 0.0))
+        damage = np.where(broken, 1.0, self.damage)
+        if points.damage_by_opening is None or points.damage_by_slip is None:
+            return damage, self.crack
+        # slip lowers the strength first; the crack then grows to where strength and gap agree
+        by_slip = points.damage_by_slip * slid / points.shear_spring
+        stretch = self._strength / points.contact.normal_stiffness
+        beyond = np.where(self.find_exceeded(gaps + by_slip * stretch), gaps + by_slip * stretch, 0)
+        growth = beyond / (1.0 - points.damage_by_opening * stretch)
+        softened = np.minimum(damage + by_slip + points.damage_by_opening * growth, 1.0)
+        crack = self.crack + np.where(self.softens, growth, 0.0)
+        return np.where(self.softens, softened, damage), crack
 
     @property
     def _strength(self) -> Array:
         strength = self.law.points.tension
-        return np.zeros_like(self.broken) if strength is None else strength
+        return np.zeros_like(self.damage) if strength is None else strength
 
 
 def normal_forces(law: NormalLaw, gaps: Array) -> Array:

@@ -5,7 +5,7 @@ transpose takes forces there to generalised forces. Whatever the coordinates are
 displacements, rigid motions, modes), the joint forces are Gᵀ f(G q) and their tangent is Gᵀ f' G,
 with the law f of `contact_law`, and the dilatancy and tensile bonds of `normal_law`.
 
-Joints have memory: the irreversible slip of each point, and which bonds are broken. Forces follow
+Joints have memory: the irreversible slip of each point, and the damage of bonds. Forces follow
 from the displacements since the memory was updated.
 """
 
@@ -21,7 +21,7 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem.joints.contact_law import ContactLaw, clip_to_friction, shear_tangent
-from archfem.joints.normal_law import Bonds, Facets, NormalLaw, dilatancy_opening
+from archfem.joints.normal_law import Bonds, CrackedLaw, Facets, NormalLaw, dilatancy_opening
 from archfem.joints.quadrature import JointPoints
 
 Flags = NDArray[np.bool_]
@@ -104,7 +104,8 @@ class JointOperator:
         gap_offset: opening and slip at q = 0, due to moved supports and construction (2, p) [m];
             None for zero.
         irreversible_slip: part of the slip that friction has not held (p,) [m]; None for zero.
-        broken: 1 where a bond is broken, else 0 (p,); None for none.
+        damage: lost share of the strength of bonds, 1 where broken (p,) [-]; None for none.
+        crack: irreversible opening of softening bonds (p,) [m]; None for zero.
     """
 
     law: NormalLaw
@@ -112,7 +113,8 @@ class JointOperator:
     slip: sparse.csr_matrix
     gap_offset: Array | None = None
     irreversible_slip: Array | None = None
-    broken: Array | None = None
+    damage: Array | None = None
+    crack: Array | None = None
 
     @property
     def points(self) -> JointPoints:
@@ -184,9 +186,19 @@ class JointOperator:
 
     @property
     def memory(self) -> Array:
-        """Irreversible slip of each point (p,) [m], then flags of broken bonds, if any (2 p,)."""
-        slip = self._slip_memory
-        return slip if self.bonds is None else np.concatenate([slip, self.bonds.broken])
+        """Irreversible slip of each point (p,) [m]; of bonds then their damage (2 p,) [-].
+
+        Where any bond softens, irreversible openings follow (3 p,) [m].
+        """
+        bonds = self.bonds
+        if bonds is None:
+            return self._slip_memory
+        return self._join_memory(self._slip_memory, bonds.damage, bonds.crack)
+
+    def _join_memory(self, slip: Array, damage: Array, crack: Array) -> Array:
+        """Return the memory of joints with bonds from its parts."""
+        softens = self.points.damage_by_opening is not None
+        return np.concatenate([slip, damage, crack] if softens else [slip, damage])
 
     @property
     def _slip_memory(self) -> Array:
@@ -199,22 +211,29 @@ class JointOperator:
         """Return the joint operator with another memory.
 
         Args:
-            memory: as `memory` (p,) or (2 p,).
+            memory: as `memory` (p,), (2 p,) or (3 p,).
         """
-        slip, broken = np.split(memory, [len(self.points.offset)])
-        return replace(
-            self,
-            irreversible_slip=slip if slip.any() else None,
-            broken=broken if broken.any() else None,
-        )
+        parts = [part if part.any() else None for part in memory.reshape(-1, self._point_count)]
+        slip, damage, crack = (*parts, None, None)[:3]
+        return replace(self, irreversible_slip=slip, damage=damage, crack=crack)
+
+    @property
+    def _point_count(self) -> int:
+        return len(self.points.offset)
 
     @cached_property
     def bonds(self) -> Bonds | None:
         """Bonds of the points; None without tensile strength at any point."""
         if self.points.tension is None:
             return None
-        broken = np.zeros(len(self.points.offset)) if self.broken is None else self.broken
-        return Bonds(self.law, broken)
+        zeros = np.zeros(self._point_count)
+        damage, crack = (zeros if each is None else each for each in (self.damage, self.crack))
+        return Bonds(self.law, damage, crack)
+
+    @property
+    def normal_law(self) -> NormalLaw | CrackedLaw:
+        """Normal law of `effective_gaps`, without the pull of bonds."""
+        return self.law if self.bonds is None else self.bonds.normal_law
 
     @cached_property
     def dilatancy_opening(self) -> Array | None:
@@ -224,14 +243,14 @@ class JointOperator:
         return dilatancy_opening(self.points, self.irreversible_slip)
 
     def effective_gaps(self, q: Array, dilatancy: Array | None = None) -> Array:
-        """Return the gaps of the normal law, less dilatancy and the stretch of bonds (p,) [m].
+        """Return the gaps of the normal law, less dilatancy and the shift of bonds (p,) [m].
 
         Args:
             q: coordinates (n,).
             dilatancy: opening by dilatancy (p,) [m]; by default that of the memory.
         """
         gaps = self.gaps_of_faces(q, dilatancy)
-        return gaps if self.bonds is None else gaps - self.bonds.stretch
+        return gaps if self.bonds is None else gaps - self.bonds.shift
 
     def gaps_of_faces(self, q: Array, dilatancy: Array | None = None) -> Array:
         """Return the gaps less dilatancy (p,) [m].
@@ -267,9 +286,11 @@ class JointOperator:
 
     @cached_property
     def contact(self) -> ContactLaw:
-        """Contact law of the points with the cohesion that belongs to `effective_gaps`."""
-        contact = self.points.contact
-        return contact if self.bonds is None else contact._replace(cohesion=self.bonds.cohesion)
+        """Contact law of the points with the shear limit that belongs to `effective_gaps`."""
+        contact, bonds = self.points.contact, self.bonds
+        if bonds is None:
+            return contact
+        return contact._replace(cohesion=bonds.cohesion, resistance=bonds.resistance)
 
     def add_bond_pull(self, normal: Array) -> Array:
         """Return normal forces with the pull of bonds (p,) [N].
@@ -285,7 +306,7 @@ class JointOperator:
         Args:
             q: coordinates (n,).
         """
-        normal, closed = self.law.forces_and_area(self.effective_gaps(q))
+        normal, closed = self.normal_law.forces_and_area(self.effective_gaps(q))
         shear = self.trial_shear(q)
         if self.slides:
             shear = clip_to_friction(shear, self.coulomb_limit(normal, closed))
@@ -334,14 +355,13 @@ class JointOperator:
         """
         if self.bonds is None:
             return self.law.energies(gaps)
-        gaps = gaps - self.bonds.stretch
-        return self.law.energies(gaps) + self.bonds.energy_of_pull(gaps)
+        return self.bonds.energies(gaps - self.bonds.shift)
 
     def updated_memory(self, q: Array) -> Array:
         """Return the memory once the joints are at rest at q, as `memory`.
 
-        Of bonds beyond their strength, those at the largest gap of each joint break first: their
-        force goes to the others, which may carry it.
+        Of brittle bonds beyond their strength, those at the largest gap of each joint break first:
+        their force goes to the others, which may carry it.
 
         Args:
             q: coordinates (n,).
@@ -350,8 +370,8 @@ class JointOperator:
         if self.bonds is None:
             return self.add_slip(excess)
         gaps = self.effective_gaps(q)
-        limit = self.coulomb_limit(*self.law.forces_and_area(gaps))
-        return self.add_breakage(self.bonds.most_exceeded(gaps), excess, limit)
+        limit = self.coulomb_limit(*self.normal_law.forces_and_area(gaps))
+        return self.add_breakage(gaps, self.bonds.most_exceeded(gaps), excess, limit)
 
     def add_slip(self, excess: Array) -> Array:
         """Return the irreversible slip of each point at the end of a step (p,) [m].
@@ -361,17 +381,18 @@ class JointOperator:
         """
         return self._slip_memory + excess / self.points.shear_spring
 
-    def add_breakage(self, exceeded: Flags, excess: Array, limit: Array) -> Array:
-        """Return the memory of joints with bonds at the end of a step, as `memory` (2 p,).
+    def add_breakage(self, gaps: Array, exceeded: Flags, excess: Array, limit: Array) -> Array:
+        """Return the memory of joints with bonds at the end of a step, as `memory`.
 
         Args:
-            exceeded: whether each bond is beyond its strength (p,).
+            gaps: as `effective_gaps`, at the end (p,) [m].
+            exceeded: which brittle bonds beyond their strength break (p,).
             excess: shear force beyond the limit during the step (p,) [N].
             limit: Coulomb's limit (p,) [N].
         """
         assert self.bonds is not None
-        broken = self.bonds.broken_after(exceeded, excess, limit)
-        return np.concatenate([self.add_slip(excess), broken])
+        damage, crack = self.bonds.after(gaps, exceeded, excess, limit)
+        return self._join_memory(self.add_slip(excess), damage, crack)
 
     def stiffness(self, q: Array) -> Array:
         """Return the point stiffnesses on which the tangent depends, for `tangent_map` (m,) [N/m].
@@ -384,10 +405,10 @@ class JointOperator:
             q: coordinates (n,).
         """
         gaps, points = self.effective_gaps(q), self.points
-        across = self.law.stiffness(gaps)
+        across = self.normal_law.stiffness(gaps)
         if not self.slides:
             return np.concatenate([across, points.shear_spring])
-        normal, closed = self.law.forces_and_area(gaps)
+        normal, closed = self.normal_law.forces_and_area(gaps)
         limit = self.coulomb_limit(normal, closed)
         along, by_limit = shear_tangent(self.trial_shear(q), limit, closed)
         coupled = self.friction_coupling(across, self.law.contact_area_rate(gaps), by_limit)

@@ -135,6 +135,10 @@ class JointPoints:
     joint_count: int
     dilatancy: Array | None = None  # tan ψ (p,) [-]; None without dilatancy at any point
     tension: Array | None = None  # tensile strength f_t (p,) [Pa]; None without bonds
+    # damage of bonds by irreversible opening and by slip, 0 of brittle ones, each (p,) [1/m];
+    # None without softening
+    damage_by_opening: Array | None = None
+    damage_by_slip: Array | None = None
     has_own_laws: bool = False  # whether any point has a law of the user
 
     @classmethod
@@ -151,6 +155,8 @@ class JointPoints:
             len(rules),
             _spread_if_any([contact.dilatancy for contact in contacts], joint),
             _spread_if_any([contact.tension for contact in contacts], joint),
+            _spread_if_any([contact.damage_rates[0] for contact in contacts], joint),
+            _spread_if_any([contact.damage_rates[1] for contact in contacts], joint),
             structure.has_own_laws,
         )
 

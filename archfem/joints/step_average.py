@@ -7,7 +7,7 @@ With dilatancy the opening of a point grows linearly over the step, to the value
 slip at its end. It follows from fixed-point iteration: a step is solved with one value, and
 `with_dilatancy` returns the step with the next. The normal force acts on the gap less the dilatancy
 opening; friction dissipates μ N |s| less the work N tan ψ |s| of opening, which is not negative.
-Bonds break at the end of a step; the energy stored in them is then lost.
+Bonds break or soften at the end of a step; the energy stored in what they lose is then lost.
 """
 
 from dataclasses import dataclass, replace
@@ -55,7 +55,7 @@ class StepForces:
 
     def _means(self, q: Array) -> tuple[Array, Array, Array, Array]:
         """Return mean normal force, mean shear, Coulomb's limit, shear lost by slip (p,)."""
-        normal, closed = self.operator.law.step_means(*self._gap_path(q), self.damping_lag)
+        normal, closed = self.operator.normal_law.step_means(*self._gap_path(q), self.damping_lag)
         limit = self.operator.coulomb_limit(normal, closed)
         shear, lost = shear_over_step(*self._shear_path(q), self.damping_lag, limit)
         return normal, shear, limit, lost
@@ -78,8 +78,8 @@ class StepForces:
         operator, (_, _, limit, lost) = self.operator, self._means(q)
         if operator.bonds is None:
             return operator.add_slip(lost)
-        exceeded = operator.bonds.find_exceeded(operator.effective_gaps(q, self.end_opening))
-        return operator.add_breakage(exceeded, lost, limit)
+        gaps = operator.effective_gaps(q, self.end_opening)
+        return operator.add_breakage(gaps, operator.bonds.find_exceeded(gaps), lost, limit)
 
     def with_dilatancy(self, q: Array) -> "StepForces":
         """Return the step with the dilatancy opening due to the slip on the way to q."""
@@ -109,8 +109,8 @@ class StepForces:
             return 0.0
         return self.end_opening if initial is None else self.end_opening - initial
 
-    def _broken_bond_energy(self, q: Array) -> float:
-        """Return the energy stored in bonds that break at the end [J]."""
+    def _lost_bond_energy(self, q: Array) -> float:
+        """Return the energy stored in what bonds lose at the end [J]."""
         operator = self.operator
         if operator.bonds is None:
             return 0.0
@@ -124,20 +124,20 @@ class StepForces:
         before, after = self._before[0], operator.effective_gaps(q, self.end_opening)
         normal, _, limit, _ = self._means(q)
         # damping across: lagged less unlagged mean force, on the change of the gap
-        across = (normal - operator.law.step_means(before, after)[0]) @ (after - before)
+        across = (normal - operator.normal_law.step_means(before, after)[0]) @ (after - before)
         along = shear_loss(*self._shear_path(q), self.damping_lag, limit)
         lost = float(across + np.sum(along / points.shear_spring))
         if points.is_plain:
             return lost
         opened = np.sum(operator.add_bond_pull(normal) * self._opening_change())
-        return lost + float(opened) + self._broken_bond_energy(q)
+        return lost + float(opened) + self._lost_bond_energy(q)
 
     def stiffness(self, q: Array) -> Array:
         """Return the derivative of the mean force, for `JointOperator.tangent_map` (m,) [N/m]."""
         operator, points, lag = self.operator, self.operator.points, self.damping_lag
         # by how much the lagged gaps at both ends change with the gap at the end
         path, rates = self._gap_path(q), (lag, 1.0 + lag)
-        across = operator.law.mean_stiffness(*path, rates)
+        across = operator.normal_law.mean_stiffness(*path, rates)
         if not operator.slides:
             return np.concatenate([across, (0.5 + lag) * points.shear_spring])
         by_change, by_limit = mean_shear_tangent(*self._shear_path(q), lag, self._means(q)[2])

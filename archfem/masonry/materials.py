@@ -5,7 +5,14 @@ from dataclasses import dataclass, replace
 from math import inf, nextafter
 from typing import Annotated, Any
 
-from archfem._typing import Friction, Metres, NewtonsPerCubicMetre, Pascals, PascalsPerMetre
+from archfem._typing import (
+    Friction,
+    Metres,
+    NewtonsPerCubicMetre,
+    NewtonsPerMetre,
+    Pascals,
+    PascalsPerMetre,
+)
 from archfem._validation import check_number, check_words, is_one_of
 from archfem.errors import InvalidInput
 from archfem.units import G, GPa, MPa, kN
@@ -83,11 +90,21 @@ class Contact:
     total resistance in either direction, with the effect of the teeth. Friction dissipates
     (μ - tan ψ) N |s| on the way up and (μ + tan ψ) N |s| on the way down.
 
-    A bond is brittle at each point. It is linear elastic in tension up to f_t; its shear limit is
-    μ |t_n| + c in compression and c - μ t_n in tension. Where either is exceeded, tensile strength
-    and cohesion are lost irreversibly, and the point is dry with friction μ (Itasca, 3DEC:
-    Mohr-Coulomb joint model with zero residual values). Breaking is checked at the end of each
-    load step or time step.
+    A bond is linear elastic in tension up to f_t; its shear limit is μ |t_n| + c in compression and
+    c - μ t_n in tension. Without fracture energy it is brittle at each point: where either is
+    exceeded, tensile strength and cohesion are lost irreversibly, and the point is dry with
+    friction μ (Itasca, 3DEC: Mohr-Coulomb joint model with zero residual values). Breaking is
+    checked at the end of each load step or time step.
+
+    With fracture energies a bond softens linearly. Strengths are (1 - D) f_t and (1 - D) c, with
+    the damage D, up to 1, from the irreversible opening κ_n and all slip κ_s of a point,
+
+        D = κ_n f_t / (2 G_I) + κ_s c / (2 G_II),
+
+    so that opening alone takes G_I to full separation, and slip alone G_II beside friction
+    (isotropic softening of Lourenço, Delft (1996), section 4.2, with his exponential as a line).
+    Unloading is elastic; faces touch again where the joint is closed, and pull again from κ_n on.
+    D grows at the end of each load step, until it is in balance, or of each time step.
 
     Attributes:
         normal_stiffness: compression per closing of the joint, k_n [Pa/m].
@@ -108,6 +125,8 @@ class Contact:
             whose tangent is k_n (1 + σ / (k_n δ_m))²; from 98 % of δ_m on the tangent stays. k_n is
             then the stiffness of a joint that just touches (Bandis, Lumsden and Barton 1983).
             None closes linearly [m].
+        fracture_energy: G_I of a bond, at least f_t² / (2 k_n); None for brittle bonds [N/m].
+        shear_fracture_energy: G_II, at least c² / (2 k_s); None takes G_I [N/m].
 
     Example:
         >>> af.Contact(1.48e9, 0.30e9, friction=0.6, cohesion=5e3).slides
@@ -123,6 +142,8 @@ class Contact:
     tension: Pascals = 0.0
     law: Annotated[Any, dict] = None
     closure: Metres | None = None
+    fracture_energy: NewtonsPerMetre | None = None
+    shear_fracture_energy: NewtonsPerMetre | None = None
 
     def __post_init__(self) -> None:
         """Check that the values are possible, which detects wrong units."""
@@ -157,8 +178,32 @@ class Contact:
                     f"tension {self.tension:.3g} Pa of '{self.name}' beside a closure: a bonded "
                     "joint closes linearly: leave out one of them"
                 )
+        self._check_fracture_energies()
         if self.law is not None:
             self._check_law()
+
+    def _check_fracture_energies(self) -> None:
+        """Check that a bond with fracture energies has at least the energy at its strength."""
+        if self.fracture_energy is None and self.shear_fracture_energy is None:
+            return
+        if self.tension == 0.0 or self.fracture_energy is None:
+            raise InvalidInput(
+                f"fracture_energy {self.fracture_energy} of '{self.name}' beside a tension of "
+                f"{self.tension:.3g} Pa and shear_fracture_energy {self.shear_fracture_energy}: a "
+                "bond that softens has tension and fracture_energy: give both, or leave all out"
+            )
+        rows = [("fracture_energy", self.tension, self.normal_stiffness)]
+        if self.slides:
+            rows += [("shear_fracture_energy", self.cohesion, self.shear_stiffness)]
+        for key, strength, stiffness in rows:
+            value, least = getattr(self, key), 0.5 * strength**2 / stiffness
+            value = self.fracture_energy if value is None else value
+            if not check_number(value, f"{key} of '{self.name}'") > least:
+                raise InvalidInput(
+                    f"{key} {value:.3g} N/m of '{self.name}' is not above {least:.3g} N/m, the "
+                    f"elastic energy of {stiffness:.3g} Pa/m at {strength:.3g} Pa: give more, "
+                    "stiffer joints, or no fracture energies, for bonds that break at once"
+                )
 
     def _check_law(self) -> None:
         """Check that a law of the user is frozen, and that it alone has cohesion and the like."""
@@ -167,7 +212,7 @@ class Contact:
                 f"law {self.law!r} of '{self.name}' is no frozen object: give an object of a class "
                 "with @dataclass(frozen=True)"
             )
-        for key in ("cohesion", "dilatancy", "tension", "closure"):
+        for key in ("cohesion", "dilatancy", "tension", "closure", "fracture_energy"):
             if getattr(self, key):
                 raise InvalidInput(
                     f"{key} {getattr(self, key):.3g} of '{self.name}' beside a law: leave it out: "
@@ -184,6 +229,14 @@ class Contact:
         normal = 1.0 / (1.0 / self.normal_stiffness + across)
         shear = 1.0 / (1.0 / self.shear_stiffness + along)
         return replace(self, normal_stiffness=normal, shear_stiffness=shear)
+
+    @property
+    def damage_rates(self) -> tuple[float, float]:
+        """Damage of a bond by irreversible opening and by slip; 0 of a brittle one [1/m]."""
+        first, second = self.fracture_energy, self.shear_fracture_energy
+        if first is None:
+            return 0.0, 0.0
+        return 0.5 * self.tension / first, 0.5 * self.cohesion / (second or first)
 
     @property
     def coefficient(self) -> float:

@@ -77,7 +77,7 @@ class LinearBlockModel(Model):
 
     @property
     def memory(self) -> Array:
-        """Irreversible slip (p,) [m], then flags of broken bonds (2 p,)."""
+        """Joint memory, as `Model.memory`."""
         return self.operator.memory
 
     def with_memory(self, memory: Array) -> Self:

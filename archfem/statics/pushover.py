@@ -154,7 +154,8 @@ def pushover(
 
         λ = λ_limit - C d^(-1/2).
 
-    Bonds break between steps, so that with them the curve does fall; follow it by displacement.
+    Bonds break or soften between steps, so that with them the curve does fall; follow it by
+    displacement.
 
     A *settlement* moves a support instead, under the dead load alone. The force with which the
     structure holds it back changes, and tends to that of the limit state which resists the

@@ -69,7 +69,7 @@ class TrescaJoints(JointOperator):
         operator = joints.law, joints.opening, joints.slip, joints.gap_offset
         # joints that never slide have no other limit than their own
         limit = np.maximum(shear_limit, joints.points.contact.resistance)
-        return cls(*operator, joints.irreversible_slip, joints.broken, limit)
+        return cls(*operator, joints.irreversible_slip, joints.damage, joints.crack, limit)
 
     def coulomb_limit(self, normal: Array, closed: Array) -> Array:
         """Return the shear limits, for any normal forces (p,) [N]."""
@@ -77,7 +77,7 @@ class TrescaJoints(JointOperator):
 
     def stiffness(self, q: Array) -> Array:
         """Return the point stiffnesses of the tangent, as `tangents` takes them (m,) [N/m]."""
-        across = self.law.stiffness(self.effective_gaps(q))
+        across = self.normal_law.stiffness(self.effective_gaps(q))
         over = exceeds_limit(self.trial_shear(q), self.shear_limit)
         along = np.where(over, 0.0, self.points.shear_spring)
         # no coupling of slip with opening: it is zero where that of Coulomb's law would stand
@@ -130,7 +130,7 @@ def _solve_creep_step(
         tresca = model.with_joint_law(TrescaJoints.of(joints, limit))
         solution = _solve_with_drag(solver, tresca, load, (start, q), drag, ("basic", "cp"))
         q, iterations = solution.q, iterations + solution.iterations
-        limit = joints.coulomb_limit(*joints.law.forces_and_area(joints.effective_gaps(q)))
+        limit = joints.coulomb_limit(*joints.normal_law.forces_and_area(joints.effective_gaps(q)))
     return Solution(q, iterations, solution.residual)
 
 

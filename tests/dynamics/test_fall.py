@@ -59,14 +59,14 @@ def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypat
     assert dataset.attrs["handover_strain"] == 0.5
     assert (dataset.attrs["fall_violation"], dataset.attrs["fall_unsettled"]) == (0.25, 0.5)
     assert (dataset.attrs["fall_gained_share"], dataset.attrs["fall_step_change"]) == (0.125, 0.75)
-    causes = "\n".join(doubt.cause for doubt in fall._doubt_fall(tower.structure, dataset, None))
+    causes = "\n".join(doubt.cause for doubt in fall._doubt_fall(tower.structure, dataset))
     assert "gained 0.12 of the energy exchanged" in causes
     assert "how far a block falls or moves by 75%" in causes
 
 
 @pytest.mark.parametrize("ratio", [0.9, pytest.param(0.8, marks=pytest.mark.slow), 0.5, None])
 def test_a_block_handed_over_rocks_on_with_the_restitution_of_its_damping(ratio):
-    """Rocking energies of the first three tilts; Housner's 1 - 3/2 sin² α at least, with a doubt.
+    """Rocking energies of the first three tilts, also below Housner's 1 - 3/2 sin² α = 0.603.
 
     Parabolas through frames 20 ms apart give the tilts, to 1 % of the ratio of speeds.
     """
@@ -82,9 +82,7 @@ def test_a_block_handed_over_rocks_on_with_the_restitution_of_its_damping(ratio)
     peaks = top + (after - before) ** 2 / (8.0 * (2.0 * top - before - after))
     energies = np.cos(tilt - peaks) - np.cos(tilt)
     housner = 1.0 - 1.5 * np.sin(tilt) ** 2
-    wanted = max(ratio or 0.0, housner)
-    doubted = ["keep at least 0.6029 at" in doubt.cause for doubt in run.doubts]
-    assert any(doubted) == (ratio == 0.5)
+    wanted = ratio or housner
     assert peaks[0] > 0.3
     assert np.sqrt(energies[1:] / energies[:-1]) == pytest.approx(np.full(2, wanted), rel=0.01)
 
@@ -163,7 +161,7 @@ def test_friction_that_loose_stones_are_given_is_doubted(contact, words):
 def test_a_fall_whose_impulses_did_not_settle_is_doubted(share, count):
     dataset = xr.Dataset(attrs={"fall_unsettled": share, "fall_violation": 0.2} | BALANCED)
     column = af.column(breadth=0.5, heights=[0.5], contact=af.Contact(1e9, 4e8, 0.6))
-    doubts = list(fall._doubt_fall(column, dataset, None))
+    doubts = list(fall._doubt_fall(column, dataset))
     assert len(doubts) == count
     assert all(
         f"did not settle in {share:.0%} of the steps" in doubt.cause

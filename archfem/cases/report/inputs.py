@@ -66,6 +66,8 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
             "cohesion": ("cohesion", 1e3, " kPa"),
             "tension": ("tensile strength", 1e3, " kPa"),
             "dilatancy": ("dilatancy", 1.0, ""),
+            "fracture_energy": ("fracture energy", 1.0, " N/m"),
+            "shear_fracture_energy": ("fracture energy in shear", 1.0, " N/m"),
         },
     }
     items: list[Material | Contact] = [block.material for block in case.structure.blocks]

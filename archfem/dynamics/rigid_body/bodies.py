@@ -48,7 +48,9 @@ class Bodies(NamedTuple):
     level: float  # of the ground [m]
     contact_gap: float  # largest gap of a contact [m]
     slop: float  # overlap that is not corrected [m]
-    rocking: Array  # ratio of speeds of a rocking face, zero where none is given (b + 1, b + 1) [-]
+    # ratio of speeds of a rocking face, zero where none is given, negative where it is less than an
+    # impact at the closing end keeps (b + 1, b + 1) [-]
+    rocking: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,13 +276,11 @@ def _rocking_table(structure: Structure, ratio: float | Mapping[str, float] | No
             table[a, b] = table[b, a] = _check_ratio(value)
     else:
         table[:] = _check_ratio(ratio)
-    for name, least in find_unkept_ratios(structure, ratio).items():
-        given = ratio[name] if isinstance(ratio, Mapping) else ratio
-        raise InvalidInput(
-            f"rocking_ratio {given:g} of joint {name!r} has no effect: by its shape the block "
-            f"keeps {least:.4g} at an impact (Housner). Give ratios above, by the names of joints, "
-            "and none for this one"
-        )
+    unkept = find_unkept_ratios(structure, ratio)
+    for joint in structure.joints:
+        if joint.name in unkept:
+            a, b = joint.blocks
+            table[a, b] = table[b, a] = -table[a, b]
     return table
 
 

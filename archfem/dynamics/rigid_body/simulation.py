@@ -85,12 +85,13 @@ class RigidBlockSimulation:
         level: height of the ground [m]; None takes the lowest point of the fixed blocks.
         rocking_ratio: angular velocity after over that before, where a face that turns about one
             end closes at the other: of all faces, or by names of joints [-]. None, and joints not
-            named, take that of an impact at the closing end alone (Housner's), which is the least:
-            smaller ones have no effect. They are refused for blocks on one joint to a fixed block;
-            of others the least depends on what they touch, and is not checked.
+            named, take that of an impact at the closing end alone (Housner's). It is the least that
+            contact without tension keeps. Blocks on one joint to a fixed block keep smaller ratios
+            too, as measured on rubber: a couple at the closing end takes the rest. Of others the
+            least depends on what they touch, and smaller ratios have no effect.
 
     Raises:
-        InvalidInput: a number is out of range, a ratio has no effect, there is no coefficient of
+        InvalidInput: a number is out of range, there is no coefficient of
             friction, a joint has a bond or a law of its own, or the ground lies above the foot of a
             free block.
     """

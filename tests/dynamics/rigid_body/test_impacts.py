@@ -138,16 +138,20 @@ def test_gravity_is_that_of_the_structure():
     assert end.poses[1, 1] == pytest.approx(1.0 - 0.5 * 1.62 * 0.25, rel=1e-12)
 
 
-@pytest.mark.parametrize(("ratio", "restitution"), [(0.936, 0.0), (0.97, 0.5)])
-def test_a_rocking_block_keeps_the_ratio_given(ratio, restitution, verified):
-    """Granite of 0.25 x 1.0 m: each of four impacts within 0.5 %, and the seventh at its time.
+@pytest.mark.parametrize(
+    ("ratio", "restitution", "last"),
+    [(0.936, 0.0, 7), (0.97, 0.5, 7), (0.85, 0.0, 4), (0.611, 0.0, 3)],
+)
+def test_a_rocking_block_keeps_the_ratio_given(ratio, restitution, last, verified):
+    """Granite of 0.25 x 1.0 m: each of four impacts within 0.5 %, and the last at its time.
 
-    The times between impacts are those of Housner's block, linear in the tilt, to 1 %.
+    Housner's ratio is 0.912: some keep more, others less, down to 0.67 of it as on rubber. The
+    times between impacts are those of Housner's block, linear in the tilt, to 1 %.
     """
     structure = floor((-0.125, 0.0, 0.125, 1.0), friction=5.0, floor=(-4.0, 4.0))
     tilt, rate = np.arctan(0.25), np.sqrt(1.5 * G / np.hypot(0.25, 1.0))
     share, exact = 0.5, np.arccosh(2.0) / rate
-    for _ in range(6):
+    for _ in range(last - 1):
         share = 1.0 - np.sqrt(1.0 - ratio**2 * (1.0 - (1.0 - share) ** 2))
         exact += 2.0 * np.arccosh(1.0 / (1.0 - share)) / rate
     joint = {"joint 1": ratio}
@@ -155,17 +159,17 @@ def test_a_rocking_block_keeps_the_ratio_given(ratio, restitution, verified):
     frames = list(falling.frames(tilted(structure, 0.5 * tilt), 1.05 * exact, spacing=2e-3))
     turn, speed = np.array([(frame.poses[1, 2], frame.velocities[1, 2]) for frame in frames]).T
     impacts = np.flatnonzero(turn[1:] * turn[:-1] < 0.0)
-    assert frames[impacts[6]].time == pytest.approx(exact, rel=0.01)
+    assert frames[impacts[last - 1]].time == pytest.approx(exact, rel=0.01)
     tops = np.flatnonzero(speed[1:] * speed[:-1] < 0.0)
     peaks = np.abs([0.5 * tilt, *turn[tops]])
-    peaks = peaks[peaks > 0.1 * tilt][:5]
+    peaks = peaks[peaks > 0.04 * tilt][:5]
     kept = np.sqrt(
         (np.cos(tilt - peaks[1:]) - np.cos(tilt)) / (np.cos(tilt - peaks[:-1]) - np.cos(tilt))
     )
     assert kept == pytest.approx(ratio, rel=0.005)
     assert frames[-1].energy.gained < 1e-4 * frames[-1].energy.lost
-    case = f"rocking block with a ratio of {ratio:g}: time of its seventh impact [s]"
-    verified(case, exact, "Housner (1963)", frames[impacts[6]].time)
+    case = f"rocking block with a ratio of {ratio:g}: time of its impact {last} [s]"
+    verified(case, exact, "Housner (1963)", frames[impacts[last - 1]].time)
 
 
 def test_rebounds_that_would_add_energy_are_reduced():
@@ -186,19 +190,19 @@ def test_invalid_ratios_are_refused():
             RigidBlockSimulation(structure, rocking_ratio=ratio)
 
 
-def test_ratios_without_effect_are_refused():
-    """Housner's ratios of rectangles bound the given ratio, except where the closing end slides."""
+def test_ratios_below_housners_are_marked_where_a_block_stands_on_fixed_ground():
+    """Housner's ratios of rectangles are the bound, except where the closing end slides."""
     structure = floor((-1.0, 0.0, -0.4, 2.4), (0.4, 0.0, 1.0, 1.2))
     slender, stocky = 1.0 - 1.5 * 0.6**2 / (0.6**2 + np.array([2.4, 1.2]) ** 2)
-    with pytest.raises(
-        af.errors.InvalidInput, match=rf"0\.85 of joint 'joint 1' .* keeps {slender:.4g}"
-    ):
-        RigidBlockSimulation(structure, rocking_ratio=0.85)
-    with pytest.raises(af.errors.InvalidInput, match="'joint 2'"):
-        RigidBlockSimulation(structure, rocking_ratio={"joint 2": stocky - 0.003})
+
+    def below(structure, ratio):
+        table = RigidBlockSimulation(structure, rocking_ratio=ratio).bodies.rocking
+        return {tuple(pair) for pair in np.sort(np.argwhere(table < 0.0)).tolist()}
+
+    assert below(structure, 0.85) == {(0, 1)}
+    assert below(structure, {"joint 2": stocky - 0.003}) == {(0, 2)}
     for given in ({"joint 2": 0.85}, {"joint 2": stocky - 0.001}, slender):
-        RigidBlockSimulation(structure, rocking_ratio=given)
-    smooth = floor((-0.3, 0.0, 0.3, 2.4), friction=0.1)
-    RigidBlockSimulation(smooth, rocking_ratio=0.85)
+        assert not below(structure, given)
+    assert not below(floor((-0.3, 0.0, 0.3, 2.4), friction=0.1), 0.85)
     # the lower of two blocks carries the other, whose support is not fixed
-    RigidBlockSimulation(af.column(breadth=0.6, heights=[2.4, 2.4]), rocking_ratio=0.5)
+    assert not below(af.column(breadth=0.6, heights=[2.4, 2.4]), 0.5)
