@@ -76,7 +76,8 @@ class ChainSystem(NamedTuple):
     end_slip: Array  # and after it (p,) [m]
     directions: Array  # slip direction of points in the last evaluation (p,)
     step: tuple[float, float, float]  # Δt, β/Δt, and the coefficient of M in C
-    has_factor: Any  # whether there is a factor of this run (1,)
+    past: Array  # accelerations at the end of the step before the last (n,)
+    known: Any  # number of steps so far in this run (1,)
     tolerances: Tolerances
 
 
@@ -159,7 +160,8 @@ def chain_system(equation: Equation, tree: StoneTree, dt: float) -> ChainSystem:
         np.zeros((4, len(stones), 3, 3)),
         *np.zeros((3, points)),
         (dt, equation.lag / dt, equation.drag),
-        np.zeros(1, bool),
+        np.zeros(size),
+        np.zeros(1, np.int64),
         tolerances,
     )
 
@@ -394,8 +396,8 @@ def _evaluate_step(system, step, states, ground, results, memory):  # type: igno
 
 
 def _start_chain_run(system, state, memory):  # type: ignore
-    """Copy the memory, and discard the factor of an earlier run."""
-    system.has_factor[0] = False
+    """Copy the memory, and forget the steps of an earlier run."""
+    system.known[0] = 0
     for point in range(len(memory)):
         system.slip[point] = memory[point]
 
@@ -439,8 +441,7 @@ def _chain_correction(system, work, iteration, reuse, hold):  # type: ignore
         for joint in range(len(faces)):
             low, high = faces[joint, 0].first // 3, faces[joint, 1].first // 3
             _add_joint(system.rates[joint], low, high, system.parent, blocks)
-        system.has_factor[0] = _eliminate(system.parent, blocks)
-        if not system.has_factor[0]:
+        if not _eliminate(system.parent, blocks):
             return False
     _substitute(system.parent, system.blocks, correction)
     return True
@@ -487,7 +488,10 @@ def _solve_chain_step(system, step, states, ground):  # type: ignore
         work.constant[k] = loads + 2.0 / dt * system.mass[k] * old[1, k]
     for share, limits in ((1.0, (12, 3, False)), (0.0, (60, 0, False))):
         for k in range(len(system.mass)):
-            work.move[k] = share * dt * (old[1, k] - 0.5 * dt * old[2, k])
+            # accelerations of stiff modes change their sign from step to step: those of two steps
+            # ago come closest
+            rate = system.past[k] if system.known[0] > 0 else -old[2, k]
+            work.move[k] = share * dt * (old[1, k] + 0.5 * dt * rate)
         iterations = _solve_chain(system, work, system.tolerances, limits)
         total += abs(iterations)
         if iterations > 0:
@@ -496,6 +500,8 @@ def _solve_chain_step(system, step, states, ground):  # type: ignore
                 new[0, k] = work.after[k]
                 new[1, k] = (2.0 / dt) * work.move[k] - old[1, k]
                 new[2, k] = (new[1, k] - old[1, k]) / dt
+                system.past[k] = old[2, k]
+            system.known[0] += 1
             return total
     return -1
 
