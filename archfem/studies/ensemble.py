@@ -159,9 +159,7 @@ def ensemble(
         ('motion', 'scale')
     """
     if isinstance(analysis, Structure):
-        analysis = Analysis(
-            analysis, fidelity="rigid", damping="effective", displacements="large"
-        )
+        analysis = Analysis(analysis, fidelity="rigid", damping="effective", displacements="large")
     motions = _list_motions(motions)
     factors = [check_number(scale, "scale", minimum=1e-6) for scale in scales]
     varied = [_check_change(change) for change in (changes if changes is not None else [{}])]
@@ -232,7 +230,9 @@ def evaluate_part(part: EnsemblePart) -> dict[str, Any]:
     return found
 
 
-def _reduce(structure: Structure, run: Callable[[Motion], History], motion: Motion) -> dict[str, Any]:
+def _reduce(
+    structure: Structure, run: Callable[[Motion], History], motion: Motion
+) -> dict[str, Any]:
     """Return the findings of one history."""
     failed = np.zeros((len(ALL_DEFINITIONS), len(structure.joints)))
     time = np.full(len(ALL_DEFINITIONS), np.nan)
