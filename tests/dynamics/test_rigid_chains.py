@@ -1,4 +1,4 @@
-"""Chains and trees of rigid stones: the block solver beside the general one, and where it applies."""
+"""Chains and trees of rigid stones: their solver beside the general one, and where it applies."""
 
 import numpy as np
 import pytest

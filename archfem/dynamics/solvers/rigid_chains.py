@@ -35,13 +35,12 @@ from archfem.joints.large.overlap_law import FaceLaw, closing_energy, overlap, s
 
 # Motion of a stone over a step: cosine and sine of half its angle at the start, series of half its
 # rotation, cosine and sine of its angle in the middle and at the end, and of half the latter
-STONE_RECORD: np.dtype[Any] = np.dtype(
-    [(name, np.float64) for name in "bc bs mean shrunk rate turn c s c1 s1 hc hs".split()]
-)
+STONE_FIELDS = ("bc", "bs", "mean", "shrunk", "rate", "turn", "c", "s", "c1", "s1", "hc", "hs")
+STONE_RECORD: np.dtype[Any] = np.dtype([(name, np.float64) for name in STONE_FIELDS])
 
 # A face of a joint: first coordinate of its stone, arm from the centroid, pose if it is fixed
 FACE_RECORD: np.dtype[Any] = np.dtype(
-    [("first", np.int64)] + [(name, np.float64) for name in "rx ry x y turn".split()]
+    [("first", np.int64), *((name, np.float64) for name in ("rx", "ry", "x", "y", "turn"))]
 )
 
 
@@ -236,9 +235,8 @@ def _evaluate_joint(system, joint, before, after, residual):  # type: ignore
     force, law_rate, _, ((shear, moment), loss, missing) = segment_forces(
         system.law, joint, (start, end, (0.0, 0.0)), system.step[1], memory
     )
-    kept = system.end[joint]
+    kept, resultants = system.end[joint], system.resultants[joint]
     kept[0], kept[1], kept[2], kept[3] = end[0], end[1], end[2], loss
-    resultants = system.resultants[joint]
     resultants[0], resultants[1], resultants[2] = -force[0], frame[1] * shear, frame[1] * moment
     x, y, turn, other = face_forces(rates, force)
     k, m = low.first, high.first
