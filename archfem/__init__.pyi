@@ -68,6 +68,7 @@ from .statics.modes import modes as modes
 from .statics.pushover import pushover as pushover
 from .studies.collapse_risk import collapse_risk as collapse_risk
 from .studies.convergence import mesh_sensitivity as mesh_sensitivity
+from .studies.ensemble import ensemble as ensemble
 from .studies.ida import ida as ida
 from .studies.study import Study as Study
 from .studies.variations import verdict_range as verdict_range

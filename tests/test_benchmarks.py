@@ -31,6 +31,7 @@ LONG = (
     "bridge_range",
     "drift_and_equality",
     "energy_drift",
+    "ensemble",
     "fidelity_errors",
     "floor",
     "matched_records",

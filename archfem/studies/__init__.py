@@ -5,6 +5,7 @@
     collapse_risk    annual rate of collapse
     comparison       cases side by side: findings and tables
     convergence      order, limit and error bar; accuracy of a case
+    ensemble         histories under many motions, scales and properties, reduced
     evaluators       functions from a case to a flat table
     fork_server      loads what workers share
     fragility        fragility functions

@@ -7,6 +7,7 @@ from .convergence import Convergence as Convergence
 from .convergence import MeshSensitivity as MeshSensitivity
 from .convergence import case_accuracy as case_accuracy
 from .convergence import converged as converged
+from .ensemble import Ensemble as Ensemble
 from .evaluators import of_history as of_history
 from .evaluators import register_finding as register_finding
 from .evaluators import run_motion as run_motion

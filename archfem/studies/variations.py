@@ -31,6 +31,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.joint_closing import FINISHES, with_finish
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import Equilibrium
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.process_pool import evaluate_points
 
@@ -294,9 +295,7 @@ def prepare_runs(
     three = changes["joint_rule"] == "three points"
     rule: Any = {"quadrature": "trapezoidal", "quadrature_points": 3} if three else {}
     analysis = replace(analysis, **{"quadrature": "exact", "quadrature_points": None, **rule})
-    rest = analysis.dead_load()
-    kind, factor = changes.get("damping_kind"), changes["damping_ratio"]
-    damping = vary_damping(analysis.damping, rest.model, rest, kind, factor)
+    rest, damping = _damp_about_rest(analysis, changes)
 
     def run(motion: Motion) -> CollapseState:
         history = time_history(analysis, motion, start=rest, damping=damping)
@@ -305,6 +304,24 @@ def prepare_runs(
         return history.fall
 
     return run
+
+
+def vary_settings(
+    analysis: Analysis, changes: Mapping[str, Any]
+) -> tuple[Analysis, Equilibrium, Viscous | None]:
+    """Return an analysis with changed properties, its dead load and its damping."""
+    changes = {**NEUTRAL, **changes}
+    analysis = replace(analysis, structure=_vary_contacts(analysis.structure, changes))
+    return analysis, *_damp_about_rest(analysis, changes)
+
+
+def _damp_about_rest(
+    analysis: Analysis, changes: Mapping[str, Any]
+) -> tuple[Equilibrium, Viscous | None]:
+    """Return the dead load of an analysis, and its damping changed in kind and ratio."""
+    rest = analysis.dead_load()
+    kind, factor = changes.get("damping_kind"), changes["damping_ratio"]
+    return rest, vary_damping(analysis.damping, rest.model, rest, kind, factor)
 
 
 def _vary_contacts(structure: Structure, changes: Mapping[str, Any]) -> Structure:

@@ -17,7 +17,8 @@ import numpy as np
 from archfem._typing import Array
 from archfem.dynamics.slip_error import SlipError, least_compression, second_derivatives
 from archfem.dynamics.solvers.integrator import Stepper
-from archfem.dynamics.state import Batch, State
+from archfem.dynamics.state import Batch, State, join_batches
+from archfem.errors import DidNotConverge
 
 # Error of the slip in one step over the joint's depth, and over the tolerance on |e| [-]. A block
 # that slides under ten motions then errs by at most 0.5 % of its way to and fro
@@ -49,7 +50,24 @@ class AdaptiveStepper:
         return self.unmet / max(self.taken, 1)
 
     def batches(self, start: State, end: float) -> Iterator[Batch]:
-        """Yield the steps from a state to a time [s], some at a time."""
+        """Yield the steps from a state to a time [s], some hundred at a time."""
+        pending: list[Batch] = []
+        try:
+            for batch in self._controlled_batches(start, end):
+                if batch.fallback or batch.readings is None:
+                    yield from _joined(pending)
+                    yield batch
+                    continue
+                pending.append(batch)
+                if sum(len(each.times) for each in pending) >= 256:
+                    yield from _joined(pending)
+        except DidNotConverge:
+            yield from _joined(pending)  # the record ends with the last step
+            raise
+        yield from _joined(pending)
+
+    def _controlled_batches(self, start: State, end: float) -> Iterator[Batch]:
+        """Yield the steps from a state to a time [s], between two checks of their errors."""
         sample = self.stepper.equation.motion.dt
         shortest, longest = 1e-4, 2e-2  # not halved, and not doubled, any more [s]
         finest = int(np.floor(np.log2(shortest / sample) + 0.5))
@@ -135,3 +153,11 @@ class AdaptiveStepper:
         bends = second_derivatives(times, values)[len(before) :]
         errors: Array = dt**2 * np.abs(bends).max(axis=1) / 6.0
         return errors
+
+
+def _joined(pending: list[Batch]) -> Iterator[Batch]:
+    """Yield all pending batches as one, if there are any, and forget them."""
+    if pending:
+        batch = join_batches(pending)
+        pending.clear()
+        yield batch

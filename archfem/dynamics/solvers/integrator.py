@@ -67,8 +67,8 @@ class Stepper:
         total = round((end - start.time) / dt)
         state, done = start, 0
         while done < total:
-            # steps between two checks of events, Ctrl-C and the progress bar
-            last = min(done + 128, total)
+            # steps between two checks of events, Ctrl-C and the progress bar: more of small systems
+            last = min(done + min(max(128, 32768 // len(start.q)), 512), total)
             times = start.time + dt * np.arange(done + 1, last + 1)
             batch = self.advance_batch(state, dt, times)
             if len(batch.times):

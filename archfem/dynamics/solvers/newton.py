@@ -47,6 +47,12 @@ from archfem.dynamics.solvers.linear_step import (
     subtract_derivatives,
     tangent_pattern,
 )
+from archfem.dynamics.solvers.rigid_chains import (
+    ChainSystem,
+    chain_system,
+    constant_chain_parts,
+    find_stone_tree,
+)
 from archfem.dynamics.solvers.semismooth_newton import Correction, Tolerances, newton_driver
 from archfem.dynamics.solvers.sparse_products import (
     SparseRows,
@@ -78,6 +84,9 @@ class NewtonSolver(StepSolver):
         self._storage = TangentStorage.of(tangent_pattern(equation), max_half_width)
         self.order, self.half_width = self._storage.order, self._storage.half_width
         self.has_band = self._storage.elimination is None
+        self._tree = find_stone_tree(equation)
+        if self._tree is not None:
+            self.order = self._tree.order
         # a band is factorised faster than the joint law is evaluated, a sparse tangent is not
         self._reduction = 0.0 if self.has_band else 0.01
 
@@ -87,13 +96,17 @@ class NewtonSolver(StepSolver):
         large = equation.model.large_displacements and equation.conserving
         return cls(equation) if large or equation.joints is not None else None
 
-    def assemble(self, dt: float) -> "SmallSystem | LargeSystem":
+    def assemble(self, dt: float) -> "SmallSystem | LargeSystem | ChainSystem":
         """Return the data of steps of one length [s]."""
+        if self._tree is not None:
+            return chain_system(self._equation, self._tree, dt)
         large = self._equation.model.large_displacements
         return self._large_system(dt) if large else self._small_system(dt)
 
-    def constants(self, system: "SmallSystem | LargeSystem") -> tuple[Any, ...]:
+    def constants(self, system: "SmallSystem | LargeSystem | ChainSystem") -> tuple[Any, ...]:
         """Return the parts of the data that no step changes."""
+        if isinstance(system, ChainSystem):
+            return constant_chain_parts(system)
         tangent = system.tangent
         changing = "entries", "factor", "products", "changed", "image", "pivots"
         parts = [getattr(tangent, name) for name in tangent._fields if name not in changing]

@@ -185,9 +185,10 @@ def segment_forces(law, segment, ends, lag, memory):  # type: ignore
     ends = (g0, s0, t0), (g1, s1, t1), longer
     mean, half, tilts = 0.5 * (l0 + l1), 0.5 * shrinks, shrinks * t1
     bounds = g0, g1, l0 * t0, l1 * t1
-    (total, moment, gap, place, square, loss), rubs = _sum_points(
-        law, segment, (bounds, ends), (mean, half, tilts, l1), lag, memory
-    )
+    sums, rubs, is_stuck = _sum_stuck(law, segment, (bounds, ends), mean, lag, memory)
+    if not is_stuck:
+        sums, rubs = _sum_points(law, segment, (bounds, ends), (mean, half, tilts, l1), lag, memory)
+    total, moment, gap, place, square, loss = sums
     # derivatives of the moment sum, of F_g and of F_σ, by the measures at the end
     leans = place, -tilts * square, -l1 * square
     scale = law.width * mean
@@ -299,6 +300,51 @@ def _sum_points(law, segment, ends, overlap, lag, memory):  # type: ignore
             limits = contact.resistance, held, overlap
             rubs = _add_point_shear(law, point + 1, (measures, lag), limits, memory, rubs)
     return (total, moment, by_gap, by_place, by_square, lost), rubs
+
+
+@inlined_kernel
+def _sum_stuck(law, segment, ends, overlap, lag, memory):  # type: ignore
+    """Return `_sum_points` of facets that stay closed and stick, and whether all of them do.
+
+    The facets cover the overlap: sums of their integrals are those over all of it.
+    """
+    ((g0, g1, r0, r1), ((_, s0, _), (_, s1, _), (e0, e1))), contact = ends, law.contacts[segment]
+    sums, rubs = 6 * (0.0,), 13 * (0.0,)
+    # gaps without and with the lag of damping, at the end that is more open
+    more, tilt = lag * (g1 - g0), lag * (r1 - r0)
+    widest = max(g0 + 0.5 * abs(r0), g1 + 0.5 * abs(r1))
+    lagged = max(g0 + more + 0.5 * abs(r0 + tilt), g1 + more + 0.5 * abs(r1 + tilt))
+    if not law.facets or contact.closing_rate > 0.0 or max(widest, lagged) > 0.0:
+        return sums, rubs, False
+    gap, turn, stiff = 0.5 * (g0 + g1) + more, 0.5 * (r0 + r1) + tilt, contact.normal_stiffness
+    shear = stretched = lost = along = first_moment = second_moment = 0.0
+    begin, end = law.first_point[segment], law.first_point[segment + 1]
+    for point in range(begin, end):
+        # Coulomb's limit from the normal force of this end of a facet
+        other = law.place[point + 1 if (point - begin) % 2 == 0 else point - 1]
+        normal = stiff / 6.0 * (3.0 * gap - (2.0 * law.place[point] + other) * turn)
+        share = overlap * law.width * law.depth_share[point]
+        limit = contact.resistance + share * limit_rate(contact, normal, 0.5)
+        spring, place = law.shear_spring[point], law.place[point]
+        first = spring * (s0 + place * e0 - memory[0][point])
+        change = spring * (s1 - s0 + place * (e1 - e0))
+        mean = first + (0.5 + lag) * change
+        if not max(abs(first), abs(first + change), abs(mean)) <= limit:
+            return sums, rubs, False
+        rate = (0.5 + lag) * spring
+        shear += mean
+        stretched += place * mean
+        lost += lag * change * change / spring
+        along += rate
+        first_moment += place * rate
+        second_moment += place * place * rate
+    for point in range(begin, end):
+        memory[1][point], memory[2][point] = memory[0][point], 0.0
+    whole, wider, leans = (0.5 + lag) * stiff, g1 - g0, r1 - r0
+    loss = lag * stiff * (wider * wider + leans * leans / 12.0)
+    sums = stiff * gap, -stiff * turn / 12.0, whole, 0.0, whole / 12.0, loss
+    held = first_moment, 0.0, first_moment, second_moment, 0.0, 0.0
+    return sums, (shear, stretched, lost, 0.0, along, 0.0, 0.0) + held, True  # noqa: RUF005
 
 
 @inlined_kernel

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from archfem._numba import inlined_kernel
+from archfem._numba import inlined_kernel, kernel
 from archfem.joints.contact_law import SLIP_LIMIT_TOLERANCE, ContactLaw
 from archfem.joints.large.closing_law import excess_means, facet_step_excess, point_step_excess
 from archfem.joints.normal_law import GAUSS_POINTS, GAUSS_WEIGHTS
@@ -90,9 +90,15 @@ def _point_means(contact, a, b, first, second):  # type: ignore
 @inlined_kernel
 def _facet_means(contact, ends, first, second):  # type: ignore
     """Return `joint_means` along a facet."""
-    a, c, b, d = ends
     if max(ends) <= 0.0 or min(ends) > 0.0:
         return _uniform_means(contact, ends, 0.5 * (first + second))
+    return _divided_means(contact, ends, first, second)
+
+
+@kernel
+def _divided_means(contact, ends, first, second):  # type: ignore
+    """Return `joint_means` of a facet of which parts are open, or open or close in the step."""
+    a, c, b, d = ends
     # Gauss's rule between the zero crossings, with sums for φ_0 and φ_1 and their products
     _, _, breaks = _zero_crossings(ends)
     normals = taken = times = (0.0, 0.0)
@@ -167,6 +173,11 @@ def damping_tractions(contact, ends, lag, facet):  # type: ignore
     """Return means of what the lag of damping adds to the traction, from gaps without it."""
     a, c, b, d = ends
     p, q = lag * (b - a), lag * (d - c)
+    if facet and max(ends) <= 0.0 and max(a + p, c + q, b + p, d + q) <= 0.0:
+        return (
+            contact.normal_stiffness / 6.0 * (2.0 * p + q),
+            contact.normal_stiffness / 6.0 * (p + 2.0 * q),
+        )
     n0, n1 = linear_means(contact, (a + p, c + q, b + p, d + q), lag, 1.0 + lag, facet)[0]
     m0, m1 = linear_means(contact, ends, 0.0, 1.0, facet)[0]
     return n0 - m0, n1 - m1
@@ -256,7 +267,7 @@ def shear_means(first, change, lag, limit):  # type: ignore
     return means
 
 
-@inlined_kernel
+@kernel
 def _sliding_means(first, change, lag, limit):  # type: ignore
     """Return `shear_means` of a point that slips during a step."""
     # elastic shear at the start and the end, clipped to the limit
