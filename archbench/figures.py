@@ -26,9 +26,6 @@ DASHES = dict(zip(PROGRAMS, ("-", "-.", "--", ":", "-", "--"), strict=True))
 WIDTH = 6.7
 """Width of a figure: that of a page of A4, so that type is printed as it is [inch]."""
 
-TYPE = {"font.size": 8.0, "axes.titlesize": 9.0}
-"""Font sizes [points]; none is smaller than 7."""
-
 
 def measured(found: list[Row]) -> Figure:
     """Draw answers over measured values, with the uncertainty of each as a bar."""
@@ -174,7 +171,8 @@ def column(found: list[Row]) -> Figure:
 def main(folder: Path = FOLDER) -> None:
     """Draw all figures."""
     found = rows()
-    with mpl.rc_context(TYPE):
+    # no type is smaller than 7 points
+    with mpl.rc_context({"font.size": 8.0, "axes.titlesize": 9.0}):
         for name, draw in (("measured", measured), ("crown", crown), ("column", column)):
             draw(found).savefig(folder / f"archbench_{name}.png", dpi=150)
 
