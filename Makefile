@@ -21,7 +21,7 @@ DEBIAN13 := /var/tmp/archfem-debian13
 # One worker a core; idle workers take over tests from others.
 SPREAD := -n auto --dist worksteal
 
-.PHONY: help setup demo test test-slow test-debian13 hard bench archbench archbench-quick wasm docs notebooks verification fuzz mutants lint clean
+.PHONY: help setup demo test test-slow test-debian13 hard bench archbench archbench-quick wasm docs notebooks pictures verification fuzz mutants lint clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -88,9 +88,11 @@ docs: .venv/docs  ## the documentation as pages: docs/build/html/index.html
 notebooks: .venv/docs .venv/compiled  ## run the notebooks, and save their outputs
 	$(PYTHON) docs/execute.py
 
-pictures: .venv/docs .venv/compiled  ## the pictures of the pages: of notebooks 5 and 6, a fall, a film
-	$(PYTHON) docs/execute.py notebooks/05_speed_against_error.py notebooks/06_a_roman_bridge.py
+pictures: .venv/docs .venv/compiled  ## the pictures of the pages: bridge, gallery, film, theory, bench
+	$(PYTHON) docs/execute.py notebooks/06_a_roman_bridge.py
 	$(PYTHON) docs/pictures.py
+	$(PYTHON) docs/figures.py
+	$(PYTHON) -m archbench.figures
 
 verification: .venv/compiled  ## the verification table of the documentation, written by the tests
 	$(PYTHON) -m pytest $(SPREAD) -m "" --verified=docs/verification.json

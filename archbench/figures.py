@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -22,10 +23,14 @@ MARKERS = dict(zip(PROGRAMS, "oP^sDv", strict=True))
 DASHES = dict(zip(PROGRAMS, ("-", "-.", "--", ":", "-", "--"), strict=True))
 
 
+WIDTH = 6.7
+"""Width of a figure: that of a page of A4, so that type is printed as it is [inch]."""
+
+
 def measured(found: list[Row]) -> Figure:
     """Draw answers over measured values, with the uncertainty of each as a bar."""
     shown = [row for row in found if row.kind == "E"]
-    figure = Figure(figsize=(8.0, 0.42 * len(shown) + 1.4), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 0.36 * len(shown) + 1.2), layout="constrained")
     axes: Axes = figure.subplots()
     labels = []
     for place, row in enumerate(shown):
@@ -43,7 +48,7 @@ def measured(found: list[Row]) -> Figure:
             face = "none" if memory else COLOURS[name]
             axes.plot(numbers[0], at, MARKERS[name], color=COLOURS[name], mfc=face, ms=6)
         if not answered:
-            axes.text(1.0, place, "cannot", ha="center", va="center", fontsize=8, color="0.4")
+            axes.text(1.0, place, "cannot", ha="center", va="center", fontsize=7, color="0.4")
     axes.axvline(1.0, color="k", lw=0.8)
     axes.set_xscale("log")
     ticks = [0.2, 0.3, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0]
@@ -68,7 +73,7 @@ def first_run(row: Row, program: str, variant: str | None = None) -> dict[str, A
 
 
 RULES = {
-    None: "three points, as the scene",
+    None: "three points",
     "exact": "exact",
     "two points": "two points",
     "rigid": "rigid",
@@ -78,7 +83,7 @@ RULES = {
 def crown(found: list[Row]) -> Figure:
     """Draw the crown of the arch of Lemos by program and by archfem's joint rules, and its fall."""
     (row, *_), (fall,) = ([r for r in found if r.scene == name] for name in ("S05", "S06"))
-    figure = Figure(figsize=(9.5, 6.4), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 5.0), layout="constrained")
     axes = figure.subplot_mosaic([["programs", "rules"], ["fall", "fall"]], height_ratios=(3, 2))
     for name in PROGRAMS:
         if run := first_run(row, name):
@@ -94,16 +99,16 @@ def crown(found: list[Row]) -> Figure:
     for key, title in titles:
         for level in (peaks["peak"], -peaks["rebound"]):
             axes[key].axhline(level, color="k", lw=0.8, ls=":")
-        axes[key].set(title=title, xlabel="time [s]", ylabel="crown [mm]", ylim=(-12, 30))
+        axes[key].set(title=title, xlabel="time [s]", ylabel="crown [mm]", ylim=(-22, 30))
         axes[key].set_xlim(0.0, 2.0)
-        axes[key].legend(frameon=False, fontsize=8)
-    axes["programs"].text(1.98, peaks["peak"], "3DEC", ha="right", va="bottom", fontsize=8)
+        axes[key].legend(frameon=False, fontsize=7, loc="lower center", ncols=2)
+    axes["programs"].text(1.98, peaks["peak"], "3DEC", ha="right", va="bottom", fontsize=7)
     bars = [(f"archfem, {text}", first_run(fall, "archfem", v)) for v, text in RULES.items()]
     bars += [(NAMES[name], first_run(fall, name)) for name in PROGRAMS[1:]]
     known = [(text, run["values"]["scale"]) for text, run in bars if run]
     axes["fall"].barh([text for text, _ in known], [value for _, value in known], color="0.6")
     axes["fall"].axvline(0.15, color="k", lw=0.8, ls=":")
-    axes["fall"].text(0.15, 1.0, "3DEC stands at 0.15 g ", ha="right", va="center", fontsize=8)
+    axes["fall"].text(0.15, 1.0, "3DEC stands at 0.15 g ", ha="right", va="center", fontsize=7)
     axes["fall"].set_title("(c) the fall")
     axes["fall"].invert_yaxis()
     axes["fall"].set_xlabel("least peak of the half sine under which it falls [g]")
@@ -120,7 +125,7 @@ def column(found: list[Row]) -> Figure:
     """Draw the domain in which the column of Dimitri falls."""
     shown = sorted((row for row in found if row.scene.startswith("S08")), key=lambda r: r.scene)
     durations = [float(row.scene[4:]) / 100.0 for row in shown]
-    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 4.2), layout="constrained")
     axes: Axes = figure.subplots()
     for place, name in enumerate(("UDEC", "HybriDFEM", "LMGC90")):
         values = [row.references[place].number for row in shown]
@@ -159,15 +164,17 @@ def column(found: list[Row]) -> Figure:
     ticks = [0.2, 0.3, 0.5, 1.0, 2.0]
     axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.set_yticks([], minor=True)
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend(frameon=False, fontsize=7)
     return figure
 
 
 def main(folder: Path = FOLDER) -> None:
     """Draw all figures."""
     found = rows()
-    for name, draw in (("measured", measured), ("crown", crown), ("column", column)):
-        draw(found).savefig(folder / f"archbench_{name}.png", dpi=130)
+    # no type is smaller than 7 points
+    with mpl.rc_context({"font.size": 8.0, "axes.titlesize": 9.0}):
+        for name, draw in (("measured", measured), ("crown", crown), ("column", column)):
+            draw(found).savefig(folder / f"archbench_{name}.png", dpi=150)
 
 
 if __name__ == "__main__":

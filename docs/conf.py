@@ -66,7 +66,4 @@ html_theme_options = {
     "footer_end": [],
 }
 # Pages without subpages have no side bar.
-html_sidebars = {
-    name: []
-    for name in ("index", "install", "tutorial", "gallery", "verification", "speed", "limits")
-}
+html_sidebars = {name: [] for name in ("index", "install", "tutorial", "gallery", "limits")}

@@ -23,7 +23,6 @@ FOLDER = Path(__file__).resolve().parents[1] / "notebooks"
 QUICK = ("07_from_first_hinge_to_the_ground",)
 
 PICTURES = {
-    "05_speed_against_error": {"accuracy": "af.view.draw_accuracy("},
     "06_a_roman_bridge": {
         "bridge": "af.view.draw_instants({name: (case.structure, None)",
         "bridge_dead_load": "af.view.draw_eccentricity(",

@@ -1,4 +1,4 @@
-"""Draw the figures of the theory and of the tutorial: `python docs/figures.py`, about a minute."""
+"""Draw the figures of the theory, and two of other pages: `python docs/figures.py`, in seconds."""
 
 import runpy
 import tempfile
@@ -267,32 +267,6 @@ def programme() -> None:
     save(figure, "programme")
 
 
-def tutorial() -> None:
-    """Draw the figures of the tutorial by its own code."""
-    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, width=1.0)
-    model = af.build(ring, fidelity="full", cells=(4, 4))
-    dead = af.dead_load(model)
-    motion = af.Motion.synthetic(duration=6.0, pga=6.0, seed=3)
-    run = af.time_history(model, motion, start=dead, damping=af.effective_damping(model, 0.05))
-    limit = af.collapse_factor(ring, live=af.BodyForce(1.0, 0.0))
-    drawn = {
-        "tutorial_dead": af.view.draw_structure(ring, dead.joints),
-        "tutorial_envelope": af.view.draw_envelope({"this run": run}, dead=dead.joints),
-        "tutorial_joint": af.view.draw_joint({"this run": run}, "joint 6"),
-        "tutorial_collapse": af.view.draw_collapse(ring, limit),
-    }
-    for name, figure in drawn.items():
-        figure.savefig(FOLDER / f"{name}.png", dpi=140)
-
-
-def verdict_range() -> None:
-    """Draw the range of a verdict, by the code of the page on verdicts."""
-    thin = af.circular_arch(radius=2.95, thickness=0.40, embrace=159.0, voussoirs=17)
-    motion = af.Motion.synthetic(duration=8.0, pga=4.5, seed=3)
-    found = af.verdict_range(thin, motion)
-    found.plot().savefig(FOLDER / "verdict_range.png", dpi=140)
-
-
 def selection() -> None:
     """Draw seven of sixty synthetic records, selected by the rule of NTC 2018."""
     with tempfile.TemporaryDirectory() as folder:
@@ -310,11 +284,14 @@ def selection() -> None:
 def assessment_map() -> None:
     """Draw the map of checks and falls, as its notebook does from the stored table."""
     notebook = FOLDER.parents[1] / "notebooks" / "10_where_checks_and_falls_differ.py"
-    runpy.run_path(str(notebook))["figure"].savefig(FOLDER / "assessment_map.png", dpi=90)
+    figure = runpy.run_path(str(notebook))["figure"]
+    for letter, axes in zip("ab", figure.axes, strict=True):
+        axes.set_title(f"({letter})", loc="left", fontsize=9.0)
+    figure.savefig(FOLDER / "assessment_map.png", dpi=150)
 
 
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
     drawings = (signs, law, section, rules, frame, ladder, states, programme)
-    for draw in (*drawings, tutorial, verdict_range, selection, assessment_map):
+    for draw in (*drawings, selection, assessment_map):
         draw()

@@ -129,7 +129,7 @@ af.view.draw_modes(found["as it stands"])
 # ## The paper's model: R = 3, five springs a joint (figures 13, 15 and 16)
 #
 # The paper divides the motions by R = 3 and gives each joint five springs. Its sentences on
-# counting do not agree ([criteria](../theory/criteria.md)), so that all definitions are shown: four
+# counting do not agree ({doc}`/theory/criteria`), so that all definitions are shown: four
 # joints that hinge (|e| ≥ 0.46) or slide anywhere at once, of one ring or pier at once, of one over
 # the record, and a motion of the blocks. With this model the next figure is the paper's figure 13.
 

@@ -63,6 +63,7 @@ def one_of_each():
         af.rate(stones, af.limit.Vehicle("lorry", (5e3,), ())),
         af.verdict_range(stones, motion, samples=2, vary={"joint_rule": "exact"}),
         risk_of_two(),
+        af.ensemble(stones, motion),
         af.studies.Ida(
             xr.Dataset(
                 {

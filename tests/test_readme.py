@@ -25,7 +25,7 @@ RUN = re.compile(r"```python\n(.*?)```(?:(?:(?!```).)*?```text\n(.*?)```)?", re.
 
 
 SLOW = tuple(f"docs/{page}.md" for page in ("tutorial", "index")) + tuple(
-    f"docs/howto/{page}.md" for page in ("assessment", "bridges", "risk", "verdict")
+    f"docs/howto/{page}.md" for page in ("capacity", "falls")
 )
 """Pages whose code other tests or the README's lines run as well."""
 

@@ -109,6 +109,10 @@ def public() -> dict[str, dict[str, Any]]:
             and id(value) not in known
         ):
             found["masonry"][f"archfem.masonry.shapes.{name}"] = value
+    seen: set[int] = set()  # a class that two rooms list has its page in the first
+    for room, values in found.items():
+        found[room] = {n: v for n, v in values.items() if id(v) not in seen or not callable(v)}
+        seen |= {id(value) for value in values.values()}
     return found
 
 

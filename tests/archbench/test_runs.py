@@ -1,6 +1,7 @@
 """Runs of Arch-Bench: archfem against stored answers, other programs, and runs that go wrong."""
 
 import json
+import re
 from dataclasses import replace
 from functools import partial
 
@@ -231,6 +232,22 @@ def test_pages_show_the_stored_answers(rows):
     for page in table.PAGES:
         text = page.read_text(encoding="utf-8")
         assert text == table.with_sections(text, made), page
+
+
+def test_the_page_of_five_programs_has_their_stored_factors():
+    page = (table.ROOT / "docs/verification.md").read_text(encoding="utf-8")
+    shown = {}
+    for program, row in (
+        *(("archfem", "archfem"), ("opensees", "OpenSees"), ("hybridfem", "HybriDFEM")),
+        *(("rbe", "RBE (compas_cra)"), ("lmgc90", "LMGC90"), ("siconos", "Siconos")),
+    ):
+        runs = run.results_of(program)["S04"]["runs"]
+        factors = {each["values"]["factor"] for each in runs if "failed" not in each}
+        (line,) = (line for line in page.splitlines() if line.startswith(f"| {row} | "))
+        cell = line.split("|")[3]
+        shown[program] = factors
+        assert set(re.findall(r"0\.\d{5}", cell)) == {f"{factor:.5f}" for factor in factors}
+    assert max(shown["archfem"]) == pytest.approx(max(shown["opensees"]), rel=1e-4)
 
 
 def test_no_value_from_memory_is_shown_without_its_mark(rows):

@@ -1,7 +1,7 @@
 """Joint laws of the user: closed forms, the built-in law written again, and refused laws."""
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -18,7 +18,8 @@ def law_of_page(page, name):
     """Return the class that a page of the documentation defines."""
     text = (ROOT / "docs/howto" / page).read_text(encoding="utf-8")
     (code,) = [c for c in re.findall(r"```python\n(.*?)```", text, re.DOTALL) if f"{name}:" in c]
-    space = {"af": af, "__name__": "page"}
+    names = {"af": af, "np": np, "dataclass": dataclass, "field": field, "ClassVar": ClassVar}
+    space = {**names, "__name__": "page"}
     exec(compile(code, page, "exec"), space)
     return space[name]
 
@@ -79,7 +80,7 @@ def test_a_block_slides_by_friction_with_history():
 
 
 def test_a_law_without_history_loses_no_energy():
-    law = law_of_page("joint_law.md", "Hardening")(STIFF[0], 50e-6, STIFF[1])
+    law = law_of_page("extend.md", "Hardening")(STIFF[0], 50e-6, STIFF[1])
     own = shaken(law, damped=False)
     # solves end at 1e-8 of the weight, some 10 kN, over displacements of some millimetres
     assert abs(own["energy_drift"]).max() < 1e-6
@@ -87,7 +88,7 @@ def test_a_law_without_history_loses_no_energy():
 
 @pytest.mark.parametrize("fidelity", ["rigid", "faces"])
 def test_a_column_closes_by_the_law_of_the_page(fidelity):
-    law = law_of_page("joint_law.md", "Hardening")(1.0e9, 20e-6, STIFF[1])
+    law = law_of_page("extend.md", "Hardening")(1.0e9, 20e-6, STIFF[1])
     contact = af.Contact(*STIFF, law=law)
     column = af.column(breadth=0.6, heights=[1.2, 1.2], contact=contact)
     rest = af.dead_load(af.build(column, fidelity=fidelity))

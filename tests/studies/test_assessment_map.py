@@ -13,7 +13,7 @@ import archfem as af
 
 ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "notebooks" / "assessment_map.csv"
-PAGE = (ROOT / "docs" / "theory" / "assessment_map.md").read_text("utf-8")
+PAGE = (ROOT / "docs" / "assessment_map.md").read_text("utf-8")
 WORDS = {"arch", "motion", "variant", "error"}
 
 

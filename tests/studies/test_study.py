@@ -611,7 +611,7 @@ def test_findings_that_cannot_be_kept(small_ring):
 
 
 def test_the_job_for_slurm_in_the_documentation_is_a_script(tmp_path):
-    page = (Path(__file__).parents[2] / "docs/howto/cluster.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs/howto/studies.md").read_text(encoding="utf-8")
     job = tmp_path / "job.sh"
     job.write_text(page.partition("```bash\n")[2].partition("```")[0])
     subprocess.run(["bash", "-n", str(job)], check=True)
