@@ -26,6 +26,7 @@ LATE_BOUND_METHODS: Mapping[str, str] = {
     "Collapse.plot": "view.collapse:draw_collapse_result",
     "CollapseRisk.plot": "studies.collapse_risk:draw_risk_result",
     "CollapseScale.verdict_range": "studies.variations:verdict_range_of_bracket",
+    "Ensemble.plot": "studies.ensemble:draw_ensemble_result",
     "Equilibrium.plot": "view.statics:draw_dead_load",
     "History.player": "view.pages.player:player",
     "History.plot": "view.histories:draw_joints",

@@ -29,6 +29,7 @@ from archfem.motion.motion import Motion
 COMPILED_VARIANTS = (
     "newton, large displacements",
     "newton, large displacements, sparse factor",
+    "newton, large displacements, chain of rigid stones",
     "compliance, Conserving",
     "newton, Conserving",
     "compliance, Newmark",
@@ -54,7 +55,7 @@ def compile_variant(variant: str) -> None:
     """Compile the kernels of one solver and scheme."""
     method, scheme, *factor = variant.split(", ")
     if scheme == "large displacements":
-        _compile_large_displacements(0 if factor else 40)
+        _compile_large_displacements(*factor)
         return
     friction = 0.6 if scheme == "Conserving" else None
     contact = Contact(1e9, 4e8, friction=friction)
@@ -67,13 +68,17 @@ def compile_variant(variant: str) -> None:
         )
 
 
-def _compile_large_displacements(max_half_width: int) -> None:
-    """Compile steps with large displacements, by a band or a sparse factor, and falling blocks."""
+def _compile_large_displacements(factor: str = "band") -> None:
+    """Compile steps with large displacements by a kind of factor; of chains, their fall as well."""
     block = column(breadth=0.6, heights=[0.6, 0.6])
     model = build(block, Discretisation("rigid", displacements="large"))
-    equation = Equation(model, _SHORT_MOTION, StiffnessDamping(0.05, 9.0))
-    stepper = Stepper(equation, NewtonSolver(equation, max_half_width))
+    # damping by the joints at rest couples more than a chain's blocks
+    joints = "closed" if factor.startswith("chain") else "initial"
+    equation = Equation(model, _SHORT_MOTION, StiffnessDamping(0.05, 9.0, joints))
+    stepper = Stepper(equation, NewtonSolver(equation, 0 if factor == "sparse factor" else 40))
     run = time_history(model, _SHORT_MOTION, dt=_SHORT_MOTION.dt, method=stepper)
+    if joints == "initial":
+        return
     end = last_state(run)
     model.observer().joint_ends(end.q)  # pose of a face, as films need it
     simulate_fall(model, end, _SHORT_MOTION)

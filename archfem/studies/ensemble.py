@@ -120,6 +120,13 @@ class Ensemble(ResultDisplay):
         return f"Ensemble: {self.outcome.size} histories: {words}"
 
 
+def draw_ensemble_result(found: Ensemble) -> Any:
+    """Draw displacements over scales, by outcome."""
+    from archfem.view.studies import draw_ensemble  # matplotlib is slow to import
+
+    return draw_ensemble(found.dataset)
+
+
 @validate_arguments
 def ensemble(
     analysis: Analysis | Structure,

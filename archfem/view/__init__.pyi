@@ -38,6 +38,7 @@ from .structure import draw_structure as draw_structure
 from .studies import draw_accuracy as draw_accuracy
 from .studies import draw_collapse_risk as draw_collapse_risk
 from .studies import draw_convergence as draw_convergence
+from .studies import draw_ensemble as draw_ensemble
 from .studies import draw_findings as draw_findings
 from .studies import draw_fragility as draw_fragility
 from .studies import draw_ida as draw_ida

@@ -313,6 +313,36 @@ def _explain_capacities(axes: Axes, capacities: Mapping[str, tuple[Array, Array]
             axes.plot([], [], label=label, **({"color": Colour.GREY, "ms": 5} | style))
 
 
+@validate_arguments
+def draw_ensemble(table: xr.Dataset) -> Figure:
+    """Draw the largest displacement of each history over the scale of its motion, by outcome.
+
+    Args:
+        table: `displacement` [m] and `outcome` over `motion`, `scale` and other dimensions, as the
+            dataset of `af.ensemble`.
+
+    Returns:
+        The figure. Scales of one motion are joined by a line; a history without an answer is left
+        out.
+    """
+    label = "largest displacement of a corner [m]"
+    figure, axes = new_axes(Size.COLUMN, 0.75 * Size.COLUMN, "scale of the motion [-]", label)
+    rows = table[["displacement", "outcome"]].transpose("scale", ...)
+    scale, shape = rows["scale"].values, (rows.sizes["scale"], -1)
+    moved = rows["displacement"].values.reshape(shape)
+    outcome = rows["outcome"].values.reshape(shape).astype(str)
+    axes.plot(scale, moved, color=Colour.GREY, lw=0.6)
+    for number, kind in enumerate(np.unique(outcome)):
+        place, history = np.nonzero((outcome == kind) & np.isfinite(moved))
+        style = {"marker": "oxs^"[number % 4], "color": Colour.LINES[number % len(Colour.LINES)]}
+        name = f"{kind}: {len(place)} of {outcome.size}"
+        axes.plot(scale[place], moved[place, history], ls="", ms=4, label=name, **style)
+    if (moved > 0.0).any():
+        axes.set_yscale("log")
+    axes.legend(frameon=False, fontsize=Size.LABEL)
+    return figure
+
+
 def draw_fragility(
     curves: FragilityCurve | Mapping[str, FragilityCurve | tuple[Array, Array, Array]],
     intensity: Array | None = None,

@@ -163,6 +163,7 @@ def test_histories_converge_to_the_fracture_energy():
     assert ratios == pytest.approx(2.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_push_ends_between_brittle_bonds_and_bonds_that_yield():
     """Little energy is the brittle answer, within steps of a tenth; much that of limit analysis.
 

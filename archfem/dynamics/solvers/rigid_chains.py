@@ -17,7 +17,7 @@ from numba.extending import overload
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from archfem._numba import KERNEL_OPTIONS, inlined_kernel, kernel
+from archfem._numba import INNER_OPTIONS, inlined_kernel, kernel
 from archfem._typing import Array
 from archfem.dynamics.solvers.base import evaluate_step, is_system, solve_step, start_run
 from archfem.dynamics.solvers.equation import Equation
@@ -378,17 +378,17 @@ def _substitute(parent, blocks, x):  # type: ignore
 # ---- steps
 
 
-@overload(start_run, jit_options=KERNEL_OPTIONS)
+@overload(start_run, jit_options=INNER_OPTIONS)
 def _start_run(system, state, memory):  # type: ignore
     return _start_chain_run if is_system(system, ChainSystem) else None
 
 
-@overload(solve_step, jit_options=KERNEL_OPTIONS)
+@overload(solve_step, jit_options=INNER_OPTIONS)
 def _solve_step(system, step, states, ground):  # type: ignore
     return _solve_chain_step if is_system(system, ChainSystem) else None
 
 
-@overload(evaluate_step, jit_options=KERNEL_OPTIONS)
+@overload(evaluate_step, jit_options=INNER_OPTIONS)
 def _evaluate_step(system, step, states, ground, results, memory):  # type: ignore
     return _evaluate_chain_step if is_system(system, ChainSystem) else None
 
