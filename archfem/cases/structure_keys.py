@@ -276,7 +276,7 @@ def _resolve_preset(settings: Table, section: str, name: str) -> Any:
     return _call(cls, f"{section}.{name}", **{"name": name, **values})
 
 
-def _read_finish(table: Table, section: str) -> dict[str, Any]:
+def _read_finish(table: dict[str, Any], section: str) -> dict[str, Any]:
     """Take the finish from the table of a contact, and return its law for usual stone."""
     finish = check_choice(table.pop("finish"), CONDITIONS, f"{section}.finish")
     if both := sorted({*FINISHED_KEYS, "law"}.intersection(table)):

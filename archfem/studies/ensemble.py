@@ -43,7 +43,7 @@ class EnsemblePart:
     """Histories that one process computes one after another: motions and scales of one change."""
 
     analysis: Analysis = field(repr=False)
-    changes: Mapping[str, Any]
+    changes: tuple[tuple[str, Any], ...]
     runs: Sequence[tuple[Motion, float]] = field(repr=False)
 
     @property
@@ -180,7 +180,7 @@ def ensemble(
     parts, places = [], []
     for number, change in enumerate(varied):
         for chosen in np.array_split(np.arange(len(runs)), count):
-            parts.append(EnsemblePart(analysis, change, [runs[k] for k in chosen]))
+            parts.append(EnsemblePart(analysis, tuple(change.items()), [runs[k] for k in chosen]))
             places.append((chosen, number))
     table = _empty_table(analysis, motions, factors, varied)
     finished = evaluate_points(list(enumerate(parts)), Evaluator(evaluate_part), workers)
@@ -227,7 +227,7 @@ def prepare_histories(
 
 def evaluate_part(part: EnsemblePart) -> dict[str, Any]:
     """Return the findings of some histories, each as a row; texts are joined by line feeds."""
-    run = prepare_histories(part.analysis, part.changes)
+    run = prepare_histories(part.analysis, dict(part.changes))
     rows = [_reduce(part.analysis.structure, run, motion.scaled(s)) for motion, s in part.runs]
     found: dict[str, Any] = {name: [row[name] for row in rows] for name in PEAKS}
     for name in ("outcome", "ended", "error"):

@@ -141,7 +141,7 @@ def chain_system(equation: Equation, tree: StoneTree, dt: float) -> ChainSystem:
     balance = 1e-9 * float(np.linalg.norm(equation.weight))
     tolerances = Tolerances(balance, balance, 1e-13 * model.structure.size, 1e4 * balance, 0.0)
     stones = np.zeros(size // 3 + 1, STONE_RECORD)
-    return ChainSystem(
+    return ChainSystem(  # type: ignore[call-arg]
         law,
         faces,
         np.ascontiguousarray(frame[:, :5]),
@@ -203,11 +203,13 @@ def _face_poses(face, stone, before, after):  # type: ignore
     """Return the poses of a face at both ends of a step, and of its middle by the angle."""
     first, rx, ry = face.first, face.rx, face.ry
     x, y = _shift(rx, ry, stone.bc, stone.bs)
-    start = face.x + before[first] + x, face.y + before[first + 1] + y
+    start = (
+        face.x + before[first] + x,
+        face.y + before[first + 1] + y,
+        face.turn + before[first + 2],
+    )
     x, y = _shift(rx, ry, stone.hc, stone.hs)
-    last = face.x + after[first] + x, face.y + after[first + 1] + y
-    start = start[0], start[1], face.turn + before[first + 2]
-    last = last[0], last[1], face.turn + after[first + 2]
+    last = face.x + after[first] + x, face.y + after[first + 1] + y, face.turn + after[first + 2]
     c, s, c1, s1 = stone.c, stone.s, stone.c1, stone.s1
     mean = -stone.shrunk * (s * rx + c * ry), stone.shrunk * (c * rx - s * ry)
     return (start, last), mean, (-(s1 * rx + c1 * ry), c1 * rx - s1 * ry)
@@ -261,8 +263,8 @@ def _evaluate_joint(system, joint, before, after, residual):  # type: ignore
     row[4], row[5], row[6], row[7] = b
     row[8], row[9], row[10], row[11] = c
     row[12], row[13], row[14], row[15] = d
-    row[16], row[17], row[18], row[19] = *low_mean, *low_end
-    row[20], row[21], row[22], row[23] = *high_mean, *high_end
+    row[16], row[17], row[18], row[19] = low_mean + low_end
+    row[20], row[21], row[22], row[23] = high_mean + high_end
     row[24] = _rotation_stiffness(low, below, -x, -y)
     row[25] = _rotation_stiffness(high, above, x, y)
 
