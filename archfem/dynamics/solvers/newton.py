@@ -53,7 +53,14 @@ from archfem.dynamics.solvers.rigid_chains import (
     constant_chain_parts,
     find_stone_tree,
 )
-from archfem.dynamics.solvers.semismooth_newton import Correction, Tolerances, newton_driver
+from archfem.dynamics.solvers.semismooth_newton import (
+    Correction,
+    Tolerances,
+    add_share,
+    newton_driver,
+    residual_work,
+    reverse_correction,
+)
 from archfem.dynamics.solvers.sparse_products import (
     SparseRows,
     add_rows,
@@ -501,35 +508,8 @@ def _has_changed(last, law):  # type: ignore
     return change > 1e-4 * largest
 
 
-@kernel
-def _large_move(system, work, before, share):  # type: ignore
-    """Go from a share of the correction to another; returns the largest entry of all of it."""
-    move, correction, largest, added = work.move, work.correction, 0.0, share - before
-    for k in range(len(move)):
-        move[k] += added * correction[k]
-        if not abs(correction[k]) <= largest:  # also where it is not a number
-            largest = abs(correction[k])
-    return largest
-
-
-@kernel
-def _large_work(system, work):  # type: ignore
-    """Return the work of the residual along the correction."""
-    total = 0.0
-    for k in range(len(work.correction)):
-        total += work.correction[k] * work.residual[k]
-    return total
-
-
-@kernel
-def _reverse_large(system, work):  # type: ignore
-    """Turn the correction around."""
-    for k in range(len(work.correction)):
-        work.correction[k] = -work.correction[k]
-
-
 _solve_large = newton_driver(
-    _large_residual, Correction(_large_correction, _large_move, _large_work, _reverse_large)
+    _large_residual, Correction(_large_correction, add_share, residual_work, reverse_correction)
 )
 
 

@@ -21,7 +21,14 @@ from archfem._numba import INNER_OPTIONS, inlined_kernel, kernel
 from archfem._typing import Array
 from archfem.dynamics.solvers.base import evaluate_step, is_system, solve_step, start_run
 from archfem.dynamics.solvers.equation import Equation
-from archfem.dynamics.solvers.semismooth_newton import Correction, Tolerances, newton_driver
+from archfem.dynamics.solvers.semismooth_newton import (
+    Correction,
+    Tolerances,
+    add_share,
+    newton_driver,
+    residual_work,
+    reverse_correction,
+)
 from archfem.joints.large.face_kinematics import (
     add_angles,
     cosine_sine,
@@ -447,35 +454,8 @@ def _chain_correction(system, work, iteration, reuse, hold):  # type: ignore
     return True
 
 
-@kernel
-def _chain_move(system, work, before, share):  # type: ignore
-    """Go from a share of the correction to another; returns the largest entry of all of it."""
-    move, correction, largest, added = work.move, work.correction, 0.0, share - before
-    for k in range(len(system.mass)):
-        move[k] += added * correction[k]
-        if not abs(correction[k]) <= largest:  # also where it is not a number
-            largest = abs(correction[k])
-    return largest
-
-
-@kernel
-def _chain_work(system, work):  # type: ignore
-    """Return the work of the residual along the correction."""
-    total = 0.0
-    for k in range(len(system.mass)):
-        total += work.correction[k] * work.residual[k]
-    return total
-
-
-@kernel
-def _reverse_chain(system, work):  # type: ignore
-    """Turn the correction around."""
-    for k in range(len(system.mass)):
-        work.correction[k] = -work.correction[k]
-
-
 _solve_chain = newton_driver(
-    _chain_residual, Correction(_chain_correction, _chain_move, _chain_work, _reverse_chain)
+    _chain_residual, Correction(_chain_correction, add_share, residual_work, reverse_correction)
 )
 
 

@@ -34,24 +34,51 @@ class Correction(NamedTuple):
     reverse: Any  # turns it around
 
 
+@kernel
+def add_share(system, work, before, share):  # type: ignore
+    """Go from a share of the correction to another; returns the largest entry of all of it."""
+    move, correction, largest, added = work.move, work.correction, 0.0, share - before
+    for k in range(len(system.weight)):  # vectors of chains are longer
+        move[k] += added * correction[k]
+        if not abs(correction[k]) <= largest:  # also where it is not a number
+            largest = abs(correction[k])
+    return largest
+
+
+@kernel
+def residual_work(system, work):  # type: ignore
+    """Return the work of the residual along the correction."""
+    total = 0.0
+    for k in range(len(system.weight)):
+        total += work.correction[k] * work.residual[k]
+    return total
+
+
+@kernel
+def reverse_correction(system, work):  # type: ignore
+    """Turn the correction around."""
+    for k in range(len(system.weight)):
+        work.correction[k] = -work.correction[k]
+
+
 def line_search(evaluate_residual: Any, correction: Correction) -> Any:
     """Return the compiled search along a correction."""
-    _, add_share, residual_work, reverse_correction = correction
+    _, add, work_along, reverse = correction
 
     @kernel
     def search_line(system, work, iteration, before, whole):  # type: ignore
         """Add the correction, or unless `whole` the share at which the residual does no work."""
-        start, share, evaluations = residual_work(system, work), 1.0, 0
+        start, share, evaluations = work_along(system, work), 1.0, 0
         if start < 0.0 and not whole:  # uphill, by friction: the other way leads down
-            reverse_correction(system, work)
+            reverse(system, work)
             start = -start
         # shares on either side of the place, and the work there
         low, high, low_work, high_work = 0.0, np.inf, start, 0.0
-        largest = add_share(system, work, 0.0, share)
+        largest = add(system, work, 0.0, share)
         while True:
             found = evaluate_residual(system, work, iteration)
             evaluations += 1
-            left = residual_work(system, work)
+            left = work_along(system, work)
             # as good as any share: the whole correction, where it takes off half the residual
             is_good = evaluations == 1 and found[0] < 0.5 * before
             if whole or is_good or not abs(left) > 0.5 * start:
@@ -69,7 +96,7 @@ def line_search(evaluate_residual: Any, correction: Correction) -> Any:
                 following = low + (high - low) * low_work / (low_work - high_work)
                 margin = 0.1 * (high - low)
                 following = min(max(following, low + margin), high - margin)
-            add_share(system, work, share, following)
+            add(system, work, share, following)
             share = following
         return found, largest * share, evaluations
 
