@@ -209,7 +209,11 @@ alternatives.slenderer = { weight = 1.0, set = ["structure.breadth=0.22"] }
     assert str(found) in printed
     assert found.rate("slenderer").rate > found.rate("slender").rate
     assert found.hazard.rate_of([1.0, 0.4 * 9.80665]) == pytest.approx([0.02, 0.001])
-    assert (tmp_path / "out" / "risk.png").exists()
+    main(["report", str(tmp_path / "out")])
+    report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Annual rate of collapse</h2>" in report
+    assert f"The structure {found.sentence}." in report.partition("Inputs and assumptions</h2>")[0]
+    assert "Cornell et al." in report
 
 
 @pytest.mark.parametrize(

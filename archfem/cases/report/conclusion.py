@@ -138,11 +138,13 @@ def _conclude_joints(data: ReportData) -> Iterator[str]:
 
 
 def _conclude_range(data: ReportData) -> Iterator[str]:
-    """Yield the sentence on the range of the verdict, if the folder has it."""
+    """Yield the sentences on the range of the verdict and on the risk, if the folder has them."""
     if (path := data.files.get("verdict_range.nc")) is not None:
         computed = VerdictRange.read(path)
         varied = ", ".join(name.replace("_", " ") for name in computed.properties)
         yield f"Where {varied} are uncertain, the structure {computed.sentence}."
+    if text := data.read_text("risk.txt"):
+        yield sentence(f"the structure {text.splitlines()[0]}")
 
 
 def _conclude_statics(data: ReportData) -> Iterator[str]:

@@ -21,8 +21,9 @@ _CAPTION = (
 
 def tabulate_inputs(data: ReportData) -> Grid:
     """Tabulate all inputs with their marks."""
-    rows = [*_structure_rows(data), *_property_rows(data), *_static_rows(data)]
-    if data.runs or not any(f"{name}.txt" in data.files for name in _STATIC_SECTIONS):
+    rows = [*_structure_rows(data), *_property_rows(data), *_command_rows(data)]
+    is_static = any(f"{name}.txt" in data.files for name in _STATIC_SECTIONS)
+    if data.runs or "risk.txt" in data.files or not is_static:
         rows += [*_motion_rows(data), *_model_rows(data), *_criteria_rows(data)]
     return Grid((), rows, _CAPTION)
 
@@ -89,9 +90,9 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
             yield f"{item.name}: law", str(item.law), "given"
 
 
-def _static_rows(data: ReportData) -> Iterator[Row]:
-    """Yield the keys of limit analysis, rating and assessment, where these are in the report."""
-    for section in _STATIC_SECTIONS:
+def _command_rows(data: ReportData) -> Iterator[Row]:
+    """Yield the keys of limit analysis, rating, assessment and risk that are in the report."""
+    for section in (*_STATIC_SECTIONS, "risk"):
         table = data.case.settings.get(section, {})
         # a rating has joints and fill of [limit]
         users = ("limit", "rating") if section == "limit" else (section,)

@@ -58,7 +58,13 @@ _FURTHER_RESULTS = {
     "assessment.txt": "a kinematic assessment",
     "accuracy.txt": "a comparison of models and time steps",
     "verdict_range.txt": "the range of the verdict over uncertain properties",
+    "risk.txt": "the annual rate of collapse",
 }
+
+_RISK_CAPTION = (
+    "Probability of a fall by intensity with its band, hazard of the site, and share of the rate "
+    "by intensity."
+)
 
 # References of the methods, with the file of the result that was made by each
 _METHODS = (
@@ -68,6 +74,7 @@ _METHODS = (
     ("rating.txt", "rating", "Heyman, The Masonry Arch, Ellis Horwood (1982)"),
     ("assessment.txt", "assessment", "NTC 2018, with its Circolare 7/2019, C8.7.1.2"),
     ("verdict_range.txt", "range", "Clopper and Pearson, Biometrika 26 (1934) 404-413"),
+    ("risk.txt", "annual rate of collapse", "Cornell et al., J. Struct. Eng. 128 (2002) 526-533"),
 )
 
 
@@ -80,6 +87,7 @@ def build_sections(data: ReportData) -> list[Section]:
         *build_dead_load_sections(data),
         build_ground_section(data),
         *build_run_sections(data),
+        Section("Annual rate of collapse", data.read_result("risk", _RISK_CAPTION)),
         build_check_section(data),
         build_method_section(data),
         build_source_section(data),
