@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.special import ndtr
 from tqdm import tqdm
 
 from archfem._display import ResultDisplay
@@ -46,7 +45,13 @@ from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.motion.suite import Suite
 from archfem.statics.modes import modes
 from archfem.studies.evaluators import Evaluator
-from archfem.studies.fragility import Fragility, fit_brackets, fragility
+from archfem.studies.fragility import (
+    Fragility,
+    Rate,
+    fit_brackets,
+    fragility,
+    integrate_rates,
+)
 from archfem.studies.process_pool import evaluate_points
 from archfem.studies.variations import (
     DEFAULT_RANGES,
@@ -317,38 +322,6 @@ def _write_hazard(hazard: Hazard) -> dict[str, Any]:
     return values | {name: values[name].tolist() for name in ("intensity", "rate")}
 
 
-@dataclass(frozen=True)
-class Rate:
-    """An annual rate of collapse.
-
-    Attributes:
-        rate: mean annual rate [1/year].
-        low: lower end of the 90 % interval [1/year].
-        high: its upper end [1/year].
-    """
-
-    rate: float
-    low: float
-    high: float
-
-    def probability(self, years: float = 50.0) -> tuple[float, float, float]:
-        """Return the probability of collapse in a time, with the ends of its interval [-].
-
-        Args:
-            years: the time [year].
-        """
-        rates = np.array([self.rate, self.low, self.high])
-        return tuple(float(each) for each in -np.expm1(-rates * years))  # type: ignore[return-value]
-
-    def __str__(self) -> str:
-        """Rate with its interval, and the probability in 50 years."""
-        chance = self.probability()
-        return (
-            f"{self.rate:.2g} a year ({self.low:.2g} to {self.high:.2g} at 90 %), "
-            f"{chance[0]:.2g} in 50 years ({chance[1]:.2g} to {chance[2]:.2g})"
-        )
-
-
 @validate_methods
 @dataclass(frozen=True, eq=False, repr=False)
 class CollapseRisk(ResultDisplay):
@@ -431,13 +404,8 @@ class CollapseRisk(ResultDisplay):
 
     def _rates(self, drawn: Any) -> Array:
         """Return the annual rates of resampled samples (k, n), each of a lognormal fit (k,)."""
-        means, deviations = fit_brackets(self._log_brackets()[:, 0, drawn])
-        x = np.exp(means[:, None] + deviations[:, None] * np.linspace(-6.0, 6.0, 241))
-        rates = self.hazard.rate_of(x)
-        middle = np.sqrt(x[:, 1:] * x[:, :-1])
-        falls = ndtr((np.log(middle) - means[:, None]) / deviations[:, None])
-        # beyond the last intensity all fall
-        return np.asarray((falls * -np.diff(rates, axis=1)).sum(axis=1) + rates[:, -1])
+        fits = fit_brackets(self._log_brackets()[:, 0, drawn])
+        return integrate_rates(*fits, self.hazard)
 
     @cached_property
     def _known_rates(self) -> dict[str | None, Rate]:
@@ -468,7 +436,7 @@ class CollapseRisk(ResultDisplay):
             random = np.random.default_rng(0)
             drawn = own[random.integers(len(own), size=(RESAMPLES, len(own)))]
         (mean,), spread = self._rates(own[None]), self._rates(drawn)
-        rate = Rate(float(mean), *(float(each) for each in np.quantile(spread, [0.05, 0.95])))
+        rate = Rate.of_sample(mean, spread)
         self._known_rates[alternative] = rate
         return rate
 

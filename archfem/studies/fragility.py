@@ -30,12 +30,51 @@ from archfem._validation import (
     validate_methods,
 )
 from archfem.errors import InvalidInput
+from archfem.motion.hazard import Hazard
 
 # Largest number of motions at a level, far below where integers of the bootstrap overflow [-]
 MAX_MOTIONS = 1e9
 
 # Smallest and largest dispersion of a fit [-]
 DISPERSION_RANGE = (0.005, 5.0)
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Mean annual rate at which a limit state is reached.
+
+    Attributes:
+        rate: mean annual rate [1/year].
+        low: lower end of the 90 % interval [1/year].
+        high: its upper end [1/year].
+    """
+
+    rate: float
+    low: float
+    high: float
+
+    @classmethod
+    def of_sample(cls, rate: float, resampled: Array) -> "Rate":
+        """Return a rate with the interval of the rates of bootstrap samples (samples,)."""
+        low, high = np.quantile(resampled, [0.05, 0.95])
+        return cls(float(rate), float(low), float(high))
+
+    def probability(self, years: float = 50.0) -> tuple[float, float, float]:
+        """Return the probability in a time, with the ends of its interval [-].
+
+        Args:
+            years: the time [year].
+        """
+        rates = np.array([self.rate, self.low, self.high])
+        return tuple(float(each) for each in -np.expm1(-rates * years))  # type: ignore[return-value]
+
+    def __str__(self) -> str:
+        """Rate with its interval, and the probability in 50 years."""
+        chance = self.probability()
+        return (
+            f"{self.rate:.2g} a year ({self.low:.2g} to {self.high:.2g} at 90 %), "
+            f"{chance[0]:.2g} in 50 years ({chance[1]:.2g} to {chance[2]:.2g})"
+        )
 
 
 @validate_methods
@@ -107,6 +146,19 @@ class Fragility:
         more = check_number(dispersion, "dispersion", minimum=0.0)
         resampled = np.column_stack([self.resampled[:, 0], np.hypot(self.resampled[:, 1], more)])
         return replace(self, dispersion=hypot(self.dispersion, more), resampled=resampled)
+
+    def annual_rate(self, hazard: Hazard) -> Rate:
+        """Return the annual rate of the limit state, with its 90 % interval.
+
+        Args:
+            hazard: of the site, for the intensity of this curve.
+
+        References:
+            Cornell, Jalayer, Hamburger and Foutch, J. Struct. Eng. 128 (2002) 526-533.
+        """
+        curves = np.vstack([[self.median, self.dispersion], self.resampled])
+        rate, *resampled = integrate_rates(np.log(curves[:, 0]), curves[:, 1], hazard)
+        return Rate.of_sample(rate, np.array(resampled))
 
 
 @dataclass(frozen=True)
@@ -286,6 +338,15 @@ def _moments(low: Array, high: Array, mean: Array, deviation: Array) -> tuple[Ar
     first = np.where(exact, low, mean + deviation * shift)
     second = mean**2 + 2.0 * mean * deviation * shift + deviation**2 * square
     return first, np.where(exact, np.where(exact, low, 0.0) ** 2, second)
+
+
+def integrate_rates(means: Array, deviations: Array, hazard: Hazard) -> Array:
+    """Return the annual rates (k,) of lognormal fragilities under a hazard curve."""
+    x = np.exp(means[:, None] + deviations[:, None] * np.linspace(-6.0, 6.0, 241))
+    rates, middle = hazard.rate_of(x), np.sqrt(x[:, 1:] * x[:, :-1])
+    falls = ndtr((np.log(middle) - means[:, None]) / deviations[:, None])
+    # beyond the last intensity all fall
+    return np.asarray((falls * -np.diff(rates, axis=1)).sum(axis=1) + rates[:, -1])
 
 
 def _bracket(samples: Array, ends: Array) -> Array:

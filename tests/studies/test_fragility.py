@@ -260,3 +260,24 @@ def test_the_dispersion_of_records_is_the_root_of_their_mean_square():
     apart = np.log(other.median / one.median)
     assert found.epistemic == pytest.approx(abs(apart) / np.sqrt(2.0))
     assert found.median == pytest.approx(np.sqrt(one.median * other.median))
+
+
+def test_annual_rate_is_that_of_cornell():
+    """For rates k a^-b, the rate is k m^-b exp(b² β² / 2), of the curve and each of its samples."""
+    random = np.random.default_rng(3)
+    curve = fragility(4.0 * np.exp(0.3 * random.standard_normal(30)))
+    rate = curve.annual_rate(af.Hazard.power(2e-3, 2.5))
+
+    def cornell(median, dispersion):
+        return 2e-3 * median**-2.5 * np.exp(0.5 * (2.5 * dispersion) ** 2)
+
+    # 240 intervals over six deviations to either side
+    assert rate.rate == pytest.approx(cornell(curve.median, curve.dispersion), rel=1e-4)
+    ends = np.quantile(cornell(*curve.resampled.T), [0.05, 0.95])
+    assert (rate.low, rate.high) == pytest.approx(tuple(ends), rel=1e-4)
+
+
+def test_an_annual_rate_needs_a_hazard():
+    curve = fragility([1.0, 2.0, 3.0])
+    with pytest.raises(af.InvalidInput, match="give Hazard"):
+        curve.annual_rate(2e-3)
