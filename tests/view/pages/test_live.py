@@ -280,7 +280,7 @@ def test_a_change_redraws_and_the_shaken_arch_falls(tmp_path):
         for strength, fate in ((0.8, "stands"), (1.3, "falls")):
             driver.execute_script(CHANGE, "strength", round(factor * strength, 2))
             wait_for_runs(driver, 20)
-            assert f"This arch {fate}" in read_text(driver, "verdict")
+            assert f"this arch {fate}" in read_text(driver, "verdict")
             assert read_text(driver, "share") == f"{20 if fate == 'falls' else 0} of 20"
         # played and moved to its end by keys: stones lie on the ground
         play = driver.find_element("css selector", "#play")

@@ -37,6 +37,17 @@ READ = """
   return { joints: arch.joints.length, area, factor: new Equilibrium(arch).weakest().factor };
 })()
 """
+CHANGE = """
+const input = document.querySelector(`#${arguments[0]}`);
+input.value = arguments[1];
+input.dispatchEvent(new Event("input"));
+"""
+# Offset of the crown that a reader marked from the middle of the picture [pixels]
+PIXELS = """
+const { tools, stage } = document.querySelector('.arch').live, c = stage.canvas;
+const [x, y] = stage.place(tools.marks[2]), ratio = devicePixelRatio;
+return [Math.round((x - c.width / 2) / ratio), Math.round((y - c.height / 2) / ratio)];
+"""
 WRONG = "(() => { try { %s; } catch (error) { return error.message; } })()"
 
 
@@ -173,7 +184,11 @@ def test_records_are_read_as_archfem_reads_them(at2, tmp_path):
         assert found["dt"] == pytest.approx(expected.dt)
         # this page has g = 9.81 m/s², and archfem 9.80665
         assert found["x"] == pytest.approx(expected.horizontal.tolist(), abs=2e-3)
-    program = WRONG % 'readRecord(given.text, "a record")'
+    in_metres = run_in_node({"text": columns}, 'readRecord(given.text, "a record", 1.0)')
+    assert in_metres["x"] == pytest.approx(samples.tolist(), abs=1e-6)
+    program = WRONG % 'readRecord(given.text, "a record", 9.81)'
+    strong = columns.replace(" 0.", " 9.").replace(" -0.", " -9.")
+    assert "choose the unit of its values" in run_in_node({"text": strong}, program)
     assert "give two columns" in run_in_node({"text": "no record\n" * 20}, program)
 
 
@@ -198,6 +213,9 @@ def test_an_arch_is_drawn_on_a_photo_and_taken_away(tmp_path):
     Image.new("RGB", (400, 300), "grey").save(photo)
     (tmp_path / "large.png").write_bytes(b"0" * 21_000_000)
     (tmp_path / "none.png").write_bytes(b"no picture")
+    record = tmp_path / "record.txt"
+    times = 0.01 * np.arange(300)
+    np.savetxt(record, np.column_stack([times, 3.0 * np.sin(times * np.pi)]), fmt="%.4f")
     find = "css selector"
     with browser(wide=1280) as driver:
         from selenium.webdriver import ActionChains
@@ -244,14 +262,39 @@ def test_an_arch_is_drawn_on_a_photo_and_taken_away(tmp_path):
         structure = af.Case.read(tmp_path / "arch.toml").structure
         shown = float(driver.find_element(find, "#collapse").text.split()[0])
         assert shown == pytest.approx(weakest(structure), abs=2e-3)
+        # the reader's record and the other choices stay where the crown is dragged
+        driver.find_element(find, "#record").send_keys(str(record))
+        wait(driver, lambda: "3.00 g" in message())
+        unit = driver.find_element(find, "#record-unit option[value='1']")
+        unit.click()
+        wait(driver, lambda: "up to 0.31 g" in message())
+        driver.execute_script(CHANGE, "friction", 0.5)
+        stage = driver.find_element(find, "#stage")
+        driver.execute_script("arguments[0].scrollIntoView({ block: 'center' })", stage)
+        crown = driver.execute_script(PIXELS)
+        drag = ActionChains(driver).move_to_element_with_offset(stage, *crown).click_and_hold()
+        drag.move_by_offset(0, -5).release().perform()
+        kept = driver.execute_script("return document.querySelector('.arch').live.design")
+        assert (kept["friction"], kept["strength"]) == (0.5, 0.31)
+        script_of_motion = "return document.querySelector('#motion').selectedOptions[0].text"
+        assert driver.execute_script(script_of_motion) == "record.txt"
+        drawn = driver.execute_script(script)
+        assert drawn["rise"] > 2.3
+        shown = float(driver.find_element(find, "#collapse").text.split()[0])
+        written = "return document.querySelector('.arch').live.tools.writeCase()"
+        (tmp_path / "arch.toml").write_text(driver.execute_script(written))
+        motion = af.Case.read(tmp_path / "arch.toml").ground_motion()
+        assert motion.horizontal == pytest.approx(np.loadtxt(record)[:, 1], abs=1e-4)
         driver.find_element(find, "#link").click()
         wait(driver, lambda: "holds the arch" in message())
+        assert "leaves out the photo" in message()
         address = driver.current_url
         driver.get("about:blank")
         driver.get(address)
         wait_for_runs(driver, 1)
         wait(driver, lambda: driver.execute_script(script) == drawn)
         assert float(driver.find_element(find, "#collapse").text.split()[0]) == shown
+        assert driver.execute_script(script_of_motion) == "record.txt"
         driver.save_screenshot(str(tmp_path / "drawn.png"))
         assert complaints(driver) == []
 
@@ -306,6 +349,71 @@ def test_stones_are_moved_by_a_finger_and_by_keys(tmp_path):
         drag.move_by_offset(*np.subtract(end, start).tolist()).release().perform()
         words = driver.find_element("css selector", "#message").text
         assert re.search(r"crosses itself|is not convex|in each other by", words), words
+        assert complaints(driver) == []
+
+
+@pytest.mark.slow
+def test_a_finger_places_points_by_taps_and_scrolls_by_swipes(tmp_path):
+    """A swipe over the photo scrolls the page; a tap places a point; a mark is dragged."""
+    photo = tmp_path / "photo.png"
+    Image.new("RGB", (400, 300), "grey").save(photo)
+    with browser() as driver:
+        phone = {"width": 390, "height": 780, "deviceScaleFactor": 2, "mobile": True}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", phone)
+        driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True})
+        live = "const live = document.querySelector('.arch').live, { tools, stage } = live;"
+
+        def run(expression):
+            return driver.execute_script(live + expression)
+
+        def touch(*points):
+            """Put a finger down at the first point of the screen, move it to the others."""
+            for kind, point in zip(
+                ["touchStart", *["touchMove"] * (len(points) - 1), "touchEnd"],
+                [*points, None],
+                strict=True,
+            ):
+                places = [] if point is None else [{"x": point[0], "y": point[1]}]
+                given = {"type": kind, "touchPoints": places}
+                driver.execute_cdp_cmd("Input.dispatchTouchEvent", given)
+
+        def place(x, y):
+            """Point of the screen at shares of the picture."""
+            box = run(
+                "const b = stage.canvas.getBoundingClientRect();"
+                "return [b.left, b.top, b.width, b.height]"
+            )
+            return box[0] + x * box[2], box[1] + y * box[3]
+
+        driver.get((DOCS / "try" / "index.html").resolve().as_uri())
+        wait_for_runs(driver, 1)
+        driver.find_element("css selector", ".live-start summary").click()
+        driver.find_element("css selector", "#photo").send_keys(str(photo))
+        wait(driver, lambda: run("return tools.mode") == "scale")
+        run("stage.canvas.scrollIntoView({ block: 'center' })")
+        before = run("return scrollY")
+        (x, y), far = place(0.5, 0.8), -180
+        touch((x, y), *[(x, y + share * far) for share in (0.2, 0.4, 0.6, 0.8, 1.0)])
+        wait(driver, lambda: run("return scrollY") > before + 50)
+        assert run("return tools.scaleMarks.length") == 0
+        # a tap while the page still glides only stops it
+        centre = "const y = scrollY; stage.canvas.scrollIntoView({ block: 'center' });"
+        wait(driver, lambda: run(f"{centre} return y === scrollY"))
+        for k, point in enumerate(((0.2, 0.8), (0.8, 0.8))):
+            touch(place(*point))
+            wait(driver, lambda k=k: run("return tools.scaleMarks.length") == k + 1)
+        driver.find_element("css selector", "#length").send_keys("6\n")
+        wait(driver, lambda: run("return tools.mode") == "mark")
+        run("stage.canvas.scrollIntoView({ block: 'center' })")
+        for k, point in enumerate(((0.2, 0.8), (0.8, 0.8), (0.5, 0.5))):
+            touch(place(*point))
+            wait(driver, lambda k=k: run("return tools.marks.length") == k + 1)
+        wait(driver, lambda: run("return Boolean(tools.source.drawn)"))
+        before, rise = run("return scrollY"), run("return tools.source.drawn.rise")
+        (x, y), step = place(0.5, 0.5), 2
+        touch((x, y), *[(x, y - step * k) for k in range(1, 9)])
+        assert run("return tools.source.drawn.rise") > rise + 0.1
+        assert run("return scrollY") == before
         assert complaints(driver) == []
 
 

@@ -21,7 +21,7 @@ class Live {
     data.motions.forEach(({ name }, k) => this.find("motion").append(new Option(name, k)));
     for (const name of ["thickness", "stones", "friction", "strength", "finish"]) this.find(name).addEventListener("input", () => this.change(name));
     this.find("motion").addEventListener("input", () => { this.design.strength = this.suggest(data.motions[this.find("motion").value]); this.change("motion"); });
-    this.find("reset").addEventListener("click", () => this.open(this.given));
+    this.find("reset").addEventListener("click", () => this.reset());
     this.find("time").addEventListener("input", () => { this.pause(); this.show(Number(this.find("time").value)); });
     this.find("play").addEventListener("click", () => (this.playing ? this.pause() : this.play()));
     for (const tab of root.querySelectorAll("[name=view]")) tab.addEventListener("input", () => { this.view = tab.value; this.pause(); this.show(this.time); });
@@ -34,9 +34,9 @@ class Live {
   startWorkers() {
     const text = ["engine", "statics", "worker"].map((name) => document.querySelector(`#${name}-script`).textContent).join("\n");
     const address = URL.createObjectURL(new Blob([text], { type: "text/javascript" })), count = Math.min(navigator.hardwareConcurrency || 1, 4);
-    const receive = ({ data: { job, number, run, failure, push } }) => {
+    const receive = ({ data: { job, asked, number, run, failure, push } }) => {
+      if (push && asked === this.asked) this.tellPush(push);
       if (job !== this.job) return;
-      if (push) return this.tellPush(push);
       this.runs[number] = run ?? { failure };
       this.tell();
       this.show(this.time);
@@ -63,7 +63,7 @@ class Live {
     this.original = { ...this.design };
     Object.assign(this.design, changes);
     this.finishes = given.finishes ?? this.data.arches[0].finishes;
-    this.find("finish").replaceChildren(new Option(given.thrust ? "as given" : "hard: they do not close", ""), ...this.finishes.map(({ name }) => new Option(name, name)));
+    this.find("finish").replaceChildren(new Option(given.thrust ? "as given" : "hard: faces meet at once", ""), ...this.finishes.map(({ name }) => new Option(name, name)));
     this.stage.handles = [];
     if (!("strength" in changes)) this.find("motion").value = 0;
     for (const name of ["thickness", "stones"]) this.find(name).closest("label").hidden = !ring;
@@ -71,7 +71,9 @@ class Live {
     this.stage.fit(given, box);
     this.change();
   }
-  /** The design changed: arch, statics and runs anew. */
+  /** The arch as it was given, under the motion of the reader's choice. */
+  reset() { this.open(this.given, { strength: this.design.strength }, this.stage.backdrop && this.stage.box); }
+  /** The design changed: arch, statics and runs anew; the finish of joints does not change the runs. */
   change(name) {
     if (name && name !== "motion") this.design[name] = name === "finish" ? this.find(name).value : Number(this.find(name).value);
     this.pause();
@@ -80,7 +82,8 @@ class Live {
     this.find("time").value = 0;
     this.showDesign();
     this.solveStatics();
-    this.run();
+    this.askPush();
+    if (name !== "finish") this.run();
     this.show(0);
   }
   isAsGiven(names) { return names.every((name) => this.design[name] === this.original[name]); }
@@ -99,6 +102,7 @@ class Live {
     this.find("finish").value = design.finish;
     for (const [name, say] of Object.entries(words)) {
       if (design[name] === null) continue;
+      if (name === "strength") this.find(name).max = Math.max(2, design[name]); // a record may be stronger
       this.find(name).value = design[name];
       this.say(`${name}-value`, say(design[name]));
     }
@@ -117,14 +121,29 @@ class Live {
     this.statics = { stands, settled, law, factor: weakest.factor, weight: links(resting), push: links(pushed), hinges: weakest.hinges.map(({ joint, sign }) => hingePoint(equilibrium.joints[joint], sign)) };
     const most = resting ? Math.max(...resting.map(Math.abs)) : NaN, percent = Math.round(100 * (1 - 2 * most));
     this.say("collapse", !stands ? "it does not stand by itself" : weakest.factor === Infinity ? "none: it leans on nothing" : `${weakest.factor.toFixed(3)} g, pushed to the ${weakest.side > 0 ? "right" : "left"}`);
-    this.say("line", percent >= 0 ? `${percent} % of half the thickness is left (max |e| = ${most.toFixed(3)})` : "it leaves the stones: this arch falls by its own weight");
-    this.say("mechanism", [`${weakest.hinges.length} hinges at joints ${weakest.hinges.map(({ joint }) => joint).join(", ")}`, weakest.slides.length ? `${weakest.slides.length} joints slide` : ""].filter(Boolean).join("; "));
-    this.say("closing", settled ? `under its own weight joints close by up to ${(1e3 * settled.closing).toFixed(3)} mm, and stones move by up to ${(1e3 * farthest(settled.q, settled.q.map(() => 0), arch.bodies.reach)).toFixed(2)} mm` : law ? "on joints that close this arch slides or falls by its own weight; hard joints are shown" : own && given.thrust ? "as in the analysis of archfem" : "hard: they do not close");
+    this.say("line", percent >= 0 ? `${percent} % of half the thickness is left (max |e| = ${most.toFixed(3)})` : "none: no line stays within the stones and within the friction of all joints");
+    this.say("weight", stands ? `it stands${percent >= 0 ? `: ${percent} % of half the thickness is left` : ""}` : "it falls");
+    this.say("sizes", this.measureOpening());
+    const list = (what, own) => (own.length ? `${own.length} ${what}${own.length > 1 ? "s" : ""}: joint${own.length > 1 ? "s" : ""} ${own.map(({ joint }) => joint).join(", ")}` : "");
+    this.say("mechanism", [list("hinge", weakest.hinges), list("slide", weakest.slides)].filter(Boolean).join("; ") || "none");
+    this.say("closing", settled ? `under its own weight joints close by up to ${(1e3 * settled.closing).toFixed(3)} mm, and stones move by up to ${(1e3 * farthest(settled.q, settled.q.map(() => 0), arch.bodies.reach)).toFixed(2)} mm` : law ? "on joints that close this arch slides or falls by its own weight; hard joints are shown" : own && given.thrust ? "as in the analysis of archfem" : "hard: faces meet at once, and do not close further");
     if (given.ring) {
       const factor = leastThickness(given.ring, { stones: design.stones, friction: design.friction }, given.parameters);
       this.say("least", Number.isNaN(factor) ? "it does not stand at any" : `${(factor * given.ring.thickness).toFixed(3)} m`);
     }
     this.find("least").parentElement.hidden = !given.ring;
+  }
+  /** Clear span and rise of a ring, along its inner side. */
+  measureOpening() {
+    if (!this.given.ring) return "–";
+    const inner = this.arch.joints.map(({ ends }) => ends[0]), [one, other] = [inner[0], inner.at(-1)];
+    return `${Math.hypot(other[0] - one[0], other[1] - one[1]).toFixed(2)} m and ${(Math.max(...inner.map(([, y]) => y)) - Math.min(one[1], other[1])).toFixed(2)} m`;
+  }
+  /** Ask a worker for the push that joints of a finish bear. */
+  askPush() {
+    const { law, settled, factor } = this.statics;
+    this.asked = (this.asked ?? 0) + 1;
+    if (settled && factor < Infinity) this.workers[0].postMessage({ asked: this.asked, closing: { arch: this.arch, law, q: settled.q, factor } });
   }
   /** The push that joints of a finish bear, beside that of hard ones. */
   tellPush(pushes) {
@@ -149,8 +168,6 @@ class Live {
     });
     this.runs = [];
     this.job += 1;
-    const { law, settled, factor } = this.statics;
-    if (settled && factor < Infinity) this.workers[0].postMessage({ job: this.job, closing: { arch: this.arch, law, q: settled.q, factor } });
     this.workers.forEach((worker, k) => worker.postMessage({ job: this.job, runs: runs.filter(({ number }) => number % this.workers.length === k), motion }));
     const peak = this.statics.factor * G, first = motion.x.findIndex((value) => Math.abs(value * scale) >= peak);
     this.say("critical", first < 0 ? "The ground never pushes that hard." : `The ground first pushes that hard at ${(first * motion.dt).toFixed(2)} s; it must do so long enough for the hinges to open.`);
@@ -162,9 +179,10 @@ class Live {
     const done = this.runs.filter(Boolean), answers = done.filter((run) => !run.failure), fallen = answers.filter((run) => run.fell !== null).length, [own] = this.runs;
     const all = done.length === RUNS, share = `${fallen} of ${answers.length}`;
     this.say("share", all ? share : answers.length ? `${share} so far` : "…");
-    const fate = own && (own.fell === null ? `This arch stands; a stone moved by up to ${(1e3 * own.displacement).toFixed(0)} mm.` : `This arch falls: the first stone is lost at ${own.fell?.toFixed(2)} s.`);
+    const fate = own && (own.fell === null ? `Shaken, this arch stands; a stone moves by up to ${(1e3 * own.displacement).toFixed(own.displacement < 1e-3 ? 2 : 0)} mm.` : `Shaken, this arch falls: the first stone is lost at ${own.fell?.toFixed(2)} s.`);
     const how = fallen === 0 ? "none fall" : fallen === answers.length ? "all fall" : `${fallen} ${fallen === 1 ? "falls" : "fall"}`;
     const others = answers.length < 2 ? "Shaking slightly different ones …" : `Of ${answers.length} slightly different arches${all ? "" : " so far"}, ${how}.`;
+    if (this.isMarking) return this.say("verdict", "Mark your arch on the photo.");
     this.say("verdict", !own ? "Shaking …" : own.failure ? `It cannot be followed: ${own.failure}` : `${fate} ${others}`);
     this.root.dataset.runs = done.length;
   }

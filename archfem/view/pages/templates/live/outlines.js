@@ -185,8 +185,10 @@ function assembleOutlines(outlines, unit, parameters, friction = 0.6) {
   return { name: "a drawing", bodies, joints, sizes: exact.map(({ area }) => Math.sqrt(area)), parameters, thrust: null, ring: null };
 }
 
-/** An accelerogram of two columns, time [s] and acceleration [g], or of an AT2 file. */
-function readRecord(text, name) {
+const MOST_G = 2.5; // peak of a record [g], beyond which its unit is taken to be another one
+
+/** An accelerogram of two columns, time [s] and acceleration in a unit [m/s²], or of an AT2 file [g]. */
+function readRecord(text, name, unit = 9.81) {
   const numbers = (lines) => lines.flatMap((line) => line.trim().split(/[\s,;]+/)).filter(Boolean).map(Number), lines = text.split(/\r?\n/);
   const head = lines.slice(0, 6).join(" ").match(/DT\s*=\s*([\d.Ee+-]+)/i);
   let dt, x;
@@ -195,12 +197,13 @@ function readRecord(text, name) {
     x = numbers(lines.slice(lines.findIndex((line) => /DT\s*=/i.test(line)) + 1));
   } else {
     const rows = lines.filter((line) => /^\s*[-+.\d]/.test(line)).map((line) => numbers([line]));
-    if (rows.length < 10 || rows.some((row) => row.length !== 2)) refuse(`${name} is no record: give two columns, time in s and acceleration in g, or an AT2 file`);
+    if (rows.length < 10 || rows.some((row) => row.length !== 2)) refuse(`${name} is no record: give two columns, time in s and acceleration, or an AT2 file`);
     dt = rows[1][0] - rows[0][0];
     if (rows.some(([time], k) => Math.abs(time - rows[0][0] - k * dt) > 0.01 * dt)) refuse(`${name} has uneven time steps: give even ones`);
-    x = rows.map((row) => row[1]);
+    x = rows.map((row) => (row[1] * unit) / 9.81);
   }
   const peak = x.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
-  if (x.some(Number.isNaN) || !(dt > 0 && dt < 0.2) || !(peak > 0 && peak < 10) || x.length * dt > 120) refuse(`${name}: ${x.length} values every ${dt} s up to ${peak.toFixed(2)} g; give at most 120 s in units of g`);
+  if (peak > MOST_G) refuse(`${name} reaches ${peak.toFixed(2)} g, more than any earthquake: choose the unit of its values`);
+  if (x.some(Number.isNaN) || !(dt > 0 && dt < 0.2) || !(peak > 0) || x.length * dt > 120) refuse(`${name}: ${x.length} values every ${dt} s up to ${peak.toFixed(2)} g; give at most 120 s, in even steps below 0.2 s`);
   return { name, dt, x: x.map((value) => value * 9.81), y: x.map(() => 0), peak: peak * 9.81, strength: Math.round(100 * peak) / 100 };
 }

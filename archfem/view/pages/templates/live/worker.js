@@ -2,14 +2,14 @@
 let engine = null, latest = 0;
 const pause = () => new Promise((resolve) => { const { port1, port2 } = new MessageChannel(); port1.onmessage = resolve; port2.postMessage(0); });
 
-onmessage = async ({ data: { start, job, closing, runs, motion } }) => {
+onmessage = async ({ data: { start, job, asked, closing, runs, motion } }) => {
   if (start) {
     engine = { module: new WebAssembly.Module(start.wasm), leaves: start.leaves };
     return;
   }
   if (closing) {
     const joints = new ClosingJoints(closing.arch, closing.law);
-    postMessage({ job, push: [1, -1].map((side) => joints.peak(closing.q, side, closing.factor)) });
+    postMessage({ asked, push: [1, -1].map((side) => joints.peak(closing.q, side, closing.factor)) });
     return;
   }
   latest = job;
