@@ -391,10 +391,7 @@ def with_sections(text: str, made: dict[str, str]) -> str:
     return re.sub(r"<!-- (\w+) -->\n.*?<!-- end -->", replaced, text, flags=re.DOTALL)
 
 
-PAGES = tuple(
-    ROOT / name
-    for name in ("archbench/ANSWERS.md", "docs/archbench.md", "docs/theory/fill.md", "README.md")
-)
+PAGES = (ROOT / "archbench/ANSWERS.md", ROOT / "README.md")
 
 
 def main() -> None:
