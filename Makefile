@@ -89,7 +89,7 @@ notebooks: .venv/docs .venv/compiled  ## run the notebooks, and save their outpu
 	$(PYTHON) docs/execute.py
 
 pictures: .venv/docs .venv/compiled  ## the pictures of the pages: bridge, gallery, film, theory, bench
-	$(PYTHON) docs/execute.py notebooks/06_a_roman_bridge.py
+	$(PYTHON) docs/execute.py notebooks/03_a_roman_bridge.py
 	$(PYTHON) docs/pictures.py
 	$(PYTHON) docs/figures.py
 	$(PYTHON) -m archbench.figures

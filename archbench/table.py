@@ -331,23 +331,27 @@ def bridges(found: Sequence[Row]) -> str:
 
 
 def sources(found: Sequence[Row]) -> str:
-    """Return the references with sources, one line each."""
-    lines = []
+    """Return the references by source, and lengths of scenes from memory, as a list."""
+    cited: dict[str, list[str]] = {}
+    memory: dict[str, list[str]] = {}
     for row in found:
         # those of weaker kinds too, which are in no ratio
         values = [v for v in read_references(row.scene) if v.quantity == row.quantity]
         for value in values:
-            note = f"; {value.note}" if value.note else ""
             read = value.read_by or "from memory"
             place = value.url if not value.url.startswith("http") else f"<{value.url}>"
-            lines.append(
-                f"- {row.scene}, {row.quantity}: "
-                f"{number(value.number)} ± {rounded(value.uncertainty)}, "
-                f"{value.kind}{value.grade}. {value.source}. {place}; {read}{note}."
-            )
+            note = f" ({value.note})" if value.note else ""
+            measure = f"{number(value.number)} ± {rounded(value.uncertainty)}"
+            text = f"{row.scene} {row.quantity} {measure}, {value.kind}{value.grade}{note}"
+            source = "; ".join(part for part in (f"{value.source}. {place}".strip(), read) if part)
+            cited.setdefault(source, []).append(text)
         if row.from_memory:
-            lines.append(f"- {row.scene}: {', '.join(row.from_memory)} from memory.")
-    return "\n".join(dict.fromkeys(lines))
+            memory[row.scene] = list(row.from_memory)
+    lines = [f"- {source}: {'; '.join(dict.fromkeys(each))}." for source, each in cited.items()]
+    if memory:
+        known = "; ".join(f"{scene}: {', '.join(parts)}" for scene, parts in memory.items())
+        lines.append(f"- From memory: {known}.")
+    return "\n".join(lines)
 
 
 def versions(found: Sequence[Row], programs: Sequence[str]) -> str:
@@ -387,7 +391,7 @@ def with_sections(text: str, made: dict[str, str]) -> str:
     return re.sub(r"<!-- (\w+) -->\n.*?<!-- end -->", replaced, text, flags=re.DOTALL)
 
 
-PAGES = (ROOT / "docs/archbench.md", ROOT / "docs/theory/fill.md", ROOT / "README.md")
+PAGES = (ROOT / "archbench/ANSWERS.md", ROOT / "README.md")
 
 
 def main() -> None:

@@ -1,11 +1,11 @@
 """Draw the figures of the theory, and two of other pages: `python docs/figures.py`, in seconds."""
 
-import runpy
 import tempfile
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Polygon
@@ -282,11 +282,31 @@ def selection() -> None:
 
 
 def assessment_map() -> None:
-    """Draw the map of checks and falls, as its notebook does from the stored table."""
-    notebook = FOLDER.parents[1] / "notebooks" / "10_where_checks_and_falls_differ.py"
-    figure = runpy.run_path(str(notebook))["figure"]
-    for letter, axes in zip("ab", figure.axes, strict=True):
-        axes.set_title(f"({letter})", loc="left", fontsize=9.0)
+    """Draw the accelerations of checks and falls of 50 arches, and their ratios."""
+    table = pd.read_csv(FOLDER.parent / "assessment_map.csv")
+    found = table[(table.variant == "map") & (table.stands > 0.0) & np.isfinite(table.falls)]
+    each = found.assign(fall=np.sqrt(found.stands * found.falls)).groupby("arch")
+    arches = each.first().assign(low=each.fall.min(), high=each.fall.max(), mid=each.fall.median())
+    figure = Figure(figsize=(7.2, 6.4), layout="constrained")
+    axes = figure.subplots(2, 1, sharex=True)
+    checks = {"linear": "#d7261e", "displacement": "#0b4f8a"}
+    for letter, ax, by in zip("ab", axes, (1.0, arches.linear), strict=True):
+        low, mid, high = (arches[name] / by for name in ("low", "mid", "high"))
+        ax.vlines(arches.radius, low, high, color="#cfcac0", lw=3.0, label="falls, range")
+        ax.plot(arches.radius, mid, "o", color="#1b1b1b", ms=4.0, label="their median")
+        for name, color in checks.items():
+            mark = {"color": color, "ms": 9.0, "mew": 2.0, "label": f"{name} check"}
+            ax.plot(arches.radius, arches[name] / by, "_", **mark)
+        ax.set(xscale="log", yscale="log")
+        ax.minorticks_off()
+        marks = [0.2, 0.5, 1.0, 2.0, 4.0]
+        ax.set_yticks(marks, [f"{mark:g}" for mark in marks])
+        ax.grid(axis="y", alpha=0.3)
+        ax.set_title(f"({letter})", loc="left", fontsize=9.0)
+    axes[0].legend(frameon=False, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    axes[0].set_ylabel("ground acceleration [g]")
+    axes[1].set(ylabel="as a multiple of the linear check's", xlabel="radius [m]")
+    axes[1].set_xticks([1.0, 2.0, 4.0, 8.0], ["1", "2", "4", "8"])
     figure.savefig(FOLDER / "assessment_map.png", dpi=150)
 
 

@@ -24,7 +24,7 @@ RUN = re.compile(r"```python\n(.*?)```(?:(?:(?!```).)*?```text\n(.*?)```)?", re.
 """A block of Python, and the output that the next block shows, if it does."""
 
 
-SLOW = tuple(f"docs/{page}.md" for page in ("tutorial", "index")) + tuple(
+SLOW = tuple(f"docs/{page}.md" for page in ("tutorial",)) + tuple(
     f"docs/howto/{page}.md" for page in ("capacity", "falls")
 )
 """Pages whose code other tests or the README's lines run as well."""

@@ -264,7 +264,7 @@ def test_no_length_from_memory_is_shown_without_its_mark(rows):
         if (row.scene, row.quantity) in table.HEAD:
             assert ("**g**" in table.head([row]).splitlines()[-1]) == bool(memory)
         if memory:
-            assert f"{row.scene}: {', '.join(memory)} from memory" in table.sources([row])
+            assert f"From memory: {row.scene}: {', '.join(memory)}." in table.sources([row])
     measured = [row for row in rows if row.kind == "E"]
     labels = [text.get_text() for text in figures.measured(measured).axes[0].get_yticklabels()]
     for row, label in zip(measured, labels, strict=True):

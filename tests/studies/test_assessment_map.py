@@ -12,7 +12,7 @@ import pytest
 import archfem as af
 
 ROOT = Path(__file__).parents[2]
-TABLE = ROOT / "notebooks" / "assessment_map.csv"
+TABLE = ROOT / "docs" / "assessment_map.csv"
 PAGE = (ROOT / "docs" / "assessment_map.md").read_text("utf-8")
 WORDS = {"arch", "motion", "variant", "error"}
 
@@ -143,6 +143,50 @@ def test_the_page_has_the_effects_of_the_settings(lines, brackets):
         assert count == len(group)
         assert stated == pytest.approx(np.quantile(ratios, (0.5, 0.1, 0.9)), abs=0.0051)
         assert below == pytest.approx(100.0 * share(group, "linear"), abs=0.051)
+
+
+def test_the_page_has_the_shares_of_the_variance(brackets):
+    """The properties were sampled independently: squared correlations are shares."""
+    ratio = np.log([math.sqrt(b["stands"] * b["falls"]) / b["linear"] for b in brackets])
+
+    def explained(name):
+        values = np.array([b[name] for b in brackets])
+        scaled = np.log(values) if name in ("radius", "stiffness") else values
+        return 100.0 * np.corrcoef(scaled, ratio)[0, 1] ** 2
+
+    motions = [b["motion"] for b in brackets]
+    means = {name: ratio[np.array(motions) == name].mean() for name in set(motions)}
+    motion = 100.0 * np.var([means[name] for name in motions]) / ratio.var()
+    text = " ".join(PAGE.split())
+    stated = (
+        f"The radius has {explained('radius'):.0f} % of the variance of ln(fall / linear check), "
+        f"the friction {explained('friction'):.0f} %, the motion {motion:.0f} %, "
+        f"the joint stiffness {explained('stiffness'):.0f} %, "
+        f"the embrace {explained('embrace'):.0f} %, "
+        f"the thickness ratio {explained('thickness_ratio'):.0f} %"
+    )
+    assert stated in text
+
+
+def test_the_linear_check_follows_from_limit_analysis(brackets):
+    """By its factor and its motion at rest: 2 α₀ g / (e* FC), to the four digits stored."""
+    for line in brackets[::200]:
+        joint = af.Contact(line["stiffness"], line["stiffness"] * 0.30 / 1.48, line["friction"])
+        ring = af.circular_arch(
+            radius=line["radius"],
+            thickness=line["thickness_ratio"] * line["radius"],
+            embrace=line["embrace"],
+            voussoirs=13,
+            contact=joint,
+        )
+        collapse = af.collapse_factor(ring, live=af.BodyForce(1.0, 0.0))
+        weights = np.array([ring.blocks[k].area for k in ring.free])  # of one material and width
+        along = np.array([collapse.motion[k][0] for k in ring.free])
+        moving = np.array([np.abs(collapse.motion[k]).max() > 1e-9 for k in ring.free])
+        mass = weights[moving].sum()
+        e_star = (weights @ along) ** 2 / mass / (weights @ along**2)
+        allowed = 2.0 * collapse.factor / e_star / 1.35 * ring.gravity / 9.80665
+        assert allowed == pytest.approx(line["linear"], rel=5e-4)
 
 
 @pytest.mark.slow
