@@ -22,6 +22,8 @@ FIRST = ("opensees_ring", "run")
 LONG = (
     "scaling",
     "shaken_blocks",
+    "three_ways",
+    "profile_step",
     "assessment_map",
     "bridge",
     "bridge_falls",
@@ -44,8 +46,8 @@ LONG = (
     "study_efficiency",
     "study_kills",
 )
-"""Scripts that take half a second or more: one runs five others of these, one compiles a loop of
-its own, two start studies of processes, three match motions, and one needs OpenSees."""
+"""Scripts that take a third of a second or more: one runs five others of these, one compiles a loop
+of its own, two start studies of processes, three match motions, and one needs OpenSees."""
 
 
 MARKED = [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in NAMES]

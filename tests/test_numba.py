@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numba
 import pytest
+from repeats import each_once
 
 from archfem import _numba
 
@@ -87,8 +88,7 @@ DAMAGES = {
 }
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
-@pytest.mark.parametrize("which", ["index", "code"])
+@pytest.mark.parametrize(("damage", "which"), each_once(DAMAGES, ("index", "code")))
 def test_damaged_code_is_found_and_compiled_anew(which, damage, stored):
     compiled(hits=1)
     assert not _numba.find_damaged_files()

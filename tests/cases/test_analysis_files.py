@@ -21,7 +21,7 @@ CASES = sorted(
 )
 ALIKE = (
     *("prusias", "prusias_paving", "prusias_piers", "prusias_records", "prusias_restored"),
-    *("prusias_paper", "prusias_paper_records", "prusias_wall"),
+    *("prusias_paper", "prusias_paper_records", "prusias_paper_restored", "prusias_wall"),
 )
 """Bridges with keys of "prusias_fill": other lengths of piers, walls and fill, other motions."""
 

@@ -15,6 +15,8 @@ BRIDGES = [
     for path in sorted(RING.parent.glob("prusias*.toml"))
     if path.stem not in ("prusias_retrofit", "prusias_sensitivity")  # studies of them
 ]
+EACH_FILL = ("prusias", "prusias_paving", "prusias_restored")
+"""Bridges without paving, with paving, and with all that restored ones have."""
 
 
 @pytest.mark.parametrize(
@@ -36,7 +38,13 @@ def test_refusals_name_the_key_in_tables_of_a_bridge(change, says):
         af.Case.read(RING.with_name("prusias.toml"), [change])
 
 
-@pytest.mark.parametrize("path", BRIDGES, ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=() if path.stem in EACH_FILL else pytest.mark.slow, id=path.stem)
+        for path in BRIDGES
+    ],
+)
 def test_shipped_bridges(path):
     structure = af.Case.read(path).structure
     parts = {block.part for block in structure.blocks}

@@ -1,10 +1,11 @@
 """JSON schema of case files: fresh, valid for all that is shipped, and as strict as the reader."""
 
+import importlib
+import sys
 import tomllib
 from copy import deepcopy
 from pathlib import Path
 
-import jsonschema
 import pytest
 
 import archfem as af
@@ -14,7 +15,16 @@ from archfem.commands import schema
 
 SHIPPED = Path(schema.__file__).with_name("case.schema.json")
 FILES = list_examples() | {f"new {kind}": path for kind, path in list_new_cases().items()}
-CHECK = jsonschema.Draft7Validator(schema.build_schema()).is_valid
+
+
+@pytest.fixture(scope="module")
+def validator():
+    """The validator of the schema; its library takes two seconds to load, here in one worker."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "rfc3987_syntax", None)  # grammars of addresses, not used here
+        jsonschema = importlib.import_module("jsonschema")
+    jsonschema.Draft7Validator.check_schema(schema.build_schema())
+    return jsonschema.Draft7Validator(schema.build_schema())
 
 
 def read(path):
@@ -26,12 +36,11 @@ def test_the_shipped_schema_is_that_of_the_reader(capsys):
     assert af.commands.main(["schema"]) == 0
     text = capsys.readouterr().out
     assert SHIPPED.read_text(encoding="utf-8") == text, "archfem schema > case.schema.json"
-    jsonschema.Draft7Validator.check_schema(schema.build_schema())
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_every_shipped_file_is_valid(name):
-    errors = jsonschema.Draft7Validator(schema.build_schema()).iter_errors(read(FILES[name]))
+def test_every_shipped_file_is_valid(name, validator):
+    errors = validator.iter_errors(read(FILES[name]))
     assert [error.message for error in errors] == []
 
 
@@ -44,7 +53,7 @@ def misspelt(table):
 
 
 @pytest.mark.parametrize("name", ["ring", "ring_suite", "prusias", "survey", "new wall"])
-def test_a_misspelt_key_is_refused_where_the_reader_refuses_it(name):
+def test_a_misspelt_key_is_refused_where_the_reader_refuses_it(name, validator):
     settings, folder, refused = read(FILES[name]), FILES[name].parent, 0
     base = settings.pop("base", None)
     for wrong in misspelt(settings):
@@ -56,7 +65,7 @@ def test_a_misspelt_key_is_refused_where_the_reader_refuses_it(name):
         else:
             unknown = False
         # names of parts, pairs and materials are free
-        assert not (unknown and CHECK(wrong)), wrong
+        assert not (unknown and validator.is_valid(wrong)), wrong
         refused += unknown
     assert refused > 10
 
@@ -75,10 +84,10 @@ def test_a_misspelt_key_is_refused_where_the_reader_refuses_it(name):
         (("report", "author"), 7),
     ],
 )
-def test_a_wrong_value_is_refused_by_both(path, value):
+def test_a_wrong_value_is_refused_by_both(path, value, validator):
     settings = read(FILES["ring"])
     settings.setdefault(path[0], {})[path[1]] = value
-    assert not CHECK(settings)
+    assert not validator.is_valid(settings)
     with pytest.raises(af.ArchfemError, match=path[1]):
         af.Case.of(settings)
 

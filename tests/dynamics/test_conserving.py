@@ -84,8 +84,7 @@ def test_an_undamped_block_neither_gains_nor_loses(kind, friction, dt):
         assert energy[:, 3].sum() > 0.01 * exchanged  # it did slide
 
 
-@pytest.mark.parametrize("rule", ["lobatto", "exact"])
-@pytest.mark.parametrize("friction", [0.4, None])
+@pytest.mark.parametrize(("rule", "friction"), each_once(("lobatto", "exact"), (0.4, None)))
 def test_an_undamped_ring_neither_gains_nor_loses(friction, rule):
     built = model("ring", friction, rule)
     start, energy, resultants, _ = steps(built, SHAKE.cut(0.0, 2.0), 0.005)

@@ -286,7 +286,9 @@ def test_drift_falls_with_the_step(ring):
 
 
 @pytest.mark.parametrize(
-    ("scheme", "method"), [(NEWMARK, "snes"), (CONSERVING, "snes"), *WAYS], ids=str
+    ("scheme", "method"),
+    [pytest.param(NEWMARK, "snes", marks=pytest.mark.slow), (CONSERVING, "snes"), *WAYS],
+    ids=str,
 )
 def test_balance_is_exact_while_joints_stay_closed(stack, scheme, method):
     """Average acceleration keeps it, with damping and with work of the ground, to a millionth."""

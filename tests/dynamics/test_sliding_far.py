@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from repeats import each_once
 from sliding_block import slide
 
 import archfem as af
@@ -65,15 +66,13 @@ def shear_while_sliding(run):
     return shear[fast]
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
 @pytest.mark.parametrize(
-    ("friction", "cohesion", "acceleration", "duration", "residual"),
-    [(0.2, 1e3, -5.0, 0.45, 0.2845), (0.0, 3e3, -9.0, 0.3, 0.5761)],
+    ("fidelity", "shove"),
+    each_once(("rigid", "faces"), ((0.2, 1e3, -5.0, 0.45, 0.2845), (0.0, 3e3, -9.0, 0.3, 0.5761))),
 )
-def test_a_block_bears_on_all_of_its_face_however_far_it_slides(
-    friction, cohesion, acceleration, duration, residual, fidelity
-):
+def test_a_block_bears_on_all_of_its_face_however_far_it_slides(fidelity, shove):
     """On a base from -2 to 4 m it resists by μ N + c · 1 m to the end."""
+    friction, cohesion, acceleration, duration, residual = shove
     model = block_on((-2.0, 4.0), friction=friction, cohesion=cohesion, fidelity=fidelity)
     motion, resistance = push(acceleration, duration), friction * WEIGHT + cohesion
     run = af.time_history(model, motion, dt=5e-4)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from repeats import each_once
 
 import archfem as af
 from archfem.dynamics import Equation
@@ -24,8 +25,7 @@ def stack(contact, motion=None):
     return model, motion or af.Motion(0.3 * np.sin(np.arange(40) / 3.0), 0.005)
 
 
-@pytest.mark.parametrize("damping", DAMPINGS)
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize(("damping", "scheme"), each_once(DAMPINGS, SCHEMES))
 def test_a_step_with_closed_joints_takes_one_iteration(damping, scheme):
     """The equation is linear then, and Newton's method exact, from any guess and for any step."""
     model, motion = stack(af.Contact(1e9, 4e8, None))

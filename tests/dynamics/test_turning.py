@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from repeats import each_once
 
 import archfem as af
 from archfem import InvalidInput
@@ -68,8 +69,7 @@ def test_small_motions_are_those_of_small_displacements(fidelity, friction, quad
     assert far.cells.displacement(q) == pytest.approx(moved, abs=1e-16)
 
 
-@pytest.mark.parametrize("friction", [0.4, None])
-@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+@pytest.mark.parametrize(("friction", "fidelity"), each_once((0.4, None), ("rigid", "faces")))
 def test_the_tangent_is_the_derivative_far_from_rest(fidelity, friction):
     far = model(fidelity, friction)
     q = 1e-2 * np.random.default_rng(1).normal(size=far.size)
@@ -93,8 +93,7 @@ def test_the_strategy_gives_the_history_of_snes(fidelity):
         assert float(np.abs(runs[0][name] - runs[1][name]).max()) < 1e-8
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.002])
-@pytest.mark.parametrize("friction", [0.3, 0.6, None])
+@pytest.mark.parametrize(("dt", "friction"), each_once((0.01, 0.002), (0.3, 0.6, None)))
 def test_an_undamped_run_keeps_its_energy(friction, dt, verified):
     """To 1e-6 of the largest exchanged, at any step, with joints that hinge and slide."""
     run = af.time_history(model(friction=friction), SHAKE.scaled(1.5), dt=dt)

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from repeats import each_once
 
 import archfem as af
 from archfem.joints.contact_law import mean_shear_tangent
@@ -129,7 +130,10 @@ def test_an_updated_memory_holds_without_sliding_further():
 
 
 @pytest.mark.parametrize("fidelity", ["rigid", "faces"])
-@pytest.mark.parametrize(("rule", "seed"), [(rule, seed) for rule in RULES for seed in range(4)])
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize(
+    "seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))]
+)
 def test_the_static_tangent_is_the_slope_of_the_forces(fidelity, rule, seed):
     """Springs are linear between changes of status: 1e-8 covers rounding over 1e-10 m.
 
@@ -282,8 +286,7 @@ def block(friction, cohesion=0.0, rule="lobatto"):
     return af.build(structure, fidelity="rigid", quadrature=rule)
 
 
-@pytest.mark.parametrize("rule", RULES)
-@pytest.mark.parametrize("cohesion", [0.0, 3e3])
+@pytest.mark.parametrize(("rule", "cohesion"), each_once(RULES, (0.0, 3e3)))
 def test_a_loop_of_even_slip_dissipates_its_area(rule, cohesion):
     """Under constant N a loop of amplitude S is a parallelogram of area 4 Y (S - Y/k).
 

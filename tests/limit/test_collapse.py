@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kinematics import displacement, gaps
+from repeats import each_once
 
 import archfem as af
 from archfem.limit import Outcome, collapse_factor, stands
@@ -86,9 +87,9 @@ def unbalance(structure, joints, factor, live):
     return left
 
 
-@pytest.mark.parametrize("live", LOADS, ids=str)
-@pytest.mark.parametrize("friction", [None, "coulomb"])
-@pytest.mark.parametrize("build", [ring, piers], ids=["ring", "piers"])
+@pytest.mark.parametrize(
+    ("live", "friction", "build"), each_once(LOADS, (None, "coulomb"), (piers, ring))
+)
 def test_static_and_kinematic_factors_are_equal(build, friction, live, verified):
     structure = build()
     found = collapse_factor(structure, live=live, friction=friction)

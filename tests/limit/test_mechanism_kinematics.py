@@ -218,7 +218,7 @@ def bonded_wall():
     [
         (piers(chords=1), 40, 0.04),
         (filled(), 50, 0.04),
-        (beside("side wall"), 40, 0.04),
+        pytest.param(beside("side wall"), 40, 0.04, marks=pytest.mark.slow),
         (bonded_wall(), 60, 0.34),  # its stones seldom move where none of their joints comes apart
     ],
     ids=["piers", "fill", "side wall", "bonded wall"],

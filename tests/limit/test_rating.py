@@ -173,7 +173,7 @@ def test_words_and_table(lorry_rating):
         pytest.param(
             "own", {}, "passes without partial and dynamic factors", marks=pytest.mark.slow
         ),
-        ("own", {"live": 1.5}, "passes without dynamic factor"),
+        pytest.param("own", {"live": 1.5}, "passes without dynamic factor", marks=pytest.mark.slow),
         pytest.param(
             "own", {"impact": 1.3}, "passes without partial factor", marks=pytest.mark.slow
         ),

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from repeats import each_once
 
 import archfem as af
 
@@ -218,9 +219,10 @@ def test_one_arch_with_fill_and_no_sidewalls():
     assert_apart(made)
 
 
-@pytest.mark.parametrize("above", [0.0, 0.8])
-@pytest.mark.parametrize("filled", [True, False])
-@pytest.mark.parametrize("state", ["free", "retained", "fixed"])
+@pytest.mark.parametrize(
+    ("above", "filled", "state"),
+    each_once((0.0, 0.8), (True, False), ("free", "retained", "fixed")),
+)
 def test_states_of_sidewalls(state, filled, above):
     fill = af.shapes.Backfill(cover=0.4) if filled else None
     made = af.bridge(arches=[ARCH], sidewalls=walls(state=state, above=above), backfill=fill)

@@ -318,8 +318,9 @@ def wall_in_bond():
     return af.masonry.assembled(stones, af.masonry.STONE_TO_STONE)
 
 
-@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
-@pytest.mark.parametrize("cells", [(1, 1), (4, 4), (2, 5)])
+@pytest.mark.parametrize(
+    ("cell", "cells"), each_once(("quadrilateral", "triangle"), ((1, 1), (4, 4), (2, 5)))
+)
 def test_stones_in_bond_fit(cell, cells):
     """Opposite sides agree although a long side faces two short ones."""
     made = af.build(wall_in_bond(), fidelity="full", cells=cells, cell=cell).cells

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from repeats import each_once
 
 import archfem as af
 
@@ -23,8 +24,7 @@ def moved(fidelity, seed, friction=0.3):
     return dead.model, first, first + 1e-4 * rng.normal(size=model.size)
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
-@pytest.mark.parametrize("late", [0.0, 0.4])
+@pytest.mark.parametrize(("fidelity", "late"), each_once(("rigid", "faces"), (0.0, 0.4)))
 def test_the_work_of_a_step_is_stored_or_lost(fidelity, late):
     """F·Δq = ΔE + lost, of joints and of stones that strain; friction gives nothing back."""
     for seed in range(2):

@@ -17,6 +17,8 @@ CASES = [
     ("bridge", {"backfill": "full", "rest": "faces"}),
     ("bridge", "full"),
 ]
+HALF = [*CASES[::2], *(pytest.param(*each, marks=pytest.mark.slow) for each in CASES[1::2])]
+"""All of them, every second one of which is slow."""
 
 
 @pytest.fixture(autouse=True)
@@ -42,7 +44,7 @@ def leaning(model):
     return spsolve(small.closed_tangent().tocsc(), small.load(af.BodyForce(0.6, -1.0)))
 
 
-@pytest.mark.parametrize(("name", "fidelity"), CASES)
+@pytest.mark.parametrize(("name", "fidelity"), HALF)
 def test_small_motions_give_the_model_of_small_displacements(structures, name, fidelity):
     """The difference is of second order: it falls with the motion."""
     model = af.build(structures[name], fidelity=fidelity, displacements="large", cells=(2, 2))
@@ -74,7 +76,7 @@ def test_strained_blocks_that_turn_together_stay_as_strained(structures, fidelit
     np.testing.assert_allclose(found, known, atol=1e-8 * np.abs(known).max())
 
 
-@pytest.mark.parametrize(("name", "fidelity"), CASES)
+@pytest.mark.parametrize(("name", "fidelity"), HALF)
 def test_the_tangent_of_a_step_is_the_derivative_of_its_force(structures, name, fidelity):
     """By central differences in one direction, of a step by which joints open and slide.
 

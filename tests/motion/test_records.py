@@ -61,6 +61,9 @@ TABLE = [
     ("other_formats/CHB0031412312349.UD", 0.01, [(6000, 0.0025)]),
 ]
 
+SIBLING = re.compile(r"(270|090|254|230|337|-UP|DWN)\.AT2|HN[NZ]\.D")
+"""Files of a component whose station has another one in the table, in the same format."""
+
 
 @pytest.fixture
 def write(tmp_path):
@@ -79,7 +82,13 @@ def recorded():
     return RECORDS
 
 
-@pytest.mark.parametrize(("name", "dt", "components"), TABLE, ids=[row[0] for row in TABLE])
+@pytest.mark.parametrize(
+    ("name", "dt", "components"),
+    [
+        pytest.param(name, *row, marks=pytest.mark.slow if SIBLING.search(name) else (), id=name)
+        for name, *row in TABLE
+    ],
+)
 def test_real_records_have_their_published_count_and_peak(recorded, name, dt, components):
     channels = read_channels(recorded / name)
     assert [len(channel.samples) for channel in channels] == [count for count, _ in components]

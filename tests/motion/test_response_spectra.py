@@ -41,7 +41,7 @@ def test_spectrum_of_a_sine_is_the_closed_form(damping, dt, verified):
     verified(case, "equal", "closed form", "equal", difference=off)
 
 
-@pytest.mark.parametrize("damping", [0.02, 0.05, 0.2])
+@pytest.mark.parametrize("damping", [0.02, pytest.param(0.05, marks=pytest.mark.slow), 0.2])
 def test_spectrum_is_that_of_another_library(damping, verified):
     """eqsig (Millen) steps the same exact recurrence, but takes its peaks from the samples."""
     eqsig = pytest.importorskip("eqsig")
@@ -57,7 +57,9 @@ def test_spectrum_is_that_of_another_library(damping, verified):
     verified("spectrum of a motion, damping 0.02 to 0.2", "equal", "eqsig", "equal", difference=off)
 
 
-@pytest.mark.parametrize("period", [0.05, pytest.param(0.3, marks=pytest.mark.slow), 1.7])
+@pytest.mark.parametrize(
+    "period", [*(pytest.param(each, marks=pytest.mark.slow) for each in (0.05, 0.3)), 1.7]
+)
 def test_spectrum_is_that_of_an_independent_integration(period):
     motion = af.Motion.synthetic(duration=1.5, seed=3)
     omega = 2.0 * np.pi / period

@@ -98,7 +98,9 @@ def test_stripes_give_the_curve_of_largest_likelihood():
     assert found.goodness > 0.05
 
 
-@pytest.mark.parametrize("failed", [[0, 2, 8, 10], [0, 1, 6, 10], [2, 3, 5, 7]])
+@pytest.mark.parametrize(
+    "failed", [[0, 2, 8, 10], pytest.param([0, 1, 6, 10], marks=pytest.mark.slow), [2, 3, 5, 7]]
+)
 def test_samples_of_stripes_are_curves_of_largest_likelihood(failed):
     """No curve of a grid is likelier, also where all motions of a sample fail from one level on."""
     levels = np.array([1.0, 1.5, 2.0, 3.0])

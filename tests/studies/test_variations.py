@@ -229,28 +229,22 @@ def test_the_sample_is_a_latin_hypercube(column, motion, calls):
     assert again.dataset.identical(found.dataset)
 
 
-@pytest.mark.parametrize(
-    ("name", "low", "high", "in_logarithm"),
-    [
-        *(("scale", 0.05, 0.15, True), ("scale", 1.0, 2.1, True), ("scale", 2.1, 1.0, True)),
-        *(("scale", 1.0, 2.0, False), ("friction", 0.0, 0.1, False), ("k_n", 3.0, 3.0, False)),
-    ],
-)
-def test_factors_over_more_than_twice_are_spread_in_their_logarithm(
-    column, motion, calls, name, low, high, in_logarithm
-):
+def test_factors_over_more_than_twice_are_spread_in_their_logarithm(column, motion, calls):
     """Each of ten equal parts of the range, in one measure or the other, has one sample."""
-    vary = HELD | {name: (low, high)}
-    found = af.verdict_range(column, motion, samples=10, vary=vary)
-    values = found.dataset[name].values[-10:]
-    if low == high:
-        assert set(values) == {low}
-        return
-    low, high = sorted((low, high))
-    share = (values - low) / (high - low)
-    if in_logarithm:
-        share = np.log(values / low) / np.log(high / low)
-    assert sorted(np.floor(10.0 * share)) == list(range(10))
+    for vary, even, in_logarithm in (
+        ({"scale": (0.05, 0.15), "friction": (0.0, 0.1), "k_n": (3.0, 3.0)}, ["friction"], "scale"),
+        ({"scale": (1.0, 2.0), "k_n": (1.0, 2.1)}, ["scale"], "k_n"),
+        ({"scale": (2.1, 1.0)}, [], "scale"),
+    ):
+        found = af.verdict_range(column, motion, samples=10, vary=HELD | vary).dataset
+        for name in (*even, in_logarithm):
+            values, (low, high) = found[name].values[-10:], sorted(vary[name])
+            share = (values - low) / (high - low)
+            if name == in_logarithm:
+                share = np.log(values / low) / np.log(high / low)
+            assert sorted(np.floor(10.0 * share)) == list(range(10)), (name, vary)
+        if vary.get("k_n") == (3.0, 3.0):
+            assert set(found["k_n"].values[-10:]) == {3.0}
 
 
 @pytest.mark.parametrize(("upper", "ratio"), [(0.9, 1.5), (np.inf, 2.0)])

@@ -7,8 +7,6 @@ second copy: a changed default changes the results of scripts, and is to be chan
 import inspect
 from importlib import import_module
 
-import pytest
-
 G = 9.81
 
 STRUCTURE = {"width": 1.0, "gravity": G}
@@ -136,11 +134,11 @@ CASES = {"run.DeadLoadResult": {"seconds": 0.0}, "run.Run": {"seconds": 0.0}}
 
 TABLES = {"motion": MOTION, "masonry": MASONRY, "": BLOCKS, "dynamics": SHAKEN, "studies": STUDIES}
 TABLES |= {"view": VIEW, "cases": CASES}
-DEFAULTS = [
-    (f"{room}.{name}".lstrip("."), given)
+DEFAULTS = {
+    f"{room}.{name}".lstrip("."): given
     for room, table in TABLES.items()
     for name, given in table.items()
-]
+}
 
 
 def found(name):
@@ -171,14 +169,17 @@ def is_number(value):
     )
 
 
-@pytest.mark.parametrize(("name", "given"), DEFAULTS, ids=[name for name, _ in DEFAULTS])
-def test_defaults_are_those_of_this_table(name, given):
-    """All numbers among them: a new default is to be added here too."""
+def default_numbers(name):
+    """The arguments of a function whose default is a number, with that number."""
     function = found(name)
     function = getattr(function, "__func__", function)
-    known = {
+    return {
         key: each.default
         for key, each in inspect.signature(function).parameters.items()
         if is_number(each.default)
     }
-    assert known == given
+
+
+def test_defaults_are_those_of_this_table():
+    """All numbers among them: a new default is to be added here too."""
+    assert {name: default_numbers(name) for name in DEFAULTS} == DEFAULTS

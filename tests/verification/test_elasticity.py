@@ -27,8 +27,7 @@ RULES = [
 ]
 
 
-@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
-@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize(("cell", "degree"), each_once(("quadrilateral", "triangle"), (1, 2)))
 def test_patch(ring, cell, degree):
     """A linear displacement: constant stress, no force inside a block, none across a joint."""
     space = build_broken_space(
