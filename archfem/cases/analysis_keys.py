@@ -103,7 +103,7 @@ def parse_limit(table: Any) -> LimitAnalysis:
         live += [_point_load(point, "limit.point") for point in points]
     dead = [_dead_load(load) for load in values.get("dead", ())]
     friction = _check_friction(values.get("friction", "coulomb"), "limit.friction")
-    fill = _fill(values["fill"]) if "fill" in values else None
+    fill = _fill(values["fill"], "limit.fill") if "fill" in values else None
     return LimitAnalysis(tuple(live), friction, values.get("strength"), fill, tuple(dead))
 
 
@@ -113,15 +113,15 @@ def _check_friction(value: Any, key: str) -> str | None:
     return None if law == "none" else law
 
 
-def _fill(table: Any) -> Fill | PlasticFill:
+def _fill(table: Any, key: str) -> Fill | PlasticFill:
     """Return the strength of the fill."""
     word = table.get("law", "pressure") if isinstance(table, Mapping) else "pressure"
-    law = FILL_LAWS[check_choice(word, tuple(FILL_LAWS), "limit.fill.law")]
-    fill = check_table(table, declared_keys(law) | {"law": str}, "limit.fill")
+    law = FILL_LAWS[check_choice(word, tuple(FILL_LAWS), f"{key}.law")]
+    fill = check_table(table, declared_keys(law) | {"law": str}, key)
     fill.pop("law", None)
     if "friction_angle" not in fill:
         raise InvalidInput(
-            f"limit.fill = {table} lacks its angle of friction: give friction_angle = "
+            f"{key} = {table} lacks its angle of friction: give friction_angle = "
             '"35 degree", which well-packed gravel has'
         )
     return law(**fill)
@@ -219,6 +219,8 @@ def parse_assessment(table: Any) -> AssessmentSettings:
         options["friction"] = _check_friction(options["friction"], "assessment.friction")
     if isinstance(state := options.get("limit_state"), dict):
         options["limit_state"] = read_object(LimitState, state, "assessment.limit_state")
+    if "fill" in options:
+        options["fill"] = _fill(options["fill"], "assessment.fill")
     if "loads" in options:
         loads = options["loads"]
         options["loads"] = [read_object(AttachedLoad, load, "assessment.loads") for load in loads]

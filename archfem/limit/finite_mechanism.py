@@ -179,7 +179,7 @@ class LinkageState:
         Normal forces that equilibrium does not determine are undefined (NaN).
         """
         normal, along = self.rates
-        dead = self.bodies.generalised(self.blocks.dead)
+        dead = self.bodies.dead_forces(velocity)
         live = self.bodies.generalised(self.blocks.live)
         slipping = np.flatnonzero(~self.sticks)
         coefficient = friction[[contact.joint for contact in self.contacts]]
