@@ -6,6 +6,7 @@ from math import atan2, cos, hypot, sin, tan
 import numpy as np
 import pytest
 from backfilled import arch_bridge
+from granite import granite_wall
 
 import archfem as af
 from archfem.limit.displaced_blocks import PlacedBlocks, find_corners, find_mechanism
@@ -380,18 +381,6 @@ def test_the_work_of_a_point_load_is_the_rise_of_the_weights():
     rise = path.displacements[1:, :, 1] @ weights
     np.testing.assert_allclose(work, rise, atol=1e-3 * rise.max())
     assert len(work) > 10
-
-
-def granite_wall():
-    """Wall WS of 1.0 x 1.2 x 0.2 m, whose beam weighs 1 kN: 8 courses of five stones, bonded."""
-    blocks = [box(-0.5, 1.5, -0.2, 0.0, "base", fixed=True)]
-    for course in range(8):
-        edges = np.linspace(0.0, 1.0, 6)
-        edges = np.array([0.0, *(edges[:-1] + 0.1), 1.0]) if course % 2 else edges
-        levels = 0.15 * course, 0.15 * (course + 1)
-        blocks += [box(*pair, *levels, f"{course} {pair[0]:.1f}") for pair in pairwise(edges)]
-    blocks.append(box(0.0, 1.0, 1.2, 1.45, "beam"))
-    return af.masonry.assembled(blocks, lambda a, b: contact(0.62), width=0.2)
 
 
 def test_the_curve_of_a_dry_granite_wall_under_a_press(verified):
