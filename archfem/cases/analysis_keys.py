@@ -137,7 +137,7 @@ def parse_pushover(table: Any) -> PushoverSettings:
     """Return the pushover of a case."""
     values = check_table(table, pushover_keys(), "pushover")
     live, dead = _read_loads(values, "pushover")
-    options: Table = {key: values[key] for key in ("control", "stop") if key in values}
+    options: dict[str, Any] = {key: values[key] for key in ("control", "stop") if key in values}
     if "stop" in options:
         options["stop"] = read_object(Stop, options["stop"], "pushover.stop")
     if ("settlement" in values) == bool(live):

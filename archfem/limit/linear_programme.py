@@ -352,9 +352,13 @@ class Programme:
         # weights without regularity make this state unique, so that cuts converge
         weights = 1.0 + np.arange(2 * len(self.friction)) * 0.5 * (5.0**0.5 - 1.0) % 1.0
         least = np.concatenate([weights, np.zeros(len(self.friction))])
-        cost = np.zeros_like(self.unknown_cost)
-        given = {"load": load, "upper_bounds": upper_bounds, "unknown_cost": cost}
-        return replace(self, force_cost=least, **given)
+        return replace(
+            self,
+            load=load,
+            force_cost=least,
+            unknown_cost=np.zeros_like(self.unknown_cost),
+            upper_bounds=upper_bounds,
+        )
 
     def _join_states(self, found: Optimum, state: Optimum, share: float = 1.0 - 1e-6) -> Optimum:
         """Return the mechanism of an optimum, and the forces at a share of its factor."""

@@ -423,8 +423,6 @@ def _sweep_contacts(bodies, workspace, touching):  # type: ignore
         tangential, wa, wb, worst = _sweep_friction(
             rows, impulse, (k, end), (along, wa, wb, worst), (ma + mb, ia, ib)
         )
-        if rows[k, 15] != 0.0:
-            wa, wb, worst = _sweep_couple(rows, impulse, k, (wa, wb, worst), (ia, ib))
         px, py = normal * nx - tangential * ny, normal * ny + tangential * nx
         speeds[a, 0], speeds[a, 1] = speeds[a, 0] - ma * px, speeds[a, 1] - ma * py
         speeds[b, 0], speeds[b, 1] = speeds[b, 0] + mb * px, speeds[b, 1] + mb * py
@@ -435,7 +433,7 @@ def _sweep_contacts(bodies, workspace, touching):  # type: ignore
 
 @kernel
 def _sweep_friction(rows, impulse, points, speeds, inverse_mass):  # type: ignore
-    """Solve for friction at the points of a face; return its change, both spins, and the slip."""
+    """Solve for friction of a face and its couple; return the change, both spins, and the slip."""
     (along, wa, wb, worst), (m, ia, ib) = speeds, inverse_mass
     total = 0.0
     for j in range(points[0], points[1]):
@@ -450,6 +448,8 @@ def _sweep_friction(rows, impulse, points, speeds, inverse_mass):  # type: ignor
         wa -= ia * rows[j, 2] * change
         wb += ib * rows[j, 3] * change
         total += change
+    if rows[points[0], 15] != 0.0:
+        wa, wb, worst = _sweep_couple(rows, impulse, points[0], (wa, wb, worst), (ia, ib))
     return total, wa, wb, worst
 
 
