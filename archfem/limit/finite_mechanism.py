@@ -343,6 +343,8 @@ def _attach_actions(structure: Structure, actions: Sequence[Action]) -> tuple[At
             loads.append(AttachedLoad(number, (float(x), float(y)), force=action.force))
             continue
         for number, (x, y), weight in PlacedBlocks.at_rest(structure).masses:
+            if structure.blocks[number].fixed:
+                continue
             force = weight * action.horizontal, weight * action.vertical
             loads.append(AttachedLoad(number, (float(x), float(y)), force=force))
     return tuple(loads)

@@ -367,6 +367,9 @@ def test_multiples_of_the_weight_stay_and_grow():
     path = af.limit.collapse_path(block, live=af.BodyForce(-0.5), dead=dead)
     turn = path.displacements[:, 1, 2]
     np.testing.assert_allclose(path.factors, 4.0 * np.tan(atan2(0.3, 1.2) - turn), atol=1e-7)
+    # both centroids, at 0.6 and 1.8 m, along the pull: their sum over the root of two
+    moved = [0.3 * (1.0 - np.cos(turn)) + height * np.sin(turn) for height in (0.6, 1.8)]
+    np.testing.assert_allclose(path.curve["displacement"], sum(moved) / np.sqrt(2.0), atol=1e-9)
 
 
 def test_the_work_of_a_point_load_is_the_rise_of_the_weights():
