@@ -1,4 +1,4 @@
-"""Sections [limit], [rating] and [assessment]: capacity and kinematic assessment."""
+"""Sections [limit], [pushover], [rating] and [assessment]: capacity, kinematic assessment."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,20 +8,23 @@ from archfem._validation import declared_keys, validate_methods
 from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.toml_file import Table, check_choice, check_table, read_object
 from archfem.errors import InvalidInput
+from archfem.joints.criteria import Criteria
 from archfem.limit.backfill import Fill
 from archfem.limit.collapse import Collapse, collapse_factor
 from archfem.limit.plastic_fill import PlasticFill
 from archfem.limit.vehicles import Rating, Vehicle, rate
-from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad
+from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Settlement
 from archfem.masonry.structure import Structure
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.mechanism_assessment import (
     KinematicAssessment,
     LimitState,
     assess_parts,
     kinematic_assessment,
 )
+from archfem.statics.pushover import Pushover, Stop, pushover
 
 # Words of [limit] and [assessment]: laws of the joints, and of the fill
 FRICTION_LAWS = ("coulomb", "nonassociated", "none")
@@ -74,11 +77,41 @@ class LimitAnalysis:
         return collapse_factor(structure, live=self.live, dead=self.dead, **self.resistance)
 
 
+@dataclass(frozen=True)
+class PushoverSettings:
+    """Pushover of a case."""
+
+    live: Settlement | tuple[Action, ...]  # loads that grow together, or the support that moves
+    dead: tuple[Action, ...]  # loads beside self-weight that do not grow
+    options: dict[str, Any]  # other arguments of `pushover`
+
+    def solve(self, start: Equilibrium, criteria: Criteria) -> Pushover:
+        """Push the structure from its dead load."""
+        given = {**self.options, "dead": self.dead, "criteria": criteria}
+        return pushover(start.model, self.live, start=start, **given)
+
+    def __str__(self) -> str:
+        """Describe the loads and the control in one line."""
+        grows = "a support moves"
+        if not isinstance(self.live, Settlement):
+            grows = f"loads that grow together: {len(self.live)}"
+        control = self.options.get("control", "displacement")
+        return f"pushover: {grows}; loads that stay: {len(self.dead)}; control by {control}"
+
+
+# Keys of loads that grow, as multiples of the weight or at points, and of loads that stay
+_LOAD_KEYS = declared_keys(BodyForce) | {"point": (dict, [dict]), "dead": [dict]}
+
+
 def limit_keys() -> dict[str, Any]:
     """Return the keys of [limit]."""
-    # the live load: multiples of the weight, and a force at a point
-    load = declared_keys(BodyForce) | {"point": (dict, [dict]), "dead": [dict]}
-    return _keys_beside(collapse_factor, "live", "dead") | load
+    return _keys_beside(collapse_factor, "live", "dead") | _LOAD_KEYS
+
+
+def pushover_keys() -> dict[str, Any]:
+    """Return the keys of [pushover]; hinges are those of [criteria]."""
+    own = _keys_beside(pushover, "live", "dead", "start", "criteria")
+    return own | _LOAD_KEYS | {"settlement": dict}
 
 
 def rating_keys() -> dict[str, Any]:
@@ -94,17 +127,43 @@ def assessment_keys() -> dict[str, Any]:
 def parse_limit(table: Any) -> LimitAnalysis:
     """Return the limit analysis of a case."""
     values = check_table(table, limit_keys(), "limit")
+    live, dead = _read_loads(values, "limit")
+    friction = _check_friction(values.get("friction", "coulomb"), "limit.friction")
+    fill = _fill(values["fill"], "limit.fill") if "fill" in values else None
+    return LimitAnalysis(live, friction, values.get("strength"), fill, dead)
+
+
+def parse_pushover(table: Any) -> PushoverSettings:
+    """Return the pushover of a case."""
+    values = check_table(table, pushover_keys(), "pushover")
+    live, dead = _read_loads(values, "pushover")
+    options: dict[str, Any] = {key: values[key] for key in ("control", "stop") if key in values}
+    if "stop" in options:
+        options["stop"] = read_object(Stop, options["stop"], "pushover.stop")
+    if ("settlement" in values) == bool(live):
+        raise InvalidInput(
+            "pushover has no load, or a load and a settlement: give one of horizontal = 1.0, a "
+            'multiple of each block\'s weight, point = { x = "1.4 m", force = ["0 kN", "-1 kN"] }, '
+            "or settlement"
+        )
+    if "settlement" in values:
+        moves = read_object(Settlement, values["settlement"], "pushover.settlement")
+        return PushoverSettings(moves, dead, options)
+    return PushoverSettings(live, dead, options)
+
+
+def _read_loads(values: Table, section: str) -> tuple[tuple[Action, ...], tuple[Action, ...]]:
+    """Return the loads of a section that grow, and those that stay."""
     live: list[Action] = []
     if "horizontal" in values or "vertical" in values:
         live.append(BodyForce(values.get("horizontal", 0.0), values.get("vertical", 0.0)))
     if "point" in values:
         points = values["point"]
         points = points if isinstance(points, list) else [points]
-        live += [_point_load(point, "limit.point") for point in points]
-    dead = [_dead_load(load) for load in values.get("dead", ())]
-    friction = _check_friction(values.get("friction", "coulomb"), "limit.friction")
-    fill = _fill(values["fill"]) if "fill" in values else None
-    return LimitAnalysis(tuple(live), friction, values.get("strength"), fill, tuple(dead))
+        live += [_point_load(point, f"{section}.point") for point in points]
+    return tuple(live), tuple(
+        _dead_load(load, f"{section}.dead") for load in values.get("dead", ())
+    )
 
 
 def _check_friction(value: Any, key: str) -> str | None:
@@ -113,26 +172,26 @@ def _check_friction(value: Any, key: str) -> str | None:
     return None if law == "none" else law
 
 
-def _fill(table: Any) -> Fill | PlasticFill:
+def _fill(table: Any, key: str) -> Fill | PlasticFill:
     """Return the strength of the fill."""
     word = table.get("law", "pressure") if isinstance(table, Mapping) else "pressure"
-    law = FILL_LAWS[check_choice(word, tuple(FILL_LAWS), "limit.fill.law")]
-    fill = check_table(table, declared_keys(law) | {"law": str}, "limit.fill")
+    law = FILL_LAWS[check_choice(word, tuple(FILL_LAWS), f"{key}.law")]
+    fill = check_table(table, declared_keys(law) | {"law": str}, key)
     fill.pop("law", None)
     if "friction_angle" not in fill:
         raise InvalidInput(
-            f"limit.fill = {table} lacks its angle of friction: give friction_angle = "
+            f"{key} = {table} lacks its angle of friction: give friction_angle = "
             '"35 degree", which well-packed gravel has'
         )
     return law(**fill)
 
 
-def _dead_load(table: Any) -> Action:
+def _dead_load(table: Any, key: str) -> Action:
     """Return a load that does not grow: a force at a point, or multiples of the weight."""
     if isinstance(table, Mapping) and {"horizontal", "vertical"} & table.keys():
-        values = check_table(table, declared_keys(BodyForce), "limit.dead")
+        values = check_table(table, declared_keys(BodyForce), key)
         return BodyForce(values.get("horizontal", 0.0), values.get("vertical", 0.0))
-    return _point_load(table, "limit.dead")
+    return _point_load(table, key)
 
 
 def _point_load(table: Any, key: str) -> PointLoad:
@@ -219,6 +278,8 @@ def parse_assessment(table: Any) -> AssessmentSettings:
         options["friction"] = _check_friction(options["friction"], "assessment.friction")
     if isinstance(state := options.get("limit_state"), dict):
         options["limit_state"] = read_object(LimitState, state, "assessment.limit_state")
+    if "fill" in options:
+        options["fill"] = _fill(options["fill"], "assessment.fill")
     if "loads" in options:
         loads = options["loads"]
         options["loads"] = [read_object(AttachedLoad, load, "assessment.loads") for load in loads]
@@ -227,4 +288,5 @@ def parse_assessment(table: Any) -> AssessmentSettings:
 
 def _keys_beside(function: Callable[..., Any], *given: str) -> dict[str, Any]:
     """Return the keys of the arguments of a function other than the structure and some."""
-    return {k: v for k, v in declared_keys(function).items() if k not in ("structure", *given)}
+    left_out = ("structure", "model", *given)
+    return {k: v for k, v in declared_keys(function).items() if k not in left_out}

@@ -14,7 +14,7 @@ from typing import Any
 from archfem._files import atomic_write
 from archfem._validation import check_words, validate_arguments
 from archfem.cases import analysis_keys, motion_keys, provenance
-from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis
+from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis, PushoverSettings
 from archfem.cases.analysis_tables import complete_path, read_analysis, write_analysis_tables
 from archfem.cases.risk_keys import RiskSettings, parse_risk
 from archfem.cases.structure_keys import cached_structure, write_structure
@@ -37,7 +37,8 @@ from archfem.motion.suite import Suite
 
 SECTIONS = (
     *("structure", "materials", "contacts", "model", "motion", "suite", "analysis", "criteria"),
-    *("record", "limit", "rating", "assessment", "risk", "dead_load", "output", "report"),
+    *("record", "limit", "pushover", "rating", "assessment", "risk", "dead_load"),
+    *("output", "report"),
 )
 OUTPUT_KEYS: Table = {"joints": [(int, str)], "animation": bool, "free_body": str}
 
@@ -58,6 +59,7 @@ class Case:
         suite: checked keys of [suite], or None; without motion and suite only the dead load is
             analysed.
         limit: limit analysis, or None.
+        pushover: pushover from the dead load, or None.
         rating: arguments of `archfem.rate` from [rating].
         assessment: kinematic assessment; without [assessment] that of the case's motion or suite.
         risk: hazard, alternatives and sampling of `archfem.collapse_risk`, or None.
@@ -72,6 +74,7 @@ class Case:
     motion: dict[str, Any] | None
     suite: dict[str, Any] | None
     limit: LimitAnalysis | None
+    pushover: PushoverSettings | None
     rating: Table
     assessment: AssessmentSettings
     risk: RiskSettings | None
@@ -137,7 +140,9 @@ class Case:
                 raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
         output = check_table(settings.get("output", {}), OUTPUT_KEYS, "output")
         report = _read_report(settings)
-        motion, suite, limit = (settings.get(key) for key in ("motion", "suite", "limit"))
+        motion, suite, limit, push = (
+            settings.get(key) for key in ("motion", "suite", "limit", "pushover")
+        )
         if motion is not None and suite is not None:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
         analysis = read_analysis(settings, cached_structure(settings, folder), folder)
@@ -150,6 +155,7 @@ class Case:
             motion=None if motion is None else motion_keys.parse_motion(motion),
             suite=None if suite is None else motion_keys.parse_suite(suite),
             limit=None if limit is None else analysis_keys.parse_limit(limit),
+            pushover=None if push is None else analysis_keys.parse_pushover(push),
             rating=analysis_keys.parse_rating(settings.get("rating", {})),
             assessment=analysis_keys.parse_assessment(settings.get("assessment", {})),
             risk=None if (risk := settings.get("risk")) is None else parse_risk(risk, folder),

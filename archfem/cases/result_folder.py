@@ -27,6 +27,7 @@ from archfem.cases.toml_file import read_tables
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.limit.collapse import Collapse
+from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_table
 from archfem.view.collapse import draw_fall
 from archfem.view.histories import draw_envelope, draw_envelopes
@@ -185,6 +186,12 @@ def limit_files(collapse: Collapse, text: str) -> Files:
     columns = ["name", "N", "V", "M", "eccentricity"]
     joints = collapse.joints.to_dataframe()[columns].to_csv(index=False).rstrip()
     return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot()}
+
+
+def pushover_files(push: Pushover, text: str) -> Files:
+    """Return text, curve and picture of a pushover."""
+    curve = push.curve.to_dataframe().to_csv().rstrip()
+    return {"pushover.txt": text, "pushover.csv": curve, "pushover.png": push.plot()}
 
 
 def dead_load_files(result: DeadLoadResult) -> Files:

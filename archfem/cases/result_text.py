@@ -26,6 +26,7 @@ from archfem.masonry.structure import Structure, join_joint_names, join_names
 from archfem.motion.matching import Match
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity
+from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_text, utilisation_text
 from archfem.units import STANDARD_GRAVITY, format_mm, kN
 
@@ -195,6 +196,14 @@ def describe_collapse(structure: Structure, collapse: Collapse) -> str:
     lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []
     return "\n".join(lines)
+
+
+def describe_pushover(push: Pushover) -> str:
+    """Describe a pushover: factor, end, and the joints in the order in which they first hinge."""
+    names = push.joints["name"].values
+    hinges = [f"{names[joint]} at the {side}" for joint, side in push.hinges]
+    first = repr(push).replace("Pushover", "pushover", 1)
+    return "\n".join([first, f"hinges in turn: {join_names(hinges, '; ')}"] if hinges else [first])
 
 
 def describe_accuracy(accuracy: Accuracy) -> str:

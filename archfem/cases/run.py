@@ -37,6 +37,7 @@ from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium, dead_load_doubts
+from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use
 
 if TYPE_CHECKING:
@@ -206,7 +207,7 @@ class Run(CaseResult):
 
 
 # Results that `run_case` yields.
-Result = Collapse | DeadLoadResult | Suite | Run
+Result = Collapse | DeadLoadResult | Pushover | Suite | Run
 
 
 @validate_arguments
@@ -233,8 +234,8 @@ def run_case(
         run_motion: function that integrates one motion; by default `run_time_history`.
 
     Yields:
-        A `Collapse` if the case has [limit] with a load; the `DeadLoadResult`; the `Suite` if there
-        is one; and a `Run` for each motion.
+        A `Collapse` if the case has [limit] with a load; the `DeadLoadResult`; a `Pushover` if the
+        case has one; the `Suite` if there is one; and a `Run` for each motion.
 
     Raises:
         InvalidInput: a motion cannot be read, limit analysis is not possible, or another command
@@ -277,6 +278,8 @@ def carry_out(
         yield case.limit.solve(case.structure)
     at_rest = DeadLoadResult.of(case)
     yield at_rest
+    if case.pushover is not None:
+        yield case.pushover.solve(at_rest.dead, case.analysis.failure_criteria)
     if case.suite is not None:
         suite = selected.ground_suite()  # spectral matching takes a second a pair
         yield suite

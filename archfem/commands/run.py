@@ -34,6 +34,7 @@ from archfem.limit.collapse import Collapse
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.modes import Modes
+from archfem.statics.pushover import Pushover
 from archfem.view.motions import draw_spectra, draw_suite
 from archfem.view.style import Files, write_files
 
@@ -369,7 +370,7 @@ def compile_steps(options: argparse.Namespace) -> None:
 
 def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[str, bool]:
     """Print results, write their files, and return the verdict and whether any is in doubt."""
-    # `carry_out` yields limit analysis, dead load, suite and runs in this order.
+    # `carry_out` yields limit analysis, dead load, pushover, suite and runs in this order.
     runs: dict[str, History] = {}
     with _record_doubts() as doubts:
         for result in found:
@@ -384,6 +385,10 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
                 write(results.dead_load_files(at_rest), folder)
                 if case.has_motion:
                     _print_first_modes(at_rest, folder)
+            elif isinstance(result, Pushover):
+                text = result_text.describe_pushover(result)
+                print(text)
+                write(results.pushover_files(result, text), folder)
             elif isinstance(result, Suite):
                 suite = result
                 print_motions(suite)

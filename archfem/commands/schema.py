@@ -30,7 +30,7 @@ from archfem.limit.vehicles import VEHICLES, Vehicle, rate
 from archfem.masonry.block import Block
 from archfem.masonry.construction import Stage
 from archfem.masonry.joint_closing import CONDITIONS
-from archfem.masonry.loads import AttachedLoad, BodyForce, PointLoad
+from archfem.masonry.loads import AttachedLoad, BodyForce, PointLoad, Settlement
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.parts import PART_ROLES
 from archfem.masonry.shapes.bridge_parts import Backfill, Paving
@@ -43,6 +43,7 @@ from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.mechanism_assessment import LimitState, kinematic_assessment
 from archfem.statics.newton import Newton
+from archfem.statics.pushover import Stop, pushover
 from archfem.studies.statements import Statement
 from archfem.studies.study import STUDIED_CASE_KEYS, STUDY_KEYS
 
@@ -93,6 +94,7 @@ def _case_sections() -> dict[str, Schema]:
         "criteria": _CRITERIA,
         "record": _table_of(Record),
         "limit": _limit(),
+        "pushover": _pushover(),
         "rating": _rating(),
         "assessment": _assessment(),
         "risk": _risk(),
@@ -202,7 +204,25 @@ def _limit() -> Schema:
         (collapse_factor, BodyForce),
         point=_any([point, {"type": "array", "items": point}]),
         friction=_choice(*analysis_keys.FRICTION_LAWS),
-        fill=_merged(analysis_keys.FILL_LAWS.values(), law=_choice(*analysis_keys.FILL_LAWS)),
+        fill=_fill(),
+    )
+
+
+def _fill() -> Schema:
+    """Return the schema of the strength of a fill."""
+    return _merged(analysis_keys.FILL_LAWS.values(), law=_choice(*analysis_keys.FILL_LAWS))
+
+
+def _pushover() -> Schema:
+    """Return the schema of [pushover]."""
+    point = _table_of(PointLoad)
+    return _table(
+        analysis_keys.pushover_keys(),
+        (pushover, BodyForce),
+        point=_any([point, {"type": "array", "items": point}]),
+        control=_choice("displacement", "arc length", "path", "force"),
+        stop=_table_of(Stop),
+        settlement=_table_of(Settlement),
     )
 
 
@@ -219,6 +239,7 @@ def _assessment() -> Schema:
         kinematic_assessment,
         spectrum=_SPECTRUM,
         friction=_choice(*analysis_keys.FRICTION_LAWS),
+        fill=_fill(),
         loads={"type": "array", "items": _table_of(AttachedLoad)},
         limit_state=_any([{"type": "string"}, _table_of(LimitState)]),
     )

@@ -39,6 +39,8 @@ def check(options: argparse.Namespace) -> int:
     case.check_ground()
     at_rest = DeadLoadResult.of(case)
     print(result_text.describe_dead_load(at_rest, explain=True))
+    if case.pushover is not None:
+        print(case.pushover)
     if case.suite is not None:
         print_motions(case.ground_suite())
     elif case.motion is not None:

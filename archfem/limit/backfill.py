@@ -516,7 +516,7 @@ def hold_backed(structure: Structure, level: float | None) -> Structure:
     return replace(structure, blocks=tuple(blocks))
 
 
-def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
+def attach_fill(structure: Structure, fill: object) -> BlocksWithFill:
     """Separate the stones of a structure from its fill, and check that the fill has a strength."""
     if fill is not None and not isinstance(fill, Fill):
         raise InvalidInput(

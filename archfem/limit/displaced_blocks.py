@@ -55,6 +55,14 @@ class KinematicChain:
     is_flat: bool = False  # whether contacts were found to slide without dilatancy
 
 
+class FillPressure(NamedTuple):
+    """Horizontal forces of a fill on pieces of the stones' faces, which keep their size."""
+
+    block: Numbers  # (n,)
+    points: Array  # at rest, of the least pressure and of what a passive one adds (2, n, 2) [m]
+    forces: Array  # least force, and the largest that a passive pressure adds (2, n, 2) [N]
+
+
 @dataclass(frozen=True, eq=False)
 class PlacedBlocks:
     """Rigid blocks after displacements of any size, with the loads that they carry."""
@@ -64,14 +72,20 @@ class PlacedBlocks:
     corners: Array  # of each joint's faces at rest, lower and higher block (2, n_joints, 2, 2) [m]
     loads: tuple[AttachedLoad, ...] = ()
     direction: float = 1.0  # sense of the horizontal forces along x, 1 or -1
+    fill: FillPressure | None = None
+    growing: tuple[AttachedLoad, ...] = ()  # forces that grow, instead of the horizontal ones
 
     @classmethod
     def at_rest(
-        cls, structure: Structure, loads: Sequence[AttachedLoad] = (), direction: float = 1.0
+        cls,
+        structure: Structure,
+        loads: Sequence[AttachedLoad] = (),
+        direction: float = 1.0,
+        fill: FillPressure | None = None,
     ) -> "PlacedBlocks":
         """Return the blocks of a structure at rest."""
         still = np.zeros((len(structure.blocks), 3))
-        return cls(structure, still, find_corners(structure), tuple(loads), direction)
+        return cls(structure, still, find_corners(structure), tuple(loads), direction, fill)
 
     def moved(self, displacement: Array) -> "PlacedBlocks":
         """Return the blocks at other displacements from rest."""
@@ -111,8 +125,12 @@ class PlacedBlocks:
     @cached_property
     def attached(self) -> list[tuple[int, Array, AttachedLoad]]:
         """Block and present place of each attached load [m]."""
-        loads = [(self.structure.block_number(load.block), load) for load in self.loads]
-        return [(k, self.places(np.array(load.point), k), load) for k, load in loads]
+        return self.attach(self.loads)
+
+    def attach(self, loads: Sequence[AttachedLoad]) -> list[tuple[int, Array, AttachedLoad]]:
+        """Return block and present place of loads [m]."""
+        numbers = [(self.structure.block_number(load.block), load) for load in loads]
+        return [(k, self.places(np.array(load.point), k), load) for k, load in numbers]
 
     @cached_property
     def dead(self) -> Array:
@@ -123,7 +141,10 @@ class PlacedBlocks:
 
     @cached_property
     def live(self) -> Array:
-        """Horizontal forces at a factor of one, about the centroids (n_blocks, 3) [N, N, N m]."""
+        """Forces that grow, at a factor of one, about the centroids (n_blocks, 3) [N, N, N m]."""
+        if self.growing:
+            grown = self.attach(self.growing)
+            return self._resultants([(k, place, load.force) for k, place, load in grown])
         pulls = [(k, place, (self.direction * weight, 0.0)) for k, place, weight in self.masses]
         return self._resultants(pulls)
 
@@ -280,6 +301,36 @@ class Bodies:
         """Return the rates of gaps and of slips, each (n_contacts, 3 n_bodies)."""
         return [jump_rates(*jumps) for jumps in self._jumps(contacts)]
 
+    @cached_property
+    def fill_forces(self) -> tuple[csr_matrix, csr_matrix]:
+        """Return generalised least and further forces of the fill, each (n, 3 n_bodies)."""
+        fill, blocks = self.blocks.fill, self.blocks
+        if fill is None:
+            none = csr_matrix((0, 3 * self.count))
+            return none, none
+        arms = fill.points - blocks.structure.centroids[fill.block]
+        turned = rotate(arms, blocks.displacement[fill.block, 2])
+        body = self.body[fill.block]
+        pairs = np.stack([np.full_like(body, -1), body], axis=1)
+        least, further = (
+            jump_rates(forces, places, pairs, self.references)
+            for forces, places in zip(
+                fill.forces, turned + blocks.centroids[fill.block], strict=True
+            )
+        )
+        return least, further
+
+    def dead_forces(self, velocity: Array | None = None) -> Array:
+        """Return the generalised forces that do not grow (3 n_bodies,).
+
+        The fill presses actively, and passively where a velocity moves a stone into it.
+        """
+        least, further = self.fill_forces
+        dead = self.generalised(self.blocks.dead) + least.sum(axis=0).A1
+        if velocity is not None:
+            dead += further.T @ (further @ velocity < 0.0)
+        return np.asarray(dead)
+
     def _jumps(self, contacts: Sequence[Contact]) -> list[tuple[Array, Array, Numbers, Array]]:
         """Return the arguments of `jump_rates` for gaps and for slips."""
         points = np.array([contact.point for contact in contacts]).reshape(-1, 2)
@@ -346,22 +397,26 @@ def _solve_static(
     With `held` normal forces, friction is limited by these.
     """
     normal, along = bodies.sparse_rates(contacts)
-    dead, live = (bodies.generalised(load) for load in (bodies.blocks.dead, bodies.blocks.live))
+    dead, live = bodies.dead_forces(), bodies.generalised(bodies.blocks.live)
+    further = bodies.fill_forces[1]
     # forces in mean body weights and lengths in metres over the size keep coefficients near one
     unit = np.abs(bodies.blocks.dead[:, 1]).sum() / bodies.count
     count, slides = len(contacts), np.isfinite(coefficient)
     coefficient_or_zero = np.where(slides, coefficient, 0.0)
-    balance = sparse.hstack([normal.T, along.T, (live / unit)[:, None]])
+    balance = sparse.hstack([normal.T, along.T, further.T / unit, (live / unit)[:, None]])
     slope, one = (sparse.diags(v).tocsr()[slides] for v in (coefficient_or_zero, np.ones(count)))
     strength = np.zeros(2 * int(slides.sum()))
     if held is not None:
         strength = np.tile((coefficient_or_zero * held)[slides], 2)
         slope = 0.0 * slope
-    none = csr_matrix((slope.shape[0], 1))
+    pieces = further.shape[0]
+    none = csr_matrix((slope.shape[0], pieces + 1))
     limits = sparse.bmat([[-slope, one, none], [-slope, -one, none]], format="csr")
-    # forces across joints, along them, and the factor, which is maximised
-    bounds = np.repeat([[0.0, np.inf], [-np.inf, np.inf]], [count, count + 1], axis=0)
-    cost = np.append(np.zeros(2 * count), -1.0)
+    # forces across joints, along them, shares of passive pressure, and the factor, maximised
+    anything, share = [-np.inf, np.inf], [0.0, 1.0]
+    kinds, numbers = [[0.0, np.inf], anything, share, anything], [count, count, pieces, 1]
+    bounds = np.repeat(kinds, numbers, axis=0)
+    cost = np.append(np.zeros(2 * count + pieces), -1.0)
     equations = sparse.diags(bodies.units) @ balance, -bodies.units * dead / unit
     if (result := solve_linear(cost, bounds, equations, (limits, strength))) is None:
         return None

@@ -1,9 +1,9 @@
 """Finite motion of a collapse mechanism: load factor along the path of rigid blocks.
 
 Limit analysis gives the velocities with which a structure begins to fall, and the factor α of the
-horizontal forces that start it. Here the blocks follow that mechanism by finite rotations and
+forces that start it. Here the blocks follow that mechanism by finite rotations and
 slips: hinges are pins at corners, and a sliding corner stays on the face that it touches. At each
-place along the path, α is the factor at which the horizontal forces balance the weights, by
+place along the path, α is the factor at which the growing forces balance the weights, by
 virtual work on the velocities there.
 
 Three events change the mechanism: a joint that closes again, a contact that would need tension,
@@ -19,11 +19,15 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import xarray as xr
 from scipy.optimize import linprog
 
 from archfem._display import ExplainedWord
 from archfem._typing import Array, Flags
-from archfem.errors import DidNotConverge
+from archfem._validation import check_choice, validate_arguments
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.limit.backfill import refuse_bonds
+from archfem.limit.collapse import Outcome, collapse_factor
 from archfem.limit.displaced_blocks import (
     STILL,
     TOUCHING,
@@ -36,16 +40,18 @@ from archfem.limit.displaced_blocks import (
 )
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.masonry.block import largest_overlap, rotate
-from archfem.masonry.structure import join_joint_names
+from archfem.masonry.loads import Action, AttachedLoad, PointLoad, list_loads
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
+from archfem.masonry.structure import HasStructure, Structure, join_joint_names, structure_of
 
 
 class PathEnd(ExplainedWord):
     """Reason for which the path of a mechanism ends."""
 
-    FALLS = "falls", "at the end it falls without any horizontal force"
+    FALLS = "falls", "at the end it falls without any of the force that moves it"
     LOCKS = "locks", "at the end its contacts permit no further motion"
     COLLIDES = "collides", "at the end it runs into blocks that it has no joint with"
-    ENDURES = "endures", "it still needs a horizontal force where the path is cut off"
+    ENDURES = "endures", "it still needs a force where the path is cut off"
     UNRESOLVED = "unresolved", "at the end no mechanism was found whose faces slide flat"
 
 
@@ -179,7 +185,7 @@ class LinkageState:
         Normal forces that equilibrium does not determine are undefined (NaN).
         """
         normal, along = self.rates
-        dead = self.bodies.generalised(self.blocks.dead)
+        dead = self.bodies.dead_forces(velocity)
         live = self.bodies.generalised(self.blocks.live)
         slipping = np.flatnonzero(~self.sticks)
         coefficient = friction[[contact.joint for contact in self.contacts]]
@@ -224,15 +230,124 @@ class PathEvent:
 
 @dataclass(frozen=True, eq=False)
 class MechanismPath:
-    """Path of a mechanism: factor and displacements from rest to the fall."""
+    """Path of a mechanism: factor and displacements from rest to the fall.
 
-    blocks: PlacedBlocks  # at rest, with their loads
-    factors: Array  # α of the horizontal forces at each place (n,) [-]
-    displacements: Array  # of centroids, and rotations (n, n_blocks, 3) [m, m, rad]
-    velocity: Array  # at rest, the fastest corner at 1 m/s (n_blocks, 3)
-    mechanisms: tuple[KinematicChain, ...]  # one after the other
+    Attributes:
+        blocks: the blocks at rest, with their loads.
+        factors: factor α of the growing forces at each place (n,) [-].
+        displacements: of centroids, and rotations (n, n_blocks, 3) [m, m, rad].
+        velocity: velocities at rest, the fastest corner at 1 m/s (n_blocks, 3).
+        mechanisms: mechanisms, one after the other.
+        events: changes of the mechanism, each with the number of its place and its text.
+        end: reason for which the path ends; `end.sentence` gives its meaning.
+        holds: last place up to which no other mechanism has a lower factor; beyond it the factors
+            are upper bounds. None where that was not examined.
+    """
+
+    blocks: PlacedBlocks
+    factors: Array
+    displacements: Array
+    velocity: Array
+    mechanisms: tuple[KinematicChain, ...]
     events: tuple[PathEvent, ...]
     end: PathEnd
+    holds: int | None = None
+
+    @cached_property
+    def curve(self) -> xr.Dataset:
+        """Factor [-], and displacement of the growing loads along themselves [m], over place."""
+        at_rest = self.blocks.attach(self.blocks.growing)
+        forces = np.array([load.force for _, _, load in at_rest]).reshape(-1, 2)
+        start = np.array([place for _, place, _ in at_rest]).reshape(-1, 2)
+        moved = np.zeros(len(self.factors))
+        for number, displacement in enumerate(self.displacements):
+            grown = self.blocks.moved(displacement).attach(self.blocks.growing)
+            travel = np.array([place for _, place, _ in grown]).reshape(-1, 2) - start
+            moved[number] = np.sum(forces * travel) / np.linalg.norm(forces)
+        values = {"factor": (self.factors, "1"), "displacement": (moved, "m")}
+        return xr.Dataset(
+            {key: ("place", value, {"units": unit}) for key, (value, unit) in values.items()}
+        )
+
+
+@validate_arguments
+def collapse_path(
+    structure: Structure | HasStructure,
+    *,
+    live: Action | Sequence[Action],
+    friction: str | None = "coulomb",
+    dead: Sequence[Action] = (),
+) -> MechanismPath:
+    """Follow the collapse mechanism of rigid blocks by finite rotations and slips to their fall.
+
+    The path begins with the mechanism of `collapse_factor`, and gives the descending branch of the
+    curve whose peak that factor is: hinges are pins at corners, faces slide flat. At each place α
+    balances the loads, by virtual work,
+
+        α f_live·v + f_dead·v - Σ μ N |G_s v| = 0.
+
+    Where a joint closes, a contact would need tension, or a corner slides off its face, limit
+    analysis on the displaced blocks gives the next mechanism. Forces keep their direction and stay
+    with the points of the blocks on which they act. Joints are rigid, have no cohesion and do not
+    crush: with elastic ones a curve lies below, and tends to this path as displacements grow.
+
+    Args:
+        structure: supports are its fixed blocks; or an `archfem.Analysis` of it.
+        live: one action, or several that grow together.
+        friction: "coulomb", by which the first mechanism dilates and its motion does not, so that
+            the first factor may be below `collapse_factor`; None forbids sliding.
+        dead: loads that act beside self-weight and do not grow.
+
+    Returns:
+        Factors, displacements and events; its `curve` is that of a pushover.
+
+    Raises:
+        InvalidInput: an option is unknown, an action misses the structure, it does not stand, no
+            factor makes it a mechanism, joints have tensile strength, or it has a fill.
+        DidNotConverge: no mechanism was found that moves without the dilatancy of sliding faces.
+
+    Example:
+        >>> wall = af.column(breadth=0.6, heights=[2.4])
+        >>> path = af.limit.collapse_path(wall, live=af.BodyForce(1.0))
+        >>> round(path.factors[0], 4), round(float(path.curve["displacement"][-1]), 4)
+        (0.25, 0.3)
+    """
+    structure, grows = structure_of(structure), list_loads(live)
+    check_choice(friction, "friction", ("coulomb", None))
+    refuse_bonds(structure)
+    if find_yielding_blocks(structure):
+        raise InvalidInput(
+            "a fill does not follow the stones on a path: under horizontal forces "
+            "af.kinematic_assessment(…, fill=…) follows them with its pressures as built"
+        )
+    found = collapse_factor(structure, live=grows, friction=friction, dead=dead)
+    if found.outcome is not Outcome.COLLAPSES:
+        raise InvalidInput(f"{found.outcome.sentence}: there is no mechanism to follow")
+    placed = PlacedBlocks.at_rest(structure, _attach_actions(structure, dead))
+    placed = replace(placed, growing=_attach_actions(structure, grows))
+    joints = list(range(len(structure.joints)))
+    coefficient = structure.friction if friction else np.full(len(joints), np.inf)
+    mechanism = find_mechanism(placed, joints, coefficient)
+    assert mechanism is not None
+    follower = PathFollower(placed, joints, coefficient)
+    path = follower.follow(mechanism)
+    return replace(path, holds=follower.last_equilibrium(path))
+
+
+def _attach_actions(structure: Structure, actions: Sequence[Action]) -> tuple[AttachedLoad, ...]:
+    """Return actions as forces that stay with points of the blocks."""
+    loads = []
+    for action in actions:
+        if isinstance(action, PointLoad):
+            number, (x, y) = action.place(structure)
+            loads.append(AttachedLoad(number, (float(x), float(y)), force=action.force))
+            continue
+        for number, (x, y), weight in PlacedBlocks.at_rest(structure).masses:
+            if structure.blocks[number].fixed:
+                continue
+            force = weight * action.horizontal, weight * action.vertical
+            loads.append(AttachedLoad(number, (float(x), float(y)), force=force))
+    return tuple(loads)
 
 
 class _Stop(Exception):

@@ -311,22 +311,62 @@ class Programme:
                 limits = limits.joined(crushing_cuts(crushes, thrust, self.crushing))
         columns = sparse.csr_matrix((len(self.load), 0)) if self.columns is None else self.columns
         reduced = self.blocks.reduce(columns, self.friction, self.cohesion > 0.0)
-        # As tangents of a parabola the cuts converge quadratically, in about six rounds.
+        # As tangents of a parabola the cuts converge quadratically, in about six rounds, where one
+        # state is optimal. Where many are, as in walls, each round may find another one: once the
+        # optimum is known, that of least compressions is sought.
+        found, programme, before = None, self, np.inf
         for _ in range(max_rounds):
-            optimum = reduced.solve(self, limits)
+            try:
+                optimum = reduced.solve(programme, limits)
+            except NoEquilibrium:
+                if found is None:
+                    raise
+                found, programme, before = None, self, np.inf  # the optimum was not yet known
+                continue
             if optimum is None or self.crushing is None:
                 return optimum
-            thrust = optimum.forces.reshape(3, -1)[:2].sum(axis=0)
-            smaller_end = optimum.forces.reshape(3, -1)[:2].min(axis=0)
-            excess = thrust**2 / (2.0 * self.crushing) - smaller_end
+            ends = optimum.forces.reshape(3, -1)[:2]
+            thrust = ends.sum(axis=0)
+            excess = thrust**2 / (2.0 * self.crushing) - ends.min(axis=0)
             violated = np.flatnonzero(excess > crushing_tolerance * self.crushing)
             if not len(violated):
-                return optimum
+                return optimum if found is None else self._join_states(found, optimum)
             limits = limits.joined(crushing_cuts(violated, thrust[violated], self.crushing))
+            if found is None and abs(optimum.value - before) <= 1e-9 * abs(optimum.value):
+                held = self._hold_factor(optimum)
+                found, programme = (None, self) if held is None else (optimum, held)
+            before = optimum.value
         raise DidNotConverge(
             f"the crushing limit is still violated after {max_rounds} rounds of cuts: "
             "check that strength is in Pa"
         )
+
+    def _hold_factor(self, optimum: Optimum, share: float = 1.0 - 1e-6) -> "Programme | None":
+        """Return the programme of least compressions at a share of a factor; None without one."""
+        if self.force_cost is not None or np.count_nonzero(self.unknown_cost[1:]):
+            return None
+        load, upper_bounds = self.load, self.upper_bounds.copy()
+        if self.columns is not None and self.unknown_cost[0]:
+            load = load - self.columns[:, [0]].toarray()[:, 0] * share * optimum.unknowns[0]
+            upper_bounds[0] = 0.0
+        # weights without regularity make this state unique, so that cuts converge
+        weights = 1.0 + np.arange(2 * len(self.friction)) * 0.5 * (5.0**0.5 - 1.0) % 1.0
+        least = np.concatenate([weights, np.zeros(len(self.friction))])
+        return replace(
+            self,
+            load=load,
+            force_cost=least,
+            unknown_cost=np.zeros_like(self.unknown_cost),
+            upper_bounds=upper_bounds,
+        )
+
+    def _join_states(self, found: Optimum, state: Optimum, share: float = 1.0 - 1e-6) -> Optimum:
+        """Return the mechanism of an optimum, and the forces at a share of its factor."""
+        unknowns = state.unknowns.copy()
+        if self.columns is not None and self.unknown_cost[0]:
+            unknowns[0] = share * found.unknowns[0]
+        value = float(self.unknown_cost @ unknowns)
+        return replace(found, value=value, forces=state.forces, unknowns=unknowns)
 
 
 class Chains:

@@ -30,9 +30,10 @@ from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import check_fields, check_number, is_one_of, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.limit.backfill import FillProfile
+from archfem.limit.backfill import BlocksWithFill, Fill, FillProfile, attach_fill
 from archfem.limit.collapse import collapse_factor
 from archfem.limit.displaced_blocks import (
+    FillPressure,
     KinematicChain,
     PlacedBlocks,
     classify_motion,
@@ -41,6 +42,7 @@ from archfem.limit.displaced_blocks import (
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
+from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.loads import AttachedLoad, BodyForce
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (
@@ -304,6 +306,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     part: str | None = None,
     blocks: Sequence[int | str] | None = None,
     loads: Sequence[AttachedLoad] = (),
+    fill: Fill | PlasticFill | None = None,
     limit_state: str | LimitState = "NTC-2018 SLV",
     q: float = 2.0,
     confidence_factor: float = 1.35,
@@ -320,7 +323,9 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
       acceleration does not set in motion, a₀* / FC above it, passes as well.
 
     A fill, bodies softer than their joints, counts by its weight and mass on the stones below,
-    column by column, without its pressure. The mechanism must stand on the ground: spectra at a
+    column by column; with its strength, `fill`, it presses on them as in `collapse_factor`. Along
+    the motion pressures are those of the weights as built, active on faces that move away and
+    passive on those that move into the fill. The mechanism must stand on the ground: spectra at a
     height of a building are not built here; give one as a `TableSpectrum`, or a `Motion`.
 
     Args:
@@ -333,6 +338,8 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         part: name of a part; only joints that touch its blocks may move.
         blocks: names or numbers of blocks; only joints that touch them may move.
         loads: loads that stay with their blocks, such as floors and ties.
+        fill: strength of the fill, a `Fill`; None leaves its pressure out. The bounds of a
+            `PlasticFill` have no finite motion.
         limit_state: rules of the displacement check: "NTC-2018 SLV" (d_u* = 0.4 d₀*, T = 1.68 π
             √(d_u*/a*), 8 % damping; Circolare 7/2019, C8.7.1.2.1.6 and .8), "NTC-2018 SLC" (0.6,
             1.56 π, 10 %; there), "NTC-2008 SLV" (0.4, secant period at 0.4 d_u*, 5 %; Circolare
@@ -375,9 +382,11 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
             raise InvalidInput(f"{name} {value:.4g} is not between 1 and {most:g}")
     structure = structure_of(structure)
     _check_structure(structure, friction, loads)
-    stones, fill = _take_fill_as_loads(structure)
+    filled = None if fill is None else attach_fill(structure, fill)
+    stones, weights = _take_fill_as_loads(structure if filled is None else filled.whole)
     joints = _select_joints(stones, part, blocks)
-    placed = PlacedBlocks.at_rest(stones, (*fill, *loads), float(direction))
+    pressure = None if filled is None else _press_stones(filled)
+    placed = PlacedBlocks.at_rest(stones, (*weights, *loads), float(direction), pressure)
     coefficient = stones.friction if friction else np.full(len(stones.joints), np.inf)
     mechanism = _find_first_mechanism(placed, joints, coefficient, friction)
     path, holds = None, 0
@@ -391,8 +400,10 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
                 "(friction=None)"
             )
         holds = follower.last_equilibrium(path)
+        if filled is not None:
+            filled.warn_of_sliding_fill([BodyForce(float(direction))], (), mechanism.factor)
     given = spectrum, rules, confidence_factor
-    return _Oscillator(placed, path, holds, bool(fill), *given).assess(q)
+    return _Oscillator(placed, path, holds, bool(weights), *given).assess(q)
 
 
 @validate_arguments
@@ -468,6 +479,14 @@ def _take_fill_as_loads(structure: Structure) -> tuple[Structure, tuple[Attached
             name = structure.blocks[number].name
             loads.append(AttachedLoad(name, (float(x), float(y)), float(weight[own].sum())))
     return regions.structure, tuple(loads)
+
+
+def _press_stones(filled: BlocksWithFill) -> FillPressure:
+    """Return the forces of a fill on the stones, from its active pressure to its passive one."""
+    contacts, width = filled.contacts, filled.whole.width
+    ranges = contacts.least, contacts.most - contacts.least
+    points, forces = zip(*(contacts.thrust(each, width) for each in ranges), strict=True)
+    return FillPressure(contacts.block, np.array(points), np.array(forces))
 
 
 def _select_joints(
@@ -590,10 +609,15 @@ class _Oscillator:
         if self.path is None:
             return []
         found, collapse = [], self.path.mechanisms[0].factor
-        if self.fill:
+        if self.placed.fill is not None:
+            found.append(
+                "the pressures of the fill on the stones are those of the weights as built, all "
+                "along the motion; that the fill stays in place is not checked"
+            )
+        elif self.fill:
             found.append(
                 "the fill counts as weight and mass on the stones; its pressure on them, which "
-                "may hold an arch back or push a wall out, is left out"
+                "may hold an arch back or push a wall out, is left out: give fill for it"
             )
         if any(any(load.force) for load in self.placed.loads):
             found.append(

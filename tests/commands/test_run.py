@@ -339,6 +339,64 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     assert f"at a factor of {2.0 * found.factor:.4g}" in capsys.readouterr().out
 
 
+def test_an_assessment_takes_the_strength_of_a_fill():
+    tables = tomllib.loads(LIMIT + '[assessment]\nfill = { friction_angle = "35 degree" }\n')
+    fill = af.Case.of(tables).assessment.options["fill"]
+    assert fill == af.limit.Fill(friction_angle=35.0)
+    tables["assessment"]["fill"] = {}
+    with pytest.raises(af.InvalidInput, match="lacks its angle"):
+        af.Case.of(tables)
+
+
+PUSHOVER = """
+title = "a pier under a press, pushed over"
+[structure]
+shape = "column"
+breadth = 0.6
+heights = [0.8, 0.8]
+[model]
+fidelity = "rigid"
+[pushover]
+point = { x = "-0.3 m", y = "1.6 m", force = ["1 kN", "0 kN"] }
+dead = [{ x = "0 m", force = ["0 kN", "-50 kN"] }]
+stop = { displacement = 0.005 }
+"""
+
+
+def test_pushover_of_a_case(tmp_path, unplotted, capsys):
+    """That of the Python call, as text, table, picture and part of the report."""
+    path, out = tmp_path / "pier.toml", tmp_path / "out"
+    path.write_text(PUSHOVER)
+    assert af.commands.main(["check", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "pushover: loads that grow together: 1; loads that stay: 1; control by displ" in said
+    assert af.commands.main(["run", str(path), "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    model = af.build(af.column(breadth=0.6, heights=[0.8, 0.8]), fidelity="rigid")
+    live, dead = af.PointLoad(-0.3, (1e3, 0.0), y=1.6), [af.PointLoad(0.0, (0.0, -50e3))]
+    push = af.pushover(model, live, dead=dead, stop=af.statics.Stop(displacement=0.005))
+    assert f"pushover: factor {push.factor:.4g} after" in said
+    assert (out / "pushover.txt").read_text().strip() in said
+    curve = pd.read_csv(out / "pushover.csv")
+    assert curve["factor"].to_numpy() == pytest.approx(push.curve["factor"].values, rel=1e-9)
+    assert (out / "pushover.png").is_file()
+    assert af.commands.main(["report", str(out)]) == 0
+    assert "Riks" in (out / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "loads", ["", "horizontal = 1.0\nsettlement = { block = 0, motion = [0, -1, 0] }"]
+)
+def test_a_pushover_has_loads_or_a_settlement(loads, tmp_path, capsys):
+    path = tmp_path / "pier.toml"
+    path.write_text(PUSHOVER.partition("point")[0] + loads)
+    assert af.commands.main(["run", str(path), "--out", str(tmp_path / "out")]) == 1
+    assert "pushover has no load, or a load and a settlement" in capsys.readouterr().err
+    moved = PUSHOVER.partition("point")[0] + "settlement = { block = 0, motion = [0.01, 0, 0] }"
+    case = af.Case.of(tomllib.loads(moved))
+    assert case.pushover.live == af.Settlement(0, (0.01, 0.0, 0.0))
+
+
 def test_limit_analysis_needs_a_load(tmp_path, capsys):
     path = tmp_path / "ring.toml"
     path.write_text(LIMIT.replace("horizontal = 1.0", 'friction = "none"'))

@@ -5,7 +5,7 @@ from math import atan2, pi, sqrt
 
 import numpy as np
 import pytest
-from backfilled import SOIL, arch_bridge, rectangle
+from backfilled import SOIL, arch_bridge, rectangle, retaining_wall
 
 import archfem as af
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
@@ -317,6 +317,46 @@ def test_a_fill_is_weight_on_the_stones():
     assert "the fill counts as weight" in found.notes[0]
     with pytest.raises(af.InvalidInput, match="attached loads or a fill: use 'coulomb'"):
         af.kinematic_assessment(bridge, SPECTRUM, friction="nonassociated")
+
+
+@pytest.mark.parametrize(("direction", "part"), [(-1.0, 1.0), (1.0, 0.4)])
+def test_a_wall_turns_from_the_fill_behind_it_or_into_it(direction, part, verified):
+    """Active or passive thrust at a third of its height about the toe, at rest and turned."""
+    fill = af.limit.Fill(friction_angle=30.0, mobilisation=0.4)
+    wall = retaining_wall()
+    options = {"direction": direction, "friction": None, "fill": fill}
+    found = af.kinematic_assessment(wall, SPECTRUM, **options)
+    breadth, height, weight = 1.0, 2.0, 2.0 * STONE
+    # it holds the wall back, or pushes it over
+    thrust = direction * part * 3.0**direction * 0.5 * SOIL.unit_weight * height**2
+    path = found.path
+    turn = np.abs(path.displacements[:, 1, 2])
+    c, s = np.cos(turn), np.sin(turn)
+    lever = height / 3.0 * c + (breadth * s if direction < 0.0 else 0.0)
+    factors = 0.5 * weight * (breadth * c - height * s) + thrust * lever
+    factors /= 0.5 * weight * (height * c + breadth * s)
+    assert path.factors[:-1] == pytest.approx(factors[:-1], rel=1e-9)
+    assert path.factors[-1] == pytest.approx(0.0, abs=1e-8)
+    assert "all along the motion" in found.notes[0]
+    verified(
+        f"wall beside a fill, pushed {direction:+g}: alpha_0",
+        factors[0],
+        "closed form",
+        found.alpha_0,
+    )
+
+
+def test_pressures_of_a_fill_are_those_of_limit_analysis():
+    """The first factor of a bridge on a fill is the collapse factor, also with a cohesive one."""
+    bridge, fill = arch_bridge(voussoirs=8), af.limit.Fill(friction_angle=35.0, cohesion=2e3)
+    found = af.kinematic_assessment(bridge, SPECTRUM, fill=fill)
+    expected = af.collapse_factor(bridge, live=af.BodyForce(1.0), fill=fill).factor
+    assert found.path.mechanisms[0].factor == pytest.approx(expected, rel=1e-6)
+    bare = af.limit.Fill(friction_angle=35.0, mobilisation=0.0, active=0.0)
+    assert expected > 1.05 * af.collapse_factor(bridge, live=af.BodyForce(1.0), fill=bare).factor
+    plastic = af.limit.PlasticFill(friction_angle=35.0)
+    with pytest.raises(af.InvalidInput, match="cannot take a PlasticFill"):
+        af.kinematic_assessment(bridge, SPECTRUM, fill=plastic)
 
 
 def test_words_table_and_a_mechanism_that_never_moves(ring):

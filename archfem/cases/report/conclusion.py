@@ -148,8 +148,8 @@ def _conclude_range(data: ReportData) -> Iterator[str]:
 
 
 def _conclude_statics(data: ReportData) -> Iterator[str]:
-    """Yield the decisive sentences of limit analysis, rating and kinematic assessment."""
-    for name in ("limit.txt", "rating.txt"):
+    """Yield the decisive sentences of limit analysis, pushover, rating and assessment."""
+    for name in ("limit.txt", "pushover.txt", "rating.txt"):
         if text := data.read_text(name):
             yield sentence(text.splitlines()[0])
     for part in (data.read_text("assessment.txt") or "").split("\n\n"):

@@ -12,7 +12,7 @@ from archfem.view.pages.document import Grid
 
 Row = tuple[str, str, str]  # quantity, value, mark
 
-_STATIC_SECTIONS = ("limit", "rating", "assessment")
+_STATIC_SECTIONS = ("limit", "pushover", "rating", "assessment")
 _CAPTION = (
     "Inputs. Given: the case states it. Default: archfem's, since the case does not. Inferred: it "
     "follows from the others."

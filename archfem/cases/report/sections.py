@@ -71,6 +71,7 @@ _METHODS = (
     ("", "joints, criteria", "Demirel and Aldemir, Buildings 11 (2021)"),
     ("", "mechanisms", "Heyman, Int. J. Solids Struct. 2 (1966) 249-279"),
     ("limit.txt", "limit analysis", "Livesley, Int. J. Numer. Meth. Eng. 12 (1978) 1853-1871"),
+    ("pushover.txt", "pushover", "Riks, Int. J. Solids Struct. 15 (1979) 529-551"),
     ("rating.txt", "rating", "Heyman, The Masonry Arch, Ellis Horwood (1982)"),
     ("assessment.txt", "assessment", "NTC 2018, with its Circolare 7/2019, C8.7.1.2"),
     ("verdict_range.txt", "range", "Clopper and Pearson, Biometrika 26 (1934) 404-413"),
@@ -172,13 +173,15 @@ def _tabulate_parts(structure: Structure) -> Grid:
 
 
 def build_dead_load_sections(data: ReportData) -> list[Section]:
-    """Build the sections on dead load, modes, limit analysis, rating and assessment."""
+    """Build the sections on dead load, modes, limit analysis, pushover, rating, assessment."""
     collapse = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
+    curve = "Load factor over displacement, with the joints in the order of their first hinge."
     rating = "Factor along the bridge, and mechanism at the worst place."
     return [
         Section("Dead load", _build_dead_load(data)),
         Section("Modes", data.read_result("modes", "Shapes of the modes about dead load.")),
         Section("Limit analysis", data.read_result("limit", collapse, "collapse.png")),
+        Section("Pushover", data.read_result("pushover", curve)),
         Section("Rating for a vehicle", data.read_result("rating", rating)),
         Section("Kinematic assessment", _build_assessment(data)),
     ]

@@ -6,7 +6,6 @@ American Mathematical Monthly 82 (1975) 648), and triangles are merged while the
 """
 
 import logging
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations, pairwise
@@ -48,9 +47,7 @@ class Bodies(NamedTuple):
     level: float  # of the ground [m]
     contact_gap: float  # largest gap of a contact [m]
     slop: float  # overlap that is not corrected [m]
-    # ratio of speeds of a rocking face, zero where none is given, negative where it is less than an
-    # impact at the closing end keeps (b + 1, b + 1) [-]
-    rocking: Array
+    rocking: Array  # ratio of speeds of a rocking face, zero for none (b + 1, b + 1) [-]
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,37 +225,6 @@ def _cohesion_table(structure: Structure) -> Array:
     return np.where(np.isinf(table), 0.0, table)
 
 
-def find_unkept_ratios(
-    structure: Structure, ratio: float | Mapping[str, float], error: float = 0.002
-) -> dict[str, float]:
-    """Return Housner's ratio of the joints where the one given is less, by more than an error.
-
-    Those of blocks on one joint to a fixed block; of others it depends on what they touch. By their
-    time steps simulations err by as much as the error.
-    """
-    counts = Counter(number for joint in structure.joints for number in joint.blocks)
-    unkept = {}
-    for joint, friction in zip(structure.joints, structure.friction, strict=True):
-        free, support = sorted(joint.blocks, key=lambda number: structure.blocks[number].fixed)
-        block = structure.blocks[free]
-        if counts[free] > 1 or block.fixed or not structure.blocks[support].fixed:
-            continue
-        given = ratio.get(joint.name, 1.0) if isinstance(ratio, Mapping) else ratio
-        arms, least = block.centroid - joint.ends, 1.0
-        for before, after in (arms, arms[::-1]):
-            # the impulse passes through the closing end, about which turning is conserved
-            inertia = block.polar_moment + block.area * np.array([before @ after, after @ after])
-            kept = inertia[0] / inertia[1]
-            # where friction does not hold that end, it slides, and less may be kept
-            change = kept * after - before
-            normal = joint.tangent @ change
-            shear = joint.tangent[0] * change[1] - joint.tangent[1] * change[0]
-            least = min(least, kept if abs(shear) <= friction * abs(normal) else 0.0)
-        if given < least - error:
-            unkept[joint.name] = float(least)
-    return unkept
-
-
 def _rocking_table(structure: Structure, ratio: float | Mapping[str, float] | None) -> Array:
     """Return the rocking restitution between any two bodies, zero where none is given."""
     count = len(structure.blocks) + 1
@@ -276,11 +242,6 @@ def _rocking_table(structure: Structure, ratio: float | Mapping[str, float] | No
             table[a, b] = table[b, a] = _check_ratio(value)
     else:
         table[:] = _check_ratio(ratio)
-    unkept = find_unkept_ratios(structure, ratio)
-    for joint in structure.joints:
-        if joint.name in unkept:
-            a, b = joint.blocks
-            table[a, b] = table[b, a] = -table[a, b]
     return table
 
 

@@ -37,7 +37,8 @@ class Contacts(NamedTuple):
     point: Array  # position (c, 2) [m]
     normal: Array  # from the first body to the second (c, 2)
     gap: Array  # negative for overlap (c,) [m]
-    impulse: Array  # along the normal, and along the normal turned by +90° (c, 2) [N s]
+    # along the normal, along the normal turned by +90°, and at both ends of a face, opposite (c, 3)
+    impulse: Array  # [N s]
 
 
 class StoredImpulses(NamedTuple):
@@ -71,7 +72,7 @@ def allocate_contacts(pieces: int) -> Contacts:
         np.zeros((capacity, 2)),
         np.zeros((capacity, 2)),
         np.zeros(capacity),
-        np.zeros((capacity, 2)),
+        np.zeros((capacity, 3)),
     )
 
 
@@ -342,7 +343,7 @@ def restore_impulses(bodies, q, contacts, count, stored):  # type: ignore
     """Set impulses to those of the nearest contacts of the same pieces, each used once."""
     slots = stored.slots
     for k in range(count):
-        contacts.impulse[k, 0] = contacts.impulse[k, 1] = 0.0
+        contacts.impulse[k, 0] = contacts.impulse[k, 1] = contacts.impulse[k, 2] = 0.0
         place, best, nearest = _tangential_position(bodies, q, contacts, k), -1, np.inf
         slot = _hash_slot(contacts.key[k], len(slots))
         # up to two contacts of a pair share a chain of slots
@@ -486,7 +487,7 @@ def measure_residual(bodies, workspace, touching):  # type: ignore
         a, b = contacts.bodies[k]
         nx, ny = contacts.normal[k]
         na, nb, ta, tb, kn, kt, target, slip, friction = workspace.rows[k, :9]
-        normal, tangential = contacts.impulse[k]
+        normal, tangential, couple = contacts.impulse[k]
         # no tension and no approach: the impulse equals its projection after a correction
         speed = relative_speed(speeds, (a, b), (nx, ny), (na, nb)) - target
         worst = max(worst, abs(max(normal - kn * speed, 0.0) - normal) / kn)
@@ -495,6 +496,12 @@ def measure_residual(bodies, workspace, touching):  # type: ignore
         limit = friction * normal + workspace.rows[k, 14]
         change = min(max(tangential - kt * speed, -limit), limit) - tangential
         worst = max(worst, abs(change) / kt)
+        arm, bound = workspace.rows[k, 15:17]
+        if arm != 0.0:
+            # no couple, or a face that opens at the bound
+            inverse = arm * arm * (bodies.inverse_mass[a, 1] + bodies.inverse_mass[b, 1])
+            excess = (arm * (speeds[b, 2] - speeds[a, 2]) - bound) / inverse
+            worst = max(worst, abs(max(couple + excess, 0.0) - couple) * inverse)
     return worst
 
 

@@ -85,10 +85,9 @@ class RigidBlockSimulation:
         level: height of the ground [m]; None takes the lowest point of the fixed blocks.
         rocking_ratio: angular velocity after over that before, where a face that turns about one
             end closes at the other: of all faces, or by names of joints [-]. None, and joints not
-            named, take that of an impact at the closing end alone (Housner's). It is the least that
-            contact without tension keeps. Blocks on one joint to a fixed block keep smaller ratios
-            too, as measured on rubber: a couple at the closing end takes the rest. Of others the
-            least depends on what they touch, and smaller ratios have no effect.
+            named, take that of an impact at the closing end alone (Housner's of one block), the
+            least that contact without tension keeps. A smaller ratio, as measured on rubber, is
+            kept by a couple between the two blocks of the joint, which takes energy.
 
     Raises:
         InvalidInput: a number is out of range, there is no coefficient of
@@ -261,10 +260,10 @@ def prepare_steps(
         contacts,
         allocate_stored_impulses(contacts),
         np.empty((count, 3)),
-        np.empty((len(contacts.key), 15)),
+        np.empty((len(contacts.key), 17)),
         np.zeros((count + 1, 3)),
         *(
-            SweepResult(np.zeros((count + 1, 3)), np.zeros((len(contacts.key), 2)))
+            SweepResult(np.zeros((count + 1, 3)), np.zeros((len(contacts.key), 3)))
             for _ in range(2)
         ),
     )

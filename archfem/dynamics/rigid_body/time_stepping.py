@@ -11,9 +11,14 @@ Methods Appl. Mech. Eng. 177 (1999) 235). Sweeps over the faces, each with both 
 once, solve for the impulses P, from those of the step before. They
 have momentum with restart (Nesterov, Soviet Math. Dokl. 27 (1983) 372; O'Donoghue and Candès,
 Found. Comput. Math. 15 (2015) 715), and end once no contact violates its conditions by more than a
-stated speed. Rebounds are reduced where they would add energy. Overlaps are corrected in positions.
-Points that would pass each other by the end of the step are contacts too, except beside faces with
-a rocking ratio.
+stated speed. Rebounds are reduced where they would add energy. Overlaps are corrected in
+positions. Points that would pass each other by the end of the step are contacts too, except beside
+faces with a rocking ratio. There a couple C between the two blocks, the same on both, bounds the
+rate at which the old end opens,
+
+    0 <= C ⊥ r |Δu_N0| - Δu_N1 >= 0   with Δu_N the difference of u_N at both ends,
+
+so that its work -C Δu_N1 is never positive.
 """
 
 from typing import NamedTuple
@@ -69,7 +74,7 @@ class SweepResult(NamedTuple):
     """Velocities and impulses after a sweep."""
 
     speeds: Array  # (b + 1, 3)
-    impulse: Array  # (c, 2)
+    impulse: Array  # (c, 3)
 
 
 class StepWorkspace(NamedTuple):
@@ -83,7 +88,8 @@ class StepWorkspace(NamedTuple):
     # the tangent; 1/(H M⁻¹ Hᵀ) of normal and tangent; target u_N and u_T; μ; coupling of u_N with
     # the impulse of the next contact, if of the same face; rebound in the target u_N; H M⁻¹ Hᵀ of
     # normal and tangent; 1/determinant of the normal equations of a face, zero for none; limit of
-    # the tangential impulse by cohesion (c, 15)
+    # the tangential impulse by cohesion; of a face with a rocking ratio that closes, its length, as
+    # the arm of the rate at which it opens, zero for none, and the bound of that rate (c, 17)
     rows: Array
     speeds: Array  # velocities during the sweeps, the ground's last (b + 1, 3)
     last: SweepResult  # of the sweep before
@@ -187,8 +193,6 @@ def take_step(bodies, parameters, workspace, state):  # type: ignore
     if rebounds and work > 0.0:
         more, residual = _limit_rebounds(bodies, parameters, workspace, touching, (v, ground))
         sweeps += more
-    if rebounds:
-        _stop_rocking(bodies, workspace, touching)
     store_impulses(bodies, middle, contacts, touching, workspace.stored)
     # trapezoidal rule for the poses
     q += 0.5 * parameters.dt * (v + speeds[: len(q)])
@@ -269,7 +273,7 @@ def _separate(bodies, parameters, workspace, touching):  # type: ignore
         deepest = max(deepest, excess)
         # the displacement of the contact, and no friction
         rows[k, 6] = excess
-        rows[k, 7] = rows[k, 8] = rows[k, 14] = 0.0
+        rows[k, 7] = rows[k, 8] = rows[k, 14] = rows[k, 15] = 0.0
     if deepest <= 0.0:
         return False
     speeds[:] = 0.0
@@ -284,17 +288,17 @@ def _add_rebounds(bodies, parameters, workspace, touching):  # type: ignore
 
     Newton's law applies to each contact. Where a face closes at one end, its other end opens by
     the given share of the speed at which the face has turned: the impulse is distributed over
-    the face, with its resultant within the closing end.
+    the face, with its resultant within the closing end. It opens no faster than that either.
     """
     contacts, rows, speeds = workspace.contacts, workspace.rows, workspace.speeds
     any_rebound = False
     for k in range(touching):
-        rows[k, 10] = 0.0
+        rows[k, 10] = rows[k, 15] = 0.0
     for k in range(touching):
         a, b = contacts.bodies[k]
         normal = contacts.normal[k, 0], contacts.normal[k, 1]
         speed = relative_speed(speeds, (a, b), normal, (rows[k, 0], rows[k, 1]))
-        ratio = abs(bodies.rocking[a, b])
+        ratio = bodies.rocking[a, b]
         is_end = k > 0 and has_partner(contacts, k - 1, touching)
         if ratio == 0.0 or not (is_end or has_partner(contacts, k, touching)):
             # a point still apart rebounds where it would cross by the end of the step
@@ -308,47 +312,14 @@ def _add_rebounds(bodies, parameters, workspace, touching):  # type: ignore
             if max(speed, other) < -parameters.min_impact_speed:
                 rows[k, 10] = rows[k + 1, 10] = -parameters.restitution * max(speed, other)
             if min(speed, other) < -parameters.min_rocking_speed:
-                opening = k if speed > other else k + 1
-                rows[opening, 10] += ratio * abs(other - speed)
+                opening, closing = (k, k + 1) if speed > other else (k + 1, k)
+                rows[k, 16] = ratio * abs(other - speed)
+                rows[k, 15] = rows[opening, 1] - rows[closing, 1]
+                rows[opening, 10] += rows[k, 16]
     for k in range(touching):
         rows[k, 6] += rows[k, 10]
         any_rebound = any_rebound or rows[k, 10] > 0.0
     return any_rebound
-
-
-@kernel
-def _stop_rocking(bodies, workspace, touching):  # type: ignore
-    """Turn faces that open faster than their rebound, where less than Housner's share is kept.
-
-    A couple on the block, and a force at the closing end whose velocity it keeps, stand for what a
-    soft layer takes beyond an impact at that end.
-    """
-    contacts, rows, speeds = workspace.contacts, workspace.rows, workspace.speeds
-    for k in range(touching):
-        a, b = contacts.bodies[k]
-        if rows[k, 10] <= 0.0 or bodies.rocking[a, b] >= 0.0:
-            continue
-        other = k + 1 if has_partner(contacts, k, touching) else k - 1
-        normal = contacts.normal[k, 0], contacts.normal[k, 1]
-        opening = relative_speed(speeds, (a, b), normal, (rows[k, 0], rows[k, 1]))
-        closing = relative_speed(speeds, (a, b), normal, (rows[other, 0], rows[other, 1]))
-        if opening - closing <= rows[k, 10] or closing < -rows[k, 10]:
-            continue
-        body = a if bodies.inverse_mass[a, 0] > 0.0 else b
-        x = contacts.point[other, 0] - bodies.centre[body, 0] - workspace.middle[body, 0]
-        y = contacts.point[other, 1] - bodies.centre[body, 1] - workspace.middle[body, 1]
-        lost = speeds[body, 2] * (1.0 - rows[k, 10] / (opening - closing))
-        # the velocity of the closing end, v + ω × r, stays
-        vx, vy, spin = (
-            speeds[body, 0] - lost * y,
-            speeds[body, 1] + lost * x,
-            speeds[body, 2] - lost,
-        )
-        m, inertia = bodies.mass[body]
-        change = m * (vx**2 + vy**2 - speeds[body, 0] ** 2 - speeds[body, 1] ** 2)
-        # an end that flies up or slides may keep more: energy must not grow
-        if change + inertia * (spin**2 - speeds[body, 2] ** 2) <= 0.0:
-            speeds[body, 0], speeds[body, 1], speeds[body, 2] = vx, vy, spin
 
 
 @kernel
@@ -405,7 +376,7 @@ def _add_momentum(workspace, touching, share):  # type: ignore
             speeds[b, axis] += share * (new - last.speeds[b, axis])
             last.speeds[b, axis] = new
     for k in range(touching):
-        for axis in range(2):
+        for axis in range(3):
             new = impulse[k, axis]
             impulse[k, axis] += share * (new - last.impulse[k, axis])
             last.impulse[k, axis] = new
@@ -462,7 +433,7 @@ def _sweep_contacts(bodies, workspace, touching):  # type: ignore
 
 @kernel
 def _sweep_friction(rows, impulse, points, speeds, inverse_mass):  # type: ignore
-    """Solve for friction at the points of a face; return its change, both spins, and the slip."""
+    """Solve for friction of a face and its couple; return the change, both spins, and the slip."""
     (along, wa, wb, worst), (m, ia, ib) = speeds, inverse_mass
     total = 0.0
     for j in range(points[0], points[1]):
@@ -477,4 +448,18 @@ def _sweep_friction(rows, impulse, points, speeds, inverse_mass):  # type: ignor
         wa -= ia * rows[j, 2] * change
         wb += ib * rows[j, 3] * change
         total += change
+    if rows[points[0], 15] != 0.0:
+        wa, wb, worst = _sweep_couple(rows, impulse, points[0], (wa, wb, worst), (ia, ib))
     return total, wa, wb, worst
+
+
+@kernel
+def _sweep_couple(rows, impulse, k, speeds, inverse_inertia):  # type: ignore
+    """Solve for the couple of a face that opens too fast; return both spins, and its excess."""
+    (wa, wb, worst), (ia, ib) = speeds, inverse_inertia
+    arm, old = rows[k, 15], impulse[k, 2]
+    inverse = arm * arm * (ia + ib)
+    # a pair of forces at both ends, projected on C >= 0
+    change = max(old + (arm * (wb - wa) - rows[k, 16]) / inverse, 0.0) - old
+    impulse[k, 2] = old + change
+    return wa + ia * arm * change, wb - ib * arm * change, max(worst, abs(change) * inverse)

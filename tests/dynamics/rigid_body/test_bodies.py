@@ -13,7 +13,6 @@ import archfem as af
 from archfem.dynamics.rigid_body.bodies import (
     check_rigid_blocks,
     drop_straight_vertices,
-    find_unkept_ratios,
     make_bodies,
     split_convex,
 )
@@ -172,40 +171,6 @@ def test_points_are_in_contact_within_a_ten_thousandth_of_a_small_block(side, ga
     """Within 0.05 mm of a large one."""
     structure = floor((0.0, 0.0, side, side), floor=(-1.0, 5.0))
     assert make_bodies(structure).contact_gap == pytest.approx(gap, rel=1e-9)
-
-
-@pytest.mark.parametrize("friction", [0.6, 0.1])
-def test_a_ratio_below_what_a_block_keeps_by_its_shape_has_no_effect(friction):
-    """Housner's 1 - 3/2 sin² α, less two thousandths; where it slides it may keep nothing."""
-    breadth, height = 0.5, 2.0
-    structure = floor((0.0, 0.0, breadth, height), friction=friction)
-    kept = 1.0 - 1.5 * breadth**2 / (breadth**2 + height**2)
-    holds = friction == 0.6
-    below, above = (find_unkept_ratios(structure, kept - off) for off in (0.00205, 0.00195))
-    assert below == ({"joint 1": pytest.approx(kept, rel=1e-12)} if holds else {})
-    assert above == {}
-    assert set(find_unkept_ratios(structure, {"joint 1": kept - 0.01})) == set(below)
-    assert find_unkept_ratios(structure, {"another": 0.5}) == {}
-
-
-def test_a_ratio_is_judged_where_a_block_stands_on_one_fixed_block_alone():
-    pile = af.column(breadth=0.5, heights=[1.0, 1.0])
-    assert find_unkept_ratios(pile, 0.1) == {}
-    single = af.column(breadth=0.5, heights=[2.0])
-    assert list(find_unkept_ratios(single, 0.1)) == ["joint 0"]
-
-
-def test_friction_that_just_holds_the_closing_end_keeps_housners_ratio():
-    """The impulse at the closing corner leans by the shear over the normal change of velocity."""
-    breadth, height = 1.0, 1.5
-    kept = 1.0 - 1.5 * breadth**2 / (breadth**2 + height**2)
-    # the centroid moves across its arms (b/2, h/2) before and (-b/2, h/2) after the impact
-    before, after = np.array([-height, breadth]), np.array([-height, -breadth])
-    change = kept * after - before
-    slope = abs(change[0] / change[1])
-    for share, known in ((1.01, True), (0.99, False)):
-        structure = floor((0.0, 0.0, breadth, height), friction=share * slope)
-        assert bool(find_unkept_ratios(structure, kept - 0.1)) is known
 
 
 @pytest.mark.parametrize(("turn", "kept"), [(0.95e-7, 4), (1.05e-7, 5)])

@@ -27,12 +27,12 @@ function makeWorkspace({ mass, owner, arms }) {
     "world.points": zeros(vertices, 2), "world.normals": zeros(vertices, 2), "world.boxes": zeros(pieces, 4),
     "world.order": { shape: [pieces], values: owner.map((_, piece) => piece) },
     "contacts.bodies": zeros(points, 2), "contacts.key": zeros(points), "contacts.point": zeros(points, 2),
-    "contacts.normal": zeros(points, 2), "contacts.gap": zeros(points), "contacts.impulse": zeros(points, 2),
+    "contacts.normal": zeros(points, 2), "contacts.gap": zeros(points), "contacts.impulse": zeros(points, 3),
     "stored.key": zeros(points), "stored.place": zeros(points), "stored.impulse": zeros(points, 2),
     "stored.slots": { shape: [slots], values: new Array(slots).fill(-1) },
-    middle: zeros(count, 3), rows: zeros(points, 15), speeds: zeros(count + 1, 3),
-    "last.speeds": zeros(count + 1, 3), "last.impulse": zeros(points, 2),
-    "rebounding.speeds": zeros(count + 1, 3), "rebounding.impulse": zeros(points, 2),
+    middle: zeros(count, 3), rows: zeros(points, 17), speeds: zeros(count + 1, 3),
+    "last.speeds": zeros(count + 1, 3), "last.impulse": zeros(points, 3),
+    "rebounding.speeds": zeros(count + 1, 3), "rebounding.impulse": zeros(points, 3),
   };
 }
 
