@@ -234,9 +234,8 @@ def _tabulate(spectrum: Callable[[Array], Array]) -> Array:
 
 def _add_common_legend(figure: Figure, axes: Sequence[Axes]) -> None:
     """Explain the lines below all panels; the first panel has a line of every motion."""
-    handles, names = axes[0].get_legend_handles_labels()
-    columns = 4 if max(map(len, names)) < 20 else 2
-    add_legend_below(figure, columns, handles=handles)
+    handles, _ = axes[0].get_legend_handles_labels()
+    add_legend_below(figure, handles=handles)
 
 
 def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:
