@@ -88,8 +88,8 @@ def draw_envelope(
             opened = list[float]()
             for number, joints in enumerate(several):
                 places, own = panel.select(joints)
-                style = line_style(row) | {"label": "" if number else label}
-                _draw_band(panel.axes, places, own, style, shade=shade)
+                look = line_style(row) | {"label": "" if number else label}
+                _draw_band(panel.axes, places, own, look, shade=shade)
                 opened += places[own["open"].any("time").values].tolist()
             height = np.full(len(opened), 0.56 + row_height * row)
             panel.axes.plot(opened, height, "x", ms=4, color=colour)

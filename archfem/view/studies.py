@@ -24,6 +24,7 @@ from archfem.view.style import (
     new_axes,
     new_figure,
     panel_grid,
+    set_figure_title,
     set_title,
     style_axes,
     white_halo,
@@ -203,7 +204,7 @@ def draw_study(
     if any(~np.isfinite(each).all() for each in scales.values()):
         axes.plot([], [], ">", label="above the scales tried", **style)
     if title:
-        figure.suptitle(title, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
+        set_figure_title(figure, title)
     head = "first mechanism: the first instant in which …"
     add_legend_below(figure, 2, title=head, title_fontsize=Size.LABEL)
     return figure
@@ -450,7 +451,7 @@ def draw_collapse_risk(risk: RiskCurves) -> Figure:
     third.bar(edges[:-1], shares, np.diff(edges), align="edge", color=Colour.LINES[2], lw=0.0)
     for axes, title in zip((first, second, third), ("fragility", "hazard", "rate"), strict=True):
         set_title(axes, title)
-    figure.suptitle(risk.sentence, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
+    set_figure_title(figure, risk.sentence)
     return figure
 
 
@@ -499,7 +500,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     add_legend_below(figure, 2, handles=panels[0].get_legend_handles_labels()[0])
     text = verdicts.sentence
     text += f"\neach other property explains {max(others):.0%} at most" if others else ""
-    figure.suptitle(text, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
+    set_figure_title(figure, text)
     return figure
 
 

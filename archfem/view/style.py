@@ -143,6 +143,13 @@ def set_title(axes: Axes, text: str) -> None:
     axes.set_title(lines, fontsize=Size.TITLE, color=Colour.TEXT, parse_math=False)
 
 
+def set_figure_title(figure: Figure, text: str) -> None:
+    """Set the title of a figure, wrapped to its width."""
+    letters = int((figure.get_figwidth() - 0.2) / text_width(1, Size.TITLE))
+    lines = "\n".join(fill(line, letters) for line in text.splitlines())
+    figure.suptitle(lines, fontsize=Size.TITLE, color=Colour.TEXT)
+
+
 def add_note(figure: Figure, notes: Mapping[str, str]) -> None:
     """Write notes above the panels of a figure; those that differ are preceded by their labels."""
     labels: dict[str, list[str]] = {}
