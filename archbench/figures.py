@@ -36,7 +36,9 @@ def measured(found: list[Row]) -> Figure:
     for place, row in enumerate(shown):
         middle, half = row.reference
         memory = row.grade == "m"
-        axes.barh(place, 2 * half / middle, left=1 - half / middle, color="0.85", height=0.6)
+        name = "" if place else "uncertainty of the measured value"
+        start = 1 - half / middle
+        axes.barh(place, 2 * half / middle, left=start, color="0.85", height=0.6, label=name)
         title = row.title.split(",")[0].removeprefix("free rocking: ")
         mark = " (from memory)" if memory else " (lengths from memory)" if row.from_memory else ""
         labels.append(title + mark)
@@ -60,7 +62,6 @@ def measured(found: list[Row]) -> Figure:
     names = [name for name in PROGRAMS if any(row.numbers(name) for row in shown)]
     for name in names:
         axes.plot([], [], MARKERS[name], color=COLOURS[name], label=NAMES[name])
-    axes.bar([], [], color="0.85", label="uncertainty of the measured value")
     figure.legend(loc="outside upper center", ncols=len(names) + 1, frameon=False)
     return figure
 

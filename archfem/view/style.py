@@ -255,9 +255,13 @@ def add_legend_below(figure: Figure, columns: int = 4, **options: Any) -> None:
 
 def legend_columns(labels: Sequence[str], width: float) -> int:
     """Return the number of columns of a legend that fit a width [inch]."""
-    longest = max((len(line) for label in labels for line in label.split("\n")), default=0)
     # the symbol of an entry takes 0.6 inch
-    return max(1, int(width / (0.6 + text_width(longest))))
+    sizes = [0.6 + text_width(max(map(len, label.split("\n")))) for label in labels]
+    for columns in range(len(sizes), 1, -1):
+        # as matplotlib divides them
+        if sum(max(column) for column in np.array_split(sizes, columns)) <= width:
+            return columns
+    return 1
 
 
 def add_legend(axes: Axes) -> None:
