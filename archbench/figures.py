@@ -10,33 +10,35 @@ from matplotlib.figure import Figure
 
 from archbench.scene import read_references
 from archbench.table import PROGRAMS, ROOT, Row, rows
+from archfem.view.style import Colour, Size
 
 FOLDER = ROOT / "docs" / "figures"
 
-# Names as the programs write them; colours that differ in grey too, by Okabe and Ito
+# Names as the programs write them
 NAMES = dict(
     zip(PROGRAMS, ("archfem", "HybriDFEM", "LMGC90", "OpenSees", "rbe", "Siconos"), strict=True)
 )
-HUES = ("#0072b2", "#7a5195", "#e69f00", "#009e73", "#d55e00", "#56b4e9")
-COLOURS = dict(zip(PROGRAMS, HUES, strict=True))
+COLOURS = dict(zip(PROGRAMS, Colour.LINES, strict=True))
 MARKERS = dict(zip(PROGRAMS, "oP^sDv", strict=True))
 DASHES = dict(zip(PROGRAMS, ("-", "-.", "--", ":", "-", "--"), strict=True))
 
 
-WIDTH = 6.7
-"""Width of a figure: that of a page of A4, so that type is printed as it is [inch]."""
+WIDTH = Size.PAGE
+"""Width of a figure, at which type is printed as it is [inch]."""
 
 
 def measured(found: list[Row]) -> Figure:
     """Draw answers over measured values, with the uncertainty of each as a bar."""
     shown = [row for row in found if row.kind == "E"]
-    figure = Figure(figsize=(WIDTH, 0.36 * len(shown) + 1.2), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 0.29 * len(shown) + 1.2), layout="constrained")
     axes: Axes = figure.subplots()
     labels = []
     for place, row in enumerate(shown):
         middle, half = row.reference
         memory = row.grade == "m"
-        axes.barh(place, 2 * half / middle, left=1 - half / middle, color="0.85", height=0.6)
+        name = "" if place else "uncertainty of the measured value"
+        start = 1 - half / middle
+        axes.barh(place, 2 * half / middle, left=start, color="0.85", height=0.6, label=name)
         title = row.title.split(",")[0].removeprefix("free rocking: ")
         mark = " (from memory)" if memory else " (lengths from memory)" if row.from_memory else ""
         labels.append(title + mark)
@@ -60,7 +62,7 @@ def measured(found: list[Row]) -> Figure:
     names = [name for name in PROGRAMS if any(row.numbers(name) for row in shown)]
     for name in names:
         axes.plot([], [], MARKERS[name], color=COLOURS[name], label=NAMES[name])
-    figure.legend(loc="outside upper center", ncols=len(names), frameon=False)
+    figure.legend(loc="outside upper center", ncols=len(names) + 1, frameon=False)
     return figure
 
 
@@ -90,7 +92,7 @@ def crown(found: list[Row]) -> Figure:
             times, u = _series(run)
             axes["programs"].plot(times, u, color=COLOURS[name], ls=DASHES[name], label=NAMES[name])
     for (variant, text), dash, hue in zip(
-        RULES.items(), ("-", "--", ":", "-."), HUES, strict=False
+        RULES.items(), ("-", "--", ":", "-."), Colour.LINES, strict=False
     ):
         if run := first_run(row, "archfem", variant):
             axes["rules"].plot(*_series(run), color=hue, ls=dash, label=text)

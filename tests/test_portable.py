@@ -11,6 +11,7 @@ import pytest
 
 import archfem as af
 from archfem import _files
+from archfem.studies import process_pool
 
 ROOT = Path(af.__file__).parents[1]
 
@@ -50,9 +51,9 @@ LARGE = ["gmsh", "pyvista", "vtkmodules", "imageio", "imageio_ffmpeg", "dolfinx"
 LARGE += ["mpi4py", "meshio", "distributed"]
 
 
-def run_without(missing, *words):
+def run_without(missing, *words, first=""):
     """Run a command in a process without some modules, and those of POSIX without its calls."""
-    code = WITHOUT.format(missing=missing, words=list(map(str, words)))
+    code = first + WITHOUT.format(missing=missing, words=list(map(str, words)))
     given = {"cwd": ROOT, "text": True, "capture_output": True, "check": False}
     return subprocess.run([sys.executable, "-c", code], **given)
 
@@ -142,3 +143,29 @@ def test_locks_of_windows_exclude_and_leave_the_content_readable(monkeypatch, tm
         monkeypatch.setattr(_files, "sleep", lambda _: held.clear())
         _files.lock_file(second, wait=True)
         assert len(held) == 1
+
+
+def test_cores_are_counted_without_calls_of_linux(monkeypatch):
+    monkeypatch.delattr(os, "sched_getaffinity", raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 7)
+    assert process_pool.count_cores() == 7
+
+
+@pytest.mark.slow
+def test_studies_start_workers_anew_where_no_process_can_fork(tmp_path):
+    """As on Windows and macOS: workers by spawn, as many as there are cores.
+
+    The others of `POSIX` stay, since the standard library kills a process by SIGKILL here.
+    """
+    (tmp_path / "case.toml").write_text(CASE.split("[motion]")[0], encoding="utf-8")
+    words = 'case = "case.toml"\ncompute = "limit"\nset = ["limit.horizontal=1.0"]\n'
+    words += "[vary.structure]\nbreadth = [1.0, 2.0]\n"
+    (tmp_path / "study.toml").write_text(words, encoding="utf-8")
+    changed = "import multiprocessing, os\ndel os.fork, os.sched_getaffinity\n"
+    changed += "os.cpu_count = lambda: 2\n"
+    changed += 'multiprocessing.get_all_start_methods = lambda: ["spawn"]\n'
+    words = ["study", tmp_path / "study.toml", "--out", tmp_path / "out"]
+    ran = run_without([], *words, first=changed)
+    assert ran.returncode == 0, ran.stderr
+    table = (tmp_path / "out" / "results.csv").read_text(encoding="utf-8")
+    assert len(table.splitlines()) == 3

@@ -1,4 +1,4 @@
-"""Structures as input of other programs: OpenSees in Python, and geometry of 3DEC."""
+"""Structures as input of other programs: OpenSees in Python, and geometry of 3DEC and UDEC."""
 
 from pathlib import Path
 
@@ -97,11 +97,12 @@ def write_model(structure: Structure, path: str | Path, *, points: int = 5) -> P
     *.py is a script of OpenSeesPy: rigid blocks, joints without tension and with Coulomb friction,
     self-weight. Its `build` and `load_dead` can be imported, to be followed by a motion. *.3ddat
     has the commands of 3DEC 7 for the geometry: blocks of the width, with z upwards, in groups by
-    their parts, supports fixed; arcs become chords. Stiffness and friction are there in comments.
+    their parts, supports fixed; arcs become chords. *.dat has those of UDEC 7: blocks in the plane,
+    1 m thick. Supports of UDEC, densities, stiffness and friction are there in comments.
 
     Args:
         structure: dry, with joints that close linearly.
-        path: of the file, .py or .3ddat.
+        path: of the file, .py, .3ddat or .dat.
         points: springs of each joint for OpenSees, at Lobatto's points, 2 to 16.
 
     Returns:
@@ -109,12 +110,17 @@ def write_model(structure: Structure, path: str | Path, *, points: int = 5) -> P
 
     Raises:
         InvalidInput: the suffix is another, joints have cohesion, tension, dilatancy, closure or a
-            law of the user, or 3DEC would refuse a block that is not convex.
+            law of the user, or 3DEC or UDEC would get a block that is not convex.
     """
     path = Path(path)
-    check_choice(path.suffix, "suffix of the file", [".py", ".3ddat"])
+    writers = {
+        ".py": lambda: _write_opensees(structure, points),
+        ".3ddat": lambda: _write_3dec(structure),
+        ".dat": lambda: _write_udec(structure),
+    }
+    check_choice(path.suffix, "suffix of the file", list(writers))
     check_integer(points, "points", minimum=2, maximum=16)
-    text = _write_opensees(structure, points) if path.suffix == ".py" else _write_3dec(structure)
+    text = writers[path.suffix]()
     with atomic_write(path) as draft:
         draft.write_text(text, encoding="utf-8")
     return path
@@ -157,16 +163,7 @@ def _write_opensees(structure: Structure, points: int) -> str:
 
 def _write_3dec(structure: Structure) -> str:
     """Return the commands of 3DEC."""
-    contacts = {joint.contact for joint in structure.joints}
-    lines = [
-        f"; {structure.name}: written by archfem, in m; elevation in x and z, width along y",
-        *sorted(
-            f"; contact '{each.name}': normal {each.normal_stiffness:g} Pa/m, shear "
-            f"{each.shear_stiffness:g} Pa/m, friction coefficient {each.friction:g}"
-            for each in contacts
-        ),
-        "model new",
-    ]
+    lines = _begin_commands(structure, "elevation in x and z, width along y")
     for block in structure.blocks:
         group = "supports" if block.fixed else block.part or "blocks"
         lines.append(f"; {block.name}: {block.material.name}, {structure.density(block):g} kg/m3")
@@ -179,15 +176,53 @@ def _write_3dec(structure: Structure) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _polyhedron(block: Block, width: float) -> list[list[Corner]]:
-    """Return the faces of a block, each clockwise as it is seen from outside."""
+def _write_udec(structure: Structure) -> str:
+    """Return the commands of UDEC."""
+    lines = _begin_commands(structure, "1 m thick")
+    outlines = [_convex_outline(block) for block in structure.blocks]
+    edges = [np.diff(points, axis=0, append=points[:1]) for points in outlines]
+    # the manual recommends one per cent of an edge; the default of 0.5 m rounds stones off
+    length = 0.01 * min(float(np.linalg.norm(each, axis=1).min()) for each in edges)
+    lines.append(f"block tolerance corner-round-length {length:.6g}")
+    for block, points in zip(structure.blocks, outlines, strict=True):
+        support = ", a support: fix it" if block.fixed else ""
+        density = f"{structure.density(block):g} kg/m3{support}"
+        lines.append(f"; {block.name}: {block.material.name}, {density}")
+        # clockwise
+        corners = " ".join(f"{x:.9g},{y:.9g}" for x, y in points[::-1])
+        lines.append(f"block create polygon {corners}")
+    return "\n".join(lines) + "\n"
+
+
+def _begin_commands(structure: Structure, axes: str) -> list[str]:
+    """Return the first lines of commands of Itasca's programs."""
+    contacts = {joint.contact for joint in structure.joints}
+    return [
+        f"; {structure.name}: written by archfem, in m; {axes}",
+        *sorted(
+            f"; contact '{each.name}': normal {each.normal_stiffness:g} Pa/m, shear "
+            f"{each.shear_stiffness:g} Pa/m, friction coefficient {each.friction:g}"
+            for each in contacts
+        ),
+        "model new",
+    ]
+
+
+def _convex_outline(block: Block) -> Array:
+    """Return the corners of a block (n, 2), anticlockwise, if it is convex."""
     points: Array = block.points
     edges = np.roll(points, -1, axis=0) - points
     after = np.roll(edges, -1, axis=0)
     if np.any(edges[:, 0] * after[:, 1] < edges[:, 1] * after[:, 0] - 1e-9 * block.area):
         raise InvalidInput(
-            f"block '{block.name}' is not convex, and polyhedra of 3DEC are: divide it"
+            f"block '{block.name}' is not convex, and blocks of 3DEC and UDEC are: divide it"
         )
+    return points
+
+
+def _polyhedron(block: Block, width: float) -> list[list[Corner]]:
+    """Return the faces of a block, each clockwise as it is seen from outside."""
+    points = _convex_outline(block)
     front, back = ([(float(x), y, float(z)) for x, z in points] for y in (0.0, width))
     pairs = list(zip(front, back, strict=True))
     sides = zip(pairs, [*pairs[1:], pairs[0]], strict=True)

@@ -99,7 +99,7 @@ def evaluate_points(
 
     `meanwhile` runs while the processes start.
     """
-    workers = len(os.sched_getaffinity(0)) if workers is None else workers
+    workers = count_cores() if workers is None else workers
     if check_integer(workers, "workers") == 1 or len(points) < 2:
         with threadpool_limits(limits=1), share_results(shared):
             yield from evaluate_serially(points, evaluator)
@@ -111,6 +111,13 @@ def evaluate_points(
         yield from pool.rows()
     finally:
         pool.close()
+
+
+def count_cores() -> int:
+    """Return the number of cores that this process may use; macOS and Windows know all cores."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def evaluate_serially(

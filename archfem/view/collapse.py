@@ -37,6 +37,7 @@ from archfem.view.style import (
     new_axes,
     new_figure,
     outline_bounds,
+    panel_grid,
     set_title,
     structure_figure,
     style_axes,
@@ -198,8 +199,7 @@ def _draw_factors(
     _draw_mechanism(lower, structure, worst, factors)
     # below both panels: arrows may stand anywhere in the lower one
     lower.get_legend().remove()
-    handles, labels = lower.get_legend_handles_labels()
-    add_legend_below(figure, handles=handles, labels=labels)
+    add_legend_below(figure, handles=lower.get_legend_handles_labels()[0])
     margin = 0.03 * np.ptp(ends)
     lower.set_xlim(ends.min() - margin, ends.max() + margin)
     return figure
@@ -222,9 +222,13 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
     if found.path is None or found.displacement is None:
         raise InvalidInput("there is no motion to draw: no mechanism moves under horizontal forces")
     wide, high = structure_figure(found.structure).get_size_inches()
-    figure = new_figure(max(wide, 0.75 * Size.COLUMN) + 0.8 * Size.COLUMN, max(high, 4.2))
-    widths = [max(wide, 0.75 * Size.COLUMN), 0.8 * Size.COLUMN]
-    left, right = figure.subplots(1, 2, width_ratios=widths)
+    wide = max(wide, 0.75 * Size.COLUMN)
+    if panel_grid(2) == (1, 2):
+        figure = new_figure(wide + 0.8 * Size.COLUMN, max(high, 4.2))
+        left, right = figure.subplots(1, 2, width_ratios=[wide, 0.8 * Size.COLUMN])
+    else:
+        figure = new_figure(wide, high + 3.0)
+        left, right = figure.subplots(2, 1, height_ratios=[high, 3.0])
     _draw_displaced_mechanism(left, found)
     _draw_capacity_curve(right, found)
     # in the panels it would lie on curves

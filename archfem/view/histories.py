@@ -37,7 +37,7 @@ from archfem.view.style import (
     add_legend_below,
     add_note,
     annotate,
-    legend_columns,
+    line_style,
     new_figure,
     set_title,
     style_axes,
@@ -80,15 +80,16 @@ def draw_envelope(
     }
     panels, openings = _make_panels(states, axes), 0
     row_height = 0.05  # of the crosses of a run, in units of e
-    coloured = zip(states.items(), Colour.LINES, strict=False)
-    for row, ((label, several), colour) in enumerate(coloured):
+    for row, (label, several) in enumerate(states.items()):
+        colour = Colour.LINES[row]
         # shades of several runs add up where they overlap
         shade = 0.0 if label in dotted else 0.2 / len(runs) / len(several)
         for panel in panels:
             opened = list[float]()
             for number, joints in enumerate(several):
                 places, own = panel.select(joints)
-                _draw_band(panel.axes, places, own, "" if number else label, colour, shade=shade)
+                look = line_style(row) | {"label": "" if number else label}
+                _draw_band(panel.axes, places, own, look, shade=shade)
                 opened += places[own["open"].any("time").values].tolist()
             height = np.full(len(opened), 0.56 + row_height * row)
             panel.axes.plot(opened, height, "x", ms=4, color=colour)
@@ -99,19 +100,19 @@ def draw_envelope(
     colours = dict(zip(runs, Colour.LINES, strict=False))
     for label, at_rest in ({"": dead} if isinstance(dead, xr.Dataset) else dead or {}).items():
         style: dict[str, Any] = {"ls": "--" if label else ":", "lw": 1.0}
-        colour = colours.get(label, Colour.TEXT)
-        _draw_state(panels, at_rest, f"dead load {label}".strip(), colour, **style)
+        style["color"] = colours.get(label, Colour.TEXT)
+        _draw_state(panels, at_rest, f"dead load {label}".strip(), **style)
     first.set_ylim(-0.56, 0.56 + (row_height * len(runs) if openings else 0.0))
     return _finish_panels(panels, states)
 
 
 def _draw_state(
-    panels: Sequence["PartPanel"], joints: xr.Dataset, label: str, colour: str, **style: Any
+    panels: Sequence["PartPanel"], joints: xr.Dataset, label: str, **style: Any
 ) -> None:
     """Draw the eccentricities of joints at one instant in all panels."""
     for panel in panels:
         places, own = panel.select(joints)
-        panel.axes.plot(places, own["eccentricity"].values, label=label, color=colour, **style)
+        panel.axes.plot(places, own["eccentricity"].values, label=label, **style)
 
 
 def draw_envelopes(runs: Mapping[str, History], dead: xr.Dataset | None) -> list[Figure]:
@@ -143,25 +144,26 @@ def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[st
         raise InvalidInput(f"{several} have several instants: give one, e.g. joints.isel(time=-1)")
     listed = {label: [joints] for label, joints in states.items()}
     panels = _make_panels(listed, None)
-    for (label, joints), colour in zip(states.items(), Colour.LINES, strict=False):
-        style: dict[str, Any] = {"ls": ":" if label in dotted else "-", "lw": 1.2}
-        _draw_state(panels, joints, label, colour, marker="o", ms=2.2, **style)
+    for number, (label, joints) in enumerate(states.items()):
+        style = line_style(number) | ({"ls": ":"} if label in dotted else {})
+        _draw_state(panels, joints, label, marker="o", ms=2.2, lw=1.2, **style)
     panels[0].axes.set_ylim(-0.56, 0.56)
     return _finish_panels(panels, listed)
 
 
 def _draw_band(
-    axes: Axes, places: Array, joints: xr.Dataset, label: str, colour: str, *, shade: float
+    axes: Axes, places: Array, joints: xr.Dataset, style: dict[str, Any], *, shade: float
 ) -> None:
     """Draw the least and the largest eccentricity of joints, dotted if the band is not shaded."""
     span = envelope(joints)
-    style: dict[str, Any] = {"color": colour, "lw": 1.1, "marker": "o", "ms": 2.2}
+    style = {"lw": 1.1, "marker": "o", "ms": 2.2} | style
     if shade > 0.0:
-        axes.fill_between(places, span["lowest"], span["highest"], color=colour, alpha=shade, lw=0)
+        low, high = span["lowest"], span["highest"]
+        axes.fill_between(places, low, high, color=style["color"], alpha=shade, lw=0)
     else:
         style |= {"ls": ":", "ms": 1.6}
-    axes.plot(places, span["highest"], **style, label=label)
-    axes.plot(places, span["lowest"], **style)
+    axes.plot(places, span["highest"], **style)
+    axes.plot(places, span["lowest"], **style | {"label": ""})
 
 
 def _draw_faces(axes: Axes, hinge: float) -> None:
@@ -255,13 +257,13 @@ def _label_joints(axes: Axes, names: Sequence[str]) -> None:
 
 
 def _lay_out_panels(
-    sizes: Mapping[str, int], *, min_joints: int = 10, joints_per_row: int = 80
+    sizes: Mapping[str, int], *, min_joints: int = 10, joints_per_inch: float = 12.0
 ) -> dict[str, Axes]:
     """Return empty panels on one figure, as wide as their parts have joints, in rows."""
     rows: list[dict[str, int]] = [{}]
     for part, size in sizes.items():
         width = max(size, min_joints)
-        if rows[-1] and sum(rows[-1].values()) + width > joints_per_row:
+        if rows[-1] and sum(rows[-1].values()) + width > joints_per_inch * Size.PAGE:
             rows.append({})
         rows[-1][part] = width
     inches = (Size.COLUMN, 3.4) if len(sizes) == 1 else (Size.PAGE, 0.6 + 2.8 * len(rows))
@@ -291,9 +293,7 @@ def _finish_panels(
     if len(panels) == 1:
         add_legend(first)
     else:
-        handles, labels = first.get_legend_handles_labels()
-        columns = legend_columns(labels, figure.get_figwidth())
-        add_legend_below(figure, columns, handles=handles)
+        add_legend_below(figure, 8, handles=first.get_legend_handles_labels()[0])
     notes = {label: describe_assessed_joints(several[0]) for label, several in states.items()}
     add_note(figure, notes)
     return figure
@@ -324,7 +324,7 @@ def draw_joints(run: History, joints: Sequence[str | int] | None = None) -> Figu
     grid = figure.add_gridspec(rows, 2)
     ground = figure.add_subplot(grid[0, :])
     draw_ground(ground, run.time, run.dataset["ground"].values)
-    ground.xaxis.set_major_locator(MaxNLocator(5))
+    ground.xaxis.set_major_locator(MaxNLocator(5 if Size.PAGE > 5.0 else 2))
     left_panels = []
     for row, joint in enumerate(selected, start=1):
         left, right = (figure.add_subplot(grid[row, k], sharex=ground) for k in range(2))
@@ -380,7 +380,7 @@ def draw_ground(
     style_axes(axes, "", "ground [m/s²]", size)
     axes.plot(times, ground[:, 0], color=Colour.TEXT, lw=width, label="horizontal", zorder=3)
     if ground[:, 1].any():
-        axes.plot(times, ground[:, 1], color=Colour.LINES[4], lw=0.85 * width, label="vertical")
+        axes.plot(times, ground[:, 1], color=Colour.LINES[1], lw=0.85 * width, label="vertical")
         # above the axes' right end: inside it would cover the lines
         style: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
         axes.legend(ncols=2, frameon=False, fontsize=size, **style)

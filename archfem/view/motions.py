@@ -21,6 +21,7 @@ from archfem.view.style import (
     add_legend_below,
     annotate,
     new_figure,
+    set_figure_title,
     style_axes,
 )
 
@@ -52,7 +53,7 @@ def draw_motion(motion: Motion) -> Figure:
             style_axes(axis, "time [s]" if axis is column[-1] else "", label)
         if len(names) > 1:  # a single component may have any direction
             column[0].set_title(name, fontsize=Size.TITLE)
-    figure.suptitle(motion.name, fontsize=Size.TITLE, wrap=True)
+    set_figure_title(figure, motion.name)
     return figure
 
 
@@ -131,7 +132,7 @@ def draw_accelerograms(suite: Suite) -> Figure:
 def _set_suite_title(figure: Figure, suite: Suite) -> None:
     """Write the name of a suite, and that its motions are not yet divided by R."""
     divided = f", before division by R = {suite.reduction:g}" if suite.reduction != 1.0 else ""
-    figure.suptitle(f"{suite.name}{divided}", fontsize=Size.TITLE, wrap=True)
+    set_figure_title(figure, f"{suite.name}{divided}")
 
 
 @validate_arguments
@@ -234,9 +235,8 @@ def _tabulate(spectrum: Callable[[Array], Array]) -> Array:
 
 def _add_common_legend(figure: Figure, axes: Sequence[Axes]) -> None:
     """Explain the lines below all panels; the first panel has a line of every motion."""
-    handles, names = axes[0].get_legend_handles_labels()
-    columns = 4 if max(map(len, names)) < 20 else 2
-    add_legend_below(figure, columns, handles=handles)
+    handles, _ = axes[0].get_legend_handles_labels()
+    add_legend_below(figure, handles=handles)
 
 
 def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:

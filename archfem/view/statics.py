@@ -30,8 +30,10 @@ from archfem.view.style import (
     add_legend_below,
     add_polygons,
     annotate,
+    line_style,
     new_figure,
     outline_bounds,
+    panel_grid,
     set_title,
     style_axes,
     style_length_axes,
@@ -213,8 +215,9 @@ def draw_free_body(
             f"block '{body.block.name}' has {len(body.joints)} joints: forces of at most {limit} "
             "can be distinguished; choose a stone"
         )
-    figure = new_figure(Size.PAGE, 3.5 + 0.18 * len(body.names))
-    left, right = figure.subplots(1, 2)
+    rows, columns = panel_grid(2)
+    figure = new_figure(Size.PAGE, 1.1 + 2.4 * rows + 0.18 * len(body.names))
+    left, right = figure.subplots(rows, columns)
     colours = [Colour.LINES[k % len(Colour.LINES)] for k in range(len(body.joints))]
     colours.append(Colour.GREY)
     _draw_block_forces(left, structure, body, colours)
@@ -355,8 +358,9 @@ def draw_pushover(
     load = "load factor λ [-]" if units == {"1"} else "work per unit of settlement [N m]"
     style_axes(axes, "displacement [mm]", load)
     reach = reach or max(_displacement_shown(push) for push in pushes.values())
-    for (label, push), colour in zip(pushes.items(), Colour.LINES, strict=False):
-        axes.plot(push.curve["displacement"] / mm, push.curve["factor"], color=colour, label=label)
+    for number, (label, push) in enumerate(pushes.items()):
+        displacement, factor = push.curve["displacement"] / mm, push.curve["factor"]
+        axes.plot(displacement, factor, label=label, **line_style(number))
         hinges = _mark_first_hinges(axes, push, reach)
     style = {"color": Colour.HINGE, "ms": 6.0, "mec": "white"}
     axes.plot([], [], "o", label="first hinge of a joint", **style)

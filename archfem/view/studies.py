@@ -23,6 +23,8 @@ from archfem.view.style import (
     legend_columns,
     new_axes,
     new_figure,
+    panel_grid,
+    set_figure_title,
     set_title,
     style_axes,
     white_halo,
@@ -202,7 +204,7 @@ def draw_study(
     if any(~np.isfinite(each).all() for each in scales.values()):
         axes.plot([], [], ">", label="above the scales tried", **style)
     if title:
-        figure.suptitle(title, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
+        set_figure_title(figure, title)
     head = "first mechanism: the first instant in which …"
     add_legend_below(figure, 2, title=head, title_fontsize=Size.LABEL)
     return figure
@@ -253,7 +255,7 @@ def draw_ida(
     Returns:
         The figure: curves at the left, limit states at the right, with a common intensity axis.
     """
-    figure = new_figure(1.35 * Size.COLUMN, 0.75 * Size.COLUMN)
+    figure = new_figure(Size.PAGE, max(0.75 * Size.COLUMN, 3.2))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2.2, 1.0))
     style_axes(left, demand, measure)
     style_axes(right)
@@ -433,8 +435,9 @@ def draw_collapse_risk(risk: RiskCurves) -> Figure:
     curve, hazard = risk.fragility(), risk.hazard
     word = {"pga": "PGA", "pgv": "PGV", "sa": "Sa", "sa_avg": "mean Sa"}[hazard.measure]
     label = f"{word} [{MEASURES[hazard.measure]}]"
-    figure = new_figure(Size.PAGE, 2.8)
-    first, second, third = figure.subplots(1, 3)
+    rows, columns = panel_grid(3)
+    figure = new_figure(Size.PAGE, 0.4 + 2.4 * rows)
+    first, second, third = figure.subplots(rows, columns).ravel()
     x = np.linspace(0.0, 2.5 * curve.median, 301)[1:]
     style_axes(first, label, "probability of a fall [-]")
     first.fill_between(x, *curve.band(x), color=Colour.LINES[0], alpha=0.2, lw=0.0)
@@ -448,7 +451,7 @@ def draw_collapse_risk(risk: RiskCurves) -> Figure:
     third.bar(edges[:-1], shares, np.diff(edges), align="edge", color=Colour.LINES[2], lw=0.0)
     for axes, title in zip((first, second, third), ("fragility", "hazard", "rate"), strict=True):
         set_title(axes, title)
-    figure.suptitle(risk.sentence, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
+    set_figure_title(figure, risk.sentence)
     return figure
 
 
@@ -479,7 +482,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     }
     others = list(shares.values())[max_panels:]
     shares = dict(islice(shares.items(), max_panels))
-    columns = min(3, len(shares))
+    columns = min(3, len(shares), int(Size.PAGE / 1.6))
     lines = -(-len(shares) // columns)
     figure = new_figure(Size.PAGE, 0.7 + 2.1 * lines)
     panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()
@@ -497,7 +500,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     add_legend_below(figure, 2, handles=panels[0].get_legend_handles_labels()[0])
     text = verdicts.sentence
     text += f"\neach other property explains {max(others):.0%} at most" if others else ""
-    figure.suptitle(text, fontsize=Size.TITLE, color=Colour.TEXT, wrap=True)
+    set_figure_title(figure, text)
     return figure
 
 
@@ -540,7 +543,8 @@ def draw_convergence(
     figure = new_figure(wide, 0.55 * Size.COLUMN)
     panels = figure.subplots(1, len(paths), sharey=True, squeeze=False)[0]
     for axes, (name, (sizes, values, limit, error)) in zip(panels, paths.items(), strict=True):
-        style_axes(axes, f"{name}: size over the finest [-]", quantity if axes is panels[0] else "")
+        first = axes is panels[0]
+        style_axes(axes, f"{name}:\nsize over the finest [-]", quantity if first else "")
         axes.plot(sizes, values, "o-", color=Colour.LINES[0], lw=1.4, ms=5)
         axes.errorbar(sizes[-1:], values[-1:], [error], color=Colour.LINES[1], capsize=4, lw=1.6)
         axes.plot([0.0], [limit], "D", color=Colour.LINES[2], ms=6, label="limit", clip_on=False)

@@ -1,6 +1,7 @@
 """Common style of all figures: colours, type sizes, axes, titles, legends and annotations."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -37,8 +38,8 @@ class Colour:
     THRUST, HINGE, SLIDING = "#0b4f8a", "#d7261e", "#e08a00"
     MECHANISM, LOAD = "#009e73", "#7b3294"
 
-    # lines that share axes; distinguishable with all common kinds of colour blindness
-    LINES = ("#0b4f8a", "#e08a00", "#009e73", "#cc6fa4", "#56b4e9", "#1b1b1b")
+    # lines that share axes; apart in grey, and with all common kinds of colour blindness
+    LINES = ("#083685", "#e69500", "#009068", "#a13179", "#90d2f2", "#151515")
 
     # scale of values, from low to high
     MAP = LinearSegmentedColormap.from_list(
@@ -46,12 +47,17 @@ class Colour:
     )
 
 
+def line_style(number: int) -> dict[str, Any]:
+    """Return the colour of one of several lines, and its dashes from the fifth line on."""
+    return {"color": Colour.LINES[number], "ls": ("-", "-", "-", "-", "--", "-.")[number]}
+
+
 class Size:
     """Font sizes [points], and widths of figures [inch]."""
 
     NOTE, LABEL, TITLE = 7.0, 8.0, 9.5  # LABEL also of ticks and legends; none is smaller than NOTE
     # a page of A4 prints 170 mm: no figure is wider, so that its type is printed as it is
-    COLUMN, PAGE = 6.4, 6.7
+    COLUMN, PAGE = 6.4, 170.0 / 25.4
 
 
 # Percentage of stresses beyond the end of a colour scale: peaks at the corners about which blocks
@@ -73,6 +79,29 @@ class Page(Figure):
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure of a size [inch], at most as wide as a page."""
     return Page(figsize=(min(width, Size.PAGE), height), layout="constrained")
+
+
+@contextmanager
+def limit_width(millimetres: float) -> Iterator[None]:
+    """Draw the figures of a `with` block for a width at which they are printed, such as a column.
+
+    Type keeps its size, 7 points at least; titles and legends take more lines.
+
+    Args:
+        millimetres: the largest width [mm], from 60 to 170, the width of a page.
+
+    Raises:
+        InvalidInput: the width is not within these limits.
+    """
+    if not 60.0 <= millimetres <= 170.0:
+        raise InvalidInput(f"figures of {millimetres:g} mm: choose a width from 60 to 170 mm")
+    kept = Size.COLUMN, Size.PAGE
+    Size.PAGE = millimetres / 25.4
+    Size.COLUMN = min(Size.COLUMN, Size.PAGE)
+    try:
+        yield
+    finally:
+        Size.COLUMN, Size.PAGE = kept
 
 
 def disable_math(drawing: Artist) -> None:
@@ -97,17 +126,28 @@ def text_width(letters: float, size: float = Size.LABEL) -> float:
     return letters * 0.56 * size / 72.0
 
 
+def panel_grid(count: int) -> tuple[int, int]:
+    """Return rows and columns of panels: side by side on a page, in a column one below another."""
+    return (1, count) if Size.PAGE > 5.0 else (count, 1)
+
+
 def set_title(axes: Axes, text: str) -> None:
     """Set the title of axes, wrapped to the width of their part of the figure."""
     place, width = axes.get_subplotspec(), axes.figure.get_figwidth()
     if place is not None and (columns := place.get_gridspec().ncols) > 1:
         ratios = np.array(place.get_gridspec().get_width_ratios() or np.ones(columns), dtype=float)
-        # labels of the axis at the left take 0.5 inch
         width *= ratios[list(place.colspan)].sum() / ratios.sum()
-        width -= 0.5
+    width -= 0.3  # labels of the axis at the left shift the panel
     letters = int(width / text_width(1, Size.TITLE))
     lines = fill(" ".join(text.split()), max(letters, 12), break_long_words=False)
     axes.set_title(lines, fontsize=Size.TITLE, color=Colour.TEXT, parse_math=False)
+
+
+def set_figure_title(figure: Figure, text: str) -> None:
+    """Set the title of a figure, wrapped to its width."""
+    letters = int((figure.get_figwidth() - 0.2) / text_width(1, Size.TITLE))
+    lines = "\n".join(fill(line, letters) for line in text.splitlines())
+    figure.suptitle(lines, fontsize=Size.TITLE, color=Colour.TEXT)
 
 
 def add_note(figure: Figure, notes: Mapping[str, str]) -> None:
@@ -205,24 +245,30 @@ def add_polygons(
 
 
 def add_legend_below(figure: Figure, columns: int = 4, **options: Any) -> None:
-    """Add a legend below all panels of a figure."""
+    """Add a legend below all panels of a figure, of at most so many columns."""
     options = {"frameon": False, "fontsize": Size.LABEL} | options
+    handles = [h for axes in figure.axes for h in axes.get_legend_handles_labels()[0]]
+    labels = [str(handle.get_label()) for handle in options.get("handles", handles)]
+    columns = min(columns, legend_columns(labels, figure.get_figwidth()))
     figure.legend(loc="outside lower center", ncols=columns, **options)
 
 
 def legend_columns(labels: Sequence[str], width: float) -> int:
     """Return the number of columns of a legend that fit a width [inch]."""
-    longest = max((len(line) for label in labels for line in label.split("\n")), default=0)
     # the symbol of an entry takes 0.6 inch
-    return max(1, int(width / (0.6 + text_width(longest))))
+    sizes = [0.6 + text_width(max(map(len, label.split("\n")))) for label in labels]
+    for columns in range(len(sizes), 1, -1):
+        # as matplotlib divides them
+        if sum(max(column) for column in np.array_split(sizes, columns)) <= width:
+            return columns
+    return 1
 
 
 def add_legend(axes: Axes) -> None:
     """Add a legend: below axes that have a figure of their own, else inside the axes."""
     page = axes.figure
     if len(page.axes) == 1 and isinstance(page, Figure) and page.get_layout_engine() is not None:
-        labels = axes.get_legend_handles_labels()[1]
-        add_legend_below(page, min(4, legend_columns(labels, page.get_figwidth())))
+        add_legend_below(page)
     else:
         axes.legend(frameon=False, fontsize=Size.LABEL)
     disable_math(page)
@@ -245,7 +291,9 @@ def drawing_scale(structure: Structure) -> float:
 def structure_figure(structure: Structure) -> Figure:
     """Return an empty figure that fits a structure."""
     low, high = outline_bounds(structure)
-    width, height = drawing_scale(structure) * (high - low) + [0.8, 1.2]
+    # in a narrow figure title and legend take a line more each
+    margins = [0.8, 1.2 if Size.PAGE > 5.0 else 1.6]
+    width, height = drawing_scale(structure) * (high - low) + margins
     return new_figure(max(0.5 * Size.COLUMN, width), max(0.35 * Size.COLUMN, height))
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import archfem as af
+from archfem.view.style import Colour
 
 ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
 push = af.collapse_factor(ring, live=af.BodyForce(1.0))
@@ -19,7 +20,7 @@ for place, program in enumerate(names):
     runs = json.loads(path.read_text(encoding="utf-8"))["S04"]["runs"]
     factors = [run["values"]["factor"] for run in runs if "failed" not in run]
     axes.plot([min(factors), max(factors)], [place, place], lw=3, color="0.6")
-    axes.plot(factors, [place] * len(factors), "o", color=af.view.style.Colour.THRUST)
+    axes.plot(factors, [place] * len(factors), "o", color=Colour.THRUST)
 axes.axvline(push.factor, color="k", lw=0.8, label="limit analysis")
 axes.set_yticks(range(len(names)), names.values())
 axes.invert_yaxis()

@@ -161,6 +161,10 @@ def test_a_case_without_motion_has_a_report_too(small, unplotted, tmp_path):
         (draft / "limit.txt").write_text("it stands")
     words = " ".join(read_page(af.cases.open_results(folder).report().read_text()).words)
     assert "It stands." in words  # the conclusion
+    assert "Not computed: modes, a rating for a vehicle" in words
+    assert "blocks rigid joints dry" in " ".join(
+        words.split()
+    )  # of limit analysis, whatever the case's model is
     # sections that would only say what is missing are left out
     for title in ("Dead load", "Ground motion", "Response", "Modes", "Mechanism and collapse"):
         assert title not in words
@@ -307,6 +311,21 @@ def test_every_input_has_its_mark():
     defaults = {each.words for each in list_defaults(af.Case.of(tables))}
     assert {"weight 20 kN/m³", "μ 0.6", "mechanism of 4 joints"} <= defaults
     assert "E 5 GPa" not in defaults
+
+
+def test_stiffness_by_a_finish_is_inferred_and_numbers_have_their_units():
+    tables = {
+        "structure": {"shape": "column", "breadth": 1.0, "heights": [1.0, 1.0]},
+        "contacts": {"stone to stone": {"finish": "dressed", "friction": 0.6}},
+        "model": {"fidelity": "rigid"},
+        "motion": {"synthetic": {"seed": 3, "duration": 6.0, "pga": "2 m/s**2"}},
+    }
+    rows = tabulate_inputs(report_data.ReportData(af.Case.of(tables), {})).rows
+    marks = {name: (value, mark) for name, value, mark in rows}
+    assert marks["stone to stone: finish"] == ("dressed", "given")
+    assert marks["stone to stone: k_n"][1] == marks["stone to stone: k_s"][1] == "inferred"
+    assert marks["stone to stone: μ"] == ("0.6", "given")
+    assert marks["motion"][0] == "synthetic: seed 3; duration 6 s; pga 2 m/s²"
 
 
 BRIDGE = """

@@ -46,7 +46,7 @@ def test_small_displacements_of_a_run_are_magnified():
     motion = af.Motion(np.full(21, 0.5), 0.005)
     run = af.time_history(model, motion, dt=0.005, record=af.Record(fields_every=5))
     figure = draw_during(model, run, run.joints.isel(time=-1))
-    by = float(figure.axes[0].get_title().partition("displacements × ")[2])
+    by = float(" ".join(figure.axes[0].get_title().split()).partition("displacements × ")[2])
     drawn = np.concatenate([path.vertices for path in labelled(figure, "blocks").get_paths()])
     places = model.cells.places + by * model.cells.displacement(run.dataset["q"].values[-1])
     assert by >= 10.0

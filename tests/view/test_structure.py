@@ -63,9 +63,9 @@ def test_structure_is_drawn_true_to_scale_with_units_and_time(ring, joints):
 
 
 def test_a_long_structure_takes_a_flat_page(ring, bridge):
-    """A page of A4 prints 170 mm, 6.7 inch."""
+    """A page of A4 prints 170 mm."""
     pages = [draw_structure(each).get_size_inches() for each in (ring, bridge)]
-    assert [wide for wide, _ in pages] == [6.7, 6.7]
+    assert [wide for wide, _ in pages] == [170.0 / 25.4] * 2
     assert pages[1][1] < 2.5 < pages[0][1]
 
 

@@ -2,15 +2,17 @@
 
 from dataclasses import replace
 from html import escape
+from itertools import combinations
 
 import matplotlib
+import numpy as np
 import pytest
 from matplotlib.text import Text
 from pictures import history
 
 import archfem as af
 from archfem.view import save
-from archfem.view.style import Page, new_figure, set_title, structure_figure
+from archfem.view.style import Colour, Page, new_figure, set_title, structure_figure
 
 
 @pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".pdf", b"%PDF")])
@@ -69,17 +71,89 @@ def test_long_titles_take_several_lines():
     assert wide < page.bbox.width
 
 
-def test_no_type_is_printed_smaller_than_seven_points(bridge):
-    """Figures are at most 170 mm wide, so that a page prints their type as it is."""
-    assert new_figure(20.0, 3.0).get_figwidth() == 6.7
-    run = af.History(history(bridge, 0.3).dataset, bridge)
-    joints = run.joints.isel(time=0)
-    for figure in (
-        af.view.draw_names(bridge),
-        af.view.draw_structure(bridge, joints),
-        af.view.draw_envelope({"run": run}),
-        af.view.draw_backbones(run, dead=joints),
+def drawings(bridge, run, runs):
+    """Figures of all layouts: one panel, panels side by side, true to scale, legends below."""
+    states = {"first hinge": 2.0, "mechanism": 3.0, "fall": 4.0}
+    shares = np.linspace(0.0, 1.0, 50)
+    curves = {name: (shares**k, 0.9 * shares**k, shares ** (0.9 * k)) for name, k in states.items()}
+    sizes = np.array([4.0, 2.0, 1.0])
+    ranges = {"friction": (1.0, 3.0), "normal stiffness of all joints": (1.5, 2.2)}
+    factors = {name: {"verified": np.array([0.5, 0.8])} for name in ("as built", "restored")}
+    motion = af.Motion.synthetic(duration=2.0, seed=3)
+    history_of_bridge = af.History(history(bridge, 0.3).dataset, bridge)
+    view = af.view
+    yield view.draw_names(bridge)
+    yield view.draw_envelope({"run": history_of_bridge})
+    yield view.draw_envelope(runs)
+    yield view.draw_joints(run)
+    yield view.draw_motion(motion)
+    yield view.draw_spectra([motion])
+    yield view.draw_fragility(curves, 5.0 * shares)
+    yield view.draw_tornado(ranges, 2.0, "factor [-]")
+    yield view.draw_study(factors, title="the motions at which mechanisms begin, by structure")
+    yield view.draw_convergence(dict.fromkeys(("cells", "steps"), (sizes, sizes, 0.0, 0.5)))
+
+
+@pytest.mark.parametrize("millimetres", [85.0, 170.0])
+def test_figures_fit_a_column_and_a_page_with_type_of_seven_points(bridge, run, runs, millimetres):
+    """The width is what is printed: no type is scaled, and none is cut off."""
+    with af.view.limit_width(millimetres):
+        for figure in drawings(bridge, run, runs):
+            assert figure.get_figwidth() <= millimetres / 25.4
+            figure.draw_without_rendering()
+            ticks = {
+                id(label)
+                for axes in figure.axes
+                for axis in (axes.xaxis, axes.yaxis)
+                for label in axis.get_ticklabels(which="both")
+            }
+            texts = [text for text in figure.findobj(Text) if text.get_text().strip()]
+            assert min(text.get_fontsize() for text in texts) >= 7.0
+            for text in texts:
+                # ticks beyond the ends of an axis are not drawn
+                if id(text) not in ticks:
+                    box, page = text.get_window_extent(), figure.bbox
+                    assert page.x0 - 1 <= box.x0 <= box.x1 <= page.x1 + 1, text
+                    assert page.y0 - 1 <= box.y0 <= box.y1 <= page.y1 + 1, text
+    assert new_figure(20.0, 3.0).get_figwidth() == 170.0 / 25.4
+
+
+@pytest.mark.parametrize("millimetres", [10.0, 500.0])
+def test_a_width_that_is_no_page_is_refused(millimetres):
+    with (
+        pytest.raises(af.InvalidInput, match="from 60 to 170 mm"),
+        af.view.limit_width(millimetres),
     ):
-        assert figure.get_figwidth() <= 6.7
-        texts = [text for text in figure.findobj(Text) if text.get_text()]
-        assert min(text.get_fontsize() for text in texts) >= 7.0
+        pass
+
+
+# Sight of linear RGB without one of three cones: Machado, Oliveira and Fernandes (2009), Table 1
+SIGHT = {
+    "all": np.eye(3),
+    "no long": [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]],
+    "no middle": [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]],
+    "no short": [[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]],
+}
+
+
+def cielab(colour, sight="all"):
+    """L*, a* and b* of a colour in sRGB (CIE 1976), D65."""
+    encoded = np.array(matplotlib.colors.to_rgb(colour))
+    rgb = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    x, y, z = xyz @ np.clip(np.array(SIGHT[sight]) @ rgb, 0.0, 1.0) / xyz.sum(axis=1)
+    fx, fy, fz = (
+        t ** (1 / 3) if t > (6 / 29) ** 3 else t / 3 * (29 / 6) ** 2 + 4 / 29 for t in (x, y, z)
+    )
+    return np.array([116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)])
+
+
+def test_lines_differ_in_grey_and_without_any_of_the_cones():
+    """A difference of 2.3 is just noticeable; thin lines need several times as much."""
+    assert cielab("#777777") == pytest.approx([50.03, 0.0, 0.0], abs=0.05)  # of tables
+    lightness = sorted(cielab(colour)[0] for colour in Colour.LINES)
+    assert min(np.diff(lightness)) >= 12.0
+    for sight in SIGHT:
+        seen = [cielab(colour, sight) for colour in Colour.LINES]
+        apart = [np.linalg.norm(one - other) for one, other in combinations(seen, 2)]
+        assert min(apart) >= 20.0, sight

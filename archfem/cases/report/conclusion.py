@@ -39,6 +39,18 @@ def describe_origin(data: ReportData) -> str:
     return f"report of archfem {import_module('archfem').__version__} · case {digest}"
 
 
+# Files of further commands, and what they hold
+_FURTHER_RESULTS = {
+    "modes.txt": "modes",
+    "limit.txt": "limit analysis",
+    "rating.txt": "a rating for a vehicle",
+    "assessment.txt": "a kinematic assessment",
+    "accuracy.txt": "a comparison of models and time steps",
+    "verdict_range.txt": "the range of the verdict over uncertain properties",
+    "risk.txt": "the annual rate of collapse",
+}
+
+
 def list_facts(data: ReportData) -> list[tuple[str, str]]:
     """List who signs what, and the principal results by name, which the report shows first."""
     signed = [(key.replace("_", " "), words) for key, words in data.case.report.items() if words]
@@ -78,6 +90,10 @@ def build_conclusion(data: ReportData) -> Section:
     blocks = [TextBlock(" ".join(sentences))] if sentences else []
     blocks += [TextBlock(f"In doubt: {text}.", "doubt") for text in list_doubts(data)]
     blocks += [TextBlock(text) for text in filter(None, [describe_what_is_not_varied(data)])]
+    # a history alone has no folder of further results
+    absent = [what for name, what in _FURTHER_RESULTS.items() if name not in data.files]
+    if data.folder is not None and absent:
+        blocks.append(TextBlock(f"Not computed: {', '.join(absent)}."))
     return Section("Conclusion", blocks)
 
 

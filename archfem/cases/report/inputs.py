@@ -3,16 +3,17 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from archfem._validation import declared_keys
 from archfem.cases.defaults import DECIDING_VALUES, list_default_keys
-from archfem.cases.report.report_data import ReportData
+from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.structure_keys import shape_keys
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.masonry.materials import Contact, Material
+from archfem.motion.motion import Motion
 from archfem.view.pages.document import Grid
 
 Row = tuple[str, str, str]  # quantity, value, mark
 
-_STATIC_SECTIONS = ("limit", "pushover", "rating", "assessment")
 _CAPTION = (
     "Inputs. Given: the case states it. Default: archfem's, since the case does not. Inferred: it "
     "follows from the others."
@@ -22,8 +23,7 @@ _CAPTION = (
 def tabulate_inputs(data: ReportData) -> Grid:
     """Tabulate all inputs with their marks."""
     rows = [*_structure_rows(data), *_property_rows(data), *_command_rows(data)]
-    is_static = any(f"{name}.txt" in data.files for name in _STATIC_SECTIONS)
-    if data.runs or "risk.txt" in data.files or not is_static:
+    if not data.is_static:
         rows += [*_motion_rows(data), *_model_rows(data), *_criteria_rows(data)]
     return Grid((), rows, _CAPTION)
 
@@ -39,23 +39,28 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
     kinds = shape_keys(table["shape"])
     for key, value in table.items():
         if key not in ("material", "contact", "width", "gravity"):
-            unit = kinds.get(key) if isinstance(value, int | float) else ""
-            unit = f" {unit}" if isinstance(unit, str) and unit not in ("", "1") else ""
-            yield key.replace("_", " "), f"{describe_value(value)}{unit}", "given"
+            yield key.replace("_", " "), describe_value(value, kinds.get(key)), "given"
     yield "width", f"{structure.width:g} m", _mark("width" in table)
     yield "gravity", f"{structure.gravity:g} m/s²", _mark("gravity" in table)
     if "joints" not in table and table["shape"] in ("blocks", "outlines"):
         yield "joints", f"{len(structure.joints)}, where outlines touch", "inferred"
 
 
-def describe_value(value: Any) -> str:
-    """Return a value of a case in words; long lists by their number."""
+def describe_value(value: Any, kind: Any = None) -> str:
+    """Return a value of a case in words, numbers with the unit of their key; lists by number."""
     if isinstance(value, Mapping):
-        own = [f"{key} {describe_value(each)}" for key, each in value.items()]
+        kinds = kind if isinstance(kind, Mapping) else {}
+        own = [
+            f"{key.replace('_', ' ')} {describe_value(each, kinds.get(key))}"
+            for key, each in value.items()
+        ]
         return "; ".join(own) or "as all"
     if isinstance(value, list):
         return ", ".join(map(describe_value, value)) if len(value) < 7 else f"{len(value)} values"
-    return f"{value:g}" if isinstance(value, float) else str(value).replace("**2", "²")
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    unit = f" {kind}" if number and isinstance(kind, str) and kind not in ("", "1") else ""
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return text.replace("**2", "²") + unit
 
 
 def _property_rows(data: ReportData) -> Iterator[Row]:
@@ -76,12 +81,16 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
     for item in dict.fromkeys(items):
         section = "materials" if isinstance(item, Material) else "contacts"
         defaults = list_default_keys(case, item)
+        given = case.settings.get(section, {}).get(item.name, {})
         for key, (word, unit, name, *_) in DECIDING_VALUES[section].items():
             value = getattr(item, key)
-            text = "not known" if value is None else f"{value / unit:.6g}{name}"
+            text = "not known" if value is None else f"{value / unit:.4g}{name}"
             text = "never slides" if text == "inf" else text
-            yield f"{item.name}: {word}", text, _mark(key not in defaults and value is not None)
-        given = case.settings.get(section, {}).get(item.name, {})
+            mark = _mark(key not in defaults and value is not None)
+            inferred = "finish" in given and key not in given and mark == "given"
+            yield f"{item.name}: {word}", text, "inferred" if inferred else mark
+        if "finish" in given:
+            yield f"{item.name}: finish", given["finish"], "given"
         for key, (word, unit, name) in others[section].items():
             if key in given or getattr(item, key):
                 text = f"{getattr(item, key) / unit:g}{name}"
@@ -91,8 +100,8 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
 
 
 def _command_rows(data: ReportData) -> Iterator[Row]:
-    """Yield the keys of limit analysis, rating, assessment and risk that are in the report."""
-    for section in (*_STATIC_SECTIONS, "risk"):
+    """Yield the keys of static analyses and of the risk that are in the report."""
+    for section in (*STATIC_RESULTS, "pushover", "risk"):
         table = data.case.settings.get(section, {})
         # a rating has joints and fill of [limit]
         users = ("limit", "rating") if section == "limit" else (section,)
@@ -102,6 +111,8 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
             yield f"{section}: {key.replace('_', ' ')}", describe_value(value), "given"
         if section == "limit" and "friction" not in table:
             yield "limit: friction", "coulomb, associated", "default"
+        if section == "rating" and (own := {"live", "impact", "dead"}.difference(table)):
+            yield f"rating: factors {', '.join(sorted(own))}", "of the code, see below", "default"
 
 
 def _motion_rows(data: ReportData) -> Iterator[Row]:
@@ -119,7 +130,9 @@ def _motion_rows(data: ReportData) -> Iterator[Row]:
     elif motion is not None:
         for source in ("file", "synthetic", "samples"):
             if source in motion:
-                yield "motion", f"{source}: {describe_value(motion[source])}", "given"
+                kinds = declared_keys(Motion.synthetic) if source == "synthetic" else None
+                text = describe_value(motion[source], kinds)
+                yield "motion", f"{source}: {text}", "given"
         ratio = motion.get("synthetic", {}).get("vertical_ratio")
         if "vertical" in motion:
             yield "vertical motion", describe_value(motion["vertical"]), "given"

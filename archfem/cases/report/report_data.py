@@ -23,6 +23,9 @@ from archfem.view.pages.live import LivePage, describe_arch, list_motions
 from archfem.view.pages.player import Player
 from archfem.view.pages.player_data import MAX_PACKED_BYTES, Scene
 
+# Results of limit analysis, for which blocks are rigid
+STATIC_RESULTS = ("limit", "rating", "assessment")
+
 
 @dataclass(frozen=True, eq=False)
 class ReportData:
@@ -50,6 +53,13 @@ class ReportData:
         """Fidelity of the runs, which "auto" has selected; without runs that of the case."""
         recorded = {str(run.dataset.attrs.get("fidelity", "")) for run in self.runs.values()}
         return ", ".join(sorted(recorded)) or self.case.analysis.discretisation.name
+
+    @property
+    def is_static(self) -> bool:
+        """Whether there are limit analysis, a rating or an assessment alone, without a model."""
+        modelled = any(f"{name}.txt" in self.files for name in ("pushover", "risk"))
+        static = any(f"{name}.txt" in self.files for name in STATIC_RESULTS)
+        return static and not modelled and not self.runs
 
     def read_result(self, name: str, caption: str, figure: str = "") -> list[Any]:
         """Return text and picture of a command in the folder, or an empty list."""

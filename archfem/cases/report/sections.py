@@ -50,17 +50,6 @@ _DEFINITIONS = {
     "Demirel and Aldemir": "of one ring, as that paper words it",
 }
 
-# Files of further commands, and what they hold
-_FURTHER_RESULTS = {
-    "modes.txt": "modes",
-    "limit.txt": "limit analysis",
-    "rating.txt": "a rating for a vehicle",
-    "assessment.txt": "a kinematic assessment",
-    "accuracy.txt": "a comparison of models and time steps",
-    "verdict_range.txt": "the range of the verdict over uncertain properties",
-    "risk.txt": "the annual rate of collapse",
-}
-
 _RISK_CAPTION = (
     "Probability of a fall by intensity with its band, hazard of the site, and share of the rate "
     "by intensity."
@@ -127,7 +116,7 @@ def build_input_section(data: ReportData) -> Section:
     large = data.case.analysis.discretisation.displacements == "large"
     assumptions = [
         ("structure", "plane; forces are those of the whole width"),
-        ("blocks", blocks.get(fidelity, f"by part: {fidelity}")),
+        ("blocks", "rigid" if data.is_static else blocks.get(fidelity, f"by part: {fidelity}")),
         ("joints", "dry: no tension but where a bond is given; Coulomb friction; no crushing"),
         ("displacements", "of any size" if large else "small: equilibrium where blocks stood"),
         ("ground", "rigid, moves as one; abutments and foundations are fixed to it"),
@@ -384,8 +373,6 @@ def build_check_section(data: ReportData) -> Section:
     blocks += data.read_result("accuracy", caption)
     caption = "Residual displacement over each property; falls are above the line."
     blocks += data.read_result("verdict_range", caption)
-    if absent := [what for name, what in _FURTHER_RESULTS.items() if name not in data.files]:
-        blocks.append(TextBlock(f"Not computed: {', '.join(absent)}."))
     return Section("Checks of the numbers, and range of the verdict", blocks)
 
 
@@ -429,6 +416,7 @@ def build_method_section(data: ReportData) -> Section:
         if key in (table := data.case.settings.get(section, {}))
     ]
     used = [row[1:] for row in _METHODS if not row[0] or row[0] in data.files]
+    used = [row for row in used if data.runs or row[0] != "joints, criteria"]
     return Section("Norms and methods", [Grid((), [*norm, *spectra, *used])])
 
 
@@ -442,7 +430,7 @@ def build_live_sections(data: ReportData) -> list[Section]:
         "Change the arch, and shake it: rigid stones fall to the ground. `archfem page FOLDER` "
         "writes this as a page of its own."
     )
-    return [Section("Try it", [TextBlock(text), live])]
+    return [Section("Try it", [TextBlock(text), live], on_screen=True)]
 
 
 def build_source_section(data: ReportData) -> Section:

@@ -1,4 +1,4 @@
-"""Structures as input of other programs: run by OpenSees, and the polyhedra of 3DEC by hand."""
+"""Structures as input of other programs: run by OpenSees; blocks of 3DEC and UDEC by hand."""
 
 import ast
 import re
@@ -70,6 +70,23 @@ def test_polyhedra_of_3dec_are_the_blocks(tmp_path):
             # clockwise as seen from outside: by the right hand the normal points inwards
             volume -= points[0] @ inward / 6.0
         assert volume == pytest.approx(block.area * 1.5, rel=1e-7)
+
+
+def test_polygons_of_udec_are_the_blocks_clockwise(tmp_path):
+    ring = af.circular_arch(**RING, chords=1)
+    text = af.models.write_model(ring, tmp_path / "ring.dat").read_text()
+    found = re.findall(r"^block create polygon (.*)$", text, re.MULTILINE)
+    for block, corners in zip(ring.blocks, found, strict=True):
+        x, y = np.array([ast.literal_eval(f"({p})") for p in corners.split()]).T
+        # the area by the formula of the trapezia is negative clockwise
+        area = 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum()
+        assert area == pytest.approx(-block.area, rel=1e-7)
+    assert text.count(", a support: fix it") == 2
+    # corners are rounded by one per cent of the shortest edge, which must precede the blocks
+    head, _ = text.split("block create polygon", 1)
+    length = float(re.search(r"^block tolerance corner-round-length (.*)$", head, re.MULTILINE)[1])
+    edges = [np.linalg.norm(b.points - np.roll(b.points, 1, axis=0), axis=1) for b in ring.blocks]
+    assert length == pytest.approx(0.01 * min(map(min, edges)), rel=1e-5)
 
 
 def test_other_joints_and_blocks_are_refused_in_words(tmp_path):

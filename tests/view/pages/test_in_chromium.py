@@ -198,5 +198,9 @@ def test_a_report_is_printed_as_pdf(small, tmp_path):
     pages = pypdf.PdfReader(print_page(page, tmp_path / "report.pdf")).pages
     assert len(pages) > 2
     assert "a column under two pairs" in pages[0].extract_text()
+    text = "".join(each.extract_text() for each in pages)
     # players have drawn their data before the page is printed
-    assert "reading …" not in "".join(each.extract_text() for each in pages)
+    assert "reading …" not in text
+    # what moves is not on paper
+    assert "Try it" in page.read_text(encoding="utf-8")
+    assert "Try it" not in text
