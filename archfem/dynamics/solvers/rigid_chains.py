@@ -258,11 +258,9 @@ def _evaluate_joint(system, joint, before, after, residual):  # type: ignore
     resultants[0], resultants[1], resultants[2] = -force[0], frame[1] * shear, frame[1] * moment
     x, y, turn, other = face_forces(rates, force)
     k, m = low.first, high.first
-    residual[k] += x
-    residual[k + 1] += y
+    residual[k], residual[k + 1] = residual[k] + x, residual[k + 1] + y
     residual[k + 2] += low_mean[0] * x + low_mean[1] * y - turn
-    residual[m] -= x
-    residual[m + 1] -= y
+    residual[m], residual[m + 1] = residual[m] - x, residual[m + 1] - y
     residual[m + 2] -= high_mean[0] * x + high_mean[1] * y + other
     # points that reverse their slip: forces as if they stuck, of which rates are the derivatives
     system.reverses[joint] = missing[0] != 0.0

@@ -210,8 +210,7 @@ def _compute_segment(joints, segment, states, lag, slip, forces):  # type: ignor
     joint, orientation = joints.joint[segment], joints.orientation[segment]
     forces.resultants[joint, 0] -= force[0]
     forces.resultants[joint, 1] += orientation * shear
-    moment = orientation * moment - joints.segment_offset[segment] * force[0]
-    forces.resultants[joint, 2] += moment
+    forces.resultants[joint, 2] += orientation * moment - joints.segment_offset[segment] * force[0]
     # generalised forces, and their correction where points should stick
     means = lower_rates[0], higher_rates[0]
     push = face_forces(rates, force)
