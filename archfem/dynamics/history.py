@@ -131,8 +131,8 @@ class History(ResultDisplay):
 
         Files of earlier versions have no opening, rotation and slip.
         """
-        names = [name for name, values in self.dataset.items() if "joint" in values.dims]
-        return self.dataset[names]
+        dataset = self.dataset
+        return dataset[[k for k in dataset.data_vars if "joint" in dataset.variables[k].dims]]
 
     @property
     def displacement(self) -> xr.DataArray:

@@ -71,8 +71,8 @@ class Batch:
             `EnergyMeter.measure_step` (steps, 4) [J].
         state: function from the number of a step to the state at its end.
         fallback: whether a compiled solver failed and SNES took these steps.
-        readings: readings of the model's observer at the ends (steps, r); None to read them from
-            the states.
+        q: coordinates at the ends (steps, n); None to take them from the states.
+        readings: readings of the model's observer at the ends (steps, r), if they are stored.
     """
 
     times: Array
@@ -82,6 +82,7 @@ class Batch:
     energy: Array
     state: Callable[[int], State]
     fallback: bool = False
+    q: Array | None = None
     readings: Array | None = None
 
     def read(self, observer: Observer) -> Array:
@@ -92,7 +93,17 @@ class Batch:
         """
         if self.readings is not None:
             return self.readings
+        if self.q is not None:
+            return observer.read_many(self.q)
         return np.array([observer.read(self.state(k).q) for k in range(len(self.times))])
+
+    def with_readings(self, observer: Observer) -> "Batch":
+        """Return the batch with stored readings, which several monitors need.
+
+        Args:
+            observer: observer of the model of the run.
+        """
+        return replace(self, readings=self.read(observer))
 
     def cut(self, steps: int) -> "Batch":
         """Return the first steps of the batch.
@@ -108,7 +119,7 @@ class Batch:
 
 
 def join_batches(batches: Sequence[Batch]) -> Batch:
-    """Return consecutive batches with readings as one."""
+    """Return consecutive batches with coordinates as one."""
     parts = tuple(batches)
     ends = np.cumsum([len(part.times) for part in parts])
 
@@ -116,7 +127,7 @@ def join_batches(batches: Sequence[Batch]) -> Batch:
         number = int(np.searchsorted(ends, k, side="right"))
         return parts[number].state(k - int(ends[number]) + len(parts[number].times))
 
-    names = "times", "resultants", "iterations", "smallest_step", "energy", "readings"
+    names = "times", "resultants", "iterations", "smallest_step", "energy", "q"
     arrays: Any = {name: np.concatenate([getattr(p, name) for p in parts]) for name in names}
     return Batch(**arrays, state=state)
 

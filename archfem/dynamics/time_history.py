@@ -188,17 +188,18 @@ def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) 
     """
     if not len(slip_error.joints):
         return None
-    joints = history.joints.isel(joint=slip_error.joints)
-    slip = joints["slip"].transpose("time", "joint").values
-    largest, worst = float(np.abs(slip - slip[0]).max()), int(np.argmax(slip_error.total))
-    error, depth = float(slip_error.total[worst]), float(joints["depth"].values[worst])
+    dataset, joints = history.dataset, slip_error.joints
+    slip = dataset["slip"].transpose("time", "joint").values[:, joints]
+    largest, error = float(np.abs(slip - slip[0]).max()), float(slip_error.total.max())
+    worst = int(joints[slip_error.total.argmax()])
+    depth = float(dataset["depth"].values[worst])
     # a tenth of the largest slip on average; and a thousandth of the depth, by which |e| errs by a
     # fifth of the default tolerance
     limit = max(1e-3 * depth, 0.3 * largest)
     if error <= limit:
         return None
     return Doubt(
-        f"steps of {1e3 * dt:g} ms are long for sliding: of '{joints['name'].values[worst]}' the "
+        f"steps of {1e3 * dt:g} ms are long for sliding: of '{dataset['name'].values[worst]}' the "
         f"slip may be wrong by {format_mm(error)}, where the largest slip is {format_mm(largest)}",
         # the error varies with the square of the step, and faster where steps miss peaks
         f"leave dt out, or take {1e3 * dt * (limit / error) ** 0.5:.2g} ms or less",

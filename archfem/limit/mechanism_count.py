@@ -6,7 +6,9 @@ Most mechanisms by count close again before anything falls: those of a record ha
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -134,12 +136,22 @@ def counted_mechanism(
         The mechanism, or None.
     """
     joints = with_failure_flags(joints, criteria)
-    limits, roles, flags = Criteria.of(joints), part_roles(joints), _flags_over_time(joints)
-    counts = _count_by_part(flags, select_assessed_parts(roles))
+    return _find_counted(joints, Failures.of(joints), kinds)
+
+
+def _find_counted(
+    joints: xr.Dataset, failures: "Failures", kinds: Sequence[str]
+) -> Mechanism | None:
+    """Return what `counted_mechanism` does, from joints with their flags."""
+    limits, roles, flags, counts = failures
+
+    @cache  # over a run the same counts are frequent
+    def find_widest(*numbers: int) -> tuple[str, ...] | None:
+        count = dict(zip(counts, numbers, strict=True))
+        return _widest_group(count, roles, limits.failures, kinds)
 
     def find_group(instant: int) -> tuple[int, tuple[str, ...]] | None:
-        count = {name: int(failures[instant]) for name, failures in counts.items()}
-        group = _widest_group(count, roles, limits.failures, kinds)
+        group = find_widest(*(int(count[instant]) for count in counts.values()))
         return None if group is None else (instant, group)
 
     enough = np.flatnonzero(sum(counts.values()) >= limits.failures)
@@ -212,10 +224,15 @@ def mechanism_over_record(joints: xr.Dataset, criteria: Criteria | None = None) 
         from the first of these failures, or None.
     """
     joints = with_failure_flags(joints, criteria)
-    limits, each = Criteria.of(joints), _flags_over_time(joints)
+    return _find_over_record(joints, Failures.of(joints))
+
+
+def _find_over_record(joints: xr.Dataset, failures: "Failures") -> Mechanism | None:
+    """Return what `mechanism_over_record` does, from joints with their flags."""
+    limits, roles, each, _ = failures
     failed = np.logical_or.accumulate(_lasting_flags(each, limits.duration), axis=0)
     flags = each.copy(data=failed)
-    counts = _count_by_part(flags, select_assessed_parts(part_roles(joints)))
+    counts = _count_by_part(flags, select_assessed_parts(roles))
     instants = {
         part: int(np.argmax(count >= limits.failures))
         for part, count in counts.items()
@@ -252,11 +269,12 @@ def counted_mechanisms(
         The first mechanism by each definition, or None, by the definition's name.
     """
     joints = with_failure_flags(joints, criteria)
+    failures = Failures.of(joints)
     found = {
-        definition: counted_mechanism(joints, kinds=kinds)
+        definition: _find_counted(joints, failures, kinds)
         for definition, kinds in DEFINITIONS_AT_ONCE.items()
     }
-    return {**found, OVER_RECORD: mechanism_over_record(joints)}
+    return {**found, OVER_RECORD: _find_over_record(joints, failures)}
 
 
 def follow_mechanism(joints: xr.Dataset, found: Mechanism) -> Mechanism:
@@ -266,12 +284,30 @@ def follow_mechanism(joints: xr.Dataset, found: Mechanism) -> Mechanism:
     times = joints["time"].values
     begin = int(np.flatnonzero(times == found.time)[0])
     own = np.isin(joints["joint"].values, found.joints)
-    after = joints.isel(joint=own, time=slice(begin, None))
-    all_failed = find_failed_joints(after).all("joint").values
+    all_failed = _flags_over_time(joints).values[begin:, own].all(axis=1)
     count = len(all_failed) if all_failed.all() else int(all_failed.argmin())
     duration = float(step_lengths(times)[begin : begin + count].sum())
-    opening = float(after["opening"].isel(time=slice(count)).max()) if "opening" in after else None
+    opening = None
+    if "opening" in joints:
+        during = joints["opening"].isel(joint=own, time=slice(begin, begin + count))
+        opening = float(during.max())
     return replace(found, duration=duration, opening=opening, closes=begin + count < len(times))
+
+
+class Failures(NamedTuple):
+    """Failed joints over time, and their number in each part that counts."""
+
+    criteria: Criteria
+    roles: Mapping[str, str]  # of each part
+    flags: xr.DataArray  # over time and joint
+    counts: Mapping[str, NDArray[np.int64]]  # of each assessed part (steps,)
+
+    @classmethod
+    def of(cls, joints: xr.Dataset) -> "Failures":
+        """Return the failures of joints with their flags."""
+        roles, flags = part_roles(joints), _flags_over_time(joints)
+        counts = _count_by_part(flags, select_assessed_parts(roles))
+        return cls(Criteria.of(joints), roles, flags, counts)
 
 
 def has_counted_mechanism(joints: xr.Dataset) -> xr.DataArray:

@@ -45,6 +45,8 @@ class EnsemblePart:
     analysis: Analysis = field(repr=False)
     changes: tuple[tuple[str, Any], ...]
     runs: Sequence[tuple[Motion, float]] = field(repr=False)
+    # from motions to histories; None where another process prepares it
+    run: Callable[[Motion], History] | None = field(default=None, repr=False)
 
     @property
     def case(self) -> "EnsemblePart":
@@ -174,13 +176,14 @@ def ensemble(
         raise InvalidInput("scales and changes are empty: give one of each, or leave them out")
     runs = [(motion, scale) for motion in motions for scale in factors]
     # a structure that does not stand is refused before any run; parts suffice for all processes
-    for change in varied:
-        prepare_histories(analysis, change)
+    prepared = [prepare_histories(analysis, change) for change in varied]
     count = 1 if workers == 1 else min(len(runs), max(1, 2 * workers // len(varied)))
     parts, places = [], []
     for number, change in enumerate(varied):
         for chosen in np.array_split(np.arange(len(runs)), count):
-            parts.append(EnsemblePart(analysis, tuple(change.items()), [runs[k] for k in chosen]))
+            run = prepared[number] if workers == 1 else None
+            chosen_runs = [runs[k] for k in chosen]
+            parts.append(EnsemblePart(analysis, tuple(change.items()), chosen_runs, run))
             places.append((chosen, number))
     table = _empty_table(analysis, motions, factors, varied)
     finished = evaluate_points(list(enumerate(parts)), Evaluator(evaluate_part), workers)
@@ -227,7 +230,7 @@ def prepare_histories(
 
 def evaluate_part(part: EnsemblePart) -> dict[str, Any]:
     """Return the findings of some histories, each as a row; texts are joined by line feeds."""
-    run = prepare_histories(part.analysis, dict(part.changes))
+    run = part.run or prepare_histories(part.analysis, dict(part.changes))
     rows = [_reduce(part.analysis.structure, run, motion.scaled(s)) for motion, s in part.runs]
     found: dict[str, Any] = {name: [row[name] for row in rows] for name in PEAKS}
     for name in ("outcome", "ended", "error"):

@@ -41,11 +41,11 @@ def test_a_step_is_a_batch_of_one():
 
 
 def test_a_batch_is_cut_and_read():
-    """Readings that come with it, or else off its states."""
+    """Readings that come with it, or else off its coordinates or its states."""
     times, rows = np.arange(1.0, 5.0), np.arange(16.0).reshape(4, 4)
     states = [af.dynamics.State(t, np.full(2, t), *np.zeros((2, 2))) for t in times]
     given = (times, np.zeros((4, 1, 3)), np.arange(4), times, rows, lambda k: states[k])
-    gauges = SimpleNamespace(read=lambda q: 2.0 * q)
+    gauges = SimpleNamespace(read=lambda q: 2.0 * q, read_many=lambda q: 3.0 * q)
     whole = Batch(*given)
     assert whole.cut(4) is whole
     part = whole.cut(2)
@@ -53,3 +53,7 @@ def test_a_batch_is_cut_and_read():
     assert part.read(gauges).tolist() == [[2.0, 2.0], [4.0, 4.0]]
     with_readings = Batch(*given, readings=np.full((4, 3), 9.0)).cut(3)
     assert with_readings.read(gauges).tolist() == [[9.0] * 3] * 3
+    with_rows = Batch(*given, q=np.arange(8.0).reshape(4, 2)).cut(2)
+    stored = with_rows.with_readings(gauges)
+    assert with_rows.readings is None
+    assert stored.readings.tolist() == stored.read(gauges).tolist() == [[0.0, 3.0], [6.0, 9.0]]

@@ -245,16 +245,17 @@ def test_facets_are_the_same_in_numpy_and_compiled(lag):
 
     def at_facet(contact, *ends):
         normals, _, _, times, _ = joint_means(contact, ends, *rates, True)
-        tangent = mean_tractions(contact, ends, lag, True)[1]
+        pressed, tangent = mean_tractions(contact, ends, lag, True)
         moves = closed_means(contact, ends, lag, True)[1]
         whole, last = facet_energy(contact, *ends[:2]), facet_energy(contact, *ends[2:])
-        return *normals, *times, *tangent, *moves, *whole, *last
+        return *normals, *times, *tangent, *moves, *whole, *last, *pressed
 
     found = compiled(at_facet, records, *ends.T)
     normal, closed = (each.reshape(-1, 2).T for each in facets.step_means(*path))
     stiffness = np.abs(facets.contact.normal_stiffness)
     size = np.abs(ends).max(axis=1)
-    assert np.all(np.abs(found[:2] - normal) <= SAME * stiffness * size)
+    for own in (found[:2], found[16:]):
+        assert np.all(np.abs(own - normal) <= SAME * stiffness * size)
     assert np.abs(found[2:4] - closed).max() <= SAME
     both = facets.mean_stiffness(*path, rates).reshape(4, -1)[[0, 1, 3]]
     assert np.all(np.abs(found[4:7] - both) <= SAME * stiffness)
@@ -262,7 +263,7 @@ def test_facets_are_the_same_in_numpy_and_compiled(lag):
     # the rate of the closed fraction is as large as one over the distance from where it changes
     assert np.all(np.abs(found[7:10] - moves) <= 1e-9 * np.abs(moves) + 1e-9)
     # an energy, its force and its moment, at start and end
-    for gaps, own in zip(path, (found[10:13], found[13:]), strict=True):
+    for gaps, own in zip(path, (found[10:13], found[13:16]), strict=True):
         force = facets.forces(gaps).reshape(-1, 2)
         energy = facets.energies(gaps).reshape(-1, 2).sum(axis=1)
         whole = np.abs(gaps).reshape(-1, 2).max(axis=1)

@@ -98,6 +98,19 @@ def test_changes_are_those_of_the_structure_changed_by_hand(ring, motions):
     assert whole.verdict.displacement == pytest.approx(second, rel=1e-9)
 
 
+def test_each_changed_structure_is_prepared_once(ring, motions, monkeypatch):
+    prepared, prepare = [], module.prepare_histories
+
+    def count(analysis, changes):
+        prepared.append(dict(changes))
+        return prepare(analysis, changes)
+
+    monkeypatch.setattr(module, "prepare_histories", count)
+    changes = [{}, {"friction": -0.1}]
+    af.ensemble(of(ring, "small"), motions, scales=(0.01,), changes=changes)
+    assert prepared == changes
+
+
 def test_a_run_without_equilibrium_is_unknown_and_the_others_remain(ring, motions, monkeypatch):
     def prepare(analysis, changes):
         def run(motion):

@@ -54,17 +54,24 @@ class AdaptiveStepper:
         pending: list[Batch] = []
         try:
             for batch in self._controlled_batches(start, end):
-                if batch.fallback or batch.readings is None:
-                    yield from _joined(pending)
+                if batch.fallback or batch.q is None:
+                    yield from self._join_pending(pending)
                     yield batch
                     continue
                 pending.append(batch)
                 if sum(len(each.times) for each in pending) >= 256:
-                    yield from _joined(pending)
+                    yield from self._join_pending(pending)
         except DidNotConverge:
-            yield from _joined(pending)  # the record ends with the last step
+            yield from self._join_pending(pending)  # the record ends with the last step
             raise
-        yield from _joined(pending)
+        yield from self._join_pending(pending)
+
+    def _join_pending(self, pending: list[Batch]) -> Iterator[Batch]:
+        """Yield all pending batches as one, if there are any, and forget them."""
+        if pending:
+            batch = join_batches(pending)
+            pending.clear()
+            yield batch.with_readings(self.stepper.equation.model.observer())
 
     def _controlled_batches(self, start: State, end: float) -> Iterator[Batch]:
         """Yield the steps from a state to a time [s], between two checks of their errors."""
@@ -153,11 +160,3 @@ class AdaptiveStepper:
         bends = second_derivatives(times, values)[len(before) :]
         errors: Array = dt**2 * np.abs(bends).max(axis=1) / 6.0
         return errors
-
-
-def _joined(pending: list[Batch]) -> Iterator[Batch]:
-    """Yield all pending batches as one, if there are any, and forget them."""
-    if pending:
-        batch = join_batches(pending)
-        pending.clear()
-        yield batch

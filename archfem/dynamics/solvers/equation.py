@@ -219,17 +219,18 @@ def mean_accelerations(motion: Motion, times: Array) -> Array:
     """
     means = np.zeros((len(times) - 1, 2))
     for axis, name in enumerate(COMPONENTS[:2]):
-        if name in motion.components:
-            speeds = motion.dt * _integrate_to(motion, name, times / motion.dt)
-            means[:, axis] = np.diff(speeds) / np.diff(times)
+        samples = getattr(motion, name)
+        if samples is not None:
+            sums = _integrate_samples(motion, name)
+            speeds = motion.dt * _integrate_to(samples, sums, times / motion.dt)
+            means[:, axis] = (speeds[1:] - speeds[:-1]) / (times[1:] - times[:-1])
     return means
 
 
-def _integrate_to(motion: Motion, name: str, places: Array) -> Array:
+def _integrate_to(samples: Array, sums: Array, places: Array) -> Array:
     """Integrate a component from its first sample to fractional sample numbers (m,)."""
-    samples, sums = motion.component(name), _integrate_samples(motion, name)
     last = len(samples) - 1
-    inside = np.clip(places, 0.0, last)
+    inside = np.minimum(np.maximum(places, 0.0), last)
     lower = np.minimum(inside.astype(int), max(last - 1, 0))
     part = inside - lower
     rise = samples[np.minimum(lower + 1, last)] - samples[lower]

@@ -72,7 +72,7 @@ class Stepper:
             times = start.time + dt * np.arange(done + 1, last + 1)
             batch = self.advance_batch(state, dt, times)
             if len(batch.times):
-                yield batch
+                yield batch.with_readings(self.equation.model.observer())
                 done += len(batch.times)
                 state = batch.state(len(batch.times) - 1)
             if len(batch.times) < len(times):
@@ -133,7 +133,6 @@ class Stepper:
         series, memories, results, *_ = arrays
         count = self._advance(*arrays)
         resultants, iterations, energy = (each[:count] for each in results)
-        displacements = series[1 : count + 1, 0].T[self._place].T
         return Batch(
             times[:count],
             resultants,
@@ -141,7 +140,7 @@ class Stepper:
             np.full(count, dt),
             energy,
             lambda k: self._state(float(times[k]), series[k + 1], memories[k + 1]),
-            readings=self.equation.model.observer().read_many(displacements),
+            q=series[1 : count + 1, 0, self._place],
         )
 
     def _state(self, time: float, vectors: Array, memory: Array) -> State:

@@ -38,7 +38,13 @@ from archfem.joints.large.face_kinematics import (
     step_measures,
 )
 from archfem.joints.large.forces import LargeDisplacementJoints
-from archfem.joints.large.overlap_law import FaceLaw, closing_energy, overlap, segment_forces
+from archfem.joints.large.overlap_law import (
+    FaceLaw,
+    closing_energy,
+    damping_loss,
+    overlap,
+    segment_forces,
+)
 
 # Motion of a stone over a step: cosine and sine of half its angle at the start, series of half its
 # rotation, cosine and sine of its angle in the middle and at the end, and of half the latter
@@ -75,7 +81,8 @@ class ChainSystem(NamedTuple):
     rates: Array
     missing: Array  # forces that joints lack if points that reversed stick (j, 6)
     resultants: Array  # mean N, V, M (j, 3)
-    end: Array  # opening, slip, rotation at the end, and loss of the step (j, 4)
+    start: Array  # opening, slip and rotation at the start (j, 3)
+    end: Array  # and at the end, and the loss of the shear (j, 4)
     reverses: Any  # whether the slip of points has reversed (j,)
     blocks: Array  # D, U, L and F (4, m + 1, 3, 3)
     slip: Array  # irreversible slip before the step (p,) [m]
@@ -161,6 +168,7 @@ def chain_system(equation: Equation, tree: StoneTree, dt: float) -> ChainSystem:
         np.zeros((count, 26)),
         np.zeros((count, 6)),
         np.zeros((count, 3)),
+        np.zeros((count, 3)),
         np.zeros((count, 4)),
         np.zeros(count, bool),
         np.zeros((4, len(stones), 3, 3)),
@@ -244,16 +252,15 @@ def _evaluate_joint(system, joint, before, after, residual):  # type: ignore
     force, law_rate, _, ((shear, moment), loss, missing) = segment_forces(
         system.law, joint, (start, end, (0.0, 0.0)), system.step[1], memory
     )
-    kept, resultants = system.end[joint], system.resultants[joint]
+    begun, kept, resultants = system.start[joint], system.end[joint], system.resultants[joint]
+    begun[0], begun[1], begun[2] = start
     kept[0], kept[1], kept[2], kept[3] = end[0], end[1], end[2], loss
     resultants[0], resultants[1], resultants[2] = -force[0], frame[1] * shear, frame[1] * moment
     x, y, turn, other = face_forces(rates, force)
     k, m = low.first, high.first
-    residual[k] += x
-    residual[k + 1] += y
+    residual[k], residual[k + 1] = residual[k] + x, residual[k + 1] + y
     residual[k + 2] += low_mean[0] * x + low_mean[1] * y - turn
-    residual[m] -= x
-    residual[m + 1] -= y
+    residual[m], residual[m + 1] = residual[m] - x, residual[m + 1] - y
     residual[m + 2] -= high_mean[0] * x + high_mean[1] * y + other
     # points that reverse their slip: forces as if they stuck, of which rates are the derivatives
     system.reverses[joint] = missing[0] != 0.0
@@ -495,7 +502,9 @@ def _evaluate_chain_step(system, step, states, ground, results, memory):  # type
         for k in range(3):
             resultants[joint, k] = system.resultants[joint, k]
         opening, slip, turn, loss = system.end[joint]
-        energy[3] += loss
+        first = system.start[joint]
+        ends = (first[0], first[1], first[2]), (opening, slip, turn)
+        energy[3] += loss + damping_loss(law, joint, ends, system.step[1])
         (length, _), (middle, _) = overlap(law, joint, slip)
         phi = closing_energy(law, joint, length, opening - middle * turn, turn)[0]
         energy[1] += law.width * length * phi

@@ -24,7 +24,13 @@ from archfem.joints.large.face_kinematics import (
     step_measures,
     step_poses,
 )
-from archfem.joints.large.overlap_law import FaceLaw, closing_energy, overlap, segment_forces
+from archfem.joints.large.overlap_law import (
+    FaceLaw,
+    closing_energy,
+    damping_loss,
+    overlap,
+    segment_forces,
+)
 from archfem.joints.large.rates import JointRates
 
 
@@ -199,12 +205,12 @@ def _compute_segment(joints, segment, states, lag, slip, forces):  # type: ignor
     force, law_rate, stretch_rate, others = segment_forces(
         law, segment, (start, end, (first, last)), lag, memory
     )
-    (shear, moment), forces.dissipation[segment], missing = others
+    (shear, moment), loss, missing = others
+    forces.dissipation[segment] = loss + damping_loss(law, segment, (start, end), lag)
     joint, orientation = joints.joint[segment], joints.orientation[segment]
     forces.resultants[joint, 0] -= force[0]
     forces.resultants[joint, 1] += orientation * shear
-    moment = orientation * moment - joints.segment_offset[segment] * force[0]
-    forces.resultants[joint, 2] += moment
+    forces.resultants[joint, 2] += orientation * moment - joints.segment_offset[segment] * force[0]
     # generalised forces, and their correction where points should stick
     means = lower_rates[0], higher_rates[0]
     push = face_forces(rates, force)

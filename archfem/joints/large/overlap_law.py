@@ -174,7 +174,8 @@ def _friction_limits(law, point, segment, pressed, lagged, lag):  # type: ignore
 def segment_forces(law, segment, ends, lag, memory):  # type: ignore
     """Return forces of a segment over a step, their derivatives, shear, moment, loss, corrections.
 
-    Shear and moment are the resultants on the overlap, the moment about its middle.
+    Shear and moment are the resultants on the overlap, the moment about its middle. The loss is
+    that of the shear.
     """
     # overlap at both ends of the step; gaps at the middle and over the overlap
     (g0, s0, t0), (g1, s1, t1), longer = ends
@@ -188,7 +189,7 @@ def segment_forces(law, segment, ends, lag, memory):  # type: ignore
     sums, rubs, is_stuck = _sum_stuck(law, segment, (bounds, ends), mean, lag, memory)
     if not is_stuck:
         sums, rubs = _sum_points(law, segment, (bounds, ends), (mean, half, tilts, l1), lag, memory)
-    total, moment, gap, place, square, loss = sums
+    total, moment, gap, place, square = sums
     # derivatives of the moment sum, of F_g and of F_σ, by the measures at the end
     leans = place, -tilts * square, -l1 * square
     scale = law.width * mean
@@ -206,8 +207,26 @@ def segment_forces(law, segment, ends, lag, memory):  # type: ignore
     rates = opens, slides, turns, (rubs[6], rubs[7], rubs[8])
     if is_off_middle:
         force, rates = _about_mean_middle(force, rates, (c0, c1, moves, slope), (t0, t1))
-    others = (rubs[0], about), rubs[2] + scale * loss, (rubs[11], rubs[12])
+    others = (rubs[0], about), rubs[2], (rubs[11], rubs[12])
     return force, rates, (rubs[9], rubs[10]), others
+
+
+@inlined_kernel
+def damping_loss(law, segment, ends, lag):  # type: ignore
+    """Return the energy that a segment loses over a step by the lag of its normal forces."""
+    if lag <= 0.0:
+        return 0.0
+    (g0, s0, t0), (g1, s1, t1) = ends
+    (l0, _), (c0, _) = overlap(law, segment, s0)
+    (l1, _), (c1, _) = overlap(law, segment, s1)
+    g0, g1, r0, r1 = g0 - c0 * t0, g1 - c1 * t1, l0 * t0, l1 * t1
+    contact, loss, stride = law.contacts[segment], 0.0, 2 if law.facets else 1
+    for point in range(law.first_point[segment], law.first_point[segment + 1], stride):
+        x0, x1 = law.place[point], law.place[point + stride - 1]
+        a, c, b, d = g0 - x0 * r0, g0 - x1 * r0, g1 - x0 * r1, g1 - x1 * r1
+        m0, m1 = damping_tractions(contact, (a, c, b, d), lag, law.facets)
+        loss += law.depth_share[point] * (m0 * (b - a) + m1 * (d - c))
+    return law.width * 0.5 * (l0 + l1) * loss
 
 
 @inlined_kernel
@@ -279,10 +298,6 @@ def _sum_points(law, segment, ends, overlap, lag, memory):  # type: ignore
         lagged = a + p, c + q, b + p, d + q
         pressed = mean_tractions(contact, lagged, lag, law.facets)
         (n0, n1), (k00, k01, k11) = pressed
-        # loss by damping, on the change of the gap
-        if lag > 0.0:
-            m0, m1 = damping_tractions(contact, (a, c, b, d), lag, law.facets)
-            lost += share * (m0 * (b - a) + m1 * (d - c))
         # sums of f, x f, and of their derivatives by the gap: 1, x, x²
         near, far = k00 + k01, k01 + k11
         total += share * (n0 + n1)
@@ -292,14 +307,18 @@ def _sum_points(law, segment, ends, overlap, lag, memory):  # type: ignore
         by_square += share * (x0 * x0 * k00 + 2.0 * x0 * x1 * k01 + x1 * x1 * k11)
         # shear of the point, or of both ends of the facet
         (near, far), (k00, k01, k11) = _friction_limits(law, point, segment, pressed, lagged, lag)
-        held = near, k00 + k01, x0 * k00 + x1 * k01
-        limits = contact.resistance, held, overlap
-        rubs = _add_point_shear(law, point, (measures, lag), limits, memory, rubs)
-        if law.facets:
-            held = far, k01 + k11, x0 * k01 + x1 * k11
+        is_free = near == 0.0 and far == 0.0 and contact.resistance == 0.0
+        for end in range(stride):
+            if is_free:
+                lost += _follow_free_point(law, point + end, measures, memory)
+                continue
+            held = near, k00 + k01, x0 * k00 + x1 * k01
+            if end == 1:
+                held = far, k01 + k11, x0 * k01 + x1 * k11
             limits = contact.resistance, held, overlap
-            rubs = _add_point_shear(law, point + 1, (measures, lag), limits, memory, rubs)
-    return (total, moment, by_gap, by_place, by_square, lost), rubs
+            rubs = _add_point_shear(law, point + end, (measures, lag), limits, memory, rubs)
+    rubs = rubs[:2] + (rubs[2] + lost,) + rubs[3:]  # noqa: RUF005 (numba has no other)
+    return (total, moment, by_gap, by_place, by_square), rubs
 
 
 @inlined_kernel
@@ -309,7 +328,7 @@ def _sum_stuck(law, segment, ends, overlap, lag, memory):  # type: ignore
     The facets cover the overlap: sums of their integrals are those over all of it.
     """
     ((g0, g1, r0, r1), ((_, s0, _), (_, s1, _), (e0, e1))), contact = ends, law.contacts[segment]
-    sums, rubs = 6 * (0.0,), 13 * (0.0,)
+    sums, rubs = 5 * (0.0,), 13 * (0.0,)
     # gaps without and with the lag of damping, at the end that is more open
     more, tilt = lag * (g1 - g0), lag * (r1 - r0)
     widest = max(g0 + 0.5 * abs(r0), g1 + 0.5 * abs(r1))
@@ -340,11 +359,20 @@ def _sum_stuck(law, segment, ends, overlap, lag, memory):  # type: ignore
         second_moment += place * place * rate
     for point in range(begin, end):
         memory[1][point], memory[2][point] = memory[0][point], 0.0
-    whole, wider, leans = (0.5 + lag) * stiff, g1 - g0, r1 - r0
-    loss = lag * stiff * (wider * wider + leans * leans / 12.0)
-    sums = stiff * gap, -stiff * turn / 12.0, whole, 0.0, whole / 12.0, loss
+    whole = (0.5 + lag) * stiff
+    sums = stiff * gap, -stiff * turn / 12.0, whole, 0.0, whole / 12.0
     held = first_moment, 0.0, first_moment, second_moment, 0.0, 0.0
     return sums, (shear, stretched, lost, 0.0, along, 0.0, 0.0) + held, True  # noqa: RUF005
+
+
+@inlined_kernel
+def _follow_free_point(law, point, measures, memory):  # type: ignore
+    """Store the slip of a point without friction, which sticks nowhere; return the energy lost."""
+    ((_, s0, _), (_, s1, _), (e0, e1)), (slip, end_slip, directions) = measures, memory
+    place = law.place[point]
+    stretched = s0 + place * e0 - slip[point]
+    end_slip[point], directions[point] = s1 + place * e1, 0.0
+    return 0.5 * law.shear_spring[point] * stretched * stretched
 
 
 @inlined_kernel

@@ -160,12 +160,41 @@ def mean_tractions(contact, ends, lag, facet):  # type: ignore
     # open during the whole step; what a joint presses beyond the linear law has no lag
     if min(ends) > 0.0 and contact.closing_rate == 0.0:
         return (0.0, 0.0), (0.0, 0.0, 0.0)
+    whole = (0.5 + lag) * contact.normal_stiffness
+    if facet and contact.closing_rate == 0.0:
+        if max(ends) > 0.0:
+            return _divided_tractions(contact, ends, lag)
+        normal = _uniform_means(contact, ends, 0.0)[0]
+        return normal, (whole / 3.0, whole / 6.0, whole / 3.0)
     # the derivative is that of a spring which is never open, less that of the release
     normal, _, rates, _, _ = joint_means(contact, ends, lag, 1.0 + lag, facet)
-    whole = (0.5 + lag) * contact.normal_stiffness
     if facet:
         return normal, (whole / 3.0 - rates[0], whole / 6.0 - rates[1], whole / 3.0 - rates[2])
     return normal, (whole - rates[0], 0.0, 0.0)
+
+
+@kernel
+def _divided_tractions(contact, ends, lag):  # type: ignore
+    """Return `mean_tractions` of the linear law along a facet of which parts are open."""
+    # `_divided_means` without what the traction does not need
+    a, c, b, d = ends
+    _, _, breaks = _zero_crossings(ends)
+    whole, normals, rates = (0.5 + lag) * contact.normal_stiffness, (0.0, 0.0), (0.0, 0.0, 0.0)
+    for piece in range(3):
+        begin, length = breaks[piece], breaks[piece + 1] - breaks[piece]
+        middle = begin + 0.5 * length
+        is_open = a + middle * (c - a) > 0.0 and b + middle * (d - b) > 0.0
+        if length <= 0.0 or is_open:
+            continue
+        for k in range(len(GAUSS_POINTS)):
+            place = begin + GAUSS_POINTS[k] * length
+            near, far = 1.0 - place, place
+            before, after = near * a + far * c, near * b + far * d
+            mean, _, taken, _, _ = _point_means(contact, before, after, lag, 1.0 + lag)
+            weight = GAUSS_WEIGHTS[k] * length
+            normals = _add_ends(normals, weight * mean, near, far)
+            rates = _add_pairs(rates, weight * (whole - taken), near, far)
+    return normals, rates
 
 
 @inlined_kernel
@@ -228,11 +257,20 @@ def released_energy(contact, gaps, taken, facet):  # type: ignore
 @inlined_kernel
 def facet_energy(contact, first, last):  # type: ignore
     """Return the energy of a facet of unit length, its force, and its moment about the middle."""
-    near, far = joint_means(contact, (first, last, first, last), 1.0, 1.0, True)[0]
+    # closed from the end that is pressed most, over this share of the length
+    low, high = min(first, last), max(first, last)
+    share = 1.0 if high <= 0.0 else (low / (low - high) if low < 0.0 else 0.0)
+    # with the gap at the other end, or 0 where the closed part ends before
+    high = min(high, 0.0)
+    third = contact.normal_stiffness / 6.0 * share
+    near, far = third * (2.0 * low + high), third * (low + 2.0 * high)
+    near, far = near + (1.0 - share) * far, share * far
+    if first > last:
+        near, far = far, near
     energy = 0.5 * (first * near + last * far)
     if contact.closing_rate > 0.0:
         mean, (one, other), _ = _excess_between(contact, first, last)
-        energy += 0.5 * (first * one + last * other) + mean
+        energy, near, far = energy + mean, near - one, far - other
     return energy, near + far, 0.5 * (far - near)
 
 

@@ -176,15 +176,24 @@ class RotatingCells(Cells):
 
     def displacement(self, q: Array) -> Array:
         """Return the displacements of all points (…, m, 2) [m]."""
-        arms, elastic = self._arms
-        has_frame = self.turns >= 0
-        turn, x, y = (np.where(has_frame, q[..., self.turns - k], 0.0) for k in (0, 2, 1))
-        strained = np.asarray(elastic @ q.T).T.reshape(*x.shape, 2)
-        u, v, (rx, ry) = strained[..., 0], strained[..., 1], arms.T
+        (rx, ry), elastic = self._arms[0].T, self._arms[1]
+        # once for each block, and then for its points
+        frames, frame = self._frames
+        turn, x, y = (np.where(frames >= 0, q[..., frames - k], 0.0) for k in (0, 2, 1))
         # (x, y) + (R - I) r + R u, with cos θ - 1 by the half angle
         c, s, less = np.cos(turn), np.sin(turn), -2.0 * np.sin(0.5 * turn) ** 2
-        dx = x + less * rx - s * ry + c * u - s * v
-        return np.stack([dx, y + s * rx + less * ry + s * u + c * v], axis=-1)
+        x, y, c, s, less = (each[..., frame] for each in (x, y, c, s, less))
+        dx, dy = x + less * rx - s * ry, y + s * rx + less * ry
+        if elastic.nnz:
+            strained = np.asarray(elastic @ q.T).T.reshape(*x.shape, 2)
+            u, v = strained[..., 0], strained[..., 1]
+            dx, dy = dx + c * u - s * v, dy + s * u + c * v
+        return np.stack([dx, dy], axis=-1)
+
+    @cached_property
+    def _frames(self) -> tuple[Any, Any]:
+        """Coordinates of the rotations of all blocks, and the number of each point's (m,)."""
+        return np.unique(self.turns, return_inverse=True)
 
 
 @dataclass(frozen=True, eq=False)
