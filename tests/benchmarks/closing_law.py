@@ -4,8 +4,9 @@
 
 The README's ring under 8 s of a synthetic motion, in small and large displacements, then all scenes
 of `scenes.py`. Joints of stones have k_n δ_m = p_0 of 0.3 MPa, the least of
-`tests/validation/closing_arch.csv`. Times of a step are of the processor: both laws run by turns in one process,
-and the least counts. Evaluations of the joints in a step say how much of the ratio is Newton's.
+`tests/validation/closing_arch.csv`. Times of a step are of the processor: both laws run by turns in
+one process, and the least counts. Evaluations of the joints in a step say how much of the ratio is
+Newton's.
 """
 
 import logging

@@ -325,15 +325,14 @@ def _sum_stuck(law, segment, ends, overlap, lag, memory):  # type: ignore
     for point in range(begin, end):
         # Coulomb's limit from the normal force of this end of a facet
         is_first = (point - begin) % 2 == 0
-        other = law.place[point + 1 if is_first else point - 1]
-        normal = stiff / 6.0 * (3.0 * gap - (2.0 * law.place[point] + other) * turn)
+        place, other = law.place[point], law.place[point + 1 if is_first else point - 1]
+        normal = stiff / 6.0 * (3.0 * gap - (2.0 * place + other) * turn)
         if contact.closing_rate > 0.0:
             if is_first:
                 pressed, excess = _add_facet_excess(law, point, contact, (g0, g1, r0, r1), pressed)
             normal -= excess[0] if is_first else excess[1]
-        share = overlap * law.width * law.depth_share[point]
+        share, spring = overlap * law.width * law.depth_share[point], law.shear_spring[point]
         limit = contact.resistance + share * limit_rate(contact, normal, 0.5)
-        spring, place = law.shear_spring[point], law.place[point]
         first = spring * (s0 + place * e0 - memory[0][point])
         change = spring * (s1 - s0 + place * (e1 - e0))
         mean = first + (0.5 + lag) * change
@@ -348,8 +347,7 @@ def _sum_stuck(law, segment, ends, overlap, lag, memory):  # type: ignore
         second_moment += place * place * rate
     for point in range(begin, end):
         memory[1][point], memory[2][point] = memory[0][point], 0.0
-    wider, leans = g1 - g0, r1 - r0
-    loss = lag * stiff * (wider * wider + leans * leans / 12.0)
+    loss = lag * stiff * ((g1 - g0) * (g1 - g0) + (r1 - r0) * (r1 - r0) / 12.0)
     sums = pressed + (loss,)  # noqa: RUF005
     held = first_moment, 0.0, first_moment, second_moment, 0.0, 0.0
     return sums, (shear, stretched, lost, 0.0, along, 0.0, 0.0) + held, True  # noqa: RUF005
