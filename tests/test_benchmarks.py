@@ -31,6 +31,7 @@ LONG = (
     "bridge_history",
     "bridge_inference",
     "bridge_range",
+    "closing_law",
     "drift_and_equality",
     "energy_drift",
     "ensemble",

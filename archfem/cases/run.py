@@ -149,7 +149,11 @@ class DeadLoadResult:
 
     @cached_property
     def softened(self) -> tuple[Analysis, Equilibrium] | None:
-        """Analysis and dead load with the compliance of rigid blocks in their joints, or None."""
+        """Analysis and dead load with the compliance of rigid blocks in their joints.
+
+        None for elastic blocks, laws of the user and joints that stiffen as they close: a spring in
+        series with these follows no such law. Histories are then compared without this screen.
+        """
         structure = self.case.structure
         stiffens = any(joint.contact.closure is not None for joint in structure.joints)
         if self.dead.model.fidelity != "rigid" or structure.has_own_laws or stiffens:

@@ -189,15 +189,19 @@ class Scene:
         """Return the number of time steps."""
         return self.steps or SITES[self.site].steps
 
+    @property
+    def structure(self) -> af.Structure:
+        """Build the structure."""
+        return with_friction(SITES[self.site].structure(), self.friction)
+
     @cached_property
     def model(self) -> Any:
         """Build the model."""
         fidelity: Any = self.fidelity
         if self.site.startswith("bridge"):
             fidelity = {**SOIL_ALL_NODES, "rest": self.fidelity}
-        structure = with_friction(SITES[self.site].structure(), self.friction)
         return af.build(
-            structure,
+            self.structure,
             fidelity=fidelity,
             quadrature=self.quadrature,
             displacements=self.displacements,

@@ -164,4 +164,4 @@ def test_each_property_has_a_panel():
     found = made_up([True, False, False], sign=list("aab"), k_n=[0.5, 1.0, 2.0])
     figure = found.plot()
     assert len([axes for axes in figure.axes if axes.get_visible()]) == 2
-    assert figure.get_suptitle() == found.sentence
+    assert " ".join(figure.get_suptitle().split()) == found.sentence

@@ -101,7 +101,8 @@ def test_mean_of_a_step_does_the_work_of_the_energy(ends):
     (near, far), _ = facet_step_excess(STIFFNESS, 1.0 / CLOSURE, tuple(ends), 0.0, 1.0)
     stored = [excess_means(STIFFNESS, 1.0 / CLOSURE, *pair)[0] for pair in (ends[:2], ends[2:])]
     work = near * (ends[2] - ends[0]) + far * (ends[3] - ends[1])
-    assert work == pytest.approx(stored[1] - stored[0], rel=1e-12)
+    # Gauss's rule, where the change is small
+    assert work == pytest.approx(stored[1] - stored[0], rel=1e-9)
     place, _ = point_step_excess(STIFFNESS, 1.0 / CLOSURE, ends[0], ends[2], 0.0, 1.0)
     stored = [excess_means(STIFFNESS, 1.0 / CLOSURE, end, end)[0] for end in ends[::2]]
     assert place * (ends[2] - ends[0]) == pytest.approx(stored[1] - stored[0], rel=1e-10)

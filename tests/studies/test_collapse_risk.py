@@ -154,6 +154,40 @@ def test_samples_are_kept_and_continued(tmp_path, monkeypatch, quick_runs):
         af.collapse_risk(analysis, motions, SITE, **options | {"seed": 1})
 
 
+def thin_arch(finish):
+    """A semicircle of seven stones, t/R = 0.125, with joints of a finish."""
+    size = {"radius": 4.0, "thickness": 0.5, "embrace": 180.0, "voussoirs": 7, "chords": 1}
+    return af.masonry.with_finish(af.circular_arch(**size), finish)
+
+
+@pytest.mark.slow
+def test_a_tree_over_finish_has_the_rates_of_each_finish_alone():
+    """Softer joints lower the capacity; a sample is the same in the tree and alone."""
+    times = np.arange(0.0, 0.5, 0.005)
+    pulses = [
+        af.Motion(np.where(times < end, np.sin(np.pi * times / end), 0.0), 0.005)
+        for end in (0.2, 0.3)
+    ]
+    held = {"k_n": 1.0, "k_s": 1.0, "friction": 0.0, "damping_ratio": 1.0}
+    options = {"samples": 16, "vary": held, "precision": 0.2}
+    damping = af.StiffnessDamping(0.05, 11.0)
+    analysis = af.Analysis(thin_arch("sawn"), fidelity="rigid", damping=damping, dt=0.005)
+    alternatives = {name: (1.0, thin_arch(name)) for name in ("sawn", "weathered")}
+    tree = af.collapse_risk(analysis, pulses, SITE, alternatives=alternatives, **options)
+    assert tree.rate("weathered").rate > 1.2 * tree.rate("sawn").rate
+    alone = af.collapse_risk(analysis, pulses, SITE, **options)
+    own = np.flatnonzero(tree.dataset["alternative"].values == "sawn")
+    same = CollapseRisk(alone.dataset.isel(sample=own))
+    first = own[own < 8]  # the search of others begins at the median of these
+    for name in ("lower", "upper"):
+        found = (each.dataset[name].values[first] for each in (tree, alone))
+        np.testing.assert_array_equal(*found)
+    # brackets of one capacity, whose width is the precision, overlap
+    assert np.log(tree.rate("sawn").rate / same.rate().rate) == pytest.approx(
+        0.0, abs=2.5 * np.log(1.2)
+    )
+
+
 @pytest.mark.parametrize("name", ["sign", "scale", "width"])
 def test_what_is_no_property_is_refused(name):
     analysis, motions = tilted_block()

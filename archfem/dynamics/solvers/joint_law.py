@@ -22,9 +22,9 @@ from archfem._typing import Array
 from archfem.dynamics.solvers.newmark import StepNumbers
 from archfem.joints.contact_law import ContactLaw
 from archfem.joints.large.point_law import (
+    instant_release,
     joint_means,
     limit_rate,
-    released_energy,
     releases,
     shear_limit,
     shear_means,
@@ -462,8 +462,8 @@ def open_forces(law, gap, released):  # type: ignore
             ends = gaps_between(
                 opening, opening, points[first].share, points[first + step - 1].share
             )
-            taken = joint_means(points[first], ends, 1.0, 1.0, facets)[1]
-            energy += points[first].area * released_energy(points[first], ends, taken, facets)
+            taken, lacking = instant_release(points[first], ends, facets)
+            energy += points[first].area * lacking
             for end in range(step):
                 point = points[first + end]
                 force = point.area * taken[end]

@@ -17,7 +17,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem._numba import INNER_OPTIONS, kernel, summing_kernel
+from archfem._numba import INNER_OPTIONS, inlined_kernel, kernel, summing_kernel
 from archfem._typing import Array
 from archfem.dynamics.solvers.base import evaluate_step, solve_step, start_run
 from archfem.dynamics.solvers.equation import Equation
@@ -39,7 +39,7 @@ from archfem.dynamics.solvers.sparse_products import (
     sparse_rows,
     without_round_off,
 )
-from archfem.joints.large.point_law import joint_means, releases
+from archfem.joints.large.point_law import linear_means, releases
 
 
 class LinearSystem(NamedTuple):
@@ -376,16 +376,29 @@ def _open_damping(law, gap):  # type: ignore
         moved = law.gain * (gap[part.near] - first[0]), law.gain * (gap[part.far] - first[1])
         last = first[0] + moved[0], first[1] + moved[1]
         # work of the released forces, which contain the lag ...
-        lost -= moved[0] * state.near + moved[1] * state.far
+        stiffens = points[part.begin].closing_rate > 0.0
+        if not stiffens:
+            lost -= moved[0] * state.near + moved[1] * state.far
         if not releases(points[part.begin], first + last):
             continue
         # ... less that of the same forces without lag
         for k in range(part.begin, part.end, step):
             point, a, b = points[k], points[k].share, points[k + step - 1].share
             ends = gaps_between(first, last, a, b)
-            taken = joint_means(point, ends, 0.0, 0.0, law.facets)[1]
+            taken = linear_means(point, ends, 0.0, 0.0, law.facets)[1]
+            if stiffens:  # ... of the linear part, as the excess over it has no lag
+                late = _lagged(ends, law.damping_lag)
+                more = linear_means(point, late, 0.0, 0.0, law.facets)[1]
+                taken = taken[0] - more[0], taken[1] - more[1]
             lost += point.area * (between(moved, a) * taken[0] + between(moved, b) * taken[1])
     return lost
+
+
+@inlined_kernel
+def _lagged(ends, lag):  # type: ignore
+    """Shift the gaps of a facet at start and end of a step by the lag of damping."""
+    first, last = lag * (ends[2] - ends[0]), lag * (ends[3] - ends[1])
+    return ends[0] + first, ends[1] + last, ends[2] + first, ends[3] + last
 
 
 @kernel

@@ -10,14 +10,15 @@ follows its tangent. The excess over the linear law is
 
     σ_e = σ - k_n δ,   Φ_e = ∫ σ_e dδ,   Ψ_e = ∫ Φ_e dδ.
 
-Where a closing changes linearly from u to v, along a facet or in time, the mean of Φ_e and its
-derivatives are divided differences, exact also where the path opens or leaves the hyperbola:
+Where a closing changes linearly from u to v, along a facet or in time, means have a closed form,
+piece by piece where the path opens or leaves the hyperbola. With the distance from δ_m over δ_m,
+y = 1 - δ/δ_m = ȳ (1 + z τ), τ from -1 to 1, σ_e/p_0 = 1/y - 2 + y. Means of 1/(1 + z τ) and
+1/(1 + z τ)², times powers of τ, follow from two functions of z,
 
-    E = (Ψ_v - Ψ_u) / s,   E_u = (E - Φ_u) / s,   E_v = (Φ_v - E) / s,   s = v - u,
-    E_uu = (2 E_u - σ_u) / s,   E_uv = (E_v - E_u) / s,   E_vv = (σ_v - 2 E_v) / s.
+    S = (atanh z / z - 1) / z² = 1/3 + z² T,   B = 1 / (1 - z²),
 
-E_u and E_v are the means of σ_e times the linear functions of both ends, E_uu, E_uv and E_vv those
-of the tangent. Gauss's rule serves where u and v are close, and differences would round.
+and no terms cancel. With E the mean of Φ_e, E_u and E_v are the means of σ_e times the linear
+functions of both ends, E_uu, E_uv and E_vv those of the tangent.
 """
 
 import math
@@ -25,44 +26,30 @@ from typing import Any
 
 import numpy as np
 
-from archfem._numba import allocating_entry, kernel
-from archfem._typing import Array
+from archfem._numba import allocating_entry, inlined_kernel, kernel
 from archfem.joints.contact_law import LARGEST_CLOSING
 
-# Closing over δ_m below which logarithms would cancel in Ψ_e, and a series serves [-]
+# Closing over δ_m below which a logarithm would cancel in Φ_e, and a series serves [-]
 SERIES_CLOSING = 0.2
 
-# Change of a closing, over its distance from 0 and from δ_m, below which Gauss's rule of six points
-# is exact but for round-off, and the divided differences of tangents round by 1e-12 [-]
-CLOSE_ENDS = 0.25
+# Change over a step, relative to the distance from δ_m and to the slope of a facet that is partly
+# open, up to which Gauss's rule of three points in time errs by 1e-10 of the work at most; beyond,
+# its energy is corrected
+SMALL_CHANGE = 0.1
 
-# Change over a step, relative to the largest closing and to its distance from δ_m, below which
-# Gauss's rule in time conserves energy, and its correction would be round-off [-]
-SMALL_CHANGE = 1e-3
+# The same for its rule of two points
+SMALLEST_CHANGE = 0.01
 
+# Points and weights of the rule of two points, then of that of three
+_legendre: Any = np.polynomial.legendre  # without type annotations
+_rules = np.hstack([_legendre.leggauss(2), _legendre.leggauss(3)])
+TIME_POINTS, TIME_WEIGHTS = 0.5 * (1.0 + _rules[0]), 0.5 * _rules[1]
 
-def _unit_rule(count: int) -> tuple[Array, Array]:
-    """Return points and weights of Gauss's rule on the unit interval."""
-    legendre: Any = np.polynomial.legendre  # without type annotations
-    points, weights = legendre.leggauss(count)
-    return 0.5 * (1.0 + points), 0.5 * weights
-
-
-SPACE_POINTS, SPACE_WEIGHTS = _unit_rule(6)
-TIME_POINTS, TIME_WEIGHTS = _unit_rule(2)
-
-# Coefficients 1 / n and 1 / (n (n + 1)) of the series of Φ_e and Ψ_e, the highest power first
-SERIES_POWERS = np.arange(22.0, 2.0, -1.0)
-ENERGY_SERIES, SUM_SERIES = 1.0 / SERIES_POWERS, 1.0 / (SERIES_POWERS * (SERIES_POWERS + 1.0))
-
-
-@kernel
-def split_closing(rate, closing):  # type: ignore
-    """Return the share of δ_m up to the end of the hyperbola, and the closing beyond it [m]."""
-    share = rate * closing
-    if share > LARGEST_CLOSING:
-        return LARGEST_CLOSING, closing - LARGEST_CLOSING / rate
-    return share, 0.0
+# Coefficients of the series of Φ_e and of T, the highest power first. T takes twelve terms up to a
+# z² of 0.0625, and six up to 0.01, where most facets are
+ENERGY_SERIES = 1.0 / np.arange(22.0, 2.0, -1.0)
+SERIES_SQUARES, SHORT_SERIES = (0.01, 0.0625), 6
+LOG_SERIES = 1.0 / np.arange(27.0, 3.0, -2.0)
 
 
 @kernel
@@ -70,79 +57,142 @@ def excess_traction(stiffness, rate, closing):  # type: ignore
     """Return σ_e and its derivative at a closing; the rate is 1/δ_m."""
     if closing <= 0.0:
         return 0.0, 0.0
-    share, beyond = split_closing(rate, closing)
-    slope = 1.0 / (1.0 - share)
-    tangent = stiffness * (slope * slope - 1.0)
-    return stiffness / rate * share * share * slope + beyond * tangent, tangent
+    share = rate * closing
+    inside = min(share, LARGEST_CLOSING)  # beyond it the law follows its tangent
+    slope = 1.0 / (1.0 - inside)
+    tangent = inside * (2.0 - inside) * slope * slope
+    traction = inside * inside * slope + (share - inside) * tangent
+    return stiffness / rate * traction, stiffness * tangent
 
 
 @kernel
 def excess_energy(stiffness, rate, closing):  # type: ignore
-    """Return Φ_e and Ψ_e at a closing."""
+    """Return Φ_e at a closing."""
     if closing <= 0.0:
-        return 0.0, 0.0
-    share, beyond = split_closing(rate, closing)
+        return 0.0
+    share = min(rate * closing, LARGEST_CLOSING)
     if share < SERIES_CLOSING:
-        single = double = 0.0
+        energy = 0.0
         for k in range(len(ENERGY_SERIES)):
-            single = single * share + ENERGY_SERIES[k]
-            double = double * share + SUM_SERIES[k]
-        single, double = single * share**3, double * share**4
+            energy = energy * share + ENERGY_SERIES[k]
+        energy *= share**3
     else:
-        logarithm = math.log1p(-share)
-        single = -logarithm - share - 0.5 * share**2
-        double = (1.0 - share) * logarithm + share - 0.5 * share**2 - share**3 / 6.0
-    energy, total = stiffness * single / rate**2, stiffness * double / rate**3
+        energy = -math.log1p(-share) - share - 0.5 * share**2
+    energy *= stiffness / rate**2
+    beyond = closing - LARGEST_CLOSING / rate
     if beyond > 0.0:
         traction, tangent = excess_traction(stiffness, rate, LARGEST_CLOSING / rate)
-        total += beyond * (energy + beyond * (0.5 * traction + beyond * tangent / 6.0))
         energy += beyond * (traction + 0.5 * beyond * tangent)
-    return energy, total
-
-
-@kernel
-def are_close(rate, first, second, change):  # type: ignore
-    """Return whether closings differ by little, relative to their distances from 0 and δ_m."""
-    low, high = min(first, second), max(first, second)
-    if rate * low >= LARGEST_CLOSING:  # the law is linear
-        return True
-    return high - low <= change * min(low, 1.0 / rate - high)
+    return energy
 
 
 @kernel
 def excess_means(stiffness, rate, first, last):  # type: ignore
     """Return E, (E_u, E_v) and (E_uu, E_uv, E_vv) between two closings."""
-    if first <= 0.0 and last <= 0.0:
-        return 0.0, (0.0, 0.0), (0.0, 0.0, 0.0)
-    if are_close(rate, first, last, CLOSE_ENDS):
-        return _gauss_means(stiffness, rate, first, last)
-    change = last - first
-    t0, t1 = excess_traction(stiffness, rate, first)[0], excess_traction(stiffness, rate, last)[0]
-    (e0, sum0), (e1, sum1) = (
-        excess_energy(stiffness, rate, first),
-        excess_energy(stiffness, rate, last),
-    )
-    mean = (sum1 - sum0) / change
-    near, far = (mean - e0) / change, (e1 - mean) / change
-    pairs = (2.0 * near - t0) / change, (far - near) / change, (t1 - 2.0 * far) / change
-    return mean, (near, far), pairs
+    (near, far), pairs = excess_forces(stiffness, rate, first, last)
+    # E is Φ_e at the less closed end, and the change of the closing times the mean of that end
+    low, beside = (first, near) if first < last else (last, far)
+    return excess_energy(stiffness, rate, low) + abs(last - first) * beside, (near, far), pairs
 
 
 @kernel
-def _gauss_means(stiffness, rate, first, last):  # type: ignore
-    """Return `excess_means` by Gauss's rule."""
-    near = far = first_pair = mixed = last_pair = 0.0
-    for k in range(len(SPACE_POINTS)):
-        b, weight = SPACE_POINTS[k], SPACE_WEIGHTS[k]
-        a = 1.0 - b
-        traction, tangent = excess_traction(stiffness, rate, a * first + b * last)
-        near += weight * a * traction
-        far += weight * b * traction
-        first_pair += weight * a * a * tangent
-        mixed += weight * a * b * tangent
-        last_pair += weight * b * b * tangent
-    mean = excess_energy(stiffness, rate, first)[0] + (last - first) * near
-    return mean, (near, far), (first_pair, mixed, last_pair)
+def excess_forces(stiffness, rate, first, last):  # type: ignore
+    """Return (E_u, E_v) and (E_uu, E_uv, E_vv) between two closings."""
+    u, v = rate * first, rate * last
+    low, high = min(u, v), max(u, v)
+    if high <= 0.0:
+        return (0.0, 0.0), (0.0, 0.0, 0.0)
+    if low >= 0.0 and high <= LARGEST_CLOSING:
+        means = _spread(_hyperbola_moments(u, v), 0.0, 1.0)
+    elif low >= LARGEST_CLOSING:
+        means = _spread(_tangent_moments(u, v), 0.0, 1.0)
+    else:
+        means = _piecewise_means(u, v)
+    near, far, first_pair, mixed, last_pair = means
+    force = stiffness / rate
+    pairs = stiffness * first_pair, stiffness * mixed, stiffness * last_pair
+    return (force * near, force * far), pairs
+
+
+@kernel
+def _piecewise_means(u, v):  # type: ignore
+    """Return sums as `_spread` of a path that opens or leaves the hyperbola."""
+    share = 1.0 / (v - u)
+    # parts on the hyperbola and beyond it, from their ends
+    p, q = min(max(u, 0.0), LARGEST_CLOSING), min(max(v, 0.0), LARGEST_CLOSING)
+    means = _spread(_hyperbola_moments(p, q), (p - u) * share, (q - u) * share)
+    if max(u, v) > LARGEST_CLOSING:
+        p, q = max(u, LARGEST_CLOSING), max(v, LARGEST_CLOSING)
+        others = _spread(_tangent_moments(p, q), (p - u) * share, (q - u) * share)
+        means = (
+            means[0] + others[0],
+            means[1] + others[1],
+            means[2] + others[2],
+            means[3] + others[3],
+            means[4] + others[4],
+        )
+    return means
+
+
+@inlined_kernel
+def _hyperbola_moments(u, v):  # type: ignore
+    """Return means of σ_e/p_0 times 1 and τ, and of its derivative times 1, τ and τ²."""
+    middle = 0.5 * (u + v)
+    rest = 1.0 - middle
+    inverse = 1.0 / rest
+    z = 0.5 * (u - v) * inverse
+    square, scale = z * z, inverse * inverse
+    series, base = _log_series(z, square), middle * (1.0 + rest) / 3.0
+    curved = 1.0 / (1.0 - square)
+    traction = (middle * middle + square * (1.0 / 3.0 + square * series)) * inverse
+    tilted = -z * inverse * (base + square * series)
+    return (
+        traction,
+        tilted,
+        scale * (3.0 * base + square * curved),
+        -z * scale * (2.0 / 3.0 + square * (curved - series)),
+        scale * (base + square * (curved - 2.0 * series)),
+    )
+
+
+@inlined_kernel
+def _log_series(z, square):  # type: ignore
+    """Return T."""
+    if square > SERIES_SQUARES[1]:
+        return (math.atanh(z) / z - 1.0 - square / 3.0) / (square * square)
+    total, terms = 0.0, len(LOG_SERIES)
+    for k in range(terms - SHORT_SERIES if square <= SERIES_SQUARES[0] else 0, terms):
+        total = total * square + LOG_SERIES[k]
+    return total
+
+
+@inlined_kernel
+def _tangent_moments(u, v):  # type: ignore
+    """Return `_hyperbola_moments` of closings beyond the hyperbola."""
+    traction, tangent = excess_traction(1.0, 1.0, LARGEST_CLOSING)
+    traction += (0.5 * (u + v) - LARGEST_CLOSING) * tangent
+    return traction, (v - u) * tangent / 6.0, tangent, 0.0, tangent / 3.0
+
+
+@inlined_kernel
+def _spread(moments, begin, end):  # type: ignore
+    """Return the parts of a path's E_u, E_v, E_uu, E_uv and E_vv from moments between two places.
+
+    They are for a path of unit stiffness and closure.
+    """
+    traction, tilted, tangent, turned, bent = moments
+    length, middle = end - begin, 0.5 * (begin + end)
+    half, other = 0.5 * length, 1.0 - middle
+    far = middle * traction + half * tilted
+    mixed = middle * tangent + half * turned  # of the tangent times the place
+    last = middle * mixed + half * (middle * turned + half * bent)
+    return (
+        length * (other * traction - half * tilted),
+        length * far,
+        length * (other * (tangent - mixed) - half * (other * turned - half * bent)),
+        length * (mixed - last),
+        length * last,
+    )
 
 
 @kernel
@@ -162,7 +212,7 @@ def point_step_excess(stiffness, rate, before, after, first, second):  # type: i
     and `second`. The excess is elastic: damping is that of the linear law.
     """
     before, after, first, second = without_lag(before, after, first, second)
-    _, (near, far), (start, mixed, end) = excess_means(stiffness, rate, before, after)
+    (near, far), (start, mixed, end) = excess_forces(stiffness, rate, before, after)
     return near + far, first * (start + mixed) + second * (mixed + end)
 
 
@@ -176,21 +226,23 @@ def crossing(before, after):  # type: ignore
 def facet_step_excess(stiffness, rate, ends, first, second):  # type: ignore
     """Return the mean excess over a step times φ_i along a facet, and its derivatives.
 
-    Closings of the ends move from (a, c) to (b, d), with lag and rates as at a place. Gauss's rule
-    in time is corrected along the change, so that the work is the change of E (Gonzalez, J.
-    Nonlinear Sci. 6 (1996) 449-467). The derivatives are made symmetric.
+    Closings of the ends move from (a, c) to (b, d), with lag and rates as at a place. Where they
+    change much, Gauss's rule in time is corrected along the change, so that the work is the change
+    of E (Gonzalez, J. Nonlinear Sci. 6 (1996) 449-467), with derivatives that are made symmetric.
     """
     a, b, _, _ = without_lag(ends[0], ends[2], first, second)
     c, d, first, second = without_lag(ends[1], ends[3], first, second)
     ends = a, c, b, d
     if a == b and c == d:  # at an instant
-        _, means, pairs = excess_means(stiffness, rate, a, c)
-        scale = 0.5 * (first + second)
-        return means, (scale * pairs[0], scale * pairs[1], scale * pairs[2])
+        means, pairs = excess_forces(stiffness, rate, a, c)
+        mean = 0.5 * (first + second)
+        return means, (mean * pairs[0], mean * pairs[1], mean * pairs[2])
     highest = max(ends)
     near = far = first_pair = mixed = last_pair = 0.0
     if highest <= 0.0:
         return (near, far), (first_pair, mixed, last_pair)
+    change, scale = max(abs(b - a), abs(d - c)), _smooth_change(rate, ends, highest)
+    rule = range(0, 2) if change <= SMALLEST_CHANGE * scale else range(2, 5)
     # the means are smooth in time between the moments at which the ends open or close
     one, other = crossing(a, b), crossing(c, d)
     breaks = 0.0, min(one, other), max(one, other), 1.0
@@ -198,21 +250,34 @@ def facet_step_excess(stiffness, rate, ends, first, second):  # type: ignore
         length = breaks[piece + 1] - breaks[piece]
         if length <= 0.0:
             continue
-        for k in range(len(TIME_POINTS)):
+        for k in rule:
             time, weight = breaks[piece] + TIME_POINTS[k] * length, TIME_WEIGHTS[k] * length
             p, q = a + time * (b - a), c + time * (d - c)
-            _, (n0, n1), (k00, k01, k11) = excess_means(stiffness, rate, p, q)
+            (n0, n1), (k00, k01, k11) = excess_forces(stiffness, rate, p, q)
             near += weight * n0
             far += weight * n1
-            scale = weight * (first + time * (second - first))
-            first_pair += scale * k00
-            mixed += scale * k01
-            last_pair += scale * k11
+            weight *= first + time * (second - first)
+            first_pair += weight * k00
+            mixed += weight * k01
+            last_pair += weight * k11
     means, pairs = (near, far), (first_pair, mixed, last_pair)
-    room = max(1.0 / rate - highest, (1.0 - LARGEST_CLOSING) / rate)
-    if max(abs(b - a), abs(d - c)) <= SMALL_CHANGE * min(highest, room):
+    if change <= SMALL_CHANGE * scale:
         return means, pairs
     return _conserve_energy(stiffness, rate, ends, (first, second), (means, pairs))
+
+
+@inlined_kernel
+def _smooth_change(rate, ends, highest):  # type: ignore
+    """Return the change of closings on the scale of which the means of a facet vary in time."""
+    a, c, b, d = ends
+    limit = LARGEST_CLOSING / rate
+    if (a > limit) != (b > limit) or (c > limit) != (d > limit):
+        return 0.0
+    scale = max(1.0 / rate - highest, 1.0 / rate - limit)
+    if min(ends) < 0.0 or highest > limit:
+        # the place at which a facet opens, or leaves the hyperbola, moves as its slope changes
+        return min(scale, abs(c - a), abs(d - b)) if (c > a) == (d > b) else 0.0
+    return scale
 
 
 @kernel

@@ -34,8 +34,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from archfem._numba import inlined_kernel
+from archfem._numba import inlined_kernel, kernel
 from archfem._typing import Array
+from archfem.joints.large.closing_law import facet_step_excess
 from archfem.joints.large.point_law import (
     closed_means,
     damping_tractions,
@@ -333,18 +334,24 @@ def _sum_stuck(law, segment, ends, overlap, lag, memory):  # type: ignore
     more, tilt = lag * (g1 - g0), lag * (r1 - r0)
     widest = max(g0 + 0.5 * abs(r0), g1 + 0.5 * abs(r1))
     lagged = max(g0 + more + 0.5 * abs(r0 + tilt), g1 + more + 0.5 * abs(r1 + tilt))
-    if not law.facets or contact.closing_rate > 0.0 or max(widest, lagged) > 0.0:
+    if not law.facets or max(widest, lagged) > 0.0:
         return sums, rubs, False
     gap, turn, stiff = 0.5 * (g0 + g1) + more, 0.5 * (r0 + r1) + tilt, contact.normal_stiffness
+    whole, excess = (0.5 + lag) * stiff, (0.0, 0.0)
+    pressed = stiff * gap, -stiff * turn / 12.0, whole, 0.0, whole / 12.0
     shear = stretched = lost = along = first_moment = second_moment = 0.0
     begin, end = law.first_point[segment], law.first_point[segment + 1]
     for point in range(begin, end):
         # Coulomb's limit from the normal force of this end of a facet
-        other = law.place[point + 1 if (point - begin) % 2 == 0 else point - 1]
-        normal = stiff / 6.0 * (3.0 * gap - (2.0 * law.place[point] + other) * turn)
-        share = overlap * law.width * law.depth_share[point]
+        is_first = (point - begin) % 2 == 0
+        place, other = law.place[point], law.place[point + 1 if is_first else point - 1]
+        normal = stiff / 6.0 * (3.0 * gap - (2.0 * place + other) * turn)
+        if contact.closing_rate > 0.0:
+            if is_first:
+                pressed, excess = _add_facet_excess(law, point, contact, (g0, g1, r0, r1), pressed)
+            normal -= excess[0] if is_first else excess[1]
+        share, spring = overlap * law.width * law.depth_share[point], law.shear_spring[point]
         limit = contact.resistance + share * limit_rate(contact, normal, 0.5)
-        spring, place = law.shear_spring[point], law.place[point]
         first = spring * (s0 + place * e0 - memory[0][point])
         change = spring * (s1 - s0 + place * (e1 - e0))
         mean = first + (0.5 + lag) * change
@@ -359,10 +366,27 @@ def _sum_stuck(law, segment, ends, overlap, lag, memory):  # type: ignore
         second_moment += place * place * rate
     for point in range(begin, end):
         memory[1][point], memory[2][point] = memory[0][point], 0.0
-    whole = (0.5 + lag) * stiff
-    sums = stiff * gap, -stiff * turn / 12.0, whole, 0.0, whole / 12.0
     held = first_moment, 0.0, first_moment, second_moment, 0.0, 0.0
-    return sums, (shear, stretched, lost, 0.0, along, 0.0, 0.0) + held, True  # noqa: RUF005
+    return pressed, (shear, stretched, lost, 0.0, along, 0.0, 0.0) + held, True  # noqa: RUF005
+
+
+@kernel
+def _add_facet_excess(law, point, contact, bounds, sums):  # type: ignore
+    """Return sums with what a facet presses beyond the linear law, and the means of that."""
+    (g0, g1, r0, r1), (total, moment, by_gap, by_place, by_square) = bounds, sums
+    x, y, share = law.place[point], law.place[point + 1], law.depth_share[point]
+    # the excess has no lag
+    closings = x * r0 - g0, y * r0 - g0, x * r1 - g1, y * r1 - g1
+    excess, (k00, k01, k11) = facet_step_excess(
+        contact.normal_stiffness, contact.closing_rate, closings, 0.0, 1.0
+    )
+    near, far = k00 + k01, k01 + k11
+    total -= share * (excess[0] + excess[1])
+    moment -= share * (x * excess[0] + y * excess[1])
+    by_gap += share * (near + far)
+    by_place += share * (x * near + y * far)
+    by_square += share * (x * x * k00 + 2.0 * x * y * k01 + y * y * k11)
+    return (total, moment, by_gap, by_place, by_square), excess
 
 
 @inlined_kernel

@@ -243,15 +243,16 @@ def _excess_between(contact, first, last):  # type: ignore
 
 
 @inlined_kernel
-def released_energy(contact, gaps, taken, facet):  # type: ignore
-    """Return the energy that a joint does not store at the gaps of its ends, from the release."""
-    half = 0.5 * (gaps[0] * taken[0] + gaps[1] * taken[1])
+def instant_release(contact, gaps, facet):  # type: ignore
+    """Return the release of `joint_means` at an instant, and the energy that it does not store."""
+    taken = linear_means(contact, gaps, 1.0, 1.0, facet)[1]
+    energy = 0.5 * (gaps[0] * taken[0] + gaps[1] * taken[1])
     if contact.closing_rate > 0.0:
-        # half the work of the release is the energy of the linear part alone
-        first, last = gaps[0], gaps[1] if facet else gaps[0]
-        mean, (near, far), _ = _excess_between(contact, first, last)
-        return half - 0.5 * (first * near + last * far) - mean
-    return half
+        mean, (near, far), _ = _excess_between(contact, gaps[0], gaps[1] if facet else gaps[0])
+        if facet:
+            return (taken[0] + near, taken[1] + far), energy - mean
+        return (taken[0] + near + far, taken[1]), energy - mean
+    return taken, energy
 
 
 @inlined_kernel
