@@ -176,7 +176,7 @@ def mean_tractions(contact, ends, lag, facet):  # type: ignore
 @kernel
 def _divided_tractions(contact, ends, lag):  # type: ignore
     """Return `mean_tractions` of the linear law along a facet of which parts are open."""
-    # `_divided_means` without what the traction does not need
+    # as `_divided_means`, with no derivatives but those that the traction needs
     a, c, b, d = ends
     _, _, breaks = _zero_crossings(ends)
     whole, normals, rates = (0.5 + lag) * contact.normal_stiffness, (0.0, 0.0), (0.0, 0.0, 0.0)
