@@ -1,7 +1,7 @@
 """Common style of all figures: colours, type sizes, axes, titles, legends and annotations."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -24,7 +24,7 @@ from matplotlib.ticker import LogFormatter, MaxNLocator
 
 from archfem._files import atomic_write
 from archfem._typing import Array
-from archfem._validation import validate_arguments
+from archfem._validation import check_number, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure, join_names
 
@@ -81,8 +81,7 @@ def new_figure(width: float, height: float) -> Figure:
     return Page(figsize=(min(width, Size.PAGE), height), layout="constrained")
 
 
-@contextmanager
-def limit_width(millimetres: float) -> Iterator[None]:
+def limit_width(millimetres: float) -> AbstractContextManager[None]:
     """Draw the figures of a `with` block for a width at which they are printed, such as a column.
 
     Type keeps its size, 7 points at least; titles and legends take more lines.
@@ -93,8 +92,12 @@ def limit_width(millimetres: float) -> Iterator[None]:
     Raises:
         InvalidInput: the width is not within these limits.
     """
-    if not 60.0 <= millimetres <= 170.0:
-        raise InvalidInput(f"figures of {millimetres:g} mm: choose a width from 60 to 170 mm")
+    return _change_width(check_number(millimetres, "width [mm]", minimum=60.0, maximum=170.0))
+
+
+@contextmanager
+def _change_width(millimetres: float) -> Iterator[None]:
+    """Change the widths of figures within a block."""
     kept = Size.COLUMN, Size.PAGE
     Size.PAGE = millimetres / 25.4
     Size.COLUMN = min(Size.COLUMN, Size.PAGE)

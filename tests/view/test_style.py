@@ -120,11 +120,8 @@ def test_figures_fit_a_column_and_a_page_with_type_of_seven_points(bridge, run, 
 
 @pytest.mark.parametrize("millimetres", [10.0, 500.0])
 def test_a_width_that_is_no_page_is_refused(millimetres):
-    with (
-        pytest.raises(af.InvalidInput, match="from 60 to 170 mm"),
-        af.view.limit_width(millimetres),
-    ):
-        pass
+    with pytest.raises(af.InvalidInput, match=r"below 60|above 170"):
+        af.view.limit_width(millimetres)
 
 
 # Sight of linear RGB without one of three cones: Machado, Oliveira and Fernandes (2009), Table 1
