@@ -93,7 +93,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     dt: float | None = None,
     fidelity: str | None = None,
     vary: Mapping[str, Any] | None = None,
-    samples: int = 26,
+    samples: int = 236,
     seed: int = 0,
     workers: int = 1,
 ) -> VerdictRange:
@@ -124,7 +124,8 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
             "dressed", "hewn" and "weathered", whose usual law of closing all joints of stones then
             have (`joint_stiffness`, by strength and modulus of the stone); "scale", factors on the
             motion; and any other name with a mapping from labels to structures or to motions.
-        samples: number of runs of the Latin hypercube.
+        samples: number of runs of the Latin hypercube. The default takes less than a minute for a
+            ring of 17 stones over 8 s on two cores, and gives a share of 5 % to ± 3 %.
         seed: seed of its random numbers.
         workers: number of processes.
 
