@@ -118,7 +118,7 @@ STUDIES = {
     "evaluators.evaluate_scales": {"precision": 0.05, "between": (0.05, 5.0)},
     "result_store.format_table": {"max_rows": 50},
     "ida.ida": {"precision": 0.05, "between": (0.05, 10.0)},
-    "variations.verdict_range": {"samples": 26, "seed": 0, "workers": 1},
+    "variations.verdict_range": {"samples": 236, "seed": 0, "workers": 1},
 }
 
 VIEW = {
