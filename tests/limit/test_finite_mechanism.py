@@ -200,21 +200,21 @@ def bonded_wall(rows, columns, breadth=0.5, height=0.25):
 
 @pytest.mark.slow
 def test_a_corner_of_a_bonded_wall_turns_away_from_the_stones_it_slides_on():
-    """The factor without dilatancy; then the corner leaves its sliding face along a circle."""
-    wall = bonded_wall(6, 4)
-    flat = af.collapse_factor(wall, live=af.BodyForce(1.0), friction="nonassociated")
+    """Solutions without dilatancy are many: the path has one between the weakest and the bound."""
+    wall, push = bonded_wall(6, 4), af.BodyForce(1.0)
+    weakest = af.collapse_factor(wall, live=push, friction="nonassociated").factor
+    bound = af.collapse_factor(wall, live=push).factor
     path = follow(wall)
-    assert path.factors[0] == pytest.approx(flat.factor, rel=1e-6)
+    assert weakest < path.factors[0] < bound * (1.0 + 1e-9)
     assert path.end is PathEnd.FALLS
-    assert [c.slip for c in path.mechanisms[0].contacts] == [0]
 
 
 @pytest.mark.slow
-def test_a_mechanism_that_slides_in_forty_joints_is_refused():
-    with pytest.raises(
-        af.DidNotConverge, match="without dilatancy: assess fewer blocks, or forbid"
-    ):
-        follow(bonded_wall(12, 6))
+def test_a_mechanism_that_slides_in_forty_joints_locks_below_the_bound():
+    wall = bonded_wall(12, 6)
+    path = follow(wall)
+    assert path.factors[0] < af.collapse_factor(wall, live=af.BodyForce(1.0)).factor
+    assert path.end is PathEnd.LOCKS
 
 
 def circles_meet(one, r_one, two, r_two, near):
