@@ -196,7 +196,12 @@ def _add_case_commands(commands: Any) -> None:
     about = "does it fall, whatever its uncertain properties are?"
     add_to = add("verdict", about, "folder for table and picture (none)", required=False)
     add_to("--workers", type=int, default=1, help="processes for the runs (1)")
-    add_to("--samples", type=int, default=236, help="runs of the sample (236)")
+    add_to(
+        "--samples",
+        type=int,
+        default=236,
+        help="runs beside those of one changed property each (236)",
+    )
     about = "annual rate of collapse, from the hazard and the sampling of [risk]"
     add("risk", about)("--workers", type=int, default=1, help="processes for the runs (1)")
     about = "speed against error over fidelities, meshes, quadratures and steps"
