@@ -142,11 +142,14 @@ class PlacedBlocks:
     @cached_property
     def live(self) -> Array:
         """Forces that grow, at a factor of one, about the centroids (n_blocks, 3) [N, N, N m]."""
+        return self._resultants(self.pulls)
+
+    @cached_property
+    def pulls(self) -> list[tuple[int, Array, tuple[float, float]]]:
+        """Block, present place and force of all that grows, at a factor of one [m, N]."""
         if self.growing:
-            grown = self.attach(self.growing)
-            return self._resultants([(k, place, load.force) for k, place, load in grown])
-        pulls = [(k, place, (self.direction * weight, 0.0)) for k, place, weight in self.masses]
-        return self._resultants(pulls)
+            return [(k, place, load.force) for k, place, load in self.attach(self.growing)]
+        return [(k, place, (self.direction * weight, 0.0)) for k, place, weight in self.masses]
 
     def _resultants(self, forces: Sequence[tuple[int, Array, Sequence[float]]]) -> Array:
         """Return the resultants of forces on each block about its centroid (n_blocks, 3)."""

@@ -228,7 +228,7 @@ class PathEvent:
     text: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MechanismPath:
     """Path of a mechanism: factor and displacements from rest to the fall.
 
@@ -256,17 +256,28 @@ class MechanismPath:
     @cached_property
     def curve(self) -> xr.Dataset:
         """Factor [-], and displacement of the growing loads along themselves [m], over place."""
-        at_rest = self.blocks.attach(self.blocks.growing)
-        forces = np.array([load.force for _, _, load in at_rest]).reshape(-1, 2)
-        start = np.array([place for _, place, _ in at_rest]).reshape(-1, 2)
-        moved = np.zeros(len(self.factors))
+        loaded = [not self.blocks.structure.blocks[k].fixed for k, *_ in self.blocks.pulls]
+        forces = np.array([force for *_, force in self.blocks.pulls])[loaded]
+        start, moved = self._pulled_points(self.blocks, loaded), np.zeros(len(self.factors))
         for number, displacement in enumerate(self.displacements):
-            grown = self.blocks.moved(displacement).attach(self.blocks.growing)
-            travel = np.array([place for _, place, _ in grown]).reshape(-1, 2) - start
+            travel = self._pulled_points(self.blocks.moved(displacement), loaded) - start
             moved[number] = np.sum(forces * travel) / np.linalg.norm(forces)
         values = {"factor": (self.factors, "1"), "displacement": (moved, "m")}
         return xr.Dataset(
             {key: ("place", value, {"units": unit}) for key, (value, unit) in values.items()}
+        )
+
+    @staticmethod
+    def _pulled_points(blocks: PlacedBlocks, chosen: Sequence[bool]) -> Array:
+        """Return the present places of the chosen forces that grow (n, 2) [m]."""
+        return np.array([place for _, place, _ in blocks.pulls])[chosen]
+
+    def __repr__(self) -> str:
+        """Describe start and end of the path in one line."""
+        moved = float(self.curve["displacement"][-1])
+        return (
+            f"MechanismPath: factor {self.factors[0]:.4g} at rest, {self.factors[-1]:.4g} after "
+            f"{moved:.4g} m along the forces, {len(self.events)} events; {self.end.sentence}"
         )
 
 
@@ -303,7 +314,7 @@ def collapse_path(
 
     Raises:
         InvalidInput: an option is unknown, an action misses the structure, it does not stand, no
-            factor makes it a mechanism, joints have tensile strength, or it has a fill.
+            factor makes it a mechanism, joints have cohesion or tensile strength, or it has a fill.
         DidNotConverge: no mechanism was found that moves without the dilatancy of sliding faces.
 
     Example:
@@ -315,6 +326,11 @@ def collapse_path(
     structure, grows = structure_of(structure), list_loads(live)
     check_choice(friction, "friction", ("coulomb", None))
     refuse_bonds(structure)
+    if (cohesion := max(joint.contact.cohesion for joint in structure.joints)) > 0.0:
+        raise InvalidInput(
+            f"joints have a cohesion of {cohesion:.3g} Pa, which a path leaves out: for the safe "
+            "answer without it give Contact(cohesion=0.0)"
+        )
     if find_yielding_blocks(structure):
         raise InvalidInput(
             "a fill does not follow the stones on a path: under horizontal forces "

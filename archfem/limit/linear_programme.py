@@ -35,6 +35,11 @@ from archfem.masonry.structure import Structure, largest_displacement, rigid_mot
 ROUND_OFF = 1e-12
 
 
+# Share of the factor at which a state of least compressions is sought: solvers meet the optimum to
+# 1e-7 or so, and at the optimum itself none might remain
+HELD_SHARE = 1.0 - 1e-6
+
+
 class NoEquilibrium(DidNotConverge):
     """The programme is infeasible: no forces within the limits balance the loads."""
 
@@ -341,13 +346,13 @@ class Programme:
             "check that strength is in Pa"
         )
 
-    def _hold_factor(self, optimum: Optimum, share: float = 1.0 - 1e-6) -> "Programme | None":
-        """Return the programme of least compressions at a share of a factor; None without one."""
+    def _hold_factor(self, optimum: Optimum) -> "Programme | None":
+        """Return the programme of least compressions below a factor; None without a factor."""
         if self.force_cost is not None or np.count_nonzero(self.unknown_cost[1:]):
             return None
         load, upper_bounds = self.load, self.upper_bounds.copy()
         if self.columns is not None and self.unknown_cost[0]:
-            load = load - self.columns[:, [0]].toarray()[:, 0] * share * optimum.unknowns[0]
+            load = load - self.columns[:, [0]].toarray()[:, 0] * HELD_SHARE * optimum.unknowns[0]
             upper_bounds[0] = 0.0
         # weights without regularity make this state unique, so that cuts converge
         weights = 1.0 + np.arange(2 * len(self.friction)) * 0.5 * (5.0**0.5 - 1.0) % 1.0
@@ -360,11 +365,11 @@ class Programme:
             upper_bounds=upper_bounds,
         )
 
-    def _join_states(self, found: Optimum, state: Optimum, share: float = 1.0 - 1e-6) -> Optimum:
-        """Return the mechanism of an optimum, and the forces at a share of its factor."""
+    def _join_states(self, found: Optimum, state: Optimum) -> Optimum:
+        """Return the mechanism of an optimum, and the forces below its factor."""
         unknowns = state.unknowns.copy()
         if self.columns is not None and self.unknown_cost[0]:
-            unknowns[0] = share * found.unknowns[0]
+            unknowns[0] = HELD_SHARE * found.unknowns[0]
         value = float(self.unknown_cost @ unknowns)
         return replace(found, value=value, forces=state.forces, unknowns=unknowns)
 

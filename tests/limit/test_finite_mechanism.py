@@ -370,6 +370,13 @@ def test_multiples_of_the_weight_stay_and_grow():
     # both centroids, at 0.6 and 1.8 m, along the pull: their sum over the root of two
     moved = [0.3 * (1.0 - np.cos(turn)) + height * np.sin(turn) for height in (0.6, 1.8)]
     np.testing.assert_allclose(path.curve["displacement"], sum(moved) / np.sqrt(2.0), atol=1e-9)
+    # the path of an assessment has the same curve; its last place is found to within a millimetre
+    shaken = follow(block, direction=-1.0).curve
+    np.testing.assert_allclose(
+        shaken["displacement"][-1], path.curve["displacement"][-1], atol=1e-3
+    )
+    assert repr(path).startswith("MechanismPath: factor 1 at rest")
+    assert "\n" not in repr(path)
 
 
 def test_the_work_of_a_point_load_is_the_rise_of_the_weights():
@@ -410,10 +417,12 @@ def test_the_curve_of_a_dry_granite_wall_under_a_press(verified):
 def test_paths_that_cannot_be_followed_are_refused():
     block, push = af.column(breadth=0.6, heights=[2.4]), af.BodyForce(1.0)
     bond = af.Contact(1e9, 0.4e9, 0.6, tension=1e4, cohesion=1e4)
+    sticky = af.Contact(1e9, 0.4e9, 0.6, cohesion=2e4)
     leaning = af.column(breadth=0.6, heights=[2.4], contact=contact(0.6))
     refused = [
         ({"friction": "nonassociated"}, block, push, "friction 'nonassociated'"),
         ({}, af.column(breadth=0.6, heights=[2.4], contact=bond), push, "tensile strength"),
+        ({}, af.column(breadth=0.6, heights=[2.4], contact=sticky), push, "a cohesion of 2e.04 Pa"),
         ({}, arch_bridge(), push, "does not follow the stones"),
         ({}, block, af.BodyForce(0.0, -1.0), "no mechanism to follow"),
         ({"dead": [af.BodyForce(1.0)]}, leaning, push, "no mechanism to follow"),
