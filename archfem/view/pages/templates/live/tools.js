@@ -128,19 +128,18 @@ class Tools {
     stage.handles = this.chosen.map(([k, i]) => outlines[k].points[i]);
     this.live.show(0);
   }
-  /** Choose the corner or the stone at a point. */
-  choose(point) {
+  /** Corners at a point, with those of neighbours: of one corner, or of the stone around it. */
+  cornersAt(point) {
     const { outlines } = this.source, far = ([x, y]) => this.live.stage.scale * Math.hypot(x - point[0], y - point[1]);
     const corner = outlines.flatMap(({ points }) => points).reduce((best, each) => (far(each) < far(best) ? each : best));
     const isInside = ({ points }) => points.every(([x, y], k) => { const [u, v] = points[(k + 1) % points.length]; return (u - x) * (point[1] - y) >= (v - y) * (point[0] - x); });
     const stone = outlines.find(isInside)?.points ?? [], middle = [0, 1].map((k) => stone.reduce((sum, each) => sum + each[k], 0) / stone.length);
     const isCorner = far(corner) < 16 * devicePixelRatio && !(far(middle) < far(corner)); // a stone may be as small as a finger
-    this.chosen = findCorners(outlines, isCorner ? [corner] : stone);
-    this.grip = { point, outlines };
+    return findCorners(outlines, isCorner ? [corner] : stone);
   }
   /** Whether a press at a point takes hold of a mark, a corner or a stone. */
   catches(point) {
-    if (this.mode === "stones") { this.choose(point); this.grip = null; return this.chosen.length > 0; }
+    if (this.mode === "stones") return this.cornersAt(point).length > 0;
     return Boolean(this.source.drawn) && !this.live.isMarking && this.findMark(point) >= 0;
   }
   findMark([u, v]) { return this.marks.findIndex(([x, y]) => this.live.stage.scale * Math.hypot(x - u, y - v) < 24 * devicePixelRatio); }
@@ -158,10 +157,14 @@ class Tools {
   press(event) {
     const { stage } = this.live, point = stage.pointAt(event);
     if (this.mode === "stones") {
-      this.choose(point);
-      if (!this.chosen.length) this.grip = null;
-      else { this.history.push(this.source.outlines); stage.canvas.setPointerCapture(event.pointerId); }
-      this.showMoved(this.source.outlines);
+      const { outlines } = this.source;
+      this.chosen = this.cornersAt(point);
+      if (this.chosen.length) {
+        this.grip = { point, outlines };
+        this.history.push(outlines);
+        stage.canvas.setPointerCapture(event.pointerId);
+      }
+      this.showMoved(outlines);
     } else if (this.source.drawn && !this.live.isMarking && this.findMark(point) >= 0) {
       this.dragged = this.findMark(point);
       stage.canvas.setPointerCapture(event.pointerId);
