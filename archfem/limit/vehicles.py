@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from tqdm import tqdm
 
 from archfem._display import ResultDisplay
 from archfem._typing import Array, Metres, Newtons, Numbers, Pascals
@@ -512,9 +513,10 @@ def _bound_factors(
     structure: Structure, rows: Sequence[AxleRow], options: dict[str, Any]
 ) -> dict[AxleRow, float]:
     """Return the lower bound of each row of axles with a plastic fill."""
+    shown = tqdm(rows, unit="place", disable=None, leave=False)
     return {
         row: collapse_factor(structure, live=list(row), **options).lower if row else np.inf
-        for row in rows
+        for row in shown
     }
 
 
