@@ -7,7 +7,8 @@ the diagonal, U_i to the right of it and L_i below it, and its factor has no oth
     F_i = L_i D_i⁻¹,   D_p ← D_p - F_i U_i,
 
 with p the stone to which i is linked. Each joint has a dense block of six by six, from the three
-coordinates of both its stones. The equation is that of `newton`, the law is `joints.large`.
+coordinates of both its stones. Eight joints are evaluated at a time, by `lane_law`. The equation is
+that of `newton`.
 """
 
 from typing import Any, NamedTuple
@@ -34,28 +35,38 @@ from archfem.joints.large.face_kinematics import (
     cosine_sine,
     face_forces,
     force_derivative,
+    measure_step,
     rotation_series,
-    step_measures,
+    short_series,
 )
 from archfem.joints.large.forces import LargeDisplacementJoints
-from archfem.joints.large.overlap_law import (
-    FaceLaw,
-    closing_energy,
-    damping_loss,
-    overlap,
-    segment_forces,
+from archfem.joints.large.lane_law import (
+    LaneLaw,
+    lane_damping_loss,
+    lane_energy,
+    lane_forces,
+    lane_law,
+    lane_overlap,
+    pad,
+)
+from archfem.joints.large.lanes import (
+    WIDTH,
+    any_lane,
+    gather,
+    lane,
+    load,
+    spread,
+    store,
+    with_lane,
 )
 
-# Motion of a stone over a step: cosine and sine of half its angle at the start, series of half its
-# rotation, cosine and sine of its angle in the middle and at the end, and of half the latter
-STONE_FIELDS = ("bc", "bs", "mean", "shrunk", "rate", "turn", "c", "s", "c1", "s1", "hc", "hs")
-STONE_RECORD: np.dtype[Any] = np.dtype([(name, np.float64) for name in STONE_FIELDS])
+# Rows of stones: cosine and sine of half the angle at the start and the end, cosine and sine of the
+# angle in the middle of the step, series of half its rotation, that half, and x and y
+BC, BS, HC, HS, C, S, SHRUNK, RATE, HALF, X, Y = range(11)
 
-# A face of a joint: first coordinate of its stone, arm from the centroid, pose if it is fixed
-FACE_RECORD: np.dtype[Any] = np.dtype(
-    [("first", np.int64), *((name, np.float64) for name in ("rx", "ry", "x", "y", "turn"))]
-)
-
+# Rows of joints: of both faces the arm from the centroid and the pose if it is fixed, direction of
+# the normal, half the difference of the angles of fixed faces, and the initial measures
+FACE, DIRECTION, DIFFERENCE, INITIAL, ORIENTATION = 0, 8, 10, 12, 15
 
 class StoneTree(NamedTuple):
     """Order of elimination of stones that joints link without a closed loop."""
@@ -67,27 +78,29 @@ class StoneTree(NamedTuple):
 class ChainSystem(NamedTuple):
     """Chains of rigid stones, as a system of steps. A last stone, of no chain, is the ground."""
 
-    law: FaceLaw
-    faces: Any  # lower and higher face of each joint, `FACE_RECORD` (j, 2)
-    frame: Array  # angle of the normal, orientation, initial opening, slip and rotation (j, 5)
+    law: LaneLaw
+    stone: Any  # lower and higher stone of each joint (2, j)
+    joint: Array  # rows of joints (16, j)
     parent: Any  # as of `StoneTree` (m,)
-    stones: Any  # their motion, `STONE_RECORD` (m + 1,)
+    stones: Array  # rows of the stones' motion (11, m + 1)
     mass: Array  # diagonal of M (n,)
     weight: Array  # forces of gravity (n,)
     body: Array  # forces per unit ground acceleration (2, n)
     work: "ChainWorkspace"
     # derivatives of each joint: of forces on jump and angles (16), of the middles of both faces by
-    # the angle, mean and at the end (8), rotation stiffness of both (2) (j, 26)
+    # the angle, mean and at the end (8), rotation stiffness of both (2) (26, j)
     rates: Array
-    missing: Array  # forces that joints lack if points that reversed stick (j, 6)
-    resultants: Array  # mean N, V, M (j, 3)
-    start: Array  # opening, slip and rotation at the start (j, 3)
-    end: Array  # and at the end, and the loss of the shear (j, 4)
-    reverses: Any  # whether the slip of points has reversed (j,)
+    # forces of joints on both stones, and what they lack if points that reversed stick (12, j)
+    forces: Array
+    resultants: Array  # mean N, V, M (3, j)
+    # jump, direction and half the difference of the angles at the start, each two rows, opening at
+    # the middle of the overlap, slip, rotation, length and middle of the overlap, energy (12, j)
+    start: Array
+    end: Array  # opening, slip and rotation at the end, energy, and loss of the shear (5, j)
     blocks: Array  # D, U, L and F (4, m + 1, 3, 3)
-    slip: Array  # irreversible slip before the step (p,) [m]
-    end_slip: Array  # and after it (p,) [m]
-    directions: Array  # slip direction of points in the last evaluation (p,)
+    slip: Array  # irreversible slip before the step (p, j) [m]
+    end_slip: Array  # and after it (p, j) [m]
+    directions: Array  # slip direction of points in the last evaluation (p, j)
     step: tuple[float, float, float]  # Δt, β/Δt, and the coefficient of M in C
     past: Array  # accelerations at the end of the step before the last (n,)
     known: Any  # number of steps so far in this run (1,)
@@ -112,7 +125,8 @@ def find_stone_tree(equation: Equation) -> StoneTree | None:
         return None
     sides = model.joints.kinematics
     rigid = np.isin(sides.size, (0, 3)).all() and not sides.stretch.size
-    if not rigid or len(model.joints.joint) != model.joints.joint_count:
+    points = np.diff(model.joints.face_law.first_point)
+    if not rigid or len(points) != model.joints.joint_count or points.min() < points.max():
         return None
     if not model.has_frame.all() or equation.rest.data.any() or model.block_stiffness.data.any():
         return None
@@ -143,46 +157,56 @@ def chain_system(equation: Equation, tree: StoneTree, dt: float) -> ChainSystem:
     """Return the data of steps of one length [s]."""
     model: Any = equation.model
     joints: LargeDisplacementJoints = model.joints
-    sides, law, order = joints.kinematics, joints.face_law, tree.order
-    size, count, points = model.size, len(joints.joint), len(law.place)
-    place = np.append(np.argsort(order), size)
-    faces = np.zeros((count, 2), FACE_RECORD)
-    free = sides.size == 3
-    faces["first"] = place[np.where(free, sides.index[:, :, 0], size)]
-    faces["rx"], faces["ry"] = np.moveaxis(np.where(free[..., None], sides.arm, 0.0), -1, 0)
-    faces["x"], faces["y"], faces["turn"] = np.moveaxis(sides.fixed_pose, -1, 0)
-    frame = np.column_stack([joints.normal_angle, joints.orientation, joints.initial_measures])
+    law, order, count = joints.face_law, tree.order, len(joints.joint)
+    points, size = len(law.place) // count, pad(count)
     balance = 1e-9 * float(np.linalg.norm(equation.weight))
     tolerances = Tolerances(balance, balance, 1e-13 * model.structure.size, 1e4 * balance, 0.0)
-    stones = np.zeros(size // 3 + 1, STONE_RECORD)
+    stones = len(tree.parent) + 1
     return ChainSystem(  # type: ignore[call-arg]
-        law,
-        faces,
-        np.ascontiguousarray(frame[:, :5]),
+        lane_law(law),
+        *_joint_rows(joints, order),
         tree.parent,
-        stones,
+        np.zeros((11, pad(stones))),
         model.mass.diagonal()[order],
         equation.weight[order],
         np.ascontiguousarray(model.mass_influence[order].T),
-        ChainWorkspace(*np.zeros((6, size + 3))),
-        np.zeros((count, 26)),
-        np.zeros((count, 6)),
-        np.zeros((count, 3)),
-        np.zeros((count, 3)),
-        np.zeros((count, 4)),
-        np.zeros(count, bool),
-        np.zeros((4, len(stones), 3, 3)),
-        *np.zeros((3, points)),
+        ChainWorkspace(*np.zeros((6, model.size + 3))),
+        np.zeros((26, size)),
+        np.zeros((12, size)),
+        np.zeros((3, size)),
+        np.zeros((12, size)),
+        np.zeros((5, size)),
+        np.zeros((4, stones, 3, 3)),
+        *np.zeros((3, points, size)),
         (dt, equation.lag / dt, equation.drag),
-        np.zeros(size),
+        np.zeros(model.size),
         np.zeros(1, np.int64),
         tolerances,
     )
 
 
+def _joint_rows(joints: LargeDisplacementJoints, order: Any) -> tuple[Any, Array]:
+    """Return the stones of each joint (2, j), and the rows of joints (16, j)."""
+    sides, count = joints.kinematics, len(joints.joint)
+    place, free = np.append(np.argsort(order), len(order)), sides.size == 3
+    stone = np.full((2, pad(count)), len(order) // 3)
+    stone[:, :count] = place[np.where(free, sides.index[:, :, 0], len(order))].T // 3
+    rows = np.zeros((16, pad(count)))
+    arm, turn = np.where(free[..., None], sides.arm, 0.0), sides.fixed_pose[:, :, 2]
+    faces = np.concatenate([arm, sides.fixed_pose[:, :, :2]], axis=2)
+    direction, difference = joints.normal_angle + 0.5 * turn.sum(1), 0.5 * (turn[:, 1] - turn[:, 0])
+    rows[:, :count] = [
+        *faces.reshape(count, 8).T,
+        *(np.cos(direction), np.sin(direction), np.cos(difference), np.sin(difference)),
+        *joints.initial_measures.T[:3],
+        joints.orientation,
+    ]
+    return stone, rows
+
+
 def constant_chain_parts(system: ChainSystem) -> tuple[Any, ...]:
     """Return the parts of the data that no step changes."""
-    return system.law, system.faces, system.frame, system.parent, system.mass, system.weight
+    return system.law, system.stone, system.joint, system.parent, system.mass, system.weight
 
 
 # ---- joints
@@ -191,104 +215,171 @@ def constant_chain_parts(system: ChainSystem) -> tuple[Any, ...]:
 @kernel
 def _move_stones(stones, before, after, begins):  # type: ignore
     """Evaluate the rotations of all stones over the step."""
-    for number in range(len(stones)):
-        stone, turn = stones[number], 3 * number + 2
+    for number in range(len(before) // 3):
+        first = 3 * number
         if begins:
-            stone.bc, stone.bs = cosine_sine(0.5 * before[turn])
-        half = 0.5 * (after[turn] - before[turn])
-        stone.mean, stone.shrunk, stone.rate = rotation_series(half)
-        stone.turn = half * stone.shrunk
+            stones[BC, number], stones[BS, number] = cosine_sine(0.5 * before[first + 2])
+        stones[HALF, number] = 0.5 * (after[first + 2] - before[first + 2])
+        stones[X, number], stones[Y, number] = after[first], after[first + 1]
+    for at in range(0, stones.shape[1], WIDTH):
+        half, bc, bs = load(stones, HALF, at), load(stones, BC, at), load(stones, BS, at)
+        mean, shrunk, rate = _lane_series(half)
+        turn = half * shrunk
         # in the middle of the step, and half the angle at its end
-        less = -2.0 * stone.bs * stone.bs
-        c, s = 1.0 + less, 2.0 * stone.bs * stone.bc
-        stone.c, stone.s = add_angles(c, s, stone.mean, stone.turn)
-        stone.hc, stone.hs = add_angles(stone.bc, stone.bs, stone.mean, stone.turn)
-        stone.c1, stone.s1 = 1.0 - 2.0 * stone.hs * stone.hs, 2.0 * stone.hs * stone.hc
+        c, s = add_angles(1.0 - 2.0 * bs * bs, 2.0 * bs * bc, mean, turn)
+        hc, hs = add_angles(bc, bs, mean, turn)
+        store(stones, C, at, c)
+        store(stones, S, at, s)
+        store(stones, HC, at, hc)
+        store(stones, HS, at, hs)
+        store(stones, SHRUNK, at, shrunk)
+        store(stones, RATE, at, rate)
 
 
 @inlined_kernel
-def _shift(rx, ry, c, s):  # type: ignore
-    """Return R r - r from cosine and sine of half the angle."""
+def _lane_series(x):  # type: ignore
+    """Return `rotation_series`."""
+    c, s, rate = short_series(x)
+    if any_lane(abs(x) > 0.25):
+        for k in range(WIDTH):
+            own = rotation_series(lane(x, k))
+            c, s = with_lane(c, k, own[0]), with_lane(s, k, own[1])
+            rate = with_lane(rate, k, own[2])
+    return c, s, rate
+
+
+@inlined_kernel
+def _face_place(system, at, side, cosine, sine):  # type: ignore
+    """Return the displacement of the middles of faces; the rows are of half the stones' angle."""
+    stones, joint, first = system.stones, system.joint, FACE + 4 * side
+    rx, ry = load(joint, first, at), load(joint, first + 1, at)
+    c = gather(stones, cosine, system.stone, side, at)
+    s = gather(stones, sine, system.stone, side, at)
+    # R r - r, with cos θ - 1 by the half angle
     less, more = -2.0 * s * s, 2.0 * s * c
-    return less * rx - more * ry, more * rx + less * ry
-
-
-@inlined_kernel
-def _face_poses(face, stone, before, after):  # type: ignore
-    """Return the poses of a face at both ends of a step, and of its middle by the angle."""
-    first, rx, ry = face.first, face.rx, face.ry
-    x, y = _shift(rx, ry, stone.bc, stone.bs)
-    start = (
-        face.x + before[first] + x,
-        face.y + before[first + 1] + y,
-        face.turn + before[first + 2],
-    )
-    x, y = _shift(rx, ry, stone.hc, stone.hs)
-    last = face.x + after[first] + x, face.y + after[first + 1] + y, face.turn + after[first + 2]
-    c, s, c1, s1 = stone.c, stone.s, stone.c1, stone.s1
-    mean = -stone.shrunk * (s * rx + c * ry), stone.shrunk * (c * rx - s * ry)
-    return (start, last), mean, (-(s1 * rx + c1 * ry), c1 * rx - s1 * ry)
-
-
-@inlined_kernel
-def _rotation_stiffness(face, stone, x, y):  # type: ignore
-    """Return the derivative of the moment about the centroid of a constant force on a face."""
-    along, across = x * stone.c + y * stone.s, y * stone.c - x * stone.s
-    turned, straight = across * face.rx - along * face.ry, along * face.rx + across * face.ry
-    return 0.5 * (stone.rate * turned - stone.shrunk * straight)
-
-
-@inlined_kernel
-def _evaluate_joint(system, joint, before, after, residual):  # type: ignore
-    """Subtract the mean forces of a joint over the step; store its derivatives and resultants."""
-    low, high, stones = system.faces[joint, 0], system.faces[joint, 1], system.stones
-    below, above, frame = stones[low.first // 3], stones[high.first // 3], system.frame[joint]
-    lower, low_mean, low_end = _face_poses(low, below, before, after)
-    higher, high_mean, high_end = _face_poses(high, above, before, after)
-    start, end, rates, now, step = step_measures(lower, higher, frame[0])
-    start = start[0] + frame[2], start[1] + frame[3], start[2] + frame[4]
-    end = end[0] + frame[2], end[1] + frame[3], end[2] + frame[4]
-    memory = system.slip, system.end_slip, system.directions
-    force, law_rate, _, ((shear, moment), loss, missing) = segment_forces(
-        system.law, joint, (start, end, (0.0, 0.0)), system.step[1], memory
-    )
-    begun, kept, resultants = system.start[joint], system.end[joint], system.resultants[joint]
-    begun[0], begun[1], begun[2] = start
-    kept[0], kept[1], kept[2], kept[3] = end[0], end[1], end[2], loss
-    resultants[0], resultants[1], resultants[2] = -force[0], frame[1] * shear, frame[1] * moment
-    x, y, turn, other = face_forces(rates, force)
-    k, m = low.first, high.first
-    residual[k], residual[k + 1] = residual[k] + x, residual[k + 1] + y
-    residual[k + 2] += low_mean[0] * x + low_mean[1] * y - turn
-    residual[m], residual[m + 1] = residual[m] - x, residual[m + 1] - y
-    residual[m + 2] -= high_mean[0] * x + high_mean[1] * y + other
-    # points that reverse their slip: forces as if they stuck, of which rates are the derivatives
-    system.reverses[joint] = missing[0] != 0.0
-    if system.reverses[joint]:
-        dx, dy, turn, other = face_forces(rates, (0.0, missing[0], 0.0))
-        lack = system.missing[joint]
-        lack[0], lack[1], lack[2] = -dx, -dy, turn - low_mean[0] * dx - low_mean[1] * dy
-        lack[3], lack[4], lack[5] = dx, dy, high_mean[0] * dx + high_mean[1] * dy + other
-        x, y = x + dx, y + dy
-    force = force[0], force[1] + missing[0], force[2]
-    a, b, c, d = force_derivative(step, rates, now, force, law_rate)
-    row = system.rates[joint]
-    row[0], row[1], row[2], row[3] = a
-    row[4], row[5], row[6], row[7] = b
-    row[8], row[9], row[10], row[11] = c
-    row[12], row[13], row[14], row[15] = d
-    row[16], row[17], row[18], row[19] = low_mean + low_end
-    row[20], row[21], row[22], row[23] = high_mean + high_end
-    row[24] = _rotation_stiffness(low, below, -x, -y)
-    row[25] = _rotation_stiffness(high, above, x, y)
+    x = load(joint, first + 2, at) + gather(stones, X, system.stone, side, at)
+    y = load(joint, first + 3, at) + gather(stones, Y, system.stone, side, at)
+    return (x + (less * rx - more * ry), y + (more * rx + less * ry)), (c, s)
 
 
 @kernel
-def _add_joint(row, low, high, parent, blocks):  # type: ignore
+def _start_joints(system, at):  # type: ignore
+    """Store what joints are at the start of a step, where the stones are then."""
+    rows, joint, law = system.start, system.joint, system.law
+    (xa, ya), (c, s) = _face_place(system, at, 0, BC, BS)
+    (xb, yb), (cb, sb) = _face_place(system, at, 1, BC, BS)
+    x, y = xb - xa, yb - ya
+    normal = add_angles(load(joint, DIRECTION, at), load(joint, DIRECTION + 1, at), c, s)
+    normal = add_angles(normal[0], normal[1], cb, sb)
+    apart = add_angles(load(joint, DIFFERENCE, at), load(joint, DIFFERENCE + 1, at), cb, sb)
+    apart = add_angles(apart[0], apart[1], c, -s)
+    opening = normal[0] * x + normal[1] * y + load(joint, INITIAL, at)
+    slip = normal[0] * y - normal[1] * x + load(joint, INITIAL + 1, at)
+    turn = 2.0 * apart[1] + load(joint, INITIAL + 2, at)
+    (length, _), (middle, _) = lane_overlap(law, at, slip)
+    opening = opening - middle * turn
+    energy = lane_energy(law, at, length, opening, turn)[0]
+    _store_rows(rows, 0, at, (x, y, normal[0], normal[1], apart[0], apart[1]))
+    _store_rows(rows, 6, at, (opening, slip, turn, length, middle, energy))
+
+
+@inlined_kernel
+def _store_rows(rows, first, at, values):  # type: ignore
+    """Store values in rows one after another."""
+    for k in range(len(values)):
+        store(rows, first + k, at, values[k])
+
+
+@inlined_kernel
+def _middle_rates(system, at, side, half_angle):  # type: ignore
+    """Return the derivatives of the middles of faces by the angle, mean and at the end."""
+    rx, ry = load(system.joint, FACE + 4 * side, at), load(system.joint, FACE + 4 * side + 1, at)
+    stones, (hc, hs) = system.stones, half_angle
+    shrunk = gather(stones, SHRUNK, system.stone, side, at)
+    c = gather(stones, C, system.stone, side, at)
+    s = gather(stones, S, system.stone, side, at)
+    c1, s1 = 1.0 - 2.0 * hs * hs, 2.0 * hs * hc
+    mean = -shrunk * (s * rx + c * ry), shrunk * (c * rx - s * ry)
+    return mean, (-(s1 * rx + c1 * ry), c1 * rx - s1 * ry), (rx, ry, c, s, shrunk)
+
+
+@inlined_kernel
+def _rotation_stiffness(system, at, side, frame, x, y):  # type: ignore
+    """Return the derivative of the moment about the centroid of constant forces on faces."""
+    rx, ry, c, s, shrunk = frame
+    along, across = x * c + y * s, y * c - x * s
+    turned, straight = across * rx - along * ry, along * rx + across * ry
+    rate = gather(system.stones, RATE, system.stone, side, at)
+    return 0.5 * (rate * turned - shrunk * straight)
+
+
+@inlined_kernel
+def _on_stones(push, low_mean, high_mean):  # type: ignore
+    """Return forces and moments on the lower and on the higher stones, from those on faces."""
+    x, y, low, high = push
+    return (
+        *(-x, -y, low - (low_mean[0] * x + low_mean[1] * y)),
+        *(x, y, high + (high_mean[0] * x + high_mean[1] * y)),
+    )
+
+
+@kernel
+def _evaluate_joints(system, at):  # type: ignore
+    """Store the mean forces of joints over the step, their derivatives and resultants."""
+    stones, joint, rows = system.stones, system.joint, system.start
+    (xa, ya), low_half = _face_place(system, at, 0, HC, HS)
+    (xb, yb), high_half = _face_place(system, at, 1, HC, HS)
+    low, high = gather(stones, HALF, system.stone, 0, at), gather(stones, HALF, system.stone, 1, at)
+    half, quarter = 0.5 * (low + high), 0.5 * (high - low)
+    jumps = (load(rows, 0, at), load(rows, 1, at)), (xb - xa, yb - ya)
+    begin = (load(rows, 2, at), load(rows, 3, at)), (load(rows, 4, at), load(rows, 5, at))
+    turns = (half, _lane_series(half)), (quarter, _lane_series(quarter))
+    _, end, rates, now, step = measure_step(jumps, begin, turns)
+    end = (
+        end[0] + load(joint, INITIAL, at),
+        end[1] + load(joint, INITIAL + 1, at),
+        end[2] + load(joint, INITIAL + 2, at),
+    )
+    start = (
+        *(load(rows, 6, at), load(rows, 7, at), load(rows, 8, at)),
+        *(load(rows, 9, at), load(rows, 10, at), load(rows, 11, at)),
+    )
+    memory = system.slip, system.end_slip, system.directions
+    force, law_rate, (shear, moment, loss), missing, energy = lane_forces(
+        system.law, at, start, end, system.step[1], memory
+    )
+    _store_rows(system.end, 0, at, (end[0], end[1], end[2], energy, loss))
+    side = load(joint, ORIENTATION, at)
+    _store_rows(system.resultants, 0, at, (-force[0], side * shear, side * moment))
+    low_mean, low_end, low_frame = _middle_rates(system, at, 0, low_half)
+    high_mean, high_end, high_frame = _middle_rates(system, at, 1, high_half)
+    push = face_forces(rates, force)
+    _store_rows(system.forces, 0, at, _on_stones(push, low_mean, high_mean))
+    # points that reverse their slip: forces as if they stuck, of which rates are the derivatives
+    none, reverses = spread(0.0), any_lane(missing != 0.0)
+    lack = face_forces(rates, (none, missing, none))
+    _store_rows(system.forces, 6, at, _on_stones(lack, low_mean, high_mean))
+    x, y = push[0] + lack[0], push[1] + lack[1]
+    force = force[0], force[1] + missing, force[2]
+    a, b, c, d = force_derivative(step, rates, now, force, law_rate)
+    _store_rows(system.rates, 0, at, a)
+    _store_rows(system.rates, 4, at, b)
+    _store_rows(system.rates, 8, at, c)
+    _store_rows(system.rates, 12, at, d)
+    _store_rows(system.rates, 16, at, low_mean + low_end)
+    _store_rows(system.rates, 20, at, high_mean + high_end)
+    low_bend = _rotation_stiffness(system, at, 0, low_frame, -x, -y)
+    high_bend = _rotation_stiffness(system, at, 1, high_frame, x, y)
+    _store_rows(system.rates, 24, at, (low_bend, high_bend))
+    return reverses
+
+
+@kernel
+def _add_joint(rates, joint, low, high, parent, blocks):  # type: ignore
     """Add the derivatives of a joint to the blocks of both its stones."""
     # L V: columns of the lower stone, and of the higher one
-    (p, q), (r, s) = (row[16], row[17]), (row[18], row[19])
-    (t, u), (v, w) = (row[20], row[21]), (row[22], row[23])
+    (p, q), (r, s) = (rates[16, joint], rates[17, joint]), (rates[18, joint], rates[19, joint])
+    (t, u), (v, w) = (rates[20, joint], rates[21, joint]), (rates[22, joint], rates[23, joint])
     diagonal, right, below = blocks[0], blocks[1], blocks[2]
     child = min(low, high)
     linked = parent[child] == max(low, high) if child < len(parent) else False
@@ -299,14 +390,14 @@ def _add_joint(row, low, high, parent, blocks):  # type: ignore
             sign, dx, dy = -1.0, -r, -s
         else:
             sign, dx, dy = 1.0, v, w
-        a0, a1 = sign * row[0], sign * row[1]
-        a2 = dx * row[0] + dy * row[1] + row[2 + side]
-        b0, b1 = sign * row[4], sign * row[5]
-        b2 = dx * row[4] + dy * row[5] + row[6 + side]
-        c0, c1 = sign * row[8], sign * row[9]
-        c2 = dx * row[8] + dy * row[9] + row[10 + side]
-        d0, d1 = sign * row[12], sign * row[13]
-        d2 = dx * row[12] + dy * row[13] + row[14 + side]
+        a0, a1 = sign * rates[0, joint], sign * rates[1, joint]
+        a2 = dx * rates[0, joint] + dy * rates[1, joint] + rates[2 + side, joint]
+        b0, b1 = sign * rates[4, joint], sign * rates[5, joint]
+        b2 = dx * rates[4, joint] + dy * rates[5, joint] + rates[6 + side, joint]
+        c0, c1 = sign * rates[8, joint], sign * rates[9, joint]
+        c2 = dx * rates[8, joint] + dy * rates[9, joint] + rates[10 + side, joint]
+        d0, d1 = sign * rates[12, joint], sign * rates[13, joint]
+        d2 = dx * rates[12, joint] + dy * rates[13, joint] + rates[14 + side, joint]
         if side == 0:
             block = diagonal[low]
             cross = below[child] if child == low else right[child]
@@ -317,12 +408,12 @@ def _add_joint(row, low, high, parent, blocks):  # type: ignore
         f0, f1, f2 = d0 + t * a0 + u * b0, d1 + t * a1 + u * b1, d2 + t * a2 + u * b2
         if side == 0:
             _add_rows(block, -1.0, (a0, a1, a2), (b0, b1, b2), (e0, e1, e2))
-            block[2, 2] += row[24]
+            block[2, 2] += rates[24, joint]
             if linked:
                 _add_rows(cross, 1.0, (a0, a1, a2), (b0, b1, b2), (f0, f1, f2))
         else:
             _add_rows(block, 1.0, (a0, a1, a2), (b0, b1, b2), (f0, f1, f2))
-            block[2, 2] += row[25]
+            block[2, 2] += rates[25, joint]
             if linked:
                 _add_rows(cross, -1.0, (a0, a1, a2), (b0, b1, b2), (e0, e1, e2))
 
@@ -412,8 +503,9 @@ def _evaluate_step(system, step, states, ground, results, memory):  # type: igno
 def _start_chain_run(system, state, memory):  # type: ignore
     """Copy the memory, and forget the steps of an earlier run."""
     system.known[0] = 0
+    points = len(system.slip)
     for point in range(len(memory)):
-        system.slip[point] = memory[point]
+        system.slip[point % points, point // points] = memory[point]
 
 
 @kernel
@@ -426,35 +518,49 @@ def _chain_residual(system, work, iteration):  # type: ignore
         after[k] = before[k] + move[k]
         residual[k] = work.constant[k] - inertia * system.mass[k] * move[k]
     if iteration != 1:  # only the first correction is compared with the guess
-        for point in range(len(system.directions)):
-            system.directions[point] = 0.0
-    _move_stones(system.stones, before, after, iteration == 0)
-    for joint in range(len(system.faces)):
-        _evaluate_joint(system, joint, before, after, residual)
-        reverses = reverses or system.reverses[joint]
+        system.directions[:] = 0.0
+    if iteration == 0:
+        _move_stones(system.stones, before, before, True)
+        for at in range(0, system.joint.shape[1], WIDTH):
+            _start_joints(system, at)
+    _move_stones(system.stones, before, after, False)
+    for at in range(0, system.joint.shape[1], WIDTH):
+        turned = _evaluate_joints(system, at)
+        reverses = reverses or turned
+    _add_forces(system, -1.0, 0, residual)
     for k in range(count):
         square += residual[k] ** 2
     return np.sqrt(square), reverses
 
 
 @kernel
+def _add_forces(system, factor, first, total):  # type: ignore
+    """Add forces of joints on their stones, times a factor, to a vector."""
+    stone, forces = system.stone, system.forces
+    for joint in range(len(system.law.face_law.depth)):
+        for side in range(2):
+            place, row = 3 * stone[side, joint], first + 3 * side
+            for k in range(3):
+                total[place + k] += factor * forces[row + k, joint]
+
+
+@kernel
 def _chain_correction(system, work, iteration, reuse, hold):  # type: ignore
     """Solve for the correction of Δq."""
-    correction, faces = work.correction, system.faces
+    correction, stone, count = work.correction, system.stone, len(system.law.face_law.depth)
     for k in range(len(correction)):
         correction[k] = work.residual[k]
-    for joint in range(len(faces) if hold else 0):
-        for k in range(6 if system.reverses[joint] else 0):
-            correction[faces[joint, k // 3].first + k % 3] -= system.missing[joint, k]
+    if hold:
+        _add_forces(system, -1.0, 6, correction)
     if not reuse:
         dt, _, drag = system.step
         blocks, inertia = system.blocks, 2.0 / dt**2 + drag / dt
         blocks[:3] = 0.0
         for k in range(len(system.mass)):
             blocks[0, k // 3, k % 3, k % 3] = inertia * system.mass[k]
-        for joint in range(len(faces)):
-            low, high = faces[joint, 0].first // 3, faces[joint, 1].first // 3
-            _add_joint(system.rates[joint], low, high, system.parent, blocks)
+        for joint in range(count):
+            low, high = stone[0, joint], stone[1, joint]
+            _add_joint(system.rates, joint, low, high, system.parent, blocks)
         if not _eliminate(system.parent, blocks):
             return False
     _substitute(system.parent, system.blocks, correction)
@@ -495,27 +601,43 @@ def _solve_chain_step(system, step, states, ground):  # type: ignore
 
 def _evaluate_chain_step(system, step, states, ground, results, memory):  # type: ignore
     """Copy mean resultants and memory, and evaluate the energies of a step."""
-    (resultants, energy), work, law = results, system.work, system.law
-    dt, _, drag = system.step
+    (resultants, energy), work, slip = results, system.work, system.slip
+    dt, lag, drag = system.step
     energy[0] = energy[1] = energy[2] = energy[3] = 0.0
+    for at in range(0, system.joint.shape[1], WIDTH):
+        loss, elastic = _joint_energies(system, at, lag)
+        for k in range(min(WIDTH, len(resultants) - at)):
+            energy[1] += lane(elastic, k)
+            energy[3] += lane(loss, k)
     for joint in range(len(resultants)):
         for k in range(3):
-            resultants[joint, k] = system.resultants[joint, k]
-        opening, slip, turn, loss = system.end[joint]
-        first = system.start[joint]
-        ends = (first[0], first[1], first[2]), (opening, slip, turn)
-        energy[3] += loss + damping_loss(law, joint, ends, system.step[1])
-        (length, _), (middle, _) = overlap(law, joint, slip)
-        phi = closing_energy(law, joint, length, opening - middle * turn, turn)[0]
-        energy[1] += law.width * length * phi
-        for point in range(law.first_point[joint], law.first_point[joint + 1]):
-            system.slip[point] = system.end_slip[point]
-            energy[1] += 0.5 * law.shear_spring[point] * (slip - system.slip[point]) ** 2
+            resultants[joint, k] = system.resultants[k, joint]
     for k in range(len(system.mass)):
         speed, move = states[1, 1, k], work.move[k]
         energy[0] += 0.5 * system.mass[k] * speed * speed
         energy[1] -= system.weight[k] * states[1, 0, k]
         energy[2] -= move * (ground[0] * system.body[0, k] + ground[1] * system.body[1, k])
         energy[3] += drag * system.mass[k] * move * move / dt
+    points = len(slip)
+    for point in range(points):
+        for joint in range(slip.shape[1]):
+            slip[point, joint] = system.end_slip[point, joint]
     for point in range(len(memory)):
-        memory[point] = system.slip[point]
+        memory[point] = slip[point % points, point // points]
+
+
+@kernel
+def _joint_energies(system, at, lag):  # type: ignore
+    """Return the energy that joints lose in a step, and what they store at its end."""
+    law, rows, end = system.law, system.start, system.end
+    g1, slip, turn = load(end, 0, at), load(end, 1, at), load(end, 2, at)
+    (length, _), (middle, _) = lane_overlap(law, at, slip)
+    loss, elastic = load(end, 4, at), law.face_law.width * length * load(end, 3, at)
+    if lag > 0.0:
+        t0, l0 = load(rows, 8, at), load(rows, 9, at)
+        start, last = (load(rows, 6, at), l0 * t0, l0), (g1 - middle * turn, length * turn, length)
+        loss += lane_damping_loss(law, at, start, last, lag)
+    for point in range(len(law.spring)):
+        stretched = slip - load(system.end_slip, point, at)
+        elastic += 0.5 * load(law.spring, point, at) * stretched * stretched
+    return loss, elastic

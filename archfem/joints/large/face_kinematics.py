@@ -41,6 +41,12 @@ def rotation_series(x):  # type: ignore
     if abs(x) > 0.25:
         c, s = np.cos(x), np.sin(x) / x
         return c, s, (c - s) / x
+    return short_series(x)
+
+
+@inlined_kernel
+def short_series(x):  # type: ignore
+    """Return `rotation_series` of |x| up to 0.25."""
     # Taylor series; the omitted terms are below 1e-17, in the derivative below 1e-14 of it
     y = x * x
     c = y * (1 / 40320 + y * (-1 / 3628800 + y * (1 / 479001600)))
@@ -74,26 +80,32 @@ def joint_measures(lower, higher, angle):  # type: ignore
 
 @inlined_kernel
 def step_measures(lower, higher, angle):  # type: ignore
-    """Return the measures at both ends of a step, and their derivatives.
-
-    A derivative is stored as c, s, a, b and t: its rows are (c, s, a, a), (-s, c, -b, -b) and
-    (0, 0, -t, t).
-    """
+    """Return the measures at both ends of a step, and their derivatives, from poses."""
     ((xa, ya, a0), (xc, yc, a1)), ((xb, yb, b0), (xd, yd, b1)) = lower, higher
     # half the change of the mean angle, and half that of half the difference
     half, quarter = 0.25 * ((a1 - a0) + (b1 - b0)), 0.25 * ((b1 - b0) - (a1 - a0))
-    # direction of the normal at the start, the middle and the end of the step
-    mean, shrunk, shrunk_rate = rotation_series(half)
     first = angle + 0.5 * (a0 + b0)
-    c0, s0 = np.cos(first), np.sin(first)
+    begin = (np.cos(first), np.sin(first)), cosine_sine(0.5 * (b0 - a0))
+    turns = (half, rotation_series(half)), (quarter, rotation_series(quarter))
+    return measure_step(((xb - xa, yb - ya), (xd - xc, yd - yc)), begin, turns)
+
+
+@inlined_kernel
+def measure_step(jumps, begin, turns):  # type: ignore
+    """Return the measures at both ends of a step, and their derivatives.
+
+    The jumps are those at both ends; cosine and sine at the start are of the direction of the
+    normal, and of half the difference of both angles; and of both there is half the change, with
+    its `rotation_series`. A derivative is stored as c, s, a, b and t: its rows are (c, s, a, a),
+    (-s, c, -b, -b) and (0, 0, -t, t).
+    """
+    ((x0, y0), (x1, y1)), ((c0, s0), (cosine, sine)) = jumps, begin
+    (half, (mean, shrunk, shrunk_rate)), (quarter, (near, less, less_rate)) = turns
+    # direction of the normal in the middle and at the end of the step
     c, s = add_angles(c0, s0, mean, half * shrunk)
     c1, s1 = add_angles(c, s, mean, half * shrunk)
-    # jumps at the start and the end
-    x0, y0, x1, y1 = xb - xa, yb - ya, xd - xc, yd - yc
-    # cosine and sine of half the difference of the angles at the start, the middle and the end
-    near, less, less_rate = rotation_series(quarter)
-    cosine, sine = cosine_sine(0.5 * (b0 - a0))
     start = c0 * x0 + s0 * y0, c0 * y0 - s0 * x0, 2.0 * sine
+    # cosine and sine of half the difference of the angles in the middle and at the end
     cosine, sine = add_angles(cosine, sine, near, quarter * less)
     last = add_angles(cosine, sine, near, quarter * less)
     end = c1 * x1 + s1 * y1, c1 * y1 - s1 * x1, 2.0 * last[1]

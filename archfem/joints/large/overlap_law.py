@@ -155,7 +155,7 @@ def _overlap_slopes(law, segment, slips, lengths):  # type: ignore
 
 
 @inlined_kernel
-def _friction_limits(law, point, segment, pressed, lagged, lag):  # type: ignore
+def friction_limits(law, point, segment, pressed, lagged, lag):  # type: ignore
     """Return Coulomb's limits μ N + c A of a facet per length of the overlap, and their rates."""
     contact, share = law.contacts[segment], law.width * law.depth_share[point]
     (n0, n1), (k00, k01, k11) = pressed
@@ -307,7 +307,7 @@ def _sum_points(law, segment, ends, overlap, lag, memory):  # type: ignore
         by_place += share * (x0 * near + x1 * far)
         by_square += share * (x0 * x0 * k00 + 2.0 * x0 * x1 * k01 + x1 * x1 * k11)
         # shear of the point, or of both ends of the facet
-        (near, far), (k00, k01, k11) = _friction_limits(law, point, segment, pressed, lagged, lag)
+        (near, far), (k00, k01, k11) = friction_limits(law, point, segment, pressed, lagged, lag)
         is_free = near == 0.0 and far == 0.0 and contact.resistance == 0.0
         for end in range(stride):
             if is_free:
