@@ -18,7 +18,7 @@ from numba.extending import overload
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from archfem._numba import INNER_OPTIONS, inlined_kernel, kernel
+from archfem._numba import INNER_OPTIONS, inlined_kernel, kernel, summing_kernel
 from archfem._typing import Array
 from archfem.dynamics.solvers.base import evaluate_step, is_system, solve_step, start_run
 from archfem.dynamics.solvers.equation import Equation
@@ -101,6 +101,7 @@ class ChainSystem(NamedTuple):
     slip: Array  # irreversible slip before the step (p, j) [m]
     end_slip: Array  # and after it (p, j) [m]
     directions: Array  # slip direction of points in the last evaluation (p, j)
+    tractions: Array  # mean normal tractions, at ends of facets times φ_i (p, j) [Pa]
     step: tuple[float, float, float]  # Δt, β/Δt, and the coefficient of M in C
     past: Array  # accelerations at the end of the step before the last (n,)
     known: Any  # number of steps so far in this run (1,)
@@ -143,7 +144,7 @@ def find_stone_tree(equation: Equation) -> StoneTree | None:
         return None
     last_first, parent = [], np.full(count, -1)
     for number in range(parts):
-        root = int(np.flatnonzero(part == number)[0])
+        root = _middle_of(links, int(np.flatnonzero(part == number)[0]))
         order, parents = breadth_first_order(links, root, directed=False)
         last_first += order.tolist()
         parent[order] = parents[order]
@@ -151,6 +152,17 @@ def find_stone_tree(equation: Equation) -> StoneTree | None:
     place = np.append(np.argsort(stones), count)
     parents = np.where(parent < 0, count, parent)[stones]
     return StoneTree((3 * stones[:, None] + np.arange(3)).ravel(), place[parents])
+
+
+def _middle_of(links: Any, stone: int) -> int:
+    """Return the stone in the middle of the longest way through a tree that has a stone."""
+    # from there both halves are eliminated side by side, by steps that do not wait for each other
+    end = breadth_first_order(links, stone, directed=False)[0][-1]
+    order, before = breadth_first_order(links, end, directed=False)
+    way = [int(order[-1])]
+    while way[-1] != end:
+        way.append(int(before[way[-1]]))
+    return way[len(way) // 2]
 
 
 def chain_system(equation: Equation, tree: StoneTree, dt: float) -> ChainSystem:
@@ -177,7 +189,7 @@ def chain_system(equation: Equation, tree: StoneTree, dt: float) -> ChainSystem:
         np.zeros((12, size)),
         np.zeros((5, size)),
         np.zeros((4, stones, 3, 3)),
-        *np.zeros((3, points, size)),
+        *np.zeros((4, points, size)),
         (dt, equation.lag / dt, equation.drag),
         np.zeros(model.size),
         np.zeros(1, np.int64),
@@ -344,7 +356,7 @@ def _evaluate_joints(system, at):  # type: ignore
         *(load(rows, 6, at), load(rows, 7, at), load(rows, 8, at)),
         *(load(rows, 9, at), load(rows, 10, at), load(rows, 11, at)),
     )
-    memory = system.slip, system.end_slip, system.directions
+    memory = system.slip, system.end_slip, system.directions, system.tractions
     force, law_rate, (shear, moment, loss), missing, energy = lane_forces(
         system.law, at, start, end, system.step[1], memory
     )
@@ -503,9 +515,11 @@ def _evaluate_step(system, step, states, ground, results, memory):  # type: igno
 def _start_chain_run(system, state, memory):  # type: ignore
     """Copy the memory, and forget the steps of an earlier run."""
     system.known[0] = 0
-    points = len(system.slip)
-    for point in range(len(memory)):
-        system.slip[point % points, point // points] = memory[point]
+    points, number = len(system.slip), 0
+    for joint in range(len(memory) // points):
+        for point in range(points):
+            system.slip[point, joint] = memory[number]
+            number += 1
 
 
 @kernel
@@ -513,7 +527,7 @@ def _chain_residual(system, work, iteration):  # type: ignore
     """Evaluate the forces out of balance at the trial displacements."""
     before, after, move, residual = work.before, work.after, work.move, work.residual
     dt, _, drag = system.step
-    inertia, count, square, reverses = 2.0 / dt**2 + drag / dt, len(system.mass), 0.0, False
+    inertia, count, reverses = 2.0 / dt**2 + drag / dt, len(system.mass), False
     for k in range(count):
         after[k] = before[k] + move[k]
         residual[k] = work.constant[k] - inertia * system.mass[k] * move[k]
@@ -528,9 +542,16 @@ def _chain_residual(system, work, iteration):  # type: ignore
         turned = _evaluate_joints(system, at)
         reverses = reverses or turned
     _add_forces(system, -1.0, 0, residual)
+    return np.sqrt(_add_squares(residual, count)), reverses
+
+
+@summing_kernel
+def _add_squares(values, count):  # type: ignore
+    """Return the sum of the squares of the first values."""
+    total = 0.0
     for k in range(count):
-        square += residual[k] ** 2
-    return np.sqrt(square), reverses
+        total += values[k] ** 2
+    return total
 
 
 @kernel
@@ -618,12 +639,13 @@ def _evaluate_chain_step(system, step, states, ground, results, memory):  # type
         energy[1] -= system.weight[k] * states[1, 0, k]
         energy[2] -= move * (ground[0] * system.body[0, k] + ground[1] * system.body[1, k])
         energy[3] += drag * system.mass[k] * move * move / dt
-    points = len(slip)
-    for point in range(points):
-        for joint in range(slip.shape[1]):
+    number = 0
+    for joint in range(len(resultants)):
+        for point in range(len(slip)):
             slip[point, joint] = system.end_slip[point, joint]
-    for point in range(len(memory)):
-        memory[point] = slip[point % points, point // points]
+            if number < len(memory):
+                memory[number] = slip[point, joint]
+            number += 1
 
 
 @kernel
@@ -636,7 +658,7 @@ def _joint_energies(system, at, lag):  # type: ignore
     if lag > 0.0:
         t0, l0 = load(rows, 8, at), load(rows, 9, at)
         start, last = (load(rows, 6, at), l0 * t0, l0), (g1 - middle * turn, length * turn, length)
-        loss += lane_damping_loss(law, at, start, last, lag)
+        loss += lane_damping_loss(law, at, start, last, system.tractions)
     for point in range(len(law.spring)):
         stretched = slip - load(system.end_slip, point, at)
         elastic += 0.5 * load(law.spring, point, at) * stretched * stretched

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from archfem._numba import kernel
+from archfem._numba import kernel, summing_kernel
 
 # Shares of a correction that a line search tries, at most
 MAX_SEARCH_EVALUATIONS = 14
@@ -45,7 +45,7 @@ def add_share(system, work, before, share):  # type: ignore
     return largest
 
 
-@kernel
+@summing_kernel
 def residual_work(system, work):  # type: ignore
     """Return the work of the residual along the correction."""
     total = 0.0

@@ -25,7 +25,7 @@ from archfem.joints.large.lanes import (
     with_lane,
 )
 from archfem.joints.large.overlap_law import ROUNDED_SLIP, FaceLaw, closing_energy, friction_limits
-from archfem.joints.large.point_law import damping_tractions, mean_tractions
+from archfem.joints.large.point_law import mean_tractions
 from archfem.joints.normal_law import GAUSS_POINTS, GAUSS_WEIGHTS
 
 # Rows of the parameters of joints: depth, k_n, μ, the limit where open, and of both ends of the
@@ -41,6 +41,7 @@ class LaneLaw(NamedTuple):
     place: Array  # x of the points (p, j) [-]
     share: Array  # width times the part of the depth of a point, or of its facet (p, j) [m]
     spring: Array  # k_s times the area of each point (p, j) [N/m]
+    flexibility: Array  # and its inverse [m/N]
     is_linear: bool  # whether all joints have facets with the linear law, and no cohesion
 
 
@@ -57,11 +58,9 @@ def lane_law(law: FaceLaw) -> LaneLaw:
         *(ends[0], sizes[0], ends[1], sizes[1]),
     ]
     rows[STIFFNESS, count:] = 0.0
-    of_points = np.ones((3, points, size))
-    for row, values in zip(
-        of_points, (law.place, law.width * law.depth_share, law.shear_spring), strict=True
-    ):
-        row[:, :count] = values.reshape(count, points).T
+    of_points, spring = np.ones((4, points, size)), law.shear_spring
+    values = law.place, law.width * law.depth_share, spring, 1.0 / spring
+    of_points[:, :, :count] = np.swapaxes(np.reshape(values, (4, count, points)), 1, 2)
     others = contacts["closing_rate"].any() or contacts["cohesion"].any()
     return LaneLaw(law, rows, *of_points, bool(law.facets and not others))
 
@@ -86,7 +85,7 @@ def _clip(x, limit):  # type: ignore
 @inlined_kernel
 def _rounded_size(bend, slip):  # type: ignore
     """Return R(s) and its derivative, with the slip below which |s| is rounded."""
-    size, share = abs(slip), slip / bend
+    size, share = abs(slip), slip * (1.0 / bend)
     is_small = size < bend
     return (
         select(is_small, 0.5 * slip * share, size - 0.5 * bend),
@@ -154,6 +153,13 @@ def _linear_tractions(stiffness, ends, lag):  # type: ignore
     They are those of `point_law.mean_tractions`.
     """
     a, c, b, d = ends
+    whole, none = (0.5 + lag) * stiffness, spread(0.0)
+    if not any_lane(greatest(greatest(a, c), greatest(b, d)) > 0.0):  # closed
+        share = stiffness * (1 / 12)
+        near, far, third = share * (a + b), share * (c + d), whole * (1 / 3)
+        return (2.0 * near + far, near + 2.0 * far), (third, 0.5 * third, third)
+    if not any_lane(least(least(a, c), least(b, d)) <= 0.0):  # open
+        return (none, none), (none, none, none)
     # zero crossings at start and end divide the facet into three parts, of which one at most is
     # closed all the time
     low = select((a <= 0.0) ^ (c <= 0.0), a / (a - c), 0.0)
@@ -168,10 +174,10 @@ def _linear_tractions(stiffness, ends, lag):  # type: ignore
     # ∫ of products of linear functions between both ends of that part
     p0, p1, begun, slope = 1.0 - begin, 1.0 - end, a + b, c + d - a - b
     s0, s1 = begun + begin * slope, begun + end * slope
-    share, whole = stiffness * length / 12.0, (0.5 + lag) * stiffness
+    share = stiffness * length * (1 / 12)
     near = share * (s0 * (2.0 * p0 + p1) + s1 * (p0 + 2.0 * p1))
     far = share * (s0 * (2.0 * begin + end) + s1 * (begin + 2.0 * end))
-    share = whole * length / 6.0
+    share = whole * length * (1 / 6)
     k00 = 2.0 * share * (p0 * p0 + p0 * p1 + p1 * p1)
     k01 = share * (2.0 * p0 * begin + p0 * end + p1 * begin + 2.0 * p1 * end)
     k11 = 2.0 * share * (begin * begin + begin * end + end * end)
@@ -203,8 +209,8 @@ def _add_crossing(stiffness, ends, lag, part, sums):  # type: ignore
         y = begin + GAUSS_POINTS[k] * length
         x = 1.0 - y
         before, after = x * a + y * c, x * b + y * d
-        total = select(moves, abs(before) + abs(after), 1.0)
-        closing, opened = least(before, after), greatest(before, after) / total
+        inverse = 1.0 / select(moves, abs(before) + abs(after), 1.0)
+        closing, opened = least(before, after), greatest(before, after) * inverse
         square = 0.5 * opened * opened
         taken = select(
             before > 0.0,
@@ -212,7 +218,7 @@ def _add_crossing(stiffness, ends, lag, part, sums):  # type: ignore
             lag * square + (1.0 + lag) * (opened - square),
         )
         weight = GAUSS_WEIGHTS[k] * length
-        mean = -0.5 * weight * stiffness * closing * closing / total
+        mean = -0.5 * weight * stiffness * closing * closing * inverse
         rate = weight * (whole - stiffness * taken)
         near, far = near + x * mean, far + y * mean
         k00, k01, k11 = k00 + x * x * rate, k01 + x * y * rate, k11 + y * y * rate
@@ -257,7 +263,7 @@ def _linear_energy(stiffness, first, last):  # type: ignore
     low, high = least(first, last), greatest(first, last)
     share = select(high <= 0.0, 1.0, select(low < 0.0, low / (low - high), 0.0))
     high = least(high, 0.0)
-    third = stiffness / 6.0 * share
+    third = stiffness * (1 / 6) * share
     near, far = third * (2.0 * low + high), third * (low + 2.0 * high)
     near, far = near + (1.0 - share) * far, share * far
     is_turned = first > last
@@ -289,12 +295,13 @@ def lane_energy(law, at, length, opening, turn):  # type: ignore
 
 
 @inlined_kernel
-def _shear_means(first, change, lag, limit):  # type: ignore
-    """Return mean shear, what slip loses of it, derivatives and loss, as `point_law.shear_means`."""
+def _shear_means(first, change, lag, limit, is_free):  # type: ignore
+    """Return `point_law.shear_means`; those of free points do not matter."""
     trial = first + (0.5 + lag) * change
     sticks = greatest(greatest(abs(first), abs(first + change)), abs(trial)) <= limit
     is_still = change == 0.0
     sticks = sticks | (is_still & (abs(first) <= (1.0 + SLIP_LIMIT_TOLERANCE) * limit))
+    sticks = sticks | is_free
     shear, over, by_change = trial, spread(0.0), spread(0.5 + lag)
     by_limit, loss = spread(0.0), lag * change * change
     if any_lane(~sticks):
@@ -332,12 +339,13 @@ def _sliding_means(first, change, lag, limit, is_still):  # type: ignore
 @inlined_kernel
 def _add_point_shear(law, point, at, step, limits, memory, sums):  # type: ignore
     """Return the sums with the shear of points added; store their slip and slip direction."""
-    (s0, s1, lag), (slip, end_slip, directions) = step, memory
+    (s0, s1, lag), (slip, end_slip, directions, _) = step, memory
     is_free, limit, by_gap, by_place, (mean, half, tilts, length) = limits
     spring, begin = load(law.spring, point, at), load(slip, point, at)
+    flexibility = load(law.flexibility, point, at)
     first, change = spring * (s0 - begin), spring * (s1 - s0)
     most = load(law.joint, RESISTANCE, at) + mean * limit
-    shear, over, by_change, by_limit, loss = _shear_means(first, change, lag, most)
+    shear, over, by_change, by_limit, loss = _shear_means(first, change, lag, most, is_free)
     # slip direction reversed since the last evaluation: derivative and correction of sticking
     direction, missing = _sign(over), spread(0.0)
     reverses = (direction * load(directions, point, at) < 0.0) & ~is_free
@@ -346,10 +354,10 @@ def _add_point_shear(law, point, at, step, limits, memory, sums):  # type: ignor
         missing = select(reverses, first + by_change * change - shear, 0.0)
         direction = select(reverses, 0.0, direction)
     # points without friction follow the faces, and lose what they had
-    store(end_slip, point, at, select(is_free, s1, begin + over / spring))
+    store(end_slip, point, at, select(is_free, s1, begin + over * flexibility))
     store(directions, point, at, select(is_free, 0.0, direction))
     shear, along = select(is_free, 0.0, shear), select(is_free, 0.0, spring * by_change)
-    loss = select(is_free, 0.5 * first * first, loss) / spring
+    loss = select(is_free, 0.5 * first * first, loss) * flexibility
     by_limit = select(is_free, 0.0, by_limit)
     # derivatives by opening, slip and rotation at the end, through the limit and the spring
     return (
@@ -379,6 +387,7 @@ def _sum_points(law, at, ends, slips, overlap, lag, memory):  # type: ignore
         p, q = lag * (b - a), lag * (d - c)
         pressed, limits = _press_facet(law, point, at, (a + p, c + q, b + p, d + q), lag)
         (n0, n1), (k00, k01, k11) = pressed
+        store(memory[3], point, at, n0)
         # sums of f, x f, and of their derivatives by the gap: 1, x, x²
         share, near, far = load(law.share, point, at), k00 + k01, k01 + k11
         total += share * (n0 + n1)
@@ -392,6 +401,7 @@ def _sum_points(law, at, ends, slips, overlap, lag, memory):  # type: ignore
         own = is_free, near, k00 + k01, x0 * k00 + x1 * k01, overlap
         rubs = _add_point_shear(law, point, at, step, own, memory, rubs)
         if stride == 2:
+            store(memory[3], point + 1, at, n1)
             own = is_free, far, k01 + k11, x0 * k01 + x1 * k11, overlap
             rubs = _add_point_shear(law, point + 1, at, step, own, memory, rubs)
     return (total, moment, by_gap, by_place, by_square), rubs
@@ -474,40 +484,20 @@ def _by_gap(row, middle, moved):  # type: ignore
 
 
 @inlined_kernel
-def lane_damping_loss(law, at, start, end, lag):  # type: ignore
+def lane_damping_loss(law, at, start, end, tractions):  # type: ignore
     """Return the energy that joints lose over a step by the lag of their normal forces.
 
-    Both ends are opening and tilt at the middle of the overlap, and its length.
+    Both ends are opening and tilt at the middle of the overlap, and its length; the mean tractions
+    of all points are those with the lag.
     """
     (g0, r0, l0), (g1, r1, l1), loss = start, end, spread(0.0)
     stride = 2 if law.face_law.facets else 1
     for point in range(0, len(law.place), stride):
         x0, x1 = load(law.place, point, at), load(law.place, point + stride - 1, at)
-        ends = g0 - x0 * r0, g0 - x1 * r0, g1 - x0 * r1, g1 - x1 * r1
-        near, far = _damping_tractions(law, at, ends, lag)
-        work = near * (ends[2] - ends[0]) + far * (ends[3] - ends[1])
+        a, c, b, d = g0 - x0 * r0, g0 - x1 * r0, g1 - x0 * r1, g1 - x1 * r1
+        near, far = _press_facet(law, point, at, (a, c, b, d), 0.0)[0][0]
+        work = (load(tractions, point, at) - near) * (b - a)
+        if stride == 2:
+            work += (load(tractions, point + 1, at) - far) * (d - c)
         loss += load(law.share, point, at) * work
     return 0.5 * (l0 + l1) * loss
-
-
-@inlined_kernel
-def _damping_tractions(law, at, ends, lag):  # type: ignore
-    """Return means of what the lag of damping adds to the traction."""
-    if not law.is_linear:
-        return _damping_apart(law, at, ends, lag)
-    (a, c, b, d), stiffness = ends, load(law.joint, STIFFNESS, at)
-    p, q = lag * (b - a), lag * (d - c)
-    n0, n1 = _linear_tractions(stiffness, (a + p, c + q, b + p, d + q), lag)[0]
-    m0, m1 = _linear_tractions(stiffness, ends, 0.0)[0]
-    return n0 - m0, n1 - m1
-
-
-@kernel
-def _damping_apart(law, at, ends, lag):  # type: ignore
-    """Return `_damping_tractions` joint by joint."""
-    (a, c, b, d), face_law, near, far = ends, law.face_law, spread(0.0), spread(0.0)
-    for k in range(min(WIDTH, len(face_law.depth) - at)):
-        own = lane(a, k), lane(c, k), lane(b, k), lane(d, k)
-        means = damping_tractions(face_law.contacts[at + k], own, lag, face_law.facets)
-        near, far = with_lane(near, k, means[0]), with_lane(far, k, means[1])
-    return near, far
