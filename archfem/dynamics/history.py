@@ -1,7 +1,7 @@
 """History of a run: recorded joints and fields, first mechanisms, verdict, and its file."""
 
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -276,12 +276,6 @@ class History(ResultDisplay):
         """Assessment of the run; `str(run.verdict)` describes it in words."""
         attrs, joints = self.dataset.attrs, self.joints
         mechanisms = detect_mechanisms(joints, self.structure)
-        if self.fall is not None:
-            outcome = self.fall.kind
-        elif attrs.get("displacements") == "large":
-            outcome = "unknown"
-        else:
-            outcome = "mechanism" if any(mechanisms.values()) else "no mechanism"
         finished = attrs.get("ended") == Ending.FINISHED or "outcome" not in attrs
         remarks = [] if finished else [f"the run {self.outcome}"]
         remarks += extremes_remark(self.dataset)
@@ -292,7 +286,7 @@ class History(ResultDisplay):
             remarks.append(f"{law}, which was not varied")
         broken_off = not (finished or self.ending.is_complete)
         return Verdict(
-            outcome=outcome,
+            outcome=classify_outcome(self, mechanisms),
             doubts=self.doubts,
             displacement=float(attrs.get("displacement", np.nan)),
             residual=float(attrs.get("residual", np.nan)),
@@ -546,6 +540,15 @@ def partial_history(error: DidNotConverge) -> History:
     if not isinstance(error.history, History):
         raise error
     return error.history
+
+
+def classify_outcome(run: History, mechanisms: Mapping[str, Mechanism | None]) -> str:
+    """Return the outcome of a run, as of `Verdict`, from its first mechanisms."""
+    if run.fall is not None:
+        return run.fall.kind
+    if run.dataset.attrs.get("displacements") == "large":
+        return "unknown"
+    return "mechanism" if any(mechanisms.values()) else "no mechanism"
 
 
 def first_mechanisms(run: History, criteria: Criteria | None = None) -> dict[str, Mechanism | None]:

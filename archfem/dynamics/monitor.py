@@ -99,7 +99,8 @@ class CornerDisplacements:
     def add(self, times: Array, readings: Array) -> None:
         """Add the times of the next steps, and the readings of the observer at these (steps, r)."""
         # squares are compared, since their order is that of the distances
-        squares = np.square(self._observer.corners(readings) - self._start).sum(axis=-1)
+        x, y = np.moveaxis(self._observer.corners(readings) - self._start, -1, 0)
+        squares = x * x + y * y
         squares = np.maximum.reduceat(squares, self._first, axis=1)
         farthest = squares.argmax(axis=0)
         largest = squares[farthest, np.arange(len(farthest))]

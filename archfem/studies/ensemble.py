@@ -17,14 +17,14 @@ from tqdm import tqdm
 from archfem._display import ResultDisplay
 from archfem._validation import check_number, check_type, validate_arguments, validate_methods
 from archfem.dynamics.analysis import Analysis
-from archfem.dynamics.history import History
+from archfem.dynamics.history import History, classify_outcome
 from archfem.dynamics.time_history import time_history
-from archfem.dynamics.verdict import ALL_DEFINITIONS
+from archfem.dynamics.verdict import ALL_DEFINITIONS, detect_mechanisms
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-from archfem.studies.evaluators import Evaluator, of_history
+from archfem.studies.evaluators import Evaluator, largest_values
 from archfem.studies.process_pool import evaluate_points
 from archfem.studies.variations import check_ranges, vary_settings
 
@@ -251,14 +251,19 @@ def _reduce(
     except ArchfemError as error:
         none = dict.fromkeys(PEAKS, np.nan) | {"outcome": "unknown", "ended": "failed"}
         return {**none, "error": f"{type(error).__name__}: {error}", "time": time, "failed": failed}
-    mechanisms = history.verdict.mechanisms
+    mechanisms, attributes = detect_mechanisms(history.joints, structure), history.dataset.attrs
     for number, definition in enumerate(ALL_DEFINITIONS):
         if definition in mechanisms:
             found = mechanisms[definition]
             time[number] = np.inf if found is None or found.time is None else found.time
             failed[number, list(found.joints) if found else []] = 1.0
-    findings = of_history(history, mechanisms)
-    return {**findings, "error": "", "time": time, "failed": failed}
+    return {
+        **largest_values(history),
+        "largest_displacement": attributes["displacement"],
+        "residual_displacement": attributes["residual"],
+        "outcome": classify_outcome(history, mechanisms),
+        **{"ended": str(history.ending), "error": "", "time": time, "failed": failed},
+    }
 
 
 def _empty_table(

@@ -90,9 +90,7 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
     """
     verdict = run.verdict
     findings: Findings = {
-        "eccentricity": _largest(run, "eccentricity", 0.5),
-        "friction": _largest(run, "friction", np.inf),
-        **{name: _largest(run, name) for name in ("rotation", "opening", "slip")},
+        **largest_values(run),
         "outcome": verdict.outcome,
         "largest_displacement": verdict.displacement,
         "residual_displacement": verdict.residual,
@@ -104,6 +102,15 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
     findings |= {"assessed": verdict.assessed} if verdict.assessed else {}
     drift = float(run.dataset.attrs["energy_drift"])
     return findings | {"energy_drift": drift, "doubts": float(len(verdict.doubts))}
+
+
+def largest_values(run: History) -> dict[str, float]:
+    """Return the largest values over time and joints of `of_history`."""
+    return {
+        "eccentricity": _largest(run, "eccentricity", 0.5),
+        "friction": _largest(run, "friction", np.inf),
+        **{name: _largest(run, name) for name in ("rotation", "opening", "slip")},
+    }
 
 
 def _largest(run: History, name: str, undefined: float = -np.inf) -> float:

@@ -68,7 +68,7 @@ class Stepper:
         state, done = start, 0
         while done < total:
             # steps between two checks of events, Ctrl-C and the progress bar: more of small systems
-            last = min(done + min(max(128, 32768 // len(start.q)), 256), total)
+            last = min(done + min(max(128, 65536 // len(start.q)), 1024), total)
             times = start.time + dt * np.arange(done + 1, last + 1)
             batch = self.advance_batch(state, dt, times)
             if len(batch.times):

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 
 from archfem._typing import Array, Numbers
 from archfem.errors import InvalidInput
-from archfem.joints.large.face_kinematics import face_pose
+from archfem.joints.large.face_kinematics import displace_points, face_pose
 from archfem.joints.large.forces import (
     JointStepForces,
     allocate_step_forces,
@@ -176,7 +176,12 @@ class RotatingCells(Cells):
 
     def displacement(self, q: Array) -> Array:
         """Return the displacements of all points (…, m, 2) [m]."""
-        (rx, ry), elastic = self._arms[0].T, self._arms[1]
+        arms, elastic = self._arms
+        if not elastic.nnz:
+            states = _plain(np.atleast_2d(q))
+            moved = displace_points(self.turns, arms, states)
+            return moved.reshape(*q.shape[:-1], *moved.shape[1:])
+        rx, ry = arms.T
         # once for each block, and then for its points
         frames, frame = self._frames
         turn, x, y = (np.where(frames >= 0, q[..., frames - k], 0.0) for k in (0, 2, 1))
@@ -184,10 +189,9 @@ class RotatingCells(Cells):
         c, s, less = np.cos(turn), np.sin(turn), -2.0 * np.sin(0.5 * turn) ** 2
         x, y, c, s, less = (each[..., frame] for each in (x, y, c, s, less))
         dx, dy = x + less * rx - s * ry, y + s * rx + less * ry
-        if elastic.nnz:
-            strained = np.asarray(elastic @ q.T).T.reshape(*x.shape, 2)
-            u, v = strained[..., 0], strained[..., 1]
-            dx, dy = dx + c * u - s * v, dy + s * u + c * v
+        strained = np.asarray(elastic @ q.T).T.reshape(*x.shape, 2)
+        u, v = strained[..., 0], strained[..., 1]
+        dx, dy = dx + c * u - s * v, dy + s * u + c * v
         return np.stack([dx, dy], axis=-1)
 
     @cached_property
