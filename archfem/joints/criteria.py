@@ -66,6 +66,18 @@ def find_lasting(
     return None
 
 
+def find_first_lasting(holds: NDArray[np.bool_], time: Array, duration: float) -> int | None:
+    """Return the record from which on a condition first holds for a duration, without a break."""
+    lasts = holds.copy()
+    if len(time) > 1:  # a sum of steps may fall short of the duration by round-off
+        lasts &= unbroken_durations(holds[:, None], time)[:, 0] >= (1.0 - 1e-6) * duration
+    if not lasts.any():
+        return None
+    end = int(lasts.argmax())
+    breaks = np.flatnonzero(~holds[:end])
+    return int(breaks[-1]) + 1 if len(breaks) else 0
+
+
 @dataclass(frozen=True, kw_only=True)
 class Criteria:
     """Define when a joint has failed, and how many failed joints make a mechanism.

@@ -6,7 +6,6 @@ Most mechanisms by count close again before anything falls: those of a record ha
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from itertools import combinations
 from typing import NamedTuple
 
@@ -20,7 +19,7 @@ from archfem.joints.criteria import (
     Criteria,
     assessed_joints,
     find_failed_joints,
-    find_lasting,
+    find_first_lasting,
     part_roles,
     step_lengths,
     unbroken_durations,
@@ -145,22 +144,25 @@ def _find_counted(
     """Return what `counted_mechanism` does, from joints with their flags."""
     limits, roles, flags, counts = failures
 
-    @cache  # over a run the same counts are frequent
-    def find_widest(*numbers: int) -> tuple[str, ...] | None:
-        count = dict(zip(counts, numbers, strict=True))
-        return _widest_group(count, roles, limits.failures, kinds)
-
-    def find_group(instant: int) -> tuple[int, tuple[str, ...]] | None:
-        group = find_widest(*(int(count[instant]) for count in counts.values()))
-        return None if group is None else (instant, group)
-
     enough = np.flatnonzero(sum(counts.values()) >= limits.failures)
-    first = find_lasting(enough, flags["time"].values, limits.duration, find_group)
-    if first is None:
+    if not len(enough):
         return None
-    instant, group = first
+    # over a run the same counts are frequent
+    rows = np.array(list(counts.values()))[:, enough]
+    patterns, places = np.unique(rows, axis=1, return_inverse=True)
+    groups = [
+        _widest_group(dict(zip(counts, numbers, strict=True)), roles, limits.failures, kinds)
+        for numbers in patterns.T.tolist()
+    ]
+    holds = np.zeros(len(flags), bool)
+    holds[enough] = np.array([group is not None for group in groups], bool)[places.ravel()]
+    instant = find_first_lasting(holds, flags["time"].values, limits.duration)
+    if instant is None:
+        return None
+    group = groups[int(places.ravel()[np.searchsorted(enough, instant)])]
+    assert group is not None
     kind = mechanism_kind([roles[name] for name in group])
-    return follow_mechanism(joints, _mechanism(flags, instant, kind, group))
+    return follow_mechanism(joints, _mechanism(flags, instant, kind, group), flags)
 
 
 @validate_arguments
@@ -196,15 +198,14 @@ def demirel_aldemir_mechanism(
     rings = [name for name, role in roles.items() if role == "ring"]
     collapsed = np.array([counts[name] >= limits.failures for name in rings])
     collapsed = collapsed.reshape(-1, flags.sizes["time"])  # also without any ring
-    instants = np.flatnonzero(collapsed.any(axis=0))
-    instant = find_lasting(instants, flags["time"].values, limits.duration, lambda number: number)
+    instant = find_first_lasting(collapsed.any(axis=0), flags["time"].values, limits.duration)
     if instant is None:
         return None
     fallen = [name for name, down in zip(rings, collapsed[:, instant], strict=True) if down]
     piers = [name for name, role in roles.items() if role == "pier" and counts[name][instant]]
     group = [name for name in roles if name in (*fallen, *piers)]
     kind = MECHANISM_KINDS[min(len(piers), 2)]
-    return follow_mechanism(joints, _mechanism(flags, instant, kind, group))
+    return follow_mechanism(joints, _mechanism(flags, instant, kind, group), flags)
 
 
 @validate_arguments
@@ -277,20 +278,26 @@ def counted_mechanisms(
     return {**found, OVER_RECORD: _find_over_record(joints, failures)}
 
 
-def follow_mechanism(joints: xr.Dataset, found: Mechanism) -> Mechanism:
-    """Return a mechanism with duration and opening, for as long as its joints stay failed."""
+def follow_mechanism(
+    joints: xr.Dataset, found: Mechanism, flags: xr.DataArray | None = None
+) -> Mechanism:
+    """Return a mechanism with duration and opening, for as long as its joints stay failed.
+
+    The failure flags of the joints, over time and joint, are found where they are not given.
+    """
     if "time" not in joints.dims:
         return found
     times = joints["time"].values
     begin = int(np.flatnonzero(times == found.time)[0])
     own = np.isin(joints["joint"].values, found.joints)
-    all_failed = _flags_over_time(joints).values[begin:, own].all(axis=1)
+    flags = _flags_over_time(joints) if flags is None else flags
+    all_failed = flags.values[begin:, own].all(axis=1)
     count = len(all_failed) if all_failed.all() else int(all_failed.argmin())
     duration = float(step_lengths(times)[begin : begin + count].sum())
     opening = None
     if "opening" in joints:
-        during = joints["opening"].isel(joint=own, time=slice(begin, begin + count))
-        opening = float(during.max())
+        openings = joints.variables["opening"].transpose("time", "joint").values
+        opening = float(np.nanmax(openings[begin : begin + count, own]))
     return replace(found, duration=duration, opening=opening, closes=begin + count < len(times))
 
 
@@ -354,10 +361,10 @@ def _count_by_part(flags: xr.DataArray, parts: Iterable[str]) -> dict[str, NDArr
 
 def _mechanism(flags: xr.DataArray, instant: int, kind: str, group: Sequence[str]) -> Mechanism:
     """Return the mechanism of the failed joints of some parts at an instant."""
-    flags = flags.isel(time=instant)
-    flags = flags[flags.values & np.isin(flags["part"].values.astype(str), group)]
-    joints, names = flags["joint"].values.tolist(), flags["name"].values.astype(str).tolist()
-    time = None if np.isnan(flags["time"]) else float(flags["time"])
+    chosen = flags.values[instant] & np.isin(flags["part"].values.astype(str), group)
+    joints, names = (flags[name].values[chosen] for name in ("joint", "name"))
+    joints, names, at = joints.tolist(), names.astype(str).tolist(), flags["time"].values[instant]
+    time = None if np.isnan(at) else float(at)
     return Mechanism(kind, " + ".join(group), tuple(joints), time, names=tuple(names))
 
 

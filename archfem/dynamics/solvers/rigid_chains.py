@@ -68,6 +68,7 @@ BC, BS, HC, HS, C, S, SHRUNK, RATE, HALF, X, Y = range(11)
 # the normal, half the difference of the angles of fixed faces, and the initial measures
 FACE, DIRECTION, DIFFERENCE, INITIAL, ORIENTATION = 0, 8, 10, 12, 15
 
+
 class StoneTree(NamedTuple):
     """Order of elimination of stones that joints link without a closed loop."""
 
@@ -90,6 +91,9 @@ class ChainSystem(NamedTuple):
     # derivatives of each joint: of forces on jump and angles (16), of the middles of both faces by
     # the angle, mean and at the end (8), rotation stiffness of both (2) (26, j)
     rates: Array
+    # the same by the coordinates of both stones: rows of the lower stone's forces by its own
+    # coordinates and by the higher's, and of the higher stone's (36, j)
+    coupling: Array
     # forces of joints on both stones, and what they lack if points that reversed stick (12, j)
     forces: Array
     resultants: Array  # mean N, V, M (3, j)
@@ -184,6 +188,7 @@ def chain_system(equation: Equation, tree: StoneTree, dt: float) -> ChainSystem:
         np.ascontiguousarray(model.mass_influence[order].T),
         ChainWorkspace(*np.zeros((6, model.size + 3))),
         np.zeros((26, size)),
+        np.zeros((36, size)),
         np.zeros((12, size)),
         np.zeros((3, size)),
         np.zeros((12, size)),
@@ -387,56 +392,68 @@ def _evaluate_joints(system, at):  # type: ignore
 
 
 @kernel
-def _add_joint(rates, joint, low, high, parent, blocks):  # type: ignore
-    """Add the derivatives of a joint to the blocks of both its stones."""
-    # L V: columns of the lower stone, and of the higher one
-    (p, q), (r, s) = (rates[16, joint], rates[17, joint]), (rates[18, joint], rates[19, joint])
-    (t, u), (v, w) = (rates[20, joint], rates[21, joint]), (rates[22, joint], rates[23, joint])
-    diagonal, right, below = blocks[0], blocks[1], blocks[2]
-    child = min(low, high)
-    linked = parent[child] == max(low, high) if child < len(parent) else False
-    # rows of Uᵀ: -x, -y, -x p - y q + angle of the lower face; x, y, x t + y u + of the higher one
+def _couple_joints(system, at):  # type: ignore
+    """Store the derivatives of the forces of joints on both stones, four blocks of three by three.
+
+    These are Uᵀ L V, and the rotation stiffness of both stones.
+    """
+    rates, blocks = system.rates, system.coupling
+    p, q, r, s = _load_four(rates, 16, at)
+    t, u, v, w = _load_four(rates, 20, at)
+    first, second, third, fourth = (
+        *(_load_four(rates, 0, at), _load_four(rates, 4, at)),
+        *(_load_four(rates, 8, at), _load_four(rates, 12, at)),
+    )
     for side in range(2):
-        # columns by the coordinates of the stone on this side
-        if side == 0:
-            sign, dx, dy = -1.0, -r, -s
-        else:
-            sign, dx, dy = 1.0, v, w
-        a0, a1 = sign * rates[0, joint], sign * rates[1, joint]
-        a2 = dx * rates[0, joint] + dy * rates[1, joint] + rates[2 + side, joint]
-        b0, b1 = sign * rates[4, joint], sign * rates[5, joint]
-        b2 = dx * rates[4, joint] + dy * rates[5, joint] + rates[6 + side, joint]
-        c0, c1 = sign * rates[8, joint], sign * rates[9, joint]
-        c2 = dx * rates[8, joint] + dy * rates[9, joint] + rates[10 + side, joint]
-        d0, d1 = sign * rates[12, joint], sign * rates[13, joint]
-        d2 = dx * rates[12, joint] + dy * rates[13, joint] + rates[14 + side, joint]
-        if side == 0:
-            block = diagonal[low]
-            cross = below[child] if child == low else right[child]
-        else:
-            block = diagonal[high]
-            cross = right[child] if child == low else below[child]
-        e0, e1, e2 = c0 - p * a0 - q * b0, c1 - p * a1 - q * b1, c2 - p * a2 - q * b2
-        f0, f1, f2 = d0 + t * a0 + u * b0, d1 + t * a1 + u * b1, d2 + t * a2 + u * b2
-        if side == 0:
-            _add_rows(block, -1.0, (a0, a1, a2), (b0, b1, b2), (e0, e1, e2))
-            block[2, 2] += rates[24, joint]
-            if linked:
-                _add_rows(cross, 1.0, (a0, a1, a2), (b0, b1, b2), (f0, f1, f2))
-        else:
-            _add_rows(block, 1.0, (a0, a1, a2), (b0, b1, b2), (f0, f1, f2))
-            block[2, 2] += rates[25, joint]
-            if linked:
-                _add_rows(cross, -1.0, (a0, a1, a2), (b0, b1, b2), (e0, e1, e2))
+        # L V: columns by the coordinates of the stone on this side
+        sign, dx, dy = (-1.0, -r, -s) if side == 0 else (1.0, v, w)
+        a, b = _by_stone(first, side, sign, dx, dy), _by_stone(second, side, sign, dx, dy)
+        c, d = _by_stone(third, side, sign, dx, dy), _by_stone(fourth, side, sign, dx, dy)
+        # rows of Uᵀ: -x, -y, -x p - y q + angle of the lower face; x, y, x t + y u + of the higher
+        for k in range(3):
+            place = 9 * side + k
+            store(blocks, place, at, -a[k])
+            store(blocks, place + 3, at, -b[k])
+            store(blocks, place + 6, at, c[k] - p * a[k] - q * b[k])
+            store(blocks, place + 18, at, a[k])
+            store(blocks, place + 21, at, b[k])
+            store(blocks, place + 24, at, d[k] + t * a[k] + u * b[k])
+    store(blocks, 8, at, load(blocks, 8, at) + load(rates, 24, at))
+    store(blocks, 35, at, load(blocks, 35, at) + load(rates, 25, at))
 
 
 @inlined_kernel
-def _add_rows(block, sign, x, y, turn):  # type: ignore
-    """Add three rows to a block, the first two with a sign."""
-    for k in range(3):
-        block[0, k] += sign * x[k]
-        block[1, k] += sign * y[k]
-        block[2, k] += turn[k]
+def _load_four(rows, first, at):  # type: ignore
+    """Return four rows."""
+    return (
+        *(load(rows, first, at), load(rows, first + 1, at)),
+        *(load(rows, first + 2, at), load(rows, first + 3, at)),
+    )
+
+
+@inlined_kernel
+def _by_stone(row, side, sign, dx, dy):  # type: ignore
+    """Return the derivatives by the coordinates of a stone from those by its face."""
+    turn = row[2] if side == 0 else row[3]
+    return sign * row[0], sign * row[1], dx * row[0] + dy * row[1] + turn
+
+
+@kernel
+def _add_joint(coupling, joint, stones, parent, blocks):  # type: ignore
+    """Add the derivatives of a joint to the blocks of both its stones."""
+    low, high = stones
+    diagonal, right, below = blocks[0], blocks[1], blocks[2]
+    child, is_low = min(low, high), low < high
+    linked = parent[child] == max(low, high) if child < len(parent) else False
+    for i in range(3):
+        for k in range(3):
+            place = 3 * i + k
+            diagonal[low, i, k] += coupling[place, joint]
+            diagonal[high, i, k] += coupling[place + 27, joint]
+            if linked:
+                across, back = coupling[place + 9, joint], coupling[place + 18, joint]
+                right[child, i, k] = across if is_low else back
+                below[child, i, k] = back if is_low else across
 
 
 @kernel
@@ -579,9 +596,11 @@ def _chain_correction(system, work, iteration, reuse, hold):  # type: ignore
         blocks[:3] = 0.0
         for k in range(len(system.mass)):
             blocks[0, k // 3, k % 3, k % 3] = inertia * system.mass[k]
+        for at in range(0, stone.shape[1], WIDTH):
+            _couple_joints(system, at)
         for joint in range(count):
-            low, high = stone[0, joint], stone[1, joint]
-            _add_joint(system.rates, joint, low, high, system.parent, blocks)
+            stones = stone[0, joint], stone[1, joint]
+            _add_joint(system.coupling, joint, stones, system.parent, blocks)
         if not _eliminate(system.parent, blocks):
             return False
     _substitute(system.parent, system.blocks, correction)
@@ -658,7 +677,7 @@ def _joint_energies(system, at, lag):  # type: ignore
     if lag > 0.0:
         t0, l0 = load(rows, 8, at), load(rows, 9, at)
         start, last = (load(rows, 6, at), l0 * t0, l0), (g1 - middle * turn, length * turn, length)
-        loss += lane_damping_loss(law, at, start, last, system.tractions)
+        loss += lane_damping_loss(law, at, start, last, lag, system.tractions)
     for point in range(len(law.spring)):
         stretched = slip - load(system.end_slip, point, at)
         elastic += 0.5 * load(law.spring, point, at) * stretched * stretched

@@ -5,7 +5,7 @@ and `select` takes one. Faces do not stretch, and each joint is one segment of a
 is neither linear nor without cohesion, or no facet, presses by `point_law`, joint by joint.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from archfem.joints.large.lanes import (
     with_lane,
 )
 from archfem.joints.large.overlap_law import ROUNDED_SLIP, FaceLaw, closing_energy, friction_limits
-from archfem.joints.large.point_law import mean_tractions
+from archfem.joints.large.point_law import damping_tractions, mean_tractions
 from archfem.joints.normal_law import GAUSS_POINTS, GAUSS_WEIGHTS
 
 # Rows of the parameters of joints: depth, k_n, μ, the limit where open, and of both ends of the
@@ -62,7 +62,8 @@ def lane_law(law: FaceLaw) -> LaneLaw:
     values = law.place, law.width * law.depth_share, spring, 1.0 / spring
     of_points[:, :, :count] = np.swapaxes(np.reshape(values, (4, count, points)), 1, 2)
     others = contacts["closing_rate"].any() or contacts["cohesion"].any()
-    return LaneLaw(law, rows, *of_points, bool(law.facets and not others))
+    is_linear = bool(law.facets and not others)
+    return LaneLaw(law, rows, *of_points, is_linear)  # type: ignore[call-arg]
 
 
 def pad(count: int) -> int:
@@ -240,7 +241,8 @@ def _press_apart(law, point, at, ends, lag):  # type: ignore
         near, far = with_lane(near, k, pressed[0][0]), with_lane(far, k, pressed[0][1])
         k00, k01 = with_lane(k00, k, pressed[1][0]), with_lane(k01, k, pressed[1][1])
         k11 = with_lane(k11, k, pressed[1][2])
-        near_limit, far_limit = with_lane(near_limit, k, limits[0]), with_lane(far_limit, k, limits[1])
+        near_limit = with_lane(near_limit, k, limits[0])
+        far_limit = with_lane(far_limit, k, limits[1])
         m00, m01 = with_lane(m00, k, rates[0]), with_lane(m01, k, rates[1])
         m11 = with_lane(m11, k, rates[2])
     return ((near, far), (k00, k01, k11)), ((near_limit, far_limit), (m00, m01, m11))
@@ -350,7 +352,8 @@ def _add_point_shear(law, point, at, step, limits, memory, sums):  # type: ignor
     direction, missing = _sign(over), spread(0.0)
     reverses = (direction * load(directions, point, at) < 0.0) & ~is_free
     if any_lane(reverses):
-        by_change, by_limit = select(reverses, 0.5 + lag, by_change), select(reverses, 0.0, by_limit)
+        by_change = select(reverses, 0.5 + lag, by_change)
+        by_limit = select(reverses, 0.0, by_limit)
         missing = select(reverses, first + by_change * change - shear, 0.0)
         direction = select(reverses, 0.0, direction)
     # points without friction follow the faces, and lose what they had
@@ -484,7 +487,7 @@ def _by_gap(row, middle, moved):  # type: ignore
 
 
 @inlined_kernel
-def lane_damping_loss(law, at, start, end, tractions):  # type: ignore
+def lane_damping_loss(law, at, start, end, lag, tractions):  # type: ignore
     """Return the energy that joints lose over a step by the lag of their normal forces.
 
     Both ends are opening and tilt at the middle of the overlap, and its length; the mean tractions
@@ -495,9 +498,21 @@ def lane_damping_loss(law, at, start, end, tractions):  # type: ignore
     for point in range(0, len(law.place), stride):
         x0, x1 = load(law.place, point, at), load(law.place, point + stride - 1, at)
         a, c, b, d = g0 - x0 * r0, g0 - x1 * r0, g1 - x0 * r1, g1 - x1 * r1
-        near, far = _press_facet(law, point, at, (a, c, b, d), 0.0)[0][0]
-        work = (load(tractions, point, at) - near) * (b - a)
-        if stride == 2:
-            work += (load(tractions, point + 1, at) - far) * (d - c)
-        loss += load(law.share, point, at) * work
+        if law.is_linear:
+            near, far = _linear_tractions(load(law.joint, STIFFNESS, at), (a, c, b, d), 0.0)[0]
+            near, far = load(tractions, point, at) - near, load(tractions, point + 1, at) - far
+        else:
+            near, far = _damp_apart(law, at, (a, c, b, d), lag)
+        loss += load(law.share, point, at) * (near * (b - a) + far * (d - c))
     return 0.5 * (l0 + l1) * loss
+
+
+@kernel
+def _damp_apart(law, at, ends, lag):  # type: ignore
+    """Return `point_law.damping_tractions` joint by joint."""
+    (a, c, b, d), face_law, near, far = ends, law.face_law, spread(0.0), spread(0.0)
+    for k in range(min(WIDTH, len(face_law.depth) - at)):
+        own = lane(a, k), lane(c, k), lane(b, k), lane(d, k)
+        means = damping_tractions(face_law.contacts[at + k], own, lag, face_law.facets)
+        near, far = with_lane(near, k, means[0]), with_lane(far, k, means[1])
+    return near, far

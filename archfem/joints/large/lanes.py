@@ -11,15 +11,10 @@ from typing import Any
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import (
-    intrinsic,
-    lower_builtin,
-    lower_cast,
-    models,
-    register_model,
-)
+from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
+from numba.np.arrayobj import make_array
 
-# mypy: disable-error-code="no-untyped-call"
+# mypy: disable-error-code="no-untyped-call,untyped-decorator"
 
 WIDTH = 8
 
@@ -83,30 +78,25 @@ def _declare(function: Any, argument: VectorType, result: VectorType, lower: Any
         lower_builtin(function, *[argument] * count)(implement)
 
 
-for _names, _method in (
-    (("add", "iadd"), "fadd"),
-    (("sub", "isub"), "fsub"),
-    (("mul", "imul"), "fmul"),
-    (("truediv", "itruediv"), "fdiv"),
-):
-    for _name in _names:
-        _declare(
-            getattr(operator, _name),
-            LANES,
-            LANES,
-            lambda builder, a, b, method=_method: getattr(builder, method)(a, b),
-        )
-for _name, _sign in (("lt", "<"), ("le", "<="), ("gt", ">"), ("ge", ">="), ("eq", "=="), ("ne", "!=")):
-    _declare(
-        getattr(operator, _name),
-        LANES,
-        MASK,
-        lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b),
-    )
+def _arithmetic(method: str) -> Any:
+    """Return the lowering of an operation with two vectors."""
+    return lambda builder, a, b: getattr(builder, method)(a, b)
+
+
+def _comparison(sign: str) -> Any:
+    """Return the lowering of a comparison of two vectors, false where one is not a number."""
+    return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
+
+
+for _name, _method in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
+    for _operator in (_name, f"i{_name}"):
+        _declare(getattr(operator, _operator), LANES, LANES, _arithmetic(_method))
+_SIGNS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
+for _name, _sign in _SIGNS.items():
+    _declare(getattr(operator, _name), LANES, MASK, _comparison(_sign))
+for _name in ("and_", "or_", "xor"):
+    _declare(getattr(operator, _name), MASK, MASK, _arithmetic(_name))
 _declare(operator.neg, LANES, LANES, lambda builder, a: builder.fneg(a))
-_declare(operator.and_, MASK, MASK, lambda builder, a, b: builder.and_(a, b))
-_declare(operator.or_, MASK, MASK, lambda builder, a, b: builder.or_(a, b))
-_declare(operator.xor, MASK, MASK, lambda builder, a, b: builder.xor(a, b))
 _declare(operator.invert, MASK, MASK, lambda builder, a: builder.not_(a))
 
 
@@ -120,7 +110,11 @@ def _size(builder: Any, value: Any) -> Any:
 _declare(abs, LANES, LANES, _size)
 
 
-@intrinsic
+# Declares a function of vectors by its lowering, for kernels; Python cannot call it.
+_lane_function: Any = intrinsic
+
+
+@_lane_function
 def least(typingctx: Any, a: Any, b: Any) -> Any:
     """Return the smaller of two numbers, in each lane."""
     del typingctx, a, b
@@ -132,7 +126,7 @@ def least(typingctx: Any, a: Any, b: Any) -> Any:
     return signature(LANES, LANES, LANES), generate
 
 
-@intrinsic
+@_lane_function
 def greatest(typingctx: Any, a: Any, b: Any) -> Any:
     """Return the larger of two numbers, in each lane."""
     del typingctx, a, b
@@ -144,7 +138,7 @@ def greatest(typingctx: Any, a: Any, b: Any) -> Any:
     return signature(LANES, LANES, LANES), generate
 
 
-@intrinsic
+@_lane_function
 def select(typingctx: Any, mask: Any, a: Any, b: Any) -> Any:
     """Return the first number where a condition holds, else the second, in each lane."""
     del typingctx, mask, a, b
@@ -156,7 +150,7 @@ def select(typingctx: Any, mask: Any, a: Any, b: Any) -> Any:
     return signature(LANES, MASK, LANES, LANES), generate
 
 
-@intrinsic
+@_lane_function
 def any_lane(typingctx: Any, mask: Any) -> Any:
     """Return whether a condition holds in any lane."""
     del typingctx, mask
@@ -171,15 +165,13 @@ def any_lane(typingctx: Any, mask: Any) -> Any:
 
 def _row_pointer(context: Any, builder: Any, kind: Any, array: Any, row: Any, first: Any) -> Any:
     """Return the address of numbers in a row of an array."""
-    from numba.np.arrayobj import make_array
-
     made = make_array(kind)(context, builder, array)
     length = builder.extract_value(made.shape, 1)
     place = builder.add(builder.mul(row, length), first)
     return builder.gep(made.data, [place])
 
 
-@intrinsic
+@_lane_function
 def load(typingctx: Any, array: Any, row: Any, first: Any) -> Any:
     """Return numbers in a row of an array, from `first` on."""
     del typingctx
@@ -192,7 +184,7 @@ def load(typingctx: Any, array: Any, row: Any, first: Any) -> Any:
     return signature(LANES, array, types.intp, types.intp), generate
 
 
-@intrinsic
+@_lane_function
 def store(typingctx: Any, array: Any, row: Any, first: Any, value: Any) -> Any:
     """Store numbers in a row of an array, from `first` on."""
     del typingctx, value
@@ -206,7 +198,7 @@ def store(typingctx: Any, array: Any, row: Any, first: Any, value: Any) -> Any:
     return signature(types.void, array, types.intp, types.intp, LANES), generate
 
 
-@intrinsic
+@_lane_function
 def gather(typingctx: Any, array: Any, row: Any, places: Any, side: Any, first: Any) -> Any:
     """Return numbers of a row of an array at places, which a row of integers has from `first`."""
     del typingctx
@@ -227,7 +219,7 @@ def gather(typingctx: Any, array: Any, row: Any, places: Any, side: Any, first: 
     return signature(LANES, array, types.intp, places, types.intp, types.intp), generate
 
 
-@intrinsic
+@_lane_function
 def lane(typingctx: Any, values: Any, number: Any) -> Any:
     """Return the number in one lane."""
     del typingctx, values, number
@@ -239,7 +231,7 @@ def lane(typingctx: Any, values: Any, number: Any) -> Any:
     return signature(types.float64, LANES, types.intp), generate
 
 
-@intrinsic
+@_lane_function
 def with_lane(typingctx: Any, values: Any, number: Any, value: Any) -> Any:
     """Return the numbers with another one in one lane."""
     del typingctx, values, number, value
@@ -252,7 +244,7 @@ def with_lane(typingctx: Any, values: Any, number: Any, value: Any) -> Any:
     return signature(LANES, LANES, types.intp, types.float64), generate
 
 
-@intrinsic
+@_lane_function
 def spread(typingctx: Any, value: Any) -> Any:
     """Return a number in all lanes."""
     del typingctx, value
