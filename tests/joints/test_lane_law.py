@@ -101,6 +101,9 @@ def evaluate_one_by_one(law, start, end, lag, memory, out):
         out[17, joint] = damping_loss(law, joint, (first, last), lag)
 
 
+side_by_side_forces, one_by_one_forces = map(from_python, (evaluate_lanes, evaluate_one_by_one))
+
+
 def joints_of(contact, quadrature=None):
     """Return the law of the joints of two rings on piers, some of whose faces are longer."""
     structure = af.shapes.arcade(
@@ -145,8 +148,8 @@ def test_joints_side_by_side_equal_joints_one_by_one(name, quadrature, lag):
         memory = np.zeros((4, points, width))
         memory[0, :, :count], memory[2, :, :count] = slip, direction
         found, expected = np.zeros((18, width)), np.zeros((18, count))
-        from_python(evaluate_lanes)(side_by_side, start, end, lag, tuple(memory), found)
-        from_python(evaluate_one_by_one)(law, start, end, lag, tuple(one_by_one), expected)
+        side_by_side_forces(side_by_side, start, end, lag, tuple(memory), found)
+        one_by_one_forces(law, start, end, lag, tuple(one_by_one), expected)
         # sums of terms of at most this size, added in another order; tangents of closing joints
         # are up to 2500 k_n, and cancel in that of the moment by the opening
         scale = np.abs(expected).max(axis=1, keepdims=True)
