@@ -62,6 +62,9 @@ def _declare(function: Any, argument: VectorType, result: VectorType, lower: Any
 
     @infer_global(function)
     class Template(AbstractTemplate):
+        # numba tries templates for this target before its own many, which takes half the time
+        metadata = {"target": "cpu"}
+
         def generic(self, args: Any, kws: Any) -> Any:
             del kws
             numbers = (types.Float, types.Integer) if argument is LANES else ()
