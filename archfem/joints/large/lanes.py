@@ -6,7 +6,7 @@ by itself in simple loops only.
 """
 
 import operator
-from typing import Any
+from typing import Any, ClassVar
 
 from llvmlite import ir
 from numba.core import cgutils, types
@@ -63,7 +63,7 @@ def _declare(function: Any, argument: VectorType, result: VectorType, lower: Any
     @infer_global(function)
     class Template(AbstractTemplate):
         # numba tries templates for this target before its own many, which takes half the time
-        metadata = {"target": "cpu"}
+        metadata: ClassVar[dict[str, str]] = {"target": "cpu"}
 
         def generic(self, args: Any, kws: Any) -> Any:
             del kws
