@@ -6,12 +6,13 @@ by itself in simple loops only.
 """
 
 import operator
-from typing import Any, ClassVar
+from collections.abc import Callable
+from typing import Any
 
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
+from numba.extending import lower_builtin, lower_cast, models, register_model
 from numba.np.arrayobj import make_array
 
 # mypy: disable-error-code="no-untyped-call,untyped-decorator"
@@ -59,26 +60,50 @@ def _number_to_lanes(context: Any, builder: Any, source: Any, target: Any, value
 
 def _declare(function: Any, argument: VectorType, result: VectorType, lower: Any) -> None:
     """Declare an operator of one or two vectors, of which one may be a number."""
+    numbers = (types.Float, types.Integer) if argument is LANES else ()
 
-    @infer_global(function)
-    class Template(AbstractTemplate):
-        # numba tries templates for this target before its own many, which takes half the time
-        metadata: ClassVar[dict[str, str]] = {"target": "cpu"}
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            del kws
-            numbers = (types.Float, types.Integer) if argument is LANES else ()
-            fits = all(each is argument or isinstance(each, numbers) for each in args)
-            if argument in args and fits:
-                return signature(result, *[argument] * len(args))
-            return None
+    def find_signature(kinds: Any) -> Any:
+        fits = all(kind is argument or isinstance(kind, numbers) for kind in kinds)
+        is_ours = argument in kinds and fits
+        return signature(result, *[argument] * len(kinds)) if is_ours else None
 
     def implement(context: Any, builder: Any, sig: Any, values: Any) -> Any:
         del context, sig
         return lower(builder, *values)
 
+    _register(function, find_signature)
     for count in (1, 2):
         lower_builtin(function, *[argument] * count)(implement)
+
+
+def _register(function: Any, find_signature: Callable[[Any], Any]) -> None:
+    """Register what finds the signature of a call of a function."""
+    contents = {
+        "key": function,
+        # numba tries what is for this target before its own, which takes half the time
+        "metadata": {"target": "cpu"},
+        "generic": lambda _, kinds, keywords: find_signature(kinds),
+    }
+    infer_global(function, types.Function(type("Template", (AbstractTemplate,), contents)))
+
+
+def _lane_function(result: Any, *arguments: Any) -> Callable[[Any], Any]:
+    """Return a decorator of what lowers a function, with types; None stands for any type."""
+
+    def declare(function: Any) -> Any:
+        def find_signature(kinds: Any) -> Any:
+            pairs = zip(arguments, kinds, strict=True)
+            return signature(result, *(kind or given for kind, given in pairs))
+
+        def implement(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+            found = function(context, builder, sig.args, *values)
+            return context.get_dummy_value() if found is None else found
+
+        _register(function, find_signature)
+        lower_builtin(function, types.VarArg(types.Any))(implement)
+        return function
+
+    return declare
 
 
 def _arithmetic(method: str) -> Any:
@@ -91,6 +116,12 @@ def _comparison(sign: str) -> Any:
     return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
 
 
+def _size(builder: Any, value: Any) -> Any:
+    """Lower the size of numbers."""
+    kind, name = ir.FunctionType(value.type, [value.type]), f"llvm.fabs.v{WIDTH}f64"
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [value])
+
+
 for _name, _method in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
     for _operator in (_name, f"i{_name}"):
         _declare(getattr(operator, _operator), LANES, LANES, _arithmetic(_method))
@@ -101,159 +132,95 @@ for _name in ("and_", "or_", "xor"):
     _declare(getattr(operator, _name), MASK, MASK, _arithmetic(_name))
 _declare(operator.neg, LANES, LANES, lambda builder, a: builder.fneg(a))
 _declare(operator.invert, MASK, MASK, lambda builder, a: builder.not_(a))
-
-
-def _size(builder: Any, value: Any) -> Any:
-    """Lower the size of numbers."""
-    kind = ir.FunctionType(value.type, [value.type])
-    name = f"llvm.fabs.v{WIDTH}f64"
-    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [value])
-
-
 _declare(abs, LANES, LANES, _size)
 
 
-# Declares a function of vectors by its lowering, for kernels; Python cannot call it.
-_lane_function: Any = intrinsic
-
-
-@_lane_function
-def least(typingctx: Any, a: Any, b: Any) -> Any:
+@_lane_function(LANES, LANES, LANES)
+def least(context: Any, builder: Any, kinds: Any, a: Any, b: Any) -> Any:
     """Return the smaller of two numbers, in each lane."""
-    del typingctx, a, b
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        del context, sig
-        return builder.select(builder.fcmp_ordered("<", args[1], args[0]), args[1], args[0])
-
-    return signature(LANES, LANES, LANES), generate
+    del context, kinds
+    return builder.select(builder.fcmp_ordered("<", b, a), b, a)
 
 
-@_lane_function
-def greatest(typingctx: Any, a: Any, b: Any) -> Any:
+@_lane_function(LANES, LANES, LANES)
+def greatest(context: Any, builder: Any, kinds: Any, a: Any, b: Any) -> Any:
     """Return the larger of two numbers, in each lane."""
-    del typingctx, a, b
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        del context, sig
-        return builder.select(builder.fcmp_ordered(">", args[1], args[0]), args[1], args[0])
-
-    return signature(LANES, LANES, LANES), generate
+    del context, kinds
+    return builder.select(builder.fcmp_ordered(">", b, a), b, a)
 
 
-@_lane_function
-def select(typingctx: Any, mask: Any, a: Any, b: Any) -> Any:
+@_lane_function(LANES, MASK, LANES, LANES)
+def select(context: Any, builder: Any, kinds: Any, mask: Any, a: Any, b: Any) -> Any:
     """Return the first number where a condition holds, else the second, in each lane."""
-    del typingctx, mask, a, b
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        del context, sig
-        return builder.select(*args)
-
-    return signature(LANES, MASK, LANES, LANES), generate
+    del context, kinds
+    return builder.select(mask, a, b)
 
 
-@_lane_function
-def any_lane(typingctx: Any, mask: Any) -> Any:
+@_lane_function(types.boolean, MASK)
+def any_lane(context: Any, builder: Any, kinds: Any, mask: Any) -> Any:
     """Return whether a condition holds in any lane."""
-    del typingctx, mask
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        del context, sig
-        bits = builder.bitcast(args[0], ir.IntType(WIDTH))
-        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
-
-    return signature(types.boolean, MASK), generate
+    del context, kinds
+    bits = builder.bitcast(mask, ir.IntType(WIDTH))
+    return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
 
-def _row_pointer(context: Any, builder: Any, kind: Any, array: Any, row: Any, first: Any) -> Any:
-    """Return the address of numbers in a row of an array."""
+@_lane_function(types.float64, LANES, types.intp)
+def lane(context: Any, builder: Any, kinds: Any, values: Any, number: Any) -> Any:
+    """Return the number in one lane."""
+    del context, kinds
+    return builder.extract_element(values, number)
+
+
+@_lane_function(LANES, LANES, types.intp, types.float64)
+def with_lane(context: Any, builder: Any, kinds: Any, values: Any, number: Any, value: Any) -> Any:
+    """Return the numbers with another one in one lane."""
+    del context, kinds
+    return builder.insert_element(values, value, number)
+
+
+@_lane_function(LANES, LANES)
+def spread(context: Any, builder: Any, kinds: Any, value: Any) -> Any:
+    """Return a number in all lanes."""
+    del context, builder, kinds
+    return value  # converted by then
+
+
+def _address(context: Any, builder: Any, kind: Any, array: Any, row: Any, column: Any) -> Any:
+    """Return the address of a number in an array of two dimensions."""
     made = make_array(kind)(context, builder, array)
-    length = builder.extract_value(made.shape, 1)
-    place = builder.add(builder.mul(row, length), first)
+    place = builder.add(builder.mul(row, builder.extract_value(made.shape, 1)), column)
     return builder.gep(made.data, [place])
 
 
-@_lane_function
-def load(typingctx: Any, array: Any, row: Any, first: Any) -> Any:
+def _lanes_at(context: Any, builder: Any, kind: Any, array: Any, row: Any, first: Any) -> Any:
+    """Return the address of numbers one after another."""
+    address = _address(context, builder, kind, array, row, first)
+    return builder.bitcast(address, _VECTORS[LANES].as_pointer())
+
+
+@_lane_function(LANES, None, types.intp, types.intp)
+def load(context: Any, builder: Any, kinds: Any, array: Any, row: Any, first: Any) -> Any:
     """Return numbers in a row of an array, from `first` on."""
-    del typingctx
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        pointer = _row_pointer(context, builder, sig.args[0], *args)
-        pointer = builder.bitcast(pointer, _VECTORS[LANES].as_pointer())
-        return builder.load(pointer, align=8)
-
-    return signature(LANES, array, types.intp, types.intp), generate
+    return builder.load(_lanes_at(context, builder, kinds[0], array, row, first), align=8)
 
 
-@_lane_function
-def store(typingctx: Any, array: Any, row: Any, first: Any, value: Any) -> Any:
+@_lane_function(types.void, None, types.intp, types.intp, LANES)
+def store(
+    context: Any, builder: Any, kinds: Any, array: Any, row: Any, first: Any, values: Any
+) -> None:
     """Store numbers in a row of an array, from `first` on."""
-    del typingctx, value
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        pointer = _row_pointer(context, builder, sig.args[0], *args[:3])
-        pointer = builder.bitcast(pointer, _VECTORS[LANES].as_pointer())
-        builder.store(args[3], pointer, align=8)
-        return context.get_dummy_value()
-
-    return signature(types.void, array, types.intp, types.intp, LANES), generate
+    builder.store(values, _lanes_at(context, builder, kinds[0], array, row, first), align=8)
 
 
-@_lane_function
-def gather(typingctx: Any, array: Any, row: Any, places: Any, side: Any, first: Any) -> Any:
+@_lane_function(LANES, None, types.intp, None, types.intp, types.intp)
+def gather(context: Any, builder: Any, kinds: Any, *values: Any) -> Any:
     """Return numbers of a row of an array at places, which a row of integers has from `first`."""
-    del typingctx
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        array, row, places, side, first = args
-        index = _row_pointer(context, builder, sig.args[2], places, side, first)
-        begin = _row_pointer(
-            context, builder, sig.args[0], array, row, ir.Constant(ir.IntType(64), 0)
-        )
-        vector: Any = ir.Constant(_VECTORS[LANES], ir.Undefined)
-        for lane in range(WIDTH):
-            place = builder.load(builder.gep(index, [ir.Constant(ir.IntType(64), lane)]))
-            value = builder.load(builder.gep(begin, [place]))
-            vector = builder.insert_element(vector, value, ir.Constant(ir.IntType(32), lane))
-        return vector
-
-    return signature(LANES, array, types.intp, places, types.intp, types.intp), generate
-
-
-@_lane_function
-def lane(typingctx: Any, values: Any, number: Any) -> Any:
-    """Return the number in one lane."""
-    del typingctx, values, number
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        del context, sig
-        return builder.extract_element(*args)
-
-    return signature(types.float64, LANES, types.intp), generate
-
-
-@_lane_function
-def with_lane(typingctx: Any, values: Any, number: Any, value: Any) -> Any:
-    """Return the numbers with another one in one lane."""
-    del typingctx, values, number, value
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        del context, sig
-        values, number, value = args
-        return builder.insert_element(values, value, number)
-
-    return signature(LANES, LANES, types.intp, types.float64), generate
-
-
-@_lane_function
-def spread(typingctx: Any, value: Any) -> Any:
-    """Return a number in all lanes."""
-    del typingctx, value
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        del context, sig
-        return _splat(builder, args[0])
-
-    return signature(LANES, types.float64), generate
+    array, row, places, side, first = values
+    begin = _address(context, builder, kinds[0], array, row, ir.Constant(ir.IntType(64), 0))
+    index = _address(context, builder, kinds[2], places, side, first)
+    gathered: Any = ir.Constant(_VECTORS[LANES], ir.Undefined)
+    for number in range(WIDTH):
+        place = builder.load(builder.gep(index, [ir.Constant(ir.IntType(64), number)]))
+        value = builder.load(builder.gep(begin, [place]))
+        gathered = builder.insert_element(gathered, value, ir.Constant(ir.IntType(32), number))
+    return gathered
