@@ -44,7 +44,7 @@ ALLOWED_IN = {
         "joints.large",
         "view.pages.wasm",
     ),
-    "llvmlite": "view.pages.wasm",
+    "llvmlite": ("joints.large.lanes", "view.pages.wasm"),
     "matplotlib": "view",
     "pyvista": "view.films",
     "imageio": "view.films",

@@ -7,7 +7,7 @@ import archfem as af
 from archfem.dynamics.schemes import Conserving
 from archfem.dynamics.solvers import newton
 from archfem.dynamics.solvers.equation import Equation
-from archfem.dynamics.solvers.rigid_chains import find_stone_tree
+from archfem.dynamics.solvers.stone_tree import find_stone_tree
 
 DAMPING = af.StiffnessDamping(0.05, 8.0)
 

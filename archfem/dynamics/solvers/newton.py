@@ -51,7 +51,6 @@ from archfem.dynamics.solvers.rigid_chains import (
     ChainSystem,
     chain_system,
     constant_chain_parts,
-    find_stone_tree,
 )
 from archfem.dynamics.solvers.semismooth_newton import (
     Correction,
@@ -69,6 +68,7 @@ from archfem.dynamics.solvers.sparse_products import (
     sparse_rows,
     without_round_off,
 )
+from archfem.dynamics.solvers.stone_tree import find_stone_tree
 from archfem.dynamics.solvers.supernodal_lu import Indices
 from archfem.dynamics.solvers.tangent_lu import TangentStorage, factorise, solve
 from archfem.joints.large.forces import (

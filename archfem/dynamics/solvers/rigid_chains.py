@@ -1,12 +1,6 @@
 """Steps of chains of rigid stones with large displacements, for Newton's method.
 
-The stones of an arch and its piers form chains, or trees where rings share a pier: joints link each
-stone to at most one that is eliminated later. The tangent then has blocks of three by three, D_i on
-the diagonal, U_i to the right of it and L_i below it, and its factor has no others:
-
-    F_i = L_i D_i⁻¹,   D_p ← D_p - F_i U_i,
-
-with p the stone to which i is linked. Each joint has a dense block of six by six, from the three
+Stones are eliminated by `stone_tree`. Each joint has a dense block of six by six, from the three
 coordinates of both its stones. Eight joints are evaluated at a time, by `lane_law`. The equation is
 that of `newton`.
 """
@@ -15,8 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import overload
-from scipy import sparse
-from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from archfem._numba import INNER_OPTIONS, inlined_kernel, kernel, summing_kernel
 from archfem._typing import Array
@@ -29,6 +21,12 @@ from archfem.dynamics.solvers.semismooth_newton import (
     newton_driver,
     residual_work,
     reverse_correction,
+)
+from archfem.dynamics.solvers.stone_tree import (
+    StoneTree,
+    add_joint_blocks,
+    eliminate_stones,
+    substitute_stones,
 )
 from archfem.joints.large.face_kinematics import (
     add_angles,
@@ -66,14 +64,7 @@ BC, BS, HC, HS, C, S, SHRUNK, RATE, HALF, X, Y = range(11)
 
 # Rows of joints: of both faces the arm from the centroid and the pose if it is fixed, direction of
 # the normal, half the difference of the angles of fixed faces, and the initial measures
-FACE, DIRECTION, DIFFERENCE, INITIAL, ORIENTATION = 0, 8, 10, 12, 15
-
-
-class StoneTree(NamedTuple):
-    """Order of elimination of stones that joints link without a closed loop."""
-
-    order: Any  # coordinates (n,)
-    parent: Any  # stone that is eliminated later and linked to each; their number if none (m,)
+FACE, DIRECTION, INITIAL, ORIENTATION = 0, 8, 12, 15
 
 
 class ChainSystem(NamedTuple):
@@ -121,52 +112,6 @@ class ChainWorkspace(NamedTuple):
     correction: Array  # of Δq
     residual: Array  # forces out of balance
     constant: Array  # forces that do not depend on the end of the step
-
-
-def find_stone_tree(equation: Equation) -> StoneTree | None:
-    """Return the order of elimination of rigid stones; None for other structures and damping."""
-    model: Any = equation.model
-    if not model.large_displacements:
-        return None
-    sides = model.joints.kinematics
-    rigid = np.isin(sides.size, (0, 3)).all() and not sides.stretch.size
-    points = np.diff(model.joints.face_law.first_point)
-    if not rigid or len(points) != model.joints.joint_count or points.min() < points.max():
-        return None
-    if not model.has_frame.all() or equation.rest.data.any() or model.block_stiffness.data.any():
-        return None
-    mass = model.mass.diagonal()
-    off_diagonal = model.mass - sparse.diags(mass)
-    if abs(off_diagonal).max() > 1e-12 * mass.max():
-        return None
-    count = model.size // 3
-    pairs = sides.index[:, :, 0][(sides.size == 3).all(axis=1)] // 3
-    links = sparse.csr_matrix((np.ones(len(pairs)), pairs.T), (count, count))
-    links = ((links + links.T) > 0).astype(int)
-    parts, part = connected_components(links, directed=False)
-    if links.nnz // 2 != count - parts:  # a closed loop
-        return None
-    last_first, parent = [], np.full(count, -1)
-    for number in range(parts):
-        root = _middle_of(links, int(np.flatnonzero(part == number)[0]))
-        order, parents = breadth_first_order(links, root, directed=False)
-        last_first += order.tolist()
-        parent[order] = parents[order]
-    stones = np.array(last_first[::-1])
-    place = np.append(np.argsort(stones), count)
-    parents = np.where(parent < 0, count, parent)[stones]
-    return StoneTree((3 * stones[:, None] + np.arange(3)).ravel(), place[parents])
-
-
-def _middle_of(links: Any, stone: int) -> int:
-    """Return the stone in the middle of the longest way through a tree that has a stone."""
-    # from there both halves are eliminated side by side, by steps that do not wait for each other
-    end = breadth_first_order(links, stone, directed=False)[0][-1]
-    order, before = breadth_first_order(links, end, directed=False)
-    way = [int(order[-1])]
-    while way[-1] != end:
-        way.append(int(before[way[-1]]))
-    return way[len(way) // 2]
 
 
 def chain_system(equation: Equation, tree: StoneTree, dt: float) -> ChainSystem:
@@ -229,6 +174,15 @@ def constant_chain_parts(system: ChainSystem) -> tuple[Any, ...]:
 # ---- joints
 
 
+@inlined_kernel
+def _load_four(rows, first, at):  # type: ignore
+    """Return four rows."""
+    return (
+        *(load(rows, first, at), load(rows, first + 1, at)),
+        *(load(rows, first + 2, at), load(rows, first + 3, at)),
+    )
+
+
 @kernel
 def _move_stones(stones, before, after, begins):  # type: ignore
     """Evaluate the rotations of all stones over the step."""
@@ -286,13 +240,12 @@ def _start_joints(system, at):  # type: ignore
     (xa, ya), (c, s) = _face_place(system, at, 0, BC, BS)
     (xb, yb), (cb, sb) = _face_place(system, at, 1, BC, BS)
     x, y = xb - xa, yb - ya
-    normal = add_angles(load(joint, DIRECTION, at), load(joint, DIRECTION + 1, at), c, s)
-    normal = add_angles(normal[0], normal[1], cb, sb)
-    apart = add_angles(load(joint, DIFFERENCE, at), load(joint, DIFFERENCE + 1, at), cb, sb)
-    apart = add_angles(apart[0], apart[1], c, -s)
-    opening = normal[0] * x + normal[1] * y + load(joint, INITIAL, at)
-    slip = normal[0] * y - normal[1] * x + load(joint, INITIAL + 1, at)
-    turn = 2.0 * apart[1] + load(joint, INITIAL + 2, at)
+    x0, y0, x1, y1 = _load_four(joint, DIRECTION, at)
+    normal, apart = add_angles(x0, y0, c, s), add_angles(x1, y1, cb, sb)
+    normal, apart = add_angles(*normal, cb, sb), add_angles(*apart, c, -s)
+    gap, slide, tilt, _ = _load_four(joint, INITIAL, at)
+    opening, slip = normal[0] * x + normal[1] * y + gap, normal[0] * y - normal[1] * x + slide
+    turn = 2.0 * apart[1] + tilt
     (length, _), (middle, _) = lane_overlap(law, at, slip)
     opening = opening - middle * turn
     energy = lane_energy(law, at, length, opening, turn)[0]
@@ -340,33 +293,39 @@ def _on_stones(push, low_mean, high_mean):  # type: ignore
     )
 
 
-@kernel
-def _evaluate_joints(system, at):  # type: ignore
-    """Store the mean forces of joints over the step, their derivatives and resultants."""
+@inlined_kernel
+def _measure_joints(system, at):  # type: ignore
+    """Return the motion of joints over the step, and of half the angles of both stones.
+
+    The former is the start as of `lane_forces`, measures at the end, and the rest of
+    `measure_step`.
+    """
     stones, joint, rows = system.stones, system.joint, system.start
     (xa, ya), low_half = _face_place(system, at, 0, HC, HS)
     (xb, yb), high_half = _face_place(system, at, 1, HC, HS)
     low, high = gather(stones, HALF, system.stone, 0, at), gather(stones, HALF, system.stone, 1, at)
     half, quarter = 0.5 * (low + high), 0.5 * (high - low)
-    jumps = (load(rows, 0, at), load(rows, 1, at)), (xb - xa, yb - ya)
-    begin = (load(rows, 2, at), load(rows, 3, at)), (load(rows, 4, at), load(rows, 5, at))
+    x, y, c, s = _load_four(rows, 0, at)
+    begin = (c, s), (load(rows, 4, at), load(rows, 5, at))
     turns = (half, _lane_series(half)), (quarter, _lane_series(quarter))
+    jumps = (x, y), (xb - xa, yb - ya)
     _, end, rates, now, step = measure_step(jumps, begin, turns)
-    end = (
-        end[0] + load(joint, INITIAL, at),
-        end[1] + load(joint, INITIAL + 1, at),
-        end[2] + load(joint, INITIAL + 2, at),
-    )
-    start = (
-        *(load(rows, 6, at), load(rows, 7, at), load(rows, 8, at)),
-        *(load(rows, 9, at), load(rows, 10, at), load(rows, 11, at)),
-    )
+    opening, slip, turn, _ = _load_four(joint, INITIAL, at)
+    end = end[0] + opening, end[1] + slip, end[2] + turn
+    start = *_load_four(rows, 6, at), load(rows, 10, at), load(rows, 11, at)
+    return (start, end, (rates, now, step)), (low_half, high_half)
+
+
+@kernel
+def _evaluate_joints(system, at):  # type: ignore
+    """Store the mean forces of joints over the step, their derivatives and resultants."""
+    (start, end, (rates, now, step)), (low_half, high_half) = _measure_joints(system, at)
     memory = system.slip, system.end_slip, system.directions, system.tractions
     force, law_rate, (shear, moment, loss), missing, energy = lane_forces(
         system.law, at, start, end, system.step[1], memory
     )
     _store_rows(system.end, 0, at, (end[0], end[1], end[2], energy, loss))
-    side = load(joint, ORIENTATION, at)
+    side = load(system.joint, ORIENTATION, at)
     _store_rows(system.resultants, 0, at, (-force[0], side * shear, side * moment))
     low_mean, low_end, low_frame = _middle_rates(system, at, 0, low_half)
     high_mean, high_end, high_frame = _middle_rates(system, at, 1, high_half)
@@ -423,92 +382,10 @@ def _couple_joints(system, at):  # type: ignore
 
 
 @inlined_kernel
-def _load_four(rows, first, at):  # type: ignore
-    """Return four rows."""
-    return (
-        *(load(rows, first, at), load(rows, first + 1, at)),
-        *(load(rows, first + 2, at), load(rows, first + 3, at)),
-    )
-
-
-@inlined_kernel
 def _by_stone(row, side, sign, dx, dy):  # type: ignore
     """Return the derivatives by the coordinates of a stone from those by its face."""
     turn = row[2] if side == 0 else row[3]
     return sign * row[0], sign * row[1], dx * row[0] + dy * row[1] + turn
-
-
-@kernel
-def _add_joint(coupling, joint, stones, parent, blocks):  # type: ignore
-    """Add the derivatives of a joint to the blocks of both its stones."""
-    low, high = stones
-    diagonal, right, below = blocks[0], blocks[1], blocks[2]
-    child, is_low = min(low, high), low < high
-    linked = parent[child] == max(low, high) if child < len(parent) else False
-    for i in range(3):
-        for k in range(3):
-            place = 3 * i + k
-            diagonal[low, i, k] += coupling[place, joint]
-            diagonal[high, i, k] += coupling[place + 27, joint]
-            if linked:
-                across, back = coupling[place + 9, joint], coupling[place + 18, joint]
-                right[child, i, k] = across if is_low else back
-                below[child, i, k] = back if is_low else across
-
-
-@kernel
-def _eliminate(parent, blocks):  # type: ignore
-    """Factorise the tangent: invert D, and store F; returns whether all of it is finite."""
-    diagonal, right, below, factor = blocks[0], blocks[1], blocks[2], blocks[3]
-    total = 0.0
-    for i in range(len(parent)):
-        d = diagonal[i]
-        a, b, c = d[0, 0], d[0, 1], d[0, 2]
-        p, q, r = d[1, 0], d[1, 1], d[1, 2]
-        u, v, w = d[2, 0], d[2, 1], d[2, 2]
-        x, y, z = q * w - r * v, r * u - p * w, p * v - q * u
-        scale = 1.0 / (a * x + b * y + c * z)
-        total += scale
-        d[0, 0], d[0, 1], d[0, 2] = x * scale, (c * v - b * w) * scale, (b * r - c * q) * scale
-        d[1, 0], d[1, 1], d[1, 2] = y * scale, (a * w - c * u) * scale, (c * p - a * r) * scale
-        d[2, 0], d[2, 1], d[2, 2] = z * scale, (b * u - a * v) * scale, (a * q - b * p) * scale
-        if parent[i] == len(parent):
-            continue
-        e, f, g, h = below[i], factor[i], right[i], diagonal[parent[i]]
-        for k in range(3):
-            f0 = e[k, 0] * d[0, 0] + e[k, 1] * d[1, 0] + e[k, 2] * d[2, 0]
-            f1 = e[k, 0] * d[0, 1] + e[k, 1] * d[1, 1] + e[k, 2] * d[2, 1]
-            f2 = e[k, 0] * d[0, 2] + e[k, 1] * d[1, 2] + e[k, 2] * d[2, 2]
-            f[k, 0], f[k, 1], f[k, 2] = f0, f1, f2
-            for m in range(3):
-                h[k, m] -= f0 * g[0, m] + f1 * g[1, m] + f2 * g[2, m]
-    return np.isfinite(total)
-
-
-@kernel
-def _substitute(parent, blocks, x):  # type: ignore
-    """Solve with the factor, x in place of the right side."""
-    count = len(parent)
-    inverse, right, factor = blocks[0], blocks[1], blocks[3]
-    for i in range(count):
-        if parent[i] < count:
-            f, k, m = factor[i], 3 * i, 3 * parent[i]
-            a, b, c = x[k], x[k + 1], x[k + 2]
-            x[m] -= f[0, 0] * a + f[0, 1] * b + f[0, 2] * c
-            x[m + 1] -= f[1, 0] * a + f[1, 1] * b + f[1, 2] * c
-            x[m + 2] -= f[2, 0] * a + f[2, 1] * b + f[2, 2] * c
-    for i in range(count - 1, -1, -1):
-        d, k = inverse[i], 3 * i
-        a, b, c = x[k], x[k + 1], x[k + 2]
-        if parent[i] < count:
-            g, m = right[i], 3 * parent[i]
-            p, q, r = x[m], x[m + 1], x[m + 2]
-            a -= g[0, 0] * p + g[0, 1] * q + g[0, 2] * r
-            b -= g[1, 0] * p + g[1, 1] * q + g[1, 2] * r
-            c -= g[2, 0] * p + g[2, 1] * q + g[2, 2] * r
-        x[k] = d[0, 0] * a + d[0, 1] * b + d[0, 2] * c
-        x[k + 1] = d[1, 0] * a + d[1, 1] * b + d[1, 2] * c
-        x[k + 2] = d[2, 0] * a + d[2, 1] * b + d[2, 2] * c
 
 
 # ---- steps
@@ -600,10 +477,10 @@ def _chain_correction(system, work, iteration, reuse, hold):  # type: ignore
             _couple_joints(system, at)
         for joint in range(count):
             stones = stone[0, joint], stone[1, joint]
-            _add_joint(system.coupling, joint, stones, system.parent, blocks)
-        if not _eliminate(system.parent, blocks):
+            add_joint_blocks(system.coupling, joint, stones, system.parent, blocks)
+        if not eliminate_stones(system.parent, blocks):
             return False
-    _substitute(system.parent, system.blocks, correction)
+    substitute_stones(system.parent, system.blocks, correction)
     return True
 
 
