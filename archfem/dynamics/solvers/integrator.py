@@ -65,10 +65,12 @@ class Stepper:
             yield from self.exact.batches(start, dt, end)
             return
         total = round((end - start.time) / dt)
-        state, done = start, 0
+        # steps between two checks of events, Ctrl-C and the progress bar: more of small systems;
+        # few at first, as steps after an event, or those in which Ctrl-C comes, are lost
+        state, done, size, most = start, 0, 128, min(max(128, 65536 // len(start.q)), 1024)
         while done < total:
-            # steps between two checks of events, Ctrl-C and the progress bar: more of small systems
-            last = min(done + min(max(128, 65536 // len(start.q)), 1024), total)
+            last = min(done + size, total)
+            size = min(2 * size, most)
             times = start.time + dt * np.arange(done + 1, last + 1)
             batch = self.advance_batch(state, dt, times)
             if len(batch.times):

@@ -86,8 +86,8 @@ def add_joint_blocks(coupling, joint, stones, parent, blocks):  # type: ignore
             diagonal[high, i, k] += coupling[place + 27, joint]
             if linked:
                 across, back = coupling[place + 9, joint], coupling[place + 18, joint]
-                right[child, i, k] = across if is_low else back
-                below[child, i, k] = back if is_low else across
+                right[child, i, k] += across if is_low else back
+                below[child, i, k] += back if is_low else across
 
 
 @kernel
