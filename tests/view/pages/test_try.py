@@ -248,13 +248,14 @@ def test_an_arch_is_drawn_on_a_photo_and_taken_away(tmp_path):
         click(0.2, 0.8)
         click(0.8, 0.8)
         driver.find_element(find, "#length").send_keys("6\n")
-        for x, y in ((0.2, 0.8), (0.8, 0.8), (0.5, 0.5)):
+        for x, y in ((0.2, 0.8), (0.8, 0.8), (0.5, 0.5), (0.5, 0.4)):
             click(x, y)
-        wait(driver, lambda: "Drag the three points" in message())
+        wait(driver, lambda: "drag the three points" in message())
         script = "return document.querySelector('.arch').live.tools.source.drawn"
         drawn = driver.execute_script(script)
         # a pixel is 2 cm
-        assert [drawn["span"], drawn["rise"]] == pytest.approx([6.0, 2.25], abs=0.05)
+        sizes = [drawn[name] for name in ("span", "rise", "thickness")]
+        assert sizes == pytest.approx([6.0, 2.25, 0.75], abs=0.05)
         case = driver.execute_script(
             "return document.querySelector('.arch').live.tools.writeCase()"
         )
@@ -408,6 +409,7 @@ def test_a_finger_places_points_by_taps_and_scrolls_by_swipes(tmp_path):
         for k, point in enumerate(((0.2, 0.8), (0.8, 0.8), (0.5, 0.5))):
             touch(place(*point))
             wait(driver, lambda k=k: run("return tools.marks.length") == k + 1)
+        touch(place(0.5, 0.4))
         wait(driver, lambda: run("return Boolean(tools.source.drawn)"))
         before, rise = run("return scrollY"), run("return tools.source.drawn.rise")
         (x, y), step = place(0.5, 0.5), 2

@@ -4,6 +4,7 @@ const STONE = 20e3 / 9.81; // kg per m² of outline, 1 m wide
 const DRAWN_JOINTS = 24; // along a drawn curve, before it is cut into stones
 const TOUCHING = 3e-3; // distance of outlines that touch [m]
 const ARC_CHORD = Math.PI / 60; // of arcs of a drawing, whose sagitta is then 0.03 % of the radius
+const MOST_G = 2.5; // peak of a record [g], beyond which its unit is taken to be another one
 const DXF_PLACES = { 10: 0, 20: 1, 21: 1, 42: 2 }; // of x, y and bulge in a point, by group code
 
 /** Say what is wrong, and what helps. */
@@ -24,9 +25,9 @@ function drawRing({ kind, span, rise, thickness, left }) {
       return [share < 0.5 ? x : -x, radius * Math.sin(away)];
     },
   };
-  const shares = [...new Array(2001).keys()].map((k) => k / 2000), points = shares.map(curves[kind]), lengths = [0];
+  const shares = range(2001).map((k) => k / 2000), points = shares.map(curves[kind]), lengths = [0];
   points.slice(1).forEach(([x, y], k) => lengths.push(lengths[k] + Math.hypot(x - points[k][0], y - points[k][1])));
-  const ends = [...new Array(DRAWN_JOINTS + 1).keys()].map((j) => {
+  const ends = range(DRAWN_JOINTS + 1).map((j) => {
     const k = lengths.findIndex((length) => length >= (j / DRAWN_JOINTS) * lengths[2000] - 1e-9), [before, after] = [points[Math.max(k - 1, 0)], points[Math.min(k + 1, 2000)]];
     const [x, y] = points[k], along = [after[0] - before[0], after[1] - before[1]], length = Math.hypot(...along);
     // at the point of two arcs the joint is upright, and longer
@@ -34,6 +35,11 @@ function drawRing({ kind, span, rise, thickness, left }) {
     return [[x, y], [x - (deep * along[1]) / length, y + (deep * along[0]) / length]].map(([u, v]) => [u + left[0] + half, v + left[1]]);
   });
   return { ends, kept: 0, stones: 15, thickness, density: STONE, level: Infinity };
+}
+/** The arch of a drawn ring. */
+function assembleRing(drawn, parameters) {
+  const ring = drawRing(drawn), arch = cutRing(ring, { factor: 1, stones: ring.stones, friction: 0.6 }, parameters);
+  return { name: "a drawn arch", ...arch, ring: { ...ring, level: arch.bodies.level }, thrust: null };
 }
 
 /** Closed outlines of a GeoJSON file: {points, fixed}. */
@@ -48,7 +54,7 @@ function readGeoJson(text) {
 function bendLine([x, y, bulge], [u, v]) {
   const turn = 4 * Math.atan(bulge), parts = Math.max(1, Math.ceil(Math.abs(turn) / ARC_CHORD)), away = bulge ? (1 - bulge ** 2) / (4 * bulge) : 0;
   const [cx, cy] = [0.5 * (x + u) - away * (v - y), 0.5 * (y + v) + away * (u - x)];
-  return [...new Array(parts).keys()].map((k) => {
+  return range(parts).map((k) => {
     const [c, s] = [Math.cos((k * turn) / parts), Math.sin((k * turn) / parts)];
     return k ? [cx + c * (x - cx) - s * (y - cy), cy + s * (x - cx) + c * (y - cy)] : [x, y];
   });
@@ -184,8 +190,6 @@ function assembleOutlines(outlines, unit, parameters, friction = 0.6) {
   const bodies = makeBodies(shapes, exact, fixed, { density: STONE, level: low }, friction);
   return { name: "a drawing", bodies, joints, sizes: exact.map(({ area }) => Math.sqrt(area)), parameters, thrust: null, ring: null };
 }
-
-const MOST_G = 2.5; // peak of a record [g], beyond which its unit is taken to be another one
 
 /** An accelerogram of two columns, time [s] and acceleration in a unit [m/s²], or of an AT2 file [g]. */
 function readRecord(text, name, unit = 9.81) {

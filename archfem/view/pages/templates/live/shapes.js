@@ -43,12 +43,12 @@ function measure(pieces) {
 
 /** Stones of a ring {ends, kept, density, level}, first and last joint on supports, as `make_bodies` of archfem makes them. */
 function cutRing(ring, { factor, stones, friction }, parameters) {
-  const at = (place) => sectionAt(ring, place, factor), faces = [...new Array(stones + 1).keys()].map((k) => at(k / stones));
+  const at = (place) => sectionAt(ring, place, factor), faces = range(stones + 1).map((k) => at(k / stones));
   const tangents = faces.map(([[x, y], [u, v]]) => [u - x, v - y]);
   const turn = Math.max(...tangents.slice(1).map((tangent, k) => Math.abs(turnOf(tangents[k], tangent))));
   const chords = Math.max(1, Math.ceil(turn / MAX_CHORD - 1e-9));
   const split = (k, parts) => {
-    const cuts = [...new Array(parts + 1).keys()].map((i) => at((k + i / parts) / stones));
+    const cuts = range(parts + 1).map((i) => at((k + i / parts) / stones));
     return cuts.slice(1).map(([c, d], i) => [cuts[i][0], c, d, cuts[i][1]]); // anticlockwise, for rings from left to right
   };
   /** A support behind a joint, half as deep as that is long. */
@@ -56,7 +56,7 @@ function cutRing(ring, { factor, stones, friction }, parameters) {
     const behind = ([x, y]) => [x + side * 0.5 * (outer[1] - inner[1]), y - side * 0.5 * (outer[0] - inner[0])];
     return [side < 0 ? [inner, outer, behind(outer), behind(inner)] : [outer, inner, behind(inner), behind(outer)]];
   };
-  const ends = [support(faces[0], -1), support(faces[stones], 1)], numbers = [...new Array(stones).keys()];
+  const ends = [support(faces[0], -1), support(faces[stones], 1)], numbers = range(stones);
   const shapes = [ends[0], ...numbers.map((k) => split(k, chords)), ends[1]];
   const exact = [measure(ends[0]), ...numbers.map((k) => measure(split(k, Math.max(1, Math.ceil(turn / FINE_CHORD))))), measure(ends[1])];
   const bodies = makeBodies(shapes, exact, [0, stones + 1], ring, friction);

@@ -84,9 +84,9 @@ class Equilibrium {
       pivot(table, row, column);
       solved[column] = row;
     });
-    const left = [...new Array(count).keys()].filter((column) => solved[column] === undefined);
+    const left = range(count).filter((column) => solved[column] === undefined);
     /** Coefficients of each force: of the free ones, of the weight and of the push. */
-    this.forces = [...new Array(count).keys()].map((column) => {
+    this.forces = range(count).map((column) => {
       const line = table[solved[column]];
       return line ? [...left.map((k) => -line[k]), line[count], line[count + 1]] : [...left.map((k) => (k === column ? 1 : 0)), 0, 0];
     });
