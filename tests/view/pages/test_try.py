@@ -364,8 +364,8 @@ def test_a_finger_places_points_by_taps_and_scrolls_by_swipes(tmp_path):
         driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True})
         live = "const live = document.querySelector('.arch').live, { tools, stage } = live;"
 
-        def run(expression):
-            return driver.execute_script(live + expression)
+        def run(expression, *given):
+            return driver.execute_script(live + expression, *given)
 
         def touch(*points):
             """Put a finger down at the first point of the screen, move it to the others."""
@@ -388,6 +388,27 @@ def test_a_finger_places_points_by_taps_and_scrolls_by_swipes(tmp_path):
 
         driver.get((DOCS / "try" / "index.html").resolve().as_uri())
         wait_for_runs(driver, 1)
+        for name in ("thickness", "time"):
+            slider = f"const s = document.querySelector('#{name}'), b = s.getBoundingClientRect();"
+            run(f"{slider} scrollBy(0, b.top - 500)")
+            x, y, value, before = run(
+                f"{slider} return [b.left + 0.8 * b.width, b.top + b.height / 2, s.value, scrollY]"
+            )
+            touch(*[(x, y - 15 * k) for k in range(8)])
+            wait(driver, lambda before=before: run("return scrollY") > before + 50)
+            assert run(f"{slider} return s.value") == value
+            assert run("return live.time") == 0.0
+            # a tap, and a move along the slider, change it
+            wait(driver, lambda: run("const y = scrollY; scrollTo(0, 300); return y === 300"))
+            place_of = f"{slider} return [b.left + arguments[0] * b.width, b.top + b.height / 2]"
+            for shares in ([0.8], [0.8, 0.7, 0.6, 0.5, 0.4]):
+                touch(*[run(place_of, share) for share in shares])
+                wait(driver, lambda value=value: run(f"{slider} return s.value") != value)
+                moved, value = value, run(f"{slider} return s.value")
+            assert float(value) < float(moved)
+            assert run("return scrollY") == 300
+        assert run("return live.time") == pytest.approx(float(value))
+        run("scrollTo(0, 0)")
         driver.find_element("css selector", ".live-start summary").click()
         driver.find_element("css selector", "#photo").send_keys(str(photo))
         wait(driver, lambda: run("return tools.mode") == "scale")

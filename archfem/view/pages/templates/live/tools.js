@@ -16,9 +16,10 @@ class Tools {
     live.reset = () => this.restore();
     const changes = {
       example: ({ value }) => this.startFrom({ example: Number(value) }), kind: () => this.source.drawn && this.drawMarked(),
-      photo: ({ files }) => this.placePhoto(files[0]), drawing: ({ files }) => this.openDrawing(files[0]), record: ({ files }) => this.openRecord(files[0]),
-      "record-unit": () => this.openRecord(this.find("record").files[0]),
+      photo: () => this.placePhoto(this.find("photo").files[0]),
     };
+    for (const name of ["drawing", "unit"]) changes[name] = () => this.openDrawing(this.find("drawing").files[0]);
+    for (const name of ["record", "record-unit"]) changes[name] = () => this.openRecord(this.find("record").files[0]);
     const clicks = {
       scale: () => this.begin("scale"), mark: () => this.begin("mark"), "stones-move": () => this.beginMoving(), undo: () => this.undoMove(),
       case: () => this.saveCase(), png: () => this.savePicture(), link: () => this.makeLink(),
@@ -58,6 +59,7 @@ class Tools {
     const { live } = this;
     this.mode = mode;
     live.isMarking = mode === "scale" || mode === "mark";
+    live.root.classList.toggle("marking", live.isMarking);
     live.stage.canvas.tabIndex = mode === "stones" ? 0 : -1;
     this.find("ask").hidden = mode !== "scale";
     this.find("undo").hidden = mode !== "stones";
@@ -120,7 +122,7 @@ class Tools {
     } else if (this.mode === "mark" && marks.length < MARKS.length) {
       marks.push(point);
       this.drawMarks();
-      if (marks.length < MARKS.length) this.say(`Click ${MARKS[marks.length]}.`); else this.drawMarked();
+      if (marks.length === MARKS.length) this.drawMarked(); else this.say(`Click ${MARKS[marks.length]}.`);
     }
   }
   setScale() {
@@ -186,7 +188,7 @@ class Tools {
     }
     const { marks, live: { stage } } = this, number = marks.findIndex(([x, y]) => stage.scale * Math.hypot(x - point[0], y - point[1]) < 24 * devicePixelRatio);
     const isPlaced = this.mode === "mark" ? marks.length === MARKS.length : this.mode === null;
-    return number < 0 || !isPlaced ? null : (to) => { marks[number] = to; this.drawMarked(); };
+    return number < 0 || !isPlaced ? null : (to) => { marks[number] = to; if (this.live.isMarking) this.drawMarks(); this.drawMarked(); };
   }
   press(event) {
     const { stage } = this.live, point = stage.pointAt(event);
