@@ -4,8 +4,16 @@ const FRAME_STEPS = 40; // steps between frames: 20 ms at steps of 0.5 ms
 const EXTRA_TIME = 4; // after the motion, for stones that still fall [s]
 const FIRST_SWEEPS = 20000; // of the first step, which has no impulses of a step before
 
-/** The numbers from 0, so many. */
+/** The numbers from 0, so many; points and vectors; each point of an outline with the next. */
 const range = (count) => [...new Array(count).keys()];
+const minus = ([x, y], [u, v]) => [x - u, y - v];
+const plus = ([x, y], [u, v]) => [x + u, y + v];
+const dot = ([x, y], [u, v]) => x * u + y * v;
+const cross = ([x, y], [u, v]) => x * v - y * u;
+const distance = (one, other) => Math.hypot(...minus(one, other));
+const mix = (one, other, share) => one.map((value, k) => (1 - share) * value + share * other[k]);
+const rotate = ([x, y], angle) => { const [c, s] = [Math.cos(angle), Math.sin(angle)]; return [c * x - s * y, s * x + c * y]; };
+const sides = (points) => points.map((point, k) => [point, points[(k + 1) % points.length]]);
 
 /** Undo deflate and base64. */
 async function inflate(text) {

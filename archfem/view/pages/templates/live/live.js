@@ -2,7 +2,6 @@
 "use strict";
 const G = 9.81, RUNS = 20;
 const SPREAD = { friction: 0.05, strength: 0.02, thickness: 0.01 }; // of slightly different arches, relative
-const count = (number, what) => `${number} ${what}${number === 1 ? "" : "s"}`;
 const PLASTIC = [0.8191725, 0.6710436, 0.5497005]; // shares that spread three properties evenly (R3 sequence)
 
 /** A motion of the reader's choice at a strength in g: recorded, a steady push, or a table that tilts. */
@@ -131,7 +130,8 @@ class Live {
     const resting = settled?.lines ?? (isGiven ? given.thrust : equilibrium.thrust(0)), stands = weakest.factor >= 0;
     const pushed = stands && weakest.factor < Infinity ? equilibrium.thrust(weakest.side * weakest.factor) : null;
     const trace = (values) => (values ? this.findLinks().map((link) => link.map((j) => crossing(joints[j], values[j]))) : []);
-    this.statics = { weakest, stands, settled, law, isGiven, resting, weight: trace(resting), push: trace(pushed), hinges: weakest.hinges.map(({ joint, sign }) => hingePoint(joints[joint], sign)) };
+    // a joint turns about its extrados where M > 0
+    this.statics = { weakest, stands, settled, law, isGiven, resting, weight: trace(resting), push: trace(pushed), hinges: weakest.hinges.map(({ joint, sign }) => joints[joint].ends[sign > 0 ? 1 : 0]) };
     this.tellStatics();
   }
   tellStatics() {
@@ -141,7 +141,7 @@ class Live {
     this.say("line", percent >= 0 ? `${percent} % of half the thickness is left (max |e| = ${most.toFixed(3)})` : "none: no line stays within the stones and within the friction of all joints");
     this.say("weight", !stands ? "it falls" : percent >= 0 ? `it stands, with ${percent} % to spare` : "it stands");
     this.say("sizes", this.measureOpening());
-    const list = (what, own) => (own.length ? [`${count(own.length, what)}: ${own.length > 1 ? "joints" : "joint"} ${own.map(({ joint }) => joint).join(", ")}`] : []);
+    const list = (what, own, s = own.length > 1 ? "s" : "") => (own.length ? [`${own.length} ${what}${s}: joint${s} ${own.map(({ joint }) => joint).join(", ")}`] : []);
     this.say("mechanism", [...list("hinge", hinges), ...list("slide", slides)].join("; ") || "none");
     const moved = settled && farthest(settled.q, settled.q.map(() => 0), arch.bodies.reach);
     this.say("closing", settled ? `under its own weight joints close by up to ${millimetres(settled.closing, 3)}, and stones move by up to ${millimetres(moved, 2)}`
@@ -156,18 +156,16 @@ class Live {
   measureOpening() {
     if (!this.given.ring) return "–";
     const inner = this.arch.joints.map(({ ends }) => ends[0]), [one, other] = [inner[0], inner.at(-1)];
-    return `${Math.hypot(other[0] - one[0], other[1] - one[1]).toFixed(2)} m and ${(Math.max(...inner.map(([, y]) => y)) - Math.min(one[1], other[1])).toFixed(2)} m`;
+    return `${distance(one, other).toFixed(2)} m and ${(Math.max(...inner.map(([, y]) => y)) - Math.min(one[1], other[1])).toFixed(2)} m`;
   }
-  /** Ask a worker for the push that joints of a finish bear. */
+  /** Ask a worker for the push that joints of a finish bear, which is said beside that of hard ones. */
   askPush() {
     const { law, settled, weakest: { factor } } = this.statics;
     this.workers.push?.terminate();
-    if (settled && factor < Infinity) this.assign("push", { closing: { arch: this.arch, law, q: settled.q, factor } }, (pushes) => this.tellPush(pushes));
-  }
-  /** The push that joints of a finish bear, beside that of hard ones. */
-  tellPush(pushes) {
-    const { factor } = this.statics.weakest, weaker = pushes[0] <= pushes[1] ? 0 : 1;
-    this.say("collapse", `${pushes[weaker].toFixed(3)} g, pushed to the ${weaker ? "left" : "right"}; ${factor.toFixed(3)} g with hard joints`);
+    if (!settled || factor === Infinity) return;
+    this.assign("push", { closing: { arch: this.arch, law, q: settled.q, factor } }, ([right, left]) => {
+      this.say("collapse", `${Math.min(right, left).toFixed(3)} g, pushed to the ${right <= left ? "right" : "left"}; ${factor.toFixed(3)} g with hard joints`);
+    });
   }
   /** Pairs of joints on both sides of a stone, between which a thrust line is drawn. */
   findLinks() {
@@ -219,7 +217,7 @@ class Live {
   show(time) {
     this.time = time;
     this.find("time").value = time;
-    if (this.isMarking) return; // a reader places points on a photo
+    if (this.isMarking) return this.stage.draw({ handles: this.stage.handles }); // a reader places points on a photo
     const at = ({ frames, spacing }) => frames[Math.min(Math.round(time / spacing), frames.length - 1)];
     const still = new Float64Array(3 * this.arch.bodies.mass.length), shaken = this.view === "shake", ready = this.runs.filter((run) => run?.frames);
     const poses = shaken && this.runs[0]?.frames ? at(this.runs[0]) : still, begins = time === 0;

@@ -9,7 +9,7 @@ class Stage {
   /** Fit an arch: what is in view is its box with room for stones that fall. */
   fit(arch, box) {
     const { centre, arms, owner, piece_starts: starts, level } = arch.bodies;
-    const points = owner.flatMap((body, piece) => arms.slice(starts[piece], starts[piece + 1]).map(([x, y]) => [x + centre[body][0], y + centre[body][1]]));
+    const points = owner.flatMap((body, piece) => arms.slice(starts[piece], starts[piece + 1]).map((arm) => plus(arm, centre[body])));
     const [xs, ys] = [0, 1].map((k) => points.map((point) => point[k])), room = 0.12 * (Math.max(...xs) - Math.min(...xs));
     if (!box) this.backdrop = null;
     this.frame(box ?? [Math.min(...xs) - room, Math.min(level, ...ys) - 0.3 * room, Math.max(...xs) + room, Math.max(...ys) + 0.6 * room]);
@@ -79,8 +79,8 @@ class Stage {
   stones({ bodies: { centre, arms, owner, piece_starts: starts, outer } }, poses, fillOf, edge, width) {
     const { pen } = this;
     owner.forEach((body, piece) => {
-      const [x, y, turn] = poses.subarray(3 * body, 3 * body + 3), [c, s] = [Math.cos(turn), Math.sin(turn)];
-      const points = arms.slice(starts[piece], starts[piece + 1]).map(([a, b]) => this.place([centre[body][0] + x + c * a - s * b, centre[body][1] + y + s * a + c * b]));
+      const [x, y, turn] = poses.subarray(3 * body, 3 * body + 3), middle = plus(centre[body], [x, y]);
+      const points = arms.slice(starts[piece], starts[piece + 1]).map((arm) => this.place(plus(middle, rotate(arm, turn))));
       const fill = fillOf(body);
       if (fill) {
         pen.beginPath();
@@ -91,7 +91,7 @@ class Stage {
         pen.fill();
         pen.stroke();
       }
-      points.forEach((point, k) => { if (outer[starts[piece] + k]) this.stroke([point, points[(k + 1) % points.length]], edge, width); });
+      sides(points).forEach((side, k) => { if (outer[starts[piece] + k]) this.stroke(side, edge, width); });
     });
   }
 }

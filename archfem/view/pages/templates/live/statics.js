@@ -65,11 +65,11 @@ class Equilibrium {
     this.joints = joints.map((joint) => makeJoint(joint, centre));
     // rows: forces along x and y and moment of each free stone; columns: forces, weight, push
     const table = free.flatMap(() => [0, 1, 2].map(() => new Float64Array(count + 2)));
-    this.joints.forEach(({ blocks, normal: [nx, ny], tangent: [tx, ty], middle: [x, y] }, j) => blocks.forEach((body, side) => {
-      const row = rowOf.get(body), sign = side ? 1 : -1;
+    this.joints.forEach(({ blocks, normal, tangent, middle }, j) => blocks.forEach((body, side) => {
+      const row = rowOf.get(body), arm = minus(middle, centre[body]), sign = side ? 1 : -1;
       if (row === undefined) return;
-      const armX = x - centre[body][0], armY = y - centre[body][1];
-      [[nx, ny, armX * ny - armY * nx], [tx, ty, armX * ty - armY * tx], [0, 0, tx * ny - ty * nx]].forEach((column, k) => column.forEach((value, i) => { table[row + i][3 * j + k] = sign * value; }));
+      const forces = [[...normal, cross(arm, normal)], [...tangent, cross(arm, tangent)], [0, 0, cross(tangent, normal)]];
+      forces.forEach((force, k) => force.forEach((value, i) => { table[row + i][3 * j + k] = sign * value; }));
     }));
     for (const [body, row] of rowOf) {
       const own = (parameters.gravity * mass[body][0]) / this.weight;
@@ -157,14 +157,10 @@ class Equilibrium {
 }
 
 /** Geometry of a joint: its normal points from its lower block to its higher one. */
-function makeJoint({ blocks, ends: [inner, outer], friction, cohesion }, centre) {
-  const depth = Math.hypot(outer[0] - inner[0], outer[1] - inner[1]), tangent = [0, 1].map((k) => (outer[k] - inner[k]) / depth);
-  const middle = [0, 1].map((k) => 0.5 * (inner[k] + outer[k])), [low, high] = blocks.map((body) => centre[body]);
-  let normal = [tangent[1], -tangent[0]];
-  if (normal[0] * (high[0] - low[0]) + normal[1] * (high[1] - low[1]) < 0) normal = normal.map((value) => -value);
-  return { blocks, ends: [inner, outer], depth, tangent, normal, middle, friction, cohesion };
+function makeJoint({ blocks, ends, friction, cohesion }, centre) {
+  const [inner, outer] = ends, depth = distance(inner, outer), tangent = minus(outer, inner).map((value) => value / depth), middle = mix(inner, outer, 0.5);
+  const right = [tangent[1], -tangent[0]], [low, high] = blocks.map((body) => centre[body]), sign = dot(right, minus(high, low)) < 0 ? -1 : 1;
+  return { blocks, ends, depth, tangent, normal: right.map((value) => sign * value), middle, friction, cohesion };
 }
 /** Where a thrust line crosses a joint. */
 const crossing = ({ middle, tangent, depth }, e) => [0, 1].map((k) => middle[k] + e * depth * tangent[k]);
-/** The end of a joint about which it turns: extrados for M > 0. */
-const hingePoint = (joint, sign) => joint.ends[sign > 0 ? 1 : 0];

@@ -105,33 +105,31 @@ class Tools {
     if (mode === "mark" && !this.isScaled) refuse("this photo has no scale yet: click two points of known distance, and give it in metres");
     this[mode === "scale" ? "scaleMarks" : "marks"] = [];
     this.setMode(mode);
-    this.say(mode === "scale" ? "Click two points whose distance you know." : `Click ${MARKS[0]}.`);
     this.live.tell();
-    this.drawMarks();
+    this.showHandles([]);
+    this.say(mode === "scale" ? "Click two points whose distance you know." : `Click ${MARKS[0]}.`);
     stage.canvas.scrollIntoView({ block: "center" });
   }
-  drawMarks() { this.live.stage.draw({ handles: this.mode === "scale" ? this.scaleMarks : this.marks }); }
   /** Place a point of the scale, of which a third one moves the nearest, or of the arch. */
   placePoint(point) {
-    const { scaleMarks: two, marks } = this, far = ([x, y]) => Math.hypot(x - point[0], y - point[1]);
+    const { scaleMarks: two, marks } = this, far = (place) => distance(place, point);
     if (this.mode === "scale") {
       if (two.length === 2) two[far(two[0]) < far(two[1]) ? 0 : 1] = point; else two.push(point);
-      this.drawMarks();
+      this.showHandles(two);
       this.say(two.length < 2 ? "Click the second point." : "Give their distance below the photo. Another click moves the nearer point.");
       if (two.length === 2) this.find("length").focus();
     } else if (this.mode === "mark" && marks.length < MARKS.length) {
       marks.push(point);
-      this.drawMarks();
+      this.showHandles(marks);
       if (marks.length === MARKS.length) this.drawMarked(); else this.say(`Click ${MARKS[marks.length]}.`);
     }
   }
   setScale() {
     const length = Number(this.find("length").value), [one, other] = this.scaleMarks, { backdrop, scale } = this.live.stage;
     if (!other) refuse("click two points of the photo first");
-    const distance = Math.hypot(one[0] - other[0], one[1] - other[1]);
-    if (scale * distance < 10 * devicePixelRatio) refuse("the two points are one: click places that are farther apart");
+    if (scale * distance(one, other) < 10 * devicePixelRatio) refuse("the two points are one: click places that are farther apart");
     this.isScaled = true;
-    this.framePhoto((backdrop.metres * length) / distance);
+    this.framePhoto((backdrop.metres * length) / distance(one, other));
     this.begin("mark");
   }
   /** The ring through the marks; its springings are level. A mark on its outer side gives the thickness, and goes. */
@@ -173,9 +171,9 @@ class Tools {
   }
   /** Corners at a point, with those of neighbours: of one corner, or of the stone around it. */
   cornersAt(point) {
-    const { outlines } = this.source, far = ([x, y]) => this.live.stage.scale * Math.hypot(x - point[0], y - point[1]);
+    const { outlines } = this.source, far = (place) => this.live.stage.scale * distance(place, point);
     const corner = outlines.flatMap(({ points }) => points).reduce((best, each) => (far(each) < far(best) ? each : best));
-    const isInside = ({ points }) => points.every(([x, y], k) => { const [u, v] = points[(k + 1) % points.length]; return (u - x) * (point[1] - y) >= (v - y) * (point[0] - x); });
+    const isInside = ({ points }) => sides(points).every(([from, to]) => cross(minus(to, from), minus(point, from)) >= 0);
     const stone = outlines.find(isInside)?.points ?? [], middle = [0, 1].map((k) => stone.reduce((sum, each) => sum + each[k], 0) / stone.length);
     const isCorner = far(corner) < 16 * devicePixelRatio && !(far(middle) < far(corner)); // a stone may be as small as a finger
     return findCorners(outlines, isCorner ? [corner] : stone);
@@ -184,11 +182,11 @@ class Tools {
   hold(point) {
     if (this.mode === "stones") {
       const { outlines } = this.source, corners = this.cornersAt(point);
-      return corners.length ? (to) => this.showMoved(moveCorners(outlines, corners, to.map((value, k) => value - point[k]))) : null;
+      return corners.length ? (to) => this.showMoved(moveCorners(outlines, corners, minus(to, point))) : null;
     }
-    const { marks, live: { stage } } = this, number = marks.findIndex(([x, y]) => stage.scale * Math.hypot(x - point[0], y - point[1]) < 24 * devicePixelRatio);
+    const { marks, live: { stage } } = this, number = marks.findIndex((mark) => stage.scale * distance(mark, point) < 24 * devicePixelRatio);
     const isPlaced = this.mode === "mark" ? marks.length === MARKS.length : this.mode === null;
-    return number < 0 || !isPlaced ? null : (to) => { marks[number] = to; if (this.live.isMarking) this.drawMarks(); this.drawMarked(); };
+    return number < 0 || !isPlaced ? null : (to) => { marks[number] = to; this.live.show(0); this.drawMarked(); };
   }
   press(event) {
     const { stage } = this.live, point = stage.pointAt(event);
