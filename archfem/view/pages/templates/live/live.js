@@ -43,7 +43,7 @@ class Live {
     root.querySelectorAll("[type=range]").forEach(awaitDirection);
     data.motions.forEach(({ name }, k) => this.find("motion").append(new Option(name, k)));
     for (const name of ["thickness", "stones", "friction", "strength", "finish"]) this.find(name).addEventListener("input", () => this.change(name));
-    this.find("motion").addEventListener("input", () => { this.design.strength = this.suggest(data.motions[this.find("motion").value]); this.change("motion"); });
+    this.find("motion").addEventListener("input", () => { this.design.strength = this.suggest(this.motion); this.change("motion"); });
     this.find("reset").addEventListener("click", () => this.reset());
     this.find("time").addEventListener("input", () => { this.pause(); this.show(Number(this.find("time").value)); });
     this.find("play").addEventListener("click", () => (this.playing ? this.pause() : this.play()));
@@ -52,6 +52,8 @@ class Live {
   }
   find(name) { return this.root.querySelector(`#${name}`); }
   say(name, words) { this.find(name).textContent = words; }
+  /** The motion that the reader chose. */
+  get motion() { return this.data.motions[this.find("motion").value]; }
 
   /** Give a task to a worker of its own, so that the page stays alive; the one before it ends. */
   assign(name, task, receive) {
@@ -118,8 +120,7 @@ class Live {
       this.find(name).value = design[name];
       this.say(`${name}-value`, say(design[name]));
     }
-    const tilts = this.data.motions[this.find("motion").value].kind === "tilt";
-    if (tilts) this.say("strength-value", `${((Math.atan(design.strength) * 180) / Math.PI).toFixed(0)}°`);
+    if (this.motion.kind === "tilt") this.say("strength-value", `${((Math.atan(design.strength) * 180) / Math.PI).toFixed(0)}°`);
   }
 
   /** Thrust lines, collapse acceleration and least thickness. */
@@ -140,23 +141,18 @@ class Live {
     this.say("collapse", !stands ? "it does not stand by itself" : factor === Infinity ? "none: it leans on nothing" : `${factor.toFixed(3)} g, pushed to the ${side > 0 ? "right" : "left"}`);
     this.say("line", percent >= 0 ? `${percent} % of half the thickness is left (max |e| = ${most.toFixed(3)})` : "none: no line stays within the stones and within the friction of all joints");
     this.say("weight", !stands ? "it falls" : percent >= 0 ? `it stands, with ${percent} % to spare` : "it stands");
-    this.say("sizes", this.measureOpening());
     const list = (what, own, s = own.length > 1 ? "s" : "") => (own.length ? [`${own.length} ${what}${s}: joint${s} ${own.map(({ joint }) => joint).join(", ")}`] : []);
     this.say("mechanism", [...list("hinge", hinges), ...list("slide", slides)].join("; ") || "none");
     const moved = settled && farthest(settled.q, settled.q.map(() => 0), arch.bodies.reach);
     this.say("closing", settled ? `under its own weight joints close by up to ${millimetres(settled.closing, 3)}, and stones move by up to ${millimetres(moved, 2)}`
       : law ? "on joints that close this arch slides or falls by its own weight; hard joints are shown"
       : isGiven ? "as in the analysis of archfem" : "hard: faces meet at once, and do not close further");
-    this.find("least").parentElement.hidden = !given.ring;
+    for (const name of ["least", "sizes"]) this.find(name).parentElement.hidden = !given.ring;
     if (!given.ring) return;
+    const inner = arch.joints.map(({ ends }) => ends[0]), [one, other] = [inner[0], inner.at(-1)], rise = Math.max(...inner.map(([, y]) => y)) - Math.min(one[1], other[1]);
+    this.say("sizes", `${distance(one, other).toFixed(2)} m and ${rise.toFixed(2)} m`);
     const least = leastThickness(given.ring, { stones: design.stones, friction: design.friction }, given.parameters);
     this.say("least", Number.isNaN(least) ? "it does not stand at any" : `${(least * given.ring.thickness).toFixed(3)} m`);
-  }
-  /** Clear span and rise of a ring, along its inner side. */
-  measureOpening() {
-    if (!this.given.ring) return "–";
-    const inner = this.arch.joints.map(({ ends }) => ends[0]), [one, other] = [inner[0], inner.at(-1)];
-    return `${distance(one, other).toFixed(2)} m and ${(Math.max(...inner.map(([, y]) => y)) - Math.min(one[1], other[1])).toFixed(2)} m`;
   }
   /** Ask a worker for the push that joints of a finish bear, which is said beside that of hard ones. */
   askPush() {
@@ -176,7 +172,7 @@ class Live {
 
   /** Shake the arch, and others that differ slightly. */
   run() {
-    const { design, data } = this, { motion, scale } = makeMotion(data.motions[this.find("motion").value], design.strength), count = Math.min(navigator.hardwareConcurrency || 1, 4);
+    const { design, data } = this, { motion, scale } = makeMotion(this.motion, design.strength), count = Math.min(navigator.hardwareConcurrency || 1, 4);
     const runs = range(RUNS).map((k) => {
       const [one, two, three] = PLASTIC.map((share) => (k ? 2 * ((0.5 + k * share) % 1) - 1 : 0));
       return { number: k, arch: this.build({ ...design, friction: design.friction * (1 + SPREAD.friction * one) }, 1 + SPREAD.thickness * three), scale: scale * (1 + SPREAD.strength * two) };

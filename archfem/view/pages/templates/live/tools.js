@@ -235,7 +235,7 @@ class Tools {
 
   /** The case as `archfem run` reads it. */
   writeCase() {
-    const { live: { design, data, finishes } } = this, { drawn, outlines, unit, file, example } = this.source, motion = data.motions[this.find("motion").value];
+    const { live: { design, data, finishes, motion } } = this, { drawn, outlines, unit, file, example } = this.source;
     let text = data.arches[example ?? 0].case;
     if (drawn) text = `title = "a drawn arch"\n\n[structure]\nshape = "${SHAPES[drawn.kind]}"\nspan = ${drawn.span.toFixed(4)}\nrise = ${drawn.rise.toFixed(4)}\nthickness = 0\nvoussoirs = 0\n${MODEL}`;
     if (outlines) text = `title = "a drawing"\n\n[structure]\nshape = "outlines"\nfile = "${file}"  # beside this file\nunit = "${UNITS[unit]}"\nsnap = "3 mm"\n${MODEL}`;
@@ -257,15 +257,16 @@ class Tools {
   }
   /** The picture, with what it shows below it. */
   savePicture() {
-    const { design, stage: { canvas } } = this.live, size = Math.max(canvas.width / 60, 12), { width, height } = canvas, text = (name) => this.find(name).textContent;
-    const picture = Object.assign(document.createElement("canvas"), { width, height: height + 6 * size }), pen = picture.getContext("2d"), style = getComputedStyle(document.body);
-    const facts = ["sizes", "weight", "collapse"].map((name) => `${this.find(name).previousElementSibling.textContent}: ${text(name)}`);
-    const sizes = design.thickness ? `thickness ${design.thickness.toFixed(3)} m, ` : "", motion = this.find("motion").selectedOptions[0].text;
+    const { design, given, stage: { canvas: { width, height }, canvas } } = this.live, size = Math.max(width / 60, 12), style = getComputedStyle(document.body);
+    const text = (name) => this.find(name).textContent, facts = given.ring ? ["sizes", "weight", "collapse"] : ["weight", "collapse"];
+    const lines = [text("verdict"), ...facts.map((name) => `${this.find(name).previousElementSibling.textContent}: ${text(name)}`)];
+    lines.push(`${design.thickness ? `thickness ${text("thickness-value")}, ` : ""}friction ${text("friction-value")}, ${this.find("motion").selectedOptions[0].text} at ${text("strength-value")}`);
+    const picture = Object.assign(document.createElement("canvas"), { width, height: height + 1.7 * size * (lines.length + 0.6) }), pen = picture.getContext("2d");
     pen.fillStyle = style.backgroundColor;
     pen.fillRect(0, 0, picture.width, picture.height);
     pen.drawImage(canvas, 0, 0);
     Object.assign(pen, { fillStyle: style.color, font: `${size}px ${style.fontFamily}` });
-    [text("verdict"), facts.join("; "), `${sizes}friction ${design.friction.toFixed(2)}, ${motion} at ${text("strength-value")}`].forEach((line, k) => pen.fillText(line, size, height + (1.6 + 1.7 * k) * size, width - 2 * size));
+    lines.forEach((line, k) => pen.fillText(line, size, height + 1.7 * size * (k + 1), width - 2 * size));
     picture.toBlob((blob) => this.save(blob, "arch.png"));
   }
   save(blob, name) {
@@ -276,7 +277,7 @@ class Tools {
   }
   /** The arch and what was chosen, in the address of this page. */
   async makeLink() {
-    const { design, stage, data: { motions } } = this.live, motion = Number(this.find("motion").value), { isOwn, x, ...rest } = motions[motion], fits = isOwn && x.length <= MAX_LINKED;
+    const { design, stage, motion: { isOwn, x, ...rest } } = this.live, motion = Number(this.find("motion").value), fits = isOwn && x.length <= MAX_LINKED;
     // whole mm/s², joined by a sign that addresses leave as it is
     const record = fits ? { ...rest, y: null, x: x.map((value) => Math.round(1e3 * value)).join("_") } : undefined;
     location.hash = encodeURIComponent(JSON.stringify({ source: this.source, design, motion, record }));
