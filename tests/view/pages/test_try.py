@@ -403,8 +403,9 @@ def test_a_finger_places_points_by_taps_and_scrolls_by_swipes(tmp_path):
             place_of = f"{slider} return [b.left + arguments[0] * b.width, b.top + b.height / 2]"
             for shares in ([0.8], [0.8, 0.7, 0.6, 0.5, 0.4]):
                 touch(*[run(place_of, share) for share in shares])
-                wait(driver, lambda value=value: run(f"{slider} return s.value") != value)
-                moved, value = value, run(f"{slider} return s.value")
+                read = f"{slider} return s.value"
+                wait(driver, lambda value=value, read=read: run(read) != value)
+                moved, value = value, run(read)
             assert float(value) < float(moved)
             assert run("return scrollY") == 300
         assert run("return live.time") == pytest.approx(float(value))
@@ -437,6 +438,45 @@ def test_a_finger_places_points_by_taps_and_scrolls_by_swipes(tmp_path):
         touch((x, y), *[(x, y - step * k) for k in range(1, 9)])
         assert run("return tools.source.drawn.rise") > rise + 0.1
         assert run("return scrollY") == before
+        assert complaints(driver) == []
+
+
+@pytest.mark.slow
+def test_mistakes_are_put_right_where_they_are_said(tmp_path):
+    """A drawing is read again in another unit; a refused mark is dragged to its place."""
+    column = [box(0.0, low, 500.0, low + 1000.0) for low in (0.0, 1000.0, 2000.0)]
+    (drawing := tmp_path / "column.dxf").write_text(dxf(*column))
+    Image.new("RGB", (400, 300), "grey").save(photo := tmp_path / "photo.png")
+    with browser(wide=1280) as driver:
+
+        def run(expression):
+            script = "const live = document.querySelector('.arch').live, { tools } = live;"
+            return driver.execute_script(script + expression)
+
+        def message():
+            return driver.find_element("css selector", "#message").text
+
+        driver.get((DOCS / "try" / "index.html").resolve().as_uri())
+        wait_for_runs(driver, 1)
+        for details in driver.find_elements("css selector", ".live-start summary"):
+            details.click()
+        driver.find_element("css selector", "#drawing").send_keys(str(drawing))
+        wait(driver, lambda: "3000 m large: choose its unit" in message())
+        driver.find_element("css selector", "#unit option[value='0.001']").click()
+        wait(driver, lambda: "2 joints" in message())
+        assert driver.find_element("css selector", "#collapse").text.startswith("0.250 g")
+        driver.find_element("css selector", "#photo").send_keys(str(photo))
+        wait(driver, lambda: "Click two points" in message())
+        run("for (const x of [1, 4]) tools.placePoint([x, 1])")
+        driver.find_element("css selector", "#length").send_keys("6\n")
+        wait(driver, lambda: "Click the left springing" in message())
+        assert not driver.find_element("css selector", "#weight").is_displayed()
+        place = "tools.attempt(() => tools.placePoint(p))"
+        run(f"for (const p of [[2, 1], [8, 1], [5, 3], [5, 2]]) {place}")
+        wait(driver, lambda: "outer side of the crown lies above" in message())
+        run("tools.hold([5, 2])([5, 3.5])")
+        assert run("return tools.source.drawn.thickness") == 0.5
+        assert driver.find_element("css selector", "#weight").text.startswith("it stands")
         assert complaints(driver) == []
 
 
