@@ -109,6 +109,15 @@ def test_a_column_in_dxf_falls_at_its_slenderness(parameters):
     assert found["factor"] == pytest.approx(0.25, rel=1e-9)  # breadth over height
 
 
+def test_stones_that_no_support_holds_do_not_stand(parameters):
+    """Two stones beside a column touch each other alone."""
+    column = [box(0, 0, 1, 1), box(0, 1, 1, 2)]
+    given = {"text": dxf(*column, box(5, 2, 6, 3), box(5, 1, 6, 2)), "parameters": parameters}
+    assert run_in_node(given | {"dxf": True}, READ)["factor"] == -1
+    stands = given | {"text": dxf(*column), "dxf": True}
+    assert run_in_node(stands, READ)["factor"] == pytest.approx(0.6)  # it slides
+
+
 @pytest.mark.parametrize("way", ["bulges", "heavy", "lines and arcs"])
 def test_arcs_of_a_drawing_are_those_of_the_ring(parameters, tmp_path, way):
     """Stones of a ring as polylines with arcs, or as lines and arcs that stones share."""

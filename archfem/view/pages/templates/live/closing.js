@@ -65,12 +65,9 @@ class ClosingJoints {
     let q = start, state = this.assemble(q, push, true);
     for (let round = 0; round < 12; round++) {
       if (state.error < this.tolerance) return q;
-      const { table, residual } = state, size = q.length, columns = [];
+      const { table, residual } = state, size = q.length;
       this.rows.forEach((row, k) => { table[k][size] = -residual[row]; });
-      table.forEach((line, k) => {
-        columns[k] = this.rows.reduce((best, row) => (Math.abs(line[row]) > Math.abs(line[best]) ? row : best));
-        pivot(table, k, columns[k]);
-      });
+      const columns = eliminate(table, this.rows);
       let share = 1, trial;
       do {
         trial = q.slice();

@@ -225,7 +225,7 @@ class Live {
   }
   play() {
     const { end } = this;
-    if (this.view !== "shake") this.root.querySelector("[value=shake]").click();
+    this.root.querySelector("[value=shake]").click();
     if (this.time >= end) this.show(0);
     this.playing = true;
     this.say("play", "❚❚ pause");

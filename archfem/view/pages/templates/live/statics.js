@@ -13,6 +13,16 @@ function pivot(table, row, column) {
   }
 }
 
+/** Solve a table of equations for some of its columns; return the column of each row, -1 for a row of zeros. */
+function eliminate(table, columns) {
+  return table.map((line, row) => {
+    const column = columns.reduce((best, k) => (Math.abs(line[k]) > Math.abs(line[best]) ? k : best));
+    if (Math.abs(line[column]) < 1e-10) return -1;
+    pivot(table, row, column);
+    return column;
+  });
+}
+
 /**
  * Maximise c·y over free y under rows·y <= limits, by the simplex method on the dual,
  * min limits·u under rowsᵀ u = c, u >= 0. Returns the value, y and u; null where no y is possible,
@@ -76,21 +86,14 @@ class Equilibrium {
       table[row + 1][count] = own;
       table[row][count + 1] = -own;
     }
-    const solved = [];
-    table.forEach((line, row) => {
-      let column = 0;
-      for (let k = 1; k < count; k++) if (Math.abs(line[k]) > Math.abs(line[column])) column = k;
-      if (Math.abs(line[column]) < 1e-10) return; // stones that nothing holds: no equilibrium
-      pivot(table, row, column);
-      solved[column] = row;
-    });
-    const left = range(count).filter((column) => solved[column] === undefined);
+    const solved = eliminate(table, range(count)), left = range(count).filter((column) => !solved.includes(column));
     /** Coefficients of each force: of the free ones, of the weight and of the push. */
     this.forces = range(count).map((column) => {
-      const line = table[solved[column]];
+      const line = table[solved.indexOf(column)];
       return line ? [...left.map((k) => -line[k]), line[count], line[count + 1]] : [...left.map((k) => (k === column ? 1 : 0)), 0, 0];
     });
     this.size = left.length;
+    this.isHeld = table.every((line, row) => solved[row] >= 0 || Math.abs(line[count]) < SMALL); // all weight goes somewhere
   }
   /** Rows of |M| <= share N h / 2 and |V| <= μ N + c A, over the free forces and the push. */
   conditions(share) {
@@ -107,6 +110,11 @@ class Equilibrium {
       for (const sign of signs) add(sign, [moment, normal], 0.5 * share * depth, 0, { joint, hinge: true });
       if (friction !== null) for (const sign of signs) add(sign, [shear, normal], friction, cohesion / this.weight, { joint, hinge: false });
     });
+    if (!this.isHeld) {
+      rows.push(new Array(this.size + 1).fill(0));
+      limits.push(-1);
+      weights.push({});
+    }
     return { rows, limits, kinds: weights };
   }
   /** Largest push to one side, +1 or -1, in g, with the joints that give way; null: it does not stand. */

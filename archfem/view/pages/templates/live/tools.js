@@ -105,6 +105,7 @@ class Tools {
     if (mode === "mark" && !this.isScaled) refuse("this photo has no scale yet: click two points of known distance, and give it in metres");
     this[mode === "scale" ? "scaleMarks" : "marks"] = [];
     this.setMode(mode);
+    this.live.root.querySelector("[value=shake]").click();
     this.live.tell();
     this.showHandles([]);
     this.say(mode === "scale" ? "Click two points whose distance you know." : `Click ${MARKS[0]}.`);
