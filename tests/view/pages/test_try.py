@@ -109,6 +109,15 @@ def test_a_column_in_dxf_falls_at_its_slenderness(parameters):
     assert found["factor"] == pytest.approx(0.25, rel=1e-9)  # breadth over height
 
 
+def test_stones_that_no_support_holds_do_not_stand(parameters):
+    """Two stones beside a column touch each other alone."""
+    column = [box(0, 0, 1, 1), box(0, 1, 1, 2)]
+    given = {"text": dxf(*column, box(5, 2, 6, 3), box(5, 1, 6, 2)), "parameters": parameters}
+    assert run_in_node(given | {"dxf": True}, READ)["factor"] == -1
+    stands = given | {"text": dxf(*column), "dxf": True}
+    assert run_in_node(stands, READ)["factor"] == pytest.approx(0.6)  # it slides
+
+
 @pytest.mark.parametrize("way", ["bulges", "heavy", "lines and arcs"])
 def test_arcs_of_a_drawing_are_those_of_the_ring(parameters, tmp_path, way):
     """Stones of a ring as polylines with arcs, or as lines and arcs that stones share."""
@@ -248,13 +257,14 @@ def test_an_arch_is_drawn_on_a_photo_and_taken_away(tmp_path):
         click(0.2, 0.8)
         click(0.8, 0.8)
         driver.find_element(find, "#length").send_keys("6\n")
-        for x, y in ((0.2, 0.8), (0.8, 0.8), (0.5, 0.5)):
+        for x, y in ((0.2, 0.8), (0.8, 0.8), (0.5, 0.5), (0.5, 0.4)):
             click(x, y)
-        wait(driver, lambda: "Drag the three points" in message())
+        wait(driver, lambda: "drag the three points" in message())
         script = "return document.querySelector('.arch').live.tools.source.drawn"
         drawn = driver.execute_script(script)
         # a pixel is 2 cm
-        assert [drawn["span"], drawn["rise"]] == pytest.approx([6.0, 2.25], abs=0.05)
+        sizes = [drawn[name] for name in ("span", "rise", "thickness")]
+        assert sizes == pytest.approx([6.0, 2.25, 0.75], abs=0.05)
         case = driver.execute_script(
             "return document.querySelector('.arch').live.tools.writeCase()"
         )
@@ -363,8 +373,8 @@ def test_a_finger_places_points_by_taps_and_scrolls_by_swipes(tmp_path):
         driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True})
         live = "const live = document.querySelector('.arch').live, { tools, stage } = live;"
 
-        def run(expression):
-            return driver.execute_script(live + expression)
+        def run(expression, *given):
+            return driver.execute_script(live + expression, *given)
 
         def touch(*points):
             """Put a finger down at the first point of the screen, move it to the others."""
@@ -387,6 +397,28 @@ def test_a_finger_places_points_by_taps_and_scrolls_by_swipes(tmp_path):
 
         driver.get((DOCS / "try" / "index.html").resolve().as_uri())
         wait_for_runs(driver, 1)
+        for name in ("thickness", "time"):
+            slider = f"const s = document.querySelector('#{name}'), b = s.getBoundingClientRect();"
+            run(f"{slider} scrollBy(0, b.top - 500)")
+            x, y, value, before = run(
+                f"{slider} return [b.left + 0.8 * b.width, b.top + b.height / 2, s.value, scrollY]"
+            )
+            touch(*[(x, y - 15 * k) for k in range(8)])
+            wait(driver, lambda before=before: run("return scrollY") > before + 50)
+            assert run(f"{slider} return s.value") == value
+            assert run("return live.time") == 0.0
+            # a tap, and a move along the slider, change it
+            wait(driver, lambda: run("const y = scrollY; scrollTo(0, 300); return y === 300"))
+            place_of = f"{slider} return [b.left + arguments[0] * b.width, b.top + b.height / 2]"
+            for shares in ([0.8], [0.8, 0.7, 0.6, 0.5, 0.4]):
+                touch(*[run(place_of, share) for share in shares])
+                read = f"{slider} return s.value"
+                wait(driver, lambda value=value, read=read: run(read) != value)
+                moved, value = value, run(read)
+            assert float(value) < float(moved)
+            assert run("return scrollY") == 300
+        assert run("return live.time") == pytest.approx(float(value))
+        run("scrollTo(0, 0)")
         driver.find_element("css selector", ".live-start summary").click()
         driver.find_element("css selector", "#photo").send_keys(str(photo))
         wait(driver, lambda: run("return tools.mode") == "scale")
@@ -408,12 +440,52 @@ def test_a_finger_places_points_by_taps_and_scrolls_by_swipes(tmp_path):
         for k, point in enumerate(((0.2, 0.8), (0.8, 0.8), (0.5, 0.5))):
             touch(place(*point))
             wait(driver, lambda k=k: run("return tools.marks.length") == k + 1)
+        touch(place(0.5, 0.4))
         wait(driver, lambda: run("return Boolean(tools.source.drawn)"))
         before, rise = run("return scrollY"), run("return tools.source.drawn.rise")
         (x, y), step = place(0.5, 0.5), 2
         touch((x, y), *[(x, y - step * k) for k in range(1, 9)])
         assert run("return tools.source.drawn.rise") > rise + 0.1
         assert run("return scrollY") == before
+        assert complaints(driver) == []
+
+
+@pytest.mark.slow
+def test_mistakes_are_put_right_where_they_are_said(tmp_path):
+    """A drawing is read again in another unit; a refused mark is dragged to its place."""
+    column = [box(0.0, low, 500.0, low + 1000.0) for low in (0.0, 1000.0, 2000.0)]
+    (drawing := tmp_path / "column.dxf").write_text(dxf(*column))
+    Image.new("RGB", (400, 300), "grey").save(photo := tmp_path / "photo.png")
+    with browser(wide=1280) as driver:
+
+        def run(expression):
+            script = "const live = document.querySelector('.arch').live, { tools } = live;"
+            return driver.execute_script(script + expression)
+
+        def message():
+            return driver.find_element("css selector", "#message").text
+
+        driver.get((DOCS / "try" / "index.html").resolve().as_uri())
+        wait_for_runs(driver, 1)
+        for details in driver.find_elements("css selector", ".live-start summary"):
+            details.click()
+        driver.find_element("css selector", "#drawing").send_keys(str(drawing))
+        wait(driver, lambda: "3000 m large: choose its unit" in message())
+        driver.find_element("css selector", "#unit option[value='0.001']").click()
+        wait(driver, lambda: "2 joints" in message())
+        assert driver.find_element("css selector", "#collapse").text.startswith("0.250 g")
+        driver.find_element("css selector", "#photo").send_keys(str(photo))
+        wait(driver, lambda: "Click two points" in message())
+        run("for (const x of [1, 4]) tools.placePoint([x, 1])")
+        driver.find_element("css selector", "#length").send_keys("6\n")
+        wait(driver, lambda: "Click the left springing" in message())
+        assert not driver.find_element("css selector", "#weight").is_displayed()
+        place = "tools.attempt(() => tools.placePoint(p))"
+        run(f"for (const p of [[2, 1], [8, 1], [5, 3], [5, 2]]) {place}")
+        wait(driver, lambda: "outer side of the crown lies above" in message())
+        run("tools.hold([5, 2])([5, 3.5])")
+        assert run("return tools.source.drawn.thickness") == 0.5
+        assert driver.find_element("css selector", "#weight").text.startswith("it stands")
         assert complaints(driver) == []
 
 

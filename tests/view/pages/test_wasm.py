@@ -19,7 +19,7 @@ RUNS = """
   const module = new WebAssembly.Module(await inflate(given.wasm));
   const engine = { module, leaves: given.leaves };
   return given.scales.map((scale) => {
-    const { frames, lost, fell } = finish(shake(engine, given.arch, given.motion, scale));
+    const { frames, lost, fell } = shake(engine, given.arch, given.motion, scale);
     return { frames: frames.slice(0, given.frames).map((each) => [...each]), lost, fell };
   });
 })()

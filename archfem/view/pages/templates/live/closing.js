@@ -13,23 +13,22 @@ function pressOn({ stiffness, closure }, closing) {
 
 /** Stones on joints that press by a law {stiffness, shear, closure, width} and do not slide. */
 class ClosingJoints {
-  constructor({ bodies, joints, parameters }, law) {
-    const { mass, centre, inverse_mass } = bodies;
-    const joint = (each) => { const made = makeJoint(each, centre); return { ...made, arms: made.blocks.map((body) => made.middle.map((value, k) => value - centre[body][k])) }; };
-    Object.assign(this, { law: { ...law, stiffness: law.stiffness * law.width, shear: law.shear * law.width }, joints: joints.map(joint), rows: mass.flatMap((_, body) => (inverse_mass[body][0] > 0 ? [3 * body, 3 * body + 1, 3 * body + 2] : [])) });
+  constructor({ bodies: { mass, centre, inverse_mass }, joints, parameters }, law) {
+    this.law = { ...law, stiffness: law.stiffness * law.width, shear: law.shear * law.width };
+    this.joints = joints.map((joint) => makeJoint(joint, centre)).map((joint) => ({ ...joint, arms: joint.blocks.map((body) => minus(joint.middle, centre[body])) }));
+    this.rows = mass.flatMap((_, body) => (inverse_mass[body][0] > 0 ? [3 * body, 3 * body + 1, 3 * body + 2] : []));
     this.weights = mass.map(([own]) => own * parameters.gravity);
     this.still = new Float64Array(3 * mass.length);
     this.reach = Math.max(...centre.flat()) - Math.min(...centre.flat());
     this.tolerance = 1e-8 * this.rows.reduce((sum, row) => sum + this.weights[Math.floor(row / 3)] / 3, 0);
   }
   /** Forces on the coordinates of both blocks of a joint in poses q, e and the largest closing. */
-  press({ blocks, arms, depth, normal: [nx, ny], tangent: [tx, ty] }, q) {
-    const turns = blocks.map((body) => q[3 * body + 2]), half = 0.5 * (turns[0] + turns[1]), [c, s] = [Math.cos(half), Math.sin(half)];
-    // arms in the poses; the jump from the lower face to the higher, from displacements for accuracy
-    const placed = arms.map(([x, y], side) => { const [u, v] = [Math.cos(turns[side]), Math.sin(turns[side])]; return [u * x - v * y, v * x + u * y]; });
+  press({ blocks, arms, depth, normal, tangent }, q) {
+    const turns = blocks.map((body) => q[3 * body + 2]), half = 0.5 * (turns[0] + turns[1]), placed = arms.map((arm, side) => rotate(arm, turns[side]));
+    // the jump from the lower face to the higher, from displacements for accuracy
     const jump = [0, 1].map((k) => q[3 * blocks[1] + k] - q[3 * blocks[0] + k] + placed[1][k] - arms[1][k] - placed[0][k] + arms[0][k]);
-    const n = [c * nx - s * ny, s * nx + c * ny], t = [c * tx - s * ty, s * tx + c * ty], sense = tx * ny - ty * nx;
-    const opening = n[0] * jump[0] + n[1] * jump[1], slip = t[0] * jump[0] + t[1] * jump[1], turn = sense * (turns[1] - turns[0]);
+    const n = rotate(normal, half), t = rotate(tangent, half), sense = cross(tangent, normal);
+    const opening = dot(n, jump), slip = dot(t, jump), turn = sense * (turns[1] - turns[0]);
     // the part of the depth that closes, from the intrados at -h/2
     const ends = [opening - 0.5 * turn * depth, opening + 0.5 * turn * depth], edge = -opening / turn;
     const [low, high] = [ends[0] > 0 ? Math.min(edge, 0.5 * depth) : -0.5 * depth, ends[1] > 0 ? Math.max(edge, -0.5 * depth) : 0.5 * depth];
@@ -41,8 +40,8 @@ class ClosingJoints {
     }
     const shear = this.law.shear * depth * slip, along = [0, 1].map((k) => shear * t[k] - force * n[k]);
     // by the mean rotation the normal and the tangent turn: dn = ez × n, dt = ez × t
-    const swing = 0.5 * (-force * (n[0] * jump[1] - n[1] * jump[0]) + shear * (t[0] * jump[1] - t[1] * jump[0]));
-    const own = [-1, 1].flatMap((sign, side) => [sign * along[0], sign * along[1], sign * (placed[side][0] * along[1] - placed[side][1] * along[0]) + swing - sign * sense * moment]);
+    const swing = 0.5 * (shear * cross(t, jump) - force * cross(n, jump));
+    const own = [-1, 1].flatMap((sign, side) => [sign * along[0], sign * along[1], sign * cross(placed[side], along) + swing - sign * sense * moment]);
     return { own, e: force > 0 ? moment / force / depth : NaN, closing: -Math.min(...ends), shear: Math.abs(shear), force };
   }
   /** Forces out of balance at the free coordinates, under a push in g; with their derivatives if wanted. */
@@ -66,12 +65,9 @@ class ClosingJoints {
     let q = start, state = this.assemble(q, push, true);
     for (let round = 0; round < 12; round++) {
       if (state.error < this.tolerance) return q;
-      const { table, residual } = state, size = q.length, columns = [];
+      const { table, residual } = state, size = q.length;
       this.rows.forEach((row, k) => { table[k][size] = -residual[row]; });
-      table.forEach((line, k) => {
-        columns[k] = this.rows.reduce((best, row) => (Math.abs(line[row]) > Math.abs(line[best]) ? row : best));
-        pivot(table, k, columns[k]);
-      });
+      const columns = eliminate(table, this.rows);
       let share = 1, trial;
       do {
         trial = q.slice();

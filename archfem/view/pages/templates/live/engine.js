@@ -4,6 +4,17 @@ const FRAME_STEPS = 40; // steps between frames: 20 ms at steps of 0.5 ms
 const EXTRA_TIME = 4; // after the motion, for stones that still fall [s]
 const FIRST_SWEEPS = 20000; // of the first step, which has no impulses of a step before
 
+/** The numbers from 0, so many; points and vectors; each point of an outline with the next. */
+const range = (count) => [...new Array(count).keys()];
+const minus = ([x, y], [u, v]) => [x - u, y - v];
+const plus = ([x, y], [u, v]) => [x + u, y + v];
+const dot = ([x, y], [u, v]) => x * u + y * v;
+const cross = ([x, y], [u, v]) => x * v - y * u;
+const distance = (one, other) => Math.hypot(...minus(one, other));
+const mix = (one, other, share) => one.map((value, k) => (1 - share) * value + share * other[k]);
+const rotate = ([x, y], angle) => { const [c, s] = [Math.cos(angle), Math.sin(angle)]; return [c * x - s * y, s * x + c * y]; };
+const sides = (points) => points.map((point, k) => [point, points[(k + 1) % points.length]]);
+
 /** Undo deflate and base64. */
 async function inflate(text) {
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -47,7 +58,7 @@ class Fall {
     const count = bodies.mass.length, workspace = makeWorkspace(bodies);
     const state = { q: zeros(count, 3), v: zeros(count, 3), ground: zeros(FRAME_STEPS, 2), energy: zeros(8), settling: zeros(4) };
     const known = { bodies, parameters, workspace, state };
-    Object.assign(this, { arguments: [], places: {}, isFirst: true });
+    Object.assign(this, { arguments: [], places: {}, first: { "parameters.max_sweeps": FIRST_SWEEPS, "parameters.tolerance": 1e-3 * parameters.tolerance } });
     for (const [path, kind] of leaves) {
       const [part, ...names] = path.split("."), given = known[part][names.join(".")];
       this.places[path] = { kind, at: this.arguments.length };
@@ -68,15 +79,11 @@ class Fall {
     const Kind = { float64: Float64Array, int64: BigInt64Array, bool: Uint8Array }[kind];
     return new Kind(this.code.memory.buffer, start, length);
   }
-  argument(path) { return this.arguments[this.places[path].at]; }
-  /** Advance by steps with ground accelerations, two a step [m/s²]. */
+  /** Advance by steps with ground accelerations, two a step [m/s²]; the first one has parameters of its own. */
   advance(ground) {
-    if (this.isFirst) {
-      this.isFirst = false;
-      this.call(ground.subarray(0, 2), { "parameters.max_sweeps": FIRST_SWEEPS, "parameters.tolerance": 1e-3 * this.argument("parameters.tolerance") });
-      ground = ground.subarray(2);
-    }
-    this.call(ground, {});
+    if (this.first) this.call(ground.subarray(0, 2), this.first);
+    this.call(ground.subarray(this.first ? 2 : 0), {});
+    this.first = null;
   }
   call(ground, changes) {
     this.view("state.ground").set(ground);
@@ -108,19 +115,15 @@ function farthest(poses, before, reach) {
   return most;
 }
 
-/**
- * Shake an arch: frames of poses every 20 ms until all rest; a stone is lost as in archfem's CollapseState.
- * A generator, which yields after each tenth of a run or so, so that a worker can end it.
- */
-function* shake(engine, arch, motion, scale) {
-  const fall = new Fall(engine, arch), { reach } = arch.bodies, step = fall.argument("parameters.dt");
+/** Shake an arch: frames of poses every 20 ms until all rest; a stone is lost as in archfem's CollapseState. */
+function shake(engine, arch, motion, scale) {
+  const fall = new Fall(engine, arch), { bodies: { reach }, parameters: { dt: step } } = arch;
   const end = (motion.x.length - 1) * motion.dt, poses = () => fall.view("state.q").slice();
   const frames = [poses()], lost = new Set();
   let time = 0, fell = null, anchor = frames[0], since = 0;
   while (time < end + EXTRA_TIME && (time <= end || time - since < 0.5)) {
     fall.advance(sampleGround(motion, (frames.length - 1) * FRAME_STEPS, FRAME_STEPS, step, scale));
     time = frames.length * FRAME_STEPS * step;
-    if (frames.length % 20 === 0) yield;
     const now = poses();
     frames.push(now);
     reach.forEach((_, body) => { if (now[3 * body + 1] < -0.5 * arch.sizes[body] || Math.abs(now[3 * body + 2]) > Math.PI / 4) lost.add(body); });
@@ -129,11 +132,4 @@ function* shake(engine, arch, motion, scale) {
     if (time <= end || farthest(now, anchor, reach) > 5e-4) [anchor, since] = [now, time];
   }
   return { frames, spacing: FRAME_STEPS * step, lost: lost.size, fell, displacement: Math.max(...frames.map((each) => farthest(each, frames[0], reach))) };
-}
-/** The result of a generator. */
-function finish(steps) {
-  for (;;) {
-    const { done, value } = steps.next();
-    if (done) return value;
-  }
 }

@@ -7,20 +7,43 @@ const PLASTIC = [0.8191725, 0.6710436, 0.5497005]; // shares that spread three p
 /** A motion of the reader's choice at a strength in g: recorded, a steady push, or a table that tilts. */
 function makeMotion(given, strength) {
   if (given.x) return { motion: given, scale: strength === given.strength ? 1 : (strength * G) / given.peak };
-  const dt = 0.01, samples = [...new Array(801).keys()].map((k) => Math.min(k * dt, 6) / 6);
-  const tilt = Math.atan(strength);
-  if (given.kind === "push") return { motion: { dt, x: samples.map((share) => -share * strength * G), y: samples.map(() => 0) }, scale: 1 };
-  return { motion: { dt, x: samples.map((share) => -G * Math.sin(share * tilt)), y: samples.map((share) => G * (Math.cos(share * tilt) - 1)) }, scale: 1 };
+  const dt = 0.01, shares = range(801).map((k) => Math.min(k * dt, 6) / 6), tilt = Math.atan(strength);
+  const [x, y] = given.kind === "push" ? [(share) => -share * strength * G, () => 0] : [(share) => -G * Math.sin(share * tilt), (share) => G * (Math.cos(share * tilt) - 1)];
+  return { motion: { dt, x: shares.map(x), y: shares.map(y) }, scale: 1 };
+}
+
+/** Let a swipe that begins on a slider scroll the page: the slider waits until a finger moves along it, or taps. */
+function awaitDirection(slider) {
+  let touch = null; // of which the direction is open: its place, and the values before and after
+  const release = () => {
+    const { before, after } = touch;
+    touch = null;
+    slider.value = after;
+    if (after !== before) slider.dispatchEvent(new Event("input"));
+  };
+  const listen = (type, action) => slider.addEventListener(type, (event) => { if (touch) action(event); });
+  slider.addEventListener("pointerdown", ({ pointerType, clientX, clientY }) => {
+    touch = pointerType === "touch" ? { x: clientX, y: clientY, before: slider.value, after: slider.value } : null;
+  });
+  listen("input", (event) => {
+    touch.after = slider.value;
+    slider.value = touch.before;
+    event.stopImmediatePropagation();
+  });
+  listen("pointermove", ({ clientX, clientY }) => { if (Math.abs(clientX - touch.x) > 8 + Math.abs(clientY - touch.y)) release(); });
+  listen("pointerup", release);
+  listen("pointercancel", () => { touch = null; }); // the page scrolls
 }
 
 class Live {
   constructor(root, data) {
-    Object.assign(this, { root, data, runs: [], job: 0, time: 0, view: "shake" });
-    this.stage = new Stage(this.find("stage"));
-    this.startWorkers();
+    Object.assign(this, { root, data, runs: [], workers: {}, time: 0, view: "shake", stage: new Stage(root.querySelector("#stage")) });
+    const scripts = ["engine", "statics", "worker"].map((name) => document.querySelector(`#${name}-script`).textContent);
+    this.script = URL.createObjectURL(new Blob([scripts.join("\n")], { type: "text/javascript" }));
+    root.querySelectorAll("[type=range]").forEach(awaitDirection);
     data.motions.forEach(({ name }, k) => this.find("motion").append(new Option(name, k)));
     for (const name of ["thickness", "stones", "friction", "strength", "finish"]) this.find(name).addEventListener("input", () => this.change(name));
-    this.find("motion").addEventListener("input", () => { this.design.strength = this.suggest(data.motions[this.find("motion").value]); this.change("motion"); });
+    this.find("motion").addEventListener("input", () => { this.design.strength = this.suggest(this.motion); this.change("motion"); });
     this.find("reset").addEventListener("click", () => this.reset());
     this.find("time").addEventListener("input", () => { this.pause(); this.show(Number(this.find("time").value)); });
     this.find("play").addEventListener("click", () => (this.playing ? this.pause() : this.play()));
@@ -29,23 +52,15 @@ class Live {
   }
   find(name) { return this.root.querySelector(`#${name}`); }
   say(name, words) { this.find(name).textContent = words; }
+  /** The motion that the reader chose. */
+  get motion() { return this.data.motions[this.find("motion").value]; }
 
-  /** Runs go to workers, so that the page stays alive. */
-  startWorkers() {
-    const text = ["engine", "statics", "worker"].map((name) => document.querySelector(`#${name}-script`).textContent).join("\n");
-    const address = URL.createObjectURL(new Blob([text], { type: "text/javascript" })), count = Math.min(navigator.hardwareConcurrency || 1, 4);
-    const receive = ({ data: { job, asked, number, run, failure, push } }) => {
-      if (push && asked === this.asked) this.tellPush(push);
-      if (job !== this.job) return;
-      this.runs[number] = run ?? { failure };
-      this.tell();
-      this.show(this.time);
-    };
-    this.workers = [...new Array(count)].map(() => new Worker(address));
-    for (const worker of this.workers) {
-      worker.onmessage = receive;
-      worker.postMessage({ start: { wasm: this.data.wasm, leaves: this.data.leaves } });
-    }
+  /** Give a task to a worker of its own, so that the page stays alive; the one before it ends. */
+  assign(name, task, receive) {
+    this.workers[name]?.terminate();
+    const worker = this.workers[name] = new Worker(this.script);
+    worker.onmessage = ({ data }) => receive(data);
+    worker.postMessage(task);
   }
 
   /** The strength at which a motion begins: its own, or near that which brings the arch down. */
@@ -86,7 +101,6 @@ class Live {
     if (name !== "finish") this.run();
     this.show(0);
   }
-  isAsGiven(names) { return names.every((name) => this.design[name] === this.original[name]); }
   /** The arch of a design; archfem's own arrays where nothing but friction differs. */
   build(design, thinner = 1) {
     const { given, original } = this, ratio = design.friction / original.friction, { ring, parameters } = given;
@@ -106,70 +120,71 @@ class Live {
       this.find(name).value = design[name];
       this.say(`${name}-value`, say(design[name]));
     }
-    const tilts = this.data.motions[this.find("motion").value].kind === "tilt";
-    if (tilts) this.say("strength-value", `${((Math.atan(design.strength) * 180) / Math.PI).toFixed(0)}°`);
+    if (this.motion.kind === "tilt") this.say("strength-value", `${((Math.atan(design.strength) * 180) / Math.PI).toFixed(0)}°`);
   }
 
   /** Thrust lines, collapse acceleration and least thickness. */
   solveStatics() {
-    const { design, given, arch } = this, own = this.isAsGiven(["thickness", "stones", "friction"]), law = this.finishes.find(({ name }) => name === design.finish);
-    const equilibrium = new Equilibrium(arch), weakest = equilibrium.weakest(), stands = weakest.factor >= 0;
-    const trace = (values) => equilibrium.joints.map((joint, j) => crossing(joint, values[j]));
-    const settled = law ? new ClosingJoints(arch, law).rest() : null, hard = own && given.thrust && !law ? given.thrust : equilibrium.thrust(0);
-    const resting = settled?.lines ?? hard, pushed = stands && weakest.factor < Infinity ? equilibrium.thrust(weakest.side * weakest.factor) : null;
-    const links = (values) => (values ? this.chains(equilibrium.joints).map((chain) => chain.map((j) => trace(values)[j])) : []);
-    this.statics = { stands, settled, law, factor: weakest.factor, weight: links(resting), push: links(pushed), hinges: weakest.hinges.map(({ joint, sign }) => hingePoint(equilibrium.joints[joint], sign)) };
-    const most = resting ? Math.max(...resting.map(Math.abs)) : NaN, percent = Math.round(100 * (1 - 2 * most));
-    this.say("collapse", !stands ? "it does not stand by itself" : weakest.factor === Infinity ? "none: it leans on nothing" : `${weakest.factor.toFixed(3)} g, pushed to the ${weakest.side > 0 ? "right" : "left"}`);
+    const { design, given, arch, original, finishes } = this, equilibrium = new Equilibrium(arch), { joints } = equilibrium, weakest = equilibrium.weakest();
+    const isGiven = given.thrust && ["thickness", "stones", "friction", "finish"].every((name) => design[name] === original[name]);
+    const law = finishes.find(({ name }) => name === design.finish), settled = law ? new ClosingJoints(arch, law).rest() : null;
+    const resting = settled?.lines ?? (isGiven ? given.thrust : equilibrium.thrust(0)), stands = weakest.factor >= 0;
+    const pushed = stands && weakest.factor < Infinity ? equilibrium.thrust(weakest.side * weakest.factor) : null;
+    const trace = (values) => (values ? this.findLinks().map((link) => link.map((j) => crossing(joints[j], values[j]))) : []);
+    // a joint turns about its extrados where M > 0
+    this.statics = { weakest, stands, settled, law, isGiven, resting, weight: trace(resting), push: trace(pushed), hinges: weakest.hinges.map(({ joint, sign }) => joints[joint].ends[sign > 0 ? 1 : 0]) };
+    this.tellStatics();
+  }
+  tellStatics() {
+    const { design, given, arch } = this, { weakest: { factor, side, hinges, slides }, stands, settled, law, isGiven, resting } = this.statics;
+    const most = resting ? Math.max(...resting.map(Math.abs)) : NaN, percent = Math.round(100 * (1 - 2 * most)), millimetres = (value, digits) => `${(1e3 * value).toFixed(digits)} mm`;
+    this.say("collapse", !stands ? "it does not stand by itself" : factor === Infinity ? "none: it leans on nothing" : `${factor.toFixed(3)} g, pushed to the ${side > 0 ? "right" : "left"}`);
     this.say("line", percent >= 0 ? `${percent} % of half the thickness is left (max |e| = ${most.toFixed(3)})` : "none: no line stays within the stones and within the friction of all joints");
-    this.say("weight", stands ? `it stands${percent >= 0 ? `: ${percent} % of half the thickness is left` : ""}` : "it falls");
-    this.say("sizes", this.measureOpening());
-    const list = (what, own) => (own.length ? `${own.length} ${what}${own.length > 1 ? "s" : ""}: joint${own.length > 1 ? "s" : ""} ${own.map(({ joint }) => joint).join(", ")}` : "");
-    this.say("mechanism", [list("hinge", weakest.hinges), list("slide", weakest.slides)].filter(Boolean).join("; ") || "none");
-    this.say("closing", settled ? `under its own weight joints close by up to ${(1e3 * settled.closing).toFixed(3)} mm, and stones move by up to ${(1e3 * farthest(settled.q, settled.q.map(() => 0), arch.bodies.reach)).toFixed(2)} mm` : law ? "on joints that close this arch slides or falls by its own weight; hard joints are shown" : own && given.thrust ? "as in the analysis of archfem" : "hard: faces meet at once, and do not close further");
-    if (given.ring) {
-      const factor = leastThickness(given.ring, { stones: design.stones, friction: design.friction }, given.parameters);
-      this.say("least", Number.isNaN(factor) ? "it does not stand at any" : `${(factor * given.ring.thickness).toFixed(3)} m`);
-    }
-    this.find("least").parentElement.hidden = !given.ring;
+    this.say("weight", !stands ? "it falls" : percent >= 0 ? `it stands, with ${percent} % to spare` : "it stands");
+    const list = (what, own, s = own.length > 1 ? "s" : "") => (own.length ? [`${own.length} ${what}${s}: joint${s} ${own.map(({ joint }) => joint).join(", ")}`] : []);
+    this.say("mechanism", [...list("hinge", hinges), ...list("slide", slides)].join("; ") || "none");
+    const moved = settled && farthest(settled.q, settled.q.map(() => 0), arch.bodies.reach);
+    this.say("closing", settled ? `under its own weight joints close by up to ${millimetres(settled.closing, 3)}, and stones move by up to ${millimetres(moved, 2)}`
+      : law ? "on joints that close this arch slides or falls by its own weight; hard joints are shown"
+      : isGiven ? "as in the analysis of archfem" : "hard: faces meet at once, and do not close further");
+    for (const name of ["least", "sizes"]) this.find(name).parentElement.hidden = !given.ring;
+    if (!given.ring) return;
+    const inner = arch.joints.map(({ ends }) => ends[0]), [one, other] = [inner[0], inner.at(-1)], rise = Math.max(...inner.map(([, y]) => y)) - Math.min(one[1], other[1]);
+    this.say("sizes", `${distance(one, other).toFixed(2)} m and ${rise.toFixed(2)} m`);
+    const least = leastThickness(given.ring, { stones: design.stones, friction: design.friction }, given.parameters);
+    this.say("least", Number.isNaN(least) ? "it does not stand at any" : `${(least * given.ring.thickness).toFixed(3)} m`);
   }
-  /** Clear span and rise of a ring, along its inner side. */
-  measureOpening() {
-    if (!this.given.ring) return "–";
-    const inner = this.arch.joints.map(({ ends }) => ends[0]), [one, other] = [inner[0], inner.at(-1)];
-    return `${Math.hypot(other[0] - one[0], other[1] - one[1]).toFixed(2)} m and ${(Math.max(...inner.map(([, y]) => y)) - Math.min(one[1], other[1])).toFixed(2)} m`;
-  }
-  /** Ask a worker for the push that joints of a finish bear. */
+  /** Ask a worker for the push that joints of a finish bear, which is said beside that of hard ones. */
   askPush() {
-    const { law, settled, factor } = this.statics;
-    this.asked = (this.asked ?? 0) + 1;
-    if (settled && factor < Infinity) this.workers[0].postMessage({ asked: this.asked, closing: { arch: this.arch, law, q: settled.q, factor } });
+    const { law, settled, weakest: { factor } } = this.statics;
+    this.workers.push?.terminate();
+    if (!settled || factor === Infinity) return;
+    this.assign("push", { closing: { arch: this.arch, law, q: settled.q, factor } }, ([right, left]) => {
+      this.say("collapse", `${Math.min(right, left).toFixed(3)} g, pushed to the ${right <= left ? "right" : "left"}; ${factor.toFixed(3)} g with hard joints`);
+    });
   }
-  /** The push that joints of a finish bear, beside that of hard ones. */
-  tellPush(pushes) {
-    const { factor } = this.statics, weaker = pushes[0] <= pushes[1] ? 0 : 1;
-    this.say("collapse", `${pushes[weaker].toFixed(3)} g, pushed to the ${weaker ? "left" : "right"}; ${factor.toFixed(3)} g with hard joints`);
-  }
-  /** Joints in rows from stone to stone, along which a thrust line is drawn. */
-  chains(joints) {
-    const links = [];
-    const free = (body) => this.arch.bodies.inverse_mass[body][0] > 0, at = new Map();
-    joints.forEach(({ blocks }, j) => blocks.filter(free).forEach((body) => at.set(body, [...(at.get(body) ?? []), j])));
-    for (const own of at.values()) if (own.length === 2) links.push(own);
-    return links;
+  /** Pairs of joints on both sides of a stone, between which a thrust line is drawn. */
+  findLinks() {
+    const { joints, bodies } = this.arch;
+    const pairs = bodies.inverse_mass.map(([free], body) => joints.flatMap(({ blocks }, j) => (free && blocks.includes(body) ? [j] : [])));
+    return pairs.filter((own) => own.length === 2);
   }
 
   /** Shake the arch, and others that differ slightly. */
   run() {
-    const { design } = this, chosen = this.data.motions[this.find("motion").value], { motion, scale } = makeMotion(chosen, design.strength);
-    const runs = [...new Array(RUNS).keys()].map((k) => {
+    const { design, data } = this, { motion, scale } = makeMotion(this.motion, design.strength), count = Math.min(navigator.hardwareConcurrency || 1, 4);
+    const runs = range(RUNS).map((k) => {
       const [one, two, three] = PLASTIC.map((share) => (k ? 2 * ((0.5 + k * share) % 1) - 1 : 0));
       return { number: k, arch: this.build({ ...design, friction: design.friction * (1 + SPREAD.friction * one) }, 1 + SPREAD.thickness * three), scale: scale * (1 + SPREAD.strength * two) };
     });
     this.runs = [];
-    this.job += 1;
-    this.workers.forEach((worker, k) => worker.postMessage({ job: this.job, runs: runs.filter(({ number }) => number % this.workers.length === k), motion }));
-    const peak = this.statics.factor * G, first = motion.x.findIndex((value) => Math.abs(value * scale) >= peak);
+    const receive = ({ number, run }) => {
+      this.runs[number] = run;
+      this.tell();
+      this.show(this.time);
+    };
+    for (const worker of range(count)) this.assign(worker, { engine: data.engine, runs: runs.filter(({ number }) => number % count === worker), motion }, receive);
+    const peak = this.statics.weakest.factor * G, first = motion.x.findIndex((value) => Math.abs(value * scale) >= peak);
     this.say("critical", first < 0 ? "The ground never pushes that hard." : `The ground first pushes that hard at ${(first * motion.dt).toFixed(2)} s; it must do so long enough for the hinges to open.`);
     this.drawGround(motion, scale);
     this.tell();
@@ -198,11 +213,11 @@ class Live {
   show(time) {
     this.time = time;
     this.find("time").value = time;
-    if (this.isMarking) return; // a reader places points on a photo
+    if (this.isMarking) return this.stage.draw({ handles: this.stage.handles }); // a reader places points on a photo
     const at = ({ frames, spacing }) => frames[Math.min(Math.round(time / spacing), frames.length - 1)];
     const still = new Float64Array(3 * this.arch.bodies.mass.length), shaken = this.view === "shake", ready = this.runs.filter((run) => run?.frames);
     const poses = shaken && this.runs[0]?.frames ? at(this.runs[0]) : still, begins = time === 0;
-    const lines = (this.view === "push" ? this.statics.push : this.view === "weight" || begins ? this.statics.weight : []).map((points) => ({ points, kind: "thrust" }));
+    const lines = this.view === "push" ? this.statics.push : this.view === "weight" || begins ? this.statics.weight : [];
     this.stage.draw({ arch: this.arch, poses, ghosts: shaken && !begins ? ready.slice(1).map(at) : [], lines, hinges: this.view === "push" ? this.statics.hinges : [], handles: begins ? this.stage.handles : [] });
     this.say("clock", shaken ? `t = ${time.toFixed(2)} s` : "");
     this.find("cursor").setAttribute("x", (1000 * time) / this.end);
@@ -210,7 +225,7 @@ class Live {
   }
   play() {
     const { end } = this;
-    if (this.view !== "shake") this.root.querySelector("[value=shake]").click();
+    this.root.querySelector("[value=shake]").click();
     if (this.time >= end) this.show(0);
     this.playing = true;
     this.say("play", "❚❚ pause");
@@ -234,7 +249,7 @@ const ready = (async () => {
   const root = document.querySelector(".arch");
   try {
     const data = JSON.parse(new TextDecoder().decode(await inflate(root.querySelector("#data").textContent)));
-    data.wasm = await inflate(data.wasm);
+    data.engine = { module: await WebAssembly.compile(await inflate(data.wasm)), leaves: data.leaves };
     root.live = new Live(root, data);
     root.dataset.ready = "yes";
     return root.live;

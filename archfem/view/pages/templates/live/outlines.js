@@ -4,6 +4,7 @@ const STONE = 20e3 / 9.81; // kg per m² of outline, 1 m wide
 const DRAWN_JOINTS = 24; // along a drawn curve, before it is cut into stones
 const TOUCHING = 3e-3; // distance of outlines that touch [m]
 const ARC_CHORD = Math.PI / 60; // of arcs of a drawing, whose sagitta is then 0.03 % of the radius
+const MOST_G = 2.5; // peak of a record [g], beyond which its unit is taken to be another one
 const DXF_PLACES = { 10: 0, 20: 1, 21: 1, 42: 2 }; // of x, y and bulge in a point, by group code
 
 /** Say what is wrong, and what helps. */
@@ -24,16 +25,21 @@ function drawRing({ kind, span, rise, thickness, left }) {
       return [share < 0.5 ? x : -x, radius * Math.sin(away)];
     },
   };
-  const shares = [...new Array(2001).keys()].map((k) => k / 2000), points = shares.map(curves[kind]), lengths = [0];
-  points.slice(1).forEach(([x, y], k) => lengths.push(lengths[k] + Math.hypot(x - points[k][0], y - points[k][1])));
-  const ends = [...new Array(DRAWN_JOINTS + 1).keys()].map((j) => {
+  const points = range(2001).map((k) => curves[kind](k / 2000)), lengths = [0];
+  points.slice(1).forEach((point, k) => lengths.push(lengths[k] + distance(point, points[k])));
+  const ends = range(DRAWN_JOINTS + 1).map((j) => {
     const k = lengths.findIndex((length) => length >= (j / DRAWN_JOINTS) * lengths[2000] - 1e-9), [before, after] = [points[Math.max(k - 1, 0)], points[Math.min(k + 1, 2000)]];
-    const [x, y] = points[k], along = [after[0] - before[0], after[1] - before[1]], length = Math.hypot(...along);
+    const [along, up] = minus(after, before).map((value) => value / distance(before, after)), inner = plus(points[k], [left[0] + half, left[1]]);
     // at the point of two arcs the joint is upright, and longer
     const deep = kind === "pointed" && 2 * j === DRAWN_JOINTS ? Math.sqrt((radius + thickness) ** 2 - (radius - half) ** 2) - rise : thickness;
-    return [[x, y], [x - (deep * along[1]) / length, y + (deep * along[0]) / length]].map(([u, v]) => [u + left[0] + half, v + left[1]]);
+    return [inner, plus(inner, [-deep * up, deep * along])];
   });
   return { ends, kept: 0, stones: 15, thickness, density: STONE, level: Infinity };
+}
+/** The arch of a drawn ring. */
+function assembleRing(drawn, parameters) {
+  const ring = drawRing(drawn), arch = cutRing(ring, { factor: 1, stones: ring.stones, friction: 0.6 }, parameters);
+  return { name: "a drawn arch", ...arch, ring: { ...ring, level: arch.bodies.level }, thrust: null };
 }
 
 /** Closed outlines of a GeoJSON file: {points, fixed}. */
@@ -47,11 +53,8 @@ function readGeoJson(text) {
 /** Points of an arc by its bulge, the tangent of a quarter of its angle, without its end. */
 function bendLine([x, y, bulge], [u, v]) {
   const turn = 4 * Math.atan(bulge), parts = Math.max(1, Math.ceil(Math.abs(turn) / ARC_CHORD)), away = bulge ? (1 - bulge ** 2) / (4 * bulge) : 0;
-  const [cx, cy] = [0.5 * (x + u) - away * (v - y), 0.5 * (y + v) + away * (u - x)];
-  return [...new Array(parts).keys()].map((k) => {
-    const [c, s] = [Math.cos((k * turn) / parts), Math.sin((k * turn) / parts)];
-    return k ? [cx + c * (x - cx) - s * (y - cy), cy + s * (x - cx) + c * (y - cy)] : [x, y];
-  });
+  const middle = [0.5 * (x + u) - away * (v - y), 0.5 * (y + v) + away * (u - x)], arm = minus([x, y], middle);
+  return range(parts).map((k) => (k ? plus(middle, rotate(arm, (k * turn) / parts)) : [x, y]));
 }
 /** Outlines of a DXF file: closed polylines, and what lines and arcs enclose; those in layers of supports are fixed. */
 function readDxf(text) {
@@ -72,12 +75,11 @@ function readDxf(text) {
   for (const { kind, points: all, layer, flags, 40: radius, 50: from, 51: to } of parts) {
     const fixed = /support|abut|found|rock|fixed/i.test(layer), points = kind === "LWPOLYLINE" ? all.slice(1) : all;
     if (/^(LW)?POLYLINE$/.test(kind) && points.length > 1) {
-      const isClosed = flags % 2 === 1 || Math.hypot(points[0][0] - points.at(-1)[0], points[0][1] - points.at(-1)[1]) === 0;
-      const bent = points.flatMap((point, k) => (k + 1 < points.length || isClosed ? bendLine(point, points[(k + 1) % points.length]) : [point.slice(0, 2)]));
-      if (isClosed) outlines.push({ points: bent, fixed }); else paths.push({ points: bent, fixed });
+      const isClosed = flags % 2 === 1 || distance(points[0], points.at(-1)) === 0, bent = sides(points).slice(0, isClosed ? undefined : -1).flatMap((side) => bendLine(...side));
+      if (isClosed) outlines.push({ points: bent, fixed }); else paths.push({ points: [...bent, points.at(-1).slice(0, 2)], fixed });
     } else if (kind === "LINE") paths.push({ points: points.map((point) => point.slice(0, 2)), fixed });
     else if (kind === "ARC") {
-      const turn = ((((to - from) % 360) + 360) % 360) * (Math.PI / 180), [start, end] = [from, to].map((angle) => [0, 1].map((k) => points[0][k] + radius * Math.cos((angle * Math.PI) / 180 - (k * Math.PI) / 2)));
+      const turn = ((((to - from) % 360) + 360) % 360) * (Math.PI / 180), [start, end] = [from, to].map((angle) => plus(points[0], rotate([radius, 0], (angle * Math.PI) / 180)));
       paths.push({ points: [...bendLine([...start, Math.tan(turn / 4)], end), end], fixed });
     }
   }
@@ -86,11 +88,12 @@ function readDxf(text) {
 /** What lines enclose together: the bounded faces of their plane graph, each anticlockwise. */
 function traceFaces(paths) {
   const values = paths.flatMap(({ points }) => points.flat()), near = 1e-5 * values.reduce((most, value) => Math.max(most, Math.abs(value)), 0), nodes = [];
-  const nodeAt = ([x, y]) => { const k = nodes.findIndex(([u, v]) => Math.hypot(x - u, y - v) <= near); return k < 0 ? nodes.push([x, y]) - 1 : k; };
+  const nodeAt = (point) => { const k = nodes.findIndex((node) => distance(point, node) <= near); return k < 0 ? nodes.push(point) - 1 : k; };
+  const heading = (from, to) => Math.atan2(to[1] - from[1], to[0] - from[0]);
   const links = new Map(); // both ways along each line, once where it is drawn twice
   for (const { points, fixed } of paths) for (const own of [points, [...points].reverse()]) {
     const [from, to] = [nodeAt(own[0]), nodeAt(own.at(-1))], middle = own[Math.floor(own.length / 2)].map((value) => Math.round(value / near / 100));
-    if (from !== to) links.set(`${from} ${to} ${own.length > 2 ? middle : ""}`, { from, to, points: own, fixed, angle: Math.atan2(own[1][1] - own[0][1], own[1][0] - own[0][0]), back: Math.atan2(own.at(-2)[1] - own.at(-1)[1], own.at(-2)[0] - own.at(-1)[0]) });
+    if (from !== to) links.set(`${from} ${to} ${own.length > 2 ? middle : ""}`, { from, to, points: own, fixed, angle: heading(own[0], own[1]), back: heading(own.at(-1), own.at(-2)) });
   }
   /** The next line on the left: from the way back, the first one clockwise. */
   const follow = ({ to, back }) => {
@@ -110,7 +113,7 @@ function traceFaces(paths) {
 /** The convex hull of points, anticlockwise (Andrew's monotone chain). */
 function findHull(points) {
   const sorted = [...points].sort(([x, y], [u, v]) => x - u || y - v), half = (own) => own.reduce((chain, point) => {
-    while (chain.length > 1 && turnOf([0, 1].map((k) => chain.at(-1)[k] - chain.at(-2)[k]), [0, 1].map((k) => point[k] - chain.at(-1)[k])) <= 1e-9) chain.pop();
+    while (chain.length > 1 && turnOf(minus(chain.at(-1), chain.at(-2)), minus(point, chain.at(-1))) <= 1e-9) chain.pop();
     return [...chain, point];
   }, []);
   return [half(sorted), half(sorted.reverse())].flatMap((chain) => chain.slice(0, -1));
@@ -118,25 +121,22 @@ function findHull(points) {
 /** Outlines of the stones of an arch, {points, fixed}, by their hulls. */
 function traceStones({ bodies: { mass, centre, owner, piece_starts: starts, arms, inverse_mass } }) {
   const points = mass.map((_, body) => owner.flatMap((own, piece) => (own === body ? arms.slice(starts[piece], starts[piece + 1]) : [])));
-  return points.map((own, body) => ({ fixed: inverse_mass[body][0] === 0, points: findHull(own).map(([x, y]) => [centre[body][0] + x, centre[body][1] + y]) }));
+  return points.map((own, body) => ({ fixed: inverse_mass[body][0] === 0, points: findHull(own).map((arm) => plus(centre[body], arm)) }));
 }
 /** Outlines with corners, pairs of outline and corner, moved. */
-const moveCorners = (outlines, corners, [dx, dy]) => outlines.map((each, k) => ({ ...each, points: each.points.map(([x, y], i) => (corners.some(([a, b]) => a === k && b === i) ? [x + dx, y + dy] : [x, y])) }));
+const moveCorners = (outlines, corners, step) => outlines.map((each, k) => ({ ...each, points: each.points.map((point, i) => (corners.some(([a, b]) => a === k && b === i) ? plus(point, step) : point)) }));
 /** All corners of outlines at points, as pairs of outline and corner: neighbours share them. */
-const findCorners = (outlines, points) => outlines.flatMap(({ points: own }, k) => own.flatMap(([x, y], i) => (points.some(([u, v]) => Math.hypot(x - u, y - v) < TOUCHING) ? [[k, i]] : [])));
+const findCorners = (outlines, points) => outlines.flatMap(({ points: own }, k) => own.flatMap((corner, i) => (points.some((point) => distance(corner, point) < TOUCHING) ? [[k, i]] : [])));
 /** Outlines as GeoJSON, as archfem reads them. */
 const writeGeoJson = (outlines) => JSON.stringify({ type: "FeatureCollection", features: outlines.map(({ points, fixed }, k) => ({ type: "Feature", properties: { name: `stone ${k + 1}`, fixed }, geometry: { type: "Polygon", coordinates: [[...points, points[0]]] } })) });
 
 /** An outline in metres, anticlockwise, without points that repeat, and its hull; others than nearly convex ones are refused in words. */
 function tidyOutline({ points, fixed }, number, unit) {
-  const far = ([x, y], [u, v]) => Math.hypot(x - u, y - v) > TOUCHING;
-  let ring = points.map((point) => point.map((value) => value * unit));
-  ring = ring.filter((point, k) => far(point, ring[(k + 1) % ring.length]));
-  if (ring.length < 3 || ring.flat().some((value) => !Number.isFinite(value))) refuse(`outline ${number} has no area: draw each stone as a closed line, and choose the unit of the drawing`);
+  const scaled = points.map((point) => point.map((value) => value * unit)), ring = sides(scaled).filter(([one, other]) => !(distance(one, other) <= TOUCHING)).map(([one]) => one);
+  if (ring.length < 3 || !ring.flat().every(Number.isFinite)) refuse(`outline ${number} has no area: draw each stone as a closed line, and choose the unit of the drawing`);
   if (measure([ring]).area < 0) ring.reverse();
-  const edges = ring.map(([x, y], k) => [ring[(k + 1) % ring.length][0] - x, ring[(k + 1) % ring.length][1] - y]);
-  const turns = edges.map((edge, k) => turnOf(edge, edges[(k + 1) % edges.length]));
-  if (Math.abs(turns.reduce((sum, turn) => sum + turn) - 2 * Math.PI) > 1e-6) refuse(`outline ${number} crosses itself: draw it anew`);
+  const edges = sides(ring).map(([from, to]) => minus(to, from)), turned = sides(edges).reduce((sum, [one, other]) => sum + turnOf(one, other), 0);
+  if (Math.abs(turned - 2 * Math.PI) > 1e-6) refuse(`outline ${number} crosses itself: draw it anew`);
   // stones touch by their hulls, and have the mass of their outline
   const hull = findHull(ring);
   if (measure([hull]).area > 1.03 * measure([ring]).area) refuse(`outline ${number} is not convex: cut the stone into convex ones, or run the drawing with archfem`);
@@ -144,22 +144,20 @@ function tidyOutline({ points, fixed }, number, unit) {
 }
 /** Where two outlines touch along an edge: the ends of the joint, or null. */
 function findJoint(one, other) {
-  for (const [k, [x, y]] of one.entries()) {
-    const end = one[(k + 1) % one.length], length = Math.hypot(end[0] - x, end[1] - y), [tx, ty] = [(end[0] - x) / length, (end[1] - y) / length];
-    for (const [i, a] of other.entries()) {
-      const b = other[(i + 1) % other.length], [from, to] = [b, a].map(([u, v]) => [(u - x) * tx + (v - y) * ty, (v - y) * tx - (u - x) * ty]);
-      const [low, high] = [Math.max(0, from[0]), Math.min(length, to[0])];
-      if (Math.max(Math.abs(from[1]), Math.abs(to[1])) < TOUCHING && high - low > 10 * TOUCHING) return [[x + low * tx, y + low * ty], [x + high * tx, y + high * ty]];
+  for (const [start, end] of sides(one)) {
+    const length = distance(start, end), along = minus(end, start).map((value) => value / length);
+    for (const [a, b] of sides(other)) {
+      const [from, to] = [b, a].map((point) => minus(point, start)), low = Math.max(0, dot(from, along)), high = Math.min(length, dot(to, along));
+      const away = Math.max(Math.abs(cross(from, along)), Math.abs(cross(to, along)));
+      if (away < TOUCHING && high - low > 10 * TOUCHING) return [low, high].map((place) => mix(start, end, place / length));
     }
   }
   return null;
 }
 /** Depth by which two convex outlines are in each other; below zero they are apart. */
 function findOverlap(one, other) {
-  const least = (ring, from) => Math.min(...ring.map(([x, y], k) => {
-    const end = ring[(k + 1) % ring.length], length = Math.hypot(end[0] - x, end[1] - y);
-    return -Math.min(...from.map(([u, v]) => ((u - x) * (end[1] - y) - (v - y) * (end[0] - x)) / length));
-  }));
+  const depth = ([start, end], points) => Math.max(...points.map((point) => cross(minus(end, start), minus(point, start)))) / distance(start, end);
+  const least = (ring, points) => Math.min(...sides(ring).map((side) => depth(side, points)));
   return Math.min(least(one, other), least(other, one));
 }
 
@@ -184,8 +182,6 @@ function assembleOutlines(outlines, unit, parameters, friction = 0.6) {
   const bodies = makeBodies(shapes, exact, fixed, { density: STONE, level: low }, friction);
   return { name: "a drawing", bodies, joints, sizes: exact.map(({ area }) => Math.sqrt(area)), parameters, thrust: null, ring: null };
 }
-
-const MOST_G = 2.5; // peak of a record [g], beyond which its unit is taken to be another one
 
 /** An accelerogram of two columns, time [s] and acceleration in a unit [m/s²], or of an AT2 file [g]. */
 function readRecord(text, name, unit = 9.81) {

@@ -3,8 +3,7 @@
 const MAX_CHORD = Math.PI / 12; // of an arc, as in archfem: chords deviate by 0.9 % of the radius
 const FINE_CHORD = 0.02; // of an arc for masses, whose error is a third of its square
 
-const turnOf = ([x, y], [u, v]) => Math.atan2(x * v - y * u, x * u + y * v);
-const mix = (one, other, share) => one.map((value, k) => (1 - share) * value + share * other[k]);
+const turnOf = (one, other) => Math.atan2(cross(one, other), dot(one, other));
 
 /**
  * Joint at a place along a ring, 0 to 1: between neighbours it turns about the point where they meet.
@@ -12,12 +11,10 @@ const mix = (one, other, share) => one.map((value, k) => (1 - share) * value + s
  */
 function sectionAt({ ends, kept }, place, factor) {
   const last = ends.length - 2, k = Math.min(Math.floor(place * (last + 1) + 1e-9), last), share = place * (last + 1) - k;
-  const [[a, b], [c, d]] = [ends[k], ends[k + 1]], one = [b[0] - a[0], b[1] - a[1]], other = [d[0] - c[0], d[1] - c[1]];
-  const cross = one[0] * other[1] - one[1] * other[0];
+  const [[a, b], [c, d]] = [ends[k], ends[k + 1]], one = minus(b, a), other = minus(d, c), sine = cross(one, other);
   let section = [mix(a, c, share), mix(b, d, share)];
-  if (Math.abs(cross) > 1e-6 * Math.hypot(...one) * Math.hypot(...other)) {
-    const along = ((c[0] - a[0]) * other[1] - (c[1] - a[1]) * other[0]) / cross, pole = [a[0] + along * one[0], a[1] + along * one[1]];
-    const radius = (point, [x, y]) => ((point[0] - pole[0]) * x + (point[1] - pole[1]) * y) / Math.hypot(x, y);
+  if (Math.abs(sine) > 1e-6 * Math.hypot(...one) * Math.hypot(...other)) {
+    const pole = mix(a, b, cross(minus(c, a), other) / sine), radius = (point, along) => dot(minus(point, pole), along) / Math.hypot(...along);
     const angle = Math.atan2(one[1], one[0]) + share * turnOf(one, other), radii = mix([a, b].map((p) => radius(p, one)), [c, d].map((p) => radius(p, other)), share);
     section = radii.map((r) => [pole[0] + r * Math.cos(angle), pole[1] + r * Math.sin(angle)]);
   }
@@ -28,14 +25,12 @@ function sectionAt({ ends, kept }, place, factor) {
 /** Area, centroid and polar moment of convex pieces together. */
 function measure(pieces) {
   let area = 0, x = 0, y = 0, moment = 0;
-  for (const points of pieces) {
-    points.forEach(([x0, y0], k) => {
-      const [x1, y1] = points[(k + 1) % points.length], twice = x0 * y1 - x1 * y0;
-      area += twice / 2;
-      x += (twice * (x0 + x1)) / 6;
-      y += (twice * (y0 + y1)) / 6;
-      moment += (twice * (x0 * x0 + x0 * x1 + x1 * x1 + y0 * y0 + y0 * y1 + y1 * y1)) / 12;
-    });
+  for (const [[x0, y0], [x1, y1]] of pieces.flatMap(sides)) {
+    const twice = x0 * y1 - x1 * y0;
+    area += twice / 2;
+    x += (twice * (x0 + x1)) / 6;
+    y += (twice * (y0 + y1)) / 6;
+    moment += (twice * (x0 * x0 + x0 * x1 + x1 * x1 + y0 * y0 + y0 * y1 + y1 * y1)) / 12;
   }
   const centre = [x / area, y / area];
   return { area, centre, moment: moment - area * (centre[0] ** 2 + centre[1] ** 2) };
@@ -43,12 +38,12 @@ function measure(pieces) {
 
 /** Stones of a ring {ends, kept, density, level}, first and last joint on supports, as `make_bodies` of archfem makes them. */
 function cutRing(ring, { factor, stones, friction }, parameters) {
-  const at = (place) => sectionAt(ring, place, factor), faces = [...new Array(stones + 1).keys()].map((k) => at(k / stones));
-  const tangents = faces.map(([[x, y], [u, v]]) => [u - x, v - y]);
+  const at = (place) => sectionAt(ring, place, factor), faces = range(stones + 1).map((k) => at(k / stones));
+  const tangents = faces.map(([inner, outer]) => minus(outer, inner));
   const turn = Math.max(...tangents.slice(1).map((tangent, k) => Math.abs(turnOf(tangents[k], tangent))));
   const chords = Math.max(1, Math.ceil(turn / MAX_CHORD - 1e-9));
   const split = (k, parts) => {
-    const cuts = [...new Array(parts + 1).keys()].map((i) => at((k + i / parts) / stones));
+    const cuts = range(parts + 1).map((i) => at((k + i / parts) / stones));
     return cuts.slice(1).map(([c, d], i) => [cuts[i][0], c, d, cuts[i][1]]); // anticlockwise, for rings from left to right
   };
   /** A support behind a joint, half as deep as that is long. */
@@ -56,7 +51,7 @@ function cutRing(ring, { factor, stones, friction }, parameters) {
     const behind = ([x, y]) => [x + side * 0.5 * (outer[1] - inner[1]), y - side * 0.5 * (outer[0] - inner[0])];
     return [side < 0 ? [inner, outer, behind(outer), behind(inner)] : [outer, inner, behind(inner), behind(outer)]];
   };
-  const ends = [support(faces[0], -1), support(faces[stones], 1)], numbers = [...new Array(stones).keys()];
+  const ends = [support(faces[0], -1), support(faces[stones], 1)], numbers = range(stones);
   const shapes = [ends[0], ...numbers.map((k) => split(k, chords)), ends[1]];
   const exact = [measure(ends[0]), ...numbers.map((k) => measure(split(k, Math.max(1, Math.ceil(turn / FINE_CHORD))))), measure(ends[1])];
   const bodies = makeBodies(shapes, exact, [0, stones + 1], ring, friction);
@@ -69,16 +64,15 @@ function makeBodies(shapes, exact, fixed, ring, friction) {
   const centre = exact.map((each) => each.centre), owner = [], starts = [0], arms = [], normals = [], outer = [];
   shapes.forEach((pieces, body) => pieces.forEach((points, piece) => {
     owner.push(body);
-    points.forEach(([x, y], k) => {
-      const [u, v] = points[(k + 1) % points.length], length = Math.hypot(u - x, v - y);
-      arms.push([x - centre[body][0], y - centre[body][1]]);
-      normals.push([(v - y) / length, (x - u) / length]);
+    sides(points).forEach(([point, next], k) => {
+      const [x, y] = minus(next, point), length = Math.hypot(x, y);
+      arms.push(minus(point, centre[body]));
+      normals.push([y / length, -x / length]);
       outer.push(pieces.length === 1 || [true, piece === pieces.length - 1, true, piece === 0][k]); // not where a stone is cut into pieces
     });
     starts.push(arms.length);
   }));
-  const reach = shapes.map(() => 0);
-  owner.forEach((body, piece) => arms.slice(starts[piece], starts[piece + 1]).forEach(([x, y]) => { reach[body] = Math.max(reach[body], Math.hypot(x, y)); }));
+  const reach = shapes.map((pieces, body) => Math.max(...pieces.flat().map((point) => distance(point, centre[body]))));
   const mass = exact.map(({ area, moment }, body) => (fixed.includes(body) ? [0, 0] : [ring.density * area, ring.density * moment]));
   const level = Math.min(ring.level, ...fixed.flatMap((body) => shapes[body].flat()).map(([, y]) => y));
   const closed = Math.min(...exact.filter((_, body) => !fixed.includes(body)).map(({ area }) => 1e-4 * Math.sqrt(area)), 5e-5);

@@ -9,11 +9,15 @@ class Stage {
   /** Fit an arch: what is in view is its box with room for stones that fall. */
   fit(arch, box) {
     const { centre, arms, owner, piece_starts: starts, level } = arch.bodies;
-    const points = owner.flatMap((body, piece) => arms.slice(starts[piece], starts[piece + 1]).map(([x, y]) => [x + centre[body][0], y + centre[body][1]]));
+    const points = owner.flatMap((body, piece) => arms.slice(starts[piece], starts[piece + 1]).map((arm) => plus(arm, centre[body])));
     const [xs, ys] = [0, 1].map((k) => points.map((point) => point[k])), room = 0.12 * (Math.max(...xs) - Math.min(...xs));
-    this.box = box ?? [Math.min(...xs) - room, Math.min(level, ...ys) - 0.3 * room, Math.max(...xs) + room, Math.max(...ys) + 0.6 * room];
     if (!box) this.backdrop = null;
-    this.canvas.style.aspectRatio = (this.box[2] - this.box[0]) / (this.box[3] - this.box[1]);
+    this.frame(box ?? [Math.min(...xs) - room, Math.min(level, ...ys) - 0.3 * room, Math.max(...xs) + room, Math.max(...ys) + 0.6 * room]);
+  }
+  /** Show a box, its left, low, right and high ends. */
+  frame(box) {
+    this.box = box;
+    this.canvas.style.aspectRatio = (box[2] - box[0]) / (box[3] - box[1]);
   }
   /** Show a picture {arch, poses, ghosts, lines, hinges, handles}; without one, the last again. */
   draw(picture = this.picture) {
@@ -25,9 +29,9 @@ class Stage {
     this.scale = Math.min(canvas.width / (right - left), canvas.height / (high - low));
     this.origin = [0.5 * canvas.width - 0.5 * this.scale * (left + right), canvas.height + this.scale * low];
     const style = getComputedStyle(canvas), colour = (name) => style.getPropertyValue(`--${name}`).trim();
-    const { arch, hinges, handles } = picture;
+    const { arch, hinges = [], handles } = picture;
     if (this.backdrop) this.drawBackdrop();
-    if (arch) this.drawArch(this.picture, colour, ratio);
+    if (arch) this.drawArch(picture, colour, ratio);
     for (const [points, kind] of [[hinges, "hinge"], [handles, "chosen"]]) for (const point of points) this.dot(this.place(point), 6 * ratio, colour(kind), colour("paper"));
   }
   drawArch({ arch, poses, ghosts, lines }, colour, ratio) {
@@ -39,9 +43,10 @@ class Stage {
     pen.globalAlpha = this.backdrop ? 0.75 : 1;
     this.stones(arch, poses, (body) => colour(arch.bodies.inverse_mass[body][0] ? "stone" : "support"), colour("edge"), width);
     pen.globalAlpha = 1;
-    for (const { points, kind } of lines) {
-      this.stroke(points.map((point) => this.place(point)), colour("paper"), 4.6 * width);
-      this.stroke(points.map((point) => this.place(point)), colour(kind), 2.2 * width);
+    for (const points of lines) {
+      const line = points.map((point) => this.place(point));
+      this.stroke(line, colour("paper"), 4.6 * width);
+      this.stroke(line, colour("thrust"), 2.2 * width);
     }
   }
   place([x, y]) { return [this.origin[0] + this.scale * x, this.origin[1] - this.scale * y]; }
@@ -50,10 +55,10 @@ class Stage {
     const box = this.canvas.getBoundingClientRect(), ratio = this.canvas.width / box.width;
     return [(ratio * (clientX - box.left) - this.origin[0]) / this.scale, (this.origin[1] - ratio * (clientY - box.top)) / this.scale];
   }
-  /** A picture behind the arch: its middle stands at a point, with metres a pixel. */
+  /** A picture behind the arch: its lower left corner stands at the origin. */
   drawBackdrop() {
-    const { image, corner, metres } = this.backdrop, [x, y] = this.place(corner);
-    this.pen.drawImage(image, x, y, this.scale * metres * image.width, this.scale * metres * image.height);
+    const { image, metres } = this.backdrop, [wide, high] = [metres * image.width, metres * image.height];
+    this.pen.drawImage(image, ...this.place([0, high]), this.scale * wide, this.scale * high);
   }
   stroke(points, colour, width) {
     const { pen } = this;
@@ -74,8 +79,8 @@ class Stage {
   stones({ bodies: { centre, arms, owner, piece_starts: starts, outer } }, poses, fillOf, edge, width) {
     const { pen } = this;
     owner.forEach((body, piece) => {
-      const [x, y, turn] = poses.subarray(3 * body, 3 * body + 3), [c, s] = [Math.cos(turn), Math.sin(turn)];
-      const points = arms.slice(starts[piece], starts[piece + 1]).map(([a, b]) => this.place([centre[body][0] + x + c * a - s * b, centre[body][1] + y + s * a + c * b]));
+      const [x, y, turn] = poses.subarray(3 * body, 3 * body + 3), middle = plus(centre[body], [x, y]);
+      const points = arms.slice(starts[piece], starts[piece + 1]).map((arm) => this.place(plus(middle, rotate(arm, turn))));
       const fill = fillOf(body);
       if (fill) {
         pen.beginPath();
@@ -86,7 +91,7 @@ class Stage {
         pen.fill();
         pen.stroke();
       }
-      points.forEach((point, k) => { if (outer[starts[piece] + k]) this.stroke([point, points[(k + 1) % points.length]], edge, width); });
+      sides(points).forEach((side, k) => { if (outer[starts[piece] + k]) this.stroke(side, edge, width); });
     });
   }
 }

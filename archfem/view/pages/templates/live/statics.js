@@ -13,6 +13,16 @@ function pivot(table, row, column) {
   }
 }
 
+/** Solve a table of equations for some of its columns; return the column of each row, -1 for a row of zeros. */
+function eliminate(table, columns) {
+  return table.map((line, row) => {
+    const column = columns.reduce((best, k) => (Math.abs(line[k]) > Math.abs(line[best]) ? k : best));
+    if (Math.abs(line[column]) < 1e-10) return -1;
+    pivot(table, row, column);
+    return column;
+  });
+}
+
 /**
  * Maximise c·y over free y under rows·y <= limits, by the simplex method on the dual,
  * min limits·u under rowsᵀ u = c, u >= 0. Returns the value, y and u; null where no y is possible,
@@ -65,32 +75,25 @@ class Equilibrium {
     this.joints = joints.map((joint) => makeJoint(joint, centre));
     // rows: forces along x and y and moment of each free stone; columns: forces, weight, push
     const table = free.flatMap(() => [0, 1, 2].map(() => new Float64Array(count + 2)));
-    this.joints.forEach(({ blocks, normal: [nx, ny], tangent: [tx, ty], middle: [x, y] }, j) => blocks.forEach((body, side) => {
-      const row = rowOf.get(body), sign = side ? 1 : -1;
+    this.joints.forEach(({ blocks, normal, tangent, middle }, j) => blocks.forEach((body, side) => {
+      const row = rowOf.get(body), arm = minus(middle, centre[body]), sign = side ? 1 : -1;
       if (row === undefined) return;
-      const armX = x - centre[body][0], armY = y - centre[body][1];
-      [[nx, ny, armX * ny - armY * nx], [tx, ty, armX * ty - armY * tx], [0, 0, tx * ny - ty * nx]].forEach((column, k) => column.forEach((value, i) => { table[row + i][3 * j + k] = sign * value; }));
+      const forces = [[...normal, cross(arm, normal)], [...tangent, cross(arm, tangent)], [0, 0, cross(tangent, normal)]];
+      forces.forEach((force, k) => force.forEach((value, i) => { table[row + i][3 * j + k] = sign * value; }));
     }));
     for (const [body, row] of rowOf) {
       const own = (parameters.gravity * mass[body][0]) / this.weight;
       table[row + 1][count] = own;
       table[row][count + 1] = -own;
     }
-    const solved = [];
-    table.forEach((line, row) => {
-      let column = 0;
-      for (let k = 1; k < count; k++) if (Math.abs(line[k]) > Math.abs(line[column])) column = k;
-      if (Math.abs(line[column]) < 1e-10) return; // stones that nothing holds: no equilibrium
-      pivot(table, row, column);
-      solved[column] = row;
-    });
-    const left = [...new Array(count).keys()].filter((column) => solved[column] === undefined);
+    const solved = eliminate(table, range(count)), left = range(count).filter((column) => !solved.includes(column));
     /** Coefficients of each force: of the free ones, of the weight and of the push. */
-    this.forces = [...new Array(count).keys()].map((column) => {
-      const line = table[solved[column]];
+    this.forces = range(count).map((column) => {
+      const line = table[solved.indexOf(column)];
       return line ? [...left.map((k) => -line[k]), line[count], line[count + 1]] : [...left.map((k) => (k === column ? 1 : 0)), 0, 0];
     });
     this.size = left.length;
+    this.isHeld = table.every((line, row) => solved[row] >= 0 || Math.abs(line[count]) < SMALL); // all weight goes somewhere
   }
   /** Rows of |M| <= share N h / 2 and |V| <= μ N + c A, over the free forces and the push. */
   conditions(share) {
@@ -107,6 +110,11 @@ class Equilibrium {
       for (const sign of signs) add(sign, [moment, normal], 0.5 * share * depth, 0, { joint, hinge: true });
       if (friction !== null) for (const sign of signs) add(sign, [shear, normal], friction, cohesion / this.weight, { joint, hinge: false });
     });
+    if (!this.isHeld) {
+      rows.push(new Array(this.size + 1).fill(0));
+      limits.push(-1);
+      weights.push({});
+    }
     return { rows, limits, kinds: weights };
   }
   /** Largest push to one side, +1 or -1, in g, with the joints that give way; null: it does not stand. */
@@ -157,14 +165,10 @@ class Equilibrium {
 }
 
 /** Geometry of a joint: its normal points from its lower block to its higher one. */
-function makeJoint({ blocks, ends: [inner, outer], friction, cohesion }, centre) {
-  const depth = Math.hypot(outer[0] - inner[0], outer[1] - inner[1]), tangent = [0, 1].map((k) => (outer[k] - inner[k]) / depth);
-  const middle = [0, 1].map((k) => 0.5 * (inner[k] + outer[k])), [low, high] = blocks.map((body) => centre[body]);
-  let normal = [tangent[1], -tangent[0]];
-  if (normal[0] * (high[0] - low[0]) + normal[1] * (high[1] - low[1]) < 0) normal = normal.map((value) => -value);
-  return { blocks, ends: [inner, outer], depth, tangent, normal, middle, friction, cohesion };
+function makeJoint({ blocks, ends, friction, cohesion }, centre) {
+  const [inner, outer] = ends, depth = distance(inner, outer), tangent = minus(outer, inner).map((value) => value / depth), middle = mix(inner, outer, 0.5);
+  const right = [tangent[1], -tangent[0]], [low, high] = blocks.map((body) => centre[body]), sign = dot(right, minus(high, low)) < 0 ? -1 : 1;
+  return { blocks, ends, depth, tangent, normal: right.map((value) => sign * value), middle, friction, cohesion };
 }
 /** Where a thrust line crosses a joint. */
 const crossing = ({ middle, tangent, depth }, e) => [0, 1].map((k) => middle[k] + e * depth * tangent[k]);
-/** The end of a joint about which it turns: extrados for M > 0. */
-const hingePoint = (joint, sign) => joint.ends[sign > 0 ? 1 : 0];

@@ -2,36 +2,43 @@
 "use strict";
 const MAX_BYTES = 2e7; // of a file that a reader opens
 const MAX_LINKED = 6000; // values of a record that a link holds, about 30 kB
-/** What a reader chose, but for the thickness: it stays where the arch is drawn anew. */
-const keep = ({ stones, friction, finish, strength }) => ({ stones, friction, finish, strength });
-const MARKS = ["the left springing, on the inner side", "the right springing, on the inner side", "the crown, on the inner side"];
+const MARKS = ["the left springing, on the inner side", "the right springing, on the inner side", "the crown, on the inner side", "the crown, on the outer side"];
+const ARROWS = { ArrowLeft: [-0.01, 0], ArrowRight: [0.01, 0], ArrowUp: [0, 0.01], ArrowDown: [0, -0.01] }; // [m]
+const SHAPES = { circle: "circular_arch", ellipse: "elliptical_arch", pointed: "pointed_arch" };
+const UNITS = { 1: "m", 0.01: "cm", 0.001: "mm" };
+const MODEL = '\n[model]\nfidelity = "rigid"\ndisplacements = "large"\n\n[analysis]\ndamping = { ratio = 0.05, modes = "effective" }\n';
 
 class Tools {
   constructor(live) {
-    Object.assign(this, { live, source: { example: 0 }, marks: [], scaleMarks: [], mode: null, dragged: -1, chosen: [], grip: null });
-    this.find = (name) => document.querySelector(`#${name}`);
+    const { stage, stage: { canvas } } = live;
+    Object.assign(this, { live, source: { example: 0 }, begun: { example: 0 }, marks: [], scaleMarks: [], chosen: [], history: [], number: -1, mode: null, drag: null });
     live.data.arches.forEach(({ name }, k) => this.find("example").append(new Option(name, k)));
-    const actions = {
-      example: () => { this.mode = null; this.startFrom({ example: Number(this.find("example").value) }); },
-      photo: (file) => this.placePhoto(file), drawing: (file) => this.openDrawing(file), record: (file) => this.openRecord(file),
-      "record-unit": () => this.openRecord(this.find("record").files[0]), kind: () => this.drawMarked(), length: () => this.setScale(),
-    };
-    for (const [name, action] of Object.entries(actions)) this.find(name).addEventListener("change", () => this.attempt(() => action(this.find(name).files?.[0])));
-    for (const mode of ["scale", "mark"]) this.find(mode).addEventListener("click", () => this.attempt(() => this.begin(mode)));
-    for (const [name, action] of [["stones-move", this.beginMoving], ["undo", this.undoMove], ["case", this.saveCase], ["png", this.savePicture], ["link", this.makeLink]]) this.find(name).addEventListener("click", () => this.attempt(() => action.call(this)));
-    this.find("length").addEventListener("keydown", (event) => { if (event.key === "Enter") this.attempt(() => this.setScale()); });
     live.reset = () => this.restore();
-    const canvas = live.stage.canvas;
-    // a tap or a click places a point; a swipe scrolls the page but where it takes hold of something
-    canvas.addEventListener("click", (event) => this.attempt(() => this.placePoint(live.stage.pointAt(event))));
-    canvas.addEventListener("touchstart", (event) => { if (event.touches.length === 1 && this.catches(live.stage.pointAt(event.touches[0]))) event.preventDefault(); }, { passive: false });
-    canvas.addEventListener("pointerdown", (event) => this.attempt(() => this.press(event)));
-    canvas.addEventListener("pointermove", (event) => this.attempt(() => this.drag(event)));
-    for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => Object.assign(this, { dragged: -1, grip: null }));
-    canvas.addEventListener("keydown", (event) => this.attempt(() => this.pressKey(event)));
+    const changes = {
+      example: ({ value }) => this.startFrom({ example: Number(value) }), kind: () => this.source.drawn && this.drawMarked(),
+      photo: () => this.placePhoto(this.find("photo").files[0]),
+    };
+    for (const name of ["drawing", "unit"]) changes[name] = () => this.openDrawing(this.find("drawing").files[0]);
+    for (const name of ["record", "record-unit"]) changes[name] = () => this.openRecord(this.find("record").files[0]);
+    const clicks = {
+      scale: () => this.begin("scale"), mark: () => this.begin("mark"), "stones-move": () => this.beginMoving(), undo: () => this.undoMove(),
+      case: () => this.saveCase(), png: () => this.savePicture(), link: () => this.makeLink(),
+      stage: (event) => this.placePoint(stage.pointAt(event)),
+    };
+    for (const [name, action] of Object.entries(changes)) this.listen(name, "change", ({ target }) => action(target));
+    for (const [name, action] of Object.entries(clicks)) this.listen(name, "click", action);
+    this.listen("ask", "submit", (event) => { event.preventDefault(); this.setScale(); });
+    this.listen("stage", "pointerdown", (event) => this.press(event));
+    this.listen("stage", "pointermove", (event) => this.drag?.(stage.pointAt(event)));
+    for (const type of ["pointerup", "pointercancel"]) this.listen("stage", type, () => { this.drag = null; });
+    this.listen("stage", "keydown", (event) => this.pressKey(event));
+    // a tap places a point; a swipe scrolls the page but where it takes hold of something
+    canvas.addEventListener("touchstart", (event) => { if (event.touches.length === 1 && this.hold(stage.pointAt(event.touches[0]))) event.preventDefault(); }, { passive: false });
     if (location.hash.length > 1) this.attempt(() => this.openLink());
   }
-  /** Do something; what is wrong stands in words below the buttons. */
+  find(name) { return this.live.find(name); }
+  listen(name, type, action) { this.find(name).addEventListener(type, (event) => this.attempt(() => action(event))); }
+  /** Do something; what is wrong is said in words. */
   async attempt(action) {
     try {
       await action();
@@ -40,191 +47,181 @@ class Tools {
     }
   }
   say(words, isWrong = false) {
-    this.find("message").textContent = words;
+    this.live.say("message", words);
     this.find("message").classList.toggle("doubt", isWrong);
   }
-  async read(file) {
-    if (file.size > MAX_BYTES) refuse(`${file.name} has ${(file.size / 1e6).toFixed(0)} MB: give a file of at most 20 MB`);
-    return file.text();
+  /** Refuse files that would take long to read. */
+  checkSize({ name, size }) {
+    if (size > MAX_BYTES) refuse(`${name} has ${(size / 1e6).toFixed(0)} MB: give a file of at most 20 MB`);
+  }
+  /** What presses on the drawing do: set the scale, mark the arch, move stones, or nothing. */
+  setMode(mode) {
+    const { live } = this;
+    this.mode = mode;
+    live.isMarking = mode === "scale" || mode === "mark";
+    live.root.classList.toggle("marking", live.isMarking);
+    live.stage.canvas.tabIndex = mode === "stones" ? 0 : -1;
+    this.find("ask").hidden = mode !== "scale";
+    this.find("undo").hidden = mode !== "stones";
   }
 
   /** Show the arch of a source: an example, a marked ring or outlines; with a design of a link. */
   startFrom(source, design = {}) {
-    const { data } = this.live, { parameters } = data.arches[0];
-    let arch = data.arches[source.example ?? 0];
-    if (source.outlines) arch = assembleOutlines(source.outlines, source.unit, parameters);
-    if (source.drawn) {
-      const ring = drawRing(source.drawn);
-      arch = { name: "a drawn arch", ...cutRing(ring, { factor: 1, stones: ring.stones, friction: 0.6 }, parameters), ring, thrust: null };
-      ring.level = arch.bodies.level;
-    }
+    const { live, live: { stage, data: { arches } } } = this, { outlines, unit, drawn, moved, example } = source;
+    const arch = outlines ? assembleOutlines(outlines, unit, arches[0].parameters) : drawn ? assembleRing(drawn, arches[0].parameters) : arches[example];
     this.source = source;
-    this.live.isMarking = false;
-    if (!source.moved) Object.assign(this, { begun: source, history: [] });
-    if (!source.drawn) Object.assign(this, source.moved ? {} : { marks: [], mode: null });
-    if (source.example === undefined) this.find("example").selectedIndex = -1;
-    const { stage } = this.live, isMoving = this.mode === "stones", box = isMoving || (stage.backdrop && source.drawn) ? stage.box : null;
-    stage.canvas.tabIndex = isMoving ? 0 : -1;
-    this.find("undo").hidden = !isMoving;
-    this.live.open(arch, design, box);
-    const { joints, bodies } = this.live.arch, supports = bodies.inverse_mass.slice(0, -1).filter(([value]) => value === 0).length;
-    this.say(`${arch.name}: ${joints.length} joints; ${supports} of its blocks ${supports > 1 ? "are supports" : "is a support"}, which follow${supports > 1 ? "" : "s"} the ground`);
+    if (!moved) Object.assign(this, { begun: source, history: [], marks: drawn ? this.marks : [] });
+    this.setMode(moved ? this.mode : null);
+    if (example === undefined) this.find("example").selectedIndex = -1;
+    live.open(arch, design, this.mode === "stones" || (drawn && stage.backdrop) ? stage.box : null);
+    if (drawn) this.showHandles(this.marks);
+    const supports = arch.bodies.inverse_mass.slice(0, -1).filter(([value]) => value === 0).length;
+    this.say(outlines ? `${arch.name}: ${arch.joints.length} joints; ${supports} of its blocks ${supports > 1 ? "are supports" : "is a support"}, which follow${supports > 1 ? "" : "s"} the ground` : "");
+  }
+  /** The arch before its stones were moved and sliders were used; motion and photo stay. */
+  restore() { this.startFrom(this.begun, { strength: this.live.design.strength }); }
+  showHandles(points) {
+    this.live.stage.handles = points;
+    this.live.show(0);
   }
 
   async placePhoto(file) {
-    if (file.size > MAX_BYTES) refuse(`${file.name} has ${(file.size / 1e6).toFixed(0)} MB: give a picture of at most 20 MB`);
+    if (!file) return;
+    this.checkSize(file);
     const image = await createImageBitmap(file).catch(() => refuse(`${file.name} is no picture: give a JPEG or a PNG`));
-    this.live.stage.backdrop = { image, corner: [0, (10 * image.height) / image.width], metres: 10 / image.width };
-    Object.assign(this, { marks: [], scaleMarks: [], isScaled: false });
-    this.showPhoto();
+    this.live.stage.backdrop = { image };
+    this.isScaled = false;
+    this.framePhoto(10 / image.width);
     this.begin("scale");
   }
-  showPhoto() {
-    const { stage } = this.live, { image, metres } = stage.backdrop;
-    stage.backdrop.corner = [0, metres * image.height];
-    stage.box = [0, 0, metres * image.width, metres * image.height];
-    stage.canvas.style.aspectRatio = image.width / image.height;
-    this.drawMarks();
+  framePhoto(metres) {
+    const { stage, stage: { backdrop } } = this.live;
+    backdrop.metres = metres;
+    stage.frame([0, 0, metres * backdrop.image.width, metres * backdrop.image.height]);
   }
   begin(mode) {
-    const { backdrop } = this.live.stage;
-    if (!backdrop) refuse("place a photo or an elevation first");
+    const { stage } = this.live;
+    if (!stage.backdrop) refuse("place a photo or an elevation first");
     if (mode === "mark" && !this.isScaled) refuse("this photo has no scale yet: click two points of known distance, and give it in metres");
-    this.mode = mode;
     this[mode === "scale" ? "scaleMarks" : "marks"] = [];
-    this.say(mode === "scale" ? "Click two points whose distance you know." : `Click ${MARKS[0]}.`);
-    this.drawMarks();
-  }
-  drawMarks() {
-    this.live.isMarking = true;
+    this.setMode(mode);
+    this.live.root.querySelector("[value=shake]").click();
     this.live.tell();
-    this.live.stage.draw({ arch: null, ghosts: [], lines: [], hinges: [], handles: this.mode === "scale" ? this.scaleMarks : this.marks });
+    this.showHandles([]);
+    this.say(mode === "scale" ? "Click two points whose distance you know." : `Click ${MARKS[0]}.`);
+    stage.canvas.scrollIntoView({ block: "center" });
   }
+  /** Place a point of the scale, of which a third one moves the nearest, or of the arch. */
+  placePoint(point) {
+    const { scaleMarks: two, marks } = this, far = (place) => distance(place, point);
+    if (this.mode === "scale") {
+      if (two.length === 2) two[far(two[0]) < far(two[1]) ? 0 : 1] = point; else two.push(point);
+      this.showHandles(two);
+      this.say(two.length < 2 ? "Click the second point." : "Give their distance below the photo. Another click moves the nearer point.");
+      if (two.length === 2) this.find("length").focus();
+    } else if (this.mode === "mark" && marks.length < MARKS.length) {
+      marks.push(point);
+      this.showHandles(marks);
+      if (marks.length === MARKS.length) this.drawMarked(); else this.say(`Click ${MARKS[marks.length]}.`);
+    }
+  }
+  setScale() {
+    const length = Number(this.find("length").value), [one, other] = this.scaleMarks, { backdrop, scale } = this.live.stage;
+    if (!other) refuse("click two points of the photo first");
+    if (scale * distance(one, other) < 10 * devicePixelRatio) refuse("the two points are one: click places that are farther apart");
+    this.isScaled = true;
+    this.framePhoto((backdrop.metres * length) / distance(one, other));
+    this.begin("mark");
+  }
+  /** The ring through the marks; its springings are level. A mark on its outer side gives the thickness, and goes. */
+  drawMarked() {
+    const [[x0, y0], [x1, y1], [, top], outer] = this.marks, level = 0.5 * (y0 + y1), span = Math.abs(x1 - x0), { design } = this.live;
+    if (Math.abs(y1 - y0) > 0.1 * span) refuse(`the springings differ by ${Math.abs(y1 - y0).toFixed(2)} m in height: drag them level, or give the outlines of the stones instead`);
+    if (outer && outer[1] - top < 0.01 * span) refuse("the outer side of the crown lies above its inner side: drag the last point up");
+    const thickness = outer ? Math.round(200 * (outer[1] - top)) / 200 : design.thickness, { stones, friction, finish, strength } = design;
+    const drawn = { kind: this.find("kind").value, span, rise: top - level, thickness, left: [Math.min(x0, x1), level] };
+    this.startFrom({ drawn }, this.source.drawn ? { stones, friction, finish, strength } : {});
+    this.marks.length = 3;
+    this.showHandles(this.marks);
+    this.say("Now match the photo: drag the three points; set thickness and number of stones by their sliders.");
+  }
+
   /** Let the reader move stones and corners; those of neighbours go along. */
   beginMoving() {
-    this.mode = "stones";
+    if (this.live.isMarking) refuse("mark the arch first, or start from an example");
+    this.setMode("stones");
     this.chosen = [];
-    if (!this.source.moved) this.history = [];
     this.showMoved(traceStones(this.live.arch));
     this.live.stage.canvas.focus();
     this.say("Drag a stone by its middle, or a corner. Keys: Enter chooses the next stone, arrows move it by 1 cm.");
   }
   undoMove() {
-    const before = this.history.pop();
-    if (!before) refuse("no stone was moved");
+    const before = this.history.pop() ?? refuse("no stone was moved");
     this.chosen = [];
     this.showMoved(before);
   }
-  /** The arch before its stones were moved and sliders were used; motion and photo stay. */
-  restore() {
-    this.mode = null;
-    const { marks, live: { design: { strength } } } = this;
-    this.startFrom(this.begun, { strength });
-    if (this.begun.drawn) { Object.assign(this, { marks }); this.live.stage.handles = marks; this.live.show(0); }
-  }
   showMoved(outlines) {
-    const { design: { friction, finish, strength }, stage } = this.live;
+    const { friction, finish, strength } = this.live.design;
     this.startFrom({ outlines, unit: 1, file: "stones.geojson", moved: true }, { friction, finish, strength });
-    stage.handles = this.chosen.map(([k, i]) => outlines[k].points[i]);
-    this.live.show(0);
+    this.choose(this.chosen);
+  }
+  /** Choose corners, pairs of outline and corner, which moves take along. */
+  choose(corners) {
+    this.chosen = corners;
+    this.showHandles(corners.map(([k, i]) => this.source.outlines[k].points[i]));
   }
   /** Corners at a point, with those of neighbours: of one corner, or of the stone around it. */
   cornersAt(point) {
-    const { outlines } = this.source, far = ([x, y]) => this.live.stage.scale * Math.hypot(x - point[0], y - point[1]);
+    const { outlines } = this.source, far = (place) => this.live.stage.scale * distance(place, point);
     const corner = outlines.flatMap(({ points }) => points).reduce((best, each) => (far(each) < far(best) ? each : best));
-    const isInside = ({ points }) => points.every(([x, y], k) => { const [u, v] = points[(k + 1) % points.length]; return (u - x) * (point[1] - y) >= (v - y) * (point[0] - x); });
+    const isInside = ({ points }) => sides(points).every(([from, to]) => cross(minus(to, from), minus(point, from)) >= 0);
     const stone = outlines.find(isInside)?.points ?? [], middle = [0, 1].map((k) => stone.reduce((sum, each) => sum + each[k], 0) / stone.length);
     const isCorner = far(corner) < 16 * devicePixelRatio && !(far(middle) < far(corner)); // a stone may be as small as a finger
     return findCorners(outlines, isCorner ? [corner] : stone);
   }
-  /** Whether a press at a point takes hold of a mark, a corner or a stone. */
-  catches(point) {
-    if (this.mode === "stones") return this.cornersAt(point).length > 0;
-    return Boolean(this.source.drawn) && !this.live.isMarking && this.findMark(point) >= 0;
-  }
-  findMark([u, v]) { return this.marks.findIndex(([x, y]) => this.live.stage.scale * Math.hypot(x - u, y - v) < 24 * devicePixelRatio); }
-  pressKey(event) {
-    if (this.mode !== "stones") return;
-    const { outlines } = this.source, move = { ArrowLeft: [-0.01, 0], ArrowRight: [0.01, 0], ArrowUp: [0, 0.01], ArrowDown: [0, -0.01] }[event.key];
-    if (!move && event.key !== "Enter") return;
-    event.preventDefault();
-    if (move) { this.history.push(outlines); return this.showMoved(moveCorners(outlines, this.chosen, move)); }
-    this.number = ((this.number ?? -1) + 1) % outlines.length;
-    this.chosen = findCorners(outlines, outlines[this.number].points);
-    this.showMoved(outlines);
-    this.say(`stone ${this.number + 1} is chosen`);
+  /** What a press at a point takes hold of, a stone, a corner or a mark: how it moves with the pointer, or null. */
+  hold(point) {
+    if (this.mode === "stones") {
+      const { outlines } = this.source, corners = this.cornersAt(point);
+      return corners.length ? (to) => this.showMoved(moveCorners(outlines, corners, minus(to, point))) : null;
+    }
+    const { marks, live: { stage } } = this, number = marks.findIndex((mark) => stage.scale * distance(mark, point) < 24 * devicePixelRatio);
+    const isPlaced = this.mode === "mark" ? marks.length === MARKS.length : this.mode === null;
+    return number < 0 || !isPlaced ? null : (to) => { marks[number] = to; this.live.show(0); this.drawMarked(); };
   }
   press(event) {
     const { stage } = this.live, point = stage.pointAt(event);
-    if (this.mode === "stones") {
-      const { outlines } = this.source;
-      this.chosen = this.cornersAt(point);
-      if (this.chosen.length) {
-        this.grip = { point, outlines };
-        this.history.push(outlines);
-        stage.canvas.setPointerCapture(event.pointerId);
-      }
-      this.showMoved(outlines);
-    } else if (this.source.drawn && !this.live.isMarking && this.findMark(point) >= 0) {
-      this.dragged = this.findMark(point);
-      stage.canvas.setPointerCapture(event.pointerId);
+    this.drag = this.hold(point);
+    if (this.drag) stage.canvas.setPointerCapture(event.pointerId);
+    if (this.mode !== "stones") return;
+    if (this.drag) this.history.push(this.source.outlines);
+    this.choose(this.cornersAt(point));
+  }
+  pressKey(event) {
+    const step = ARROWS[event.key], { outlines } = this.source;
+    if (this.mode !== "stones" || !(step || event.key === "Enter")) return;
+    event.preventDefault();
+    if (step) {
+      this.history.push(outlines);
+      return this.showMoved(moveCorners(outlines, this.chosen, step));
     }
-  }
-  /** Place a point of the scale, of which a third one moves the nearest, or a springing or the crown. */
-  placePoint(point) {
-    const { scaleMarks: two } = this, far = ([x, y]) => Math.hypot(x - point[0], y - point[1]);
-    if (!this.live.isMarking) return;
-    if (this.mode === "scale") {
-      if (two.length === 2) two[far(two[0]) < far(two[1]) ? 0 : 1] = point; else two.push(point);
-      this.say(two.length < 2 ? "Click the second point." : "Give their distance in metres, and press Enter. Another click moves the nearer point.");
-      this.drawMarks();
-      if (two.length === 2) this.find("length").focus();
-    } else if (this.mode === "mark" && this.marks.length < 3) {
-      this.marks.push(point);
-      this.drawMarks();
-      if (this.marks.length < 3) this.say(`Click ${MARKS[this.marks.length]}.`); else this.drawMarked();
-    }
-  }
-  drag(event) {
-    const point = this.live.stage.pointAt(event);
-    if (this.grip) this.showMoved(moveCorners(this.grip.outlines, this.chosen, point.map((value, k) => value - this.grip.point[k])));
-    if (this.dragged < 0) return;
-    this.marks[this.dragged] = point;
-    this.drawMarked();
-  }
-  setScale() {
-    const length = Number(this.find("length").value), [one, other] = this.scaleMarks, { backdrop, scale } = this.live.stage;
-    if (this.mode !== "scale") return; // Enter comes as a key and as a change
-    if (!other) refuse("click two points of the photo first");
-    if (scale * Math.hypot(one[0] - other[0], one[1] - other[1]) < 10 * devicePixelRatio) refuse("the two points are one: click places that are farther apart");
-    if (!(length > 0.01 && length < 1000)) refuse("give the distance of the two points in metres");
-    backdrop.metres *= length / Math.hypot(one[0] - other[0], one[1] - other[1]);
-    this.isScaled = true;
-    this.showPhoto();
-    this.begin("mark");
-  }
-  /** The ring through the marks; its springings are level. */
-  drawMarked() {
-    if (this.marks.length < 3) return;
-    const [[x0, y0], [x1, y1], [, top]] = this.marks, level = 0.5 * (y0 + y1), span = Math.abs(x1 - x0);
-    if (Math.abs(y1 - y0) > 0.1 * span) refuse(`the springings differ by ${Math.abs(y1 - y0).toFixed(2)} m in height: a drawn ring has level ones; give the outlines of its stones instead`);
-    const thickness = this.source.drawn ? this.live.design.thickness : Math.round(10 * Math.max(span, 1)) / 100;
-    this.startFrom({ drawn: { kind: this.find("kind").value, span, rise: top - level, thickness, left: [Math.min(x0, x1), level] } }, this.source.drawn ? keep(this.live.design) : {});
-    this.live.stage.handles = this.marks;
-    this.live.show(0);
-    this.say("Drag the three points; set thickness and number of stones by their sliders.");
+    this.number = (this.number + 1) % outlines.length;
+    this.choose(findCorners(outlines, outlines[this.number].points));
+    this.say(`stone ${this.number + 1} is chosen`);
   }
 
   async openDrawing(file) {
-    const text = await this.read(file), isDxf = /\.dxf$/i.test(file.name), unit = Number(this.find("unit").value);
+    if (!file) return;
+    this.checkSize(file);
+    const text = await file.text(), unit = Number(this.find("unit").value);
     let outlines = [];
-    try { outlines = isDxf ? readDxf(text) : readGeoJson(text); } catch { refuse(`${file.name} cannot be read: give GeoJSON, or DXF as text`); }
-    this.live.stage.backdrop = null;
+    try { outlines = /\.dxf$/i.test(file.name) ? readDxf(text) : readGeoJson(text); } catch { refuse(`${file.name} cannot be read: give GeoJSON, or DXF as text`); }
     this.startFrom({ outlines, unit, file: file.name });
   }
   async openRecord(file) {
     if (!file) return;
-    const record = readRecord(await this.read(file), file.name, Number(this.find("record-unit").value));
+    this.checkSize(file);
+    const record = readRecord(await file.text(), file.name, Number(this.find("record-unit").value));
     this.addRecord(record);
     this.find("motion").dispatchEvent(new Event("input"));
     this.say(`${file.name}: ${record.x.length} values every ${record.dt.toPrecision(3)} s, up to ${record.strength.toFixed(2)} g`);
@@ -239,14 +236,12 @@ class Tools {
 
   /** The case as `archfem run` reads it. */
   writeCase() {
-    const { live } = this, { design, data } = live, { drawn, outlines, unit, file } = this.source, motion = data.motions[this.find("motion").value];
-    const shapes = { circle: "circular_arch", ellipse: "elliptical_arch", pointed: "pointed_arch" };
-    const model = '\n[model]\nfidelity = "rigid"\ndisplacements = "large"\n\n[analysis]\ndamping = { ratio = 0.05, modes = "effective" }\n';
-    let text = data.arches[this.source.example ?? 0].case;
-    if (drawn) text = `title = "a drawn arch"\n\n[structure]\nshape = "${shapes[drawn.kind]}"\nspan = ${drawn.span.toFixed(4)}\nrise = ${drawn.rise.toFixed(4)}\nthickness = 0\nvoussoirs = 0\n${model}`;
-    if (outlines) text = `title = "a drawing"\n\n[structure]\nshape = "outlines"\nfile = "${file}"  # beside this file\nunit = "${{ 1: "m", 0.01: "cm", 0.001: "mm" }[unit]}"\nsnap = "3 mm"\n${model}`;
+    const { live: { design, data, finishes, motion } } = this, { drawn, outlines, unit, file, example } = this.source;
+    let text = data.arches[example ?? 0].case;
+    if (drawn) text = `title = "a drawn arch"\n\n[structure]\nshape = "${SHAPES[drawn.kind]}"\nspan = ${drawn.span.toFixed(4)}\nrise = ${drawn.rise.toFixed(4)}\nthickness = 0\nvoussoirs = 0\n${MODEL}`;
+    if (outlines) text = `title = "a drawing"\n\n[structure]\nshape = "outlines"\nfile = "${file}"  # beside this file\nunit = "${UNITS[unit]}"\nsnap = "3 mm"\n${MODEL}`;
     if (design.stones) text = text.replace(/^thickness = .*$/m, `thickness = ${design.thickness}`).replace(/^voussoirs = .*$/m, `voussoirs = ${design.stones}`);
-    const law = live.finishes.find(({ name }) => name === design.finish);
+    const law = finishes.find(({ name }) => name === design.finish);
     text += `\n[contacts."stone to stone"]\nfriction = ${design.friction}\n`;
     if (law) text += `normal_stiffness = ${law.stiffness}  # ${law.name}\nshear_stiffness = ${law.shear}\nclosure = ${law.closure}\n`;
     const seed = motion.name.match(/^earthquake (\d)$/);
@@ -263,14 +258,16 @@ class Tools {
   }
   /** The picture, with what it shows below it. */
   savePicture() {
-    const { canvas } = this.live.stage, size = Math.max(canvas.width / 60, 12), picture = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height + 6 * size });
-    const pen = picture.getContext("2d"), style = getComputedStyle(document.body), texts = ["sizes", "weight", "collapse"].map((name) => `${this.find(name).previousElementSibling.textContent}: ${this.find(name).textContent}`);
-    const { design } = this.live, lines = [this.find("verdict").textContent, texts.join("; "), `${design.thickness ? `thickness ${design.thickness.toFixed(3)} m, ` : ""}friction ${design.friction.toFixed(2)}, ${this.find("motion").selectedOptions[0].text} at ${this.find("strength-value").textContent}`];
-    Object.assign(pen, { fillStyle: style.backgroundColor });
+    const { design, given, stage: { canvas: { width, height }, canvas } } = this.live, size = Math.max(width / 60, 12), style = getComputedStyle(document.body);
+    const text = (name) => this.find(name).textContent, facts = given.ring ? ["sizes", "weight", "collapse"] : ["weight", "collapse"];
+    const lines = [text("verdict"), ...facts.map((name) => `${this.find(name).previousElementSibling.textContent}: ${text(name)}`)];
+    lines.push(`${design.thickness ? `thickness ${text("thickness-value")}, ` : ""}friction ${text("friction-value")}, ${this.find("motion").selectedOptions[0].text} at ${text("strength-value")}`);
+    const picture = Object.assign(document.createElement("canvas"), { width, height: height + 1.7 * size * (lines.length + 0.6) }), pen = picture.getContext("2d");
+    pen.fillStyle = style.backgroundColor;
     pen.fillRect(0, 0, picture.width, picture.height);
     pen.drawImage(canvas, 0, 0);
     Object.assign(pen, { fillStyle: style.color, font: `${size}px ${style.fontFamily}` });
-    lines.forEach((line, k) => pen.fillText(line, size, canvas.height + (1.6 + 1.7 * k) * size, picture.width - 2 * size));
+    lines.forEach((line, k) => pen.fillText(line, size, height + 1.7 * size * (k + 1), width - 2 * size));
     picture.toBlob((blob) => this.save(blob, "arch.png"));
   }
   save(blob, name) {
@@ -281,27 +278,23 @@ class Tools {
   }
   /** The arch and what was chosen, in the address of this page. */
   async makeLink() {
-    const motion = Number(this.find("motion").value), { isOwn, x, ...rest } = this.live.data.motions[motion], fits = isOwn && x.length <= MAX_LINKED;
+    const { design, stage, motion: { isOwn, x, ...rest } } = this.live, motion = Number(this.find("motion").value), fits = isOwn && x.length <= MAX_LINKED;
     // whole mm/s², joined by a sign that addresses leave as it is
     const record = fits ? { ...rest, y: null, x: x.map((value) => Math.round(1e3 * value)).join("_") } : undefined;
-    location.hash = encodeURIComponent(JSON.stringify({ source: this.source, design: this.live.design, motion, record }));
+    location.hash = encodeURIComponent(JSON.stringify({ source: this.source, design, motion, record }));
     await navigator.clipboard?.writeText(location.href).catch(() => {});
-    const without = [this.live.stage.backdrop ? "the photo" : "", isOwn && !fits ? `your record of ${x.length} values` : ""].filter(Boolean).join(" and ");
+    const without = [stage.backdrop ? "the photo" : "", isOwn && !fits ? `your record of ${x.length} values` : ""].filter(Boolean).join(" and ");
     this.say(`The address of this page holds the arch now: copy it.${without ? ` It leaves out ${without}.` : ""}`);
   }
   openLink() {
     let found;
     try { found = JSON.parse(decodeURIComponent(location.hash.slice(1))); } catch { refuse("the link is not complete: copy all of it"); }
-    this.startFrom(found.source, found.design);
-    if (found.record) {
-      const x = found.record.x.split("_").map((value) => Number(value) / 1e3);
-      this.addRecord({ ...found.record, x, y: x.map(() => 0) });
-    } else {
-      const known = this.live.data.motions[found.motion];
-      this.find("motion").value = known ? found.motion : 0;
-      if (!known) this.say("The record of this link was too long for it: open the record again.", true);
-    }
-    this.live.design.strength = found.design.strength;
-    this.live.change("motion");
+    const { source, design, motion, record } = found, known = this.live.data.motions[motion];
+    if (record) {
+      const x = record.x.split("_").map((value) => Number(value) / 1e3);
+      this.addRecord({ ...record, x, y: x.map(() => 0) });
+    } else this.find("motion").value = known ? motion : 0;
+    this.startFrom(source, design);
+    if (!record && !known) this.say("The record of this link was too long for it: open the record again.", true);
   }
 }
