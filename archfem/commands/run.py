@@ -171,7 +171,7 @@ def assess(options: argparse.Namespace) -> None:
 def rate(options: argparse.Namespace) -> None:
     """Rate the bridge of a case for a vehicle, by the joints and the fill of its [limit]."""
     case = Case.read(options.case, options.changes)
-    keys = ("vehicle", "live", "impact", "dead", "width")
+    keys = ("vehicle", "live", "impact", "dead", "width", "area_load")
     given = {key: value for key in keys if (value := getattr(options, key)) is not None}
     with _record_doubts() as doubts:
         found = rate_case(case.structure, case.rating, case.limit, given)
