@@ -35,6 +35,7 @@ OPTIONAL_PACKAGES = {
     ),
     "PETSc": Requirement("its solvers", "it comes with FEniCSx, " + FENICSX_REMEDY),
     "ObsPy": Requirement("records in miniSEED and SAC", "pip install 'archfem[seismology]'"),
+    "python-docx": Requirement("reports for Word", "pip install 'archfem[word]'"),
     "pygmm": Requirement("ground-motion models", "pip install 'archfem[hazard]'"),
     "Clarabel": Requirement("bounds with a plastic fill", "pip install 'archfem[cones]'"),
     "Chromium": Requirement(

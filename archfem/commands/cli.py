@@ -229,7 +229,7 @@ def _add_result_commands(commands: Any) -> None:
     about = "one HTML page of a result folder, to print"
     add = _add_command(commands, "report", about, "run", description=text)
     add("folder", metavar="FOLDER", help="that `archfem run` has written, or a history.nc")
-    add("--out", metavar="FILE.html", help="the page (FOLDER/report.html)")
+    add("--out", metavar="FILE.html", help="the page (FOLDER/report.html), or .docx for Word")
     about = "who signs what, as in report.author=NAME; repeatable"
     add(
         "--set", action="append", default=[], metavar="report.KEY=WORDS", dest="changes", help=about

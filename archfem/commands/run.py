@@ -251,6 +251,8 @@ def verdict(options: argparse.Namespace) -> None:
 
 def report(options: argparse.Namespace) -> None:
     """Write the report of a result folder, or of a history alone."""
+    if options.pdf and str(options.out).lower().endswith(".docx"):
+        raise InvalidInput(f"--pdf prints the page, and {options.out} is none: give FILE.html")
     if (history := Path(options.folder)).is_file():
         path = History.read(history).report(options.out or history.with_suffix(".html"))
     else:
