@@ -48,6 +48,7 @@ OPTIONAL_PACKAGES = {
     "trame": Requirement("pyvista's HTML pages", "pip install 'archfem[notebooks]'"),
     "imageio": Requirement("films", "pip install 'archfem[film]'"),
     "pyvista": Requirement("its viewer and its films", "pip install 'archfem[film]'"),
+    "ifcopenshell": Requirement("IFC files", "pip install 'archfem[ifc]'"),
     "gmsh": Requirement(
         "meshes",
         "pip install 'archfem[mesh]'; where libGLU or another library is missing, 'apt-get install "
