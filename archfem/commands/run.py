@@ -157,7 +157,7 @@ def assess(options: argparse.Namespace) -> None:
     with _record_doubts() as doubts:
         found = case.assessment.solve(case.structure, demand, options.parts)
     texts = [f"{name}: {result}" for name, result in found.items()]
-    text = "\n\n".join([*texts, *filter(None, ["\n".join(doubts)])])
+    text = "\n\n".join([*texts, *filter(None, ["\n".join(dict.fromkeys(doubts))])])
     print(f"{case.title}\n{text}")
 
     def draw() -> Files:
