@@ -169,7 +169,8 @@ def moving_load(
     `collapse_factor` follows at the worst place, and where that finds nothing.
 
     A distributed load grows with the axles. At each place it stands on those parts of the road, in
-    40 strips, that sink in the mechanism of the least factor.
+    40 strips, that sink in the mechanism of the least factor; sets of strips are searched, from the
+    mechanisms of other places and of the distributed load alone.
 
     Args:
         structure: the bridge, or an `archfem.Analysis` of it.
@@ -612,7 +613,8 @@ def _lay_strips(
     """Return each row of axles with the strips of the least factor, and the forces of all."""
     # A mechanism bounds the factor of any load from above: by its resistance over the power of the
     # axles, and of the strips that sink in it (kinematic theorem). At each place the best one so
-    # far selects the strips; the mechanism of these is added, until none is better.
+    # far selects the strips; the mechanism of these is added, until none is better. The first ones
+    # are of the distributed load alone, on stretches of the road: else a search may end early.
     road, motions, resistances = np.array(forces), list[Array](), list[float]()
     powers = np.array([dead.blocks.dimensionless(force) for force in road])
 
@@ -624,8 +626,9 @@ def _lay_strips(
         resistances.append(-optimum.value)  # at a power of 1
         return -optimum.value
 
-    for half in np.array_split(road, 2):
-        solve(half.sum(axis=0))
+    for size in (len(road) // 8, len(road) // 4, len(road) // 2):
+        for first in range(0, len(road) - size + 1, max(size // 2, 1)):
+            solve(road[first : first + size].sum(axis=0))
     chosen = {row: (solve(load), np.zeros(len(road), dtype=bool)) for row, load in axles.items()}
     for row in (*axles, *reversed(axles)):  # and back with the mechanisms of all places
         load = dead.blocks.dimensionless(axles[row])
