@@ -35,6 +35,7 @@ OPTIONAL_PACKAGES = {
     ),
     "PETSc": Requirement("its solvers", "it comes with FEniCSx, " + FENICSX_REMEDY),
     "ObsPy": Requirement("records in miniSEED and SAC", "pip install 'archfem[seismology]'"),
+    "python-docx": Requirement("reports for Word", "pip install 'archfem[word]'"),
     "pygmm": Requirement("ground-motion models", "pip install 'archfem[hazard]'"),
     "Clarabel": Requirement("bounds with a plastic fill", "pip install 'archfem[cones]'"),
     "Chromium": Requirement(
@@ -47,6 +48,7 @@ OPTIONAL_PACKAGES = {
     "trame": Requirement("pyvista's HTML pages", "pip install 'archfem[notebooks]'"),
     "imageio": Requirement("films", "pip install 'archfem[film]'"),
     "pyvista": Requirement("its viewer and its films", "pip install 'archfem[film]'"),
+    "ifcopenshell": Requirement("IFC files", "pip install 'archfem[ifc]'"),
     "gmsh": Requirement(
         "meshes",
         "pip install 'archfem[mesh]'; where libGLU or another library is missing, 'apt-get install "

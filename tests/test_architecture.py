@@ -50,6 +50,8 @@ ALLOWED_IN = {
     "imageio": "view.films",
     "imageio_ffmpeg": "view.films",
     "jinja2": "view.pages",
+    "ifcopenshell": "masonry.survey.ifc",
+    "docx": "view.pages.word",
     "markupsafe": "view.pages",
     "pint": "units",
     "shapely": "masonry",

@@ -4,6 +4,7 @@ import errno
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -169,3 +170,17 @@ def test_studies_start_workers_anew_where_no_process_can_fork(tmp_path):
     assert ran.returncode == 0, ran.stderr
     table = (tmp_path / "out" / "results.csv").read_text(encoding="utf-8")
     assert len(table.splitlines()) == 3
+
+
+def test_the_conda_recipe_has_the_version_and_the_dependencies_of_the_package():
+    """No conda builds it here: the recipe says so, and is compared word by word."""
+    recipe = (ROOT / ".ci" / "conda" / "meta.yaml").read_text(encoding="utf-8")
+    assert "have not built it" in recipe
+    assert f'version: "{af.__version__}"' in recipe
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    listed = recipe.split("  run:\n")[1].split("test:")[0].split("    - ")[1:]
+    names = {"matplotlib": "matplotlib-base", "lazy-loader": "lazy_loader", "netCDF4": "netcdf4"}
+    own = [each.partition(">=") for each in project["dependencies"]]
+    expected = {f"{names.get(name, name)} >={least}" for name, _, least in own}
+    assert {each.strip() for each in listed} == expected | {f"python {project['requires-python']}"}
+    assert project["scripts"]["archfem"] in recipe

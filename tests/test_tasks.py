@@ -41,7 +41,7 @@ def check_printed(shown, printed):
 
 
 def test_every_task_has_a_file_commands_and_python():
-    assert len(TASKS) == 9
+    assert len(TASKS) == 10
     assert set(QUICK) < set(TASKS)
     for task, text in TASKS.items():
         assert {"```toml", "```sh", "```python"} <= set(re.findall(r"```\w+", text)), task

@@ -61,7 +61,7 @@ class ResultFolder(CaseResult):
         """Write an HTML report of the folder in one file, for print.
 
         Args:
-            path: the file, .html; by default report.html in the folder.
+            path: the file, .html, or .docx for Word; by default report.html in the folder.
 
         Returns:
             The file.

@@ -60,7 +60,7 @@ class CaseResult:
         """Write an HTML report in one file, for print.
 
         Args:
-            path: the file, .html; missing folders are created.
+            path: the file, .html, or .docx for Word; missing folders are created.
 
         Returns:
             The file.

@@ -188,7 +188,8 @@ def _add_case_commands(commands: Any) -> None:
     add_to("--live", type=float, help="partial factor on the vehicle (of its code)")
     add_to("--impact", type=float, help="dynamic factor on the vehicle (of its code)")
     add_to("--dead", type=float, help="partial factor on the weights (1)")
-    add_to("--width", type=float, help="width that carries one vehicle [m] (all)")
+    add_to("--width", type=float, help="width that carries one vehicle [m] (by rule)")
+    add_to("--area-load", type=float, help="load beside the axles [Pa] (of its code)")
     add_to("--out", metavar="DIR", help="folder for text, table and picture (none)")
     add("mesh", "write the mesh of a case as a gmsh file", "")(
         "--out", required=True, metavar="FILE.msh", help="the mesh file"
@@ -228,7 +229,7 @@ def _add_result_commands(commands: Any) -> None:
     about = "one HTML page of a result folder, to print"
     add = _add_command(commands, "report", about, "run", description=text)
     add("folder", metavar="FOLDER", help="that `archfem run` has written, or a history.nc")
-    add("--out", metavar="FILE.html", help="the page (FOLDER/report.html)")
+    add("--out", metavar="FILE.html", help="the page (FOLDER/report.html), or .docx for Word")
     about = "who signs what, as in report.author=NAME; repeatable"
     add(
         "--set", action="append", default=[], metavar="report.KEY=WORDS", dest="changes", help=about

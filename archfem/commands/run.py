@@ -157,7 +157,7 @@ def assess(options: argparse.Namespace) -> None:
     with _record_doubts() as doubts:
         found = case.assessment.solve(case.structure, demand, options.parts)
     texts = [f"{name}: {result}" for name, result in found.items()]
-    text = "\n\n".join([*texts, *filter(None, ["\n".join(doubts)])])
+    text = "\n\n".join([*texts, *filter(None, ["\n".join(dict.fromkeys(doubts))])])
     print(f"{case.title}\n{text}")
 
     def draw() -> Files:
@@ -171,7 +171,7 @@ def assess(options: argparse.Namespace) -> None:
 def rate(options: argparse.Namespace) -> None:
     """Rate the bridge of a case for a vehicle, by the joints and the fill of its [limit]."""
     case = Case.read(options.case, options.changes)
-    keys = ("vehicle", "live", "impact", "dead", "width")
+    keys = ("vehicle", "live", "impact", "dead", "width", "area_load")
     given = {key: value for key in keys if (value := getattr(options, key)) is not None}
     with _record_doubts() as doubts:
         found = rate_case(case.structure, case.rating, case.limit, given)
@@ -251,6 +251,8 @@ def verdict(options: argparse.Namespace) -> None:
 
 def report(options: argparse.Namespace) -> None:
     """Write the report of a result folder, or of a history alone."""
+    if options.pdf and str(options.out).lower().endswith(".docx"):
+        raise InvalidInput(f"--pdf prints the page, and {options.out} is none: give FILE.html")
     if (history := Path(options.folder)).is_file():
         path = History.read(history).report(options.out or history.with_suffix(".html"))
     else:

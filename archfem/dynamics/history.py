@@ -442,7 +442,7 @@ class History(ResultDisplay):
         """Write an HTML report of the run and of its case, in one file for print.
 
         Args:
-            path: file to write, .html; folders are created.
+            path: file to write, .html, or .docx for Word; folders are created.
 
         Returns:
             The file.

@@ -95,6 +95,7 @@ class Recorder:
     dt: float | None  # constant time step [s]; None for steps of varying length
     record: Record  # which steps are recorded
     criteria: Criteria  # for the failure flags of joints
+    rest: Array | None = None  # N, V, M of all joints at rest, where the run starts there
     fallback: int = 0  # number of steps at which a compiled solver fell back to SNES
     count: int = 0  # number of steps added, the start of the run among them
     _rows: dict[str, "GrowingArray"] = field(default_factory=lambda: defaultdict(GrowingArray))
@@ -141,7 +142,7 @@ class Recorder:
         times, faces = (self._recorded(name)[: len(resultants)] for name in ("times", "faces"))
         moved = self.model.large_displacements
         dataset = joint_dataset(
-            structure, resultants, times, self.criteria, faces=faces, moved=moved
+            structure, resultants, times, self.criteria, faces=faces, moved=moved, rest=self.rest
         )
         attributes = {"units": "m/s2", "long_name": "acceleration of the ground"}
         variables: dict[str, Any] = self._block_displacements()

@@ -126,12 +126,12 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         check_large_displacement_scheme(scheme)
     model, start, viscous = _resolve_start(model, start, damping, newton)
     equation = Equation(model, motion, viscous, scheme or Conserving())
-    if isinstance(start, Equilibrium):
+    if is_at_rest := isinstance(start, Equilibrium):
         start = equation.at_rest(start.q, memory=start.model.memory)
     start.check(model)
     stepper = stepper_for(method, equation, newton)
     first = start_batch(stepper, start, dt or 0.005)  # typical where steps vary in length
-    recorder = _make_recorder(stepper, first, dt, record or Record(), criteria)
+    recorder = _make_recorder(stepper, first, dt, record or Record(), criteria, is_at_rest)
     adaptive = AdaptiveStepper(stepper, tolerance, first, SlipError(model.structure, motion, first))
     try:
         recorder.add(first)
@@ -237,13 +237,19 @@ def _check_types(**arguments: Any) -> None:
 
 
 def _make_recorder(
-    stepper: Stepper, first: Batch, dt: float | None, record: Record, criteria: Criteria
+    stepper: Stepper,
+    first: Batch,
+    dt: float | None,
+    record: Record,
+    criteria: Criteria,
+    is_at_rest: bool,
 ) -> Recorder:
-    """Return the recorder of a run, with its validity checks."""
+    """Return the recorder of a run, with its validity checks and, if it starts there, the rest."""
     equation = stepper.equation
     damps, drag = isinstance(equation.scheme, HHT), equation.drag
     monitor = RunMonitor(equation.model, first, damps=damps, mass_damping=drag)
-    return Recorder(monitor, first.state(0), stepper.name, dt, record, criteria)
+    rest = first.resultants[0] if is_at_rest else None
+    return Recorder(monitor, first.state(0), stepper.name, dt, record, criteria, rest)
 
 
 # What may end a run: an event, and blocks that become loose where displacements are large
@@ -267,6 +273,7 @@ def _run_steps(
 ) -> tuple[Ending, str]:
     """Record steps up to an event or the end of the motion; return how and why the run ended."""
     start = recorder.state
+    events.set_rest(monitors[0], recorder.rest)
     duration, is_announced = round(end - start.time, 4), False
     # the pace is that after the first batch, which may wait for compilation
     begun = since = 0.0

@@ -142,13 +142,13 @@ class VerdictRange(ResultDisplay):
         return f"{which} with {where}, where {inside} of {int(chosen.sum())} fall"
 
     def _condition_text(self, condition: "Condition") -> str:
-        """Return a condition in words, with joint stiffness in GPa/m rather than as a factor."""
+        """Return a condition in words, with joint stiffness in MPa/mm rather than as a factor."""
         name, value, below = condition.name, condition.value, condition.below
         if below is None:
             return f"{_property_text(name)} '{value}'"
         word = "below" if below else "above"
         if name in ("k_n", "k_s"):
-            return f"{name} {word} {value * self.dataset.attrs[name] / 1e9:.3g} GPa/m"
+            return f"{name} {word} {value * self.dataset.attrs[name] / 1e9:.3g} MPa/mm"
         if name == "friction":
             return f"friction {word} that given {value:+.2g}"
         return f"{_property_text(name)} {word} × {value:.3g}"

@@ -23,6 +23,9 @@ Found = TypeVar("Found")
 # Coordinate of a dataset with the tensile strengths of its joints; absent without bonds
 TENSION_COORDINATE = "tension"
 
+# Coordinate of a dataset with the joints that carry no force at rest; absent where all do
+IDLE_COORDINATE = "idle"
+
 # Prefix of dataset attributes with the criteria
 CRITERIA_PREFIX = "criteria_"
 
@@ -218,6 +221,13 @@ def tension_margin(normal: Array, tension: Array) -> Array:
     return np.where(tension > 0.0, np.abs(normal), normal)
 
 
+def find_idle_joints(normal: Array, tension: Array) -> NDArray[np.bool_]:
+    """Return which joints carry no force at rest, from normal forces and tensile strengths."""
+    margin = tension_margin(normal, tension)
+    # above the round-off of equilibria, below what a stone of a structure weighs
+    return np.asarray(margin <= 1e-6 * margin.max(initial=0.0))
+
+
 def with_failure_flags(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
     """Return joints with the failure flags and attributes of some criteria."""
     if criteria is None and "hinge" in joints:
@@ -255,12 +265,19 @@ def sliding_limits(joints: xr.Dataset, criteria: Criteria) -> Array:
 
 
 def find_failed_joints(joints: xr.Dataset) -> xr.DataArray:
-    """Return whether each joint hinges, slides or is open."""
+    """Return whether each joint hinges, slides or is open; never of joints idle at rest.
+
+    A joint that carries no force at rest, as the head joints of a wall do, is no part of what
+    carries: that it is open, or that a small force leaves its middle, is no failure.
+    """
     hinge = joints["hinge"]
     slides, is_open = (
         joints.variables[name].transpose(*hinge.dims).values for name in ("slide", "open")
     )
-    return hinge.copy(data=(hinge.values != 0) | slides | is_open).rename("failed")
+    failed = hinge.copy(data=(hinge.values != 0) | slides | is_open)
+    if IDLE_COORDINATE in joints.coords:
+        failed = failed & ~joints[IDLE_COORDINATE]
+    return failed.rename("failed")
 
 
 def first_time(flags: xr.DataArray) -> xr.DataArray:

@@ -23,9 +23,11 @@ from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
+    IDLE_COORDINATE,
     TENSION_COORDINATE,
     Criteria,
     failure_flags,
+    find_idle_joints,
     sliding_ratio,
     tension_margin,
 )
@@ -85,6 +87,7 @@ def joint_dataset(
     *,
     faces: Array | None = None,
     moved: bool = False,
+    rest: Array | None = None,
 ) -> xr.Dataset:
     """Return labelled resultants, with eccentricity, mobilised friction and flags of failure.
 
@@ -106,6 +109,8 @@ def joint_dataset(
             (steps, 3, n_joints) [m, rad, m]; None without displacements.
         moved: whether displacements may be large: eccentricity is then from the middle of the
             overlap of both faces, as a fraction of its length, and cohesion acts on that length.
+        rest: N, V, M at rest (n_joints, 3) [N, N, N m]; joints without a force there are `idle`,
+            a coordinate, and never count as failed. None where it is not known.
 
     Returns:
         Variables N, V, M, eccentricity and friction, `opening`, `rotation` and `slip` if `faces`
@@ -137,6 +142,8 @@ def joint_dataset(
         coordinates["cohesion_limit"] = dims, limits, {"units": "N"}
     if structure.tension.any():
         coordinates[TENSION_COORDINATE] = "joint", structure.tension, {"units": "Pa"}
+    if rest is not None and (idle := find_idle_joints(rest[:, 0], structure.tension)).any():
+        coordinates[IDLE_COORDINATE] = "joint", idle
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
     return xr.Dataset(variables, coordinates, criteria.attributes)

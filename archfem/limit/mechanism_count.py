@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from archfem._typing import Flags
 from archfem._validation import validate_arguments
 from archfem.joints.criteria import (
+    IDLE_COORDINATE,
     Criteria,
     assessed_joints,
     find_failed_joints,
@@ -290,7 +291,8 @@ def follow_mechanism(
     times = joints["time"].values
     begin = int(np.flatnonzero(times == found.time)[0])
     own = np.isin(joints["joint"].values, found.joints)
-    flags = _flags_over_time(joints) if flags is None else flags
+    if flags is None:  # idle joints take part in a verified motion
+        flags = _flags_over_time(joints.drop_vars(IDLE_COORDINATE, errors="ignore"))
     all_failed = flags.values[begin:, own].all(axis=1)
     count = len(all_failed) if all_failed.all() else int(all_failed.argmin())
     duration = float(step_lengths(times)[begin : begin + count].sum())

@@ -1,5 +1,6 @@
 """Vehicles over a bridge: collapse factor at every position of a row of axles, and its rating."""
 
+import logging
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -32,7 +33,9 @@ from archfem.masonry.structure import HasStructure, Structure, structure_of
 
 DRIVING_DIRECTIONS = ("right", "left")
 
-# Axles that stand on the structure, from left to right
+logger = logging.getLogger("archfem")
+
+# Axles that stand on the structure, from left to right, or these and a distributed load
 AxleRow = tuple[PointLoad, ...]
 
 
@@ -51,6 +54,12 @@ class Vehicle:
         live_source: code and clause of the partial factor, and its grade.
         impact: dynamic factor of the code on its weight [-].
         impact_source: code and clause of the dynamic factor, and its grade.
+        area_load: load of the code on the road beside and below the axles, wherever it is adverse,
+            without the dynamic factor [Pa].
+        wheels: width between the outer faces of the wheels, at the road [m].
+        lane: width of a lane, beyond which a vehicle does not spread [m].
+        width_source: code and clause of wheels and lane, and their grade.
+        left_out: what of the code's load acts at the same time and is left out; else empty.
     """
 
     name: str
@@ -62,12 +71,38 @@ class Vehicle:
     live_source: str = "given"
     impact: float = 1.0
     impact_source: str = "given"
+    area_load: Pascals = 0.0
+    wheels: Metres = 1.5
+    lane: Metres = 3.0
+    width_source: str = "as a single axle of CS 454, and a lane of EN 1991-2, 4.2.3; from memory"
+    left_out: str = ""
 
     def __post_init__(self) -> None:
         """Refuse weights, spacings and factors out of range."""
         _parse_axles(self.axles, self.spacings)
         _check_factor(self.live, f"partial factor on the live load of {self.name}")
         _check_factor(self.impact, f"dynamic factor of {self.name}")
+        for key in ("area_load", "wheels", "lane"):
+            check_number(getattr(self, key), f"{key} of {self.name}", minimum=0.0)
+
+    def spread_over(self, structure: Structure) -> float:
+        """Return the width over which one vehicle spreads on a bridge, by rule [m].
+
+        It is the width of the wheels and, at 1 in 2 to both sides, the least depth of fill above
+        the rings; at most that of a lane, and of the bridge.
+
+        Args:
+            structure: the bridge.
+        """
+        ring = [block for block in structure.blocks if block.role == "ring"]
+        points = np.concatenate([block.drawn() for block in ring] or [np.zeros((0, 2))])
+        tops = [[block.top(x) for block in structure.blocks] for x in points[:, 0].tolist()]
+        covers = [
+            max(top for top in above if top is not None) - y
+            for above, y in zip(tops, points[:, 1], strict=True)
+        ]
+        depth = max(min(covers, default=0.0), 0.0)
+        return min(self.wheels + depth, self.lane, structure.width)
 
 
 def _read_vehicles() -> dict[str, Vehicle]:
@@ -86,9 +121,9 @@ class MovingLoad(ResultDisplay):
     """Collapse factors of a vehicle that moves over a structure.
 
     Attributes:
-        factors: `factor`, the multiple of the vehicle's weight at collapse [-], and `axles`, the
-            number of its axles on the structure, over direction ("right", "left") and position
-            of the vehicle's middle [m].
+        factors: `factor`, the multiple of the vehicle's weight at collapse [-], `axles`, the number
+            of its axles on the structure, and `loaded`, the length of road under a distributed load
+            [m], over direction ("right", "left") and position of the vehicle's middle [m].
         worst: collapse with the least factor.
         direction: driving direction of the vehicle there.
         position: x of its middle there [m].
@@ -119,6 +154,7 @@ def moving_load(
     *,
     spacings: Sequence[float] = (),
     positions: Sequence[float] | None = None,
+    area_load: float = 0.0,
     friction: str | None = "coulomb",
     strength: float | None = None,
     fill: Fill | PlasticFill | None = None,
@@ -132,6 +168,10 @@ def moving_load(
     the solution at the place beside it and from a few more states. The whole search of
     `collapse_factor` follows at the worst place, and where that finds nothing.
 
+    A distributed load grows with the axles. At each place it stands on those parts of the road, in
+    40 strips, that sink in the mechanism of the least factor; sets of strips are searched, from the
+    mechanisms of other places and of the distributed load alone.
+
     Args:
         structure: the bridge, or an `archfem.Analysis` of it.
         axles: weight of each axle over the bridge's whole width, from the front [N].
@@ -139,6 +179,8 @@ def moving_load(
         positions: x of the vehicle's middle, halfway between first and last axle (n,) [m]; by
             default 101, from where it drives onto the structure to where it is off it again, or 21
             with a plastic fill.
+        area_load: distributed load beside and below the axles, where it is adverse [Pa]. With a
+            plastic fill that is found with the fill as `Fill`, and a warning says so.
         friction: as for `collapse_factor`.
         strength: as for `collapse_factor` [Pa].
         fill: as for `collapse_factor`. A plastic fill takes some seconds at each place; factors
@@ -172,22 +214,21 @@ def moving_load(
         )
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
     distinct = tuple(dict.fromkeys((*rows[0], *rows[1])))
-    if isinstance(fill, PlasticFill):
-        factor_of = _bound_factors(structure, distinct, options)
-    else:
-        stones, dead = self_weight_programme(structure, friction, strength, fill)
-        factor_of = dict.fromkeys(distinct, np.nan)
-        if is_balanced(dead.minimise_residual(), dead):
-            factor_of = _collapse_factors(stones, dead, distinct, options)
+    strips = _cut_road(structure, check_number(area_load, "area_load [Pa]", minimum=0.0))
+    laid, factor_of = _solve_rows(structure, distinct, strips, options)
     factors = np.array([[factor_of[row] for row in rows_one_way] for rows_one_way in rows])
     direction, place = _find_worst(factors, on_bridge)
-    worst = collapse_factor(structure, live=list(rows[direction][place]), **options)
+    live = laid[rows[direction][place]]
+    worst = collapse_factor(structure, live=list(live), **options)
     if friction == "nonassociated":
         factors[direction, place] = worst.factor  # by the whole search: may be a weaker state
+    length = area_load and -strips[0].force[1] / (area_load * structure.width)  # of a strip
+    loaded = [[length * (len(laid[row]) - len(row)) for row in one_way] for one_way in rows]
     dims = ("direction", "position")
     variables = {
         "factor": (dims, factors, {"units": "1", "long_name": "factor at collapse"}),
         "axles": (dims, on_bridge, {"units": "1", "long_name": "axles on the structure"}),
+        "loaded": (dims, loaded, {"units": "m", "long_name": "road under the distributed load"}),
     }
     position = ("position", places, {"units": "m"})
     coordinates = {"direction": list(DRIVING_DIRECTIONS), "position": position}
@@ -206,12 +247,15 @@ class Rating(ResultDisplay):
         impact: dynamic factor on the vehicle's weight [-].
         dead: partial factor on the weights of stones and fill [-].
         width: width of the bridge over which one vehicle spreads [m].
+        area_load: distributed load of the code, where it is adverse, without factors [Pa].
         moving: factors at all places in both directions, on the factored vehicle over factored
             weights, and the collapse at the worst place.
         geometric: geometric factor of safety at the worst place [-]: depth of the joints over the
             least share of it, about their middles, that carries the factored vehicle; below 1 where
             only deeper joints would. Undefined (NaN) where joints of any depth do not carry it,
             infinite where hinges alone do. Not searched, and NaN, with a plastic fill.
+        by_rule: factor at the worst place with the width by rule and all of the code's distributed
+            load, where others were given; else NaN.
     """
 
     structure: Structure
@@ -220,8 +264,10 @@ class Rating(ResultDisplay):
     impact: float
     dead: float
     width: float
+    area_load: float
     moving: MovingLoad
     geometric: float
+    by_rule: float
 
     @property
     def factor(self) -> float:
@@ -235,19 +281,30 @@ class Rating(ResultDisplay):
 
     @property
     def outcome(self) -> str:
-        """Whether it passes, and by which factors on the vehicle that nobody has given."""
+        """Whether it passes, without what, and the factor by rule where less was given."""
         names = {"partial": "live", "dynamic": "impact"}
         missing = [n for n, key in names.items() if self._source(key).startswith("none")]
-        without = f" without {' and '.join(missing)} factor{'s'[: len(missing) - 1]}"
-        return f"{'passes' if self.passes else 'fails'}{without if missing else ''}"
+        without = [f"{' and '.join(missing)} factor{'s'[: len(missing) - 1]}"] if missing else []
+        without += [self.vehicle.left_out] if self.vehicle.left_out else []
+        words = "passes" if self.passes else "fails"
+        words += f" without {' and '.join(without)}" if without else ""
+        return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
+
+    def _rule_text(self) -> str:
+        """Return the factor with the width by rule and the whole load of the code."""
+        rule, code = self.vehicle.spread_over(self.structure), self.vehicle.area_load
+        load = f" and {code / 1e3:g} kN/m² beside the axles" if code else ""
+        return f"over {rule:.3g} m of width{load}, by rule, {self.by_rule:.4g} at this place"
 
     def table(self) -> str:
-        """Return factors [-] and axles on the bridge at all places [m], as rows of CSV."""
-        rows = ["direction,position of the vehicle's middle [m],factor [-],axles [-]"]
+        """Return factors [-], axles and loaded road at all places [m], as rows of CSV."""
+        head = "direction,position of the vehicle's middle [m],factor [-],axles [-]"
+        rows = [f"{head},road under the distributed load [m]"]
         for way in DRIVING_DIRECTIONS:
             here = self.moving.factors.sel(direction=way)
-            values = (here[key].values for key in ("position", "factor", "axles"))
-            rows += [f"{way},{x:.6g},{f:.6g},{n}" for x, f, n in zip(*values, strict=True)]
+            values = (here[key].values for key in ("position", "factor", "axles", "loaded"))
+            each = zip(*values, strict=True)
+            rows += [f"{way},{x:.6g},{f:.6g},{n},{length:.4g}" for x, f, n, length in each]
         return "\n".join(rows)
 
     def _summary(self) -> str:
@@ -264,16 +321,22 @@ class Rating(ResultDisplay):
         source = vehicle.source if own else f"{vehicle.source} ({vehicle.grade})"
         factors = self.moving.factors["factor"].min("position")
         least = (f"{way} {float(factors.sel(direction=way)):.4g}" for way in DRIVING_DIRECTIONS)
+        by_rule = self.width == vehicle.spread_over(self.structure)
+        also, beside = "", ""
+        if self.area_load:
+            also = " and on the distributed load × live"
+            beside = f", and {self.area_load / 1e3:g} kN/m² of road where it is adverse"
         favourable = "EN 1990:2002, Table A2.4(B), favourable; from memory"
         lines = [
             f"{self._summary()}",
-            "the factor is on axles × live × impact; codes with partial factors require 1",
+            f"the factor is on axles × live × impact{also}; codes with partial factors require 1",
             f"least factor driving {', '.join(least)}",
             f"{self.moving}",
             f"geometric factor of safety at that place: {self._geometric_text()}",
             "it is of the same vehicle; Heyman requires it, often 2 (from memory), and no code",
-            f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN "
-            f"over {self.width:.3g} m of width; {source}",
+            f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN"
+            f"{beside}; {source}",
+            f"over {self.width:.3g} m of width ({vehicle.width_source if by_rule else 'given'})",
             f"live load by {self.live:g} ({self._source('live')})",
             f"impact by {self.impact:g} ({self._source('impact')})",
             f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
@@ -310,6 +373,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     impact: float | None = None,
     dead: float = 1.0,
     width: Metres | None = None,
+    area_load: Pascals | None = None,
     friction: str | None = "coulomb",
     strength: Pascals | None = None,
     fill: Fill | PlasticFill | None = None,
@@ -318,7 +382,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
 
     The vehicle drives over the bridge in both directions (`moving_load`), from on to off in steps
     of 1/100 of the bridge's length, or 1/20 with a plastic fill. Its axles spread through a fill
-    along the bridge; across it they spread evenly over `width`. The geometric factor of safety is
+    along the bridge; across it they spread evenly over `width`. The distributed load of its code
+    grows with them, where it is adverse (`moving_load`). The geometric factor of safety is
     Heyman's: all joints are narrowed about their middles, at unchanged weights and with the vehicle
     at its worst place, until it is carried no longer; or deepened until it is carried.
 
@@ -330,7 +395,10 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
             factor depends on the span.
         dead: partial factor on the weights of stones and fill [-]; by default 1, as for weights
             that stabilise. Weights on one side alone are not increased.
-        width: width over which one vehicle spreads [m]; by default all of the bridge's.
+        width: width over which one vehicle spreads [m]; by default that of the wheels and of the
+            least depth of fill above the rings, at most a lane (`Vehicle.spread_over`).
+        area_load: distributed load beside and below the axles [Pa]; by default that of its code.
+            Where less of it or a larger width is given, `by_rule` is the factor without.
         friction: as for `collapse_factor`; the geometric factor takes "coulomb" for
             "nonassociated".
         strength: as for `collapse_factor`, divided by its partial factor [Pa].
@@ -351,22 +419,34 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     live = driven.live if live is None else _check_factor(live, "live, factor on the vehicle")
     impact = driven.impact if impact is None else _check_factor(impact, "impact, dynamic factor")
     _check_factor(dead, "dead, factor on the weights")
-    width = structure.width if width is None else width
+    rule = driven.spread_over(structure)
+    width = rule if width is None else width
+    area_load = driven.area_load if area_load is None else area_load
     if not 0.0 < width <= structure.width:
         raise InvalidInput(
             f"width {width:.4g} m is not above 0 and up to that of the bridge, "
             f"{structure.width:.4g} m: give the part over which one vehicle spreads"
         )
-    # the structure is modelled over its whole width, of which a vehicle loads a part
-    axles = [live * impact * structure.width / width * weight for weight in driven.axles]
-    weighted = _scale_weights(structure, dead)
-    is_plastic = isinstance(fill, PlasticFill)
-    positions = _places_along(weighted, _parse_axles(axles, driven.spacings))
-    positions = positions[::5] if is_plastic else positions
+    weighted, code = _scale_weights(structure, dead), np.array(driven.axles) * live * impact
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
-    moving = moving_load(weighted, axles, spacings=driven.spacings, positions=positions, **options)
+
+    def drive(width: float, area_load: float, positions: Sequence[float]) -> MovingLoad:
+        # the structure is modelled over its whole width, of which a vehicle loads a part
+        axles = (structure.width / width * code).tolist()
+        given = options | {"spacings": driven.spacings, "area_load": live * area_load}
+        return moving_load(weighted, axles, positions=positions, **given)
+
+    is_plastic = isinstance(fill, PlasticFill)
+    positions = _places_along(weighted, _parse_axles(driven.axles, driven.spacings))
+    moving = drive(width, area_load, positions[::5] if is_plastic else positions)
+    by_rule = np.nan
+    if width > (1.0 + 1e-9) * rule or area_load < driven.area_load:
+        least = min(width, rule), max(area_load, driven.area_load)
+        by_rule = drive(*least, [moving.position]).worst.factor
     geometric = np.nan if is_plastic else _geometric_factor(weighted, moving, options)
-    return Rating(structure, driven, live, impact, dead, width, moving, geometric)
+    return Rating(
+        structure, driven, live, impact, dead, width, area_load, moving, geometric, by_rule
+    )
 
 
 def _find_vehicle(vehicle: str | Vehicle) -> Vehicle:
@@ -484,12 +564,92 @@ def _axles_on_structure(
     )
 
 
+def _cut_road(structure: Structure, area_load: float, count: int = 40) -> AxleRow:
+    """Return a distributed load as a point load on each of some strips of the road."""
+    points = np.concatenate([structure.blocks[number].drawn() for number in structure.free])
+    edges = np.linspace(points[:, 0].min(), points[:, 0].max(), count + 1)
+    weight = area_load * structure.width * float(edges[1] - edges[0])
+    strips = [
+        _axles_on_structure(structure, np.array([[weight, 0.0]]), "right", x)
+        for x in (0.5 * (edges[:-1] + edges[1:])).tolist()
+    ]
+    return tuple(load for strip in strips for load in strip) if area_load else ()
+
+
+def _solve_rows(
+    structure: Structure, rows: Sequence[AxleRow], strips: AxleRow, options: dict[str, Any]
+) -> tuple[dict[AxleRow, AxleRow], dict[AxleRow, float]]:
+    """Return each row of axles with the adverse strips, and its collapse factor."""
+    laid, fill = {row: row for row in rows}, options["fill"]
+    if is_plastic := isinstance(fill, PlasticFill):
+        keys = ("friction_angle", "cohesion", "spread", "backing")
+        fill = Fill(**{key: getattr(fill, key) for key in keys})
+    if not is_plastic or strips:
+        stones, dead = self_weight_programme(structure, **(options | {"fill": fill}))
+        stands = is_balanced(dead.minimise_residual(), dead)
+        loads = {row: stones.load(row) for row in rows}
+        if strips and stands:
+            laid, loads = _lay_strips(dead, loads, strips, [stones.load([s]) for s in strips])
+    if not is_plastic:
+        factors = _collapse_factors(stones, dead, loads, options) if stands else {}
+        return laid, {row: factors.get(laid[row], np.nan) for row in rows}
+    if strips:
+        logger.warning(
+            "the distributed load stands where it is adverse to the stones with the fill as "
+            "pressure, %s: other parts may be worse with a plastic fill",
+            "af.limit.Fill" if stands else "but these do not stand so, and it is left out",
+        )
+    factors = _bound_factors(structure, tuple(laid.values()), options)
+    return laid, {row: factors[laid[row]] for row in rows}
+
+
+def _lay_strips(
+    dead: Programme,
+    axles: dict[AxleRow, Array],
+    strips: AxleRow,
+    forces: Sequence[Array],
+    rounds: int = 20,
+) -> tuple[dict[AxleRow, AxleRow], dict[AxleRow, Array]]:
+    """Return each row of axles with the strips of the least factor, and the forces of all."""
+    # A mechanism bounds the factor of any load from above: by its resistance over the power of the
+    # axles, and of the strips that sink in it (kinematic theorem). At each place the best one so
+    # far selects the strips; the mechanism of these is added, until none is better. The first ones
+    # are of the distributed load alone, on stretches of the road: else a search may end early.
+    road, motions, resistances = np.array(forces), list[Array](), list[float]()
+    powers = np.array([dead.blocks.dimensionless(force) for force in road])
+
+    def solve(load: Array) -> float:
+        optimum = dead.with_load_factor(load).solve() if load.any() else None
+        if optimum is None:
+            return np.inf
+        motions.append(optimum.multipliers)
+        resistances.append(-optimum.value)  # at a power of 1
+        return -optimum.value
+
+    for size in (len(road) // 8, len(road) // 4, len(road) // 2):
+        for first in range(0, len(road) - size + 1, max(size // 2, 1)):
+            solve(road[first : first + size].sum(axis=0))
+    chosen = {row: (solve(load), np.zeros(len(road), dtype=bool)) for row, load in axles.items()}
+    for row in (*axles, *reversed(axles)):  # and back with the mechanisms of all places
+        load = dead.blocks.dimensionless(axles[row])
+        for _ in range(rounds if motions else 0):
+            sinks = powers @ np.array(motions).T
+            power = load @ np.array(motions).T + np.maximum(sinks, 0.0).sum(axis=0)
+            bounds = np.array(resistances) / np.maximum(power, 1e-300)
+            best = int(bounds.argmin())
+            if bounds[best] >= (1.0 - 1e-7) * chosen[row][0]:  # beyond the programme's round-off
+                break
+            adverse = sinks[:, best] > 1e-9 * sinks[:, best].max()
+            chosen[row] = solve(axles[row] + road[adverse].sum(axis=0)), adverse
+    laid = {row: (*row, *np.array(strips, dtype=object)[chosen[row][1]]) for row in axles}
+    return laid, {laid[row]: axles[row] + road[chosen[row][1]].sum(axis=0) for row in axles}
+
+
 def _collapse_factors(
-    stones: BlocksWithFill, dead: Programme, rows: Sequence[AxleRow], options: dict[str, Any]
+    stones: BlocksWithFill, dead: Programme, loads: dict[AxleRow, Array], options: dict[str, Any]
 ) -> dict[AxleRow, float]:
     """Return the collapse factor of each row of axles; a full search only where it is needed."""
-    factors = dict.fromkeys(rows, np.inf)
-    loads = {row: stones.load(row) for row in rows}
+    factors = dict.fromkeys(loads, np.inf)
     # rows whose load reaches the stones, beyond round-off of the fan
     programmes = {
         row: dead.with_load_factor(load)

@@ -179,6 +179,12 @@ class Block:
             object.__setattr__(self, "centre", as_point(self.centre))
         if self.corners is not None:
             object.__setattr__(self, "corners", tuple(map(int, self.corners)))
+        sides = np.roll(self.points, -1, axis=0) - self.points
+        if (short := np.flatnonzero(~sides.any(axis=1))).size:
+            raise InvalidStructure(
+                f"block '{self.name}' has two corners beside each other at "
+                f"{self.outline[short[0]]}: leave one out"
+            )
         if self.area <= 0.0:
             raise InvalidStructure(
                 f"block '{self.name}' has area {self.area:.3g} m²: give its outline anticlockwise"

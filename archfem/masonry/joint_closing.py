@@ -397,7 +397,7 @@ def _describe_law(contact: Contact, finish: str | None) -> str:
     """Describe the law of closing of a contact as an adverb."""
     if contact.law is not None:
         return "by a law of the user"
-    stiffness = f"{contact.normal_stiffness / GPa:.3g} GPa/m"
+    stiffness = f"{contact.normal_stiffness / GPa:.3g} MPa/mm"
     if contact.closure is None:
         return f"linearly with {stiffness}{', of a bed of mortar' if finish else ''}"
     law = f"the law of {finish} faces" if finish else "a law that stiffens"

@@ -17,6 +17,7 @@ References:
     Circolare 21 January 2019 n. 7 C.S.LL.PP. on the NTC 2018, C8.7.1.2.1.1 to C8.7.1.2.1.8.
 """
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
@@ -62,6 +63,8 @@ from archfem.motion.design_spectra import (
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import response_spectrum
 from archfem.units import STANDARD_GRAVITY
+
+logger = logging.getLogger("archfem")
 
 
 @dataclass(frozen=True)
@@ -313,9 +316,10 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
 ) -> KinematicAssessment:
     """Assess the collapse mechanism under horizontal forces against a spectrum at the ground.
 
-    The mechanism is that of `collapse_factor` under `BodyForce(direction)`, without cohesion. It is
-    followed along its finite motion (`archfem.limit.finite_mechanism`), which gives the capacity
-    curve a*(d*). Two checks follow, with the factors of the Italian code:
+    The mechanism is that of `collapse_factor` under `BodyForce(direction)`, without cohesion, which
+    is left out with a warning: α₀ is then on the safe side. It is followed along its finite motion
+    (`archfem.limit.finite_mechanism`), which gives the capacity curve a*(d*). Two checks follow,
+    with the factors of the Italian code:
 
     - *linear*: q a₀* / FC against the ground acceleration, that of the spectrum at T = 0;
     - *displacement*: d_u* as a share of d₀* against the displacement spectrum at the period of the
@@ -461,6 +465,13 @@ def _check_structure(
         raise InvalidInput(
             "joints have tensile strength, which breaks before a mechanism forms: give contacts "
             "with tension 0"
+        )
+    cohesion = max(joint.contact.cohesion for joint in structure.joints)
+    if friction is not None and cohesion > 0.0:
+        logger.warning(
+            "joints have a cohesion of %.3g Pa, which the assessment leaves out: its factor is on "
+            "the safe side, and joints slide that might hold; collapse_factor counts cohesion",
+            cohesion,
         )
 
 

@@ -364,7 +364,15 @@ def _label_result(path: Path, criteria: Criteria, outcome: str) -> Pushover:
     steps = np.arange(count, dtype=float)
     structure, faces = path.model.structure, path.faces
     large = path.model.large_displacements
-    joints = joint_dataset(structure, path.resultants, steps, criteria, faces=faces, moved=large)
+    joints = joint_dataset(
+        structure,
+        path.resultants,
+        steps,
+        criteria,
+        faces=faces,
+        moved=large,
+        rest=path.resultants[0],
+    )
     joints = joints.rename(time="step").assign_coords(step=np.arange(count))
     curve = xr.Dataset(
         {

@@ -135,20 +135,17 @@ def draw_rating(found: Rating) -> Figure:
 
     Returns:
         The figure: factors of both directions over the place of the vehicle's middle, up to four
-        times the least one, above the mechanism at the worst place with the axles as given.
+        times the least one, above the mechanism at the worst place with the axles as given, and
+        marks where the distributed load stands.
     """
     title = f"{found.vehicle.name}: factor {found.factor:.3g}, {found.outcome}"
     code = found.live * found.impact
     # each axle as it was given, on its part of the width and without factors
-    share, worst = code * found.structure.width / found.width, found.moving.worst
-    live = [
-        replace(load, force=tuple(force / share for force in load.force))
-        for load in worst.live
-        if isinstance(load, PointLoad)
-    ]
-    factors = "" if code == 1.0 else f" {code:.3g} ×"
+    share, (axles, strips) = code * found.structure.width / found.width, _split_loads(found.moving)
+    live = [replace(load, force=tuple(force / share for force in load.force)) for load in axles]
+    factors, worst = "" if code == 1.0 else f" {code:.3g} ×", found.moving.worst
     worst = replace(worst, live=live)
-    return _draw_factors(found.moving, worst, title, factors, required=1.0)
+    return _draw_factors(found.moving, worst, title, factors, strips, required=1.0)
 
 
 @validate_arguments
@@ -163,11 +160,25 @@ def draw_moving_load(found: MovingLoad) -> Figure:
         times the least one, above the mechanism at the worst place.
     """
     title = f"least factor {found.worst.factor:.3g}, driving {found.direction}"
-    return _draw_factors(found, found.worst, title)
+    axles, strips = _split_loads(found)
+    return _draw_factors(found, replace(found.worst, live=axles), title, strips=strips)
+
+
+def _split_loads(found: MovingLoad) -> tuple[list[PointLoad], list[PointLoad]]:
+    """Return the axles at the worst place, and the strips of the distributed load."""
+    loads = [load for load in found.worst.live if isinstance(load, PointLoad)]
+    here = found.factors["axles"].sel(direction=found.direction, position=found.position)
+    return loads[: int(here)], loads[int(here) :]
 
 
 def _draw_factors(
-    found: MovingLoad, worst: Collapse, title: str, factors: str = "", required: float = 0.0
+    found: MovingLoad,
+    worst: Collapse,
+    title: str,
+    factors: str = "",
+    strips: Sequence[PointLoad] = (),
+    *,
+    required: float = 0.0,
 ) -> Figure:
     """Draw factors over the vehicle's middle, above the worst mechanism on the same x axis."""
     structure = worst.structure
@@ -197,6 +208,10 @@ def _draw_factors(
     upper.legend(frameon=False, fontsize=Size.LABEL)
     draw_structure(structure, axes=lower)
     _draw_mechanism(lower, structure, worst, factors)
+    if strips:
+        places = np.array([load.place(structure)[1] for load in strips])
+        style = {"color": Colour.LOAD, "ls": "", "marker": "v", "ms": 3.0, "zorder": 9}
+        lower.plot(*places.T, label="distributed load", **style)
     # below both panels: arrows may stand anywhere in the lower one
     lower.get_legend().remove()
     add_legend_below(figure, handles=lower.get_legend_handles_labels()[0])

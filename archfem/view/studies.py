@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from archfem._typing import Array
 from archfem._validation import validate_arguments
@@ -27,7 +28,6 @@ from archfem.view.style import (
     set_figure_title,
     set_title,
     style_axes,
-    white_halo,
 )
 
 
@@ -572,6 +572,10 @@ def draw_accuracy(found: Accuracy) -> Figure:
     figure, axes = new_axes(7.2, 5.0, *labels)
     axes.set(xscale="log", yscale="log")
     axes.tick_params(which="both", labelsize=Size.LABEL)
+    # seconds as numbers, few enough to stay apart over three decades
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(lambda seconds, _: f"{seconds:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
     # smaller errors are drawn at this one: they are uncertain, or exactly zero
     floor = max(found.reference_error / 10.0, 1e-7)
     reached = [trial for trial in found.front if np.isfinite(trial.error)]
@@ -584,9 +588,7 @@ def draw_accuracy(found: Accuracy) -> Figure:
         chosen = found.choice
         place = (chosen.seconds, max(chosen.error, floor))
         style = {"mfc": "none", "mec": Colour.HINGE, "mew": 1.4, "zorder": 6}
-        axes.plot(*place, "o", ms=15, label="chosen", **style)
-        style = {"path_effects": white_halo(3.0), "zorder": 6}
-        annotate(axes, chosen.setting.label, place, (10, -14), **style)
+        axes.plot(*place, "o", ms=15, label=f"chosen:\n{chosen.setting.label}", **style)
     _draw_settings(axes, found, floor)
     axes.legend(fontsize=Size.LABEL, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure

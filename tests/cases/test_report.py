@@ -280,6 +280,20 @@ def test_captions_are_numbered_without_a_gap(carried_out, tmp_path):
         assert len(numbers) > 3
 
 
+def test_a_report_for_word_has_the_sections_of_the_page(carried_out, tmp_path, capsys):
+    docx = pytest.importorskip("docx")
+    path = tmp_path / "report.docx"
+    assert af.commands.main(["report", str(carried_out), "--out", str(path)]) == 0
+    assert "wrote" in capsys.readouterr().out
+    found = docx.Document(str(path))
+    headings = [each.text for each in found.paragraphs if each.style.name.startswith("Heading")]
+    words = words_of(af.cases.open_results(carried_out).report(tmp_path / "report.html"))
+    assert len(headings) > 5
+    assert all(heading in words for heading in headings)
+    assert af.commands.main(["report", str(carried_out), "--out", str(path), "--pdf"]) == 1
+    assert "--pdf prints the page" in capsys.readouterr().err
+
+
 def test_every_input_has_its_mark():
     tables = tomllib.loads(CASE) | {
         "materials": {"stone": {"young": "5 GPa"}},

@@ -112,7 +112,7 @@ def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
 def test_the_conclusion_names_the_law_of_the_joints(piers, monkeypatch):
     data = report_data.ReportData(SimpleNamespace(structure=piers), {"first": None})
     (words,) = conclusion._conclude_joints(data)
-    assert words == "Joints close linearly with 1.48 GPa/m, which was not varied."
+    assert words == "Joints close linearly with 1.48 MPa/mm, which was not varied."
     ranged = SimpleNamespace(**vars(data) | {"files": {"verdict_range.nc": "file"}})
     for properties, varied in ((("damping_ratio",), "not varied"), (("finish",), "varied")):
         computed = SimpleNamespace(properties=properties)

@@ -1,5 +1,6 @@
 """Speed against error: settings that are tried and compared, by known runs."""
 
+from itertools import pairwise
 from time import process_time
 from types import SimpleNamespace
 
@@ -54,6 +55,26 @@ def test_errors_are_the_largest_difference_to_the_reference(settings):
     assert "20" in second.split()
     with pytest.raises(af.DidNotConverge, match=r"the reference, condensed 12×12 exact 1\.25 ms"):
         compare_runs(settings, [TimedRun(7, 1.0, None), *runs[1:]], 10.0, 0.003)
+
+
+@pytest.mark.parametrize("longest", [0.4, 9.0, 300.0])
+def test_labels_of_computing_times_stay_apart(settings, longest):
+    """Numbers of seconds, over one decade up to four; the setting that was chosen is named."""
+    seconds = [0.05, longest, 0.06, 0.1, 0.2, longest]
+    errors = [0.30, 0.31, 0.302, 0.32, 0.34, 0.301]
+    runs = [TimedRun(7, s, np.array([e])) for s, e in zip(seconds, errors, strict=True)]
+    found = compare_runs(settings, runs, 10.0, 0.003)
+    figure = af.view.draw_accuracy(found)
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    low, high = axes.get_xlim()
+    ticks = axes.xaxis.get_major_ticks()
+    seen = [tick.label1 for tick in ticks if low <= tick.get_loc() <= high]
+    boxes = [label.get_window_extent() for label in seen if label.get_text()]
+    assert len(boxes) >= 2
+    assert all(left.x1 + 2.0 < right.x0 for left, right in pairwise(boxes))
+    assert not any(tick.label1.get_text() for tick in axes.xaxis.get_minor_ticks())
+    assert f"chosen:\n{found.choice.setting.label}" in axes.get_legend_handles_labels()[1]
 
 
 @pytest.mark.parametrize("fails", [False, True])

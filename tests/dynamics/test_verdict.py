@@ -1,11 +1,16 @@
 """The verdict of a run: outcome, doubts, displacements and mechanisms."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from glued import glued
+from portals import DRY, box
 
 import archfem as af
 from archfem.dynamics import MECHANISM_DEFINITIONS
+from archfem.joints.criteria import find_failed_joints
 from archfem.limit import mechanism_over_record
 from archfem.masonry.joint_closing import describe_closing
 
@@ -290,3 +295,60 @@ def test_an_event_ends_a_run_of_any_steps_in_its_first_mechanism(paced, model, m
     before = halted.time[len(halted.time) - len(held) - 1]
     assert held[-1] - before >= 1e-3 * (1.0 - 1e-6)
     assert len(held) == 1 or held[-2] - before < 1e-3
+
+
+def bonded_wall():
+    """Four courses of three stones of 0.5 m by 0.25 m in running bond: nine head joints."""
+    blocks = [box(-0.5, -0.5, 2.0, 0.0, "ground", fixed=True, part="ground")]
+    for course in range(4):
+        inner = (0.5, 1.0) if course % 2 else (0.25, 0.75, 1.25)
+        for left, right in pairwise((0.0, *inner, 1.5)):
+            outline = left, 0.25 * course, right, 0.25 * (course + 1)
+            blocks.append(box(*outline, f"stone {len(blocks)}", part="wall", role="pier"))
+    return af.masonry.assembled(blocks, replace(DRY, friction=0.3))
+
+
+@pytest.fixture(scope="module", params=["small", "large"])
+def wall_model(request):
+    return af.build(bonded_wall(), fidelity="rigid", displacements=request.param)
+
+
+def test_head_joints_without_a_force_at_rest_are_no_failures(wall_model):
+    """Nothing has failed in a wall at rest, nor under a hundredth of its friction."""
+    still = af.Motion(0.03 * np.sin(40.0 * np.arange(0.0, 0.2, 0.005)), 0.005)
+    given = {"dt": 0.005, "damping": af.StiffnessDamping(0.05, 20.0)}
+    run = af.time_history(wall_model, still, until=af.dynamics.CountedMechanism(), **given)
+    heads = np.abs(wall_model.structure.normals[:, 0]) > 0.5
+    np.testing.assert_array_equal(run.joints["idle"].values, heads)
+    assert heads.sum() == 10
+    assert not find_failed_joints(run.joints).any()
+    assert not any(run.verdict.mechanisms.values())
+    assert run.ending is af.dynamics.Ending.FINISHED
+    # without what is known of the rest, their small forces and gaps count
+    assert mechanism_over_record(run.joints.drop_vars("idle")) is not None
+
+
+def test_bed_joints_of_a_wall_still_fail_and_move(wall_model, tmp_path):
+    """By sliding; idle joints count in no number, and take part in the verified motion.
+
+    A vibration doubles a force that begins at once, at most: friction of 0.3 holds below 0.15 g.
+    """
+    pulse = af.Motion(6.0 * np.sin(10.0 * np.arange(0.0, 0.3, 0.005)), 0.005)
+    given = {"dt": 0.005, "damping": af.StiffnessDamping(0.05, 20.0)}
+    run = af.time_history(wall_model, pulse, **given)
+    counted, idle = run.mechanism, np.flatnonzero(run.joints["idle"])
+    assert 6.0 * np.sin(10.0 * counted.time) > 0.5 * 0.3 * 9.81
+    assert not set(counted.joints) & set(idle)
+    ended = af.time_history(wall_model, pulse, until=af.dynamics.CountedMechanism(), **given)
+    assert ended.time[-1] == counted.time
+    bare = run.joints.drop_vars("idle")
+    found, other = (
+        af.limit.first_verified_mechanism(run.structure, each) for each in (run.joints, bare)
+    )
+    assert found.moved == other.moved
+    again = af.History.read(run.save(tmp_path / "run.nc"), run.structure)
+    assert again.mechanism.joints == counted.joints
+
+
+def test_joints_of_a_ring_are_never_idle(run):
+    assert "idle" not in run.joints.coords

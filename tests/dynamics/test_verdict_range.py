@@ -112,7 +112,7 @@ def test_a_deciding_property_explains_all_and_a_constant_one_nothing():
         (
             {"k_n": np.array([0.5, 0.8, 1.5, 2.5]), "sign": list("abab")},
             [True, True, False, False],
-            "all with k_n below 2.3 GPa/m, where 2 of 2 fall",
+            "all with k_n below 2.3 MPa/mm, where 2 of 2 fall",
         ),
         (
             {"friction": np.array([-0.1, 0.0, 0.05, 0.1])},

@@ -106,11 +106,65 @@ def test_an_axle_on_an_overhang_by_hand():
     # It stands on as much of its base, about the middle, as reaches to the resultant; a heavy axle
     # needs a base that reaches beyond the toe.
     for axle, stands in ((2e3, True), (2e5, False)):
-        other = af.rate(stone, Vehicle("axle", (axle,)))
+        other = af.rate(stone, Vehicle("axle", (axle,)), width=2.0)
         weight, place = 6.0 * af.STONE.unit_weight, other.moving.position
         resultant = (weight * (2.0 * 0.5 + 1.0 * 1.5) / 3.0 + axle * place) / (weight + axle)
         assert other.geometric == pytest.approx(0.5 / (resultant - 0.5), rel=2e-4)  # of the halving
         assert other.passes == (other.geometric >= 1.0) == stands
+
+
+def test_a_distributed_load_on_an_overhang_by_hand():
+    """It counts where it turns the stone: beyond the toe at 1 m, with its middle at 1.5 m.
+
+    It has the partial factor, on the width of the vehicle, and no dynamic factor.
+    """
+    stone = column_under_axle(width=2.0)
+    resists = af.STONE.unit_weight * 2.0 * (2.0 * 0.5 - 1.0 * 0.5)
+    lorry = Vehicle("lorry", (50e3,), live=2.0, impact=1.5, area_load=4e3)
+    found = af.rate(stone, lorry, width=1.0)
+    assert found.moving.position == pytest.approx(2.0)
+    turns = 2.0 * 1.5 * 2.0 * 50e3 * 1.0 + 2.0 * 4e3 * 2.0 * 0.5
+    assert found.factor == pytest.approx(resists / turns, rel=EXACT)
+    here = found.moving.factors.sel(direction="left", position=found.moving.position)
+    assert float(here["loaded"]) == pytest.approx(1.0)
+    assert np.isnan(found.by_rule)  # it has what its code and the rule say, or more
+    assert ", and 4 kN/m² of road where it is adverse; given" in str(found)
+
+
+def test_a_vehicle_spreads_over_its_wheels_and_the_fill_up_to_a_lane():
+    for name, cover, width in (
+        ("LM1", 0.3, 2.4 + 0.3),
+        ("LM1", 0.9, 3.0),
+        ("LM1", None, 2.4),
+        ("CS454-single", 0.3, 1.5 + 0.3),
+        ("CS454-single", 1.2, 2.5),
+    ):
+        bridge = arch_bridge(voussoirs=4, cover=cover, width=4.0)
+        assert VEHICLES[name].spread_over(bridge) == pytest.approx(width, abs=1e-6), (name, cover)
+        assert VEHICLES[name].spread_over(replace(bridge, width=1.2)) == 1.2
+
+
+def test_less_than_the_rule_is_stated_beside_the_verdict(monkeypatch):
+    """Twice the width has twice the factor; the factor by rule stands in the same line."""
+    monkeypatch.setattr(vehicles, "_places_along", lambda *_: (2.6, 3.1, 3.6))
+    bridge = arch_bridge(voussoirs=5, cover=0.6, width=6.0)
+    axle = Vehicle("axle", (50e3,), live=1.35, impact=1.2, area_load=3e3)
+    rule, wide = (af.rate(bridge, axle, fill=GRAVEL, **given) for given in ({}, {"width": 6.0}))
+    bare = af.rate(bridge, axle, fill=GRAVEL, width=6.0, area_load=0.0)
+    alone = af.rate(bridge, axle, fill=GRAVEL, area_load=0.0)
+    assert rule.width == pytest.approx(2.1, abs=1e-6)
+    assert bare.factor == pytest.approx(6.0 / 2.1 * alone.factor, rel=EXACT)
+    assert rule.factor < wide.factor < bare.factor
+    for found in (wide, bare, alone):
+        assert found.moving.position == rule.moving.position
+        assert found.by_rule == pytest.approx(rule.factor, rel=EXACT)
+        by_rule = f"over 2.1 m of width and 3 kN/m² beside the axles, by rule, {rule.factor:.4g}"
+        assert f"passes; {by_rule} at this place" in repr(found)
+    assert np.isnan(rule.by_rule)
+    assert repr(rule).endswith("passes")
+    train = replace(VEHICLES["LM71"], axles=(1e3,), spacings=())
+    left = "passes without dynamic factor and the 80 kN/m beside the axles (LM71-train)"
+    assert repr(af.rate(bridge, train, fill=GRAVEL)).endswith(left)
 
 
 def test_places_are_a_hundredth_of_the_bridge_apart():
@@ -149,7 +203,8 @@ def test_words_and_table(lorry_rating):
     words = str(lorry_rating)
     assert "live load by 1.35 (given)" in words
     assert "dead load by 1.1 (given)" in words
-    assert "175 kN over 2 m of width" in words
+    assert "175 kN; given" in words
+    assert "over 2 m of width (given)" in words
     assert f"factor {lorry_rating.factor:.4g} at x = " in repr(lorry_rating)
     assert ("passes" in repr(lorry_rating)) == (lorry_rating.factor >= 1.0)
     head, *rows = lorry_rating.table().splitlines()
@@ -179,15 +234,16 @@ def test_words_and_table(lorry_rating):
         ),
         ("own", {"live": 1.5, "impact": 1.3}, "passes"),
         ("by span", {"live": 1.45}, "passes without dynamic factor"),
-        ("LM2", {"width": 100.0}, "passes"),
+        ("LM2", {}, "passes"),
     ],
 )
 def test_a_vehicle_without_factors_passes_in_so_many_words(vehicle, given, says):
     """Those of LM2 are in its weights, and the one of LM71 depends on the span."""
     stone = column_under_axle(width=100.0)
-    own = Vehicle("axle", (10e3,))
-    by_span = Vehicle("axle", (10e3,), impact_source=VEHICLES["LM71"].impact_source)
-    found = af.rate(stone, {"own": own, "by span": by_span}.get(vehicle, vehicle), **given)
+    own, light = Vehicle("axle", (10e3,)), VEHICLES["LM2"]
+    by_span = replace(own, impact_source=VEHICLES["LM71"].impact_source)
+    driven = {"own": own, "by span": by_span, "LM2": light}[vehicle]
+    found = af.rate(stone, replace(driven, wheels=100.0, lane=100.0), **given)
     assert str(found).splitlines()[0].endswith(f"(the vehicle's middle), {says}")
     (live, impact) = (line for line in str(found).splitlines() if line[:6] in ("live l", "impact"))
     assert ("(none" in live) == ("partial" in says)
@@ -226,6 +282,7 @@ def test_impact_multiplies_the_vehicle():
         ({"dead": -1.0}, "dead, factor on the weights"),
         ({"width": 7.0}, "up to that of the bridge"),
         ({"width": 0.0}, "up to that of the bridge"),
+        ({"area_load": -1.0}, "area_load"),
         ({"structure": 3}, "structure"),
         ({"fill": None}, "softer than the joints"),
     ],
@@ -241,3 +298,5 @@ def test_a_vehicle_needs_weights_and_spacings():
         Vehicle("lorry", (1e5, 1e5))
     with pytest.raises(af.InvalidInput, match="partial factor on the live load of lorry"):
         Vehicle("lorry", (1e5,), live=-1.0)
+    with pytest.raises(af.InvalidInput, match="lane of lorry"):
+        Vehicle("lorry", (1e5,), lane=-1.0)

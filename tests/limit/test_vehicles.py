@@ -1,5 +1,6 @@
 """A vehicle over a bridge: each place against the collapse of its axles there."""
 
+import itertools
 from functools import cache
 from types import SimpleNamespace
 
@@ -18,6 +19,7 @@ EXACT = 1e-6
 """Relative: the programme is solved to 1e-9 block weights, corners count as one within 1e-6."""
 
 GRAVEL = af.limit.Fill(friction_angle=35.0)
+CLAYEY = af.limit.Fill(friction_angle=30.0, cohesion=5e3)
 LORRY = ([60e3, 115e3, 80e3], [3.2, 1.3])
 FEW = np.linspace(-1.0, 10.0, 23)
 
@@ -167,6 +169,32 @@ def descent(structure, motion, x):
     return -v - turn * (point[0] - structure.blocks[number].centroid[0])
 
 
+@pytest.mark.parametrize("fill", [GRAVEL, None], ids=["fill", "bare"])
+def test_a_distributed_load_stands_on_the_worst_of_all_sets_of_strips(fill, monkeypatch):
+    """Against each of the 2**6 sets of strips, solved one by one with the axles."""
+    monkeypatch.setattr(vehicles._cut_road, "__defaults__", (6,))
+    structure, weight = arch_bridge(cover=0.3 if fill else None), 20e3
+    strips = vehicles._cut_road(structure, weight)
+    corners = np.concatenate([structure.blocks[n].drawn() for n in structure.free])[:, 0]
+    total = sum(load.force[1] for load in strips)
+    assert total == pytest.approx(-weight * np.ptp(corners))
+    places = [2.6, 3.4]
+    found = over(structure, [60e3], positions=places, area_load=weight, fill=fill).factors
+    for place in places:
+        axle = af.PointLoad(place, (0.0, -60e3))
+        sets = itertools.product((False, True), repeat=len(strips))
+        factors = [
+            af.collapse_factor(structure, live=[axle, *itertools.compress(strips, s)], fill=fill)
+            for s in sets
+        ]
+        least = min(factors, key=lambda each: each.factor)
+        here = found.sel(direction="right", position=place)
+        assert float(here["factor"]) == pytest.approx(least.factor, rel=EXACT)
+        alone, everywhere = factors[0].factor, factors[-1].factor
+        assert least.factor < min(alone, everywhere)
+    assert 0.0 < float(found["loaded"].min()) <= float(found["loaded"].max()) < np.ptp(corners)
+
+
 @pytest.mark.slow
 def test_more_cover_spreads_axles_and_carries_more():
     """A weightless fill without strength has only the spreading."""
@@ -265,19 +293,23 @@ def test_the_weakest_solution_at_a_place_is_kept(monkeypatch):
     ]
 
 
-def test_a_plastic_fill_bounds_the_vehicle_at_each_place(monkeypatch):
+def test_a_plastic_fill_bounds_the_vehicle_at_each_place(monkeypatch, caplog):
     """Each place is one pair of bounds; the rating has the least of them."""
     pytest.importorskip("clarabel")
     fill = af.limit.PlasticFill(friction_angle=30.0, cohesion=5e3, gap=0.9)
-    moving = af.moving_load(arch_bridge(), [1e4], positions=[3.3], fill=fill)
+    given = {"positions": [3.3], "area_load": 2e3}
+    moving = af.moving_load(arch_bridge(), [1e4], fill=fill, **given)
+    assert "other parts may be worse with a plastic fill" in caplog.text
     factors = moving.factors["factor"].sel(direction="right").values
-    load = af.PointLoad(3.3, (0.0, -1e4))
-    alone = af.collapse_factor(arch_bridge(), live=load, fill=fill)
+    pressing = af.moving_load(arch_bridge(), [1e4], fill=CLAYEY, **given).worst
+    assert moving.worst.live == pressing.live
+    assert len(pressing.live) > 3
+    alone = af.collapse_factor(arch_bridge(), live=list(moving.worst.live), fill=fill)
     assert factors[0] == pytest.approx(alone.lower, rel=1e-6)
     assert moving.worst.upper == pytest.approx(alone.upper, rel=1e-6)
     # a rating takes every fifth of its places: one here
     monkeypatch.setattr(vehicles, "_places_along", lambda *_: (3.3, *[4.5] * 4))
-    rating = af.rate(arch_bridge(), vehicles.Vehicle("axle", (1e4,)), fill=fill)
+    rating = af.rate(arch_bridge(), vehicles.Vehicle("axle", (1e4,), area_load=2e3), fill=fill)
     assert rating.factor == pytest.approx(factors[0], rel=1e-6)
     assert np.isnan(rating.geometric)
     assert "not searched with a plastic fill" in str(rating)

@@ -33,3 +33,13 @@ def test_arcs_are_about_their_own_centre():
         assert points[[0, -1]] == pytest.approx(sector.points[[side, side + 1]])
         assert np.hypot(*(points - [3.0, 1.0]).T) == pytest.approx(radius)
     assert sector.area == pytest.approx(0.75 * np.pi)
+
+
+def test_a_repeated_corner_is_refused():
+    """A side without length has no direction, along which loose blocks would touch."""
+    for place in range(4):
+        outline = [*SQUARE[: place + 1], SQUARE[place], *SQUARE[place + 1 :]]
+        with pytest.raises(af.InvalidStructure, match=r"'gable' has two corners beside each other"):
+            af.Block(outline, af.STONE, "gable")
+    with pytest.raises(af.InvalidStructure, match=r"at \(0\.0, 0\.0\): leave one out"):
+        af.Block((*SQUARE, SQUARE[0]), af.STONE, "gable")

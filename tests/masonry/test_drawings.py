@@ -109,7 +109,7 @@ def test_wrong_units(tmp_path):
 
 def test_files_that_are_no_drawings(tmp_path):
     for name, text, says in (
-        ("a.shp", "", "is no drawing: give a .geojson, .dxf, .svg or .msh"),
+        ("a.shp", "", "is no drawing: give a .geojson, .dxf, .svg, .ifc or .msh"),
         ("a.geojson", "{", "it is not JSON"),
         ("b.geojson", "[]", "no GeoJSON FeatureCollection"),
         ("d.geojson", '{"features": [3]}', "feature 1 is 3, where GeoJSON has an object"),

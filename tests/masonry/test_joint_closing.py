@@ -247,17 +247,17 @@ def test_a_finish_gives_the_law_of_the_weaker_stone():
 def test_the_law_of_joints_is_described_in_a_sentence():
     stone = af.Material(20e9, 0.2, 22e3, 40e6)
     wall = wall_of(stone, stone)
-    assert describe_closing(wall) == "joints close linearly with 1.48 GPa/m"
+    assert describe_closing(wall) == "joints close linearly with 1.48 MPa/mm"
     dressed = af.masonry.with_finish(wall, "dressed")
     law = af.joint_stiffness(20e9, 0.5, "dressed", strength=40e6)
     stiffness, closure = f"{law.initial[1] / 1e9:.3g}", f"{1e3 * law.closure[1]:.2g}"
-    words = f"by the law of dressed faces ({stiffness} GPa/m at first, {closure} mm at most)"
+    words = f"by the law of dressed faces ({stiffness} MPa/mm at first, {closure} mm at most)"
     assert describe_closing(dressed) == f"joints close {words}"
     # a law of other numbers has no finish, whatever it was made from
     softer = replace(dressed.joints[1].contact, closure=2e-3, name="bed")
     both = replace(dressed, joints=(dressed.joints[0], replace(wall.joints[1], contact=softer)))
-    other = f"'bed' by a law that stiffens ({stiffness} GPa/m at first, 2 mm at most)"
+    other = f"'bed' by a law that stiffens ({stiffness} MPa/mm at first, 2 mm at most)"
     assert describe_closing(both) == f"joints close: 'stone to stone' {words}; {other}"
     bed = describe_closing(af.masonry.with_finish(wall, "mortar"))
-    assert bed == "joints close linearly with 31.6 GPa/m, of a bed of mortar"
+    assert bed == "joints close linearly with 31.6 MPa/mm, of a bed of mortar"
     assert describe_closing(wall_of(af.masonry.BACKFILL)) == ""

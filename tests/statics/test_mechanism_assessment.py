@@ -423,6 +423,19 @@ def test_refused_structures_and_rules():
         af.masonry.AttachedLoad(1, (0.0, 1.0), weight=1e12)
 
 
+def test_cohesion_that_is_left_out_is_named(caplog):
+    """The squat stone slides at its friction, 0.6 g, as without cohesion, and a warning says so."""
+    glue = af.Contact(1e9, 1e9, 0.6, cohesion=1e5)
+    squat = af.column(breadth=2.0, heights=[1.0], contact=glue)
+    assert af.kinematic_assessment(squat, SPECTRUM).alpha_0 == pytest.approx(0.6, rel=1e-6)
+    assert "a cohesion of 1e+05 Pa, which the assessment leaves out" in caplog.text
+    caplog.clear()
+    # breadth over height; and no joint slides
+    turning = af.kinematic_assessment(squat, SPECTRUM, friction=None)
+    assert turning.alpha_0 == pytest.approx(2.0, rel=1e-6)
+    assert not caplog.text
+
+
 @pytest.mark.parametrize(
     ("name", "most"),
     [("share", 1.0), ("period_factor", 10.0), ("secant_share", 1.0), ("damping", 0.5)],

@@ -152,6 +152,7 @@ def test_a_rating_shows_its_worst_place_and_the_axles_as_given(ring, few_places)
     axles, places = [3.6 * axle for axle in lorry.axles], np.linspace(-9.0, 9.0, 37).tolist()
     moving = af.moving_load(wide, axles, spacings=lorry.spacings, positions=places)
     factors = {"live": 1.5, "impact": 1.2, "dead": 1.0, "geometric": 1.0}
+    factors |= {"area_load": 0.0, "by_rule": np.nan}
     found = af.limit.Rating(wide, lorry, width=2.0, moving=moving, **factors)
     upper, lower = draw_rating(found).axes
     place, drawn = lines_of(upper)["worst place"][0], lines_of(upper)
@@ -167,6 +168,17 @@ def test_a_rating_shows_its_worst_place_and_the_axles_as_given(ring, few_places)
     # the bridge is analysed under more newtons, over all of its width
     sizes = [-load.force[1] for load in found.moving.worst.live]
     np.testing.assert_allclose(sizes, 12e3 * 1.8 * 2.0)
+
+
+def test_a_rating_marks_where_the_distributed_load_stands(coarse_ring, few_places):
+    found = af.rate(coarse_ring, af.limit.Vehicle("lorry", (5e3,), area_load=2e3), friction=None)
+    marked = lines_of(draw_rating(found).axes[1])["distributed load"]
+    (axle, *strips) = found.moving.worst.live
+    np.testing.assert_allclose(marked[:, 0], [load.x for load in strips])
+    sinks = [load.place(coarse_ring)[1] for load in strips]
+    np.testing.assert_allclose(marked, sinks)
+    assert axle.force[1] == -5e3
+    assert 0 < len(strips) < 40
 
 
 def test_a_moving_load_shows_factors_over_its_middle_and_the_mechanism(coarse_ring):

@@ -14,6 +14,8 @@ from archfem.view.pages.document import Grid
 
 Row = tuple[str, str, str]  # quantity, value, mark
 
+_RATING_KEYS = {"live", "impact", "dead", "width", "area_load"}
+
 _CAPTION = (
     "Inputs. Given: the case states it. Default: archfem's, since the case does not. Inferred: it "
     "follows from the others."
@@ -111,8 +113,9 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
             yield f"{section}: {key.replace('_', ' ')}", describe_value(value), "given"
         if section == "limit" and "friction" not in table:
             yield "limit: friction", "coulomb, associated", "default"
-        if section == "rating" and (own := {"live", "impact", "dead"}.difference(table)):
-            yield f"rating: factors {', '.join(sorted(own))}", "of the code, see below", "default"
+        if section == "rating" and (own := _RATING_KEYS - table.keys()):
+            words = ", ".join(sorted(own)).replace("_", " ")
+            yield f"rating: {words}", "of the code, see below", "default"
 
 
 def _motion_rows(data: ReportData) -> Iterator[Row]:

@@ -1,4 +1,4 @@
-"""HTML reports of cases, result folders and single histories."""
+"""Reports of cases, result folders and single histories."""
 
 from pathlib import Path
 
@@ -13,10 +13,11 @@ from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.view.pages.document import Document, write_page
 from archfem.view.pages.player import Player
+from archfem.view.pages.word import write_word
 
 
 def write_report(data: ReportData, path: str | Path) -> Path:
-    """Write a report atomically."""
+    """Write a report atomically, as HTML or, by its suffix, for Word."""
     case = data.case
     footer = (
         "Written by archfem from the results named above; figures and numbers are theirs. On paper "
@@ -24,6 +25,8 @@ def write_report(data: ReportData, path: str | Path) -> Path:
     )
     head = case.title, describe_origin(data), list_facts(data)
     document = Document(*head, build_sections(data), footer)
+    if Path(path).suffix.lower() == ".docx":
+        return write_word(path, document)
     return write_page(path, document.page)
 
 

@@ -1,4 +1,4 @@
-"""Plane assemblies of compas_assembly and compas_dem (JSON): outlines of their blocks.
+"""Plane assemblies of compas_assembly and compas_dem (JSON): outlines of blocks, also of IFC.
 
 Blocks are polyhedra, z upwards. Where all of them have the same extent along x or along y, and two
 equal faces across it, the assembly is plane: these faces are its elevation.
@@ -41,6 +41,12 @@ def read_plane_assembly(found: dict[str, Any]) -> Iterator[tuple[str, Array, boo
     blocks = [_read_block(*each) for each in _find_meshes(found)]
     if not blocks:
         raise InvalidInput("it has no blocks with vertices and faces: export the whole assembly")
+    for block, outline in zip(blocks, trace_elevation(blocks), strict=True):
+        yield block.name, outline, block.fixed
+
+
+def trace_elevation(blocks: list[Polyhedron]) -> list[Array]:
+    """Return the outlines (n, 2) of prisms of one width across x or y, in units of the file."""
     points = np.concatenate([block.points for block in blocks])
     near = FLATNESS * float(np.ptp(points, axis=0).max())
     uneven = []
@@ -48,10 +54,8 @@ def read_plane_assembly(found: dict[str, Any]) -> Iterator[tuple[str, Array, boo
         ends = points[:, across].min(), points[:, across].max()
         outlines = [_trace_front(block, across, ends, near) for block in blocks]
         if all(outline is not None for outline in outlines):
-            for block, outline in zip(blocks, outlines, strict=True):
-                assert outline is not None
-                yield block.name, block.points[outline][:, [along, 2]], block.fixed
-            return
+            pairs = zip(blocks, outlines, strict=True)
+            return [block.points[outline or []][:, [along, 2]] for block, outline in pairs]
         uneven.append(blocks[outlines.index(None)].name)
     raise InvalidInput(
         f"it is not plane: across y '{uneven[0]}' and across x '{uneven[1]}' have not the width of "

@@ -1,4 +1,4 @@
-"""Drawings with one closed outline for each block: GeoJSON, DXF, SVG and tagged gmsh files.
+"""Drawings with one closed outline for each block: GeoJSON, DXF, SVG, IFC, tagged gmsh files.
 
 A drawing is an elevation: x to the right, y upwards. ezdxf reads DXF files and meshio gmsh files;
 nothing in them is executed. Only calls of these two are within `_foreign_reader`, since files that
@@ -28,7 +28,8 @@ from archfem._validation import short_repr
 from archfem.errors import InvalidInput
 from archfem.masonry.block import measure_polygon
 from archfem.masonry.structure import suggest_name
-from archfem.masonry.survey.assemblies import is_assembly, read_plane_assembly
+from archfem.masonry.survey.assemblies import is_assembly, read_plane_assembly, trace_elevation
+from archfem.masonry.survey.ifc import load_ifc_reader
 from archfem.masonry.survey.svg import read_svg
 from archfem.units import in_unit
 
@@ -61,8 +62,9 @@ def read_drawing(
     path = Path(path)
     readers = {".geojson": _read_geojson, ".json": _read_geojson, ".msh": _read_msh}
     readers |= {".dxf": partial(_read_dxf, snap=snap), ".svg": partial(_read_svg, snap=snap)}
+    readers[".ifc"] = _read_ifc
     if (read := readers.get(path.suffix.lower())) is None:
-        raise InvalidInput(f"{path} is no drawing: give a .geojson, .dxf, .svg or .msh file")
+        raise InvalidInput(f"{path} is no drawing: give a .geojson, .dxf, .svg, .ifc or .msh file")
     check_file(path, "drawing", max_bytes=2**25)
     try:
         outlines = list(read(path, unit, ignored))
@@ -397,6 +399,19 @@ def _read_svg(
     factor = in_unit(f"1 {unit}", "m", "unit")
     for name, layer, points in read_svg(read_text(path, "drawing"), 0.5 * snap / factor, ignored):
         yield Outline(_check_polygon(points, f"'{name}'", factor), name, layer)
+
+
+def _read_ifc(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
+    """Read the solids of an IFC file as an elevation, each on the layer of its class."""
+    if unit is not None:
+        raise InvalidInput(f"an IFC file states its unit: leave unit = {unit!r} out")
+    read = load_ifc_reader()
+    with _foreign_reader("ifcopenshell", "IFC file"):
+        solids = read(path, ignored)
+    if solids:
+        outlines = trace_elevation([solid for solid, _ in solids])
+        for (solid, kind), points in zip(solids, outlines, strict=True):
+            yield Outline(_check_polygon(points, f"'{solid.name}'", 1.0), solid.name, kind)
 
 
 def _read_msh(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:

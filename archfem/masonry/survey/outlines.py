@@ -101,7 +101,8 @@ def read_outlines(
 
     Args:
         path: GeoJSON, DXF or SVG file or gmsh mesh of an elevation, y upwards; or a plane assembly
-            of compas_assembly or compas_dem (.json), whose blocks are on the layer "blocks".
+            of compas_assembly or compas_dem (.json), whose blocks are on the layer "blocks"; or an
+            IFC file whose solids are one, each on the layer of its class, as "IfcMember".
         unit: unit of the coordinates; by default that of the DXF file, and metres otherwise. An SVG
             file needs one.
         snap: vertices and edges nearer than this are made to touch; chords stand for arcs, to half

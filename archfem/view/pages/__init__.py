@@ -5,4 +5,5 @@ live         page that simulates falling stones in a browser
 player       player of a run
 player_data  data of the player
 wasm         compiled kernels of that page
+word         documents for Word
 """

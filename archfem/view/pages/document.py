@@ -1,7 +1,7 @@
 """HTML documents of sections with text, tables, figures and players."""
 
 from abc import ABC, abstractmethod
-from base64 import b64encode
+from base64 import b64decode, b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -55,6 +55,7 @@ class FigureBlock:
     source: str  # the picture as a data URI
     caption: str  # below the figure
     inches: float  # width of the figure; it shrinks with a narrower page
+    figure: Figure | None = None  # that was drawn, not read from a file
 
     kind = "plate"
 
@@ -65,7 +66,16 @@ class FigureBlock:
         buffer = BytesIO()
         with matplotlib.rc_context({"svg.fonttype": "path", "path.simplify_threshold": 0.5}):
             figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
-        return cls(_uri("image/svg+xml", buffer.getvalue()), caption, float(figure.get_figwidth()))
+        width = float(figure.get_figwidth())
+        return cls(_uri("image/svg+xml", buffer.getvalue()), caption, width, figure)
+
+    def raster(self) -> bytes:
+        """Return the picture as PNG, 300 dots per inch."""
+        if self.figure is None:
+            return b64decode(self.source.partition(",")[2])
+        buffer = BytesIO()
+        self.figure.savefig(buffer, format="png", dpi=300)
+        return buffer.getvalue()
 
     @classmethod
     def read(cls, path: Path, caption: str) -> "FigureBlock":
