@@ -17,6 +17,9 @@
 
 # %%
 # %matplotlib inline
+from dataclasses import replace
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -225,6 +228,110 @@ plt.close(figure)
 figure
 
 # %% [markdown]
+# ## A wall, and a bridge
+#
+# Wall 12 of Griffith et al. (scene S33 of Arch-Bench) has 18 courses of brick, 0.11 m thick. It is
+# held at its head and pushed at mid-height. The measured force is 0.1378 of its weight, within 7 %,
+# where mid-height has moved by 0.0752 of the thickness. Joints are taken as dry, with the finishes
+# of stone.
+
+
+# %%
+def wall(contact):
+    """Return the wall, with a smooth stop behind its head."""
+    brick = af.Material(30 * GPa, 0.2, 1800 * 9.81)
+    stack = af.column(breadth=0.11, heights=[1.5 / 18] * 18, material=brick, contact=contact)
+    corners = ((0.055, 1.48), (0.105, 1.48), (0.105, 1.5), (0.055, 1.5))
+    stop = af.Block(corners, brick, "stop", fixed=True)
+    smooth = af.Contact(20 * GPa, 8 * GPa, 1e-6, "smooth")
+    head = af.Joint((18, 19), corners[0], corners[3], smooth, "head")
+    return replace(stack, blocks=(*stack.blocks, stop), joints=(*stack.joints, head))
+
+
+def push(contact):
+    """Return displacements over the thickness, and forces over the weight."""
+    pushed = wall(contact)
+    force = af.PointLoad(-0.055, (0.11 * 1.5 * 1800 * 9.81, 0.0), y=0.75)
+    stop = af.statics.Stop(displacement=0.1 * 0.11 / pushed.size)
+    model = af.build(pushed, fidelity="rigid", displacements="large")
+    path = af.pushover(model, force, stop=stop).curve
+    return path["displacement"].values / 0.11, path["factor"].values
+
+
+FORCE, PLACE = 0.1378, 0.0752
+curves = {}
+for name in laws:
+    law = af.joint_stiffness(30 * GPa, 0.11, name)
+    curves[name, "closing"] = push(law.closing_contact(0.7))
+    curves[name, "linear"] = push(law.contact(0.7))
+columns = ["peak", f"at {PLACE}", f"at {PLACE}, over the measured"]
+forces = {key: (f.max(), np.interp(PLACE, x, f)) for key, (x, f) in curves.items()}
+forces = pd.DataFrame(
+    [(peak, at, at / FORCE) for peak, at in forces.values()], list(forces), columns
+)
+peaks = {key: f.max() for key, (_, f) in curves.items()}
+law_share = max(peaks[name, "closing"] / peaks[name, "linear"] for name in laws) - 1.0
+finish_share = 1.0 - peaks["weathered", "closing"] / peaks["dressed", "closing"]
+print(f"the law raises the peak by up to {law_share:.1%}")
+print(f"weathered joints have {finish_share:.1%} less than dressed ones")
+for name in ("dressed", "weathered"):
+    share = forces.loc[[(name, "closing")]].iloc[0, 2]
+    print(f"{name} joints at the measured place: {share:.2f} of the force")
+forces.round(4)
+
+# %% [markdown]
+# Joints of the bridge of Prusias ({doc}`03_a_roman_bridge`) have 1.48 GPa/m in the paper, whatever
+# their pressure. Its lowest modes about the dead load follow.
+
+# %%
+meshes = Path(af.__file__).parents[1] / "meshes"
+bridge = af.Case.read(meshes / "prusias.toml").structure
+
+
+def lowest(structure):
+    """Return the lowest frequency [Hz], and the share of the mass that it moves along x."""
+    model = af.build(structure, fidelity={"backfill": "full", "rest": "faces"})
+    modes = af.modes(model, 1, start=af.dead_load(model))
+    return modes.frequencies[0], modes.mass_ratios[0, 0]
+
+
+modes = {"paper": lowest(bridge)}
+modes |= {name: lowest(af.masonry.with_finish(bridge, name)) for name in laws}
+for name, (frequency, share) in modes.items():
+    print(f"{name}: {frequency:.2f} Hz, {share:.0%} of the mass along the bridge")
+
+
+# %%
+def draw_wall_and_bridge():
+    """Draw the push of the wall, and the lowest frequency of the bridge by finish."""
+    figure, axes = plt.subplots(1, 2, figsize=(7.2, 2.9), layout="constrained")
+    for name in ("sawn", "dressed", "weathered"):
+        (line,) = axes[0].plot(*curves[name, "closing"], label=name)
+        axes[0].plot(*curves[name, "linear"], "--", lw=1.0, color=line.get_color())
+    axes[0].errorbar(PLACE, FORCE, 0.07 * FORCE, fmt="o", color="#1b1b1b", label="measured")
+    axes[0].set(xlabel="displacement over thickness", ylabel="force over weight", ylim=(0.1, 0.15))
+    places = range(len(modes))
+    axes[1].bar(places, [each[0] for each in modes.values()], 0.5, color="#0b4f8a")
+    axes[1].set_xticks(places, list(modes), fontsize=8)
+    axes[1].set_ylabel("lowest frequency of the bridge [Hz]")
+    axes[0].legend(frameon=False, fontsize=8, loc="lower right")
+    return figure
+
+
+figure = draw_wall_and_bridge()
+plt.close(figure)
+figure
+
+# %% [markdown]
+# The law raises the peak of the wall by 0.8 % at most; weathered joints have 3.4 % less than
+# dressed ones. At the measured place dressed joints have 0.95 of the measured force. Weathered
+# joints have 0.92, which is outside its 7 %. Dashed lines are linear joints of the same tangent at
+# 0.05 MPa.
+#
+# Joints of any finish are stiffer than those of the paper. The lowest mode of the bridge is at 4.16
+# Hz with the paper's joints, at 4.74 Hz with dressed and at 4.63 Hz with weathered ones. With a
+# finish it moves 5 to 8 % of the mass along the bridge in place of 23 %.
+#
 # ## Check
 #
 # An explicit code of its own, which shares nothing with archfem, has a static peak of 0.0508 g for

@@ -57,7 +57,16 @@ CLAIMS = {
         *(("3.505 s for 15 ms", "3.505 s, global"), ("for 5 ms", "for 5 ms")),
         *(("Hinges open by 5.9 mm", "opens by 5.9 mm"), ("25 mm are left", ": 25.2 mm left")),
         ("19 mm are left", ": 19.5 mm left"),
-    ]
+    ],
+    "06_how_a_joint_closes": [
+        ("by 0.8 % at most", "by up to 0.8%"),
+        ("3.4 % less than dressed", "3.4% less than dressed"),
+        ("0.95 of the measured force", "dressed joints at the measured place: 0.95 of"),
+        ("0.92, which is outside", "weathered joints at the measured place: 0.92 of"),
+        ("4.16 Hz with the paper's joints", "paper: 4.16 Hz, 23%"),
+        ("4.74 Hz with dressed", "dressed: 4.74 Hz, 5%"),
+        ("4.63 Hz with weathered", "weathered: 4.63 Hz, 8%"),
+    ],
 }
 """Words of the text, and of the output that they describe."""
 

@@ -41,7 +41,8 @@ def _steps(equation, start, widest):
 @pytest.mark.parametrize(
     "damping", [pytest.param(None, marks=pytest.mark.slow), af.StiffnessDamping(0.05, 8.0)]
 )
-# the sparse factor of small displacements, which "auto" never selects, compiles for 20 s
+# the sparse factor of small displacements, which "auto" selects where joints stiffen, compiles for
+# 20 s
 @pytest.mark.parametrize(
     "widest",
     [pytest.param(40, id="band"), pytest.param(0, id="sparse factor", marks=pytest.mark.slow)],

@@ -80,6 +80,10 @@ from archfem.joints.large.forces import (
 )
 from archfem.joints.large.rates import JointRates, add_rates, copy_rates, find_rate_pairs
 
+# Evaluations in a step, above which the next one begins with a factor of its own: joints open or
+# slide then, and change their derivatives much
+MAX_EVALUATIONS_TO_KEEP = 5
+
 
 class NewtonSolver(StepSolver):
     """Steps by Newton's method on all coordinates."""
@@ -88,6 +92,10 @@ class NewtonSolver(StepSolver):
 
     def __init__(self, equation: Equation, max_half_width: int = 40) -> None:
         self._equation, self.assembled = equation, {}
+        joints = equation.joints
+        stiffens = joints is not None and joints.points.stiffens
+        if stiffens:  # their factor serves for several steps, and a wide band is solved more slowly
+            max_half_width = min(12, max_half_width)
         self._storage = TangentStorage.of(tangent_pattern(equation), max_half_width)
         self.order, self.half_width = self._storage.order, self._storage.half_width
         self.has_band = self._storage.elimination is None
@@ -96,6 +104,11 @@ class NewtonSolver(StepSolver):
             self.order = self._tree.order
         # a band is factorised faster than the joint law is evaluated, a sparse tangent is not
         self._reduction = 0.0 if self.has_band else 0.01
+        self.keeps_factor = stiffens and not self.has_band
+        if self.keeps_factor:
+            # a factor takes as long as 4 to 10 iterations with the last one, which take off 6 to 15
+            # digits at this reduction: a step needs 5 to 8
+            self._reduction = 0.03
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
@@ -145,6 +158,7 @@ class NewtonSolver(StepSolver):
             *rows,
             contact,
             self._reduction,
+            self.keeps_factor,
         )
 
     def _large_system(self, dt: float) -> "LargeSystem":
@@ -210,6 +224,7 @@ class SmallSystem(NamedTuple):
     balanced_origin: Array  # balanced λ before the correction (r,)
     contact: Array  # w, w before the correction, and the correction (3, n)
     reduction: float  # as of `Tolerances`
+    keeps_factor: bool  # whether a step begins with the factor of the one before
 
 
 @kernel
@@ -334,13 +349,18 @@ def _solve_small_step(system):  # type: ignore
     # relative to the largest force; ten times as much where rounding does not let it fall
     error = 1e-12 * largest_force(law, work.gap)
     tolerances = Tolerances(error, 10.0 * error, 0.0, 0.0, system.reduction)
-    for limit, full_steps in ((12, 4), (60, 1)):
+    number = system.factored[2]
+    # the derivatives of joints that stiffen change in every step, but little
+    earlier = system.keeps_factor and number[0] >= 0
+    for limit, full_steps, reusable in ((12, 4, earlier), (60, 1, False)):
         predict_gaps(law, work.gap, work.gap_before)
         if full_steps == 1:
             for row in range(len(law.guess)):
                 law.guess[row] = law.start[row] if law.gain > 0.0 else work.gap[row]
-        iterations = _solve_small(system, work, tolerances, (limit, full_steps, False))
+        iterations = _solve_small(system, work, tolerances, (limit, full_steps, reusable))
         total += abs(iterations)
+        if system.keeps_factor and total > MAX_EVALUATIONS_TO_KEEP:
+            number[0] = -1
         if iterations > 0:
             for row in range(len(law.guess)):
                 work.gap_before[row], work.gap[row] = (
