@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from tqdm import tqdm
 
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
@@ -44,7 +43,6 @@ from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.motion.suite import Suite
 from archfem.statics.modes import modes
-from archfem.studies.evaluators import Evaluator
 from archfem.studies.fragility import (
     Fragility,
     Rate,
@@ -52,7 +50,7 @@ from archfem.studies.fragility import (
     fragility,
     integrate_rates,
 )
-from archfem.studies.process_pool import evaluate_points
+from archfem.studies.process_pool import evaluate_with_bar
 from archfem.studies.variations import (
     DEFAULT_RANGES,
     Variation,
@@ -188,8 +186,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
             )
             for k in todo
         ]
-        finished = evaluate_points(points, Evaluator(bracket_capacity), workers)
-        for k, row in tqdm(finished, total=len(todo), unit="sample", disable=None, leave=False):
+        for k, row in evaluate_with_bar(points, bracket_capacity, workers, unit="sample"):
             _store_row(table, k, row)
             if out is not None:
                 write_dataset(table, Path(out), {})
