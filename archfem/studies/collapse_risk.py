@@ -71,7 +71,7 @@ FIRST_ROUND = 8
 # Peak acceleration at which those begin [m/s²]
 FIRST_PEAK = 2.0
 
-# Factor between the scales that are tried until the fall is bracketed, and the most runs of one [-]
+# Largest factor between scales that are tried until the fall is bracketed, and most runs of one [-]
 SEARCH_FACTOR, MOST_RUNS = 1.6, 12
 
 # Samples of the bootstrap
@@ -93,21 +93,32 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
     smallest, largest = admissible_range(sample.between, sample.motion)
     stands, falls, runs = 0.0, inf, 0
     scale = min(max(sample.begin, smallest), largest)
+    wide = 1.0 + sample.precision
+    factor = _search_factor(wide)
     while runs < MOST_RUNS:
         runs += 1
         if run(sample.motion.scaled(scale)).kind in FALLEN_STATES:
             falls = scale
         else:
             stands = scale
-        if falls <= smallest or stands >= largest or falls <= (1.0 + sample.precision) * stands:
+        if falls <= smallest or stands >= largest or falls <= (wide + 1e-9) * stands:
             break
         if falls == inf:
-            scale = min(SEARCH_FACTOR * stands, largest)
+            scale = min(factor * stands, largest)
         elif stands == 0.0:
-            scale = max(falls / SEARCH_FACTOR, smallest)
+            scale = max(falls / factor, smallest)
         else:
             scale = sqrt(stands * falls)
     return {"lower": stands, "upper": falls, "runs": runs}
+
+
+def _search_factor(wide: float) -> float:
+    """Return the factor between scales whose bisections end at the width of a bracket [-]."""
+    # a little more would take another run, which tells the rate nothing
+    factor = wide
+    while factor**2 <= SEARCH_FACTOR:
+        factor **= 2
+    return factor
 
 
 @validate_arguments
