@@ -114,7 +114,7 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
 
 def _search_factor(wide: float) -> float:
     """Return the factor between scales whose bisections end at the width of a bracket [-]."""
-    # a little more would take another run, which tells the rate nothing
+    # with a little more the last bracket would take another run, for which the rate is no surer
     factor = wide
     while factor**2 <= SEARCH_FACTOR:
         factor **= 2

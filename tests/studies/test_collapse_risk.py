@@ -128,7 +128,7 @@ def test_a_block_falls_between_what_tilts_it_and_what_any_pulse_needs():
 
 @pytest.mark.parametrize("precision", [0.1, 0.25, 0.5, 1.0])
 @pytest.mark.parametrize("begin", [0.3, 0.95, 3.7])
-def test_no_run_makes_a_bracket_narrower_than_asked(quick_runs, precision, begin):
+def test_no_bracket_is_narrower_than_its_precision(quick_runs, precision, begin):
     analysis, motions = tilted_block()
     exact = 9.81 * 0.25 / 1.5 / motions[0].pga
     sample = RiskSample(
