@@ -20,7 +20,6 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
-from glob import escape
 from importlib import import_module
 from numbers import Real
 from pathlib import Path, PurePath
@@ -120,26 +119,26 @@ def read_text(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) -
 
 
 @contextmanager
-def atomic_write(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path, *, flush: bool = True) -> Iterator[Path]:
     """Yield a draft file that replaces the target when the block ends without error.
 
-    An error or a kill leaves the old file or the new one, never a part of it.
+    An error or a kill leaves the old file or the new one, never a part of it. Without `flush`, a
+    failure of the machine within seconds may damage the file.
     """
     _refuse_null(path)
-    machine = platform.node()
-    draft = path.with_name(f".{path.stem}.{machine}.{os.getpid()}.part{path.suffix}")
-    pattern = f".{escape(path.stem)}.{machine}.*.part{escape(path.suffix)}"
+    begin, end = f".{path.stem}.{platform.node()}.", f".part{path.suffix}"
+    draft = path.with_name(f"{begin}{os.getpid()}{end}")
     try:
         with _explain_write_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-            for left in path.parent.glob(pattern):
-                process = left.name.removesuffix(f".part{path.suffix}").rpartition(".")[2]
-                if not _is_running(process):
-                    left.unlink(missing_ok=True)  # of a process that was killed
+            for name in os.listdir(path.parent):
+                if name.startswith(begin) and name.endswith(end):
+                    _remove_draft_of_killed(path.with_name(name), name[len(begin) : -len(end)])
             draft.unlink(missing_ok=True)  # a link that another has made
             yield draft
-            with draft.open("rb+") as file:
-                os.fsync(file.fileno())
+            if flush:
+                with draft.open("rb+") as file:
+                    os.fsync(file.fileno())
             os.replace(draft, path)
     finally:
         with suppress(OSError):  # the folder may be none, which was said above
@@ -159,6 +158,12 @@ def _explain_write_errors(path: Path) -> Iterator[None]:
                 error.errno, f"{path} could not be written, for the disk is full: make room there"
             ) from error
         raise InvalidInput(_write_error(path, error)) from error
+
+
+def _remove_draft_of_killed(draft: Path, process: str) -> None:
+    """Remove a draft unless its process, a number, is running."""
+    if not _is_running(process):
+        draft.unlink(missing_ok=True)
 
 
 def _is_running(process: str) -> bool:
@@ -331,9 +336,9 @@ def is_locked(folder: Path) -> bool:
     return False
 
 
-def write_sealed_json(path: Path, content: Any) -> None:
-    """Write a JSON file with the SHA-256 of its content."""
-    with atomic_write(path) as draft:
+def write_sealed_json(path: Path, content: Any, *, flush: bool = True) -> None:
+    """Write a JSON file with the SHA-256 of its content, by which a damaged file is noticed."""
+    with atomic_write(path, flush=flush) as draft:
         sealed = {"content": content, "sha256": hash_json(content)}
         draft.write_text(json.dumps(sealed), encoding="utf-8")
 

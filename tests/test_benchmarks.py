@@ -44,6 +44,7 @@ LONG = (
     "random_structures",
     "run",
     "solvers",
+    "study_cluster",
     "study_efficiency",
     "study_kills",
 )

@@ -61,8 +61,9 @@ def read_analysis(settings: Table, structure: Structure, folder: Path) -> Analys
         "newton": lambda table: read_object(Newton, table, "analysis.newton"),
     }
     values: dict[str, Any] = {}
+    known = analysis_keys()
     for section, names in SECTION_FIELDS.items():
-        keys = {name: analysis_keys()[name] for name in names}
+        keys = {name: known[name] for name in names}
         for name, value in check_table(settings.get(section, {}), keys, section).items():
             values[name] = readers[name](value) if name in readers else value
     for name, cls in (("criteria", Criteria), ("record", Record)):

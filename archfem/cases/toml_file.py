@@ -12,6 +12,7 @@ import json
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -219,6 +220,17 @@ def check_choice(value: Any, choices: Iterable[str], key: str) -> str:
     return str(value)
 
 
+def _convert_row(values: Any, kind: Any, key: str) -> list[Any]:
+    """Convert the values of a row to their kind."""
+    if not isinstance(values, list | tuple):
+        raise InvalidInput(f"{key} = {values!r} is not a list: write [a, b, …]")
+    # such as thousands of samples of a motion, which each point of a study has
+    is_unit = isinstance(kind, str) and kind != "degree"
+    if is_unit and all(type(value) is float and isfinite(value) for value in values):
+        return list(values)
+    return [_convert(value, kind, f"{key}[{n}]") for n, value in enumerate(values)]
+
+
 def _convert(value: Any, kind: Any, key: str) -> Any:
     """Convert one value to the kind of its key."""
     if kind == "degree":
@@ -233,9 +245,7 @@ def _convert(value: Any, kind: Any, key: str) -> Any:
         except InvalidInput as error:
             raise InvalidInput(f'{error}, or "{kind.word}"') from error
     if isinstance(kind, list):
-        if not isinstance(value, list | tuple):
-            raise InvalidInput(f"{key} = {value!r} is not a list: write [a, b, …]")
-        return [_convert(item, kind[0], f"{key}[{n}]") for n, item in enumerate(value)]
+        return _convert_row(value, kind[0], key)
     several = kind if isinstance(kind, tuple) else (kind,)
     kinds = tuple(each for each in several if isinstance(each, type))
     # bool is a subclass of int, and `voussoirs = true` is an error.

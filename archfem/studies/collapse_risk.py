@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from tqdm import tqdm
 
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
@@ -44,7 +43,6 @@ from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.motion.suite import Suite
 from archfem.statics.modes import modes
-from archfem.studies.evaluators import Evaluator
 from archfem.studies.fragility import (
     Fragility,
     Rate,
@@ -52,7 +50,7 @@ from archfem.studies.fragility import (
     fragility,
     integrate_rates,
 )
-from archfem.studies.process_pool import evaluate_points
+from archfem.studies.process_pool import evaluate_with_bar
 from archfem.studies.variations import (
     DEFAULT_RANGES,
     Variation,
@@ -73,7 +71,7 @@ FIRST_ROUND = 8
 # Peak acceleration at which those begin [m/s²]
 FIRST_PEAK = 2.0
 
-# Factor between the scales that are tried until the fall is bracketed, and the most runs of one [-]
+# Largest factor between scales that are tried until the fall is bracketed, and most runs of one [-]
 SEARCH_FACTOR, MOST_RUNS = 1.6, 12
 
 # Samples of the bootstrap
@@ -95,21 +93,32 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
     smallest, largest = admissible_range(sample.between, sample.motion)
     stands, falls, runs = 0.0, inf, 0
     scale = min(max(sample.begin, smallest), largest)
+    wide = 1.0 + sample.precision
+    factor = _search_factor(wide)
     while runs < MOST_RUNS:
         runs += 1
         if run(sample.motion.scaled(scale)).kind in FALLEN_STATES:
             falls = scale
         else:
             stands = scale
-        if falls <= smallest or stands >= largest or falls <= (1.0 + sample.precision) * stands:
+        if falls <= smallest or stands >= largest or falls <= (wide + 1e-9) * stands:
             break
         if falls == inf:
-            scale = min(SEARCH_FACTOR * stands, largest)
+            scale = min(factor * stands, largest)
         elif stands == 0.0:
-            scale = max(falls / SEARCH_FACTOR, smallest)
+            scale = max(falls / factor, smallest)
         else:
             scale = sqrt(stands * falls)
     return {"lower": stands, "upper": falls, "runs": runs}
+
+
+def _search_factor(wide: float) -> float:
+    """Return the factor between scales whose bisections end at the width of a bracket [-]."""
+    # with a little more the last bracket would take another run, for which the rate is no surer
+    factor = wide
+    while factor**2 <= SEARCH_FACTOR:
+        factor **= 2
+    return factor
 
 
 @validate_arguments
@@ -188,8 +197,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
             )
             for k in todo
         ]
-        finished = evaluate_points(points, Evaluator(bracket_capacity), workers)
-        for k, row in tqdm(finished, total=len(todo), unit="sample", disable=None, leave=False):
+        for k, row in evaluate_with_bar(points, bracket_capacity, workers, unit="sample"):
             _store_row(table, k, row)
             if out is not None:
                 write_dataset(table, Path(out), {})

@@ -7,26 +7,24 @@ kept. It is computed by `time_history`, so that its answers are those of a run o
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from tqdm import tqdm
 
 from archfem._display import ResultDisplay
 from archfem._validation import check_number, check_type, validate_arguments, validate_methods
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import History, classify_outcome
-from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict import ALL_DEFINITIONS, detect_mechanisms
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-from archfem.studies.evaluators import Evaluator, largest_values
-from archfem.studies.process_pool import evaluate_points
-from archfem.studies.variations import check_ranges, vary_settings
+from archfem.studies.evaluators import PreparedRuns, largest_values
+from archfem.studies.parameter_space import WholePoint
+from archfem.studies.process_pool import evaluate_with_bar
+from archfem.studies.variations import change_properties, check_ranges
 
 # Properties that a change may have, as `verdict_range` varies them
 CHANGED = ("k_n", "k_s", "friction", "damping_ratio", "damping_kind", "finish")
@@ -39,7 +37,7 @@ PEAKS = {
 
 
 @dataclass(frozen=True, eq=False)
-class EnsemblePart:
+class EnsemblePart(WholePoint):
     """Histories that one process computes one after another: motions and scales of one change."""
 
     analysis: Analysis = field(repr=False)
@@ -47,16 +45,6 @@ class EnsemblePart:
     runs: Sequence[tuple[Motion, float]] = field(repr=False)
     # from motions to histories; None where another process prepares it
     run: Callable[[Motion], History] | None = field(default=None, repr=False)
-
-    @property
-    def case(self) -> "EnsemblePart":
-        """The part itself, as evaluators take it."""
-        return self
-
-    @property
-    def model_key(self) -> str:
-        """Empty: each part has a model of its own."""
-        return ""
 
 
 @validate_methods
@@ -186,8 +174,7 @@ def ensemble(
             parts.append(EnsemblePart(analysis, tuple(change.items()), chosen_runs, run))
             places.append((chosen, number))
     table = _empty_table(analysis, motions, factors, varied)
-    finished = evaluate_points(list(enumerate(parts)), Evaluator(evaluate_part), workers)
-    for k, row in tqdm(finished, total=len(parts), unit="part", disable=None, leave=False):
+    for k, row in evaluate_with_bar([*enumerate(parts)], evaluate_part, workers, unit="part"):
         if row["error"]:
             raise ArchfemError(f"histories of change {dict(parts[k].changes)}: {row['error']}")
         _store_findings(table, places[k], row["found"])
@@ -222,10 +209,9 @@ def prepare_histories(
     analysis: Analysis, changes: Mapping[str, Any]
 ) -> Callable[[Motion], History]:
     """Return a function from motions to histories of a structure with changed properties."""
-    if not changes:
-        return analysis.run
-    changed, rest, damping = vary_settings(analysis, changes)
-    return partial(time_history, changed, start=rest, damping=damping)
+    if analysis.selects_model and not changes:
+        return PreparedRuns(analysis, None, analysis.damping).run
+    return change_properties(analysis, changes).run
 
 
 def evaluate_part(part: EnsemblePart) -> dict[str, Any]:

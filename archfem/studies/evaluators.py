@@ -13,15 +13,19 @@ import xarray as xr
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
-from archfem.cases.run import DeadLoadResult, log_prefix, run_time_history
+from archfem.cases.run import DeadLoadResult, log_prefix
+from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.motion_scaling import mechanism_scales
+from archfem.dynamics.schemes import EffectiveDamping, Viscous
+from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict import ALL_DEFINITIONS, MECHANISM_DEFINITIONS
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints, eccentricity_magnitude, part_roles
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import suggest_name
 from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import Equilibrium
 from archfem.studies.cache import dead_load_of, ground_motion, ground_suite, lowest_modes
 from archfem.studies.parameter_space import Point
 from archfem.studies.statements import capacity_findings, dead_load_findings, history_findings
@@ -48,6 +52,25 @@ def _describe_first_mode(result: DeadLoadResult) -> Findings:
     return {"frequency": float(first.frequencies[0]), "mass": float(first.mass_ratios[0, 0])}
 
 
+@dataclass(frozen=True, eq=False)
+class PreparedRuns:
+    """Runs of one structure under any motions, each independent of the others.
+
+    All evaluations compute their histories by it, from a dead load and a damping that are shared.
+    """
+
+    analysis: Analysis
+    rest: Equilibrium | None  # dead load; None where each motion selects its model
+    damping: Viscous | EffectiveDamping | str | None
+
+    def run(self, motion: Motion) -> History:
+        """Return the history under a motion; Ctrl-C ends all runs."""
+        run = time_history(self.analysis, motion, start=self.rest, damping=self.damping)
+        if run.ending is Ending.INTERRUPTED:
+            raise KeyboardInterrupt
+        return run
+
+
 def evaluate_history(case: Case) -> Findings:
     """Return the findings of the time history of a case."""
     return of_history(run_motion(dead_load_of(case), ground_motion(case)))
@@ -65,10 +88,9 @@ def run_motion(result: DeadLoadResult, motion: Motion) -> History:
         DidNotConverge: a step failed.
         KeyboardInterrupt: on Ctrl-C.
     """
-    run = run_time_history(result.case, motion, result.dead, result.damping[0])
-    if run.ending is Ending.INTERRUPTED:
-        raise KeyboardInterrupt
-    return run
+    runs = PreparedRuns(result.case.analysis, result.dead, result.damping[0])
+    with log_prefix(result.case.title, motion.name):
+        return runs.run(motion)
 
 
 @validate_arguments

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import chain, product
 from math import isfinite, log2
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from scipy import stats
@@ -216,7 +216,7 @@ class Point:
     @property
     def settings(self) -> dict[str, Any]:
         """Sections of the changed case."""
-        settings = deepcopy(dict(self.base))
+        settings = _copy_tables(self.base)
         for key, value in self.changes:
             if key == PAIR_KEY:
                 _select_pair(settings, value)
@@ -251,6 +251,20 @@ class StudyPoint(Protocol):
         """Text that points of one model have in common, whichever case they are of."""
 
 
+class WholePoint:
+    """Base of points that are evaluated as they are, and share no model with others."""
+
+    @property
+    def case(self) -> Self:
+        """The point itself."""
+        return self
+
+    @property
+    def model_key(self) -> str:
+        """Empty: the order of points saves nothing."""
+        return ""
+
+
 def describe_changes(point: StudyPoint) -> str:
     """Return the changes of a point in words."""
     changes = ", ".join(f"{key} = {short_repr(value)}" for key, value in point.changes)
@@ -263,6 +277,14 @@ def group_by_model(points: Iterable[tuple[int, Point]]) -> list[tuple[int, Point
     for number, point in points:
         groups.setdefault(point.model_key, []).append((number, point))
     return list(chain.from_iterable(groups.values()))
+
+
+def _copy_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Copy tables within each other, but not the rows in them, which nothing changes."""
+    return {
+        key: _copy_tables(value) if isinstance(value, Mapping) else value
+        for key, value in tables.items()
+    }
 
 
 def _select_pair(settings: dict[str, Any], pair: str) -> None:

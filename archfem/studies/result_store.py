@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from importlib import import_module
-from math import inf
+from math import inf, isfinite, isnan
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
@@ -150,7 +150,8 @@ class Store:
     def _write(self, path: Path, content: dict[str, Any]) -> None:
         """Write a JSON file whole or not at all."""
         with explain_full_disk(self.folder):
-            _files.write_sealed_json(path, content)
+            # thousands of rows would wait for the disk, and a damaged one is computed again
+            _files.write_sealed_json(path, content, flush=False)
 
 
 @contextmanager
@@ -353,7 +354,13 @@ def _flatten(table: xr.Dataset) -> pd.DataFrame:
 
 def _write_sheet(frame: pd.DataFrame, path: Path) -> None:
     """Write a sheet of Excel without the time of day, so that equal tables are equal files."""
-    frame.to_excel(path, index=False, sheet_name="results", engine="openpyxl")
+    # row by row, in half the time of pandas
+    book = import_module("openpyxl").Workbook(write_only=True)
+    sheet = book.create_sheet("results")
+    sheet.append(list(frame.columns))
+    for row in frame.itertuples(index=False, name=None):
+        sheet.append([_to_cell(value) for value in row])
+    book.save(path)
     with ZipFile(path) as archive:
         parts = {name: archive.read(name) for name in archive.namelist()}
     with ZipFile(path, "w", ZIP_DEFLATED) as archive:
@@ -361,6 +368,13 @@ def _write_sheet(frame: pd.DataFrame, path: Path) -> None:
             timeless = re.sub(rb"\d{4}-\d\d-\d\dT[\d:]+Z", b"1980-01-01T00:00:00Z", content)
             is_core = name == "docProps/core.xml"
             archive.writestr(ZipInfo(name), timeless if is_core else content, ZIP_DEFLATED)
+
+
+def _to_cell(value: Any) -> Any:
+    """Return a value of a cell, which has no NaN and no infinity."""
+    if isinstance(value, float) and not isfinite(value):
+        return None if isnan(value) else str(value)
+    return value
 
 
 def format_table(table: xr.Dataset, max_rows: int = 50) -> str:

@@ -43,7 +43,7 @@ def compute_once(kind: str, key: str, compute: Callable[[], Any]) -> Any:
             content = compute()
             # where the disk is full it is not shared
             with suppress(OSError, InvalidInput):
-                write_sealed_json(path, {"key": digest, "result": content})
+                write_sealed_json(path, {"key": digest, "result": content}, flush=False)
     return content
 
 

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from scipy.stats import qmc
-from tqdm import tqdm
 
 from archfem._validation import check_integer, check_number, validate_arguments
 from archfem.dynamics.analysis import Analysis
@@ -25,15 +24,14 @@ from archfem.dynamics.recorder import Record
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.dynamics.rigid_body.simulation import RigidBlockSimulation
 from archfem.dynamics.schemes import Conserving, EffectiveDamping, Viscous, interpret_damping
-from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.joint_closing import FINISHES, with_finish
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import Equilibrium
-from archfem.studies.evaluators import Evaluator
-from archfem.studies.process_pool import evaluate_points
+from archfem.studies.evaluators import PreparedRuns
+from archfem.studies.parameter_space import WholePoint
+from archfem.studies.process_pool import evaluate_with_bar
 
 # What is varied by default: values, of which numbers are the ends of a range
 DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
@@ -66,22 +64,12 @@ NEUTRAL: dict[str, Any] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Variation:
+class Variation(WholePoint):
     """One run of the range: the settings as given, and the changed values by name."""
 
     analysis: Analysis = field(repr=False)
     motion: Motion = field(repr=False)
     changes: tuple[tuple[str, Any], ...]
-
-    @property
-    def case(self) -> "Variation":
-        """The variation itself, as evaluators take it."""
-        return self
-
-    @property
-    def model_key(self) -> str:
-        """Empty: each run has a model of its own, and the order of runs saves nothing."""
-        return ""
 
 
 @validate_arguments
@@ -147,9 +135,8 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     neutral = {**NEUTRAL, "damping_kind": damping_kind(viscous)}
     changes = [*_single_changes(ranges, neutral), *sample_changes(ranges, samples, seed)]
     variations = [Variation(analysis, motion, _resolve_labels(ranges, each)) for each in changes]
-    points, evaluator = list(enumerate(variations)), Evaluator(evaluate_variation)
-    finished = evaluate_points(points, evaluator, workers)
-    rows = dict(tqdm(finished, total=len(points), unit="run", disable=None, leave=False))
+    points = list(enumerate(variations))
+    rows = dict(evaluate_with_bar(points, evaluate_variation, workers, unit="run"))
     dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], neutral)
     dataset["sampled"] = "run", np.arange(len(points)) >= len(points) - samples
     contacts = [joint.contact for joint in analysis.structure.joints]
@@ -290,16 +277,15 @@ def prepare_runs(
     changes = {**NEUTRAL, **changes}
     assert analysis.dt is not None
     dt = analysis.dt * (0.5 if changes["dt"] == "half" else 1.0)
-    analysis = replace(analysis, structure=_vary_contacts(analysis.structure, changes), dt=dt)
     if changes["joint_rule"] == "rigid":
-        return partial(_run_rigid_blocks, analysis.structure, dt=dt)
+        return partial(_run_rigid_blocks, _vary_contacts(analysis.structure, changes), dt=dt)
     three = changes["joint_rule"] == "three points"
     rule: Any = {"quadrature": "trapezoidal", "quadrature_points": 3} if three else {}
-    analysis = replace(analysis, **{"quadrature": "exact", "quadrature_points": None, **rule})
-    rest, damping = _damp_about_rest(analysis, changes)
+    rule = {"quadrature": "exact", "quadrature_points": None, **rule}
+    runs = change_properties(replace(analysis, dt=dt, **rule), changes)
 
     def run(motion: Motion) -> CollapseState:
-        history = time_history(analysis, motion, start=rest, damping=damping)
+        history = runs.run(motion)
         if history.fall is None:
             raise DidNotConverge(f"the run {history.outcome}", last=None)
         return history.fall
@@ -307,26 +293,20 @@ def prepare_runs(
     return run
 
 
-def vary_settings(
-    analysis: Analysis, changes: Mapping[str, Any]
-) -> tuple[Analysis, Equilibrium, Viscous | None]:
-    """Return an analysis with changed properties, its dead load and its damping."""
+def change_properties(analysis: Analysis, changes: Mapping[str, Any]) -> PreparedRuns:
+    """Return the runs of a structure whose joints and damping are changed."""
     changes = {**NEUTRAL, **changes}
     analysis = replace(analysis, structure=_vary_contacts(analysis.structure, changes))
-    return analysis, *_damp_about_rest(analysis, changes)
-
-
-def _damp_about_rest(
-    analysis: Analysis, changes: Mapping[str, Any]
-) -> tuple[Equilibrium, Viscous | None]:
-    """Return the dead load of an analysis, and its damping changed in kind and ratio."""
     rest = analysis.dead_load()
     kind, factor = changes.get("damping_kind"), changes["damping_ratio"]
-    return rest, vary_damping(analysis.damping, rest.model, rest, kind, factor)
+    damping = vary_damping(analysis.damping, rest.model, rest, kind, factor)
+    return PreparedRuns(analysis, rest, damping)
 
 
 def _vary_contacts(structure: Structure, changes: Mapping[str, Any]) -> Structure:
     """Return the structure with other laws of closing, stiffness and friction of its joints."""
+    if all(changes[name] == NEUTRAL[name] for name in ("finish", "k_n", "k_s", "friction")):
+        return structure
     if changes["finish"] != "as given":
         structure = with_finish(structure, changes["finish"])
     joints = []

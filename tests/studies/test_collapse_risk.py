@@ -14,7 +14,7 @@ from scipy.stats import norm
 import archfem as af
 from archfem.cases import risk_keys
 from archfem.commands.cli import main
-from archfem.studies.collapse_risk import CollapseRisk
+from archfem.studies.collapse_risk import CollapseRisk, RiskSample, bracket_capacity
 
 SITE = af.Hazard.power(2e-3, 2.5)
 
@@ -124,6 +124,20 @@ def test_a_block_falls_between_what_tilts_it_and_what_any_pulse_needs():
     assert (low < high).all()
     # peaks above b/h g lift it
     assert (high > 9.81 * 0.25 / 1.5).all()
+
+
+@pytest.mark.parametrize("precision", [0.1, 0.25, 0.5, 1.0])
+@pytest.mark.parametrize("begin", [0.3, 0.95, 3.7])
+def test_no_bracket_is_narrower_than_its_precision(quick_runs, precision, begin):
+    analysis, motions = tilted_block()
+    exact = 9.81 * 0.25 / 1.5 / motions[0].pga
+    sample = RiskSample(
+        analysis, motions[0], (("friction", 0.0),), begin * exact, (0.01, 5.0), precision
+    )
+    found = bracket_capacity(sample)
+    assert found["lower"] < exact < found["upper"]
+    # but for rounding: bisections of the factor between scales end there
+    assert found["upper"] / found["lower"] == pytest.approx(1.0 + precision, rel=1e-12)
 
 
 def test_samples_are_kept_and_continued(tmp_path, monkeypatch, quick_runs):

@@ -97,7 +97,7 @@ def test_invalid_studies_are_refused(text, says, tmp_path):
 
 
 def interrupted_run(*given, **options):
-    history = af.cases.run_time_history(*given, **options)
+    history = af.time_history(*given, **options)
     history.dataset.attrs["ended"] = "interrupted"
     return history
 
@@ -109,7 +109,7 @@ def interrupted_search(*given, **options):
 
 @pytest.mark.parametrize(
     ("name", "instead"),
-    [("run_time_history", interrupted_run), ("mechanism_scales", interrupted_search)],
+    [("time_history", interrupted_run), ("mechanism_scales", interrupted_search)],
 )
 def test_ctrl_c_leaves_no_half_of_a_pair(study, tmp_path, monkeypatch, name, instead):
     monkeypatch.setattr(f"archfem.studies.evaluators.{name}", instead)

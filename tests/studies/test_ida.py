@@ -56,6 +56,19 @@ def test_brackets_agree_with_runs_at_their_ends(small_ida):
         assert (found.table["first hinge"] <= found.table[limit]).all()
 
 
+def test_runs_are_those_of_an_ensemble(small_ida):
+    case, _, found = small_ida
+    row = found.table.sel(motion="seed 2")
+    scales = row["scale"].values[np.isfinite(row["scale"].values)]
+    motion = af.Motion.synthetic(seed=2, duration=0.6, pga=9.0)
+    runs = af.ensemble(case.analysis, motion, scales=scales.tolist()).dataset.isel(motion=0)
+    # the same code from the same start: no bit may differ
+    for name in ("eccentricity", "rotation", "slip"):
+        assert np.array_equal(row[name].values[: len(scales)], runs[name].values)
+    moved = row["largest_displacement"].values[: len(scales)]
+    assert np.array_equal(moved, runs["displacement"].values)
+
+
 def test_measures_grow_with_the_scale_by_their_definition(small_ida):
     _, _, found = small_ida
     motion = af.Motion.synthetic(seed=1, duration=0.6, pga=9.0)

@@ -241,16 +241,16 @@ def test_a_second_driver_is_refused(study_file, tmp_path):
 
 def test_a_full_disk_is_named_and_finished_points_stay(study_file, tmp_path, monkeypatch):
     folder, written = tmp_path / "out", []
-    fsync = os.fsync
+    replace = os.replace
 
-    def full(descriptor):
-        written.append(descriptor)
+    def full(draft, path):
+        written.append(path)
         if len(written) > 4:
             raise OSError(errno.ENOSPC, "No space left on device")
-        fsync(descriptor)
+        replace(draft, path)
 
     with monkeypatch.context() as patch:
-        patch.setattr(os, "fsync", full)
+        patch.setattr(os, "replace", full)
         with pytest.raises(af.errors.StudyStopped, match=r"disk of .*out is full"):
             af.Study.read(study_file, own_code=True).run(folder, workers=1)
     kept = list(folder.glob("points/*/*.json"))

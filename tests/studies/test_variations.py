@@ -10,7 +10,7 @@ from pages import read_page
 import archfem as af
 from archfem.dynamics import CollapseState, analysis
 from archfem.dynamics.damping import vary_damping
-from archfem.studies import variations
+from archfem.studies import evaluators, variations
 from archfem.studies.variations import (
     DEFAULT_RANGES,
     Variation,
@@ -40,13 +40,13 @@ def calls(monkeypatch):
 
     def elastic(analysis, motion, **options):
         calls.append((analysis.structure, motion, analysis.dt, analysis))
-        return SimpleNamespace(fall=stands)
+        return SimpleNamespace(fall=stands, ending=af.dynamics.Ending.FINISHED)
 
     def rigid(structure, motion, *, dt):
         calls.append((structure, motion, dt, None))
         return stands
 
-    monkeypatch.setattr(variations, "time_history", elastic)
+    monkeypatch.setattr(evaluators, "time_history", elastic)
     monkeypatch.setattr(variations, "_run_rigid_blocks", rigid)
     return calls
 
@@ -164,9 +164,9 @@ def test_rigid_blocks_have_shorter_steps_and_time_to_settle(column, motion, monk
 )
 def test_damping_that_is_given_is_varied(column, motion, monkeypatch, given, kind, expected):
     used = []
-    history = variations.time_history
+    history = evaluators.time_history
     monkeypatch.setattr(
-        variations,
+        evaluators,
         "time_history",
         lambda *words, damping, **rest: (
             used.append(damping) or history(*words, damping=damping, **rest)
