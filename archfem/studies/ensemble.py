@@ -237,7 +237,7 @@ def _reduce(
     except ArchfemError as error:
         none = dict.fromkeys(PEAKS, np.nan) | {"outcome": "unknown", "ended": "failed"}
         return {**none, "error": f"{type(error).__name__}: {error}", "time": time, "failed": failed}
-    mechanisms, attributes = detect_mechanisms(history.joints, structure), history.dataset.attrs
+    mechanisms = detect_mechanisms(history.joints, structure)
     for number, definition in enumerate(ALL_DEFINITIONS):
         if definition in mechanisms:
             found = mechanisms[definition]
@@ -245,8 +245,6 @@ def _reduce(
             failed[number, list(found.joints) if found else []] = 1.0
     return {
         **largest_values(history),
-        "largest_displacement": attributes["displacement"],
-        "residual_displacement": attributes["residual"],
         "outcome": classify_outcome(history, mechanisms),
         **{"ended": str(history.ending), "error": "", "time": time, "failed": failed},
     }

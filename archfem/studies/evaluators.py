@@ -114,8 +114,6 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
     findings: Findings = {
         **largest_values(run),
         "outcome": verdict.outcome,
-        "largest_displacement": verdict.displacement,
-        "residual_displacement": verdict.residual,
     }
     for definition, first in (mechanisms or first_mechanisms(run)).items():
         findings[definition] = np.inf if first is None or first.time is None else first.time
@@ -127,11 +125,14 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
 
 
 def largest_values(run: History) -> dict[str, float]:
-    """Return the largest values over time and joints of `of_history`."""
+    """Return the largest values and displacements of `of_history`."""
+    attributes = run.dataset.attrs
     return {
         "eccentricity": _largest(run, "eccentricity", 0.5),
         "friction": _largest(run, "friction", np.inf),
         **{name: _largest(run, name) for name in ("rotation", "opening", "slip")},
+        "largest_displacement": float(attributes.get("displacement", np.nan)),
+        "residual_displacement": float(attributes.get("residual", np.nan)),
     }
 
 

@@ -38,7 +38,7 @@ from archfem.limit.mechanism_count import Mechanism
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.studies.cache import dead_load_of, ground_motion, lowest_modes
-from archfem.studies.evaluators import Evaluator, Findings, of_history, run_motion
+from archfem.studies.evaluators import Evaluator, Findings, largest_values, run_motion
 from archfem.studies.fragility import Fragility, fragility
 from archfem.studies.parameter_space import PAIR_KEY, Axis, Point
 from archfem.studies.shared_results import compute_once
@@ -119,7 +119,7 @@ def _run(result: DeadLoadResult, motion: Motion) -> dict[str, Any]:
         run, complete = partial_history(error), False
     mechanisms, demands = first_mechanisms(run), dict.fromkeys(DEMAND_LABELS, inf)
     if complete:
-        findings = of_history(run, mechanisms)
+        findings = largest_values(run)
         demands = {name: findings[name] for name in DEMAND_LABELS}
     hinges = assessed_joints(with_failure_flags(run.joints))["hinge"] != 0
     reached = {
