@@ -153,7 +153,8 @@ class Recorder:
             "axis": ["x", "y"],
         }
         self._add_coordinates(variables, coordinates)
-        dataset = dataset.assign_coords(coordinates).assign(variables)
+        dataset.coords.update(coordinates)
+        dataset.update(variables)
         dataset.attrs |= self._attributes(motion, ending, outcome)
         history = History(dataset, structure)
         return history.with_doubts((*self.monitor.doubts, *self._doubt_mass_damping(dataset)))

@@ -340,6 +340,10 @@ def _largest_motion(blocks: RigidBlocks, freedoms: Array) -> Array:
     return result.x
 
 
+# Patterns of failed joints whose answers are kept, of some kilobytes each at most
+MAX_KNOWN_PATTERNS = 4096
+
+
 @dataclass(frozen=True, eq=False)
 class LoopCheck:
     """Compatibility of gaps around all loops of bodies, for the motion of some parts.
@@ -399,12 +403,25 @@ class LoopCheck:
         basis = np.linalg.qr(gaps, mode="complete")[0][:, gaps.shape[1] :]
         return np.where(np.abs(basis) > 1e-12, basis, 0.0)  # round-off: the joint is in no loop
 
-    def permits_motion(self, freedoms: Array, large: int = 200) -> bool:
-        """Return whether the failed joints may permit a motion of the parts.
+    @cached_property
+    def _known(self) -> dict[bytes, bool]:
+        """Answers of `permits_motion` by the freedoms: many histories share them."""
+        return {}
+
+    def permits_motion(self, freedoms: Array) -> bool:
+        """Return whether the failed joints may permit a motion of the parts."""
+        pattern = freedoms.tobytes()
+        if pattern not in self._known:
+            if len(self._known) >= MAX_KNOWN_PATTERNS:
+                self._known.clear()
+            self._known[pattern] = self._closes_any_loops(freedoms.reshape(3, -1))
+        return self._known[pattern]
+
+    def _closes_any_loops(self, freedoms: Array, large: int = 200) -> bool:
+        """Return `permits_motion`, by the loops between bodies.
 
         Where more than `large` joints between bodies have failed, the programme takes less time.
         """
-        freedoms = freedoms.reshape(3, -1)
         bodies = self.find_bodies(freedoms.any(axis=0))
         judged = np.unique(bodies[self.judged])
         judged = judged[judged >= 0]

@@ -67,7 +67,7 @@ class Stepper:
         total = round((end - start.time) / dt)
         # steps between two checks of events, Ctrl-C and the progress bar: more of small systems;
         # few at first, as steps after an event, or those in which Ctrl-C comes, are lost
-        state, done, size, most = start, 0, 128, min(max(128, 65536 // len(start.q)), 1024)
+        state, done, size, most = start, 0, 128, min(max(128, 65536 // len(start.q)), 512)
         while done < total:
             last = min(done + size, total)
             size = min(2 * size, most)
