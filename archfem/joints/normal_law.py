@@ -211,7 +211,7 @@ class Facets(NormalLaw):
         """Return Gauss's points on the parts of facets between the zero crossings of the gaps."""
         ends = [(gap[0::2], gap[1::2]) for gap in gaps]
         breaks = np.zeros((len(gaps) + 2, len(self.area)))
-        breaks[1:-1] = [a * _inverse_change(a, b) for a, b in ends]
+        breaks[1:-1] = [_divide_by_change(a, a, b) for a, b in ends]
         breaks[1:-1].sort(axis=0)
         breaks[-1] = 1.0
         length = (breaks[1:] - breaks[:-1])[:, None]
@@ -224,16 +224,20 @@ class Facets(NormalLaw):
         """Return the derivative of the closed area for each of `coupling_pairs` (2 p,) [m]."""
         a, b = opening[0::2], opening[1::2]
         # the zero z = a / (a - b) ends the closed part, or begins it; φ at z divides the area
-        inverse = _inverse_change(a, b)
-        zero, scale = a * inverse, np.where(is_closed(a), self.area, -self.area) * inverse**2
+        zero, inverse = _divide_by_change(a, a, b), _divide_by_change(1.0, a, b)
+        scale = np.where(is_closed(a), self.area, -self.area) * inverse**2
         shapes, rates = np.stack([1.0 - zero, zero]), np.stack([-b * scale, a * scale])
         return np.asarray(shapes[:, None] * rates).ravel()
 
 
-def _inverse_change(a: Array, b: Array) -> Array:
-    """Return 1 / (a - b) where a line from a to b crosses zero, which is there at a / (a - b)."""
+def _divide_by_change(value: Array | float, a: Array, b: Array) -> Array:
+    """Return value / (a - b) where a line from a to b crosses zero, which it does at a / (a - b).
+
+    A line that ends at zero crosses it at 1 exactly: a part as short as round-off would have a
+    large rate.
+    """
     crosses = is_closed(a) != is_closed(b)
-    return np.divide(1.0, a - b, out=np.zeros_like(a), where=crosses)
+    return np.divide(value, a - b, out=np.zeros_like(a), where=crosses)
 
 
 def choose_law(rule: Quadrature, points: JointPoints) -> NormalLaw:

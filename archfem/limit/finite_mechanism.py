@@ -320,7 +320,7 @@ def collapse_path(
     Example:
         >>> wall = af.column(breadth=0.6, heights=[2.4])
         >>> path = af.limit.collapse_path(wall, live=af.BodyForce(1.0))
-        >>> round(path.factors[0], 4), round(float(path.curve["displacement"][-1]), 4)
+        >>> round(float(path.factors[0]), 4), round(float(path.curve["displacement"][-1]), 4)
         (0.25, 0.3)
     """
     structure, grows = structure_of(structure), list_loads(live)

@@ -237,6 +237,7 @@ def test_facets_are_the_same_in_numpy_and_compiled(lag):
     points = JointPoints(np.zeros(2 * count, int), np.zeros(2 * count), ones, law, 1)
     facets = Facets(points)
     gaps = random_gaps(random, (2, 2 * count))
+    gaps[:, 1:81:2] = 0.0  # far ends that touch all the time: the parts of a facet end there
     gaps[:, 0::2] += np.where(gaps[:, 0::2] == 0.0, 1e-6, 0.0)  # one end at most just touches
     path, rates = lagged_path(*gaps, lag), (lag, 1.0 + lag)
     pairs = [each.reshape(-1, 2) for each in path]

@@ -46,6 +46,20 @@ def test_rough_points_have_the_circle_of_least_squares():
     assert found.radius == pytest.approx(radius, abs=0.02)
 
 
+def test_distances_of_a_symmetric_arc_are_square_to_every_change_of_the_circle():
+    """The condition of the least sum, where the search starts on the axis of symmetry."""
+    angles = np.radians(np.linspace(-70.0, 70.0, 36))
+    radii = 2.0 + 4e-3 * np.tile([1.0, -1.0], 18)
+    points = np.array([1.0, -0.5]) + radii[:, None] * np.stack([np.sin(angles), np.cos(angles)], 1)
+    for given in (points, points[::-1]):
+        found = fitted_circle(given)
+        normals = given - found.centre
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        changes = np.column_stack([normals, np.ones(36)])
+        # the search stops where the cosine between both is 1e-8; sizes are 4e-3 and 1 a point
+        assert np.abs(found.distances @ changes).max() <= 1e-8 * 36 * 4e-3
+
+
 @pytest.mark.parametrize(
     ("points", "says"),
     [

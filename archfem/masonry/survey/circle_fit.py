@@ -73,7 +73,13 @@ def fitted_circle(points: Sequence[Point] | Array) -> FittedCircle:
     def distances(circle: Array) -> Array:
         return np.asarray(np.linalg.norm(centred - circle[:2], axis=1) - circle[2])
 
-    fit = least_squares(distances, start, method="lm", xtol=1e-12, ftol=1e-15)
+    def derivatives(circle: Array) -> Array:
+        offsets = circle[:2] - centred
+        sizes = np.linalg.norm(offsets, axis=1)
+        return np.column_stack([offsets / sizes[:, None], -np.ones(len(centred))])
+
+    # differences take steps of 1e-8 of a coordinate, and round-off where it starts at zero
+    fit = least_squares(distances, start, derivatives, method="lm", xtol=1e-12, ftol=1e-15)
     if not fit.success:
         raise InvalidInput("no circle comes nearest to these points: they hardly bend")
     circle = fit.x
