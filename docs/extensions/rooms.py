@@ -54,6 +54,7 @@ FOREIGN = (
     "xarray",
     "matplotlib",
     "collections",
+    "contextlib",
     "pathlib",
     "typing",
     "enum",
