@@ -338,15 +338,14 @@ def displace_points(turns, arms, states):  # type: ignore
     """
     moved = np.zeros((len(states), len(turns), 2))
     for k in range(len(states)):
-        last, less, s, x, y = -1, 0.0, 0.0, 0.0, 0.0
+        last, half, x, y = -1, (1.0, 0.0), 0.0, 0.0
         for point in range(len(turns)):
-            turn, rx, ry = turns[point], arms[point, 0], arms[point, 1]
+            turn, arm = turns[point], (arms[point, 0], arms[point, 1])
             if turn < 0:
                 continue
             if turn != last:  # points are listed block by block
-                last, (c, half_sine) = turn, cosine_sine(0.5 * states[k, turn])
-                less, s = -2.0 * half_sine * half_sine, 2.0 * half_sine * c
+                last, half = turn, cosine_sine(0.5 * states[k, turn])
                 x, y = states[k, turn - 2], states[k, turn - 1]
-            moved[k, point, 0] = x + less * rx - s * ry
-            moved[k, point, 1] = y + s * rx + less * ry
+            (dx, dy), _ = _rotate_arm(arm, (0.0, 0.0), half)
+            moved[k, point, 0], moved[k, point, 1] = x + dx, y + dy
     return moved

@@ -24,7 +24,13 @@ from archfem.joints.large.lanes import (
     store,
     with_lane,
 )
-from archfem.joints.large.overlap_law import ROUNDED_SLIP, FaceLaw, closing_energy, friction_limits
+from archfem.joints.large.overlap_law import (
+    ROUNDED_SLIP,
+    FaceLaw,
+    about_mean_middle,
+    closing_energy,
+    friction_limits,
+)
 from archfem.joints.large.point_law import damping_tractions, mean_tractions
 from archfem.joints.normal_law import GAUSS_POINTS, GAUSS_WEIGHTS
 
@@ -439,7 +445,7 @@ def lane_forces(law, at, start, end, lag, memory):  # type: ignore
     )
     # F_s: edge force w Δℓ/Δs (Φ̄ - ℓ̄ σ̄ Σ x_i t̄_i), and shear
     after, whole, tilted = lane_energy(law, at, l1, g1, t1)
-    (slope, bends), (drags, drag_bends) = _overlap_slopes(law, at, (s0, s1), (l0, last))
+    (slope, bends), drags = _overlap_slopes(law, at, (s0, s1), (l0, last))
     turn = 0.5 * (t0 + t1)
     push = 0.5 * width * (before + after) - mean * turn * moment
     by_slip = -0.5 * shrinks * (t1 * width * tilted + turn * moment) - mean * turn * leans[1]
@@ -450,40 +456,10 @@ def lane_forces(law, at, start, end, lag, memory):  # type: ignore
     )
     force, about = (mean * total, slope * push + rubs[0]), -mean * mean * moment
     rates = opens, slides, turns
-    whole_force, rates = _about_mean_middle(
-        (force[0], force[1], about), rates, (c0, c1, moves, drags, drag_bends), (t0, t1)
+    whole_force, rates = about_mean_middle(
+        (force[0], force[1], about), rates, (c0, c1, moves, drags), (t0, t1)
     )
     return whole_force, rates, (rubs[0], about, rubs[1]), rubs[5], after
-
-
-@inlined_kernel
-def _about_mean_middle(force, rates, middle, turns):  # type: ignore
-    """Return forces and derivatives by g, s and σ from those by the gap at the overlap's middle."""
-    (c0, c1, moves, slope, bends), (t0, t1) = middle, turns
-    mean, turn, total = 0.5 * (c0 + c1), 0.5 * (t0 + t1), force[0]
-    # derivatives by g' = g - c σ at the end
-    opens = _by_gap(rates[0], c1, moves * t1)
-    slides = _by_gap(rates[1], c1, moves * t1)
-    turning = _by_gap(rates[2], c1, moves * t1)
-    # F_s - σ̄ Δc/Δs F_g and F_σ - c̄ F_g
-    pull = turn * slope
-    slides = (
-        slides[0] - pull * opens[0],
-        slides[1] - pull * opens[1] - turn * bends * total,
-        slides[2] - pull * opens[2] - 0.5 * slope * total,
-    )
-    turning = (
-        turning[0] - mean * opens[0],
-        turning[1] - mean * opens[1] - 0.5 * moves * total,
-        turning[2] - mean * opens[2],
-    )
-    return (total, force[1] - pull * total, force[2] - mean * total), (opens, slides, turning)
-
-
-@inlined_kernel
-def _by_gap(row, middle, moved):  # type: ignore
-    """Return derivatives by g, s and σ from those by g', s and σ."""
-    return row[0], row[1] - moved * row[0], row[2] - middle * row[0]
 
 
 @inlined_kernel

@@ -207,7 +207,9 @@ def segment_forces(law, segment, ends, lag, memory):  # type: ignore
     slides = slides[0] + rubs[3], slides[1] + rubs[4], slides[2] + rubs[5]
     rates = opens, slides, turns, (rubs[6], rubs[7], rubs[8])
     if is_off_middle:
-        force, rates = _about_mean_middle(force, rates, (c0, c1, moves, slope), (t0, t1))
+        moved, of_moved = about_mean_middle(force, rates, (c0, c1, moves, slope), (t0, t1))
+        force = moved[0], moved[1], moved[2], force[3]
+        rates = of_moved[0], of_moved[1], of_moved[2], _by_gap(rates[3], c1, moves * t1)
     others = (rubs[0], about), rubs[2], (rubs[11], rubs[12])
     return force, rates, (rubs[9], rubs[10]), others
 
@@ -231,7 +233,7 @@ def damping_loss(law, segment, ends, lag):  # type: ignore
 
 
 @inlined_kernel
-def _about_mean_middle(force, rates, middle, turns):  # type: ignore
+def about_mean_middle(force, rates, middle, turns):  # type: ignore
     """Return forces and derivatives by g, s and σ from those by the gap at the overlap's middle."""
     (c0, c1, moves, (slope, bends)), (t0, t1) = middle, turns
     mean, turn, total = 0.5 * (c0 + c1), 0.5 * (t0 + t1), force[0]
@@ -251,8 +253,7 @@ def _about_mean_middle(force, rates, middle, turns):  # type: ignore
         turning[1] - mean * opens[1] - 0.5 * moves * total,
         turning[2] - mean * opens[2],
     )
-    force = total, force[1] - pull * total, force[2] - mean * total, force[3]
-    return force, (opens, slides, turning, _by_gap(rates[3], c1, moves * t1))
+    return (total, force[1] - pull * total, force[2] - mean * total), (opens, slides, turning)
 
 
 @inlined_kernel
