@@ -69,11 +69,17 @@ def find_lasting(
     return None
 
 
+def lasting_flags(flagged: NDArray[np.bool_], time: Array, duration: float) -> NDArray[np.bool_]:
+    """Return whether each joint has by then been flagged for a duration [s] (steps, joints)."""
+    if len(flagged) == 1:
+        return flagged
+    # a sum of steps may fall short of the duration by round-off
+    return flagged & (unbroken_durations(flagged, time) >= (1.0 - 1e-6) * duration)
+
+
 def find_first_lasting(holds: NDArray[np.bool_], time: Array, duration: float) -> int | None:
     """Return the record from which on a condition first holds for a duration, without a break."""
-    lasts = holds.copy()
-    if len(time) > 1:  # a sum of steps may fall short of the duration by round-off
-        lasts &= unbroken_durations(holds[:, None], time)[:, 0] >= (1.0 - 1e-6) * duration
+    lasts = lasting_flags(holds[:, None], time, duration)[:, 0]
     if not lasts.any():
         return None
     end = int(lasts.argmax())

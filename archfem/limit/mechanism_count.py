@@ -13,7 +13,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from archfem._typing import Flags
 from archfem._validation import validate_arguments
 from archfem.joints.criteria import (
     IDLE_COORDINATE,
@@ -21,9 +20,9 @@ from archfem.joints.criteria import (
     assessed_joints,
     find_failed_joints,
     find_first_lasting,
+    lasting_flags,
     part_roles,
     step_lengths,
-    unbroken_durations,
     with_failure_flags,
 )
 from archfem.masonry.parts import select_assessed_parts
@@ -232,7 +231,9 @@ def mechanism_over_record(joints: xr.Dataset, criteria: Criteria | None = None) 
 def _find_over_record(joints: xr.Dataset, failures: "Failures") -> Mechanism | None:
     """Return what `mechanism_over_record` does, from joints with their flags."""
     limits, roles, each, _ = failures
-    failed = np.logical_or.accumulate(_lasting_flags(each, limits.duration), axis=0)
+    failed = np.logical_or.accumulate(
+        lasting_flags(each.values, each["time"].values, limits.duration), axis=0
+    )
     flags = each.copy(data=failed)
     counts = _count_by_part(flags, select_assessed_parts(roles))
     instants = {
@@ -343,16 +344,6 @@ def _flags_over_time(joints: xr.Dataset) -> xr.DataArray:
     if "time" not in flags.dims:
         flags = flags.expand_dims("time")
     return flags if flags.dims == ("time", "joint") else flags.transpose("time", "joint")
-
-
-def _lasting_flags(flags: xr.DataArray, duration: float) -> Flags:
-    """Return whether each joint has by then failed for a duration [s] unbroken (steps, joints)."""
-    failed = flags.values
-    if len(failed) == 1:
-        return failed
-    unbroken = unbroken_durations(failed, flags["time"].values)
-    # a sum of steps may fall short of the duration by round-off
-    return failed & (unbroken >= (1.0 - 1e-6) * duration)
 
 
 def _count_by_part(flags: xr.DataArray, parts: Iterable[str]) -> dict[str, NDArray[np.int64]]:
