@@ -316,12 +316,12 @@ af.view.draw_envelope(whole, dotted=["as it stands"])
 # The other assumptions were varied under the matched Erzincan E-W record with exact joints that
 # never slide. They move the levels by about a fifth. Damping of 2 % or a fill of 24 MPa bring four
 # hinges below R = 3; mesh and time step have little effect. `archfem study
-# meshes/prusias_sensitivity.toml --out out/sensitivity` does so under the first synthetic pair, with
-# joints that slide. The joint rule decides most: five springs a joint, joints that never slide and
-# the law of the paper bring a mechanism at 0.3 to 0.5 of the motion, not at 1.0. A cover of 0.8 or
-# 2.0 m raises all levels, the verified one to 1.3 and 2.0. Piers, walls, erosion and fill move four
-# failures at once by up to a sixth; failures over the record lie between 0.5 and 1.1. A finer mesh
-# changes nothing, half the time step up to a sixth.
+# meshes/prusias_sensitivity.toml --out out/sensitivity` does so under the first synthetic pair,
+# with joints that slide. The joint rule decides most: five springs a joint, joints that never slide
+# and the law of the paper bring a mechanism at 0.3 to 0.5 of the motion, not at 1.0. A cover of 0.8
+# or 2.0 m raises all levels, the verified one to 1.3 and 2.0. Piers, walls, erosion and fill move
+# four failures at once by up to a sixth; failures over the record lie between 0.5 and 1.1. A finer
+# mesh changes nothing, half the time step up to a sixth.
 #
 # ![sensitivity of the verdict](figures/bridge_sensitivity.png)
 

@@ -21,6 +21,7 @@ from archfem.dynamics.analysis import Analysis, takes_analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
+from archfem.dynamics.recorder import Record
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
@@ -202,8 +203,9 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
     def run_scaled(scale: float) -> ScaledRun:
         scaled = motion.scaled(scale)
         solver = method if isinstance(method, str) else method(scaled)
-        options = {"until": EveryMechanism(), "criteria": criteria, "method": solver}
-        run = _run_as_far(model, scaled, start=start, damping=damping, dt=dt, **options)
+        options = {"start": start, "damping": damping, "criteria": criteria, "method": solver}
+        record = Record(whole_fall=False)  # mechanisms come before a fall
+        run = _run_as_far(model, scaled, dt=dt, until=EveryMechanism(), record=record, **options)
         return ScaledRun(scale, first_mechanisms(run), run.ending, run.outcome)
 
     definitions = (*applicable_definitions(start.model.structure, criteria), "verified")

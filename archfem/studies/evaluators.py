@@ -3,7 +3,7 @@
 import hashlib
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Any
 
@@ -77,18 +77,22 @@ def evaluate_history(case: Case) -> Findings:
 
 
 @validate_arguments
-def run_motion(result: DeadLoadResult, motion: Motion) -> History:
+def run_motion(result: DeadLoadResult, motion: Motion, *, whole_fall: bool = True) -> History:
     """Return the time history of a case under a motion, independent of earlier runs.
 
     Args:
         result: dead-load result of the case.
         motion: ground motion.
+        whole_fall: as of `Record`; False ends the fall of any case with its first lost block.
 
     Raises:
         DidNotConverge: a step failed.
         KeyboardInterrupt: on Ctrl-C.
     """
-    runs = PreparedRuns(result.case.analysis, result.dead, result.damping[0])
+    analysis = result.case.analysis
+    if not whole_fall:
+        analysis = replace(analysis, record=replace(analysis.record, whole_fall=False))
+    runs = PreparedRuns(analysis, result.dead, result.damping[0])
     with log_prefix(result.case.title, motion.name):
         return runs.run(motion)
 

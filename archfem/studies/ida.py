@@ -113,7 +113,8 @@ def search_limit_states(
 def _run(result: DeadLoadResult, motion: Motion) -> dict[str, Any]:
     """The limit states that a run reaches, its end, and its demands, infinite if incomplete."""
     try:
-        run = run_motion(result, motion)
+        # demands of a run whose blocks fall are infinite: its first lost block tells all
+        run = run_motion(result, motion, whole_fall=False)
         complete = run.ending not in (Ending.PARTED, Ending.MET)
     except DidNotConverge as error:
         run, complete = partial_history(error), False

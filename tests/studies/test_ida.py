@@ -1,5 +1,7 @@
 """Incremental dynamic analysis: brackets, curves, and their summaries."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -7,8 +9,11 @@ from scipy.integrate import trapezoid
 
 import archfem as af
 from archfem import ida
+from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.motion_scaling import MechanismScales
 from archfem.studies import ida as ida_module
+from archfem.studies.cache import dead_load_of
+from archfem.studies.evaluators import run_motion
 
 
 def made(count):
@@ -118,11 +123,11 @@ def test_each_run_is_kept_when_it_is_ended(small_ida, tmp_path, monkeypatch, cal
     runs, options = [], {"precision": 0.2, "between": (0.3, 2.5), "workers": 1}
     original = ida_module.run_motion
 
-    def counted(result, motion):
+    def counted(result, motion, **options):
         runs.append(motion)
         if len(runs) == call:
             raise KeyboardInterrupt
-        return original(result, motion)
+        return original(result, motion, **options)
 
     monkeypatch.setattr(ida_module, "run_motion", counted)
     with pytest.raises(KeyboardInterrupt):
@@ -260,3 +265,20 @@ def test_invalid_analyses_are_refused(small_ring):
         ida(small_ring, [3])
     found = ida(small_ring, made(1), limits=["collapse"], workers=1)
     assert "collapse needs displacements = 'large'" in found.table["error"].item()
+
+
+def test_collapse_is_that_of_whole_falls(small_ida):
+    small, _, _ = small_ida
+    analysis = replace(small.analysis, displacements="large")
+    motion = af.Motion.synthetic(seed=1, duration=1.0, pga=8.0)
+    options = {"precision": 0.2, "between": (0.8, 6.0), "workers": 1}
+    found = af.ida(analysis, [motion], limits=["collapse"], **options)
+    low, high = (end[0] / motion.pga for end in found.capacities("collapse"))
+    whole = analysis.run(motion.scaled(high))
+    assert whole.fall.kind in FALLEN_STATES
+    assert analysis.run(motion.scaled(low)).fall.kind not in FALLEN_STATES
+    # the search itself follows a fall no farther than it must
+    result = dead_load_of(af.cases.case.case_of(analysis))
+    brief = run_motion(result, motion.scaled(high), whole_fall=False)
+    assert len(brief.dataset["fall_time"]) < len(whole.dataset["fall_time"])
+    assert brief.fall.time == pytest.approx(whole.fall.time, abs=0.1)
