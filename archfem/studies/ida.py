@@ -25,13 +25,14 @@ from archfem.cases.toml_file import check_choice
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.events import applicable_definitions
-from archfem.dynamics.history import Ending, first_mechanisms, partial_history
+from archfem.dynamics.history import Ending, partial_history
 from archfem.dynamics.motion_scaling import (
     COLLAPSE_DEFINITION,
     ScaledRun,
     admissible_range,
     search_scales,
 )
+from archfem.dynamics.verdict import detect_mechanisms
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints, with_failure_flags
 from archfem.limit.mechanism_count import Mechanism
@@ -118,7 +119,8 @@ def _run(result: DeadLoadResult, motion: Motion) -> dict[str, Any]:
         complete = run.ending not in (Ending.PARTED, Ending.MET)
     except DidNotConverge as error:
         run, complete = partial_history(error), False
-    mechanisms, demands = first_mechanisms(run), dict.fromkeys(DEMAND_LABELS, inf)
+    mechanisms = detect_mechanisms(run.joints, run.structure)
+    demands = dict.fromkeys(DEMAND_LABELS, inf)
     if complete:
         findings = largest_values(run)
         demands = {name: findings[name] for name in DEMAND_LABELS}
