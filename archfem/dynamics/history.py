@@ -1,7 +1,7 @@
 """History of a run: recorded joints and fields, first mechanisms, verdict, and its file."""
 
 import logging
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -272,10 +272,14 @@ class History(ResultDisplay):
         )
 
     @cached_property
+    def mechanisms(self) -> dict[str, Mechanism | None]:
+        """First mechanism by each definition that applies, or None."""
+        return detect_mechanisms(self.joints, self.structure)
+
+    @cached_property
     def verdict(self) -> Verdict:
         """Assessment of the run; `str(run.verdict)` describes it in words."""
-        attrs, joints = self.dataset.attrs, self.joints
-        mechanisms = detect_mechanisms(joints, self.structure)
+        attrs, joints, mechanisms = self.dataset.attrs, self.joints, self.mechanisms
         finished = attrs.get("ended") == Ending.FINISHED or "outcome" not in attrs
         remarks = [] if finished else [f"the run {self.outcome}"]
         remarks += extremes_remark(self.dataset)
@@ -286,7 +290,7 @@ class History(ResultDisplay):
             remarks.append(f"{law}, which was not varied")
         broken_off = not (finished or self.ending.is_complete)
         return Verdict(
-            outcome=classify_outcome(self, mechanisms),
+            outcome=classify_outcome(self),
             doubts=self.doubts,
             displacement=float(attrs.get("displacement", np.nan)),
             residual=float(attrs.get("residual", np.nan)),
@@ -542,13 +546,13 @@ def partial_history(error: DidNotConverge) -> History:
     return error.history
 
 
-def classify_outcome(run: History, mechanisms: Mapping[str, Mechanism | None]) -> str:
-    """Return the outcome of a run, as of `Verdict`, from its first mechanisms."""
+def classify_outcome(run: History) -> str:
+    """Return the outcome of a run, as of `Verdict`."""
     if run.fall is not None:
         return run.fall.kind
     if run.dataset.attrs.get("displacements") == "large":
         return "unknown"
-    return "mechanism" if any(mechanisms.values()) else "no mechanism"
+    return "mechanism" if any(run.mechanisms.values()) else "no mechanism"
 
 
 def first_mechanisms(run: History, criteria: Criteria | None = None) -> dict[str, Mechanism | None]:
@@ -580,4 +584,4 @@ def first_mechanisms(run: History, criteria: Criteria | None = None) -> dict[str
             "History.read(path, structure)"
         )
     judged = run if criteria is None else run.with_criteria(criteria)
-    return {name: judged.verdict.mechanisms.get(name) for name in ALL_DEFINITIONS}
+    return {name: judged.mechanisms.get(name) for name in ALL_DEFINITIONS}

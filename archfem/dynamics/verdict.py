@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
+from archfem._typing import Array
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.joints.criteria import (
     Criteria,
@@ -225,18 +226,18 @@ def extremes_remark(dataset: xr.Dataset) -> list[str]:
     if "rotation" not in dataset:
         return []
     # rotations of joints while they hinge, slips of all joints, both of rings and piers
-    joints = assessed_joints(dataset[["rotation", "slip", "hinge"]])
-    rotations = abs(joints["rotation"]).where(joints["hinge"] != 0, 0.0)
-    if float(rotations.max()) > 0.0:
-        rotation = f"largest hinge rotation {_peak_text(rotations, 1e-3, 'mrad')}"
+    joints = assessed_joints(dataset[["rotation", "slip", "hinge"]]).transpose("time", "joint")
+    rotations, slips = (np.abs(joints[name].values) for name in ("rotation", "slip"))
+    rotations = np.where(joints["hinge"].values != 0, rotations, 0.0)
+    if rotations.max() > 0.0:
+        rotation = f"largest hinge rotation {_peak_text(joints, rotations, 1e-3, 'mrad')}"
     else:
         rotation = f"no{_assessed_word(dataset)} joint hinges"
-    return [f"{rotation}, largest slip {_peak_text(abs(joints['slip']), mm, 'mm')}"]
+    return [f"{rotation}, largest slip {_peak_text(joints, slips, mm, 'mm')}"]
 
 
-def _peak_text(values: xr.DataArray, unit: float, name: str) -> str:
+def _peak_text(joints: xr.Dataset, values: Array, unit: float, name: str) -> str:
     """Return the largest of values over time and joint, with the joint and the time."""
-    values = values.transpose("time", "joint")
-    instant, joint = np.unravel_index(int(values.values.argmax()), values.shape)
-    largest, time = float(values.values[instant, joint]), float(values["time"][instant])
-    return f"{largest / unit:.3g} {name} ({values['name'].values[joint]}, {time:.3f} s)"
+    instant, joint = np.unravel_index(int(values.argmax()), values.shape)
+    largest, time = float(values[instant, joint]), float(joints["time"].values[instant])
+    return f"{largest / unit:.3g} {name} ({joints['name'].values[joint]}, {time:.3f} s)"

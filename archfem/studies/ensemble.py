@@ -16,7 +16,7 @@ from archfem._display import ResultDisplay
 from archfem._validation import check_number, check_type, validate_arguments, validate_methods
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import History, classify_outcome
-from archfem.dynamics.verdict import ALL_DEFINITIONS, detect_mechanisms
+from archfem.dynamics.verdict import ALL_DEFINITIONS
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
@@ -237,15 +237,14 @@ def _reduce(
     except ArchfemError as error:
         none = dict.fromkeys(PEAKS, np.nan) | {"outcome": "unknown", "ended": "failed"}
         return {**none, "error": f"{type(error).__name__}: {error}", "time": time, "failed": failed}
-    mechanisms = detect_mechanisms(history.joints, structure)
     for number, definition in enumerate(ALL_DEFINITIONS):
-        if definition in mechanisms:
-            found = mechanisms[definition]
+        if definition in history.mechanisms:
+            found = history.mechanisms[definition]
             time[number] = np.inf if found is None or found.time is None else found.time
             failed[number, list(found.joints) if found else []] = 1.0
     return {
         **largest_values(history),
-        "outcome": classify_outcome(history, mechanisms),
+        "outcome": classify_outcome(history),
         **{"ended": str(history.ending), "error": "", "time": time, "failed": failed},
     }
 

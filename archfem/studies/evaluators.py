@@ -15,13 +15,24 @@ from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.run import DeadLoadResult, log_prefix
 from archfem.dynamics.analysis import Analysis
-from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
+from archfem.dynamics.history import (
+    Ending,
+    History,
+    classify_outcome,
+    first_mechanisms,
+    partial_history,
+)
 from archfem.dynamics.motion_scaling import mechanism_scales
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict import ALL_DEFINITIONS, MECHANISM_DEFINITIONS
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.criteria import assessed_joints, eccentricity_magnitude, part_roles
+from archfem.joints.criteria import (
+    assessed_joints,
+    describe_assessed_joints,
+    eccentricity_magnitude,
+    part_roles,
+)
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import suggest_name
 from archfem.motion.motion import Motion
@@ -114,18 +125,15 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
         the largest energy error at any step over the exchanged energy [-]. `assessed`, which
         joints count, if not all do. `doubts`, the number of warnings.
     """
-    verdict = run.verdict
-    findings: Findings = {
-        **largest_values(run),
-        "outcome": verdict.outcome,
-    }
+    findings: Findings = {**largest_values(run), "outcome": classify_outcome(run)}
     for definition, first in (mechanisms or first_mechanisms(run)).items():
         findings[definition] = np.inf if first is None or first.time is None else first.time
         findings[f"{definition}, class"] = "" if first is None else str(first.kind)
     findings |= {"ended": str(run.ending), "fall": "" if run.fall is None else run.fall.kind}
-    findings |= {"assessed": verdict.assessed} if verdict.assessed else {}
+    assessed = describe_assessed_joints(run.joints)
+    findings |= {"assessed": assessed} if assessed else {}
     drift = float(run.dataset.attrs["energy_drift"])
-    return findings | {"energy_drift": drift, "doubts": float(len(verdict.doubts))}
+    return findings | {"energy_drift": drift, "doubts": float(len(run.doubts))}
 
 
 def largest_values(run: History) -> dict[str, float]:

@@ -32,7 +32,6 @@ from archfem.dynamics.motion_scaling import (
     admissible_range,
     search_scales,
 )
-from archfem.dynamics.verdict import detect_mechanisms
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints, with_failure_flags
 from archfem.limit.mechanism_count import Mechanism
@@ -119,7 +118,6 @@ def _run(result: DeadLoadResult, motion: Motion) -> dict[str, Any]:
         complete = run.ending not in (Ending.PARTED, Ending.MET)
     except DidNotConverge as error:
         run, complete = partial_history(error), False
-    mechanisms = detect_mechanisms(run.joints, run.structure)
     demands = dict.fromkeys(DEMAND_LABELS, inf)
     if complete:
         findings = largest_values(run)
@@ -127,8 +125,8 @@ def _run(result: DeadLoadResult, motion: Motion) -> dict[str, Any]:
     hinges = assessed_joints(with_failure_flags(run.joints))["hinge"] != 0
     reached = {
         "first hinge": bool(hinges.any()),
-        "four failures": mechanisms["any joints at once"] is not None,
-        "verified": mechanisms["verified"] is not None,
+        "four failures": run.mechanisms["any joints at once"] is not None,
+        "verified": run.mechanisms["verified"] is not None,
     }
     fall = None if run.fall is None else run.fall.kind
     end = {"ending": str(run.ending), "outcome": run.outcome, "fall": fall}
