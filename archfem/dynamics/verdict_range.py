@@ -104,6 +104,11 @@ class VerdictRange(ResultDisplay):
         return rankdata(damage)
 
     @property
+    def count(self) -> str:
+        """How often the structure falls."""
+        return f"falls in {int(self.falls[self.answered].sum())} of {int(self.answered.sum())}"
+
+    @property
     def sentence(self) -> str:
         """How often the structure falls, and where."""
         falls, answered = self.falls[self.answered], int(self.answered.sum())
@@ -111,7 +116,7 @@ class VerdictRange(ResultDisplay):
         if not (self.answered & self.dataset["sampled"].values).any():
             errors = [error for error in self.dataset["error"].values if error]
             return f"{missing} of {len(self.answered)} runs have no answer: {errors[0]}"
-        text = f"falls in {int(falls.sum())} of {answered}"
+        text = self.count
         if 0 < falls.sum() < len(falls):
             text += f": {self._describe_falls()}"
         low, high = self.interval()
@@ -145,13 +150,13 @@ class VerdictRange(ResultDisplay):
         """Return a condition in words, with joint stiffness in MPa/mm rather than as a factor."""
         name, value, below = condition.name, condition.value, condition.below
         if below is None:
-            return f"{_property_text(name)} '{value}'"
+            return f"{property_text(name)} '{value}'"
         word = "below" if below else "above"
         if name in ("k_n", "k_s"):
             return f"{name} {word} {value * self.dataset.attrs[name] / 1e9:.3g} MPa/mm"
         if name == "friction":
             return f"friction {word} that given {value:+.2g}"
-        return f"{_property_text(name)} {word} × {value:.3g}"
+        return f"{property_text(name)} {word} × {value:.3g}"
 
     def save(self, path: str | Path) -> Path:
         """Write all runs to a NetCDF file, which `read` reads.
@@ -183,7 +188,7 @@ class VerdictRange(ResultDisplay):
                 f"{label}: {int(falls[chosen].sum())} of {int(chosen.sum())}"
                 for label, chosen in groups
             ]
-            rows.append([_property_text(name), f"{share:.0%}", ", ".join(cells)])
+            rows.append([property_text(name), f"{share:.0%}", ", ".join(cells)])
         return align_columns(["property", "explains", "falls"], rows)
 
     def __str__(self) -> str:
@@ -203,7 +208,7 @@ class Condition(NamedTuple):
     holds: NDArray[np.bool_]  # (runs,)
 
 
-def _property_text(name: str) -> str:
+def property_text(name: str) -> str:
     """Return the name of a property as users read it; k_n and k_s are symbols."""
     return name if name in ("k_n", "k_s") else name.replace("_", " ")
 

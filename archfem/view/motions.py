@@ -40,7 +40,7 @@ def draw_motion(motion: Motion) -> Figure:
         The figure, with a column for each component.
     """
     names = motion.components
-    figure = new_figure(Size.COLUMN * (0.4 + 0.6 * len(names)), 5.5)
+    figure = new_figure(Size.COLUMN * (0.4 + 0.6 * len(names)), 4.4)
     axes = figure.subplots(3, len(names), sharex=True, squeeze=False)
     for column, name in zip(axes.T, names, strict=True):
         rows = (

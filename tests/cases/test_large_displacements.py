@@ -2,7 +2,9 @@
 
 import tomllib
 
+import numpy as np
 import pytest
+import xarray as xr
 
 import archfem as af
 from archfem.cases.report.conclusion import build_conclusion, summarise_outcomes
@@ -98,21 +100,45 @@ def held(path):
 def test_a_run_that_stands_is_reported_so(held):
     assert held.verdict.headline.startswith("stands")
     assert "largest displacement of a corner " in str(held.verdict)
-    assert summarise_outcomes([held]) == held.verdict.headline
+    data = ReportData(af.Case.of(tomllib.loads(CASE)), {"shake": held})
+    assert summarise_outcomes(data, [held]) == held.verdict.headline
+
+
+def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
+    """The run says that no range was computed; a command after it computed one."""
+    count = 4
+    columns = {"k_n": np.linspace(0.5, 2.0, count), "dt": ["as given", "half"] * 2}
+    columns |= {"outcome": ["fallen", "stands", "stands", "stands"], "error": [""] * count}
+    columns |= {"residual": np.zeros(count), "sampled": np.ones(count, bool)}
+    rows = {name: ("run", np.asarray(values)) for name, values in columns.items()}
+    attrs = {"properties": ["k_n", "dt"], "k_n": 1e9, "k_s": 1e9}
+    data = ReportData(af.Case.of(tomllib.loads(CASE)), {"shake": held})
+    without = build_conclusion(data).pieces
+    assert "Not varied: one motion, one set of properties, one model and time" in without[-1].text
+    assert ", which was not varied." in without[0].text
+    data = ReportData(data.case, data.runs)
+    vars(data)["verdict_range"] = af.dynamics.VerdictRange(xr.Dataset(rows, attrs=attrs))
+    assert summarise_outcomes(data, [held]) == "stands; falls in 1 of 4 variations"
+    stated, varied = (piece.text for piece in build_conclusion(data).pieces)
+    assert "Where k_n and dt are uncertain, the structure falls in 1 of 4: all with k_n" in stated
+    assert ", which was varied." in stated
+    assert "Not varied: one motion, one model. What" in varied
+    words = [piece.text for piece in _build_mechanism(data, held) if hasattr(piece, "text")]
+    assert words[0] == "Outcome: stands; falls in 1 of 4 variations."
+    assert not any("not varied" in line for line in words)
 
 
 def test_a_report_begins_with_the_number_of_lost_stones_and_lists_all_below(held):
     names = [f"stone {number}" for number in range(1, 13)]
     fall = af.dynamics.CollapseState("fallen", 1.25, tuple(names), 2.0, 2.0, True)
     run = with_fall(held, fall)
-    assert (
-        summarise_outcomes([run]) == "fallen; one motion, one set of properties: range not computed"
-    )
     data = ReportData(af.Case.of(tomllib.loads(CASE)), {"shake": run})
+    words = "fallen; one motion, one set of properties: range not computed"
+    assert summarise_outcomes(data, [run]) == words
     text = build_conclusion(data).pieces[0].text
     short = "stone 1, stone 2, stone 3, …"
     assert text.startswith("The structure falls under the motion 'shake'.")
     assert f"Under 'shake' it loses 12 blocks, the first at 1.25 s: {short}." in text
-    first, second, *_ = [b.text for b in _build_mechanism(run) if hasattr(b, "text")]
-    assert first == "Outcome: fallen; one motion, one set of properties: range not computed."
+    first, second, *_ = [b.text for b in _build_mechanism(data, run) if hasattr(b, "text")]
+    assert first == f"Outcome: {words}."
     assert second == f"Lost: 12 blocks, the first at 1.25 s: {', '.join(names)}."

@@ -159,8 +159,10 @@ def test_a_case_without_motion_has_a_report_too(small, unplotted, tmp_path):
     )
     with replace_run(case, folder) as draft:
         (draft / "limit.txt").write_text("it stands")
+        (draft / "assessment.txt").write_text("right: it moves\nnote: it is an upper bound")
     words = " ".join(read_page(af.cases.open_results(folder).report().read_text()).words)
     assert "It stands." in words  # the conclusion
+    assert "In doubt: it is an upper bound." in words
     assert "Not computed: modes, a rating for a vehicle" in words
     assert "blocks rigid joints dry" in " ".join(
         words.split()
@@ -407,7 +409,12 @@ def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path):
     assert af.commands.main(["report", str(folder)]) == 0
     conclusion = words_of(folder / "report.html").split("Inputs and assumptions")[1]
     assert "Kinematic assessment, right: NTC-2018 SLV: capacity" in conclusion
-    assert "ag 0.25" in words_of(folder / "report.html").split("Norms and methods")[2]
+    words = words_of(folder / "report.html")
+    assert "ag 0.25" in words.split("Norms and methods")[2]
+    inputs = " ".join(words.split("Assumptions, units")[0].split())
+    assert "assessment: direction right and left default" in inputs
+    assert "assessment: limit state NTC-2018 SLV default assessment: q 2 default" in inputs
+    assert "player" not in words  # of a run that there is not
 
 
 def test_a_history_alone_has_a_report_and_a_film_by_the_command_line(

@@ -14,8 +14,8 @@ from archfem.cases import result_text
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import History
-from archfem.dynamics.verdict import DOUBT_MARK
-from archfem.dynamics.verdict_range import VerdictRange
+from archfem.dynamics.verdict import DOUBT_MARK, NO_RANGE
+from archfem.dynamics.verdict_range import property_text
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.joint_closing import describe_closing
 from archfem.units import format_mm
@@ -70,17 +70,22 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     friction = max(float(each["friction"].max()) for each in joints)
     sizes = [("PGA", f"{pga:.2f} m/s²"), ("largest |e|", f"{eccentricity:.3f}{opened}")]
     sizes.append(("largest V / N", result_text.format_ratio(friction)))
-    verdict = ("verdict", summarise_outcomes(runs))
+    verdict = ("verdict", summarise_outcomes(data, runs))
     return [*signed, verdict, *blocks, *sizes]
 
 
-def summarise_outcomes(runs: Sequence[History]) -> str:
-    """Return outcome and number of doubts of a run, or how many runs have each outcome."""
+def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
+    """Return outcome, and doubts or range, of a run, or how many runs have each outcome."""
     verdict = runs[0].verdict
-    if len(runs) > 1 or verdict.fall is None:
+    if len(runs) > 1:
         return result_text.describe_verdicts(runs)
-    # lost blocks have a line of their own
-    return replace(verdict, fall=replace(verdict.fall, time=None)).headline
+    if verdict.fall is not None:
+        # lost blocks have a line of their own
+        verdict = replace(verdict, fall=replace(verdict.fall, time=None))
+    if (found := data.verdict_range) is None:
+        return verdict.headline
+    # a run cannot know that a range was computed after it
+    return verdict.headline.replace(NO_RANGE, f"{found.count} variations")
 
 
 def build_conclusion(data: ReportData) -> Section:
@@ -147,18 +152,22 @@ def _conclude_joints(data: ReportData) -> Iterator[str]:
     """Yield the sentence on the law by which joints close, if runs depend on it."""
     law = describe_closing(data.case.structure)
     if data.runs and law:
-        path = data.files.get("verdict_range.nc")
-        properties = () if path is None else VerdictRange.read(path).properties
-        varied = {"joint_rule", "k_n", "finish"}.intersection(properties)
+        varied = {"joint_rule", "k_n", "finish"}.intersection(list_varied(data))
         yield sentence(f"{law}, which was {'varied' if varied else 'not varied'}")
+
+
+def list_varied(data: ReportData) -> tuple[str, ...]:
+    """Return the properties that the range of the verdict varies; none without a range."""
+    return () if data.verdict_range is None else data.verdict_range.properties
 
 
 def _conclude_range(data: ReportData) -> Iterator[str]:
     """Yield the sentences on the range of the verdict and on the risk, if the folder has them."""
-    if (path := data.files.get("verdict_range.nc")) is not None:
-        computed = VerdictRange.read(path)
-        varied = ", ".join(name.replace("_", " ") for name in computed.properties)
-        yield f"Where {varied} are uncertain, the structure {computed.sentence}."
+    if (computed := data.verdict_range) is not None:
+        words = ", ".join(map(property_text, computed.properties))
+        varied = " and ".join(words.rsplit(", ", 1))
+        verb = "is" if len(computed.properties) == 1 else "are"
+        yield f"Where {varied} {verb} uncertain, the structure {computed.sentence}."
     if text := data.read_text("risk.txt"):
         yield sentence(f"the structure {text.splitlines()[0]}")
 
@@ -184,7 +193,9 @@ def list_doubts(data: ReportData) -> list[str]:
         doubts = [f"{count} of {len(verdicts)} runs: {text}" for text, count in reasons.items()]
     for name in ("limit.txt", "rating.txt", "assessment.txt"):
         lines = (data.read_text(name) or "").splitlines()
-        doubts += [line.removeprefix(DOUBT_MARK) for line in lines if line.startswith(DOUBT_MARK)]
+        # what a kinematic assessment leaves out stands there as a note
+        for mark in (DOUBT_MARK, "note: "):
+            doubts += [line.removeprefix(mark) for line in lines if line.startswith(mark)]
     return list(dict.fromkeys(doubts))
 
 
@@ -193,9 +204,10 @@ def describe_what_is_not_varied(data: ReportData) -> str:
     if not data.runs:
         return ""
     single = ["one motion"] if len(data.runs) == 1 else []
-    single += [] if "verdict_range.nc" in data.files else ["one set of properties"]
+    single += [] if data.verdict_range else ["one set of properties"]
     predicted = all("predicted_error" in run.dataset.attrs for run in data.runs.values())
-    single += [] if predicted or "accuracy.txt" in data.files else ["one model and time step"]
+    if not predicted and "accuracy.txt" not in data.files:
+        single.append("one model" if "dt" in list_varied(data) else "one model and time step")
     doubts = "" if list_doubts(data) else "The checks of the numbers raise no doubt. "
     if not single:
         return doubts.strip()

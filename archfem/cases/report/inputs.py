@@ -1,6 +1,7 @@
 """Inputs of a report: each value with its mark given, default or inferred."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from inspect import Parameter, signature
 from typing import Any
 
 from archfem._validation import declared_keys
@@ -8,11 +9,21 @@ from archfem.cases.defaults import DECIDING_VALUES, list_default_keys
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.structure_keys import shape_keys
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
+from archfem.limit.collapse import collapse_factor
 from archfem.masonry.materials import Contact, Material
 from archfem.motion.motion import Motion
+from archfem.statics.mechanism_assessment import kinematic_assessment
+from archfem.statics.pushover import pushover
 from archfem.view.pages.document import Grid
 
 Row = tuple[str, str, str]  # quantity, value, mark
+
+# Their arguments are keys of the sections
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "limit": collapse_factor,
+    "pushover": pushover,
+    "assessment": kinematic_assessment,
+}
 
 _RATING_KEYS = {"live", "impact", "dead", "width", "area_load"}
 
@@ -111,11 +122,23 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
             continue
         for key, value in table.items():
             yield f"{section}: {key.replace('_', ' ')}", describe_value(value), "given"
-        if section == "limit" and "friction" not in table:
-            yield "limit: friction", "coulomb, associated", "default"
+        if section in _FUNCTIONS:
+            yield from _default_rows(section, table)
         if section == "rating" and (own := _RATING_KEYS - table.keys()):
             words = ", ".join(sorted(own)).replace("_", " ")
             yield f"rating: {words}", "of the code, see below", "default"
+
+
+def _default_rows(section: str, table: Mapping[str, Any]) -> Iterator[Row]:
+    """Yield the arguments of the function of a section that its table does not give."""
+    if section == "assessment" and "spectrum" not in table:
+        yield "assessment: spectrum", "of the motions or their target", "inferred"
+    words = {"direction": "right and left"} if section == "assessment" else {}
+    for key, argument in signature(_FUNCTIONS[section]).parameters.items():
+        # an empty value stands for none, and is no input
+        if key not in table and argument.default not in (Parameter.empty, None, ()):
+            value = words.get(key, describe_value(argument.default))
+            yield f"{section}: {key.replace('_', ' ')}", value, "default"
 
 
 def _motion_rows(data: ReportData) -> Iterator[Row]:

@@ -19,10 +19,9 @@ from archfem.view.pages.word import write_word
 def write_report(data: ReportData, path: str | Path) -> Path:
     """Write a report atomically, as HTML or, by its suffix, for Word."""
     case = data.case
-    footer = (
-        "Written by archfem from the results named above; figures and numbers are theirs. On paper "
-        "a player shows the instant and the joint that it showed on the screen."
-    )
+    footer = "Written by archfem from the results named above; figures and numbers are theirs."
+    if data.runs:
+        footer += " On paper a player shows the instant and the joint that it showed on the screen."
     head = case.title, describe_origin(data), list_facts(data)
     document = Document(*head, build_sections(data), footer)
     if Path(path).suffix.lower() == ".docx":

@@ -13,6 +13,7 @@ from archfem._files import check_listed, describe_deleted, group_of, path_inside
 from archfem.cases.case import Case
 from archfem.cases.run import CASE_FILE
 from archfem.dynamics.history import History
+from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import ArchfemError
 from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
@@ -60,6 +61,12 @@ class ReportData:
         modelled = any(f"{name}.txt" in self.files for name in ("pushover", "risk"))
         static = any(f"{name}.txt" in self.files for name in STATIC_RESULTS)
         return static and not modelled and not self.runs
+
+    @cached_property
+    def verdict_range(self) -> VerdictRange | None:
+        """Range of the verdict, if the folder has one."""
+        path = self.files.get("verdict_range.nc")
+        return None if path is None else VerdictRange.read(path)
 
     def read_result(self, name: str, caption: str, figure: str = "") -> list[Any]:
         """Return text and picture of a command in the folder, or an empty list."""
@@ -120,7 +127,8 @@ def build_player(case: Case, run: History, title: str, players: int = 1) -> Play
     model, reason = _rebuild_model(case, run)
     # Players of one page share its size, but each stays legible.
     max_bytes = max(MAX_PACKED_BYTES // players, 800_000)
-    return Player(Scene(case.structure, run, model, title, max_bytes, reason))
+    scene = Scene(case.structure, run, model, title, max_bytes, reason)
+    return Player(scene, "The structure at an instant, the ground acceleration, and one joint.")
 
 
 def build_live_page(data: ReportData) -> LivePage:

@@ -29,6 +29,7 @@ from archfem.dynamics.history import SIGN_CONVENTION, History
 from archfem.dynamics.recorder import library_versions
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
+from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
@@ -94,7 +95,7 @@ def number_captions(sections: Sequence[Section]) -> list[Section]:
     counts: Counter[str] = Counter()
 
     def number(piece: Any) -> Any:
-        word = {"plate": "Figure", "grid": "Table"}.get(piece.kind)
+        word = {"plate": "Figure", "player": "Figure", "grid": "Table"}.get(piece.kind)
         if word is None or not piece.caption:
             return piece
         counts[word] += 1
@@ -263,14 +264,14 @@ def build_run_sections(data: ReportData) -> list[Section]:
         (name,) = data.runs
         return [
             Section("Response", _build_response(data, name, 1)),
-            Section("Mechanism and collapse", _build_mechanism(data.runs[name])),
+            Section("Mechanism and collapse", _build_mechanism(data, data.runs[name])),
         ]
     sections = [
         Section("Response: all pairs", [*_build_suite_response(data), *missing]),
         Section("Response: pair by pair", []),
     ]
     for name, run in data.runs.items():
-        blocks = [*_build_response(data, name, len(data.runs)), *_build_mechanism(run)]
+        blocks = [*_build_response(data, name, len(data.runs)), *_build_mechanism(data, run)]
         sections.append(Section(name, blocks, level=3))
     return sections
 
@@ -313,11 +314,11 @@ def _shorten_joint_table(table: result_text.ResultTable, assessed: str) -> Grid:
     return Grid([head[k] for k in filled], [[row[k] for k in filled] for row in rows], caption)
 
 
-def _build_mechanism(run: History) -> list[Any]:
+def _build_mechanism(data: ReportData, run: History) -> list[Any]:
     """Build verdict and mechanism in a line each, the definitions, and the fall of a run."""
     verdict, fall = run.verdict, run.verdict.fall
     lines = [
-        f"Outcome: {summarise_outcomes([run])}",
+        f"Outcome: {summarise_outcomes(data, [run])}",
         *(f"In doubt: {doubt}" for doubt in verdict.doubts),
     ]
     lines += (
@@ -327,7 +328,10 @@ def _build_mechanism(run: History) -> list[Any]:
     )
     blocks: list[Any] = [TextBlock(sentence(line)) for line in lines]
     blocks.append(TextBlock(sentence(f"Mechanism: {describe_mechanism(verdict)}")))
-    blocks += [TextBlock(sentence(line)) for line in verdict.remarks]
+    # the conclusion names the law of closing, and whether it was varied
+    law = describe_closing(data.case.structure)
+    own = [line for line in verdict.remarks if not law or not line.startswith(law)]
+    blocks += [TextBlock(sentence(line)) for line in own]
     caption = "Definitions of a mechanism: failed joints that it needs, and the first one"
     rows = [
         [name, _DEFINITIONS[name], "none" if found is None else str(found)]

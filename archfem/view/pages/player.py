@@ -20,10 +20,12 @@ class Player(StandalonePage):
 
     Attributes:
         scene: the data shown.
+        caption: below it; "" for none.
         kind: name of this block in the templates of documents.
     """
 
     scene: Scene
+    caption: str = ""
 
     kind = "player"
 

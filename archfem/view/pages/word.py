@@ -40,7 +40,7 @@ def write_word(path: str | Path, document: Document) -> Path:
                 word.add_picture(BytesIO(piece.raster()), Inches(min(piece.inches, TEXT_WIDTH)))
                 word.add_paragraph(piece.caption, "Caption")
             else:
-                word.add_paragraph("Player of the run: it is in the HTML report.")
+                word.add_paragraph(f"{piece.caption} It is in the HTML report.", "Caption")
     word.add_paragraph(document.foot)
     with atomic_write(target) as draft:
         word.save(str(draft))
