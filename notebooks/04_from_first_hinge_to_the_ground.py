@@ -20,11 +20,16 @@
 import os
 from dataclasses import replace
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
 import archfem as af
+from archfem.view.style import Colour
+
+# colours that stay apart in grey
+mpl.rcParams.update({"axes.prop_cycle": mpl.cycler(color=Colour.LINES), "font.size": 8.0})
 
 quick = "ARCHFEM_QUICK" in os.environ  # short paths, one step: for tests
 

@@ -20,12 +20,17 @@
 from dataclasses import replace
 from pathlib import Path
 
+import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
 import archfem as af
 from archfem.units import GPa, MPa, mm
+from archfem.view.style import Colour
+
+# colours that stay apart in grey
+mpl.rcParams.update({"axes.prop_cycle": mpl.cycler(color=Colour.LINES), "font.size": 8.0})
 
 # %% [markdown]
 # ## The law

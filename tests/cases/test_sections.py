@@ -91,7 +91,7 @@ def test_the_extremes_of_each_part_are_those_of_its_joints(piers):
 
 
 def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
-    data = SimpleNamespace(runs=runs, case=SimpleNamespace(structure=piers, report={}))
+    data = report_data.ReportData(SimpleNamespace(structure=piers, report={}), runs)
     facts = dict(conclusion.list_facts(data))
     assert facts["structure"] == f"{len(piers.free)} blocks, {len(piers.joints)} joints"
     assert facts["PGA"] == "0.60 m/s²"
@@ -103,28 +103,26 @@ def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
     doubtful = sum(bool(run.verdict.doubts) for run in runs.values()) or "none"
     outcome = runs["first"].verdict.outcome
     assert facts["verdict"] == f"{outcome} in 2 of 2 runs; doubts in {doubtful}"
-    one = SimpleNamespace(runs={"first": runs["first"]}, case=data.case)
+    one = report_data.ReportData(data.case, {"first": runs["first"]})
     assert dict(conclusion.list_facts(one))["verdict"] == runs["first"].verdict.headline
-    none = SimpleNamespace(runs={}, case=data.case)
+    none = report_data.ReportData(data.case, {})
     assert "verdict" not in dict(conclusion.list_facts(none))
 
 
-def test_the_conclusion_names_the_law_of_the_joints(piers, monkeypatch):
+def test_the_conclusion_names_the_law_of_the_joints(piers):
     data = report_data.ReportData(SimpleNamespace(structure=piers), {"first": None})
     (words,) = conclusion._conclude_joints(data)
     assert words == "Joints close linearly with 1.48 MPa/mm, which was not varied."
-    ranged = SimpleNamespace(**vars(data) | {"files": {"verdict_range.nc": "file"}})
     for properties, varied in ((("damping_ratio",), "not varied"), (("finish",), "varied")):
-        computed = SimpleNamespace(properties=properties)
-        monkeypatch.setattr(conclusion.VerdictRange, "read", lambda _, found=computed: found)
-        (words,) = conclusion._conclude_joints(ranged)
+        vars(data)["verdict_range"] = SimpleNamespace(properties=properties)
+        (words,) = conclusion._conclude_joints(data)
         assert words.endswith(f"which was {varied}.")
 
 
 def test_the_pga_of_older_files_is_that_at_their_steps(piers, runs):
     old = af.History(runs["first"].dataset.drop_attrs(), piers)
     old.dataset.attrs |= {k: v for k, v in runs["first"].dataset.attrs.items() if k != "pga"}
-    data = SimpleNamespace(runs={"only": old}, case=SimpleNamespace(structure=piers, report={}))
+    data = report_data.ReportData(SimpleNamespace(structure=piers, report={}), {"only": old})
     assert dict(conclusion.list_facts(data))["PGA"] == "0.60 m/s²"
 
 
@@ -132,7 +130,7 @@ def test_the_pga_of_a_report_is_that_of_the_motion_and_not_of_the_steps(piers):
     motion = af.Motion(np.array([0.0, 2.0, -1.0, 0.0]), 0.005)
     run = af.time_history(af.build(piers, fidelity="rigid"), motion, dt=0.003)
     assert np.abs(run.dataset["ground"]).max() < 1.9
-    data = SimpleNamespace(runs={"only": run}, case=SimpleNamespace(structure=piers, report={}))
+    data = report_data.ReportData(SimpleNamespace(structure=piers, report={}), {"only": run})
     assert dict(conclusion.list_facts(data))["PGA"] == "2.00 m/s²"
     del run.dataset.attrs["pga"]  # as in files of older versions
     largest = float(np.abs(run.dataset["ground"][:, 0]).max())

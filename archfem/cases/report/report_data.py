@@ -127,8 +127,7 @@ def build_player(case: Case, run: History, title: str, players: int = 1) -> Play
     model, reason = _rebuild_model(case, run)
     # Players of one page share its size, but each stays legible.
     max_bytes = max(MAX_PACKED_BYTES // players, 800_000)
-    scene = Scene(case.structure, run, model, title, max_bytes, reason)
-    return Player(scene, "The structure at an instant, the ground acceleration, and one joint.")
+    return Player(Scene(case.structure, run, model, title, max_bytes, reason))
 
 
 def build_live_page(data: ReportData) -> LivePage:

@@ -56,6 +56,8 @@ _RISK_CAPTION = (
     "by intensity."
 )
 
+_PLAYER_CAPTION = "The structure at an instant, the ground acceleration, and one joint."
+
 # References of the methods, with the file of the result that was made by each
 _METHODS = (
     ("", "joints, criteria", "Demirel and Aldemir, Buildings 11 (2021)"),
@@ -96,10 +98,11 @@ def number_captions(sections: Sequence[Section]) -> list[Section]:
 
     def number(piece: Any) -> Any:
         word = {"plate": "Figure", "player": "Figure", "grid": "Table"}.get(piece.kind)
-        if word is None or not piece.caption:
+        caption = _PLAYER_CAPTION if piece.kind == "player" else getattr(piece, "caption", "")
+        if word is None or not caption:
             return piece
         counts[word] += 1
-        return replace(piece, caption=f"{word} {counts[word]}. {sentence(piece.caption)}")
+        return replace(piece, caption=f"{word} {counts[word]}. {sentence(caption)}")
 
     return [replace(each, pieces=[number(piece) for piece in each.pieces]) for each in sections]
 

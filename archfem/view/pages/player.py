@@ -20,7 +20,7 @@ class Player(StandalonePage):
 
     Attributes:
         scene: the data shown.
-        caption: below it; "" for none.
+        caption: text below it in a document; "" for none.
         kind: name of this block in the templates of documents.
     """
 
