@@ -5,6 +5,7 @@ import re
 import shutil
 import tomllib
 from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from archfem.cases.report.conclusion import build_conclusion
 from archfem.cases.report.inputs import tabulate_inputs
 from archfem.cases.report.sections import supported_weight_ratio
 from archfem.cases.run import carry_out, replace_run
+from archfem.limit import vehicles
 
 CASE = """
 title = "a column <b>& more</b> under two pairs"
@@ -282,7 +284,9 @@ def test_captions_are_numbered_without_a_gap(carried_out, tmp_path):
         assert len(numbers) > 3
 
 
-def test_a_report_for_word_has_the_sections_of_the_page(carried_out, tmp_path, capsys):
+def test_a_report_for_word_has_the_sections_of_the_page(
+    carried_out, tmp_path, capsys, low_resolution
+):
     docx = pytest.importorskip("docx")
     path = tmp_path / "report.docx"
     assert af.commands.main(["report", str(carried_out), "--out", str(path)]) == 0
@@ -378,7 +382,11 @@ first = { synthetic = { seed = 1 } }
         ("limit", ["--set", "limit.horizontal=1.0"], "Limit analysis: the load turns it into a m"),
     ],
 )
-def test_a_result_without_a_time_history_has_a_report(command, given, found, tmp_path, capsys):
+def test_a_result_without_a_time_history_has_a_report(
+    command, given, found, tmp_path, capsys, undrawn, monkeypatch
+):
+    places = partial(vehicles._places_along, steps=10)
+    monkeypatch.setattr(vehicles, "_places_along", places)
     path, folder = tmp_path / "case.toml", tmp_path / "out"
     path.write_text(BRIDGE, encoding="utf-8")
     assert af.commands.main([command, str(path), "--out", str(folder), *given]) == 0

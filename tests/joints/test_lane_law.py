@@ -137,7 +137,7 @@ def test_joints_side_by_side_equal_joints_one_by_one(name, quadrature, lag):
     count, points = len(law.depth), int(law.first_point[1])
     side_by_side, seen = lanes_of.lane_law(law), 0
     width = lanes_of.pad(count)
-    for _ in range(60):
+    for _ in range(30):
         start, end = np.zeros((2, 3, width))
         start[:, :count] = random_measures(rng, count, law.depth)
         change = random_measures(rng, count, law.depth)

@@ -19,9 +19,9 @@ GRAVEL = af.limit.Fill(friction_angle=35.0)
 
 @pytest.fixture(scope="module", autouse=True)
 def few_places():
-    """Places are a fortieth of the bridge apart, not a hundredth, which takes longer."""
+    """Places are a thirtieth of the bridge apart, not a hundredth, which takes longer."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(vehicles, "_places_along", partial(vehicles._places_along, steps=40))
+        patch.setattr(vehicles, "_places_along", partial(vehicles._places_along, steps=30))
         yield
 
 

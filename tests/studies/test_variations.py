@@ -215,36 +215,36 @@ def test_the_run_as_given_comes_first_then_each_change_alone(column, motion, cal
 
 def test_the_sample_is_a_latin_hypercube(column, motion, calls):
     """Each of as many equal parts of a range as there are samples has one sample."""
-    found = af.verdict_range(column, motion, samples=12, seed=3, vary={"scale": (0.5, 0.9)})
-    rows = found.dataset.isel(run=slice(-12, None))
+    found = af.verdict_range(column, motion, samples=6, seed=3, vary={"scale": (0.5, 0.9)})
+    rows = found.dataset.isel(run=slice(-6, None))
     log = np.log(rows["k_n"].values * 3.0) / np.log(9.0)  # evenly in logarithm
     even = (rows["scale"].values - 0.5) / 0.4
     shift = (rows["friction"].values + 0.1) / 0.2
     for share in (log, even, shift):
-        assert sorted(np.floor(12.0 * share)) == list(range(12))
+        assert sorted(np.floor(6.0 * share)) == list(range(6))
     for name in ("joint_rule", "sign"):
         _, counts = np.unique(rows[name].values, return_counts=True)
-        assert set(counts) == {12 // len(DEFAULT_RANGES[name])}
-    again = af.verdict_range(column, motion, samples=12, seed=3, vary={"scale": (0.5, 0.9)})
+        assert set(counts) == {6 // len(DEFAULT_RANGES[name])}
+    again = af.verdict_range(column, motion, samples=6, seed=3, vary={"scale": (0.5, 0.9)})
     assert again.dataset.identical(found.dataset)
 
 
 def test_factors_over_more_than_twice_are_spread_in_their_logarithm(column, motion, calls):
-    """Each of ten equal parts of the range, in one measure or the other, has one sample."""
+    """Each of six equal parts of the range, in one measure or the other, has one sample."""
     for vary, even, in_logarithm in (
         ({"scale": (0.05, 0.15), "friction": (0.0, 0.1), "k_n": (3.0, 3.0)}, ["friction"], "scale"),
         ({"scale": (1.0, 2.0), "k_n": (1.0, 2.1)}, ["scale"], "k_n"),
         ({"scale": (2.1, 1.0)}, [], "scale"),
     ):
-        found = af.verdict_range(column, motion, samples=10, vary=HELD | vary).dataset
+        found = af.verdict_range(column, motion, samples=6, vary=HELD | vary).dataset
         for name in (*even, in_logarithm):
-            values, (low, high) = found[name].values[-10:], sorted(vary[name])
+            values, (low, high) = found[name].values[-6:], sorted(vary[name])
             share = (values - low) / (high - low)
             if name == in_logarithm:
                 share = np.log(values / low) / np.log(high / low)
-            assert sorted(np.floor(10.0 * share)) == list(range(10)), (name, vary)
+            assert sorted(np.floor(6.0 * share)) == list(range(6)), (name, vary)
         if vary.get("k_n") == (3.0, 3.0):
-            assert set(found["k_n"].values[-10:]) == {3.0}
+            assert set(found["k_n"].values[-6:]) == {3.0}
 
 
 @pytest.mark.parametrize(("upper", "ratio"), [(0.9, 1.5), (np.inf, 2.0)])
