@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from archfem.cases import result_text
+from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import History
@@ -53,7 +54,8 @@ _FURTHER_RESULTS = {
 
 def list_facts(data: ReportData) -> list[tuple[str, str]]:
     """List who signs what, and the principal results by name, which the report shows first."""
-    signed = [(key.replace("_", " "), words) for key, words in data.case.report.items() if words]
+    report = data.case.report
+    signed = [(key.replace("_", " "), report[key]) for key in REPORT_KEYS if report.get(key)]
     runs, structure = list(data.runs.values()), data.case.structure
     blocks = [("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")]
     blocks += [("joints", structure.assessment)] if structure.assessment else []
