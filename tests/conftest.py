@@ -27,6 +27,8 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    # a failure of the machine, against which files are flushed, ends the tests too
+    os.fsync = lambda number: None
     if config.getoption("--verified") and not hasattr(config, "workerinput"):
         config.pluginmanager.register(Table(config.getoption("--verified")))
 
