@@ -68,13 +68,16 @@ class ReportData:
         path = self.files.get("verdict_range.nc")
         return None if path is None else VerdictRange.read(path)
 
-    def read_result(self, name: str, caption: str, figure: str = "") -> list[Any]:
-        """Return text and picture of a command in the folder, or an empty list."""
+    def read_result(self, name: str, caption: str, figure: str = "", table: str = "") -> list[Any]:
+        """Return text, under the caption of a table, and picture of a command, or an empty list."""
         # a report shows what other commands left in the folder, and computes nothing itself
         lines = self.read_text(f"{name}.txt")
         if lines is None:
             return []
-        return [TextBlock(lines, "lines"), *self.read_figure(figure or f"{name}.png", caption)]
+        return [
+            TextBlock(lines, "lines", table),
+            *self.read_figure(figure or f"{name}.png", caption),
+        ]
 
     @cached_property
     def files(self) -> dict[str, Path]:

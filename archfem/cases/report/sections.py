@@ -51,9 +51,12 @@ _DEFINITIONS = {
     "Demirel and Aldemir": "of one ring, as that paper words it",
 }
 
-_RISK_CAPTION = (
+# Of figure and table, with the file of the figure
+_RISK_CAPTIONS = (
     "Probability of a fall by intensity with its band, hazard of the site, and share of the rate "
-    "by intensity."
+    "by intensity.",
+    "risk.png",
+    "Annual rate of collapse, and that of each alternative, with intervals",
 )
 
 _PLAYER_CAPTION = "The structure at an instant, the ground acceleration, and one joint."
@@ -80,7 +83,7 @@ def build_sections(data: ReportData) -> list[Section]:
         *build_dead_load_sections(data),
         build_ground_section(data),
         *build_run_sections(data),
-        Section("Annual rate of collapse", data.read_result("risk", _RISK_CAPTION)),
+        Section("Annual rate of collapse", data.read_result("risk", *_RISK_CAPTIONS)),
         build_check_section(data),
         build_method_section(data),
         build_source_section(data),
@@ -97,9 +100,9 @@ def number_captions(sections: Sequence[Section]) -> list[Section]:
     counts: Counter[str] = Counter()
 
     def number(piece: Any) -> Any:
-        word = {"plate": "Figure", "player": "Figure", "grid": "Table"}.get(piece.kind)
+        word = "Figure" if piece.kind in ("plate", "player") else "Table"
         caption = _PLAYER_CAPTION if piece.kind == "player" else getattr(piece, "caption", "")
-        if word is None or not caption:
+        if not caption:
             return piece
         counts[word] += 1
         return replace(piece, caption=f"{word} {counts[word]}. {sentence(caption)}")
@@ -170,9 +173,10 @@ def build_dead_load_sections(data: ReportData) -> list[Section]:
     collapse = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
     curve = "Load factor over displacement, with the joints in the order of their first hinge."
     rating = "Factor along the bridge, and mechanism at the worst place."
+    shapes, modes = "Shapes of the modes about dead load.", "Modes: effective masses along x and y"
     return [
         Section("Dead load", _build_dead_load(data)),
-        Section("Modes", data.read_result("modes", "Shapes of the modes about dead load.")),
+        Section("Modes", data.read_result("modes", shapes, table=modes)),
         Section("Limit analysis", data.read_result("limit", collapse, "collapse.png")),
         Section("Pushover", data.read_result("pushover", curve)),
         Section("Rating for a vehicle", data.read_result("rating", rating)),
@@ -377,9 +381,11 @@ def build_check_section(data: ReportData) -> Section:
         )
         blocks.append(Grid(head, rows, caption))
     caption = "Speed against error over fidelities, meshes and steps."
-    blocks += data.read_result("accuracy", caption)
+    table = "Models in the order of their errors, with times"
+    blocks += data.read_result("accuracy", caption, table=table)
     caption = "Residual displacement over each property; falls are above the line."
-    blocks += data.read_result("verdict_range", caption)
+    table = "Share of the damage that each property explains, and falls by its value"
+    blocks += data.read_result("verdict_range", caption, table=table)
     return Section("Checks of the numbers, and range of the verdict", blocks)
 
 

@@ -33,6 +33,7 @@ class TextBlock:
     # "plain"; "missing" for results that do not exist; "doubt" for warnings; "lines" for
     # preformatted text
     manner: str = "plain"
+    caption: str = ""  # above preformatted text that is a table
 
     kind = "words"
 

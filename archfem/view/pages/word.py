@@ -49,6 +49,8 @@ def write_word(path: str | Path, document: Document) -> Path:
 
 def _add_text(word: Any, block: TextBlock) -> None:
     """Add a paragraph; code and preformatted text have letters of one width."""
+    if block.caption:
+        word.add_paragraph(block.caption, "Caption").paragraph_format.keep_with_next = True
     paragraph = word.add_paragraph()
     parts = [block.text] if block.manner == "lines" else block.text.split("`")
     for number, part in enumerate(parts):
