@@ -10,7 +10,7 @@ from portals import DRY, box, portal
 
 import archfem as af
 from archfem.cases import result_text
-from archfem.cases.report import conclusion, sections
+from archfem.cases.report import conclusion, report_data, sections
 from archfem.dynamics.verdict import doubt_unassessed_joints
 from archfem.joints.criteria import describe_assessed_joints
 from archfem.studies.evaluators import of_history
@@ -173,7 +173,7 @@ def test_tables_state_what_is_assessed(other, ring):
         assert (SENTENCE in table.splitlines()) == said
         assert (of_history(run).get("assessed") == SENTENCE) == said
         case = SimpleNamespace(structure=model.structure, report={})
-        facts = conclusion.list_facts(SimpleNamespace(runs={"one": run}, case=case))
+        facts = conclusion.list_facts(report_data.ReportData(case, {"one": run}))
         assert (("joints", SENTENCE) in facts) == said
         grid = sections._shorten_joint_table(
             result_text.tabulate_joints(run.joints), run.verdict.assessed
