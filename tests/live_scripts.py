@@ -1,8 +1,10 @@
 """Scripts of the page that shakes an arch, run by Node with data of a test."""
 
+import atexit
 import json
 import shutil
 import subprocess
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,17 +14,43 @@ from archfem.view.pages import live
 SCRIPTS = Path(live.__file__).parent / "templates" / "live"
 NODE = shutil.which("node")
 
+# Answers lines with a program and its data; names of the scripts are in the scope of `eval`
+ANSWER = """
+const evaluate = async (given, program) => await eval(`(${program})`);
+require("readline").createInterface({ input: process.stdin }).on("line", async (line) => {
+  const { given, program } = JSON.parse(line);
+  let said;
+  try {
+    said = { value: await evaluate(given, program) };
+  } catch (error) {
+    said = { error: String(error.stack) };
+  }
+  console.log(JSON.stringify(said));
+});
+"""
+
 
 def run_in_node(given, program):
     """The value of a program, an expression or a promise of JavaScript, with the data `given`."""
     if NODE is None:
         pytest.skip("there is no node: apt-get install nodejs")
+    node = start_node()
+    node.stdin.write(json.dumps({"given": given, "program": program.strip()}) + "\n")
+    node.stdin.flush()
+    said = json.loads(node.stdout.readline())
+    assert "error" not in said, said["error"]
+    return said.get("value")
+
+
+@cache
+def start_node():
+    """A process that serves all tests: its start takes longer than most programs."""
     names = ("engine", "statics", "closing", "shapes", "outlines")
     scripts = "\n".join((SCRIPTS / f"{name}.js").read_text() for name in names)
-    source = f"{scripts}\nconst given = {json.dumps(given)};\n"
-    source += f"Promise.resolve({program.strip()}).then((r) => console.log(JSON.stringify(r)));"
-    done = subprocess.run([NODE, "-"], input=source, capture_output=True, text=True, check=True)
-    return json.loads(done.stdout)
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    node = subprocess.Popen([NODE, "-e", scripts + ANSWER], **pipes)
+    atexit.register(node.communicate)  # which ends it
+    return node
 
 
 def wait_for_runs(driver, runs):
