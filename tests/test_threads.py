@@ -39,9 +39,9 @@ def test_a_decorated_function_takes_one_thread_and_restores_the_limit():
 def test_a_run_takes_one_thread():
     """An event of the run reads the number of threads."""
     seen = {}
-    column = af.column(breadth=1.0, heights=[1.0])
+    model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid")
+    af.dead_load(model)  # loads the libraries, of which each begins with a limit of its own
     with threadpool_limits(limits=2, user_api="blas"):
-        model = af.build(column, fidelity="rigid")
         af.time_history(
             model,
             af.Motion.synthetic(duration=0.3, pga=0.5),
