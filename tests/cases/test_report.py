@@ -1,5 +1,6 @@
 """Reports: they contain all files of the folder, and leave out what was not computed."""
 
+import base64
 import logging
 import re
 import shutil
@@ -22,6 +23,7 @@ from archfem.cases.report.inputs import tabulate_inputs
 from archfem.cases.report.sections import supported_weight_ratio
 from archfem.cases.run import carry_out, replace_run
 from archfem.limit import vehicles
+from archfem.view.pages.document import FigureBlock
 
 CASE = """
 title = "a column <b>& more</b> under two pairs"
@@ -40,6 +42,10 @@ second = { synthetic = { seed = 2, duration = 1.0, pga = 1.0, vertical_ratio = 0
 [record]
 fields_every = 10
 """
+
+PIXEL = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNkYAAAAAYAAjCB0C8AAAAASUVORK5CYII="
+)
 
 
 @pytest.fixture(scope="module")
@@ -276,7 +282,7 @@ def test_who_signs_is_in_the_head_and_changes_no_result(kept, unplotted, capsys)
     assert "did you mean 'author'" in capsys.readouterr().err
 
 
-def test_captions_are_numbered_without_a_gap(carried_out, tmp_path):
+def test_captions_are_numbered_without_a_gap(carried_out, unplotted, tmp_path):
     words = words_of(af.cases.open_results(carried_out).report(tmp_path / "page.html"))
     for kind in ("Figure", "Table"):
         numbers = [int(number) for number in re.findall(rf"{kind} (\d+)\. [A-Z]", words)]
@@ -285,9 +291,10 @@ def test_captions_are_numbered_without_a_gap(carried_out, tmp_path):
 
 
 def test_a_report_for_word_has_the_sections_of_the_page(
-    carried_out, tmp_path, capsys, low_resolution
+    carried_out, tmp_path, capsys, unplotted, monkeypatch
 ):
     docx = pytest.importorskip("docx")
+    monkeypatch.setattr(FigureBlock, "raster", lambda _: PIXEL)
     path = tmp_path / "report.docx"
     assert af.commands.main(["report", str(carried_out), "--out", str(path)]) == 0
     assert "wrote" in capsys.readouterr().out
