@@ -63,7 +63,9 @@ def _find_bracket(
     build: Callable[[float], Structure], is_stable: Callable[[float], bool]
 ) -> tuple[float, float]:
     """Return an unstable thickness and a stable one, at most twice as large [m]."""
-    thin = 1e-4 * _family_size(build)  # thinner than anything built: the search starts here
+    # Thinner than anything built: the search starts here. The size is that of a thin member: the
+    # thickest may be all thickness.
+    thin = 1e-4 * build(1e-4 * _family_size(build)).size
     if is_stable(thin):
         raise InvalidInput(
             f"it stands at any thickness, even {thin:.3g} m: there is no least one to look for"

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import archfem as af
@@ -67,3 +68,16 @@ def test_the_greatest_that_can_be_built_may_be_the_only_one_that_stands():
         return ring(thickness=thickness)
 
     assert minimum_thickness(bounded, tolerance=1e-4) == pytest.approx(free, rel=2e-4)
+
+
+def test_a_least_thickness_far_below_the_greatest_that_can_be_built_is_found():
+    """A ring along its intrados may be 100 m thick, and this one stands from 14 mm on."""
+    x = np.linspace(-2.0, 2.0, 2001)
+    parabola = np.column_stack([x, 1.0 - 0.25 * x**2])
+
+    def build(thickness):
+        return af.shapes.arch_along(parabola, thickness=thickness, voussoirs=16)
+
+    least = minimum_thickness(build, friction=None, tolerance=1e-4)
+    assert least == pytest.approx(0.01406, rel=5e-3)  # by a linear programme of its own
+    assert not af.stands(build(0.99 * least), friction=None)
