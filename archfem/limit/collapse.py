@@ -200,9 +200,9 @@ def collapse_factor(
         The factor, the outcome and the mechanism.
 
     Raises:
-        InvalidInput: an option is unknown, an action misses the structure, joints have tensile
-            strength under a settlement, or bodies too soft to be rigid are without the strength of
-            a fill.
+        InvalidInput: an option is unknown, an action misses the structure or what can move of it,
+            joints have tensile strength under a settlement, or bodies too soft to be rigid are
+            without the strength of a fill.
         DidNotConverge: the solver of linear programmes gave up.
 
     Note:
@@ -225,6 +225,11 @@ def collapse_factor(
         result = _bound_collapse(structure, loads, stays, friction, strength, fill)
     else:
         stones, programme = self_weight_programme(structure, friction, strength, fill, stays)
+        if not (isinstance(loads, Settlement) or stones.load(loads).any()):
+            raise InvalidInput(
+                "the load is zero on all that can move: give it a force or a multiple of g, or "
+                "another place"
+            )
         result = _solve_collapse(stones, programme, loads, friction)
         if result.outcome is Outcome.COLLAPSES and not isinstance(loads, Settlement):
             stones.warn_of_sliding_fill(loads, stays, result.factor)

@@ -339,6 +339,8 @@ def test_piers_reach_to_the_ground_and_carry_the_ring():
             "misses the structure",
         ),
         (lambda: collapse_factor(ring(), live=SIDEWAYS, friction="cohesion"), "is not known"),
+        (lambda: collapse_factor(ring(), live=af.BodyForce(0.0)), "load is zero"),
+        (lambda: collapse_factor(ring(), live=[SIDEWAYS, af.BodyForce(-1.0)]), "load is zero"),
         (lambda: stands(ring(), friction="none"), "is not known"),
         (lambda: stands(ring(), strength=0.0), "is not positive"),
         (lambda: collapse_factor(ring(), live=af.Settlement(3, (1.0, 0.0, 0.0))), "cannot settle"),
