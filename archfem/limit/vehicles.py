@@ -80,10 +80,16 @@ class Vehicle:
     def __post_init__(self) -> None:
         """Refuse weights, spacings and factors out of range."""
         _parse_axles(self.axles, self.spacings)
-        _check_factor(self.live, f"partial factor on the live load of {self.name}")
-        _check_factor(self.impact, f"dynamic factor of {self.name}")
         for key in ("area_load", "wheels", "lane"):
             check_number(getattr(self, key), f"{key} of {self.name}", minimum=0.0)
+        longest = max(self.spacings, default=0.0)
+        if min(self.axles) < 1e3 or longest > 100.0 or 0.0 < self.area_load < 100.0:
+            raise InvalidInput(
+                f"vehicle '{self.name}' has axles of {self.axles} N, spacings of {self.spacings} m "
+                f"and {self.area_load} Pa: that can only be a wrong unit"
+            )
+        _check_factor(self.live, f"partial factor on the live load of {self.name}")
+        _check_factor(self.impact, f"dynamic factor of {self.name}")
 
     def spread_over(self, structure: Structure) -> float:
         """Return the width over which one vehicle spreads on a bridge, by rule [m].

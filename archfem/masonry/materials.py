@@ -66,13 +66,14 @@ class Material:
             ("unit_weight", *weight_range, heavy),
         ):
             _check_range(self, *row)
-        # no building material weighs 1 to 4 kN/m³, but soils and stones have such densities
-        if 1000.0 <= self.unit_weight <= 4000.0:
-            raise InvalidInput(
-                f"unit_weight {self.unit_weight:.4g} N/m³ of '{self.name}' is the number of a "
-                f"density in kg/m³: give a weight in N/m³: {self.unit_weight:.4g} kg/m³ have "
-                f"{self.unit_weight * G:.4g}"
-            )
+        # no building material weighs as little in N/m³ as soils and stones do in these units
+        for low, high, unit, factor in ((1e3, 4e3, "kg/m³", G), (5.0, 50.0, "kN/m³", kN)):
+            if low <= self.unit_weight <= high:
+                number = f"{self.unit_weight:.4g}"
+                raise InvalidInput(
+                    f"unit_weight {number} N/m³ of '{self.name}' looks like {unit}: give it in "
+                    f"N/m³: {number} {unit} have {self.unit_weight * factor:.4g}"
+                )
         strength = self.strength
         if strength is not None and check_number(strength, f"strength of '{self.name}'") < 1e3:
             raise InvalidInput(

@@ -251,11 +251,8 @@ class Eurocode8(CodeSpectrum):
 
     def __post_init__(self) -> None:
         ag = check_number(self.ag, "design ground acceleration [g]")
-        if not 0.0 < ag <= MAX_SPECTRAL_ACCELERATION:
-            raise InvalidInput(
-                f"design ground acceleration {self.ag!r} g: expected more than 0, up to "
-                f"{MAX_SPECTRAL_ACCELERATION:g}"
-            )
+        if not 0.0 < ag < 2.0:
+            raise InvalidInput(f"design ground acceleration {ag:g} g: expected g, from 0 to 2")
         check_fields(self)
         if self.type not in self._ground_types or self.ground not in self._ground_types[1]:
             raise InvalidInput(

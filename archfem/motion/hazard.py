@@ -61,6 +61,12 @@ class Hazard:
                 f"hazard with intensities {x.tolist()} and rates {y.tolist()}: give two points or "
                 "more above 0, intensities ascending, annual rates descending"
             )
+        unit, most = MEASURES[self.measure], 20.0 if self.measure == "pgv" else 200.0
+        if x[-1] > most:
+            raise InvalidInput(
+                f"the hazard reaches {x[-1]:g} {unit}: that can only be a wrong unit, or return "
+                "periods in place of intensities"
+            )
         object.__setattr__(self, "intensity", x)
         object.__setattr__(self, "rate", y)
 

@@ -300,3 +300,16 @@ def test_a_vehicle_needs_weights_and_spacings():
         Vehicle("lorry", (1e5,), live=-1.0)
     with pytest.raises(af.InvalidInput, match="lane of lorry"):
         Vehicle("lorry", (1e5,), lane=-1.0)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"axles": (60.0, 115.0), "spacings": (3.2,)},  # kN
+        {"axles": (60e3, 115e3), "spacings": (3200.0,)},  # mm
+        {"axles": (60e3,), "area_load": 9.0},  # kPa
+    ],
+)
+def test_vehicles_of_wrong_units_are_refused(given):
+    with pytest.raises(af.InvalidInput, match=r"'lorry' .* can only be a wrong unit"):
+        Vehicle("lorry", **given)

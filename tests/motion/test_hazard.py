@@ -46,6 +46,19 @@ def test_a_curve_that_does_not_fall_is_refused(intensity, rate):
         af.Hazard(intensity, rate)
 
 
+@pytest.mark.parametrize(
+    ("points", "options"),
+    [
+        ({475.0: 250.0}, {}),  # gal
+        ({3.0: 475.0}, {}),  # swapped
+        ({475.0: 25.0}, {"measure": "pgv"}),  # cm/s
+    ],
+)
+def test_intensities_of_a_wrong_unit_are_refused(points, options):
+    with pytest.raises(af.InvalidInput, match="can only be a wrong unit"):
+        af.Hazard.from_return_periods({1.0: 0.1} | points, **options)
+
+
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(af.InvalidInput, match=r"nothing\.csv"):
         af.Hazard.read(tmp_path / "nothing.csv")
