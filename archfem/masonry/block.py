@@ -240,6 +240,16 @@ class Block:
             met += intersect_arc(self.points[side : side + 2], np.array(self.centre), x)
         return max(met, default=None)
 
+    def distance_to(self, other: "Block") -> float:
+        """Return the distance to another block, zero where they touch [m].
+
+        Args:
+            other: the block.
+        """
+        import shapely
+
+        return float(shapely.distance(*(shapely.Polygon(each.drawn()) for each in (self, other))))
+
     def side_of(self, line: Array, near: float) -> int:
         """Return on which side of a line the block lies, if its straight edges cover the line.
 

@@ -210,9 +210,12 @@ class Structure(ResultDisplay):
                 raise InvalidStructure(f"{kind} names {twice} are used twice: name each once")
         if all(block.fixed for block in self.blocks):
             raise InvalidStructure("no block is free to move: leave at least one not fixed")
+        smallest = min(float(np.ptp(self.blocks[k].drawn(), axis=0).max()) for k in self.free)
+        if smallest > 100.0:
+            raise InvalidStructure(f"the smallest stone is {smallest:.4g} m large: give metres")
         _ = self.normals
-        self._check_support()
         self._check_outlines()
+        self._check_support()
 
     @cached_property
     def size(self) -> float:
@@ -345,10 +348,13 @@ class Structure(ResultDisplay):
     def _check_support(self) -> None:
         """Check that every block is connected, through others, to a fixed one."""
         held = find_supported_blocks(self, range(len(self.blocks)))
-        if loose := [block.name for k, block in enumerate(self.blocks) if k not in held]:
+        if loose := [block for k, block in enumerate(self.blocks) if k not in held]:
+            gaps = {self.blocks[k].name: loose[0].distance_to(self.blocks[k]) for k in held}
+            nearest = min(gaps, key=gaps.__getitem__, default=None)
             raise InvalidStructure(
-                f"blocks {loose} rest on nothing: join each, through others, to a fixed block, "
-                "which has fixed = true, in a drawing by its layer"
+                f"blocks {[block.name for block in loose]} rest on nothing: join each, through "
+                "others, to a fixed block, which has fixed = true, in a drawing by its layer"
+                + ("" if nearest is None else f"; '{nearest}' is {1e3 * gaps[nearest]:.3g} mm away")
             )
 
     def _check_outlines(self) -> None:

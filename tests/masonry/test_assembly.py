@@ -167,6 +167,16 @@ def test_blocks_that_share_a_corner_do_not_touch():
         assembled([], af.masonry.STONE_TO_STONE)
 
 
+@pytest.mark.parametrize(
+    ("level", "says"),
+    [(1.0001, r"\['b'\] rest on nothing.*; 'a' is 0\.1 mm away"), (0.9999, "overlap by 1 cm²")],
+)
+def test_faces_that_nearly_meet_are_refused_by_their_distance(level, says):
+    blocks = [box(0.0, 0.0, 1.0, 1.0, "a"), box(0.0, level, 1.0, 2.0, "b")]
+    with pytest.raises(af.errors.InvalidStructure, match=says):
+        assembled([replace(blocks[0], fixed=True), blocks[1]], af.masonry.STONE_TO_STONE)
+
+
 def test_joints_given_are_left_alone(stack):
     given = replace(stack.joints[0], name="mine")
     found = assembled(stack.blocks, af.masonry.STONE_TO_STONE, joints=[given])

@@ -45,6 +45,12 @@ def test_a_loose_block_is_named(stack):
         replace(stack, joints=stack.joints[:1])
 
 
+def test_millimetres_are_refused():
+    with pytest.raises(af.errors.InvalidStructure, match="smallest stone is 300 m large"):
+        af.column(breadth=200.0, heights=[300.0, 400.0])
+    assert len(af.column(breadth=50.0, heights=[90.0]).joints) == 1
+
+
 def test_other_refusals(stack):
     with pytest.raises(af.errors.InvalidStructure, match="anticlockwise"):
         af.Block(SQUARE[::-1], af.STONE, "turned")
