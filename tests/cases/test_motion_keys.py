@@ -80,7 +80,10 @@ def test_samples_may_stand_in_the_case():
         ("suite.pairs.third={synthetic={}, units='g'}", "units belongs to a file"),
         ("suite.pairs.third={synthetic={}, response='a.xml'}", "response belongs to a file"),
         ("suite.pairs.third={samples=[0.0, 1.0]}", "needs the time between them"),
-        ("suite.pairs.third={samples=[0.0, 1.0], synthetic={}}", "it has .'samples', 'synthetic'."),
+        (
+            "suite.pairs.third={samples=[0.0, 1.0], synthetic={}}",
+            "it has .'samples', 'synthetic'.+remove =",
+        ),
         ("suite.pairs.first.vertical=3", "vertical = 3 is not a word or a table"),
         ("suite.pairs.first.vertical={}", "suite.pairs.first.vertical needs either a file"),
         ("suite.matched=true", "suite.matched = true needs a target"),

@@ -494,7 +494,7 @@ def test_rounded_times_still_give_the_step(write):
         ("0.00;0,1\n0.01;0,2\n", {"units": "gal", "column": 2}, "line 1: .*decimal commas"),
         ("# dt = 0,01 s\n1.0\n2.0\n", {"units": "gal"}, "'dt = 0,01': these look like decimal"),
         ("5\n", {"units": "gal", "dt": 0.01}, "one row is no accelerogram"),
-        ("1\n2\n", {"units": "gal", "dt": "fast"}, "a number in seconds"),
+        ("1\n2\n", {"units": "gal", "dt": "10 ms"}, "dt = '10 ms' is no number: .*seconds"),
         ("1\n2\nend\n", {"units": "gal", "dt": 0.01}, "line 3: numbers expected, got 'end'"),
         ("1\n2\n", {"units": "gal", "dt": 3.0}, "sampling interval 3 s"),
     ],

@@ -121,8 +121,10 @@ def read_channels(
     """Read all channels of a record, or one of them."""
     if units is not None:
         parse_unit(units)
-    if not (isinstance(dt, Real | None) and isinstance(column, int | None)):
-        raise InvalidInput(f"dt {dt!r} is a number in seconds and column {column!r} a whole number")
+    if not isinstance(dt, Real | None):
+        raise InvalidInput(f"dt = {dt!r} is no number: give it in seconds, as in 0.01")
+    if not isinstance(column, int | None):
+        raise InvalidInput(f"column = {column!r} is no whole number")
     content = read_bytes(path, "record")
     if waveform := waveforms.find_waveform_format(content):
         if dt is not None:
