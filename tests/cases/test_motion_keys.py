@@ -82,7 +82,7 @@ def test_samples_may_stand_in_the_case():
         ("suite.pairs.third={samples=[0.0, 1.0]}", "needs the time between them"),
         (
             "suite.pairs.third={samples=[0.0, 1.0], synthetic={}}",
-            "it has .'samples', 'synthetic'.+remove =",
+            "has .'samples', 'synthetic'.+remove =",
         ),
         ("suite.pairs.first.vertical=3", "vertical = 3 is not a word or a table"),
         ("suite.pairs.first.vertical={}", "suite.pairs.first.vertical needs either a file"),
