@@ -206,8 +206,8 @@ def _parse_source(table: Any, keys: Table, section: str) -> dict[str, Any]:
     if len(sources) != 1:
         raise InvalidInput(
             f"{section} needs either a file, or synthetic = {{ seed = 1, … }} to make one, or "
-            f"samples = [ … ] and dt; it has {sources or 'none of them'} (to leave out that of a base: "
-            f'remove = ["{section}.synthetic"])'
+            f"samples = [ … ] and dt; it has {sources or 'none of them'} "
+            f'(remove = ["{section}.synthetic"] leaves out that of a base)'
         )
     (source,) = sources
     if source == "synthetic":

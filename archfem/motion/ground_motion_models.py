@@ -85,11 +85,14 @@ def peak_ground_acceleration(
         raise InvalidInput(
             f"ground-motion model {model!r} is unknown: use {', '.join(GROUND_MOTION_MODELS)}"
         )
-    away = check_number(distance, "distance [m]", minimum=0.0) / 1e3
+    for key, value in (("distance", distance), ("depth", depth)):
+        if 0.0 < check_number(value, f"{key} [m]", minimum=0.0) < 300.0:
+            raise InvalidInput(f"{key} {value:g} m looks like kilometres: give metres")
+    away = distance / 1e3
     names = ("dist_epi",) if model == "ASB14" else ("dist_jb", "dist_rup", "dist_x")
     keys: dict[str, Any] = dict.fromkeys(names, away)
     keys |= {"mag": check_number(magnitude, "magnitude"), "v_s30": v_s30, "dip": 90.0}
-    keys["depth_hyp"] = check_number(depth, "depth [m]", minimum=0.0) / 1e3
+    keys["depth_hyp"] = depth / 1e3
     keys["mechanism"] = {"strike-slip": "SS", "normal": "NS", "reverse": "RS"}[mechanism]
     keys |= {} if region is None else {"region": region}
     with require_package("pygmm"):

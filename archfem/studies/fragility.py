@@ -266,7 +266,7 @@ def stripe_fragility(
     Raises:
         InvalidInput: there are fewer than three levels, counts are out of range, motions are not
             whole numbers, or the dispersion is undetermined: no motion fails up to one level, and
-            all from the next.
+            all from the next, or the share of failures does not grow.
     """
     x = np.array(check_numbers(levels, "levels"))
     count = check_array(motions, "motions")
@@ -287,6 +287,11 @@ def stripe_fragility(
             "not, and the dispersion is undetermined; try levels between"
         )
     median, dispersion = (float(each[0]) for each in _probit(x, failed[None], count))
+    if dispersion >= 0.999 * DISPERSION_RANGE[1]:
+        raise InvalidInput(
+            f"{failed.tolist()} of {count.tolist()} motions fail at levels {x.tolist()}: their "
+            "share hardly grows with the level, and has no fragility curve"
+        )
     share = _curve(x, median, dispersion)
     random = np.random.default_rng(check_integer(seed, "seed", minimum=0))
     size = check_integer(resamples, "resamples"), len(x)

@@ -86,6 +86,8 @@ def test_peaks_of_the_six_earthquakes_at_the_bridge(verified):
         ),
         ({"model": "CB14", "depth": 21e3}, "depth_hyp = 21 is outside its range from 0 to 20"),
         ({"model": "ASB14", "region": "italy"}, "ASB14 has no regions: leave out region = 'italy'"),
+        ({"distance": 15.4}, "distance 15.4 m looks like kilometres"),
+        ({"depth": 12.0}, "depth 12 m looks like kilometres"),
         ({"region": "mars"}, "BSSA14: region 'mars' is none of"),
         ({"model": "I14", "v_s30": 500.0, "mechanism": "normal"}, "mechanism 'NS' is none of"),
     ],

@@ -197,6 +197,8 @@ def test_invalid_capacities_are_refused(given, says):
             stripe_fragility([1.0, 2.0, 3.0], [0, 5, 10], motions)
     with pytest.raises(af.InvalidInput, match="try levels between"):
         stripe_fragility([1.0, 2.0, 3.0], [0, 0, 20], 20)
+    with pytest.raises(af.errors.InvalidInput, match="hardly grows with the level"):
+        stripe_fragility([1.0, 2.0, 3.0], [18, 10, 2], 20)
 
 
 def test_intervals_and_bands_are_quantiles_of_the_samples():
