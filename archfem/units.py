@@ -170,6 +170,7 @@ def _convert(text: str, unit: str, key: str) -> float:
         _check_text(part, unit, key)
     registry = _registry()
     target = "dimensionless" if unit == "1" else unit
+    text = re.sub(r"\b([A-Za-z]+)([23])\b", r"\1**\2", text)  # as in kN/m3
     if unit == "m/s**2":  # here g is gravity and gal the unit of Galileo, not gram and gallon
         # a digit may stand before them, as in "0.3g"
         text = re.sub(r"(?<![^\W\d])gal\b", "Gal", text)

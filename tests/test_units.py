@@ -28,6 +28,19 @@ def test_a_common_unit_of_another_dimension_is_refused(text, si):
         af.units.in_unit(text, si, "length")
 
 
+@pytest.mark.parametrize(
+    ("text", "si", "value"),
+    [
+        ("20 kN/m3", "N/m**3", 2e4),
+        ("1e3 mm/s2", "m/s**2", 1.0),
+        ("9 kN / m2", "Pa", 9e3),
+        ("0.3 g", "m/s**2", 0.3 * 9.80665),
+    ],
+)
+def test_powers_may_be_written_without_a_sign(text, si, value):
+    assert af.units.in_unit(text, si, "x") == pytest.approx(value)
+
+
 @pytest.mark.parametrize("text", ["2,95 m", "1,000 m", "-0,5e3 mm"])
 def test_a_comma_in_a_number_is_refused(text):
     with pytest.raises(af.InvalidInput, match=r"has a comma in its number.*write a point"):
