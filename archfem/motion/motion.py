@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from archfem._display import ResultDisplay
-from archfem._typing import Array, MetresPerSecondSquared, Seconds
+from archfem._typing import Angle, Array, MetresPerSecondSquared, Seconds
 from archfem._validation import check_number, check_words, is_number, short_repr, validate_methods
 from archfem.errors import InvalidInput
 from archfem.motion import signal_processing
 from archfem.motion.records.reader import join_channels, read_components
-from archfem.units import STANDARD_GRAVITY
+from archfem.units import STANDARD_GRAVITY, in_degrees
 
 COMPONENTS = "horizontal", "vertical", "transverse"
 
@@ -294,17 +294,18 @@ class Motion(ResultDisplay):
         """
         return self._map_components(signal_processing.filter_band, self.dt, low, high, order=order)
 
-    def rotated(self, angle: float) -> "Motion":
+    def rotated(self, angle: Angle) -> "Motion":
         """Return the motion in horizontal axes rotated by an angle, from horizontal to transverse.
 
         Args:
-            angle: by which the axes turn [rad].
+            angle: by which the axes turn [degrees]; a small one with its unit, "5 degree".
 
         Raises:
-            InvalidInput: there is no transverse.
+            InvalidInput: there is no transverse, or the angle looks like radians.
         """
         pair = self.horizontal, self.component("transverse")
-        level, across = signal_processing.rotate_components(*pair, angle)
+        turn = np.radians(in_degrees(angle, "angle"))
+        level, across = signal_processing.rotate_components(*pair, turn)
         return replace(self, horizontal=level, transverse=across)
 
     def with_vertical(self, other: "Motion | None") -> "Motion":

@@ -142,12 +142,19 @@ def test_refining_by_a_whole_number_keeps_the_motion(shaking):
 
 def test_rotation_keeps_energy_and_turns_back(shaking):
     both = af.Motion(shaking.horizontal, shaking.dt, transverse=shaking.vertical)
-    turned = both.rotated(0.7)
+    turned = both.rotated("0.7 rad")
     energy = both.horizontal**2 + both.transverse**2
     assert turned.horizontal**2 + turned.transverse**2 == pytest.approx(energy)
-    assert turned.rotated(-0.7).horizontal == pytest.approx(both.horizontal)
+    assert turned.rotated("-0.7 rad").horizontal == pytest.approx(both.horizontal)
     with pytest.raises(af.errors.InvalidInput, match="no component 'transverse'"):
-        shaking.rotated(0.1)
+        shaking.rotated(10.0)
+
+
+def test_a_quarter_turn_is_90_degrees_and_bare_radians_are_refused(shaking):
+    both = af.Motion(shaking.horizontal, shaking.dt, transverse=shaking.vertical)
+    assert both.rotated(90).horizontal == pytest.approx(both.transverse)
+    with pytest.raises(af.errors.InvalidInput, match="looks like radians"):
+        both.rotated(0.5 * np.pi)
 
 
 def test_vertical_comes_from_another_motion(shaking):

@@ -123,7 +123,7 @@ def test_a_downward_vertical_is_turned_up(recorded):
 def test_two_horizontals_of_two_files_can_be_rotated(recorded):
     files = [recorded / f"peer_at2/RSN125_FRIULI.A_A-TMZ{angle}.AT2" for angle in ("000", "270")]
     motion = af.Motion.read(files[0], transverse=files[1])
-    turned = motion.rotated(0.5 * np.pi)
+    turned = motion.rotated(90.0)
     assert turned.pga == pytest.approx(0.3151 * af.units.STANDARD_GRAVITY, rel=2e-4)
     # Each keeps its own length until they are mixed; then the longer one counts.
     assert (len(motion.horizontal), len(turned.horizontal)) == (7277, 7279)

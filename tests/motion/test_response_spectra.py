@@ -228,8 +228,7 @@ def test_rotd_is_the_percentile_over_rotated_motions():
     pair = af.Motion.synthetic(duration=4.0, seed=5, vertical_ratio=0.0)
     pair = pair.with_transverse(af.Motion.synthetic(duration=3.0, seed=6, vertical_ratio=0.0))
     periods = np.array([0.0, 0.1, 0.5])
-    angles = np.radians(np.arange(180))
-    turned = [response_spectrum(pair.rotated(angle), periods) for angle in angles]
+    turned = [response_spectrum(pair.rotated(f"{k} degree"), periods) for k in range(180)]
     for share in (0.0, 50.0, 100.0):
         expected = np.percentile(turned, share, axis=0)
         assert rotated_spectrum(pair, periods, share) == pytest.approx(expected, rel=1e-9)
