@@ -7,7 +7,7 @@ from dataclasses import replace
 from archfem._threads import single_threaded
 from archfem.errors import InvalidInput
 from archfem.masonry.stiffness_ratio import estimate_block_stiffness, find_soft_blocks
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, join_names
 from archfem.models.condensed import condense_blocks
 from archfem.models.discretisation import Discretisation
 from archfem.models.linear_blocks import build_rigid_model
@@ -102,12 +102,14 @@ def _check_plain_joints(structure: Structure) -> None:
 
 def _doubt_soft_blocks(structure: Structure, fidelities: Sequence[str]) -> Iterator[Doubt]:
     """Yield doubts about blocks too soft for their fidelity."""
-    for number in find_soft_blocks(structure):
-        if fidelities[number] in ("rigid", "faces", "condensed"):
-            ratio = estimate_block_stiffness(structure, number)
+    soft = find_soft_blocks(structure)
+    for fidelity in ("rigid", "faces", "condensed"):
+        if numbers := [number for number in soft if fidelities[number] == fidelity]:
+            found = [estimate_block_stiffness(structure, number) for number in numbers]
             yield Doubt(
-                f"block '{structure.blocks[number].name}' is soft: its own modes begin near "
-                f"{ratio.inner:.0f} Hz, in the seismic band, and it is {ratio.ratio:.2g} times as "
-                f"stiff as its joints",
-                f"'{fidelities[number]}' is wrong for it, use 'full'",
+                f"own modes of soft blocks begin near {min(each.inner for each in found):.0f} Hz, "
+                f"in the seismic band, and they are {min(each.ratio for each in found):.2g} times "
+                f"as stiff as their joints or more: "
+                f"{join_names([structure.blocks[number].name for number in numbers])}",
+                f"'{fidelity}' is wrong for them, use 'full'",
             )
