@@ -45,6 +45,16 @@ from archfem.masonry.materials import Contact, Material
 from archfem.masonry.structure import Joint, Structure, join_names
 from archfem.units import GPa, MPa, mm
 
+# Least and largest values of stones, beyond which units are wrong
+SI_RANGES = {
+    "young": (1e6, 1e13),
+    "strength": (1e4, 1e11),
+    "face_strength": (1e4, 1e11),
+    "stress": (1.0, 1e9),
+    "spacing": (1e-3, 100.0),
+    "aperture": (1e-7, 0.02),
+}
+
 # Least and largest joint roughness coefficient JRC, and strength of the faces over that of the
 # stone. Judgement: sawn faces are between profiles 1 and 3 of Barton and Choubey (1977), dressed
 # ones between 2 and 5; hewn ones are weaker and between 3 and 7; weathered have a third.
@@ -207,8 +217,8 @@ def face_closing(
         (12.35, 0.093)
     """
     check_number(roughness, "roughness", minimum=0.4, maximum=20.0)
-    stone = _check_above_zero(face_strength if strength is None else strength, "strength") / MPa
-    jcs = _check_above_zero(face_strength, "face_strength") / MPa
+    jcs = _check_si(face_strength, "face_strength [Pa]") / MPa
+    stone = jcs if strength is None else _check_si(strength, "strength [Pa]") / MPa
     if aperture is None:
         gap = 0.2 * roughness * (0.2 * stone / jcs - 0.1)  # [mm]
         if gap <= 0.0:
@@ -217,7 +227,7 @@ def face_closing(
                 f"stone, {strength:.3g} Pa: the relation gives no aperture: give it in m"
             )
     else:
-        gap = _check_above_zero(aperture, "aperture") / mm
+        gap = _check_si(aperture, "aperture [m]") / mm
     # the regressions are limited to positive values
     initial = max(-7.15 + 1.75 * roughness + 0.02 * jcs / gap, 0.1)  # [MPa/mm]
     closure = max(-0.1032 - 0.0074 * roughness + 1.135 * (jcs / gap) ** -0.251, 1e-3)  # [mm]
@@ -267,12 +277,11 @@ def joint_stiffness(
         True
     """
     check_choice(condition, "condition", CONDITIONS)
-    for name, value in (("young", young), ("spacing", spacing), ("strength", strength)):
-        _check_above_zero(value, name)
-    if not 0.0 < check_number(stress, "stress") < strength:
-        raise InvalidInput(
-            f"stress {stress!r} Pa is not between 0 and the strength {strength!r} Pa"
-        )
+    given = {"young [Pa]": young, "spacing [m]": spacing, "strength [Pa]": strength}
+    for name, value in (given | {"stress [Pa]": stress}).items():
+        _check_si(value, name)
+    if stress >= strength:
+        raise InvalidInput(f"stress {stress!r} Pa is not below the strength {strength!r} Pa")
     check_number(poisson, "poisson", minimum=0.0, maximum=0.499)
     elastic = 2.0 * (1.0 + poisson)  # E / G, and k_n / k_s of an elastic layer
     flexibility = spacing / young if rigid else 0.0
@@ -470,11 +479,10 @@ def fit_closing(
     return ClosingFit(stiffness, closure, misfit, (float(stress.min()), float(stress.max())))
 
 
-def _check_above_zero(value: float, name: str) -> float:
-    """Return a number above 0."""
-    if check_number(value, name, minimum=0.0) == 0.0:
-        raise InvalidInput(f"{name} = {value!r} is not above 0: give it in SI")
-    return value
+def _check_si(value: float, name: str) -> float:
+    """Return a number that can be in the SI unit of its name."""
+    least, most = SI_RANGES[name.split()[0]]
+    return check_number(value, name, minimum=least, maximum=most)
 
 
 def _finish_laws(condition: str, strength: float, stress: float) -> list[tuple[float, float]]:

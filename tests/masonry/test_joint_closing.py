@@ -180,9 +180,12 @@ def test_measured_walls_follow_the_law(wall, kind, expected, misfit, verified):
     ("given", "says"),
     [
         (((30e9, 0.5, "rough"), {}), "condition 'rough' is not known"),
-        (((30e9, 0.0), {}), "spacing = 0.0 is not above 0"),
-        (((-1.0, 0.5), {}), "young = -1.0"),
-        (((30e9, 0.5), {"stress": 1e9}), "not between 0 and the strength"),
+        (((30e9, 0.0), {}), r"spacing \[m\] = 0.0 is below 0.001"),
+        (((30e9, 500.0), {}), r"spacing \[m\] = 500.0 is above 100"),
+        (((30.0, 0.5), {}), r"young \[Pa\] = 30.0 is below 1e"),
+        (((30e9, 0.5), {"strength": 56.0}), r"strength \[Pa\] = 56.0 is below 10000"),
+        (((30e9, 0.5), {"stress": 0.05}), r"stress \[Pa\] = 0.05 is below 1"),
+        (((30e9, 0.5), {"stress": 1e9}), "not below the strength"),
         (((30e9, 0.5), {"poisson": 0.51}), "poisson"),
     ],
 )
@@ -209,7 +212,7 @@ def test_invalid_curves_are_refused(given, says):
 
 
 def test_invalid_faces_are_refused():
-    for given in ((0.1, 5e7), (4.0, 0.0), (4.0, 5e7, 0.0)):
+    for given in ((0.1, 5e7), (4.0, 100.0), (4.0, 5e7, 0.0), (4.0, 5e7, 0.2)):
         with pytest.raises(af.InvalidInput):
             joint_closing.face_closing(*given)
     with pytest.raises(af.InvalidInput, match="at least twice"):
