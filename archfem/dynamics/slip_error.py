@@ -8,6 +8,9 @@ by what the ground's acceleration a varies within the step. The slip errs in a s
 
 with N₀ that at rest, and c = 1/m₁ + 1/m₂ of the two blocks, their relative acceleration by 1 N.
 The margin is what V/N lacks to its limit: below it nothing slides.
+
+Where a slide turns within a step without rest, the mean shear is that of a turn in its middle. The
+velocity then errs by up to ½ Δt c N₀ |ΔV/N| until it turns or rests again, 1/√3 of that on average.
 """
 
 import numpy as np
@@ -62,6 +65,7 @@ class SlipError:
         self._jumps = motion.dt * (np.array([len(row) for row in rows]) - 1)
         # times at the middle of the last two steps [s], and their V/N and margins
         self._middles, self._rows = np.zeros(0), np.zeros((0, 2, len(self.joints)))
+        self._drift = np.zeros(len(self.joints))  # error of the velocity since the last rest [m/s]
 
     def estimate(self, batch: Batch) -> Array:
         """Return the error of the slip in each step that follows those added (steps, j) [m]."""
@@ -87,11 +91,28 @@ class SlipError:
 
     def add(self, batch: Batch, errors: Array) -> None:
         """Add steps with their errors."""
-        lengths = self._lengths(batch)[-2:]
-        self.total = self.total + errors.sum(axis=0)
-        self._middles = np.append(self._middles, batch.times[-2:] - 0.5 * lengths)[-2:]
-        self._rows = np.concatenate([self._rows, self._ratios(batch.resultants[-2:])])[-2:]
-        self._end = float(batch.times[-1])
+        lengths = self._lengths(batch)
+        rows = np.concatenate([self._rows, self._ratios(batch.resultants)])
+        self.total = self.total + errors.sum(axis=0) + self._drifts(lengths, rows)
+        self._middles = np.append(self._middles, batch.times - 0.5 * lengths)[-2:]
+        self._rows, self._end = rows[-2:], float(batch.times[-1])
+
+    def _drifts(self, lengths: Array, rows: Array, near: float = 1e-3) -> Array:
+        """Return the errors of the slip in steps by those of the velocity, and keep these (j,) [m].
+
+        A turn replaces the error of the velocity: of the last one it leaves (a - μ g)/(a + μ g).
+        """
+        slides, ratios = rows[:, 1] < near, rows[:, 0]
+        turns = slides[2:] & slides[:-2] & (ratios[2:] * ratios[:-2] < 0.0)
+        rests = ~(slides[2:] | slides[1:-1])
+        total = np.zeros(len(self.joints))
+        if turns.any() or self._drift.any():
+            turned = self._acceleration * np.abs(ratios[2:] - ratios[:-2]) / np.sqrt(12.0)
+            steps = lengths[len(lengths) - len(turns) :, None]
+            for length, turn, rest, speed in zip(steps, turns, rests, turned * steps, strict=True):
+                self._drift = np.where(turn, speed, np.where(rest, 0.0, self._drift))
+                total += length * self._drift
+        return total
 
     def _lengths(self, batch: Batch) -> Array:
         """Return the lengths of the steps (steps,) [s]."""
