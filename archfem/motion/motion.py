@@ -37,7 +37,8 @@ class Motion(ResultDisplay):
             date; None where nothing states it, and components added begin with this motion.
 
     Raises:
-        InvalidInput: a component is no row of finite numbers up to 5 g, or dt is not positive.
+        InvalidInput: a component is no row of finite numbers up to 5 g, or dt is not from
+            1e-6 to 2 s.
     """
 
     horizontal: Array
@@ -48,8 +49,8 @@ class Motion(ResultDisplay):
     start_time: float | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        if not (is_number(self.dt) and self.dt >= 1e-6):
-            raise InvalidInput(f"dt {short_repr(self.dt)} s is no positive number from 1e-6 on")
+        if not (is_number(self.dt) and 1e-6 <= self.dt <= 2.0):
+            raise InvalidInput(f"dt {short_repr(self.dt)} s is not from 1e-6 to 2: give seconds")
         if self.start_time is not None:
             check_number(self.start_time, "start_time of a motion [s]")
         check_words(self.name, "name of a motion")
