@@ -29,6 +29,7 @@ def test_components_keep_their_own_lengths():
         ([0.0, np.nan], 0.01, "one row of finite numbers"),
         ([0.0, np.inf], 0.01, "one row of finite numbers"),
         ([[0.0, 1.0]], 0.01, "one row of finite numbers"),
+        (np.array([0.0, 1.0 + 1.0j]), 0.01, "is complex"),
         (["fast"], 0.01, "not a row of numbers"),
         (None, 0.01, "one row of finite numbers"),
         ([0.0, 1.0], 0.0, "not from 1e-6 to 2"),
