@@ -13,6 +13,7 @@ from live_scripts import run_in_node, wait_for_runs
 from PIL import Image
 
 import archfem as af
+from archfem.masonry.materials import STONE_TO_STONE
 from archfem.view.pages import live
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -37,18 +38,37 @@ READ = """
   return { joints: arch.joints.length, area, factor: new Equilibrium(arch).weakest().factor };
 })()
 """
+LARGE = """
+(() => {
+  const { text, parameters, arch } = given;
+  const own = text ? assembleOutlines(readGeoJson(text), 1, parameters) : arch;
+  const state = new Equilibrium(own), factors = [1, -1].map((side) => state.collapse(side).factor);
+  return { factors, hasLine: state.thrust(0) !== null };
+})()
+"""
 CHANGE = """
 const input = document.querySelector(`#${arguments[0]}`);
 input.value = arguments[1];
-input.dispatchEvent(new Event("input"));
+input.dispatchEvent(new Event("input", { bubbles: true }));
 """
 # Offset of the crown that a reader marked from the middle of the picture [pixels]
 PIXELS = """
-const { tools, stage } = document.querySelector('.arch').live, c = stage.canvas;
-const [x, y] = stage.place(tools.marks[2]), ratio = devicePixelRatio;
-return [Math.round((x - c.width / 2) / ratio), Math.round((y - c.height / 2) / ratio)];
+const { tools, stage: { svg, layers } } = document.querySelector('.arch').live;
+const { x, y } = new DOMPoint(...tools.marks[2]).matrixTransform(layers.getScreenCTM());
+const box = svg.getBoundingClientRect();
+return [Math.round(x - box.left - box.width / 2), Math.round(y - box.top - box.height / 2)];
 """
 WRONG = "(() => { try { %s; } catch (error) { return error.message; } })()"
+
+
+def load_try_page():
+    """Return the script that writes the page of the documentation."""
+    sys.path.insert(0, str(DOCS))
+    try:
+        import try_page
+    finally:
+        sys.path.remove(str(DOCS))
+    return try_page
 
 
 @pytest.fixture(scope="module")
@@ -116,6 +136,46 @@ def test_stones_that_no_support_holds_do_not_stand(parameters):
     assert run_in_node(given | {"dxf": True}, READ)["factor"] == -1
     stands = given | {"text": dxf(*column), "dxf": True}
     assert run_in_node(stands, READ)["factor"] == pytest.approx(0.6)  # it slides
+
+
+def build_wall(columns, courses):
+    """A wall in running bond, whose many joints share the weight in countless ways."""
+    rows = [("ground", -1.0, columns + 1.0, -0.5)]
+    for course in range(courses):
+        cuts = np.clip(np.arange(columns + 2) - 0.5 * (course % 2), 0.0, columns)
+        rows += [(f"{course}", *ends, 0.5 * course) for ends in itertools.pairwise(cuts)]
+    blocks = [
+        af.Block(box(left, low, right, low + 0.5), af.STONE, f"{name}, {left}", name == "ground")
+        for name, left, right, low in rows
+        if right > left
+    ]
+    return af.masonry.assembled(blocks, STONE_TO_STONE)
+
+
+def bridge_of_the_page():
+    return load_try_page().list_examples()["a Roman bridge without fill"]
+
+
+@pytest.mark.parametrize(
+    ("build", "stones", "drawn"),
+    [(bridge_of_the_page, 56, False), (lambda: build_wall(9, 6), 57, True)],
+    ids=["bridge", "wall"],
+)
+def test_large_structures_fall_where_limit_analysis_says(
+    parameters, tmp_path, build, stones, drawn
+):
+    """The largest preset, and as many stones as a drawing may have: both sides, thrust line."""
+    structure = build()
+    assert len(structure.free) == stones
+    given = {"parameters": parameters, "arch": live.describe_arch(structure)}
+    if drawn:
+        af.masonry.write_outlines(structure, path := tmp_path / "wall.geojson")
+        given["text"] = path.read_text()
+    found = run_in_node(given, LARGE)
+    loads = [af.BodyForce(side, 0.0) for side in (1.0, -1.0)]
+    expected = [af.collapse_factor(structure, live=each).factor for each in loads]
+    assert found["factors"] == pytest.approx(expected, rel=1e-6)
+    assert found["hasLine"] is not drawn  # the page has no thrust line of a wall
 
 
 @pytest.mark.parametrize("way", ["bulges", "heavy", "lines and arcs"])
@@ -203,11 +263,7 @@ def test_records_are_read_as_archfem_reads_them(at2, tmp_path):
 
 def test_the_page_of_the_documentation_is_that_of_the_scripts():
     """All but the packed examples, which take seconds to compute."""
-    sys.path.insert(0, str(DOCS))
-    try:
-        import try_page
-    finally:
-        sys.path.remove(str(DOCS))
+    try_page = load_try_page()
     stored = try_page.PAGE.read_text(encoding="utf-8")
     written = try_page.build_page([{"ring": {"stones": 1}, "thrust": None}])
     bare = [re.sub(r'(id="data">)[^<]*', r"\1", text) for text in (stored, written)]
@@ -321,9 +377,10 @@ def test_stones_are_moved_by_a_finger_and_by_keys(tmp_path):
 
         def pixels(point):
             """Offset of a point of the drawing from the middle of the canvas."""
-            script = "const [x, y] = stage.place(arguments[0]), c = stage.canvas;"
-            script += "return [(x - c.width / 2) / devicePixelRatio,"
-            script += " (y - c.height / 2) / devicePixelRatio];"
+            script = "const screen = stage.layers.getScreenCTM();"
+            script += "const { x, y } = new DOMPoint(...arguments[0]).matrixTransform(screen);"
+            script += "const box = stage.svg.getBoundingClientRect();"
+            script += "return [x - box.left - box.width / 2, y - box.top - box.height / 2];"
             return [round(each) for each in run(script, [float(value) for value in point])]
 
         driver.get((DOCS / "try" / "index.html").resolve().as_uri())
@@ -337,8 +394,8 @@ def test_stones_are_moved_by_a_finger_and_by_keys(tmp_path):
         drag.click_and_hold().move_by_offset(*there).release().perform()
         after = run("return tools.source.outlines")
         moved = np.subtract(after[9]["points"], before[9]["points"])
-        scale = run("return stage.scale / devicePixelRatio")
-        assert moved == pytest.approx(np.tile([0.0, 0.1], (4, 1)), abs=1.1 / scale)
+        pixel = run("return stage.pixel")
+        assert moved == pytest.approx(np.tile([0.0, 0.1], (4, 1)), abs=1.1 * pixel)
         assert after[0] == before[0]
         assert sum(a != b for a, b in zip(after, before, strict=True)) == 3  # and its neighbours
         # the fourth choice is stone 4; by 2 cm to the right
@@ -390,7 +447,7 @@ def test_a_finger_places_points_by_taps_and_scrolls_by_swipes(tmp_path):
         def place(x, y):
             """Point of the screen at shares of the picture."""
             box = run(
-                "const b = stage.canvas.getBoundingClientRect();"
+                "const b = stage.svg.getBoundingClientRect();"
                 "return [b.left, b.top, b.width, b.height]"
             )
             return box[0] + x * box[2], box[1] + y * box[3]
@@ -422,21 +479,21 @@ def test_a_finger_places_points_by_taps_and_scrolls_by_swipes(tmp_path):
         driver.find_element("css selector", ".live-start summary").click()
         driver.find_element("css selector", "#photo").send_keys(str(photo))
         wait(driver, lambda: run("return tools.mode") == "scale")
-        run("stage.canvas.scrollIntoView({ block: 'center' })")
+        run("stage.svg.scrollIntoView({ block: 'center' })")
         before = run("return scrollY")
         (x, y), far = place(0.5, 0.8), -180
         touch((x, y), *[(x, y + share * far) for share in (0.2, 0.4, 0.6, 0.8, 1.0)])
         wait(driver, lambda: run("return scrollY") > before + 50)
-        assert run("return tools.scaleMarks.length") == 0
+        assert run("return tools.marks.length") == 0
         # a tap while the page still glides only stops it
-        centre = "const y = scrollY; stage.canvas.scrollIntoView({ block: 'center' });"
+        centre = "const y = scrollY; stage.svg.scrollIntoView({ block: 'center' });"
         wait(driver, lambda: run(f"{centre} return y === scrollY"))
         for k, point in enumerate(((0.2, 0.8), (0.8, 0.8))):
             touch(place(*point))
-            wait(driver, lambda k=k: run("return tools.scaleMarks.length") == k + 1)
+            wait(driver, lambda k=k: run("return tools.marks.length") == k + 1)
         driver.find_element("css selector", "#length").send_keys("6\n")
         wait(driver, lambda: run("return tools.mode") == "mark")
-        run("stage.canvas.scrollIntoView({ block: 'center' })")
+        run("stage.svg.scrollIntoView({ block: 'center' })")
         for k, point in enumerate(((0.2, 0.8), (0.8, 0.8), (0.5, 0.5))):
             touch(place(*point))
             wait(driver, lambda k=k: run("return tools.marks.length") == k + 1)

@@ -83,7 +83,7 @@ class ClosingJoints {
   /** Poses, e of the joints and the largest closing under the weight; null where it does not stand, or slides. */
   rest() {
     const q = this.settle(this.still, 0), found = q ? this.joints.map((joint) => this.press(joint, q)) : [];
-    if (!q || found.some(({ force, shear }, j) => !(force > 0) || shear > (this.joints[j].friction ?? Infinity) * force)) return null;
+    if (!q || found.some(({ force, shear }, j) => !(force > 0) || shear > this.joints[j].friction * force)) return null;
     return { q, lines: found.map(({ e }) => e), closing: Math.max(...found.map(({ closing }) => closing)) };
   }
   /** The largest push to a side that has an equilibrium, to 0.1 % of that with hard joints. */

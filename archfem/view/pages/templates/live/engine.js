@@ -58,7 +58,7 @@ class Fall {
     const count = bodies.mass.length, workspace = makeWorkspace(bodies);
     const state = { q: zeros(count, 3), v: zeros(count, 3), ground: zeros(FRAME_STEPS, 2), energy: zeros(8), settling: zeros(4) };
     const known = { bodies, parameters, workspace, state };
-    Object.assign(this, { arguments: [], places: {}, first: { "parameters.max_sweeps": FIRST_SWEEPS, "parameters.tolerance": 1e-3 * parameters.tolerance } });
+    Object.assign(this, { arguments: [], places: {} });
     for (const [path, kind] of leaves) {
       const [part, ...names] = path.split("."), given = known[part][names.join(".")];
       this.places[path] = { kind, at: this.arguments.length };
@@ -79,13 +79,8 @@ class Fall {
     const Kind = { float64: Float64Array, int64: BigInt64Array, bool: Uint8Array }[kind];
     return new Kind(this.code.memory.buffer, start, length);
   }
-  /** Advance by steps with ground accelerations, two a step [m/s²]; the first one has parameters of its own. */
-  advance(ground) {
-    if (this.first) this.call(ground.subarray(0, 2), this.first);
-    this.call(ground.subarray(this.first ? 2 : 0), {});
-    this.first = null;
-  }
-  call(ground, changes) {
+  /** Advance by steps with ground accelerations, two a step [m/s²], and with changed parameters. */
+  advance(ground, changes = {}) {
     this.view("state.ground").set(ground);
     const given = [...this.arguments];
     for (const [path, value] of Object.entries(changes)) given[this.places[path].at] = value;
@@ -117,12 +112,15 @@ function farthest(poses, before, reach) {
 
 /** Shake an arch: frames of poses every 20 ms until all rest; a stone is lost as in archfem's CollapseState. */
 function shake(engine, arch, motion, scale) {
-  const fall = new Fall(engine, arch), { bodies: { reach }, parameters: { dt: step } } = arch;
+  const fall = new Fall(engine, arch), { bodies: { reach }, parameters: { dt: step, tolerance } } = arch;
+  const precise = { "parameters.max_sweeps": FIRST_SWEEPS, "parameters.tolerance": 1e-3 * tolerance };
   const end = (motion.x.length - 1) * motion.dt, poses = () => fall.view("state.q").slice();
   const frames = [poses()], lost = new Set();
   let time = 0, fell = null, anchor = frames[0], since = 0;
   while (time < end + EXTRA_TIME && (time <= end || time - since < 0.5)) {
-    fall.advance(sampleGround(motion, (frames.length - 1) * FRAME_STEPS, FRAME_STEPS, step, scale));
+    const ground = sampleGround(motion, (frames.length - 1) * FRAME_STEPS, FRAME_STEPS, step, scale), done = frames.length === 1 ? 2 : 0;
+    if (done) fall.advance(ground.subarray(0, done), precise);
+    fall.advance(ground.subarray(done));
     time = frames.length * FRAME_STEPS * step;
     const now = poses();
     frames.push(now);

@@ -7,9 +7,10 @@ const PLASTIC = [0.8191725, 0.6710436, 0.5497005]; // shares that spread three p
 /** A motion of the reader's choice at a strength in g: recorded, a steady push, or a table that tilts. */
 function makeMotion(given, strength) {
   if (given.x) return { motion: given, scale: strength === given.strength ? 1 : (strength * G) / given.peak };
-  const dt = 0.01, shares = range(801).map((k) => Math.min(k * dt, 6) / 6), tilt = Math.atan(strength);
-  const [x, y] = given.kind === "push" ? [(share) => -share * strength * G, () => 0] : [(share) => -G * Math.sin(share * tilt), (share) => G * (Math.cos(share * tilt) - 1)];
-  return { motion: { dt, x: shares.map(x), y: shares.map(y) }, scale: 1 };
+  const dt = 0.01, tilt = Math.atan(strength), shares = range(801).map((k) => Math.min(k * dt, 6) / 6);
+  const pull = (share) => (given.kind === "push" ? [-share * strength, 0] : [-Math.sin(share * tilt), Math.cos(share * tilt) - 1]);
+  const [x, y] = [0, 1].map((axis) => shares.map((share) => G * pull(share)[axis]));
+  return { motion: { dt, x, y }, scale: 1 };
 }
 
 /** Let a swipe that begins on a slider scroll the page: the slider waits until a finger moves along it, or taps. */
@@ -19,7 +20,7 @@ function awaitDirection(slider) {
     const { before, after } = touch;
     touch = null;
     slider.value = after;
-    if (after !== before) slider.dispatchEvent(new Event("input"));
+    if (after !== before) slider.dispatchEvent(new Event("input", { bubbles: true }));
   };
   const listen = (type, action) => slider.addEventListener(type, (event) => { if (touch) action(event); });
   slider.addEventListener("pointerdown", ({ pointerType, clientX, clientY }) => {
@@ -40,18 +41,20 @@ class Live {
     Object.assign(this, { root, data, runs: [], workers: {}, time: 0, view: "shake", stage: new Stage(root.querySelector("#stage")) });
     const scripts = ["engine", "statics", "worker"].map((name) => document.querySelector(`#${name}-script`).textContent);
     this.script = URL.createObjectURL(new Blob([scripts.join("\n")], { type: "text/javascript" }));
+    this.sliders = root.querySelectorAll(".live-controls [type=range]");
     root.querySelectorAll("[type=range]").forEach(awaitDirection);
     data.motions.forEach(({ name }, k) => this.find("motion").append(new Option(name, k)));
-    for (const name of ["thickness", "stones", "friction", "strength", "finish"]) this.find(name).addEventListener("input", () => this.change(name));
-    this.find("motion").addEventListener("input", () => { this.design.strength = this.suggest(this.motion); this.change("motion"); });
+    root.querySelector(".live-controls").addEventListener("input", ({ target }) => this.change(target));
     this.find("reset").addEventListener("click", () => this.reset());
-    this.find("time").addEventListener("input", () => { this.pause(); this.show(Number(this.find("time").value)); });
+    this.find("time").addEventListener("input", () => this.pause(this.find("time").valueAsNumber));
     this.find("play").addEventListener("click", () => (this.playing ? this.pause() : this.play()));
-    for (const tab of root.querySelectorAll("[name=view]")) tab.addEventListener("input", () => { this.view = tab.value; this.pause(); this.show(this.time); });
+    root.querySelector(".live-tabs").addEventListener("input", ({ target }) => { this.view = target.value; this.pause(); });
     this.open(data.arches[0]);
   }
   find(name) { return this.root.querySelector(`#${name}`); }
   say(name, words) { this.find(name).textContent = words; }
+  /** Whether the reader places points on a photo. */
+  get isMarking() { return /scale|mark/.test(this.root.dataset.mode); }
   /** The motion that the reader chose. */
   get motion() { return this.data.motions[this.find("motion").value]; }
 
@@ -63,43 +66,41 @@ class Live {
     worker.postMessage(task);
   }
 
-  /** The strength at which a motion begins: its own, or near that which brings the arch down. */
-  suggest({ strength, kind }) {
-    const often = kind ? 1.05 : 2.7; // short pushes of an earthquake must be stronger than a steady one
-    return strength ?? Math.min(Math.max(Math.round(100 * often * this.factor) / 100, 0.05), 2);
-  }
   /** Begin with an arch as it was given. */
   open(given, changes = {}, box = null) {
-    const { ring } = this.given = given;
-    this.design = { thickness: ring?.thickness ?? null, stones: ring?.stones ?? null, strength: 0, finish: "" };
-    this.factor = new Equilibrium(given).weakest().factor;
-    this.design.strength = this.suggest(this.data.motions[0]);
-    this.design.friction = Math.min(...given.joints.map((joint) => joint.friction));
-    this.original = { ...this.design };
-    Object.assign(this.design, changes);
+    const { ring } = this.given = given, friction = Math.min(...given.joints.map((joint) => joint.friction));
+    this.original = { thickness: ring?.thickness ?? null, stones: ring?.stones ?? null, friction, finish: "" };
+    this.design = { ...this.original, strength: null, ...changes };
     this.finishes = given.finishes ?? this.data.arches[0].finishes;
     this.find("finish").replaceChildren(new Option(given.thrust ? "as given" : "hard: faces meet at once", ""), ...this.finishes.map(({ name }) => new Option(name, name)));
     this.stage.handles = [];
     if (!("strength" in changes)) this.find("motion").value = 0;
     for (const name of ["thickness", "stones"]) this.find(name).closest("label").hidden = !ring;
-    if (ring) Object.assign(this.find("thickness"), { min: (0.2 * ring.thickness).toPrecision(2), max: (2 * ring.thickness).toPrecision(2), step: 0.005 });
+    for (const name of ["least", "sizes"]) this.find(name).parentElement.hidden = !ring;
+    if (ring) Object.assign(this.find("thickness"), { min: (0.2 * ring.thickness).toPrecision(2), max: (2 * ring.thickness).toPrecision(2) });
     this.stage.fit(given, box);
     this.change();
   }
   /** The arch as it was given, under the motion of the reader's choice. */
-  reset() { this.open(this.given, { strength: this.design.strength }, this.stage.backdrop && this.stage.box); }
+  reset() { this.open(this.given, { strength: this.design.strength }); }
   /** The design changed: arch, statics and runs anew; the finish of joints does not change the runs. */
-  change(name) {
-    if (name && name !== "motion") this.design[name] = name === "finish" ? this.find(name).value : Number(this.find(name).value);
-    this.pause();
-    this.time = 0;
-    this.arch = this.build(this.design);
-    this.find("time").value = 0;
-    this.showDesign();
+  change({ id, value } = {}) {
+    const { design } = this;
+    if (id === "motion") design.strength = null;
+    else if (id) design[id] = id === "finish" ? value : Number(value);
+    this.arch = this.build(design);
     this.solveStatics();
+    design.strength ??= this.suggest(this.motion);
+    this.showDesign();
+    this.tellStatics();
     this.askPush();
-    if (name !== "finish") this.run();
-    this.show(0);
+    if (id !== "finish") this.run();
+    this.pause(0);
+  }
+  /** The strength at which a motion begins: its own, or near that which brings the arch down. */
+  suggest({ strength, kind }) {
+    const often = kind ? 1.05 : 2.7; // short pushes of an earthquake must be stronger than a steady one
+    return strength ?? Math.min(Math.max(Math.round(100 * often * this.statics.weakest.factor) / 100, 0.05), 2);
   }
   /** The arch of a design; archfem's own arrays where nothing but friction differs. */
   build(design, thinner = 1) {
@@ -112,42 +113,46 @@ class Live {
     return { ...given, bodies, joints: given.joints.map((joint) => ({ ...joint, friction: joint.friction * ratio })) };
   }
   showDesign() {
-    const { design } = this, words = { thickness: (value) => `${value.toFixed(3)} m`, stones: String, friction: (value) => value.toFixed(2), strength: (value) => `${value.toFixed(2)} g` };
+    const { design } = this, tilt = (Math.atan(design.strength) * 180) / Math.PI;
     this.find("finish").value = design.finish;
-    for (const [name, say] of Object.entries(words)) {
-      if (design[name] === null) continue;
-      if (name === "strength") this.find(name).max = Math.max(2, design[name]); // a record may be stronger
-      this.find(name).value = design[name];
-      this.say(`${name}-value`, say(design[name]));
+    this.find("strength").max = Math.max(2, design.strength); // a record may be stronger
+    for (const slider of this.sliders) {
+      const value = design[slider.id], digits = slider.step.replace(/^\d*\.?/, "").length;
+      if (value === null) continue;
+      slider.value = value;
+      this.say(`${slider.id}-value`, `${value.toFixed(digits)}${slider.dataset.unit}`);
     }
-    if (this.motion.kind === "tilt") this.say("strength-value", `${((Math.atan(design.strength) * 180) / Math.PI).toFixed(0)}°`);
+    if (this.motion.kind === "tilt") this.say("strength-value", `${tilt.toFixed(0)}°`);
   }
 
-  /** Thrust lines, collapse acceleration and least thickness. */
+  /** Thrust lines, collapse acceleration and the joints that close. */
   solveStatics() {
-    const { design, given, arch, original, finishes } = this, equilibrium = new Equilibrium(arch), { joints } = equilibrium, weakest = equilibrium.weakest();
-    const isGiven = given.thrust && ["thickness", "stones", "friction", "finish"].every((name) => design[name] === original[name]);
-    const law = finishes.find(({ name }) => name === design.finish), settled = law ? new ClosingJoints(arch, law).rest() : null;
-    const resting = settled?.lines ?? (isGiven ? given.thrust : equilibrium.thrust(0)), stands = weakest.factor >= 0;
+    const { design, given, arch, original, finishes } = this, equilibrium = new Equilibrium(arch), { joints } = equilibrium;
+    const weakest = equilibrium.weakest(), stands = weakest.factor >= 0, law = finishes.find(({ name }) => name === design.finish);
+    const isGiven = given.thrust && Object.keys(original).every((name) => design[name] === original[name]);
+    const settled = law ? new ClosingJoints(arch, law).rest() : null;
+    const resting = settled?.lines ?? (isGiven ? given.thrust : equilibrium.thrust(0));
     const pushed = stands && weakest.factor < Infinity ? equilibrium.thrust(weakest.side * weakest.factor) : null;
     const trace = (values) => (values ? this.findLinks().map((link) => link.map((j) => crossing(joints[j], values[j]))) : []);
     // a joint turns about its extrados where M > 0
-    this.statics = { weakest, stands, settled, law, isGiven, resting, weight: trace(resting), push: trace(pushed), hinges: weakest.hinges.map(({ joint, sign }) => joints[joint].ends[sign > 0 ? 1 : 0]) };
-    this.tellStatics();
+    const hinges = weakest.hinges.map(({ joint, sign }) => joints[joint].ends[sign > 0 ? 1 : 0]);
+    this.statics = { weakest, stands, settled, law, isGiven, resting, weight: trace(resting), push: trace(pushed), hinges };
   }
   tellStatics() {
     const { design, given, arch } = this, { weakest: { factor, side, hinges, slides }, stands, settled, law, isGiven, resting } = this.statics;
-    const most = resting ? Math.max(...resting.map(Math.abs)) : NaN, percent = Math.round(100 * (1 - 2 * most)), millimetres = (value, digits) => `${(1e3 * value).toFixed(digits)} mm`;
+    const most = resting ? Math.max(...resting.map(Math.abs)) : NaN, percent = Math.round(100 * (1 - 2 * most));
+    const millimetres = (value, digits) => `${(1e3 * value).toFixed(digits)} mm`;
     this.say("collapse", !stands ? "it does not stand by itself" : factor === Infinity ? "none: it leans on nothing" : `${factor.toFixed(3)} g, pushed to the ${side > 0 ? "right" : "left"}`);
-    this.say("line", percent >= 0 ? `${percent} % of half the thickness is left (max |e| = ${most.toFixed(3)})` : "none: no line stays within the stones and within the friction of all joints");
     this.say("weight", !stands ? "it falls" : percent >= 0 ? `it stands, with ${percent} % to spare` : "it stands");
+    this.say("line", percent >= 0 ? `${percent} % of half the thickness is left (max |e| = ${most.toFixed(3)})`
+      : stands ? "none is drawn: some joints bear nothing, or too many share the weight"
+      : "none: no line stays within the stones and within the friction of all joints");
     const list = (what, own, s = own.length > 1 ? "s" : "") => (own.length ? [`${own.length} ${what}${s}: joint${s} ${own.map(({ joint }) => joint).join(", ")}`] : []);
     this.say("mechanism", [...list("hinge", hinges), ...list("slide", slides)].join("; ") || "none");
     const moved = settled && farthest(settled.q, settled.q.map(() => 0), arch.bodies.reach);
     this.say("closing", settled ? `under its own weight joints close by up to ${millimetres(settled.closing, 3)}, and stones move by up to ${millimetres(moved, 2)}`
       : law ? "on joints that close this arch slides or falls by its own weight; hard joints are shown"
       : isGiven ? "as in the analysis of archfem" : "hard: faces meet at once, and do not close further");
-    for (const name of ["least", "sizes"]) this.find(name).parentElement.hidden = !given.ring;
     if (!given.ring) return;
     const inner = arch.joints.map(({ ends }) => ends[0]), [one, other] = [inner[0], inner.at(-1)], rise = Math.max(...inner.map(([, y]) => y)) - Math.min(one[1], other[1]);
     this.say("sizes", `${distance(one, other).toFixed(2)} m and ${rise.toFixed(2)} m`);
@@ -175,7 +180,8 @@ class Live {
     const { design, data } = this, { motion, scale } = makeMotion(this.motion, design.strength), count = Math.min(navigator.hardwareConcurrency || 1, 4);
     const runs = range(RUNS).map((k) => {
       const [one, two, three] = PLASTIC.map((share) => (k ? 2 * ((0.5 + k * share) % 1) - 1 : 0));
-      return { number: k, arch: this.build({ ...design, friction: design.friction * (1 + SPREAD.friction * one) }, 1 + SPREAD.thickness * three), scale: scale * (1 + SPREAD.strength * two) };
+      const arch = this.build({ ...design, friction: design.friction * (1 + SPREAD.friction * one) }, 1 + SPREAD.thickness * three);
+      return { number: k, arch, scale: scale * (1 + SPREAD.strength * two) };
     });
     this.runs = [];
     const receive = ({ number, run }) => {
@@ -192,56 +198,58 @@ class Live {
   /** Outcome in words. */
   tell() {
     const done = this.runs.filter(Boolean), answers = done.filter((run) => !run.failure), fallen = answers.filter((run) => run.fell !== null).length, [own] = this.runs;
-    const all = done.length === RUNS, share = `${fallen} of ${answers.length}`;
-    this.say("share", all ? share : answers.length ? `${share} so far` : "…");
-    const fate = own && (own.fell === null ? `Shaken, this arch stands; a stone moves by up to ${(1e3 * own.displacement).toFixed(own.displacement < 1e-3 ? 2 : 0)} mm.` : `Shaken, this arch falls: the first stone is lost at ${own.fell?.toFixed(2)} s.`);
-    const how = fallen === 0 ? "none fall" : fallen === answers.length ? "all fall" : `${fallen} ${fallen === 1 ? "falls" : "fall"}`;
-    const others = answers.length < 2 ? "Shaking slightly different ones …" : `Of ${answers.length} slightly different arches${all ? "" : " so far"}, ${how}.`;
-    if (this.isMarking) return this.say("verdict", "Mark your arch on the photo.");
-    this.say("verdict", !own ? "Shaking …" : own.failure ? `It cannot be followed: ${own.failure}` : `${fate} ${others}`);
+    const soFar = done.length < RUNS ? " so far" : "", millimetres = 1e3 * own?.displacement;
     this.root.dataset.runs = done.length;
+    this.say("share", answers.length ? `${fallen} of ${answers.length}${soFar}` : "…");
+    if (this.isMarking) return this.say("verdict", "Mark your arch on the photo.");
+    if (!own || own.failure) return this.say("verdict", own ? `It cannot be followed: ${own.failure}` : "Shaking …");
+    const fate = own.fell === null ? `stands; a stone moves by up to ${millimetres.toFixed(millimetres < 1 ? 2 : 0)} mm.` : `falls: the first stone is lost at ${own.fell.toFixed(2)} s.`;
+    const how = fallen === 0 ? "none fall" : fallen === answers.length ? "all fall" : `${fallen} ${fallen === 1 ? "falls" : "fall"}`;
+    const others = answers.length < 2 ? "Shaking slightly different ones …" : `Of ${answers.length} slightly different arches${soFar}, ${how}.`;
+    this.say("verdict", `Shaken, this arch ${fate} ${others}`);
   }
   drawGround({ dt, x }, scale) {
-    const most = x.reduce((largest, value) => Math.max(largest, Math.abs(value)), 1e-9), every = Math.max(1, Math.floor(x.length / 1500)), end = (x.length - 1) * dt + EXTRA_TIME;
-    this.find("time").max = this.end = end;
-    const points = x.filter((_, k) => k % every === 0).map((value, k) => `${((1000 * k * every * dt) / end).toFixed(1)} ${(30 - (28 * value) / most).toFixed(1)}`);
+    const most = x.reduce((largest, value) => Math.max(largest, Math.abs(value)), 1e-9), every = Math.max(1, Math.floor(x.length / 1500));
+    this.find("time").max = this.end = (x.length - 1) * dt + EXTRA_TIME;
+    const points = x.filter((_, k) => k % every === 0).map((value, k) => `${((1000 * k * every * dt) / this.end).toFixed(1)} ${(30 - (28 * value) / most).toFixed(1)}`);
     this.find("ground").setAttribute("d", `M${points.join("L")}`);
     this.say("ground-name", `ground acceleration, up to ${((most * scale) / G).toFixed(2)} g`);
   }
 
   /** Draw an instant. */
   show(time) {
-    this.time = time;
-    this.find("time").value = time;
-    if (this.isMarking) return this.stage.draw({ handles: this.stage.handles }); // a reader places points on a photo
+    const { stage, statics, view, arch: { bodies } } = this, begins = time === 0;
+    this.time = this.find("time").value = time;
+    if (this.isMarking) return stage.draw({ handles: stage.handles });
     const at = ({ frames, spacing }) => frames[Math.min(Math.round(time / spacing), frames.length - 1)];
-    const still = new Float64Array(3 * this.arch.bodies.mass.length), shaken = this.view === "shake", ready = this.runs.filter((run) => run?.frames);
-    const poses = shaken && this.runs[0]?.frames ? at(this.runs[0]) : still, begins = time === 0;
-    const lines = this.view === "push" ? this.statics.push : this.view === "weight" || begins ? this.statics.weight : [];
-    this.stage.draw({ arch: this.arch, poses, ghosts: shaken && !begins ? ready.slice(1).map(at) : [], lines, hinges: this.view === "push" ? this.statics.hinges : [], handles: begins ? this.stage.handles : [] });
-    this.say("clock", shaken ? `t = ${time.toFixed(2)} s` : "");
+    const [own, ...others] = view === "shake" ? range(RUNS).map((k) => (this.runs[k]?.frames ? at(this.runs[k]) : undefined)) : [];
+    const lines = view === "push" ? statics.push : view === "weight" || begins ? statics.weight : [], hinges = view === "push" ? statics.hinges : [];
+    stage.draw({ bodies, poses: own, ghosts: begins ? [] : others.filter(Boolean), lines, hinges, handles: begins ? stage.handles : [] });
+    this.say("clock", view === "shake" ? `t = ${time.toFixed(2)} s` : "");
     this.find("cursor").setAttribute("x", (1000 * time) / this.end);
-    this.find("stage").setAttribute("aria-label", `the arch ${{ shake: `at ${time.toFixed(2)} s`, weight: "under its own weight, with its thrust line", push: "at the push that brings it down, with its hinges" }[this.view]}`);
+    const seen = { shake: `at ${time.toFixed(2)} s`, weight: "under its own weight, with its thrust line", push: "at the push that brings it down, with its hinges" };
+    this.find("stage").setAttribute("aria-label", `the arch ${seen[view]}`);
   }
   play() {
-    const { end } = this;
     this.root.querySelector("[value=shake]").click();
-    if (this.time >= end) this.show(0);
+    if (this.time >= this.end) this.show(0);
     this.playing = true;
     this.say("play", "❚❚ pause");
     let last = performance.now();
     const tick = (now) => {
       if (!this.playing) return;
       // the time of a frame may be before the click that started it
-      this.show(Math.min(this.time + (Math.max(now - last, 0) / 1e3) * Number(this.find("speed").value), end));
+      this.show(Math.min(this.time + (Math.max(now - last, 0) / 1e3) * Number(this.find("speed").value), this.end));
       last = now;
-      if (this.time >= end) this.pause(); else requestAnimationFrame(tick);
+      if (this.time >= this.end) this.pause(); else requestAnimationFrame(tick);
     };
     requestAnimationFrame(tick);
   }
-  pause() {
+  /** Stop at an instant. */
+  pause(time = this.time) {
     this.playing = false;
     this.say("play", "▶ shake it");
+    this.show(time);
   }
 }
 

@@ -1,6 +1,7 @@
 // Arches that readers draw: rings by springings and crown, and stones by the outlines of a drawing.
 "use strict";
 const STONE = 20e3 / 9.81; // kg per m² of outline, 1 m wide
+const FRICTION = 0.6;
 const DRAWN_JOINTS = 24; // along a drawn curve, before it is cut into stones
 const TOUCHING = 3e-3; // distance of outlines that touch [m]
 const ARC_CHORD = Math.PI / 60; // of arcs of a drawing, whose sagitta is then 0.03 % of the radius
@@ -38,8 +39,8 @@ function drawRing({ kind, span, rise, thickness, left }) {
 }
 /** The arch of a drawn ring. */
 function assembleRing(drawn, parameters) {
-  const ring = drawRing(drawn), arch = cutRing(ring, { factor: 1, stones: ring.stones, friction: 0.6 }, parameters);
-  return { name: "a drawn arch", ...arch, ring: { ...ring, level: arch.bodies.level }, thrust: null };
+  const ring = drawRing(drawn), arch = cutRing(ring, { factor: 1, stones: ring.stones, friction: FRICTION }, parameters);
+  return { ...arch, ring: { ...ring, level: arch.bodies.level } };
 }
 
 /** Closed outlines of a GeoJSON file: {points, fixed}. */
@@ -119,14 +120,10 @@ function findHull(points) {
   return [half(sorted), half(sorted.reverse())].flatMap((chain) => chain.slice(0, -1));
 }
 /** Outlines of the stones of an arch, {points, fixed}, by their hulls. */
-function traceStones({ bodies: { mass, centre, owner, piece_starts: starts, arms, inverse_mass } }) {
-  const points = mass.map((_, body) => owner.flatMap((own, piece) => (own === body ? arms.slice(starts[piece], starts[piece + 1]) : [])));
-  return points.map((own, body) => ({ fixed: inverse_mass[body][0] === 0, points: findHull(own).map((arm) => plus(centre[body], arm)) }));
+function traceStones({ bodies }) {
+  const pieces = placePieces(bodies), pointsOf = (body) => pieces.filter((_, piece) => bodies.owner[piece] === body).flat();
+  return bodies.mass.map((_, body) => ({ points: findHull(pointsOf(body)), fixed: bodies.inverse_mass[body][0] === 0 }));
 }
-/** Outlines with corners, pairs of outline and corner, moved. */
-const moveCorners = (outlines, corners, step) => outlines.map((each, k) => ({ ...each, points: each.points.map((point, i) => (corners.some(([a, b]) => a === k && b === i) ? plus(point, step) : point)) }));
-/** All corners of outlines at points, as pairs of outline and corner: neighbours share them. */
-const findCorners = (outlines, points) => outlines.flatMap(({ points: own }, k) => own.flatMap((corner, i) => (points.some((point) => distance(corner, point) < TOUCHING) ? [[k, i]] : [])));
 /** Outlines as GeoJSON, as archfem reads them. */
 const writeGeoJson = (outlines) => JSON.stringify({ type: "FeatureCollection", features: outlines.map(({ points, fixed }, k) => ({ type: "Feature", properties: { name: `stone ${k + 1}`, fixed }, geometry: { type: "Polygon", coordinates: [[...points, points[0]]] } })) });
 
@@ -162,7 +159,7 @@ function findOverlap(one, other) {
 }
 
 /** The arch of outlines: joints where they touch; the lowest stones are supports where none is given. */
-function assembleOutlines(outlines, unit, parameters, friction = 0.6) {
+function assembleOutlines(outlines, unit, parameters) {
   if (outlines.length < 2) refuse("the drawing has no closed outlines: draw each stone as a closed polyline (DXF) or a Polygon (GeoJSON)");
   if (outlines.length > 70) refuse(`${outlines.length} outlines: a page takes up to 60 stones; run the drawing with archfem`);
   const tidy = outlines.map((each, k) => tidyOutline(each, k + 1, unit)), rings = tidy.map(({ hull }) => hull), foot = (ring) => Math.min(...ring.map(([, y]) => y));
@@ -174,13 +171,13 @@ function assembleOutlines(outlines, unit, parameters, friction = 0.6) {
   rings.forEach((one, a) => rings.slice(a + 1).forEach((other, k) => {
     const b = a + 1 + k, overlap = findOverlap(one, other), ends = findJoint(one, other);
     if (overlap > 5 * TOUCHING) refuse(`outlines ${a + 1} and ${b + 1} are in each other by ${(1e3 * overlap).toFixed(0)} mm: stones may only touch`);
-    if (ends) joints.push({ blocks: [a, b], ends, friction, cohesion: 0 });
+    if (ends) joints.push({ blocks: [a, b], ends, friction: FRICTION, cohesion: 0 });
   }));
   const alone = rings.findIndex((_, k) => !fixed.includes(k) && !joints.some(({ blocks }) => blocks.includes(k)));
   if (alone >= 0) refuse(`outline ${alone + 1} touches no other: draw it within 3 mm of its neighbours`);
   const shapes = rings.map((ring) => [ring]), exact = tidy.map(({ ring }) => measure([ring]));
-  const bodies = makeBodies(shapes, exact, fixed, { density: STONE, level: low }, friction);
-  return { name: "a drawing", bodies, joints, sizes: exact.map(({ area }) => Math.sqrt(area)), parameters, thrust: null, ring: null };
+  const bodies = makeBodies(shapes, exact, fixed, { density: STONE, level: low }, FRICTION);
+  return { bodies, joints, sizes: exact.map(({ area }) => Math.sqrt(area)), parameters };
 }
 
 /** An accelerogram of two columns, time [s] and acceleration in a unit [m/s²], or of an AT2 file [g]. */

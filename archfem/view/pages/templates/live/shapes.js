@@ -84,9 +84,17 @@ function makeBodies(shapes, exact, fixed, ring, friction) {
   };
 }
 
+/** Points of the pieces of all stones in their poses, or as they were built. */
+function placePieces({ mass, centre, arms, owner, piece_starts: starts }, poses = new Float64Array(3 * mass.length)) {
+  return owner.map((body, piece) => {
+    const [x, y, turn] = poses.subarray(3 * body, 3 * body + 3), middle = plus(centre[body], [x, y]);
+    return arms.slice(starts[piece], starts[piece + 1]).map((arm) => plus(middle, rotate(arm, turn)));
+  });
+}
+
 /** Least thickness over that of the ring at which it stands, by halving; NaN where even three times it does not. */
 function leastThickness(ring, design, parameters) {
-  const stands = (factor) => new Equilibrium(cutRing(ring, { ...design, factor }, parameters)).stands();
+  const stands = (factor) => new Equilibrium(cutRing(ring, { ...design, factor }, parameters)).weakest().factor >= 0;
   let [low, high] = [0.02, 3];
   if (!stands(high)) return NaN;
   while (high - low > 1e-4 * high) {

@@ -1,6 +1,8 @@
 // Statics of rigid stones: forces in joints, thrust line, least thickness, collapse acceleration.
 "use strict";
 const SMALL = 1e-9;
+const DISTURBANCE = 1e-6, GOLDEN = 0.618034; // of c in a linear programme: by different numbers, evenly spread
+const MAX_FREE_FORCES = 60; // of structures with one thrust line; walls have more, and lines without number
 
 /** Subtract multiples of a row of a table from all others, so that a column is that of a unit. */
 function pivot(table, row, column) {
@@ -29,28 +31,28 @@ function eliminate(table, columns) {
  * and the value Infinity where nothing limits it.
  */
 function maximise(c, rows, limits) {
-  const n = c.length, m = rows.length, signs = c.map((value) => (value < 0 ? -1 : 1)), basis = c.map((_, k) => m + k);
+  const n = c.length, m = rows.length, last = m + n, basis = c.map((_, k) => m + k);
+  // columns: u, spare ones of a unit, c, and c disturbed, as zeros in it would let pivots go round in circles
   const table = c.map((value, k) => {
-    const line = new Float64Array(m + n + 1);
-    rows.forEach((row, i) => { line[i] = signs[k] * row[k]; });
+    const line = new Float64Array(last + 2);
+    rows.forEach((row, i) => { line[i] = row[k]; });
+    line.set([value, value + Math.sign(value || 1) * DISTURBANCE * (1 + ((GOLDEN * k) % 1))], last);
+    if (value < 0) line.forEach((each, i) => { line[i] = -each; });
     line[m + k] = 1;
-    line[m + n] = Math.abs(value);
     return line;
   });
-  /** Pivot until no column lowers the cost; return the reduced costs, or null without a minimum. */
+  /** Pivot until none of the first columns lowers the cost; return the reduced costs, or null without a minimum. */
   const minimise = (costs, columns) => {
-    const reduced = Float64Array.from([...costs, 0]);
+    const reduced = Float64Array.from([...costs, 0, 0]);
     basis.forEach((own, k) => table[k].forEach((value, j) => { reduced[j] -= costs[own] * value; }));
-    for (let round = 0; ; round++) {
-      let column = -1;
-      // the steepest column first; the first one later, which cannot go round in circles (Bland)
-      for (let j = 0; j < columns && (round < 200 || column < 0); j++) if (reduced[j] < -SMALL && (column < 0 || reduced[j] < reduced[column])) column = j;
-      if (column < 0 || round > 2000) return reduced;
+    for (;;) {
+      const column = reduced.subarray(0, columns).reduce((best, value, j) => (value < reduced[best] ? j : best), 0);
+      if (reduced[column] > -SMALL) return reduced;
       let row = -1, least = Infinity;
       table.forEach((line, k) => {
         const isSpare = basis[k] >= m && columns === m && Math.abs(line[column]) > SMALL;
-        const ratio = isSpare ? 0 : line[column] > SMALL ? line[m + n] / line[column] : Infinity;
-        if (ratio < least - 1e-14 || (ratio === least && row >= 0 && basis[k] < basis[row])) [row, least] = [k, ratio];
+        const ratio = isSpare ? 0 : line[column] > SMALL ? line[last + 1] / line[column] : Infinity;
+        if (ratio < least) [row, least] = [k, ratio];
       });
       if (row < 0) return null;
       pivot([...table, reduced], row, column);
@@ -58,12 +60,12 @@ function maximise(c, rows, limits) {
     }
   };
   const spare = [...new Array(m).fill(0), ...new Array(n).fill(1)];
-  if (-minimise(spare, m + n)[m + n] > 1e-7) return { value: Infinity, y: null, u: null };
+  if (-minimise(spare, last)[last] > 1e-7) return { value: Infinity, y: null, u: null };
   const reduced = minimise([...limits, ...new Array(n).fill(0)], m);
   if (reduced === null) return null;
   const u = new Float64Array(m);
-  basis.forEach((own, k) => { if (own < m) u[own] = table[k][m + n]; });
-  return { value: -reduced[m + n], y: signs.map((sign, k) => -sign * reduced[m + k]), u };
+  basis.forEach((own, k) => { if (own < m) u[own] = table[k][last]; });
+  return { value: -reduced[last], y: c.map((value, k) => (value < 0 ? 1 : -1) * reduced[m + k]), u };
 }
 
 /** Forces N, V, M of joints in equilibrium: those of weight, of 1 g sideways, and what is left free. */
@@ -97,38 +99,29 @@ class Equilibrium {
   }
   /** Rows of |M| <= share N h / 2 and |V| <= μ N + c A, over the free forces and the push. */
   conditions(share) {
-    const rows = [], limits = [], weights = [], signs = [-1, 1];
+    const rows = [], limits = [], kinds = [];
     const add = (sign, [one, other], factor, constant, kind) => {
       const row = other.map((value, k) => sign * one[k] - factor * value), weight = row.splice(this.size, 1)[0];
       const scale = 1 / Math.max(...row.map(Math.abs), SMALL);
       rows.push(row.map((value) => scale * value));
       limits.push(scale * (constant - weight));
-      weights.push({ ...kind, sign, scale });
+      kinds.push({ ...kind, sign, scale });
     };
     this.joints.forEach(({ depth, friction, cohesion }, joint) => {
       const [normal, shear, moment] = [0, 1, 2].map((k) => this.forces[3 * joint + k]);
-      for (const sign of signs) add(sign, [moment, normal], 0.5 * share * depth, 0, { joint, hinge: true });
-      if (friction !== null) for (const sign of signs) add(sign, [shear, normal], friction, cohesion / this.weight, { joint, hinge: false });
+      for (const sign of [-1, 1]) {
+        add(sign, [moment, normal], 0.5 * share * depth, 0, { joint, hinge: true });
+        add(sign, [shear, normal], friction, cohesion / this.weight, { joint, hinge: false });
+      }
     });
-    if (!this.isHeld) {
-      rows.push(new Array(this.size + 1).fill(0));
-      limits.push(-1);
-      weights.push({});
-    }
-    return { rows, limits, kinds: weights };
+    return { rows, limits, kinds };
   }
   /** Largest push to one side, +1 or -1, in g, with the joints that give way; null: it does not stand. */
   collapse(side) {
-    const { rows, limits, kinds } = this.conditions(1);
-    const found = maximise([...new Array(this.size).fill(0), side], rows, limits);
+    const { rows, limits, kinds } = this.conditions(1), found = this.isHeld ? maximise([...new Array(this.size).fill(0), side], rows, limits) : null;
     if (found === null) return null;
-    const failing = found.u ? kinds.filter((_, k) => found.u[k] > 1e-7) : [];
-    return { factor: found.value, side, y: found.y, hinges: failing.filter((each) => each.hinge), slides: failing.filter((each) => !each.hinge) };
-  }
-  /** Whether any state of equilibrium holds under its weight. */
-  stands() {
-    const { rows, limits } = this.conditions(1);
-    return maximise(new Array(this.size).fill(0), rows.map((row) => row.slice(0, this.size)), limits) !== null;
+    const failing = kinds.filter((_, k) => found.u?.[k] > 1e-7);
+    return { factor: found.value, side, hinges: failing.filter((each) => each.hinge), slides: failing.filter((each) => !each.hinge) };
   }
   /** The push that brings it down, the weaker side; a factor below zero where it does not stand. */
   weakest() {
@@ -136,29 +129,23 @@ class Equilibrium {
     if (!one || !other) return { factor: -1, side: 1, hinges: [], slides: [] };
     return one.factor <= other.factor * (1 + 1e-9) ? one : other;
   }
-  /** N, V and M of all joints, from free forces and a push [1/weight]. */
-  read(y) {
-    const all = [...y.slice(0, this.size), 1, y[this.size]];
-    const values = this.forces.map((row) => row.reduce((sum, value, k) => sum + value * all[k], 0));
-    return this.joints.map((_, j) => values.slice(3 * j, 3 * j + 3));
-  }
-  /** e of the thrust line that stays farthest from the faces under a push in g: the least max |e|. */
+  /** e of the thrust line that stays farthest from the faces under a push in g: the least max |e|; null without one. */
   thrust(push) {
-    let share = 1, weights = this.joints.map(({ depth }) => 0.5 * depth), best = null;
-    for (let round = 0; round < 12; round++) {
+    const { size, joints } = this;
+    let share = 1, weights = joints.map(({ depth }) => 0.5 * depth), best = null;
+    for (let round = 0; round < 12 && this.isHeld && size <= MAX_FREE_FORCES; round++) {
       // Dinkelbach: the largest reserve at a share, then the share that this line has
-      const { rows, limits, kinds } = this.conditions(share), size = this.size;
+      const { rows, limits, kinds } = this.conditions(share);
       const reserve = rows.map((row, k) => [...row.slice(0, size), kinds[k].hinge ? kinds[k].scale * weights[kinds[k].joint] : 0]);
       const found = maximise([...new Array(size).fill(0), 1], reserve, limits.map((limit, k) => limit - push * rows[k][size]));
       if (!found?.y) return best;
-      const forces = this.read([...found.y.slice(0, size), push]);
-      const lines = forces.map(([normal, , moment], j) => (normal > SMALL ? moment / normal / this.joints[j].depth : NaN));
+      const all = [...found.y.slice(0, size), 1, push], values = this.forces.map((row) => row.reduce((sum, value, k) => sum + value * all[k], 0));
+      const lines = joints.map(({ depth }, j) => (values[3 * j] > SMALL ? values[3 * j + 2] / values[3 * j] / depth : NaN));
       if (lines.some(Number.isNaN)) return best;
       const next = 2 * Math.max(...lines.map(Math.abs));
       if (best && next > share - 1e-10) return best;
-      best = lines;
-      share = next;
-      weights = forces.map(([normal], j) => 0.5 * normal * this.joints[j].depth);
+      [best, share] = [lines, next];
+      weights = joints.map(({ depth }, j) => 0.5 * values[3 * j] * depth);
     }
     return best;
   }

@@ -7,37 +7,29 @@ const ARROWS = { ArrowLeft: [-0.01, 0], ArrowRight: [0.01, 0], ArrowUp: [0, 0.01
 const SHAPES = { circle: "circular_arch", ellipse: "elliptical_arch", pointed: "pointed_arch" };
 const UNITS = { 1: "m", 0.01: "cm", 0.001: "mm" };
 const MODEL = '\n[model]\nfidelity = "rigid"\ndisplacements = "large"\n\n[analysis]\ndamping = { ratio = 0.05, modes = "effective" }\n';
+const PAINT = ["fill", "stroke", "stroke-width", "stroke-linecap", "stroke-linejoin", "vector-effect", "opacity"]; // of what a picture shows
 
 class Tools {
   constructor(live) {
-    const { stage, stage: { canvas } } = live;
-    Object.assign(this, { live, source: { example: 0 }, begun: { example: 0 }, marks: [], scaleMarks: [], chosen: [], history: [], number: -1, mode: null, drag: null });
+    const { root, stage, stage: { svg } } = live;
+    Object.assign(this, { live, source: { example: 0 }, begun: { example: 0 }, marks: [], chosen: [], history: [], number: -1, drag: null });
     live.data.arches.forEach(({ name }, k) => this.find("example").append(new Option(name, k)));
     live.reset = () => this.restore();
-    const changes = {
-      example: ({ value }) => this.startFrom({ example: Number(value) }), kind: () => this.source.drawn && this.drawMarked(),
-      photo: () => this.placePhoto(this.find("photo").files[0]),
-    };
-    for (const name of ["drawing", "unit"]) changes[name] = () => this.openDrawing(this.find("drawing").files[0]);
-    for (const name of ["record", "record-unit"]) changes[name] = () => this.openRecord(this.find("record").files[0]);
-    const clicks = {
-      scale: () => this.begin("scale"), mark: () => this.begin("mark"), "stones-move": () => this.beginMoving(), undo: () => this.undoMove(),
-      case: () => this.saveCase(), png: () => this.savePicture(), link: () => this.makeLink(),
-      stage: (event) => this.placePoint(stage.pointAt(event)),
-    };
-    for (const [name, action] of Object.entries(changes)) this.listen(name, "change", ({ target }) => action(target));
-    for (const [name, action] of Object.entries(clicks)) this.listen(name, "click", action);
-    this.listen("ask", "submit", (event) => { event.preventDefault(); this.setScale(); });
-    this.listen("stage", "pointerdown", (event) => this.press(event));
-    this.listen("stage", "pointermove", (event) => this.drag?.(stage.pointAt(event)));
-    for (const type of ["pointerup", "pointercancel"]) this.listen("stage", type, () => { this.drag = null; });
-    this.listen("stage", "keydown", (event) => this.pressKey(event));
+    // the page names the method that an element calls with its value
+    for (const type of ["click", "change", "submit"]) {
+      for (const element of root.querySelectorAll(`[data-${type}]`)) this.listen(element, type, () => this[element.dataset[type]](element.value));
+    }
+    this.listen(svg, "click", (event) => this.placePoint(stage.pointAt(event)));
+    this.listen(svg, "pointerdown", (event) => this.press(event));
+    this.listen(svg, "pointermove", (event) => this.drag?.(stage.pointAt(event)));
+    for (const type of ["pointerup", "pointercancel"]) this.listen(svg, type, () => { this.drag = null; });
+    this.listen(svg, "keydown", (event) => this.pressKey(event));
     // a tap places a point; a swipe scrolls the page but where it takes hold of something
-    canvas.addEventListener("touchstart", (event) => { if (event.touches.length === 1 && this.hold(stage.pointAt(event.touches[0]))) event.preventDefault(); }, { passive: false });
+    svg.addEventListener("touchstart", (event) => { if (event.touches.length === 1 && this.hold(stage.pointAt(event.touches[0]))) event.preventDefault(); }, { passive: false });
     if (location.hash.length > 1) this.attempt(() => this.openLink());
   }
   find(name) { return this.live.find(name); }
-  listen(name, type, action) { this.find(name).addEventListener(type, (event) => this.attempt(() => action(event))); }
+  listen(element, type, action) { element.addEventListener(type, (event) => this.attempt(() => action(event))); }
   /** Do something; what is wrong is said in words. */
   async attempt(action) {
     try {
@@ -50,34 +42,36 @@ class Tools {
     this.live.say("message", words);
     this.find("message").classList.toggle("doubt", isWrong);
   }
-  /** Refuse files that would take long to read. */
-  checkSize({ name, size }) {
-    if (size > MAX_BYTES) refuse(`${name} has ${(size / 1e6).toFixed(0)} MB: give a file of at most 20 MB`);
+  /** The file that a reader chose, if any; those that would take long to read are refused. */
+  fileOf(name) {
+    const [file] = this.find(name).files;
+    if (file?.size > MAX_BYTES) refuse(`${file.name} has ${(file.size / 1e6).toFixed(0)} MB: give a file of at most 20 MB`);
+    return file;
   }
   /** What presses on the drawing do: set the scale, mark the arch, move stones, or nothing. */
-  setMode(mode) {
-    const { live } = this;
-    this.mode = mode;
-    live.isMarking = mode === "scale" || mode === "mark";
-    live.root.classList.toggle("marking", live.isMarking);
-    live.stage.canvas.tabIndex = mode === "stones" ? 0 : -1;
-    this.find("ask").hidden = mode !== "scale";
-    this.find("undo").hidden = mode !== "stones";
+  get mode() { return this.live.root.dataset.mode; }
+  set mode(mode) {
+    this.live.root.dataset.mode = mode;
+    this.live.stage.svg.tabIndex = mode === "stones" ? 0 : -1;
   }
 
   /** Show the arch of a source: an example, a marked ring or outlines; with a design of a link. */
   startFrom(source, design = {}) {
-    const { live, live: { stage, data: { arches } } } = this, { outlines, unit, drawn, moved, example } = source;
-    const arch = outlines ? assembleOutlines(outlines, unit, arches[0].parameters) : drawn ? assembleRing(drawn, arches[0].parameters) : arches[example];
+    const { live, live: { stage, data: { arches: [{ parameters }] } } } = this, { outlines, unit, drawn, moved, example } = source;
+    const arch = outlines ? assembleOutlines(outlines, unit, parameters) : drawn ? assembleRing(drawn, parameters) : live.data.arches[example];
     this.source = source;
-    if (!moved) Object.assign(this, { begun: source, history: [], marks: drawn ? this.marks : [] });
-    this.setMode(moved ? this.mode : null);
+    if (!moved) {
+      Object.assign(this, { begun: source, history: [], marks: drawn ? this.marks : [] });
+      this.mode = "";
+    }
     if (example === undefined) this.find("example").selectedIndex = -1;
-    live.open(arch, design, this.mode === "stones" || (drawn && stage.backdrop) ? stage.box : null);
+    live.open(arch, design, this.mode === "stones" || (drawn && stage.photo) ? stage.box : null);
     if (drawn) this.showHandles(this.marks);
-    const supports = arch.bodies.inverse_mass.slice(0, -1).filter(([value]) => value === 0).length;
-    this.say(outlines ? `${arch.name}: ${arch.joints.length} joints; ${supports} of its blocks ${supports > 1 ? "are supports" : "is a support"}, which follow${supports > 1 ? "" : "s"} the ground` : "");
+    const count = arch.bodies.mass.filter((_, body) => arch.bodies.inverse_mass[body][0] === 0).length;
+    const supports = count > 1 ? "are supports, which follow" : "is a support, which follows";
+    this.say(outlines ? `a drawing: ${arch.joints.length} joints; ${count} of its blocks ${supports} the ground` : "");
   }
+  startFromExample(number) { this.startFrom({ example: Number(number) }); }
   /** The arch before its stones were moved and sliders were used; motion and photo stay. */
   restore() { this.startFrom(this.begun, { strength: this.live.design.strength }); }
   showHandles(points) {
@@ -85,117 +79,114 @@ class Tools {
     this.live.show(0);
   }
 
-  async placePhoto(file) {
+  async openPhoto() {
+    const file = this.fileOf("photo"), { stage } = this.live, photo = new Image();
     if (!file) return;
-    this.checkSize(file);
-    const image = await createImageBitmap(file).catch(() => refuse(`${file.name} is no picture: give a JPEG or a PNG`));
-    this.live.stage.backdrop = { image };
+    photo.src = await new Promise((resolve) => { Object.assign(new FileReader(), { onload: ({ target }) => resolve(target.result) }).readAsDataURL(file); });
+    await photo.decode().catch(() => refuse(`${file.name} is no picture: give a JPEG or a PNG`));
     this.isScaled = false;
-    this.framePhoto(10 / image.width);
+    stage.placePhoto(photo, 10 / photo.naturalWidth);
     this.begin("scale");
   }
-  framePhoto(metres) {
-    const { stage, stage: { backdrop } } = this.live;
-    backdrop.metres = metres;
-    stage.frame([0, 0, metres * backdrop.image.width, metres * backdrop.image.height]);
-  }
   begin(mode) {
-    const { stage } = this.live;
-    if (!stage.backdrop) refuse("place a photo or an elevation first");
+    const { root, stage } = this.live;
+    if (!stage.photo) refuse("place a photo or an elevation first");
     if (mode === "mark" && !this.isScaled) refuse("this photo has no scale yet: click two points of known distance, and give it in metres");
-    this[mode === "scale" ? "scaleMarks" : "marks"] = [];
-    this.setMode(mode);
-    this.live.root.querySelector("[value=shake]").click();
+    this.marks = [];
+    this.mode = mode;
+    root.querySelector("[value=shake]").click();
     this.live.tell();
     this.showHandles([]);
     this.say(mode === "scale" ? "Click two points whose distance you know." : `Click ${MARKS[0]}.`);
-    stage.canvas.scrollIntoView({ block: "center" });
+    stage.svg.scrollIntoView({ block: "center" });
   }
   /** Place a point of the scale, of which a third one moves the nearest, or of the arch. */
   placePoint(point) {
-    const { scaleMarks: two, marks } = this, far = (place) => distance(place, point);
-    if (this.mode === "scale") {
-      if (two.length === 2) two[far(two[0]) < far(two[1]) ? 0 : 1] = point; else two.push(point);
-      this.showHandles(two);
-      this.say(two.length < 2 ? "Click the second point." : "Give their distance below the photo. Another click moves the nearer point.");
-      if (two.length === 2) this.find("length").focus();
-    } else if (this.mode === "mark" && marks.length < MARKS.length) {
+    const { marks, mode } = this, far = (place) => distance(place, point);
+    if (mode === "scale") {
+      if (marks.length === 2) marks[far(marks[0]) < far(marks[1]) ? 0 : 1] = point; else marks.push(point);
+      this.say(marks.length < 2 ? "Click the second point." : "Give their distance below the photo. Another click moves the nearer point.");
+      this.showHandles(marks);
+      if (marks.length === 2) this.find("length").focus();
+    } else if (mode === "mark" && marks.length < MARKS.length) {
       marks.push(point);
       this.showHandles(marks);
       if (marks.length === MARKS.length) this.drawMarked(); else this.say(`Click ${MARKS[marks.length]}.`);
     }
   }
   setScale() {
-    const length = Number(this.find("length").value), [one, other] = this.scaleMarks, { backdrop, scale } = this.live.stage;
+    const { stage } = this.live, [one, other] = this.marks;
     if (!other) refuse("click two points of the photo first");
-    if (scale * distance(one, other) < 10 * devicePixelRatio) refuse("the two points are one: click places that are farther apart");
+    if (distance(one, other) < 10 * stage.pixel) refuse("the two points are one: click places that are farther apart");
     this.isScaled = true;
-    this.framePhoto((backdrop.metres * length) / distance(one, other));
+    stage.placePhoto(stage.photo, (stage.metres * this.find("length").valueAsNumber) / distance(one, other));
     this.begin("mark");
   }
   /** The ring through the marks; its springings are level. A mark on its outer side gives the thickness, and goes. */
   drawMarked() {
-    const [[x0, y0], [x1, y1], [, top], outer] = this.marks, level = 0.5 * (y0 + y1), span = Math.abs(x1 - x0), { design } = this.live;
+    const [[x0, y0], [x1, y1], [, top], outer] = this.marks, level = 0.5 * (y0 + y1), span = Math.abs(x1 - x0);
+    const { thickness, stones, friction, finish, strength } = this.live.design;
     if (Math.abs(y1 - y0) > 0.1 * span) refuse(`the springings differ by ${Math.abs(y1 - y0).toFixed(2)} m in height: drag them level, or give the outlines of the stones instead`);
     if (outer && outer[1] - top < 0.01 * span) refuse("the outer side of the crown lies above its inner side: drag the last point up");
-    const thickness = outer ? Math.round(200 * (outer[1] - top)) / 200 : design.thickness, { stones, friction, finish, strength } = design;
-    const drawn = { kind: this.find("kind").value, span, rise: top - level, thickness, left: [Math.min(x0, x1), level] };
+    const depth = outer ? Math.round(200 * (outer[1] - top)) / 200 : thickness;
+    const drawn = { kind: this.find("kind").value, span, rise: top - level, thickness: depth, left: [Math.min(x0, x1), level] };
     this.startFrom({ drawn }, this.source.drawn ? { stones, friction, finish, strength } : {});
     this.marks.length = 3;
     this.showHandles(this.marks);
     this.say("Now match the photo: drag the three points; set thickness and number of stones by their sliders.");
   }
+  changeKind() { if (this.source.drawn) this.drawMarked(); }
 
   /** Let the reader move stones and corners; those of neighbours go along. */
   beginMoving() {
     if (this.live.isMarking) refuse("mark the arch first, or start from an example");
-    this.setMode("stones");
-    this.chosen = [];
-    this.showMoved(traceStones(this.live.arch));
-    this.live.stage.canvas.focus();
+    this.mode = "stones";
+    this.showMoved(traceStones(this.live.arch), []);
+    this.live.stage.svg.focus();
     this.say("Drag a stone by its middle, or a corner. Keys: Enter chooses the next stone, arrows move it by 1 cm.");
   }
-  undoMove() {
-    const before = this.history.pop() ?? refuse("no stone was moved");
-    this.chosen = [];
-    this.showMoved(before);
-  }
-  showMoved(outlines) {
+  undoMove() { this.showMoved(this.history.pop() ?? refuse("no stone was moved"), []); }
+  /** Show outlines, with the places that were chosen of them. */
+  showMoved(outlines, chosen) {
     const { friction, finish, strength } = this.live.design;
     this.startFrom({ outlines, unit: 1, file: "stones.geojson", moved: true }, { friction, finish, strength });
-    this.choose(this.chosen);
+    this.choose(chosen);
   }
-  /** Choose corners, pairs of outline and corner, which moves take along. */
-  choose(corners) {
-    this.chosen = corners;
-    this.showHandles(corners.map(([k, i]) => this.source.outlines[k].points[i]));
+  choose(places) {
+    this.chosen = places;
+    this.showHandles(places);
   }
-  /** Corners at a point, with those of neighbours: of one corner, or of the stone around it. */
-  cornersAt(point) {
-    const { outlines } = this.source, far = (place) => this.live.stage.scale * distance(place, point);
+  /** Move the corners at some places, of all stones that have them. */
+  move(outlines, places, step) {
+    const shift = (point) => (places.some((place) => distance(place, point) < TOUCHING) ? plus(point, step) : point);
+    this.showMoved(outlines.map(({ points, fixed }) => ({ points: points.map(shift), fixed })), places.map(shift));
+  }
+  /** The corner at a point, or those of the stone around it. */
+  placesAt(point) {
+    const { outlines } = this.source, far = (place) => distance(place, point);
     const corner = outlines.flatMap(({ points }) => points).reduce((best, each) => (far(each) < far(best) ? each : best));
     const isInside = ({ points }) => sides(points).every(([from, to]) => cross(minus(to, from), minus(point, from)) >= 0);
     const stone = outlines.find(isInside)?.points ?? [], middle = [0, 1].map((k) => stone.reduce((sum, each) => sum + each[k], 0) / stone.length);
-    const isCorner = far(corner) < 16 * devicePixelRatio && !(far(middle) < far(corner)); // a stone may be as small as a finger
-    return findCorners(outlines, isCorner ? [corner] : stone);
+    const isCorner = far(corner) < 16 * this.live.stage.pixel && !(far(middle) < far(corner)); // a stone may be as small as a finger
+    return isCorner ? [corner] : stone;
   }
   /** What a press at a point takes hold of, a stone, a corner or a mark: how it moves with the pointer, or null. */
   hold(point) {
     if (this.mode === "stones") {
-      const { outlines } = this.source, corners = this.cornersAt(point);
-      return corners.length ? (to) => this.showMoved(moveCorners(outlines, corners, minus(to, point))) : null;
+      const { outlines } = this.source, places = this.placesAt(point);
+      return places.length ? (to) => this.move(outlines, places, minus(to, point)) : null;
     }
-    const { marks, live: { stage } } = this, number = marks.findIndex((mark) => stage.scale * distance(mark, point) < 24 * devicePixelRatio);
-    const isPlaced = this.mode === "mark" ? marks.length === MARKS.length : this.mode === null;
+    const { marks, live: { stage } } = this, number = marks.findIndex((mark) => distance(mark, point) < 24 * stage.pixel);
+    const isPlaced = this.mode === "mark" ? marks.length === MARKS.length : this.mode === "";
     return number < 0 || !isPlaced ? null : (to) => { marks[number] = to; this.live.show(0); this.drawMarked(); };
   }
   press(event) {
     const { stage } = this.live, point = stage.pointAt(event);
     this.drag = this.hold(point);
-    if (this.drag) stage.canvas.setPointerCapture(event.pointerId);
+    if (this.drag) stage.svg.setPointerCapture(event.pointerId);
     if (this.mode !== "stones") return;
     if (this.drag) this.history.push(this.source.outlines);
-    this.choose(this.cornersAt(point));
+    this.choose(this.placesAt(point));
   }
   pressKey(event) {
     const step = ARROWS[event.key], { outlines } = this.source;
@@ -203,27 +194,26 @@ class Tools {
     event.preventDefault();
     if (step) {
       this.history.push(outlines);
-      return this.showMoved(moveCorners(outlines, this.chosen, step));
+      return this.move(outlines, this.chosen, step);
     }
     this.number = (this.number + 1) % outlines.length;
-    this.choose(findCorners(outlines, outlines[this.number].points));
+    this.choose(outlines[this.number].points);
     this.say(`stone ${this.number + 1} is chosen`);
   }
 
-  async openDrawing(file) {
+  async openDrawing() {
+    const file = this.fileOf("drawing"), text = await file?.text();
     if (!file) return;
-    this.checkSize(file);
-    const text = await file.text(), unit = Number(this.find("unit").value);
     let outlines = [];
     try { outlines = /\.dxf$/i.test(file.name) ? readDxf(text) : readGeoJson(text); } catch { refuse(`${file.name} cannot be read: give GeoJSON, or DXF as text`); }
-    this.startFrom({ outlines, unit, file: file.name });
+    this.startFrom({ outlines, unit: Number(this.find("unit").value), file: file.name });
   }
-  async openRecord(file) {
+  async openRecord() {
+    const file = this.fileOf("record");
     if (!file) return;
-    this.checkSize(file);
     const record = readRecord(await file.text(), file.name, Number(this.find("record-unit").value));
     this.addRecord(record);
-    this.find("motion").dispatchEvent(new Event("input"));
+    this.live.change(this.find("motion"));
     this.say(`${file.name}: ${record.x.length} values every ${record.dt.toPrecision(3)} s, up to ${record.strength.toFixed(2)} g`);
   }
   /** Add a record to the motions, in place of one of its name, and choose it. */
@@ -256,16 +246,21 @@ class Tools {
     this.save(new Blob([this.writeCase()], { type: "text/plain" }), "arch.toml");
     if (moved) this.say(`saved as arch.toml and ${file}: keep them in one folder`);
   }
-  /** The picture, with what it shows below it. */
-  savePicture() {
-    const { design, given, stage: { canvas: { width, height }, canvas } } = this.live, size = Math.max(width / 60, 12), style = getComputedStyle(document.body);
-    const text = (name) => this.find(name).textContent, facts = given.ring ? ["sizes", "weight", "collapse"] : ["weight", "collapse"];
-    const lines = [text("verdict"), ...facts.map((name) => `${this.find(name).previousElementSibling.textContent}: ${text(name)}`)];
-    lines.push(`${design.thickness ? `thickness ${text("thickness-value")}, ` : ""}friction ${text("friction-value")}, ${this.find("motion").selectedOptions[0].text} at ${text("strength-value")}`);
+  /** The picture, with what the page says of it. */
+  async savePicture() {
+    const { root, stage: { svg } } = this.live, box = svg.getBoundingClientRect(), [width, height] = [box.width, box.height].map((size) => size * devicePixelRatio);
+    const copy = svg.cloneNode(true), drawn = new Image(), own = svg.querySelectorAll("*");
+    copy.querySelectorAll("*").forEach((part, k) => { for (const name of PAINT) part.style[name] = getComputedStyle(own[k])[name]; });
+    Object.entries({ width, height }).forEach((each) => copy.setAttribute(...each));
+    drawn.src = `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(copy))}`;
+    await drawn.decode();
+    const words = (rows) => [...root.querySelectorAll(rows)].map((row) => [...row.children].map((each) => each.selectedOptions?.[0].text ?? each.textContent).filter(Boolean).join(": "));
+    const lines = [this.find("verdict").textContent, ...words(".facts div:not([hidden])"), words(".live-controls label:not([hidden])").join(", ")];
+    const size = Math.max(width / 60, 12), style = getComputedStyle(document.body);
     const picture = Object.assign(document.createElement("canvas"), { width, height: height + 1.7 * size * (lines.length + 0.6) }), pen = picture.getContext("2d");
     pen.fillStyle = style.backgroundColor;
     pen.fillRect(0, 0, picture.width, picture.height);
-    pen.drawImage(canvas, 0, 0);
+    pen.drawImage(drawn, 0, 0);
     Object.assign(pen, { fillStyle: style.color, font: `${size}px ${style.fontFamily}` });
     lines.forEach((line, k) => pen.fillText(line, size, height + 1.7 * size * (k + 1), width - 2 * size));
     picture.toBlob((blob) => this.save(blob, "arch.png"));
@@ -283,7 +278,7 @@ class Tools {
     const record = fits ? { ...rest, y: null, x: x.map((value) => Math.round(1e3 * value)).join("_") } : undefined;
     location.hash = encodeURIComponent(JSON.stringify({ source: this.source, design, motion, record }));
     await navigator.clipboard?.writeText(location.href).catch(() => {});
-    const without = [stage.backdrop ? "the photo" : "", isOwn && !fits ? `your record of ${x.length} values` : ""].filter(Boolean).join(" and ");
+    const without = [stage.photo ? "the photo" : "", isOwn && !fits ? `your record of ${x.length} values` : ""].filter(Boolean).join(" and ");
     this.say(`The address of this page holds the arch now: copy it.${without ? ` It leaves out ${without}.` : ""}`);
   }
   openLink() {
