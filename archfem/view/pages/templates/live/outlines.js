@@ -37,6 +37,8 @@ function drawRing({ kind, span, rise, thickness, left }) {
   });
   return { ends, kept: 0, stones: 15, thickness, density: STONE, level: Infinity };
 }
+/** Springings and crown of a drawn ring, on its inner side. */
+const markRing = ({ span, rise, left: [x, y] }) => [[x, y], [x + span, y], [x + 0.5 * span, y + rise]];
 /** The arch of a drawn ring. */
 function assembleRing(drawn, parameters) {
   const ring = drawRing(drawn), arch = cutRing(ring, { factor: 1, stones: ring.stones, friction: FRICTION }, parameters);

@@ -12,7 +12,7 @@ const PAINT = ["fill", "stroke", "stroke-width", "stroke-linecap", "stroke-linej
 class Tools {
   constructor(live) {
     const { root, stage, stage: { svg } } = live;
-    Object.assign(this, { live, source: { example: 0 }, begun: { example: 0 }, marks: [], chosen: [], history: [], number: -1, drag: null });
+    Object.assign(this, { live, source: { example: 0 }, begun: { example: 0 }, history: [], number: -1, drag: null });
     live.data.arches.forEach(({ name }, k) => this.find("example").append(new Option(name, k)));
     live.reset = () => this.restore();
     // the page names the method that an element calls with its value
@@ -48,6 +48,12 @@ class Tools {
     if (file?.size > MAX_BYTES) refuse(`${file.name} has ${(file.size / 1e6).toFixed(0)} MB: give a file of at most 20 MB`);
     return file;
   }
+  /** The points that a reader placed on a photo, or chose of stones. */
+  get marks() { return this.live.stage.handles; }
+  set marks(points) {
+    this.live.stage.handles = points;
+    this.live.show(0);
+  }
   /** What presses on the drawing do: set the scale, mark the arch, move stones, or nothing. */
   get mode() { return this.live.root.dataset.mode; }
   set mode(mode) {
@@ -60,13 +66,10 @@ class Tools {
     const { live, live: { stage, data: { arches: [{ parameters }] } } } = this, { outlines, unit, drawn, moved, example } = source;
     const arch = outlines ? assembleOutlines(outlines, unit, parameters) : drawn ? assembleRing(drawn, parameters) : live.data.arches[example];
     this.source = source;
-    if (!moved) {
-      Object.assign(this, { begun: source, history: [], marks: drawn ? this.marks : [] });
-      this.mode = "";
-    }
+    if (!moved) Object.assign(this, { begun: source, history: [], mode: "" });
     if (example === undefined) this.find("example").selectedIndex = -1;
-    live.open(arch, design, this.mode === "stones" || (drawn && stage.photo) ? stage.box : null);
-    if (drawn) this.showHandles(this.marks);
+    live.open(arch, design, this.drag || this.mode === "stones" || (drawn && stage.photo) ? stage.box : null);
+    if (drawn) this.marks = markRing(drawn);
     const count = arch.bodies.mass.filter((_, body) => arch.bodies.inverse_mass[body][0] === 0).length;
     const supports = count > 1 ? "are supports, which follow" : "is a support, which follows";
     this.say(outlines ? `a drawing: ${arch.joints.length} joints; ${count} of its blocks ${supports} the ground` : "");
@@ -74,10 +77,6 @@ class Tools {
   startFromExample(number) { this.startFrom({ example: Number(number) }); }
   /** The arch before its stones were moved and sliders were used; motion and photo stay. */
   restore() { this.startFrom(this.begun, { strength: this.live.design.strength }); }
-  showHandles(points) {
-    this.live.stage.handles = points;
-    this.live.show(0);
-  }
 
   async openPhoto() {
     const file = this.fileOf("photo"), { stage } = this.live, photo = new Image();
@@ -92,11 +91,10 @@ class Tools {
     const { root, stage } = this.live;
     if (!stage.photo) refuse("place a photo or an elevation first");
     if (mode === "mark" && !this.isScaled) refuse("this photo has no scale yet: click two points of known distance, and give it in metres");
-    this.marks = [];
     this.mode = mode;
     root.querySelector("[value=shake]").click();
     this.live.tell();
-    this.showHandles([]);
+    this.marks = [];
     this.say(mode === "scale" ? "Click two points whose distance you know." : `Click ${MARKS[0]}.`);
     stage.svg.scrollIntoView({ block: "center" });
   }
@@ -104,14 +102,12 @@ class Tools {
   placePoint(point) {
     const { marks, mode } = this, far = (place) => distance(place, point);
     if (mode === "scale") {
-      if (marks.length === 2) marks[far(marks[0]) < far(marks[1]) ? 0 : 1] = point; else marks.push(point);
-      this.say(marks.length < 2 ? "Click the second point." : "Give their distance below the photo. Another click moves the nearer point.");
-      this.showHandles(marks);
-      if (marks.length === 2) this.find("length").focus();
+      this.marks = marks.length < 2 ? [...marks, point] : far(marks[0]) < far(marks[1]) ? [point, marks[1]] : [marks[0], point];
+      if (this.marks.length === 2) this.find("length").focus();
+      this.say(this.marks.length < 2 ? "Click the second point." : "Give their distance below the photo. Another click moves the nearer point.");
     } else if (mode === "mark" && marks.length < MARKS.length) {
-      marks.push(point);
-      this.showHandles(marks);
-      if (marks.length === MARKS.length) this.drawMarked(); else this.say(`Click ${MARKS[marks.length]}.`);
+      this.marks = [...marks, point];
+      if (this.marks.length === MARKS.length) this.drawMarked(); else this.say(`Click ${MARKS[this.marks.length]}.`);
     }
   }
   setScale() {
@@ -131,8 +127,6 @@ class Tools {
     const depth = outer ? Math.round(200 * (outer[1] - top)) / 200 : thickness;
     const drawn = { kind: this.find("kind").value, span, rise: top - level, thickness: depth, left: [Math.min(x0, x1), level] };
     this.startFrom({ drawn }, this.source.drawn ? { stones, friction, finish, strength } : {});
-    this.marks.length = 3;
-    this.showHandles(this.marks);
     this.say("Now match the photo: drag the three points; set thickness and number of stones by their sliders.");
   }
   changeKind() { if (this.source.drawn) this.drawMarked(); }
@@ -141,20 +135,16 @@ class Tools {
   beginMoving() {
     if (this.live.isMarking) refuse("mark the arch first, or start from an example");
     this.mode = "stones";
-    this.showMoved(traceStones(this.live.arch), []);
+    this.showMoved(traceStones(this.live.arch));
     this.live.stage.svg.focus();
     this.say("Drag a stone by its middle, or a corner. Keys: Enter chooses the next stone, arrows move it by 1 cm.");
   }
-  undoMove() { this.showMoved(this.history.pop() ?? refuse("no stone was moved"), []); }
-  /** Show outlines, with the places that were chosen of them. */
-  showMoved(outlines, chosen) {
+  undoMove() { this.showMoved(this.history.pop() ?? refuse("no stone was moved")); }
+  /** Show outlines, with the corners that were chosen of them. */
+  showMoved(outlines, chosen = []) {
     const { friction, finish, strength } = this.live.design;
     this.startFrom({ outlines, unit: 1, file: "stones.geojson", moved: true }, { friction, finish, strength });
-    this.choose(chosen);
-  }
-  choose(places) {
-    this.chosen = places;
-    this.showHandles(places);
+    this.marks = chosen;
   }
   /** Move the corners at some places, of all stones that have them. */
   move(outlines, places, step) {
@@ -176,9 +166,9 @@ class Tools {
       const { outlines } = this.source, places = this.placesAt(point);
       return places.length ? (to) => this.move(outlines, places, minus(to, point)) : null;
     }
-    const { marks, live: { stage } } = this, number = marks.findIndex((mark) => distance(mark, point) < 24 * stage.pixel);
-    const isPlaced = this.mode === "mark" ? marks.length === MARKS.length : this.mode === "";
-    return number < 0 || !isPlaced ? null : (to) => { marks[number] = to; this.live.show(0); this.drawMarked(); };
+    const number = this.marks.findIndex((mark) => distance(mark, point) < 24 * this.live.stage.pixel);
+    const isPlaced = this.mode === "mark" ? this.marks.length === MARKS.length : this.mode === "";
+    return number < 0 || !isPlaced ? null : (to) => { this.marks = this.marks.with(number, to); this.drawMarked(); };
   }
   press(event) {
     const { stage } = this.live, point = stage.pointAt(event);
@@ -186,7 +176,7 @@ class Tools {
     if (this.drag) stage.svg.setPointerCapture(event.pointerId);
     if (this.mode !== "stones") return;
     if (this.drag) this.history.push(this.source.outlines);
-    this.choose(this.placesAt(point));
+    this.marks = this.placesAt(point);
   }
   pressKey(event) {
     const step = ARROWS[event.key], { outlines } = this.source;
@@ -194,10 +184,10 @@ class Tools {
     event.preventDefault();
     if (step) {
       this.history.push(outlines);
-      return this.move(outlines, this.chosen, step);
+      return this.move(outlines, this.marks, step);
     }
     this.number = (this.number + 1) % outlines.length;
-    this.choose(outlines[this.number].points);
+    this.marks = outlines[this.number].points;
     this.say(`stone ${this.number + 1} is chosen`);
   }
 
