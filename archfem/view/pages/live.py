@@ -66,6 +66,8 @@ class LivePage(StandalonePage):
             packed=_pack(json.dumps(data).encode()),
             digest=layout["digest"],
             step=1e3 * TRIED_STEPS[0],
+            motions=self.motions,
+            finishes=FINISHES,
             has_ring=any(arch["ring"] for arch in self.arches),
             has_thrust=any(arch["thrust"] for arch in self.arches),
         )

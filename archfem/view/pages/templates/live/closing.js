@@ -44,39 +44,36 @@ class ClosingJoints {
     const own = [-1, 1].flatMap((sign, side) => [sign * along[0], sign * along[1], sign * cross(placed[side], along) + swing - sign * sense * moment]);
     return { own, e: force > 0 ? moment / force / depth : NaN, closing: -Math.min(...ends), shear: Math.abs(shear), force };
   }
-  /** Forces out of balance at the free coordinates, under a push in g; with their derivatives if wanted. */
-  assemble(q, push, isTangent) {
-    const size = q.length, residual = new Float64Array(size), table = isTangent ? this.rows.map(() => new Float64Array(size + 1)) : null;
-    this.weights.forEach((weight, body) => { residual[3 * body] -= push * weight; residual[3 * body + 1] += weight; });
-    const rowOf = new Map(this.rows.map((row, k) => [row, k]));
-    for (const joint of this.joints) {
-      const places = joint.blocks.flatMap((body) => [3 * body, 3 * body + 1, 3 * body + 2]);
-      this.press(joint, q).own.forEach((value, k) => { residual[places[k]] += value; });
-      if (isTangent) for (const column of places.filter((place) => rowOf.has(place))) {
-        const before = q[column], sides = [1, -1].map((sign) => { q[column] = before + sign * SMALL_MOVE; return this.press(joint, q).own; });
-        q[column] = before;
-        places.forEach((place, k) => { if (rowOf.has(place)) table[rowOf.get(place)][column] += (sides[0][k] - sides[1][k]) / (2 * SMALL_MOVE); });
-      }
+  /** Forces out of balance at the free coordinates, under a push in g; of all joints, or of some. */
+  unbalance(q, push, joints = this.joints) {
+    const forces = Float64Array.from(this.weights.flatMap((weight) => [-push * weight, weight, 0]));
+    for (const joint of joints) {
+      this.press(joint, q).own.forEach((value, k) => { forces[3 * joint.blocks[Math.floor(k / 3)] + (k % 3)] += value; });
     }
-    return { residual, table, error: Math.max(...this.rows.map((row) => Math.abs(residual[row]))) };
+    return this.rows.map((row) => forces[row]);
+  }
+  /** Derivatives of the forces out of balance by each free coordinate, of central differences. */
+  differentiate(q) {
+    return this.rows.map((row) => {
+      const own = this.joints.filter(({ blocks }) => blocks.includes(Math.floor(row / 3)));
+      const [more, less] = [1, -1].map((sign) => this.unbalance(q.with(row, q[row] + sign * SMALL_MOVE), 0, own));
+      return more.map((value, k) => (value - less[k]) / (2 * SMALL_MOVE));
+    });
   }
   /** Poses in equilibrium near others, by Newton's method; null where there are none. */
   settle(start, push) {
-    let q = start, state = this.assemble(q, push, true);
+    const count = this.rows.length, sizeOf = (forces) => Math.max(...forces.map(Math.abs));
+    let q = start, forces = this.unbalance(q, push);
     for (let round = 0; round < 12; round++) {
-      if (state.error < this.tolerance) return q;
-      const { table, residual } = state, size = q.length;
-      this.rows.forEach((row, k) => { table[k][size] = -residual[row]; });
-      const columns = eliminate(table, this.rows);
-      let share = 1, trial;
-      do {
-        trial = q.slice();
-        columns.forEach((column, k) => { trial[column] += share * table[k][size]; });
-        share /= 2;
-      } while (share > 0.01 && !(this.assemble(trial, push, false).error < 2 * state.error));
-      q = trial;
+      if (sizeOf(forces) < this.tolerance) return q;
+      const slopes = this.differentiate(q), table = forces.map((force, row) => Float64Array.from([...slopes.map((slope) => slope[row]), -force]));
+      const columns = eliminate(table, range(count)), before = sizeOf(forces);
+      for (let share = 1, from = q; share === 1 || (share > 0.01 && !(sizeOf(forces) < 2 * before)); share /= 2) {
+        q = from.slice();
+        columns.forEach((column, k) => { q[this.rows[column]] += share * table[k][count]; });
+        forces = this.unbalance(q, push);
+      }
       if (!q.every((value) => Math.abs(value) < 0.05 * this.reach)) return null;
-      state = this.assemble(q, push, true);
     }
     return null;
   }

@@ -43,7 +43,6 @@ class Live {
     this.script = URL.createObjectURL(new Blob([scripts.join("\n")], { type: "text/javascript" }));
     this.sliders = root.querySelectorAll(".live-controls [type=range]");
     root.querySelectorAll("[type=range]").forEach(awaitDirection);
-    data.motions.forEach(({ name }, k) => this.find("motion").append(new Option(name, k)));
     root.querySelector(".live-controls").addEventListener("input", ({ target }) => this.change(target));
     this.find("reset").addEventListener("click", () => this.reset());
     this.find("time").addEventListener("input", () => this.pause(this.find("time").valueAsNumber));
@@ -72,7 +71,6 @@ class Live {
     this.original = { thickness: ring?.thickness ?? null, stones: ring?.stones ?? null, friction, finish: "" };
     this.design = { ...this.original, strength: null, ...changes };
     this.finishes = given.finishes ?? this.data.arches[0].finishes;
-    this.find("finish").replaceChildren(new Option(given.thrust ? "as given" : "hard: faces meet at once", ""), ...this.finishes.map(({ name }) => new Option(name, name)));
     this.stage.handles = [];
     if (!("strength" in changes)) this.find("motion").value = 0;
     for (const name of ["thickness", "stones"]) this.find(name).closest("label").hidden = !ring;
