@@ -514,6 +514,7 @@ def test_mistakes_are_put_right_where_they_are_said(tmp_path):
     (drawing := tmp_path / "column.dxf").write_text(dxf(*column))
     Image.new("RGB", (400, 300), "grey").save(photo := tmp_path / "photo.png")
     with browser(wide=1280) as driver:
+        from selenium.webdriver import Keys
 
         def run(expression):
             script = "const live = document.querySelector('.arch').live, { tools } = live;"
@@ -543,6 +544,24 @@ def test_mistakes_are_put_right_where_they_are_said(tmp_path):
         run("tools.hold([5, 2])([5, 3.5])")
         assert run("return tools.source.drawn.thickness") == 0.5
         assert driver.find_element("css selector", "#weight").text.startswith("it stands")
+        # marks of a moved arch come back with it
+        marks = run("return tools.marks")
+        driver.find_element("css selector", "#stones-move").click()
+        stage = driver.find_element("css selector", "#stage")
+        stage.send_keys(Keys.ENTER + Keys.ARROW_UP)
+        assert run("return tools.source.moved")
+        driver.find_element("css selector", "#undo").click()
+        driver.find_element("css selector", "#undo").click()
+        wait(driver, lambda: message() == "no stone was moved")
+        driver.find_element("css selector", "#reset").click()
+        assert run("return tools.marks") == marks
+        # points are placed by keys, too: an arrow moves by 5 ‰ of the width
+        driver.find_element("css selector", "#scale").click()
+        stage.send_keys(Keys.ENTER + Keys.ARROW_RIGHT * 20 + Keys.ENTER)
+        (x, y), (u, v) = run("return tools.marks")
+        wide = run("return live.stage.box[2]")
+        assert (u - x, v - y) == pytest.approx((0.1 * wide, 0.0))
+        assert driver.switch_to.active_element.get_attribute("id") == "length"
         assert complaints(driver) == []
 
 

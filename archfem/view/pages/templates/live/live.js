@@ -218,7 +218,7 @@ class Live {
   show(time) {
     const { stage, statics, view, arch: { bodies } } = this, begins = time === 0;
     this.time = this.find("time").value = time;
-    if (this.isMarking) return stage.draw({ handles: stage.handles });
+    if (this.isMarking) return stage.draw({ handles: [...stage.handles, ...stage.cross] });
     const at = ({ frames, spacing }) => frames[Math.min(Math.round(time / spacing), frames.length - 1)];
     const [own, ...others] = view === "shake" ? range(RUNS).map((k) => (this.runs[k]?.frames ? at(this.runs[k]) : undefined)) : [];
     const lines = view === "push" ? statics.push : view === "weight" || begins ? statics.weight : [], hinges = view === "push" ? statics.hinges : [];

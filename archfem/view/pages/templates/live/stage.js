@@ -3,7 +3,7 @@
 
 class Stage {
   constructor(svg) {
-    Object.assign(this, { svg, layers: svg.querySelector("g"), photo: null, handles: [] });
+    Object.assign(this, { svg, layers: svg.querySelector("g"), photo: null, handles: [], cross: [] });
   }
   /** Fit an arch: what is in view is its box with room for stones that fall. */
   fit({ bodies }, box) {

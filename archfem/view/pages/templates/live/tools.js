@@ -58,7 +58,7 @@ class Tools {
   get mode() { return this.live.root.dataset.mode; }
   set mode(mode) {
     this.live.root.dataset.mode = mode;
-    this.live.stage.svg.tabIndex = mode === "stones" ? 0 : -1;
+    this.live.stage.svg.tabIndex = mode ? 0 : -1;
   }
 
   /** Show the arch of a source: an example, a marked ring or outlines; with a design of a link. */
@@ -94,8 +94,9 @@ class Tools {
     this.mode = mode;
     root.querySelector("[value=shake]").click();
     this.live.tell();
-    this.marks = [];
-    this.say(mode === "scale" ? "Click two points whose distance you know." : `Click ${MARKS[0]}.`);
+    this.marks = stage.cross = [];
+    this.say(`Click ${mode === "scale" ? "two points whose distance you know" : MARKS[0]}.`);
+    stage.svg.focus({ preventScroll: true });
     stage.svg.scrollIntoView({ block: "center" });
   }
   /** Place a point of the scale, of which a third one moves the nearest, or of the arch. */
@@ -180,8 +181,9 @@ class Tools {
   }
   pressKey(event) {
     const step = ARROWS[event.key], { outlines } = this.source;
-    if (this.mode !== "stones" || !(step || event.key === "Enter")) return;
+    if (!this.mode || !(step || event.key === "Enter")) return;
     event.preventDefault();
+    if (this.live.isMarking) return this.steer(step);
     if (step) {
       this.history.push(outlines);
       return this.move(outlines, this.marks, step);
@@ -189,6 +191,14 @@ class Tools {
     this.number = (this.number + 1) % outlines.length;
     this.marks = outlines[this.number].points;
     this.say(`stone ${this.number + 1} is chosen`);
+  }
+
+  /** Move a cross over the photo from its middle, by a part of its width; without a step, place a point there. */
+  steer(step) {
+    const { stage, stage: { box: [left, low, right, high] } } = this.live, [place = [0.5 * (left + right), 0.5 * (low + high)]] = stage.cross;
+    if (!step) return this.placePoint(place);
+    stage.cross = [plus(place, step.map((part) => 0.5 * part * (right - left)))];
+    this.live.show(0);
   }
 
   async openDrawing() {
