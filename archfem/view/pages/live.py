@@ -201,10 +201,11 @@ def describe_ring(structure: Structure) -> dict[str, Any] | None:
 def list_motions(motions: Sequence[Motion] = ()) -> list[dict[str, Any]]:
     """Return motions as lists: those given or default ones, a push and a tilting table."""
     found = [_describe_motion(motion) for motion in motions or _default_motions()]
-    if not motions:  # the page chooses a strength near that which brings the arch down
-        found = [motion | {"strength": None} for motion in found]
+    # the page chooses strengths near that which brings the arch down; short pushes need more
+    if not motions:
+        found = [motion | {"strength": None, "often": 2.7} for motion in found]
     slow = ("push", "a steady push sideways"), ("tilt", "a table that tilts slowly")
-    return found + [{"name": name, "kind": kind, "strength": None} for kind, name in slow]
+    return found + [{"name": name, "kind": kind, "often": 1.05} for kind, name in slow]
 
 
 def _default_motions() -> list[Motion]:

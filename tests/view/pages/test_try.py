@@ -307,6 +307,7 @@ def test_an_arch_is_drawn_on_a_photo_and_taken_away(tmp_path):
             wait(driver, lambda words=words: words in message())
         driver.find_element(find, "#photo").send_keys(str(photo))
         wait(driver, lambda: "Click two points" in message())
+        driver.execute_script("scrollTo(0, 0)")  # the verdict stays above what is scrolled
         driver.find_element(find, "#mark").click()
         assert "no scale yet" in message()
         driver.find_element(find, "#scale").click()
@@ -351,6 +352,18 @@ def test_an_arch_is_drawn_on_a_photo_and_taken_away(tmp_path):
         (tmp_path / "arch.toml").write_text(driver.execute_script(written))
         motion = af.Case.read(tmp_path / "arch.toml").ground_motion()
         assert motion.horizontal == pytest.approx(np.loadtxt(record)[:, 1], abs=1e-4)
+        # the files that it saves: the case, and a picture with photo, stones and thrust line
+        folder = {"behavior": "allow", "downloadPath": str(tmp_path / "saved")}
+        driver.execute_cdp_cmd("Browser.setDownloadBehavior", folder)
+        for name, saved in (("case", "arch.toml"), ("png", "arch.png")):
+            driver.find_element(find, f"#{name}").click()
+            wait(driver, (tmp_path / "saved" / saved).exists)
+        assert (tmp_path / "saved" / "arch.toml").read_text() == (
+            tmp_path / "arch.toml"
+        ).read_text()
+        with Image.open(tmp_path / "saved" / "arch.png") as picture:
+            colours = {colour for _, colour in picture.convert("RGB").getcolors(2**20)}
+        assert {(128, 128, 128), (11, 79, 138)} < colours
         driver.find_element(find, "#link").click()
         wait(driver, lambda: "holds the arch" in message())
         assert "leaves out the photo" in message()

@@ -88,17 +88,13 @@ class Live {
     else if (id) design[id] = id === "finish" ? value : Number(value);
     this.arch = this.build(design);
     this.solveStatics();
-    design.strength ??= this.suggest(this.motion);
+    const { strength, often } = this.motion; // its own, or one near that which brings the arch down
+    design.strength ??= strength ?? Math.min(Math.max(Math.round(100 * often * this.statics.weakest.factor) / 100, 0.05), 2);
     this.showDesign();
     this.tellStatics();
     this.askPush();
     if (id !== "finish") this.run();
     this.pause(0);
-  }
-  /** The strength at which a motion begins: its own, or near that which brings the arch down. */
-  suggest({ strength, kind }) {
-    const often = kind ? 1.05 : 2.7; // short pushes of an earthquake must be stronger than a steady one
-    return strength ?? Math.min(Math.max(Math.round(100 * often * this.statics.weakest.factor) / 100, 0.05), 2);
   }
   /** The arch of a design; archfem's own arrays where nothing but friction differs. */
   build(design, thinner = 1) {
@@ -131,7 +127,10 @@ class Live {
     const settled = law ? new ClosingJoints(arch, law).rest() : null;
     const resting = settled?.lines ?? (isGiven ? given.thrust : equilibrium.thrust(0));
     const pushed = stands && weakest.factor < Infinity ? equilibrium.thrust(weakest.side * weakest.factor) : null;
-    const trace = (values) => (values ? this.findLinks().map((link) => link.map((j) => crossing(joints[j], values[j]))) : []);
+    // a thrust line is drawn through the stones that have two joints
+    const pairs = arch.bodies.inverse_mass.map(([free], body) => range(joints.length).filter((j) => free && joints[j].blocks.includes(body)));
+    const links = pairs.filter((own) => own.length === 2);
+    const trace = (values) => (values ? links.map((link) => link.map((j) => crossing(joints[j], values[j]))) : []);
     // a joint turns about its extrados where M > 0
     const hinges = weakest.hinges.map(({ joint, sign }) => joints[joint].ends[sign > 0 ? 1 : 0]);
     this.statics = { weakest, stands, settled, law, isGiven, resting, weight: trace(resting), push: trace(pushed), hinges };
@@ -165,12 +164,6 @@ class Live {
     this.assign("push", { closing: { arch: this.arch, law, q: settled.q, factor } }, ([right, left]) => {
       this.say("collapse", `${Math.min(right, left).toFixed(3)} g, pushed to the ${right <= left ? "right" : "left"}; ${factor.toFixed(3)} g with hard joints`);
     });
-  }
-  /** Pairs of joints on both sides of a stone, between which a thrust line is drawn. */
-  findLinks() {
-    const { joints, bodies } = this.arch;
-    const pairs = bodies.inverse_mass.map(([free], body) => joints.flatMap(({ blocks }, j) => (free && blocks.includes(body) ? [j] : [])));
-    return pairs.filter((own) => own.length === 2);
   }
 
   /** Shake the arch, and others that differ slightly. */
