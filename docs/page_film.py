@@ -41,8 +41,10 @@ def film_page(path: Path) -> None:
     finally:
         driver.quit()
     images = [image for image, _ in frames]
-    # one palette for all, of a picture in which everything is; it keeps the few red points
-    palette = images[-1].quantize(96, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    # one palette for all, of a picture in which everything is, with more of the few red points
+    sample = images[-1].copy()
+    sample.paste("#d7261e", (0, 0, 60, 60))
+    palette = sample.quantize(64, dither=Image.Dither.NONE)
     first, *rest = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
     lengths = [milliseconds for _, milliseconds in frames]
     first.save(path, save_all=True, append_images=rest, duration=lengths, loop=0, optimize=True)
