@@ -180,7 +180,13 @@ class Live {
       this.tell();
       this.show(this.time);
     };
-    for (const worker of range(count)) this.assign(worker, { engine: data.engine, runs: runs.filter(({ number }) => number % count === worker), motion }, receive);
+    const hand = (worker, own, answer) => this.assign(worker, { engine: data.engine, runs: own, motion }, answer);
+    for (const worker of range(count)) this.workers[worker]?.terminate();
+    // the arch that is drawn has the processor to itself
+    hand(0, runs.slice(0, 1), (first) => {
+      receive(first);
+      for (const worker of range(count)) hand(worker, runs.slice(1).filter(({ number }) => number % count === worker), receive);
+    });
     const peak = this.statics.weakest.factor * G, first = motion.x.findIndex((value) => Math.abs(value * scale) >= peak);
     this.say("critical", first < 0 ? "The ground never pushes that hard." : `The ground first pushes that hard at ${(first * motion.dt).toFixed(2)} s; it must do so long enough for the hinges to open.`);
     this.drawGround(motion, scale);
