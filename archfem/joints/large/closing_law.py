@@ -19,15 +19,21 @@ y = 1 - δ/δ_m = ȳ (1 + z τ), τ from -1 to 1, σ_e/p_0 = 1/y - 2 + y. Means 
 
 and no terms cancel. With E the mean of Φ_e, E_u and E_v are the means of σ_e times the linear
 functions of both ends, E_uu, E_uv and E_vv those of the tangent.
+
+Kernels take numbers, or eight at a time (`lanes`).
 """
 
-import math
 from typing import Any
 
 import numpy as np
 
 from archfem._numba import allocating_entry, inlined_kernel, kernel
 from archfem.joints.contact_law import LARGEST_CLOSING
+from archfem.joints.large.lanes import any_lane, greatest, least, logarithm, select
+
+# σ_e/p_0 at the largest closing, and its derivative by the share of δ_m
+LARGEST_TRACTION = LARGEST_CLOSING**2 / (1.0 - LARGEST_CLOSING)
+LARGEST_TANGENT = LARGEST_CLOSING * (2.0 - LARGEST_CLOSING) / (1.0 - LARGEST_CLOSING) ** 2
 
 # Closing over δ_m below which a logarithm would cancel in Φ_e, and a series serves [-]
 SERIES_CLOSING = 0.2
@@ -42,8 +48,8 @@ SMALLEST_CHANGE = 0.01
 
 # Points and weights of the rule of two points, then of that of three
 _legendre: Any = np.polynomial.legendre  # without type annotations
-_rules = np.hstack([_legendre.leggauss(2), _legendre.leggauss(3)])
-TIME_POINTS, TIME_WEIGHTS = 0.5 * (1.0 + _rules[0]), 0.5 * _rules[1]
+_rules = np.array([np.pad(_legendre.leggauss(2), ((0, 0), (0, 1))), _legendre.leggauss(3)])
+TIME_POINTS, TIME_WEIGHTS = 0.5 * (1.0 + _rules[:, 0].copy()), 0.5 * _rules[:, 1].copy()
 
 # Coefficients of the series of Φ_e and of T, the highest power first. T takes twelve terms up to a
 # z² of 0.0625, and six up to 0.01, where most facets are
@@ -53,37 +59,19 @@ LOG_SERIES = 1.0 / np.arange(27.0, 3.0, -2.0)
 
 
 @kernel
-def excess_traction(stiffness, rate, closing):  # type: ignore
-    """Return σ_e and its derivative at a closing; the rate is 1/δ_m."""
-    if closing <= 0.0:
-        return 0.0, 0.0
-    share = rate * closing
-    inside = min(share, LARGEST_CLOSING)  # beyond it the law follows its tangent
-    slope = 1.0 / (1.0 - inside)
-    tangent = inside * (2.0 - inside) * slope * slope
-    traction = inside * inside * slope + (share - inside) * tangent
-    return stiffness / rate * traction, stiffness * tangent
-
-
-@kernel
 def excess_energy(stiffness, rate, closing):  # type: ignore
     """Return Φ_e at a closing."""
-    if closing <= 0.0:
-        return 0.0
-    share = min(rate * closing, LARGEST_CLOSING)
-    if share < SERIES_CLOSING:
-        energy = 0.0
-        for k in range(len(ENERGY_SERIES)):
-            energy = energy * share + ENERGY_SERIES[k]
-        energy *= share**3
-    else:
-        energy = -math.log1p(-share) - share - 0.5 * share**2
-    energy *= stiffness / rate**2
-    beyond = closing - LARGEST_CLOSING / rate
-    if beyond > 0.0:
-        traction, tangent = excess_traction(stiffness, rate, LARGEST_CLOSING / rate)
-        energy += beyond * (traction + 0.5 * beyond * tangent)
-    return energy
+    whole = rate * greatest(closing, 0.0)
+    share = least(whole, LARGEST_CLOSING)
+    energy, is_far = 0.0, share >= SERIES_CLOSING
+    for k in range(len(ENERGY_SERIES)):
+        energy = energy * share + ENERGY_SERIES[k]
+    energy = energy * share * share * share
+    if any_lane(is_far):
+        energy = select(is_far, -logarithm(1.0 - share) - share - 0.5 * share * share, energy)
+    beyond = whole - share
+    energy += beyond * (LARGEST_TRACTION + 0.5 * beyond * LARGEST_TANGENT)
+    return stiffness / (rate * rate) * energy
 
 
 @kernel
@@ -91,23 +79,22 @@ def excess_means(stiffness, rate, first, last):  # type: ignore
     """Return E, (E_u, E_v) and (E_uu, E_uv, E_vv) between two closings."""
     (near, far), pairs = excess_forces(stiffness, rate, first, last)
     # E is Φ_e at the less closed end, and the change of the closing times the mean of that end
-    low, beside = (first, near) if first < last else (last, far)
-    return excess_energy(stiffness, rate, low) + abs(last - first) * beside, (near, far), pairs
+    low, beside = least(first, last), select(first < last, near, far)
+    energy = abs(last - first) * beside
+    if any_lane(low > 0.0):
+        energy += excess_energy(stiffness, rate, low)
+    return energy, (near, far), pairs
 
 
 @kernel
 def excess_forces(stiffness, rate, first, last):  # type: ignore
     """Return (E_u, E_v) and (E_uu, E_uv, E_vv) between two closings."""
     u, v = rate * first, rate * last
-    low, high = min(u, v), max(u, v)
-    if high <= 0.0:
-        return (0.0, 0.0), (0.0, 0.0, 0.0)
-    if low >= 0.0 and high <= LARGEST_CLOSING:
-        means = _spread(_hyperbola_moments(u, v), 0.0, 1.0)
-    elif low >= LARGEST_CLOSING:
-        means = _spread(_tangent_moments(u, v), 0.0, 1.0)
-    else:
+    low, high = least(u, v), greatest(u, v)
+    if any_lane((low < 0.0) | (high > LARGEST_CLOSING)):
         means = _piecewise_means(u, v)
+    else:
+        means = _spread(_hyperbola_moments(u, v), 0.0, 1.0)
     near, far, first_pair, mixed, last_pair = means
     force = stiffness / rate
     pairs = stiffness * first_pair, stiffness * mixed, stiffness * last_pair
@@ -117,13 +104,19 @@ def excess_forces(stiffness, rate, first, last):  # type: ignore
 @kernel
 def _piecewise_means(u, v):  # type: ignore
     """Return sums as `_spread` of a path that opens or leaves the hyperbola."""
-    share = 1.0 / (v - u)
-    # parts on the hyperbola and beyond it, from their ends
-    p, q = min(max(u, 0.0), LARGEST_CLOSING), min(max(v, 0.0), LARGEST_CLOSING)
-    means = _spread(_hyperbola_moments(p, q), (p - u) * share, (q - u) * share)
-    if max(u, v) > LARGEST_CLOSING:
-        p, q = max(u, LARGEST_CLOSING), max(v, LARGEST_CLOSING)
-        others = _spread(_tangent_moments(p, q), (p - u) * share, (q - u) * share)
+    # parts on the hyperbola and beyond it, from their ends; of a path without length all or nothing
+    p = least(greatest(u, 0.0), LARGEST_CLOSING)
+    q = least(greatest(v, 0.0), LARGEST_CLOSING)
+    is_still, is_whole = u == v, (p == u) & (q == v)
+    share = 1.0 / select(is_still, 1.0, v - u)
+    begin, end = (p - u) * share, (q - u) * share
+    begin, end = select(is_whole, 0.0, begin), select(is_whole, 1.0, end)
+    means = _spread(_hyperbola_moments(p, q), begin, end)
+    if any_lane(greatest(u, v) > LARGEST_CLOSING):
+        p, q = greatest(u, LARGEST_CLOSING), greatest(v, LARGEST_CLOSING)
+        is_whole = (p == u) & (q == v)
+        begin, end = (p - u) * share, select(is_whole, 1.0, (q - u) * share)
+        others = _spread(_tangent_moments(p, q), begin, end)
         means = (
             means[0] + others[0],
             means[1] + others[1],
@@ -142,15 +135,15 @@ def _hyperbola_moments(u, v):  # type: ignore
     inverse = 1.0 / rest
     z = 0.5 * (u - v) * inverse
     square, scale = z * z, inverse * inverse
-    series, base = _log_series(z, square), middle * (1.0 + rest) / 3.0
+    series, base = _log_series(z, square), middle * (1.0 + rest) * (1 / 3)
     curved = 1.0 / (1.0 - square)
-    traction = (middle * middle + square * (1.0 / 3.0 + square * series)) * inverse
+    traction = (middle * middle + square * (1 / 3 + square * series)) * inverse
     tilted = -z * inverse * (base + square * series)
     return (
         traction,
         tilted,
         scale * (3.0 * base + square * curved),
-        -z * scale * (2.0 / 3.0 + square * (curved - series)),
+        -z * scale * (2 / 3 + square * (curved - series)),
         scale * (base + square * (curved - 2.0 * series)),
     )
 
@@ -158,20 +151,20 @@ def _hyperbola_moments(u, v):  # type: ignore
 @inlined_kernel
 def _log_series(z, square):  # type: ignore
     """Return T."""
-    if square > SERIES_SQUARES[1]:
-        return (math.atanh(z) / z - 1.0 - square / 3.0) / (square * square)
-    total, terms = 0.0, len(LOG_SERIES)
-    for k in range(terms - SHORT_SERIES if square <= SERIES_SQUARES[0] else 0, terms):
+    total, terms, is_far = 0.0, len(LOG_SERIES), square > SERIES_SQUARES[1]
+    for k in range(0 if any_lane(square > SERIES_SQUARES[0]) else terms - SHORT_SERIES, terms):
         total = total * square + LOG_SERIES[k]
+    if any_lane(is_far):
+        tangent = 0.5 * logarithm((1.0 + z) / (1.0 - z)) / z
+        total = select(is_far, (tangent - 1.0 - square * (1 / 3)) / (square * square), total)
     return total
 
 
 @inlined_kernel
 def _tangent_moments(u, v):  # type: ignore
     """Return `_hyperbola_moments` of closings beyond the hyperbola."""
-    traction, tangent = excess_traction(1.0, 1.0, LARGEST_CLOSING)
-    traction += (0.5 * (u + v) - LARGEST_CLOSING) * tangent
-    return traction, (v - u) * tangent / 6.0, tangent, 0.0, tangent / 3.0
+    traction = LARGEST_TRACTION + (0.5 * (u + v) - LARGEST_CLOSING) * LARGEST_TANGENT
+    return traction, (v - u) * (LARGEST_TANGENT / 6), LARGEST_TANGENT, 0.0, LARGEST_TANGENT / 3
 
 
 @inlined_kernel
@@ -219,7 +212,7 @@ def point_step_excess(stiffness, rate, before, after, first, second):  # type: i
 @kernel
 def crossing(before, after):  # type: ignore
     """Return the part of a step after which a closing changes its sign, 0 if it does not."""
-    return before / (before - after) if (before > 0.0) != (after > 0.0) else 0.0
+    return select((before > 0.0) ^ (after > 0.0), before / (before - after), 0.0)
 
 
 @kernel
@@ -232,26 +225,26 @@ def facet_step_excess(stiffness, rate, ends, first, second):  # type: ignore
     """
     a, b, _, _ = without_lag(ends[0], ends[2], first, second)
     c, d, first, second = without_lag(ends[1], ends[3], first, second)
-    ends = a, c, b, d
-    if a == b and c == d:  # at an instant
+    highest = greatest(greatest(a, b), greatest(c, d))
+    near = far = first_pair = mixed = last_pair = 0.0 * stiffness
+    if not any_lane(highest > 0.0):
+        return (near, far), (first_pair, mixed, last_pair)
+    if not any_lane((a != b) | (c != d)):  # at an instant
         means, pairs = excess_forces(stiffness, rate, a, c)
         mean = 0.5 * (first + second)
         return means, (mean * pairs[0], mean * pairs[1], mean * pairs[2])
-    highest = max(ends)
-    near = far = first_pair = mixed = last_pair = 0.0
-    if highest <= 0.0:
-        return (near, far), (first_pair, mixed, last_pair)
-    change, scale = max(abs(b - a), abs(d - c)), _smooth_change(rate, ends, highest)
-    rule = range(0, 2) if change <= SMALLEST_CHANGE * scale else range(2, 5)
+    ends = a, c, b, d
+    change, scale = greatest(abs(b - a), abs(d - c)), _smooth_change(rate, ends, highest)
+    needs_three = change > SMALLEST_CHANGE * scale
+    count = 3 if any_lane(needs_three) else 2
     # the means are smooth in time between the moments at which the ends open or close
     one, other = crossing(a, b), crossing(c, d)
-    breaks = 0.0, min(one, other), max(one, other), 1.0
-    for piece in range(3):
-        length = breaks[piece + 1] - breaks[piece]
-        if length <= 0.0:
-            continue
-        for k in rule:
-            time, weight = breaks[piece] + TIME_POINTS[k] * length, TIME_WEIGHTS[k] * length
+    begin = 0.0 * one
+    for end in (least(one, other), greatest(one, other), 1.0 + 0.0 * one):
+        length = end - begin
+        for k in range(count if any_lane(length > 0.0) else 0):
+            time = begin + select(needs_three, TIME_POINTS[1, k], TIME_POINTS[0, k]) * length
+            weight = select(needs_three, TIME_WEIGHTS[1, k], TIME_WEIGHTS[0, k]) * length
             p, q = a + time * (b - a), c + time * (d - c)
             (n0, n1), (k00, k01, k11) = excess_forces(stiffness, rate, p, q)
             near += weight * n0
@@ -260,28 +253,29 @@ def facet_step_excess(stiffness, rate, ends, first, second):  # type: ignore
             first_pair += weight * k00
             mixed += weight * k01
             last_pair += weight * k11
+        begin = end
     means, pairs = (near, far), (first_pair, mixed, last_pair)
-    if change <= SMALL_CHANGE * scale:
-        return means, pairs
-    return _conserve_energy(stiffness, rate, ends, (first, second), (means, pairs))
+    is_large = change > SMALL_CHANGE * scale
+    if any_lane(is_large):
+        return _conserve_energy(stiffness, rate, ends, (first, second), (means, pairs), is_large)
+    return means, pairs
 
 
 @inlined_kernel
 def _smooth_change(rate, ends, highest):  # type: ignore
     """Return the change of closings on the scale of which the means of a facet vary in time."""
-    a, c, b, d = ends
-    limit = LARGEST_CLOSING / rate
-    if (a > limit) != (b > limit) or (c > limit) != (d > limit):
-        return 0.0
-    scale = max(1.0 / rate - highest, 1.0 / rate - limit)
-    if min(ends) < 0.0 or highest > limit:
-        # the place at which a facet opens, or leaves the hyperbola, moves as its slope changes
-        return min(scale, abs(c - a), abs(d - b)) if (c > a) == (d > b) else 0.0
-    return scale
+    (a, c, b, d), whole = ends, 1.0 / rate
+    limit = LARGEST_CLOSING * whole
+    scale, lowest = whole - least(highest, limit), least(least(a, b), least(c, d))
+    # the place at which a facet opens, or leaves the hyperbola, moves as its slope changes
+    slope = select((c > a) ^ (d > b), 0.0, least(abs(c - a), abs(d - b)))
+    scale = select((lowest < 0.0) | (highest > limit), least(scale, slope), scale)
+    leaves = ((a > limit) ^ (b > limit)) | ((c > limit) ^ (d > limit))
+    return select(leaves, 0.0, scale)
 
 
 @kernel
-def _conserve_energy(stiffness, rate, ends, rates, results):  # type: ignore
+def _conserve_energy(stiffness, rate, ends, rates, results, is_large):  # type: ignore
     """Correct means over a step, so that their work is the change of energy, and derivatives.
 
     Each mean is corrected in proportion to itself and to the change of its closing.
@@ -289,17 +283,18 @@ def _conserve_energy(stiffness, rate, ends, rates, results):  # type: ignore
     (a, c, b, d), (first, second), ((near, far), (k00, k01, k11)) = ends, rates, results
     x, y, turn = b - a, d - c, second - first
     scale = near * x * x + far * y * y
-    if scale <= 0.0:
-        return results
+    is_large = is_large & (scale > 0.0)
+    scale = select(is_large, scale, 1.0)
     before, (f0, f1), _ = excess_means(stiffness, rate, a, c)
     after, (l0, l1), _ = excess_means(stiffness, rate, b, d)
-    factor = (after - before - near * x - far * y) / scale
+    factor = select(is_large, (after - before - near * x - far * y) / scale, 0.0)
     # derivatives of the factor by both ends
     by_near = second * l0 - first * f0 - k00 * x - k01 * y - turn * near
     by_far = second * l1 - first * f1 - k01 * x - k11 * y - turn * far
     by_near -= factor * (k00 * x * x + k01 * y * y + 2.0 * turn * near * x)
     by_far -= factor * (k01 * x * x + k11 * y * y + 2.0 * turn * far * y)
-    by_near, by_far = by_near / scale, by_far / scale
+    by_near = select(is_large, by_near / scale, 0.0)
+    by_far = select(is_large, by_far / scale, 0.0)
     means = near * (1.0 + factor * x), far * (1.0 + factor * y)
     mixed = near * x * by_far + far * y * by_near + factor * k01 * (x + y)
     pairs = (

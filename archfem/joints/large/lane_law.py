@@ -1,8 +1,8 @@
 """The contact law on the overlaps of eight joints at a time, over a step, compiled.
 
 The law is that of `overlap_law`, written for `lanes`: where joints differ, both ways are computed,
-and `select` takes one. Faces do not stretch, and each joint is one segment of as many points. What
-is neither linear nor without cohesion, or no facet, presses by `point_law`, joint by joint.
+and `select` takes one. Faces do not stretch, and each joint is one segment of as many points.
+Cohesive joints, and those that are no facets, press by `point_law`, joint by joint.
 """
 
 from typing import NamedTuple
@@ -12,6 +12,7 @@ import numpy as np
 from archfem._numba import inlined_kernel, kernel
 from archfem._typing import Array
 from archfem.joints.contact_law import SLIP_LIMIT_TOLERANCE
+from archfem.joints.large.closing_law import excess_means, facet_step_excess
 from archfem.joints.large.lanes import (
     WIDTH,
     any_lane,
@@ -34,42 +35,47 @@ from archfem.joints.large.overlap_law import (
 from archfem.joints.large.point_law import damping_tractions, mean_tractions
 from archfem.joints.normal_law import GAUSS_POINTS, GAUSS_WEIGHTS
 
-# Rows of the parameters of joints: depth, k_n, μ, the limit where open, and of both ends of the
-# overlap the slip at which faces end together, and R of it
+# Rows of the parameters of joints: depth, k_n, μ, the limit where open, of both ends of the overlap
+# the slip at which faces end together, and R of it, and 1/δ_m
 DEPTH, STIFFNESS, FRICTION, RESISTANCE, RIGHT_SLIP, RIGHT_SIZE, LEFT_SLIP, LEFT_SIZE = range(8)
+RATE = 8
+
+# 1/δ_m of linear joints among others, which exceed the linear law by less than rounding [1/m]
+LINEAR_RATE = 1e-30
 
 
 class LaneLaw(NamedTuple):
     """Parameters of the law of all joints; those of lanes without a joint do not matter."""
 
     face_law: FaceLaw
-    joint: Array  # rows of parameters (8, j)
+    joint: Array  # rows of parameters (9, j)
     place: Array  # x of the points (p, j) [-]
     share: Array  # width times the part of the depth of a point, or of its facet (p, j) [m]
     spring: Array  # k_s times the area of each point (p, j) [N/m]
     flexibility: Array  # and its inverse [m/N]
-    is_linear: bool  # whether all joints have facets with the linear law, and no cohesion
+    by_lanes: bool  # whether all joints have facets without cohesion
+    stiffens: bool  # whether any of them stiffens as it closes
 
 
 def lane_law(law: FaceLaw) -> LaneLaw:
     """Return the parameters of joints with as many points each."""
     count, contacts = len(law.depth), law.contacts
     size, points = pad(count), int(law.first_point[1])
-    rows, bend = np.ones((8, size)), ROUNDED_SLIP * law.depth
+    rows, bend = np.ones((9, size)), ROUNDED_SLIP * law.depth
     ends = law.end_slip.T
     sizes = np.abs(ends)
     sizes = np.where(sizes < bend, 0.5 * ends**2 / bend, sizes - 0.5 * bend)
     rows[:, :count] = [
         *(law.depth, contacts["normal_stiffness"], contacts["friction"], contacts["resistance"]),
         *(ends[0], sizes[0], ends[1], sizes[1]),
+        np.maximum(contacts["closing_rate"], LINEAR_RATE),
     ]
     rows[STIFFNESS, count:] = 0.0
     of_points, spring = np.ones((4, points, size)), law.shear_spring
     values = law.place, law.width * law.depth_share, spring, 1.0 / spring
     of_points[:, :, :count] = np.swapaxes(np.reshape(values, (4, count, points)), 1, 2)
-    others = contacts["closing_rate"].any() or contacts["cohesion"].any()
-    is_linear = bool(law.facets and not others)
-    return LaneLaw(law, rows, *of_points, is_linear)  # type: ignore[call-arg]
+    kind = bool(law.facets and not contacts["cohesion"].any()), bool(contacts["closing_rate"].any())
+    return LaneLaw(law, rows, *of_points, *kind)  # type: ignore[call-arg]
 
 
 def pad(count: int) -> int:
@@ -255,14 +261,29 @@ def _press_apart(law, point, at, ends, lag):  # type: ignore
 
 
 @inlined_kernel
-def _press_facet(law, point, at, ends, lag):  # type: ignore
-    """Return means of the traction, and Coulomb's limits, each with derivatives."""
-    if not law.is_linear:
-        return _press_apart(law, point, at, ends, lag)
-    pressed = _linear_tractions(load(law.joint, STIFFNESS, at), ends, lag)
+def _press_facet(law, point, at, ends, lag, tractions):  # type: ignore
+    """Return means of the traction, and Coulomb's limits, each with derivatives.
+
+    Those of the linear law, on which damping depends, are stored.
+    """
+    # the gaps, shifted by the lag
+    a, c, b, d = ends
+    p, q = lag * (b - a), lag * (d - c)
+    lagged = a + p, c + q, b + p, d + q
+    if not law.by_lanes:
+        return _press_apart(law, point, at, lagged, lag)
+    stiffness = load(law.joint, STIFFNESS, at)
+    (near, far), (k00, k01, k11) = _linear_tractions(stiffness, lagged, lag)
+    store(tractions, point, at, near)
+    store(tractions, point + 1, at, far)
+    if law.stiffens:  # the excess has no lag
+        rate, closings = load(law.joint, RATE, at), (-a, -c, -b, -d)
+        excess, rates = facet_step_excess(stiffness, rate, closings, 0.0, 1.0)
+        near, far = near - excess[0], far - excess[1]
+        k00, k01, k11 = k00 + rates[0], k01 + rates[1], k11 + rates[2]
     scale = -load(law.joint, FRICTION, at) * load(law.share, point, at)
-    (near, far), (k00, k01, k11) = pressed
-    return pressed, ((scale * near, scale * far), (scale * k00, scale * k01, scale * k11))
+    limits = (scale * near, scale * far), (scale * k00, scale * k01, scale * k11)
+    return ((near, far), (k00, k01, k11)), limits
 
 
 @inlined_kernel
@@ -293,10 +314,15 @@ def _energy_apart(law, at, length, opening, turn):  # type: ignore
 @inlined_kernel
 def lane_energy(law, at, length, opening, turn):  # type: ignore
     """Return the mean energy Φ over the overlaps, and its derivatives by gap and tilt."""
-    if not law.is_linear:
+    if not law.by_lanes:
         return _energy_apart(law, at, length, opening, turn)
-    half = 0.5 * length * turn
-    return _linear_energy(load(law.joint, STIFFNESS, at), opening + half, opening - half)
+    half, stiffness = 0.5 * length * turn, load(law.joint, STIFFNESS, at)
+    first, last = opening + half, opening - half
+    energy, force, moment = _linear_energy(stiffness, first, last)
+    if law.stiffens:
+        more, (near, far), _ = excess_means(stiffness, load(law.joint, RATE, at), -first, -last)
+        energy, force, moment = energy + more, force - near - far, moment + 0.5 * (near - far)
+    return energy, force, moment
 
 
 # ---- shear
@@ -390,13 +416,11 @@ def _sum_points(law, at, ends, slips, overlap, lag, memory):  # type: ignore
     rubs, stride = (none, none, none, none, none, none), 2 if law.face_law.facets else 1
     step, resistance = (slips[0], slips[1], lag), load(law.joint, RESISTANCE, at)
     for point in range(0, len(law.place), stride):
-        # gaps at both ends of the facet at start (a, c) and end (b, d), shifted by the lag
+        # gaps at both ends of the facet at start and end
         x0, x1 = load(law.place, point, at), load(law.place, point + stride - 1, at)
-        a, c, b, d = g0 - x0 * r0, g0 - x1 * r0, g1 - x0 * r1, g1 - x1 * r1
-        p, q = lag * (b - a), lag * (d - c)
-        pressed, limits = _press_facet(law, point, at, (a + p, c + q, b + p, d + q), lag)
+        gaps = g0 - x0 * r0, g0 - x1 * r0, g1 - x0 * r1, g1 - x1 * r1
+        pressed, limits = _press_facet(law, point, at, gaps, lag, memory[3])
         (n0, n1), (k00, k01, k11) = pressed
-        store(memory[3], point, at, n0)
         # sums of f, x f, and of their derivatives by the gap: 1, x, x²
         share, near, far = load(law.share, point, at), k00 + k01, k01 + k11
         total += share * (n0 + n1)
@@ -410,7 +434,6 @@ def _sum_points(law, at, ends, slips, overlap, lag, memory):  # type: ignore
         own = is_free, near, k00 + k01, x0 * k00 + x1 * k01, overlap
         rubs = _add_point_shear(law, point, at, step, own, memory, rubs)
         if stride == 2:
-            store(memory[3], point + 1, at, n1)
             own = is_free, far, k01 + k11, x0 * k01 + x1 * k11, overlap
             rubs = _add_point_shear(law, point + 1, at, step, own, memory, rubs)
     return (total, moment, by_gap, by_place, by_square), rubs
@@ -467,14 +490,14 @@ def lane_damping_loss(law, at, start, end, lag, tractions):  # type: ignore
     """Return the energy that joints lose over a step by the lag of their normal forces.
 
     Both ends are opening and tilt at the middle of the overlap, and its length; the mean tractions
-    of all points are those with the lag.
+    of all points are those of the linear law with the lag.
     """
     (g0, r0, l0), (g1, r1, l1), loss = start, end, spread(0.0)
     stride = 2 if law.face_law.facets else 1
     for point in range(0, len(law.place), stride):
         x0, x1 = load(law.place, point, at), load(law.place, point + stride - 1, at)
         a, c, b, d = g0 - x0 * r0, g0 - x1 * r0, g1 - x0 * r1, g1 - x1 * r1
-        if law.is_linear:
+        if law.by_lanes:
             near, far = _linear_tractions(load(law.joint, STIFFNESS, at), (a, c, b, d), 0.0)[0]
             near, far = load(tractions, point, at) - near, load(tractions, point + 1, at) - far
         else:

@@ -2,7 +2,8 @@
 
 A kernel without branches computes eight joints at the time of one, where its numbers are `LANES`
 and what it compares is a `MASK`. `select` takes the place of a condition. Numba makes such vectors
-by itself in simple loops only.
+by itself in simple loops only. `least`, `greatest`, `select`, `any_lane` and `logarithm` also take
+single numbers, for kernels that serve both.
 """
 
 import operator
@@ -87,13 +88,19 @@ def _register(function: Any, find_signature: Callable[[Any], Any]) -> None:
     infer_global(function, types.Function(type("Template", (AbstractTemplate,), contents)))
 
 
-def _lane_function(result: Any, *arguments: Any) -> Callable[[Any], Any]:
+def _lane_function(
+    result: Any, *arguments: Any, takes_numbers: bool = False
+) -> Callable[[Any], Any]:
     """Return a decorator of what lowers a function, with types; None stands for any type."""
+    of_number = {LANES: types.float64, MASK: types.boolean}
 
     def declare(function: Any) -> Any:
         def find_signature(kinds: Any) -> Any:
             pairs = zip(arguments, kinds, strict=True)
-            return signature(result, *(kind or given for kind, given in pairs))
+            found = [result, *(kind or given for kind, given in pairs)]
+            if takes_numbers and not any(isinstance(kind, VectorType) for kind in kinds):
+                found = [of_number.get(kind, kind) for kind in found]
+            return signature(*found)
 
         def implement(context: Any, builder: Any, sig: Any, values: Any) -> Any:
             found = function(context, builder, sig.args, *values)
@@ -135,31 +142,42 @@ _declare(operator.invert, MASK, MASK, lambda builder, a: builder.not_(a))
 _declare(abs, LANES, LANES, _size)
 
 
-@_lane_function(LANES, LANES, LANES)
+@_lane_function(LANES, LANES, LANES, takes_numbers=True)
 def least(context: Any, builder: Any, kinds: Any, a: Any, b: Any) -> Any:
     """Return the smaller of two numbers, in each lane."""
     del context, kinds
     return builder.select(builder.fcmp_ordered("<", b, a), b, a)
 
 
-@_lane_function(LANES, LANES, LANES)
+@_lane_function(LANES, LANES, LANES, takes_numbers=True)
 def greatest(context: Any, builder: Any, kinds: Any, a: Any, b: Any) -> Any:
     """Return the larger of two numbers, in each lane."""
     del context, kinds
     return builder.select(builder.fcmp_ordered(">", b, a), b, a)
 
 
-@_lane_function(LANES, MASK, LANES, LANES)
+@_lane_function(LANES, MASK, LANES, LANES, takes_numbers=True)
 def select(context: Any, builder: Any, kinds: Any, mask: Any, a: Any, b: Any) -> Any:
     """Return the first number where a condition holds, else the second, in each lane."""
     del context, kinds
     return builder.select(mask, a, b)
 
 
-@_lane_function(types.boolean, MASK)
+@_lane_function(LANES, LANES, takes_numbers=True)
+def logarithm(context: Any, builder: Any, kinds: Any, a: Any) -> Any:
+    """Return the natural logarithm, in each lane."""
+    del context
+    kind, suffix = ir.FunctionType(a.type, [a.type]), f"v{WIDTH}f64" if kinds[0] is LANES else "f64"
+    function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.log.{suffix}")
+    return builder.call(function, [a])
+
+
+@_lane_function(types.boolean, MASK, takes_numbers=True)
 def any_lane(context: Any, builder: Any, kinds: Any, mask: Any) -> Any:
     """Return whether a condition holds in any lane."""
-    del context, kinds
+    del context
+    if kinds[0] is types.boolean:
+        return mask
     bits = builder.bitcast(mask, ir.IntType(WIDTH))
     return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 

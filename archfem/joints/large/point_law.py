@@ -51,18 +51,24 @@ def linear_means(contact, ends, first, second, facet):  # type: ignore
 @inlined_kernel
 def _add_excess(contact, ends, rates, facet, means):  # type: ignore
     """Return `joint_means` with the traction by which a joint exceeds the linear law."""
+    if not facet:
+        return add_point_excess(contact, ends, rates, means)
     stiffness, rate = contact.normal_stiffness, contact.closing_rate
     closings = -ends[0], -ends[1], -ends[2], -ends[3]
-    if facet:
-        (near, far), (k00, k01, k11) = facet_step_excess(
-            stiffness, rate, closings, rates[0], rates[1]
-        )
-    else:
-        near, k00 = point_step_excess(stiffness, rate, closings[0], closings[2], rates[0], rates[1])
-        far = k01 = k11 = 0.0
+    (near, far), (k00, k01, k11) = facet_step_excess(stiffness, rate, closings, rates[0], rates[1])
     normal, taken, slopes, time, moves = means
     normal, taken = (normal[0] - near, normal[1] - far), (taken[0] + near, taken[1] + far)
     return normal, taken, (slopes[0] - k00, slopes[1] - k01, slopes[2] - k11), time, moves
+
+
+@inlined_kernel
+def add_point_excess(contact, ends, rates, means):  # type: ignore
+    """Return `joint_means` at a place, with the traction beyond the linear law."""
+    stiffness, rate = contact.normal_stiffness, contact.closing_rate
+    more, slope = point_step_excess(stiffness, rate, -ends[0], -ends[2], rates[0], rates[1])
+    normal, taken, slopes, time, moves = means
+    normal, taken = (normal[0] - more, normal[1]), (taken[0] + more, taken[1])
+    return normal, taken, (slopes[0] - slope, slopes[1], slopes[2]), time, moves
 
 
 @inlined_kernel
