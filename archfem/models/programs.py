@@ -120,6 +120,13 @@ def write_model(structure: Structure, path: str | Path, *, points: int = 5) -> P
     }
     check_choice(path.suffix, "suffix of the file", list(writers))
     check_integer(points, "points", minimum=2, maximum=16)
+    for joint in structure.joints:
+        for key in ("cohesion", "dilatancy", "tension", "closure", "law"):
+            if value := getattr(joint.contact, key):
+                raise InvalidInput(
+                    f"joint '{joint.name}' has {key} = {value!r}, which files for other programs "
+                    "do not carry: give a dry joint that closes linearly"
+                )
     text = writers[path.suffix]()
     with atomic_write(path) as draft:
         draft.write_text(text, encoding="utf-8")
@@ -132,12 +139,6 @@ def _write_opensees(structure: Structure, points: int) -> str:
     places, weights = Quadrature("lobatto", points).on_facet(1)
     for joint, normal in zip(structure.joints, structure.normals, strict=True):
         contact = joint.contact
-        for key in ("cohesion", "dilatancy", "tension", "closure", "law"):
-            if getattr(contact, key):
-                raise InvalidInput(
-                    f"joint '{joint.name}' has {key} = {getattr(contact, key)!r}, which the "
-                    "springs of OpenSees do not follow: give a dry joint that closes linearly"
-                )
         friction = contact.friction if contact.slides else None
         for place, weight in zip(places, weights, strict=True):
             x, y = joint.middle + (place - 0.5) * joint.depth * joint.tangent

@@ -305,30 +305,24 @@ def predict_gaps(law, gap, before):  # type: ignore
             law.guess[row] = 2.0 * gap[row] - before[row]
 
 
-@inlined_kernel
-def _path_ends(law, gap, segment):  # type: ignore
-    """Return gaps of both ends of a segment before and after, at which the law sees its path."""
-    # on either side of z
-    near, far, half = gap[segment.near], gap[segment.far], 0.5 * law.gain
-    moved = half * (near - law.start[segment.near]), half * (far - law.start[segment.far])
-    return (near - moved[0], far - moved[1]), (near + moved[0], far + moved[1])
-
-
 @kernel
 def evaluate_openings(law, gap, segments):  # type: ignore
     """Evaluate normal and released forces of some segments at z, into their states."""
-    half, facets, points = 0.5 * law.gain, law.facets, law.points
+    half, facets, start, points = 0.5 * law.gain, law.facets, law.start, law.points
     rates, (step, area) = (1.0 - half, 1.0 + half), (2, 0.5) if facets else (1, 1.0)
     for number in segments:
         segment, state = law.segments[number], law.segment_states[number]
-        before, after = _path_ends(law, gap, segment)
+        # ends of the path of the gaps, at which the law sees them, on either side of z
+        near, far = gap[segment.near], gap[segment.far]
+        moved = half * (near - start[segment.near]), half * (far - start[segment.far])
+        before, after = (near - moved[0], far - moved[1]), (near + moved[0], far + moved[1])
         stiffens = points[segment.begin].closing_rate > 0.0
         state.near = state.far = state.first = state.mixed = state.last = 0.0
         if max(before + after) <= 0.0 and (facets or not stiffens):
-            # linear forces over the whole path
+            # forces are linear over the whole path
             for k in range(segment.begin, segment.end):
                 point, point_state = points[k], law.point_states[k]
-                point_state.normal = point.near * gap[segment.near] + point.far * gap[segment.far]
+                point_state.normal = point.near * near + point.far * far
                 point_state.area = area * point.area
                 point_state.near = point_state.far = 0.0
             continue
@@ -357,9 +351,13 @@ def evaluate_openings(law, gap, segments):  # type: ignore
 def _add_excess(law, gap, segments):  # type: ignore
     """Add what facets press beyond the linear law, eight of them at a time."""
     points, rows, pressed, count = law.points, law.excess, law.pressed, 0
+    gain, start = law.gain, law.start if law.gain > 0.0 else gap
     for number in segments:
         segment = law.segments[number]
-        before, after = _path_ends(law, gap, segment)
+        # the excess has no lag: from the gaps at the start to those at the end
+        before = start[segment.near], start[segment.far]
+        moved = gain * (gap[segment.near] - before[0]), gain * (gap[segment.far] - before[1])
+        after = before[0] + moved[0], before[1] + moved[1]
         if points[segment.begin].closing_rate == 0.0 or min(before + after) > 0.0:
             continue
         for first in range(segment.begin, segment.end, 2):
@@ -381,11 +379,9 @@ def _add_excess(law, gap, segments):  # type: ignore
 @kernel
 def _press_facets(law, count):  # type: ignore
     """Add the excess of eight facets or less to the states of their points and segments."""
-    rows, half = law.excess, 0.5 * law.gain
+    rows, rate = law.excess, (0.0, law.gain) if law.gain > 0.0 else (1.0, 1.0)
     ends = load(rows, 2, 0), load(rows, 3, 0), load(rows, 4, 0), load(rows, 5, 0)
-    means, rates = facet_step_excess(
-        load(rows, 0, 0), load(rows, 1, 0), ends, 1.0 - half, 1.0 + half
-    )
+    means, rates = facet_step_excess(load(rows, 0, 0), load(rows, 1, 0), ends, rate[0], rate[1])
     store(rows, 6, 0, means[0])
     store(rows, 7, 0, means[1])
     for k in range(3):
@@ -525,25 +521,29 @@ def _enter(entries, number, where, value):  # type: ignore
 @kernel
 def open_forces(law, gap, released):  # type: ignore
     """Evaluate the forces that joints release at an instant, of all opening rows; their energy."""
-    points, facets, step, energy = law.points, law.facets, 2 if law.facets else 1, 0.0
+    points, facets, energy = law.points, law.facets, 0.0
     for k in range(len(released)):
         released[k] = 0.0
     for segment in law.segments:
-        opening = gap[segment.near], gap[segment.far]
-        if not releases(points[segment.begin], opening):
+        opening, first = (gap[segment.near], gap[segment.far]), points[segment.begin]
+        if not releases(first, opening):
             continue
-        for first in range(segment.begin, segment.end, step):
-            # a path without length: both its ends are the gaps themselves
-            ends = gaps_between(
-                opening, opening, points[first].share, points[first + step - 1].share
-            )
-            taken, lacking = instant_release(points[first], ends, facets)
-            energy += points[first].area * lacking
-            for end in range(step):
-                point = points[first + end]
-                force = point.area * taken[end]
-                released[segment.near] += (1.0 - point.share) * force
-                released[segment.far] += point.share * force
+        if facets:  # they cover their segment: integrals over them are one over all of it
+            area = 0.0
+            for number in range(segment.begin, segment.end, 2):
+                area += points[number].area
+            taken, lacking = instant_release(first, opening + opening, True)
+            released[segment.near] += area * taken[0]
+            released[segment.far] += area * taken[1]
+            energy += area * lacking
+            continue
+        for number in range(segment.begin, segment.end):
+            point, place = points[number], between(opening, points[number].share)
+            taken, lacking = instant_release(point, (place, place, place, place), False)
+            force = point.area * taken[0]
+            released[segment.near] += (1.0 - point.share) * force
+            released[segment.far] += point.share * force
+            energy += point.area * lacking
     return energy
 
 

@@ -39,7 +39,7 @@ from archfem.dynamics.solvers.sparse_products import (
     sparse_rows,
     without_round_off,
 )
-from archfem.joints.large.point_law import linear_means, releases
+from archfem.joints.large.point_law import linear_means
 
 
 class LinearSystem(NamedTuple):
@@ -379,7 +379,8 @@ def _open_damping(law, gap):  # type: ignore
         stiffens = points[part.begin].closing_rate > 0.0
         if not stiffens:
             lost -= moved[0] * state.near + moved[1] * state.far
-        if not releases(points[part.begin], first + last):
+        late = _lagged(first + last, law.damping_lag)
+        if max(first + last) <= 0.0 and not (stiffens and max(late) > 0.0):
             continue
         # ... less that of the same forces without lag
         for k in range(part.begin, part.end, step):

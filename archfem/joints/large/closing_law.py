@@ -51,8 +51,8 @@ _legendre: Any = np.polynomial.legendre  # without type annotations
 _rules = np.array([np.pad(_legendre.leggauss(2), ((0, 0), (0, 1))), _legendre.leggauss(3)])
 TIME_POINTS, TIME_WEIGHTS = 0.5 * (1.0 + _rules[:, 0].copy()), 0.5 * _rules[:, 1].copy()
 
-# Coefficients of the series of Φ_e and of T, the highest power first. T takes twelve terms up to a
-# z² of 0.0625, and six up to 0.01, where most facets are
+# Coefficients of the series of Φ_e and of T, the highest power first, an even number. T takes
+# twelve up to a z² of 0.0625, and six up to 0.01, where most facets are
 ENERGY_SERIES = 1.0 / np.arange(22.0, 2.0, -1.0)
 SERIES_SQUARES, SHORT_SERIES = (0.01, 0.0625), 6
 LOG_SERIES = 1.0 / np.arange(27.0, 3.0, -2.0)
@@ -63,9 +63,7 @@ def excess_energy(stiffness, rate, closing):  # type: ignore
     """Return Φ_e at a closing."""
     whole = rate * greatest(closing, 0.0)
     share = least(whole, LARGEST_CLOSING)
-    energy, is_far = 0.0, share >= SERIES_CLOSING
-    for k in range(len(ENERGY_SERIES)):
-        energy = energy * share + ENERGY_SERIES[k]
+    energy, is_far = _sum_series(ENERGY_SERIES, 0, share), share >= SERIES_CLOSING
     energy = energy * share * share * share
     if any_lane(is_far):
         energy = select(is_far, -logarithm(1.0 - share) - share - 0.5 * share * share, energy)
@@ -151,13 +149,23 @@ def _hyperbola_moments(u, v):  # type: ignore
 @inlined_kernel
 def _log_series(z, square):  # type: ignore
     """Return T."""
-    total, terms, is_far = 0.0, len(LOG_SERIES), square > SERIES_SQUARES[1]
-    for k in range(0 if any_lane(square > SERIES_SQUARES[0]) else terms - SHORT_SERIES, terms):
-        total = total * square + LOG_SERIES[k]
+    skipped = 0 if any_lane(square > SERIES_SQUARES[0]) else len(LOG_SERIES) - SHORT_SERIES
+    total, is_far = _sum_series(LOG_SERIES, skipped, square), square > SERIES_SQUARES[1]
     if any_lane(is_far):
         tangent = 0.5 * logarithm((1.0 + z) / (1.0 - z)) / z
         total = select(is_far, (tangent - 1.0 - square * (1 / 3)) / (square * square), total)
     return total
+
+
+@inlined_kernel
+def _sum_series(coefficients, first, x):  # type: ignore
+    """Return the sum of a series from a coefficient on."""
+    # even and odd powers beside each other: each of them waits for half as many results
+    odd, even, square = 0.0, 0.0, x * x
+    for k in range(first, len(coefficients), 2):
+        odd = odd * square + coefficients[k]
+        even = even * square + coefficients[k + 1]
+    return odd * x + even
 
 
 @inlined_kernel

@@ -90,9 +90,10 @@ def test_polygons_of_udec_are_the_blocks_clockwise(tmp_path):
 
 
 def test_other_joints_and_blocks_are_refused_in_words(tmp_path):
-    contact = replace(STONE_TO_STONE, cohesion=1e4)
-    with pytest.raises(af.errors.InvalidInput, match=r"has cohesion = 10000.0, which the springs"):
-        af.models.write_model(af.circular_arch(**RING, contact=contact), tmp_path / "ring.py")
+    for key, value, name in (("cohesion", 1e4, "ring.py"), ("closure", 1e-4, "ring.3ddat")):
+        ring = af.circular_arch(**RING, contact=replace(STONE_TO_STONE, **{key: value}))
+        with pytest.raises(af.errors.InvalidInput, match=f"has {key} = {value}, which files"):
+            af.models.write_model(ring, tmp_path / name)
     angle = ((0, 1), (2, 1), (2, 2), (1, 2), (1, 3), (0, 3))
     blocks = [af.Block(((0, 0), (2, 0), (2, 1), (0, 1)), af.STONE, "base", fixed=True, role="pier")]
     blocks.append(af.Block(angle, af.STONE, "angle", role="pier"))
