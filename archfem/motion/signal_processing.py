@@ -28,7 +28,7 @@ MAX_SAMPLES = 10_000_000
 def validate_samples(samples: Array | None, component: str) -> Array:
     """Copy a component into a read-only array of finite numbers below 5 g."""
     check_unmasked(samples, f"{component} acceleration")
-    if np.iscomplexobj(samples):  # a conversion would drop the imaginary part
+    if np.iscomplexobj(np.asarray(samples)):  # a conversion would drop the imaginary part
         raise InvalidInput(f"{component} acceleration is complex: give its real samples")
     try:
         row = np.array(samples, dtype=float)
