@@ -83,7 +83,8 @@ class Vehicle:
         for key in ("area_load", "wheels", "lane"):
             check_number(getattr(self, key), f"{key} of {self.name}", minimum=0.0)
         longest = max(self.spacings, default=0.0)
-        if min(self.axles) < 1e3 or longest > 100.0 or 0.0 < self.area_load < 100.0:
+        light = min(self.axles) < 1e3 and max(self.axles) != 1.0  # the factor of 1 N is a load
+        if light or longest > 100.0 or 0.0 < self.area_load < 100.0:
             raise InvalidInput(
                 f"vehicle '{self.name}' has axles of {self.axles} N, spacings of {self.spacings} m "
                 f"and {self.area_load} Pa: that can only be a wrong unit"

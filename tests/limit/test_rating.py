@@ -311,5 +311,6 @@ def test_a_vehicle_needs_weights_and_spacings():
     ],
 )
 def test_vehicles_of_wrong_units_are_refused(given):
+    Vehicle("unit load", (1.0, 1.0), spacings=(3.2,))
     with pytest.raises(af.InvalidInput, match=r"'lorry' .* can only be a wrong unit"):
         Vehicle("lorry", **given)
