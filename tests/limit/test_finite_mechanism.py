@@ -1,6 +1,6 @@
 """Finite motion of mechanisms: closed forms of rocking, sliding and linkages, and their events."""
 
-from itertools import pairwise
+from itertools import combinations, pairwise
 from math import atan2, cos, hypot, sin, tan
 
 import numpy as np
@@ -209,12 +209,32 @@ def test_a_corner_of_a_bonded_wall_turns_away_from_the_stones_it_slides_on():
     assert path.end is PathEnd.FALLS
 
 
-@pytest.mark.slow
-def test_a_mechanism_that_slides_in_forty_joints_locks_below_the_bound():
-    wall = bonded_wall(12, 6)
+def test_a_mechanism_with_three_hinges_on_a_line_locks_below_the_bound():
+    """Three bodies with hinges A, B and C on a line turn by unequal angles only to first order.
+
+    Two stones beside each other on one below have them at their outer lower corners and between
+    them: finite rotations would bring the outer ones nearer to each other, which friction prevents.
+    """
+    wall = bonded_wall(8, 6)
     path = follow(wall)
-    assert path.factors[0] < af.collapse_factor(wall, live=af.BodyForce(1.0)).factor
+    assert 0.0 < path.factors[0] < af.collapse_factor(wall, live=af.BodyForce(1.0)).factor
     assert path.end is PathEnd.LOCKS
+    assert np.abs(path.displacements[-1]).max() < 1e-6
+    chain = path.mechanisms[0]
+    hinges = {  # by the two bodies that turn about them
+        frozenset(chain.body[[contact.corner, contact.face]]): contact.point
+        for contact in chain.contacts
+        if not contact.slip
+    }
+    triangles = [
+        [hinges[frozenset(pair)] for pair in combinations(bodies, 2)]
+        for bodies in combinations(set(chain.body), 3)
+        if all(frozenset(pair) in hinges for pair in combinations(bodies, 2))
+    ]
+    assert triangles
+    for first, second, third in triangles:
+        (x, y), (far_x, far_y) = second - first, third - first
+        assert x * far_y - y * far_x == pytest.approx(0.0, abs=1e-12)
 
 
 def circles_meet(one, r_one, two, r_two, near):
