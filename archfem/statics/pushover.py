@@ -95,7 +95,7 @@ class Pushover(ResultDisplay):
     def factor(self) -> float:
         """Largest factor under a load; of a settlement that of the last step.
 
-        Where bonds break or displacements are large, the curve falls after its largest factor.
+        The curve falls after it where bonds break, displacements are large or joints have slid.
         """
         factors = self.curve["factor"]
         return float(factors.max() if factors.units == "1" else factors[-1])

@@ -66,6 +66,23 @@ def test_history_equals_that_of_the_general_solver(monkeypatch, damping):
     assert np.abs(energies[0] - energies[1]).max() < 1e-6 * np.abs(general["N"]).max()
 
 
+def test_supports_that_have_moved_and_turned_stay_there(monkeypatch):
+    """The frame of a joint turns with both of its stones, a fixed one too."""
+    structure, motion = ring(), af.Motion.synthetic(duration=0.3, pga=5.0, seed=3)
+    supports = np.zeros((len(structure.blocks), 3))
+    supports[0], supports[-1] = (-0.002, 0.001, 0.02), (0.003, -0.001, -0.005)
+    runs = []
+    for find in (find_stone_tree, lambda equation: None):
+        monkeypatch.setattr(newton, "find_stone_tree", find)
+        model = af.build(structure, fidelity="rigid", displacements="large")
+        model = model.with_support_motion(supports)
+        runs.append(af.time_history(model, motion, dt=0.002, damping=DAMPING))
+    for name in ("slip", "rotation", "N"):
+        chain, general = (run.joints[name] for run in runs)
+        size = float(np.abs(general).max())
+        assert float(np.abs(chain - general).max()) < 1e-7 * size, name
+
+
 def test_tree_of_rings_on_a_pier_is_eliminated_from_its_leaves():
     piers = {"heights": (0.8, 1.2, 0.8), "breadths": (0.8, 0.6, 0.8)}
     structure = af.shapes.arcade(

@@ -105,19 +105,17 @@ side_by_side_forces, one_by_one_forces = map(from_python, (evaluate_lanes, evalu
 
 
 def joints_of(contact, quadrature=None):
-    """Return the law of the joints of two rings on piers, some of whose faces are longer."""
-    structure = af.shapes.arcade(
-        spans=(2.0, 2.0),
-        thicknesses=0.3,
-        voussoirs=4,
-        embraces=150.0,
-        heights=(0.8, 1.2, 0.8),
-        breadths=(0.8, 0.6, 0.8),
-        contact=af.Contact(**STONE, **contact),
-    )
+    """Return the law of the joints of 18 stones on each other, some of whose faces are longer."""
+    ends = 0.5 + 0.1 * np.random.default_rng(2).integers(0, 3, (18, 2))
+    blocks = []
+    for k, (left, right) in enumerate(ends.tolist()):
+        outline = ((-left, k), (right, k), (right, k + 1.0), (-left, k + 1.0))
+        blocks.append(af.Block(outline, af.STONE, f"stone {k}", fixed=k == 0))
+    structure = af.masonry.assembled(blocks, af.Contact(**STONE, **contact), width=0.7)
     options = {"quadrature": quadrature} if quadrature else {}
-    model = af.build(structure, fidelity="rigid", displacements="large", **options)
-    return model.joints.face_law
+    law = af.build(structure, fidelity="rigid", displacements="large", **options).joints.face_law
+    assert set(np.sign(law.end_slip).ravel()) == {-1.0, 0.0, 1.0}
+    return law
 
 
 def random_measures(rng, count, depth):
