@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from kernels import from_python
 
 import archfem as af
+from archfem._numba import kernel
 from archfem.dynamics.schemes import Conserving
-from archfem.dynamics.solvers import newton
+from archfem.dynamics.solvers import newton, rigid_chains
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.stone_tree import find_stone_tree
 
@@ -81,6 +83,43 @@ def test_supports_that_have_moved_and_turned_stay_there(monkeypatch):
         chain, general = (run.joints[name] for run in runs)
         size = float(np.abs(general).max())
         assert float(np.abs(chain - general).max()) < 1e-7 * size, name
+
+
+@kernel
+def evaluate_step(system, before, after):
+    rigid_chains._move_stones(system.stones, before, before, True)
+    rigid_chains._start_joints(system, 0)
+    rigid_chains._move_stones(system.stones, before, after, False)
+    rigid_chains._evaluate_joints(system, 0)
+    rigid_chains._couple_joints(system, 0)
+
+
+def test_coupling_of_stones_is_the_derivative_of_their_forces():
+    """Central differences at 0.05 rad; joints that open are integrated by Gauss's rule."""
+    structure = ring(contact=af.Contact(1e6, 4e5, None))
+    equation = equation_of(structure)
+    tree, rng = find_stone_tree(equation), np.random.default_rng(4)
+    system = rigid_chains.chain_system(equation, tree, 0.002)
+    before, after = 0.05 * rng.standard_normal((2, len(system.mass) + 3))
+    before[-3:] = after[-3:] = 0.0
+    evaluate = from_python(evaluate_step)
+
+    def forces(place, change):
+        moved = after.copy()
+        moved[place] += change
+        evaluate(system, before, moved)
+        return system.forces[:6].copy()
+
+    forces(0, 0.0)
+    coupling = system.coupling.reshape(2, 2, 3, 3, -1).copy()
+    scale = np.abs(coupling).max()
+    for joint in range(len(structure.joints)):
+        for side, stone in enumerate(system.stone[:, joint]):
+            for k in range(3 if stone < len(tree.parent) else 0):
+                pair = [forces(3 * stone + k, sign * 1e-6)[:, joint] for sign in (1.0, -1.0)]
+                expected = (pair[0] - pair[1]) / 2e-6
+                found = coupling[:, side, :, k, joint].ravel()
+                assert found == pytest.approx(expected, abs=1e-4 * scale), (joint, side, k)
 
 
 def test_tree_of_rings_on_a_pier_is_eliminated_from_its_leaves():

@@ -264,10 +264,25 @@ alternatives.slenderer = { weight = 1.0, set = ["structure.breadth=0.22"] }
     assert "Cornell et al." in report
 
 
-@pytest.mark.parametrize(
-    "hazard",
-    ["{ rates = [0.1] }", "{ factor = 1.0 }", "{ file = 'none.csv', period = 0.2 }", "{}"],
-)
+def test_a_hazard_is_a_power_law_points_or_a_row_of_a_file(tmp_path):
+    def parse(words):
+        return risk_keys.parse_hazard(tomllib.loads(f"h = {words}")["h"], tmp_path)
+
+    assert parse("{ factor = 0.01, exponent = 2.0 }").rate_of(2.0) == pytest.approx(0.0025)
+    points = parse('{ return_periods = [475, 2475], intensities = ["4 m/s**2", 7.0] }')
+    assert points.rate_of([4.0, 7.0]) == pytest.approx([1 / 475, 1 / 2475])
+    rows = "31.16,40.84,0.0,0.4,0.2\n", "31.16,40.85,0.0,0.3,0.1\n"
+    head = "#,,,\"imt='PGA', investigation_time=50.0\"\nlon,lat,depth,poe-0.1,poe-0.2\n"
+    (tmp_path / "curves.csv").write_text(head + "".join(rows))
+    for words, probability in (("", 0.4), (", site = 1", 0.3)):
+        hazard = parse(f"{{ file = 'curves.csv'{words} }}")
+        rate = -np.log(1.0 - probability) / 50.0
+        assert hazard.rate_of(0.1 * 9.80665) == pytest.approx(rate)
+    with pytest.raises(af.InvalidInput, match="a file names its measure"):
+        parse("{ file = 'curves.csv', period = 0.2 }")
+
+
+@pytest.mark.parametrize("hazard", ["{ rates = [0.1] }", "{ factor = 1.0 }", "{}"])
 def test_a_hazard_that_is_none_is_refused(hazard):
     with pytest.raises(af.InvalidInput, match="hazard"):
         risk_keys.parse_hazard(tomllib.loads(f"h = {hazard}")["h"], Path())
