@@ -62,6 +62,9 @@ def test_history_equals_that_of_the_general_solver(monkeypatch, damping):
     # both solve each step to 1e-9 of the weight: joints that open and slide amplify that
     for name, size in (("slip", slip), ("rotation", turn), ("N", general["N"].max())):
         assert float(np.abs(chain[name] - general[name]).max()) < 1e-7 * float(size)
+    # by matrices that are as good: 1518 and 1606, or 1573 and 1625
+    chained, other = (int(run.dataset["iterations"].sum()) for run in runs)
+    assert chained < 1.02 * other
     drifts = [abs(run.dataset.attrs["energy_drift"]) for run in runs]
     assert max(drifts) < 1e-7
     energies = [run.dataset["energy_drift"].values for run in runs]

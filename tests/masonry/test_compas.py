@@ -63,14 +63,16 @@ def test_a_plane_assembly_is_its_elevation(tmp_path, kind):
     assert af.collapse_factor(found, live=load).factor == pytest.approx(expected, rel=1e-6)
 
 
-def wedge():
+SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+
+
+def wedge(place=0.0):
     """A block whose back is smaller than its front."""
-    mesh = prism([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
-    mesh["vertex"]["5"]["x"] = 0.8
+    mesh = prism([(place + x, z) for x, z in SQUARE])
+    mesh["vertex"]["5"]["x"] -= 0.2
     return mesh
 
 
-SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 NARROW = [(0.6 * x, z + 1.0) for x, z in SQUARE]
 
 
@@ -78,6 +80,7 @@ NARROW = [(0.6 * x, z + 1.0) for x, z in SQUARE]
     ("meshes", "words"),
     [
         ([prism(SQUARE), wedge()], "it is not plane: across y 'block 1'"),
+        ([wedge(3e3)], "it is not plane"),
         ([prism(SQUARE), prism(NARROW, width=0.5)], "have not the width of all blocks"),
         ([], "it has no blocks"),
         ([{"vertex": {"0": {"x": 0.0}}, "face": {}}], "'block 0' is no mesh of compas"),

@@ -255,6 +255,8 @@ def test_pieces_fill_the_body_and_are_soil_still():
     fill = jointed_fill(whole, 0.4, friction_angle=35.0, cohesion=5e3)
     soil = find_yielding_blocks(fill)
     assert sum(fill.blocks[n].area for n in soil) == pytest.approx(whole.blocks[-1].area)
+    # slivers below 30 % of a whole piece are merged
+    assert min(fill.blocks[n].area for n in soil) > 0.3 * 0.4**2 * np.sqrt(3.0) / 8.0
     assert {fill.blocks[n].part for n in soil} == {"backfill"}
     assert find_soft_blocks(fill) == ()  # no fidelity is too low for them
     assert [j.name for j in fill.joints if j.role == "ring"] == [

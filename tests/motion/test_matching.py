@@ -50,6 +50,7 @@ def test_matching_keeps_the_character_of_the_motion(match, shaking):
     before, after = match.before["horizontal"], match.after["horizontal"]
     assert before.pga == pytest.approx(shaking.pga)
     assert after.pga == match.motion.pga
+    assert match.motion.dt == 0.005  # a tenth of the shortest period that is matched
     assert after.significant_duration == pytest.approx(before.significant_duration, rel=0.3)
     moved = np.corrcoef(match.motion.at(shaking.times())[:, 0], shaking.horizontal)[0, 1]
     assert moved > 0.7

@@ -771,6 +771,11 @@ def test_zeros_that_fill_a_block_end_a_file(write):
     assert read_channels(write(content))[0].samples == pytest.approx(DAMAGE["WAVE"], abs=2e-4)
 
 
+def test_an_odd_count_of_numbers_of_a_film_includes_the_whole_last_pair(write):
+    content = SAMPLES["smc_film"].replace(f"{80:10d}", f"{79:10d}")
+    assert read_channels(write(content))[0].samples == pytest.approx(DAMAGE["WAVE"], abs=2e-4)
+
+
 def test_one_line_left_over_in_the_last_block_of_a_film_is_no_sample(write):
     content = SAMPLES["smc_film"] + DAMAGE["rows"](np.array([9.0, 1.0, 9.1, 2.0]), "11.3E", 8)
     assert len(read_channels(write(content))[0].samples) == 40
