@@ -203,7 +203,7 @@ def accuracy(options: argparse.Namespace) -> None:
     _write_results("accuracy", case, options.out, lambda: files)
 
 
-def risk(options: argparse.Namespace) -> None:
+def risk(options: argparse.Namespace) -> int:
     """Compute the annual rate at which the structure of a case falls, by its [risk]."""
     from archfem.studies.collapse_risk import collapse_risk
 
@@ -227,6 +227,7 @@ def risk(options: argparse.Namespace) -> None:
     print(found)
     files: Files = {"risk.txt": str(found), "risk.nc": found.save, "risk.png": found.plot()}
     _write_results("risk", case, options.out, lambda: files)
+    return ExitCode.DOUBTFUL if found.doubts else 0
 
 
 def verdict(options: argparse.Namespace) -> None:

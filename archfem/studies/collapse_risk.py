@@ -36,8 +36,10 @@ from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.motion_scaling import admissible_range
 from archfem.dynamics.recorder import Record
+from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.structure import Structure
+from archfem.models.model import Doubt
 from archfem.motion.hazard import MEASURES, Hazard
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
@@ -76,6 +78,10 @@ SEARCH_FACTOR, MOST_RUNS = 1.6, 12
 
 # Samples of the bootstrap
 RESAMPLES = 400
+
+# Share of the rate beyond the last point of the hazard from which it is in doubt [-]: a slope that
+# is wrong by half there moves the rate by more than a usual interval, 20 %
+LARGEST_EXTRAPOLATED_SHARE = 1.0 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -484,16 +490,32 @@ class CollapseRisk(ResultDisplay):
         return edges, shares / shares.sum()
 
     @property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Reasons why the rate may be wrong, each with its remedy."""
+        last, unit = self.hazard.intensity[-1], MEASURES[self.hazard.measure]
+        edges, shares = self.disaggregation(240)
+        beyond = float(shares[edges[:-1] > last].sum())
+        if beyond <= LARGEST_EXTRAPOLATED_SHARE:
+            return ()
+        cause = (
+            f"{beyond:.0%} of the rate comes from intensities above {last:.3g} {unit}, the last of "
+            "the hazard, whose slope is extrapolated there"
+        )
+        return (Doubt(cause, "give the hazard at longer return periods"),)
+
+    @property
     def sentence(self) -> str:
         """The rate, and what it rests on."""
         curve, parts = self.fragility(), self.dispersions()
+        records = len(np.unique(self._of_answered("record_number")))
         failed = len(self.dataset["sample"]) - len(self.answered)
         known = ", ".join(f"{name} {x:.2f}" for name, x in parts.items() if name != "total")
         shares = "its parts unknown, with one sample a record" if "nan" in known else known
         text = (
             f"falls at {self.rate()}; median {curve.median:.3g} "
             f"{MEASURES[self.hazard.measure]} of {self.hazard.measure}, dispersion "
-            f"{curve.dispersion:.2f} ({shares}); {self.best_measure} has the least dispersion"
+            f"{curve.dispersion:.2f} ({shares}); {self.best_measure} has the least dispersion; "
+            f"{len(self.answered)} samples under {records} records"
         )
         return text + (f"; {failed} samples have no answer" if failed else "")
 
@@ -511,8 +533,9 @@ class CollapseRisk(ResultDisplay):
         return align_columns(["alternative", "samples", "falls"], rows)
 
     def __str__(self) -> str:
-        """Sentence and table."""
-        return f"{self.sentence}\n{self.table()}"
+        """Sentence, doubts and table."""
+        doubts = [f"{DOUBT_MARK}{doubt}" for doubt in self.doubts]
+        return "\n".join([self.sentence, *doubts, self.table()])
 
     def _summary(self) -> str:
         return f"CollapseRisk: {self.sentence}"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 from scipy.stats import norm
 
@@ -55,6 +56,27 @@ def test_rate_of_a_lognormal_capacity_is_that_of_cornell():
     z = brentq(lambda z: norm.pdf(z) / norm.cdf(z) - 2.5 * dispersion, -5.0, 5.0)
     peak = np.sqrt(edges[1:] * edges[:-1])[np.argmax(shares)]
     assert peak == pytest.approx(median * np.exp(dispersion * z), rel=0.04)  # a bin is 4 %
+
+
+@pytest.mark.parametrize("last", [2.5, 8.0])
+def test_a_rate_from_beyond_the_last_point_of_the_hazard_is_in_doubt(last):
+    median, dispersion = 5.0, 0.4
+    capacity = median * np.exp(dispersion * norm.ppf((np.arange(400) + 0.5) / 400))
+    site = asdict(SITE) | {"intensity": [1.0, last], "rate": SITE.rate_of([1.0, last]).tolist()}
+    risk = risk_of(capacity, np.arange(400) % 20)
+    risk.dataset.attrs["hazard"] = json.dumps(site)
+
+    def rate_above(least):
+        """Rate of falls by intensities above one, by the density of the power law's rate."""
+        x = np.linspace(least, 60.0, 200_000)
+        falls = norm.cdf(np.log(x / median) / dispersion) * 2.5 * SITE.rate_of(x) / x
+        return trapezoid(falls, x)
+
+    share = rate_above(last) / rate_above(0.2)
+    if share < 0.3:
+        assert not risk.doubts
+    else:
+        assert f"{share:.0%} of the rate comes from intensities above {last:g}" in str(risk)
 
 
 def test_the_interval_holds_the_rate_as_often_as_it_says():
@@ -251,10 +273,11 @@ alternatives.slender = {}
 alternatives.slenderer = { weight = 1.0, set = ["structure.breadth=0.22"] }
 """
     )
-    main(["risk", str(path), "--out", str(tmp_path / "out")])
+    code = main(["risk", str(path), "--out", str(tmp_path / "out")])
     printed = capsys.readouterr().out
     found = CollapseRisk.read(tmp_path / "out" / "risk.nc")
     assert str(found) in printed
+    assert (code == 3) == bool(found.doubts)
     assert found.rate("slenderer").rate > found.rate("slender").rate
     assert found.hazard.rate_of([1.0, 0.4 * 9.80665]) == pytest.approx([0.02, 0.001])
     main(["report", str(tmp_path / "out")])

@@ -193,7 +193,7 @@ def list_doubts(data: ReportData) -> list[str]:
     doubts = list(reasons)
     if len(verdicts) > 1:
         doubts = [f"{count} of {len(verdicts)} runs: {text}" for text, count in reasons.items()]
-    for name in ("limit.txt", "rating.txt", "assessment.txt"):
+    for name in ("limit.txt", "rating.txt", "assessment.txt", "risk.txt"):
         lines = (data.read_text(name) or "").splitlines()
         # what a kinematic assessment leaves out stands there as a note
         for mark in (DOUBT_MARK, "note: "):
