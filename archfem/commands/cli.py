@@ -203,6 +203,7 @@ def _add_case_commands(commands: Any) -> None:
         default=236,
         help="runs beside those of one changed property each (236)",
     )
+    add_to("--pair", metavar="NAME", help="motion of a [suite] of several")
     about = "annual rate of collapse, from the hazard and the sampling of [risk]"
     add("risk", about)("--workers", type=int, default=1, help="processes for the runs (1)")
     about = "speed against error over fidelities, meshes, quadratures and steps"

@@ -139,6 +139,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     rows = dict(evaluate_with_bar(points, evaluate_variation, workers, unit="run"))
     dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], neutral)
     dataset["sampled"] = "run", np.arange(len(points)) >= len(points) - samples
+    dataset.attrs["motion"] = motion.name
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
     dataset.attrs["k_s"] = float(np.mean([contact.shear_stiffness for contact in contacts]))

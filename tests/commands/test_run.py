@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 import archfem as af
 from archfem.cases.run import carry_out
@@ -155,6 +156,19 @@ def run_with(small, shake):
     """Carry out a case as `archfem run` does, with another function that runs a motion."""
     case, out = af.Case.read(small), small.parent / "out"
     print_results(case, carry_out(case, out, run_motion=shake), out)
+
+
+def test_a_range_is_of_one_motion_of_a_suite(small, unplotted, capsys):
+    out = small.parent / "out"
+    given = ["verdict", str(small), "--samples", "1", "--out", str(out)]
+    assert af.commands.main(given) == 1
+    assert "take one of ['first', 'second'] by --pair NAME" in capsys.readouterr().err
+    assert af.commands.main([*given, "--pair", "first"]) == 0
+    assert xr.load_dataset(out / "verdict_range.nc").attrs["motion"] == "first"
+    assert run(small) == 0
+    assert af.commands.main(["report", str(out)]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert re.search(r"uncertain, under \S*first\S* the structure falls", page)
 
 
 @pytest.mark.slow

@@ -169,7 +169,8 @@ def _conclude_range(data: ReportData) -> Iterator[str]:
         words = ", ".join(map(property_text, computed.properties))
         varied = " and ".join(words.rsplit(", ", 1))
         verb = "is" if len(computed.properties) == 1 else "are"
-        yield f"Where {varied} {verb} uncertain, the structure {computed.sentence}."
+        under = f" under '{computed.dataset.attrs['motion']}'" if len(data.runs) > 1 else ""
+        yield f"Where {varied} {verb} uncertain,{under} the structure {computed.sentence}."
     if text := data.read_text("risk.txt"):
         yield sentence(f"the structure {text.splitlines()[0]}")
 
