@@ -89,6 +89,15 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert f"{float(run.joints['friction'].max()):.3f}" in words
 
 
+def test_the_head_counts_the_doubts_of_all_results(kept, undrawn):
+    with replace_results(kept, "limit", read_file_list(kept)["run"].inputs) as draft:
+        (draft / "limit.txt").write_text("it stands\nin doubt: a made one")
+    page = af.cases.open_results(kept).report()
+    words = " ".join(read_page(page.read_text(encoding="utf-8")).words)
+    assert "In doubt: a made one." in words
+    assert f"doubts, of all results: {words.count('In doubt: ')}" in words
+
+
 def test_missing_pairs_are_named_and_different_cases_refused(kept, unplotted):
     (kept / "second" / "history.nc").unlink()
     found = af.cases.open_results(kept)

@@ -102,7 +102,7 @@ def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
     assert facts["largest V / N"] == f"{friction:.3f}"
     doubtful = sum(bool(run.verdict.doubts) for run in runs.values()) or "none"
     outcome = runs["first"].verdict.outcome
-    assert facts["verdict"] == f"{outcome} in 2 of 2 runs; doubts in {doubtful}"
+    assert facts["verdict"] == f"{outcome} in 2 of 2 runs; doubts, of all results: {doubtful}"
     one = report_data.ReportData(data.case, {"first": runs["first"]})
     assert dict(conclusion.list_facts(one))["verdict"] == runs["first"].verdict.headline
     none = report_data.ReportData(data.case, {})

@@ -80,7 +80,8 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
     """Return outcome, and doubts or range, of a run, or how many runs have each outcome."""
     verdict = runs[0].verdict
     if len(runs) > 1:
-        return result_text.describe_verdicts(runs)
+        outcomes = result_text.describe_verdicts(runs).partition("; doubts")[0]
+        return f"{outcomes}; doubts, of all results: {len(list_doubts(data)) or 'none'}"
     if verdict.fall is not None:
         # lost blocks have a line of their own
         verdict = replace(verdict, fall=replace(verdict.fall, time=None))
