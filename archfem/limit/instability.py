@@ -59,9 +59,10 @@ def explain_instability(structure: Structure) -> str | None:
             "same weight; no friction helps"
         )
     if _stands(dead, friction=unlimited, depth=unlimited):
+        moves = [sliding and f"slide ({sliding})", turning and f"hinge ({turning})"]
         return (
-            f"joints slide ({sliding}) and hinge ({turning}): it needs more friction and deeper "
-            "joints"
+            f"joints {' and '.join(filter(None, moves))}: a stone or a support is missing, or it "
+            "needs both more friction and deeper joints"
         )
     number = int(np.abs(fall.multipliers.reshape(-1, 3)).max(axis=1).argmax())
     block = dead.blocks.structure.blocks[dead.blocks.structure.free[number]].name

@@ -99,3 +99,11 @@ def test_the_joint_that_slides_and_the_block_that_nothing_holds_are_named():
     both = af.masonry.assembled([*blocks[:2], *shifted], af.Contact(1e10, 4e9, 0.9))
     text = explain_instability(both)
     assert text.startswith("no compression in its joints can hold 'hanging'")
+
+
+def test_an_arch_without_its_keystone_is_said_to_lack_a_stone():
+    ring = af.circular_arch(radius=3.0, thickness=0.6, embrace=150.0, voussoirs=7)
+    blocks = [block for k, block in enumerate(ring.blocks) if k != ring.free[3]]
+    text = explain_instability(af.masonry.assembled(blocks, af.Contact(1e10, 4e9, 0.6)))
+    assert "a stone or a support is missing" in text
+    assert "()" not in text

@@ -194,8 +194,11 @@ def _check_layers(outlines: list[Outline], layers: Mapping[str, Layer], path: st
     """Refuse layers of the file without properties, and properties of missing layers."""
     there = {outline.layer for outline in outlines}
     if strange := sorted(there - set(layers)):
+        stones = [outline for outline in outlines if outline.layer == strange[0]]
+        x, y = stones[0].points.mean(axis=0)
         raise InvalidInput(
-            f"{path}: of layer '{strange[0]}' nothing is said: name its part, or ignore it"
+            f"{path}: of layer '{strange[0]}' nothing is said: name its part, or ignore it; closed "
+            f"outlines on it: {len(stones)}, the first about ({x:.4g}, {y:.4g}) m"
         )
     expected = {name for name, layer in layers.items() if not layer.ignore}
     if missing := sorted(expected - there):
