@@ -213,11 +213,9 @@ def parse_rating(table: Any) -> Table:
     return options
 
 
-def rate_case(
-    structure: Structure, rating: Table, limit: LimitAnalysis | None, given: Table
-) -> Rating:
+def rate_case(structure: Structure, rating: Table, limit: LimitAnalysis | None) -> Rating:
     """Rate the bridge of a case, by the joints and the fill of its [limit]."""
-    options = {**rating, **given}
+    options = dict(rating)
     if "vehicle" not in options:
         raise InvalidInput(
             'a rating needs a vehicle: write [rating] with vehicle = "LM1", or give --vehicle LM1'

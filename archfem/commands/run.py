@@ -89,14 +89,27 @@ def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
         yield draft
 
 
-def _write_results(command: str, case: Case, out: str | None, draw: Callable[[], Files]) -> None:
-    """Write the results of a command to its folder, if one is given."""
-    if out is not None:
-        with _replace_results(command, case, folder := create_result_folder(out)) as draft:
-            files = draw()
-            if "run" not in intact_file_list(folder):  # which has the case of the folder
-                files = {CASE_FILE: case.text().rstrip("\n"), **files}
-            write(files, draft)
+def _write_results(
+    command: str,
+    case: Case,
+    out: str | None,
+    draw: Callable[[], Files],
+    changed: Case | None = None,
+) -> None:
+    """Write the results of a command to its folder, if one is given.
+
+    A result alone is of the case that options have changed; beside a run it is of the run's case.
+    """
+    if out is None:
+        return
+    folder = create_result_folder(out)
+    has_run = "run" in intact_file_list(folder)
+    case = changed if changed is not None and not has_run else case
+    with _replace_results(command, case, folder) as draft:
+        files = draw()
+        if not has_run:  # which has the case of the folder
+            files = {CASE_FILE: case.text().rstrip("\n"), **files}
+        write(files, draft)
 
 
 def _name_published_files(text: str, folder: Path, command: str) -> str:
@@ -170,15 +183,19 @@ def assess(options: argparse.Namespace) -> None:
 
 def rate(options: argparse.Namespace) -> None:
     """Rate the bridge of a case for a vehicle, by the joints and the fill of its [limit]."""
-    case = Case.read(options.case, options.changes)
     keys = ("vehicle", "live", "impact", "dead", "width", "area_load")
     given = {key: value for key in keys if (value := getattr(options, key)) is not None}
+    case = Case.read(options.case, options.changes)
+    changes = [f"rating.{key}={value}" for key, value in given.items()]
+    rated = Case.read(options.case, [*options.changes, *changes])
     with _record_doubts() as doubts:
-        found = rate_case(case.structure, case.rating, case.limit, given)
+        found = rate_case(case.structure, rated.rating, case.limit)
     text = "\n".join([str(found), *doubts])
     print(f"{case.title}\n{text}")
     texts = {"rating.txt": text, "rating.csv": found.table()}
-    _write_results("rate", case, options.out, lambda: {**texts, "rating.png": found.plot()})
+    _write_results(
+        "rate", case, options.out, lambda: {**texts, "rating.png": found.plot()}, changed=rated
+    )
 
 
 def mesh(options: argparse.Namespace) -> None:

@@ -99,18 +99,18 @@ def test_a_case_is_rated_by_its_own_table(ring):
     rating = parse_rating({"vehicle": lorry, "live": 1.2, "impact": 1.1, "width": "0.5 m"})
     own = af.limit.Vehicle("lorry", (20e3, 40e3), (3.0,))
     expected = af.rate(ring, own, live=1.2, impact=1.1, width=0.5, friction=None)
-    found = rate_case(ring, rating, parse_limit({"friction": "none"}), {})
+    found = rate_case(ring, rating, parse_limit({"friction": "none"}))
     assert found.factor == expected.factor
     # keys of the command count before those of the table
-    heavier = rate_case(ring, rating, None, {"live": 2.4})
+    heavier = rate_case(ring, rating | {"live": 2.4}, None)
     assert heavier.live == 2.4
     with pytest.raises(af.InvalidInput, match="a rating needs a vehicle"):
-        rate_case(ring, {}, None, {})
+        rate_case(ring, {}, None)
     # a vehicle has the factors of its code, and stones the strength of the limit analysis
     coded = parse_rating({"vehicle": {**lorry, "live": 1.2, "impact": 1.1}, "width": "0.5 m"})
     limit = parse_limit({"friction": "none", "strength": "1 MPa"})
     weaker = af.rate(ring, own, live=1.2, impact=1.1, width=0.5, friction=None, strength=1e6)
-    assert rate_case(ring, coded, limit, {}).factor == weaker.factor < expected.factor
+    assert rate_case(ring, coded, limit).factor == weaker.factor < expected.factor
     with pytest.raises(af.InvalidInput, match=r"rating.vehicle.axles.0. = '20 m'"):
         parse_rating({"vehicle": {**lorry, "axles": ["20 m"]}})
 
@@ -297,4 +297,4 @@ def test_loads_of_a_limit_may_stay(stack):
     with pytest.raises(af.InvalidInput, match=r"limit\.dead"):
         parse_limit({"point": point, "dead": [{"x": 0.0}]})
     with pytest.raises(af.InvalidInput, match="a rating takes no loads that stay"):
-        rate_case(stack, {"vehicle": "LM1"}, limit, {})
+        rate_case(stack, {"vehicle": "LM1"}, limit)

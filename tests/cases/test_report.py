@@ -412,6 +412,8 @@ def test_a_result_without_a_time_history_has_a_report(
     conclusion = words.split("Inputs and assumptions")[1]  # between the contents and the heading
     assert found in conclusion
     assert "In doubt: joints slide (arch, joint" in conclusion
+    if command == "rate":  # the vehicle of the command line, not that of a case
+        assert af.Case.read(folder / "case.toml").rating["vehicle"] == "LM1"
     factor = re.search(r"factor (?:of )?([\d.]+)", said)[1]
     assert f"{factor}" in words
     assert "Response" not in words
