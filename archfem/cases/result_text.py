@@ -12,7 +12,7 @@ from archfem.cases.defaults import describe_defaults, explain_defaults
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import Ending, History
-from archfem.dynamics.verdict import ALL_DEFINITIONS, DOUBT_MARK
+from archfem.dynamics.verdict import ALL_DEFINITIONS, DOUBT_MARK, Verdict
 from archfem.joints.criteria import (
     assessed_joints,
     envelope,
@@ -107,10 +107,15 @@ def describe_verdicts(runs: Iterable[History]) -> str:
     verdicts = [run.verdict for run in runs]
     if len(verdicts) == 1:
         return verdicts[0].headline
+    doubtful = sum(bool(verdict.doubts) for verdict in verdicts)
+    return f"{count_outcomes(verdicts)}; doubts in {doubtful or 'none'}"
+
+
+def count_outcomes(verdicts: Sequence[Verdict]) -> str:
+    """Say how many runs have each outcome."""
     outcomes = Counter(verdict.outcome for verdict in verdicts)
     text = ", ".join(f"{outcome} in {count}" for outcome, count in outcomes.items())
-    doubtful = sum(bool(verdict.doubts) for verdict in verdicts)
-    return f"{text} of {len(verdicts)} runs; doubts in {doubtful or 'none'}"
+    return f"{text} of {len(verdicts)} runs"
 
 
 def describe_pairs(runs: Mapping[str, History]) -> str:

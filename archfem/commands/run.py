@@ -187,7 +187,7 @@ def rate(options: argparse.Namespace) -> None:
     given = {key: value for key in keys if (value := getattr(options, key)) is not None}
     case = Case.read(options.case, options.changes)
     changes = [f"rating.{key}={value}" for key, value in given.items()]
-    rated = Case.read(options.case, [*options.changes, *changes])
+    rated = Case.read(options.case, [*options.changes, *changes]) if changes else case
     with _record_doubts() as doubts:
         found = rate_case(case.structure, rated.rating, case.limit)
     text = "\n".join([str(found), *doubts])

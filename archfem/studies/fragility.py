@@ -290,7 +290,7 @@ def stripe_fragility(
     if dispersion >= 0.999 * DISPERSION_RANGE[1]:
         raise InvalidInput(
             f"{failed.tolist()} of {count.tolist()} motions fail at levels {x.tolist()}: their "
-            "share hardly grows with the level, and has no fragility curve"
+            "share hardly grows with the level, which gives no curve; try levels farther apart"
         )
     share = _curve(x, median, dispersion)
     random = np.random.default_rng(check_integer(seed, "seed", minimum=0))

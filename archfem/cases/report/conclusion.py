@@ -80,7 +80,7 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
     """Return outcome, and doubts or range, of a run, or how many runs have each outcome."""
     verdict = runs[0].verdict
     if len(runs) > 1:
-        outcomes = result_text.describe_verdicts(runs).partition("; doubts")[0]
+        outcomes = result_text.count_outcomes([run.verdict for run in runs])
         return f"{outcomes}; doubts, of all results: {len(list_doubts(data)) or 'none'}"
     if verdict.fall is not None:
         # lost blocks have a line of their own
@@ -170,7 +170,9 @@ def _conclude_range(data: ReportData) -> Iterator[str]:
         words = ", ".join(map(property_text, computed.properties))
         varied = " and ".join(words.rsplit(", ", 1))
         verb = "is" if len(computed.properties) == 1 else "are"
-        under = f" under '{computed.dataset.attrs['motion']}'" if len(data.runs) > 1 else ""
+        # files of older versions do not name the motion
+        motion = computed.dataset.attrs.get("motion") if len(data.runs) > 1 else None
+        under = f" under '{motion}'" if motion else ""
         yield f"Where {varied} {verb} uncertain,{under} the structure {computed.sentence}."
     if text := data.read_text("risk.txt"):
         yield sentence(f"the structure {text.splitlines()[0]}")

@@ -124,7 +124,7 @@ def read_channels(
     if not isinstance(dt, Real | None):
         raise InvalidInput(f"dt = {dt!r} is no number: give it in seconds, as in 0.01")
     if not isinstance(column, int | None):
-        raise InvalidInput(f"column = {column!r} is no whole number")
+        raise InvalidInput(f"column = {column!r} is no whole number: the first is 1")
     content = read_bytes(path, "record")
     if waveform := waveforms.find_waveform_format(content):
         if dt is not None:
