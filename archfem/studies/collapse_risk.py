@@ -38,7 +38,7 @@ from archfem._validation import (
 )
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES
-from archfem.dynamics.motion_scaling import admissible_range
+from archfem.dynamics.motion_scaling import admissible_range, check_search
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.errors import DidNotConverge, InvalidInput
@@ -177,6 +177,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
     check_type(hazard, Hazard, "hazard", "give an archfem.Hazard")
     check_integer(samples, "samples", minimum=FIRST_ROUND)
     width = check_number(precision, "precision", minimum=0.01, maximum=1.0)
+    check_search(width, between)
     records = list(motions.motions if isinstance(motions, Suite) else motions)
     if len(records) < 2:
         raise InvalidInput(f"{len(records)} motion: give several records, seven or more at best")

@@ -142,6 +142,11 @@ def test_questions_without_an_answer_are_refused(ask, words):
         ask(risk)
 
 
+def test_scales_the_larger_first_are_refused():
+    with pytest.raises(af.InvalidInput, match="the smaller first"):
+        af.collapse_risk(*tilted_block(), SITE, between=(2.0, 1.0))
+
+
 def test_a_motion_of_nothing_is_refused():
     analysis, motions = tilted_block()
     still = af.Motion(np.zeros(50), 0.01, name="still")
