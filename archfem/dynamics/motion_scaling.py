@@ -193,11 +193,7 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
     References:
         Vamvatsikos and Cornell, Earthq. Eng. Struct. Dyn. 31 (2002) 491-514.
     """
-    if not _valid_search(precision, between):
-        raise InvalidInput(
-            f"precision {precision:g} between scales {between}: give 0.0001 to 1, and two scales "
-            "above 0, the smaller first"
-        )
+    check_search(precision, between)
     start = start or dead_load(model)
 
     def run_scaled(scale: float) -> ScaledRun:
@@ -220,8 +216,13 @@ def _run_as_far(model: Model | Analysis, motion: Motion, **options: Any) -> Hist
         return partial_history(error)
 
 
-def _valid_search(precision: float, between: tuple[float, float]) -> bool:
-    return 1e-4 <= precision <= 1.0 and 0.0 < between[0] <= between[1]
+def check_search(precision: float, between: Sequence[float]) -> None:
+    """Refuse a width of brackets, or a range of scales, that no search has."""
+    if not (1e-4 <= precision <= 1.0 and 0.0 < between[0] <= between[1] < inf):
+        raise InvalidInput(
+            f"precision {precision:g} between scales {tuple(between)}: give 0.0001 to 1, and two "
+            "scales above 0, the smaller first"
+        )
 
 
 def admissible_range(between: Sequence[float], motion: Motion) -> tuple[float, float]:
@@ -412,11 +413,9 @@ def collapse_scale(
             "displacements='large'"
         )
     steps = (dt, 0.5 * dt) if isinstance(dt, int | float) else tuple(dt)
-    if not _valid_search(precision, between) or not steps:
-        raise InvalidInput(
-            f"precision {precision:g} between scales {between} by steps {steps}: give 0.0001 "
-            "to 1, two scales above 0, the smaller first, and a step or two"
-        )
+    check_search(precision, between)
+    if not steps:
+        raise InvalidInput("dt = () has no step: give one or two")
 
     def run_scaled(step: float, scale: float) -> ScaledRun:
         run = _run_as_far(model, motion.scaled(scale), start=begin, damping=damping, dt=step)

@@ -10,6 +10,9 @@ from archfem._validation import check_integer, check_number, check_numbers
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 
+# Distance below which points are at one place, relative to the size of a structure [-]
+SAME_PLACE = 1e-9
+
 
 @dataclass(frozen=True)
 class BodyForce:
@@ -52,8 +55,8 @@ class PointLoad:
     Attributes:
         x: position [m].
         force: its components for the whole width, up positive (2,) [N].
-        y: height, within a block or on its outline [m]; at a joint the block above carries the
-            force. None for the highest point at x.
+        y: height, within a block or on its outline [m]; None for the highest point at x. At a joint
+            the block whose centroid is higher carries the force, of two at one height the first.
 
     Raises:
         InvalidInput: x or y is no number, or the force no two of up to 1e9 N.
@@ -100,8 +103,9 @@ class PointLoad:
                 f"a point load at x = {self.x:.4g} m misses the structure, which reaches from "
                 f"{low:.4g} to {high:.4g} m: move it there"
             )
-        block = max(tops, key=lambda number: tops[number])
-        return block, np.array([self.x, tops[block]])
+        highest = max(tops.values())
+        touching = [n for n, top in tops.items() if top > highest - SAME_PLACE * structure.size]
+        return _highest_block(structure, touching), np.array([self.x, highest])
 
     def _place_at_height(self, structure: Structure, point: Array) -> tuple[int, Array]:
         """Return the highest block that has a point (2,) [m], and the point."""
@@ -116,8 +120,14 @@ class PointLoad:
                 f"a point load at ({self.x:.4g}, {self.y:.4g}) m is {away.min():.4g} m away from "
                 f"the nearest block that moves, '{nearest}': move it there"
             )
-        carrying = [structure.free[k] for k in np.flatnonzero(near)]
-        return max(carrying, key=lambda number: structure.blocks[number].centroid[1]), point
+        return _highest_block(structure, [structure.free[k] for k in np.flatnonzero(near)]), point
+
+
+def _highest_block(structure: Structure, numbers: Sequence[int]) -> int:
+    """Return the block whose centroid is highest, the first of those at one height."""
+    heights = np.array([structure.blocks[number].centroid[1] for number in numbers])
+    level = heights.max() - SAME_PLACE * structure.size  # rounding decides nothing
+    return int(numbers[int(np.argmax(heights > level))])
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,20 @@ from pathlib import Path
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import check_array, check_choice, check_numbers, validate_methods
+from archfem._validation import (
+    check_array,
+    check_choice,
+    check_number,
+    check_numbers,
+    validate_methods,
+)
 from archfem.errors import InvalidInput
 
 # Intensity measures, with their units
 MEASURES = {"pga": "m/s²", "pgv": "m/s", "sa": "m/s²", "sa_avg": "m/s²"}
+
+# Largest intensity of a hazard curve [m/s² or m/s]: the unit of a larger one must be wrong
+LARGEST = {"pga": 200.0, "pgv": 20.0, "sa": 200.0, "sa_avg": 200.0}
 
 # Names that OpenQuake gives to measures, and their unit in ours
 OPENQUAKE_UNITS = {"PGA": ("pga", 9.80665), "PGV": ("pgv", 0.01), "SA": ("sa", 9.80665)}
@@ -53,6 +62,10 @@ class Hazard:
     def __post_init__(self) -> None:
         """Check that the curve falls."""
         check_choice(self.measure, "measure", tuple(MEASURES))
+        if self.period is not None:
+            check_number(self.period, "period [s]", minimum=0.01)
+            if self.measure != "sa":
+                raise InvalidInput(f"period with measure {self.measure!r}: it belongs to 'sa'")
         x = np.array(check_numbers(self.intensity, "intensity"), float)
         y = np.array(check_numbers(self.rate, "rate", len(x)), float)
         falls = len(x) > 1 and (np.diff(x) > 0.0).all() and (np.diff(y) < 0.0).all()
@@ -61,7 +74,7 @@ class Hazard:
                 f"hazard with intensities {x.tolist()} and rates {y.tolist()}: give two points or "
                 "more above 0, intensities ascending, annual rates descending"
             )
-        unit, most = MEASURES[self.measure], 20.0 if self.measure == "pgv" else 200.0
+        unit, most = MEASURES[self.measure], LARGEST[self.measure]
         if x[-1] > most:
             raise InvalidInput(
                 f"the hazard reaches {x[-1]:g} {unit}: that can only be a wrong unit, or return "
@@ -71,18 +84,22 @@ class Hazard:
         object.__setattr__(self, "rate", y)
 
     @classmethod
-    def power(cls, factor: float, exponent: float, **options: object) -> "Hazard":
+    def power(
+        cls, factor: float, exponent: float, *, measure: str = "pga", period: float | None = None
+    ) -> "Hazard":
         """Return the curve rate = factor · intensity^(-exponent).
 
         Args:
             factor: annual rate at intensity 1 in SI units [1/year].
             exponent: slope in double logarithm, above 0; 2 to 4 at most sites [-].
-            options: `measure` and `period`.
+            measure: as of the class.
+            period: as of the class.
         """
         if not (factor > 0.0 and exponent > 0.0):
             raise InvalidInput(f"hazard {factor} · a^-{exponent}: give two numbers above 0")
-        ends = np.array([0.01, 100.0])
-        return cls(ends, factor * ends**-exponent, **options)  # type: ignore[arg-type]
+        check_choice(measure, "measure", tuple(MEASURES))
+        ends = np.array([0.01, LARGEST[measure]])
+        return cls(ends, factor * ends**-exponent, measure=measure, period=period)
 
     @classmethod
     def from_return_periods(cls, points: Mapping[float, float], **options: object) -> "Hazard":
@@ -138,7 +155,10 @@ class Hazard:
         Args:
             intensity: above 0, of any shape.
         """
-        x = np.log(check_array(intensity, "intensity"))
+        given = check_array(intensity, "intensity")
+        if (given <= 0.0).any():
+            raise InvalidInput(f"intensity {float(given.min()):g}: a rate needs one above 0")
+        x = np.log(given)
         points, values = np.log(self.intensity), np.log(self.rate)
         piece = np.clip(np.searchsorted(points, x) - 1, 0, len(points) - 2)
         slopes = np.diff(values) / np.diff(points)

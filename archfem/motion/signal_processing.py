@@ -109,6 +109,7 @@ def filter_band(samples: Array, dt: float, low: float, high: float, *, order: in
         )
     if order < 1:
         raise InvalidInput(f"filter of order {order!r}: expected 1 or more")
+    count_pieces(1.5 * order / low, dt, "samples beside a filtered motion", MAX_SAMPLES)
     pad = int(np.ceil(1.5 * order / low / dt))
     filter_ = scipy.signal.butter(order, (low, high), "bandpass", fs=1.0 / dt, output="sos")
     return scipy.signal.sosfiltfilt(filter_, np.pad(samples, pad), padlen=0)[pad:-pad]

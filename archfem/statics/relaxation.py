@@ -18,13 +18,15 @@ most, so that a crack grows from its tip, and stops where the rest bears the loa
 
 Where joints slide a structure has many equilibria, and the loading path decides between them. A
 search therefore starts near the last equilibrium, and joint memory is taken from equilibria alone.
+From a relaxed state Newton's method looks for the equilibrium whose slips grow in proportion to the
+load: where displacements are small it depends on no steps, neither of creep nor of the load.
 
 References: Kelley and Keyes, SIAM J. Numer. Anal. 35 (1998) 508-523. Haslinger, Hlaváček and
 Nečas, Handbook of Numerical Analysis IV (1996).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -241,7 +243,13 @@ def solve_or_relax(
     except DidNotConverge:
         if check is not None:
             check(model)
-        model, solution = relax(solver, model, load, start)
+        relaxed, crept = relax(solver, model, load, start)
         if has_irreversible_joints(model):
-            return solve_irreversible(solver, model, load, solution.q)
-        return model, solution
+            return solve_irreversible(solver, relaxed, load, crept.q)
+        # Creep makes joints slide to and fro, and its end depends on its steps. Of the equilibria
+        # near it that one is taken whose slips grow in proportion to the load.
+        try:
+            model, solution = solve_irreversible(solver, model, load, crept.q)
+        except DidNotConverge:
+            return relaxed, crept
+        return model, replace(solution, iterations=crept.iterations + solution.iterations)

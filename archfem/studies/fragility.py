@@ -53,20 +53,15 @@ class Rate:
     low: float
     high: float
 
-    @classmethod
-    def of_sample(cls, rate: float, resampled: Array) -> "Rate":
-        """Return a rate with the interval of the rates of bootstrap samples (samples,)."""
-        low, high = np.quantile(resampled, [0.05, 0.95])
-        return cls(float(rate), float(low), float(high))
-
     def probability(self, years: float = 50.0) -> tuple[float, float, float]:
         """Return the probability in a time, with the ends of its interval [-].
 
         Args:
             years: the time [year].
         """
+        time = check_number(years, "years", minimum=0.0)
         rates = np.array([self.rate, self.low, self.high])
-        return tuple(float(each) for each in -np.expm1(-rates * years))  # type: ignore[return-value]
+        return tuple(float(each) for each in -np.expm1(-rates * time))  # type: ignore[return-value]
 
     def __str__(self) -> str:
         """Rate with its interval, and the probability in 50 years."""
@@ -158,7 +153,8 @@ class Fragility:
         """
         curves = np.vstack([[self.median, self.dispersion], self.resampled])
         rate, *resampled = integrate_rates(np.log(curves[:, 0]), curves[:, 1], hazard)
-        return Rate.of_sample(rate, np.array(resampled))
+        low, high = np.quantile(resampled, [0.05, 0.95])
+        return Rate(float(rate), float(low), float(high))
 
 
 @dataclass(frozen=True)
@@ -311,17 +307,24 @@ def _curve(intensity: Array, median: Any, dispersion: Any) -> Array:
         return np.asarray(ndtr((np.log(intensity) - np.log(median)) / dispersion))
 
 
-def fit_brackets(ends: Array) -> tuple[Array, Array]:
-    """Mean and deviation (samples,) of normal data in brackets (2, samples, n), by EM."""
+def fit_brackets(ends: Array, members: Any = True) -> tuple[Array, Array]:
+    """Mean and deviation (samples,) of normal data in brackets (2, samples, n), by EM.
+
+    Only members (samples, n) count, of which each sample has one or more.
+    """
     low, high = ends
+    members = np.broadcast_to(members, low.shape)
+    shares = members / members.sum(axis=1, keepdims=True)
     # initial guess: the middle of a bracket, or the end of an unbounded one
     bounded = np.where(np.isfinite(high), high, low)
     start = np.where(np.isfinite(high) & np.isfinite(low), 0.5 * (low + high), bounded)
-    mean, deviation = start.mean(axis=1), np.maximum(start.std(axis=1), DISPERSION_RANGE[0])
+    mean = (shares * start).sum(axis=1)
+    variance = (shares * (start - mean[:, None]) ** 2).sum(axis=1)
+    deviation = np.maximum(np.sqrt(variance), DISPERSION_RANGE[0])
     for _ in range(2000):
         first, second = _moments(low, high, mean[:, None], deviation[:, None])
-        new_mean = first.mean(axis=1)
-        variance = second.mean(axis=1) - new_mean**2
+        new_mean = (shares * first).sum(axis=1)
+        variance = (shares * second).sum(axis=1) - new_mean**2
         new_deviation = np.clip(np.sqrt(np.maximum(variance, 0.0)), *DISPERSION_RANGE)
         change = max(np.abs(new_mean - mean).max(), np.abs(new_deviation - deviation).max())
         mean, deviation = new_mean, new_deviation

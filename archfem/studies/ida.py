@@ -30,6 +30,7 @@ from archfem.dynamics.motion_scaling import (
     COLLAPSE_DEFINITION,
     ScaledRun,
     admissible_range,
+    check_search,
     search_scales,
 )
 from archfem.errors import DidNotConverge, InvalidInput
@@ -333,7 +334,8 @@ def ida(
         Capacities, curves and fragility by any intensity measure.
 
     Raises:
-        InvalidInput: there are no motions, or a limit state is unknown.
+        InvalidInput: there are no motions, a limit state is unknown, or precision or scales are out
+            of range.
         StudyStopped: as for `Study.run`.
 
     References:
@@ -342,6 +344,7 @@ def ida(
     """
     for limit in limits or ():
         check_choice(limit, LIMIT_STATES, "limits")
+    check_search(precision, between)
     options: Findings = {"limits": None if limits is None else list(limits), "precision": precision}
     options["between"] = [float(scale) for scale in between]
     case = case_of(subject)

@@ -106,3 +106,40 @@ def test_one_load_or_several():
     assert list_loads((push, weight)) == [push, weight]
     with pytest.raises(af.errors.InvalidInput, match="a Settlement comes alone"):
         list_loads([push, af.Settlement(0, (0.0, 0.0, 0.0))])
+
+
+@pytest.mark.parametrize("chords", [None, 1])
+def test_loads_at_joints_stand_as_in_a_mirror(chords):
+    """On the higher stone of two: rounding of coordinates decided where 1e-6 m changed a factor.
+
+    Two loads at the edges of the keystone of seven stones have 152 or 396 times 1 kN.
+    """
+    given = {"chords": chords} if chords else {}
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=7, **given)
+    edges = [joint.extrados[0] for joint in ring.joints]
+    carrying = [af.PointLoad(x, (0.0, -1e3)).place(ring)[0] for x in edges[1:-1]]
+    assert carrying == [2, 3, 4, 4, 5, 6]
+    exact, inside = (
+        af.collapse_factor(
+            ring,
+            live=[
+                af.PointLoad(edges[3] + by, (0.0, -1e3)),
+                af.PointLoad(edges[4] - by, (0.0, -1e3)),
+            ],
+            friction=None,
+        ).factor
+        for by in (0.0, 1e-6)
+    )
+    assert exact == pytest.approx(inside, rel=1e-5)
+
+
+def test_of_two_stones_at_one_height_the_first_carries():
+    stones = [
+        af.Block(((x, 0.0), (x + 0.3, 0.0), (x + 0.3, 0.7), (x, 0.7)), af.STONE, f"stone {x}")
+        for x in (0.1, 0.4, 0.7)
+    ]
+    ground = af.Block(((0, -1), (2, -1), (2, 0), (0, 0)), af.STONE, "ground", fixed=True)
+    row = af.masonry.assembled([ground, *stones], af.Contact(1e9, 4e8))
+    for y in (None, 0.7):
+        assert af.PointLoad(0.4, (0.0, -1.0), y=y).place(row)[0] == 1
+        assert af.PointLoad(0.7, (0.0, -1.0), y=y).place(row)[0] == 2

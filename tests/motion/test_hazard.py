@@ -59,6 +59,30 @@ def test_intensities_of_a_wrong_unit_are_refused(points, options):
         af.Hazard.from_return_periods({1.0: 0.1} | points, **options)
 
 
+def test_a_power_law_of_velocities_ends_where_no_unit_is_wrong():
+    site = af.Hazard.power(2e-5, 2.5, measure="pgv")
+    assert float(site.rate_of(0.3)) == pytest.approx(2e-5 * 0.3**-2.5)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"measure": "sa", "period": 0.0}, "period"),  # not that of the structure
+        ({"measure": "sa", "period": -0.5}, "period"),
+        ({"measure": "pga", "period": 0.5}, "it belongs to 'sa'"),
+    ],
+)
+def test_periods_that_belong_to_no_spectrum_are_refused(options, words):
+    with pytest.raises(af.InvalidInput, match=words):
+        af.Hazard([1.0, 2.0], [0.1, 0.01], **options)
+
+
+@pytest.mark.parametrize("intensity", [0.0, -1.0, [2.0, 0.0]])
+def test_intensities_that_are_not_above_zero_have_no_rate(intensity):
+    with pytest.raises(af.InvalidInput, match="a rate needs one above 0"):
+        af.Hazard.power(2e-3, 2.5).rate_of(intensity)
+
+
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(af.InvalidInput, match=r"nothing\.csv"):
         af.Hazard.read(tmp_path / "nothing.csv")

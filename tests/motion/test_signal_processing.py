@@ -58,6 +58,8 @@ def test_band_pass_keeps_frequencies_inside_and_drops_those_outside():
     assert passed[inner] == pytest.approx(middle[inner], abs=3e-3)
     with pytest.raises(af.errors.InvalidInput, match="band from"):
         signal_processing.filter_band(passed, 0.01, 0.5, 60.0)
+    with pytest.raises(af.errors.InvalidInput, match="samples beside a filtered motion"):
+        signal_processing.filter_band(passed, 0.01, 1e-9, 10.0)
     for order in (0, -1):
         with pytest.raises(af.errors.InvalidInput, match=f"filter of order {order}"):
             signal_processing.filter_band(passed, 0.01, 0.5, 10.0, order=order)

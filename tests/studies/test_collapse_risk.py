@@ -94,6 +94,66 @@ def test_the_interval_holds_the_rate_as_often_as_it_says():
     assert np.mean(widths) == pytest.approx(expected, rel=0.1)
 
 
+def test_few_records_widen_the_interval():
+    """Of seven records quantiles of the bootstrap would contain the rate in 74 of these cases."""
+    random, inside = np.random.default_rng(3), 0
+    exact = 2e-3 * 5.0**-2.5 * np.exp(0.5 * 2.5**2 * (0.35**2 + 0.25**2))
+    record = np.arange(21) % 7
+    for _ in range(100):
+        logs = 0.35 * random.standard_normal(7)[record] + 0.25 * random.standard_normal(21)
+        rate = risk_of(5.0 * np.exp(logs), record).rate()
+        inside += rate.low <= exact <= rate.high
+    assert 78 <= inside <= 96
+
+
+def test_alternatives_far_apart_add_their_rates():
+    """Their capacities together are far from lognormal: one fit gives half of the rate."""
+    quantiles = 0.3 * norm.ppf((np.arange(200) + 0.5) / 200)
+    weak = np.arange(2000) % 10 == 0
+    capacity = np.empty(2000)
+    capacity[weak] = 2.0 * np.exp(quantiles)
+    capacity[~weak] = 10.0 * np.exp(np.tile(quantiles, 9))
+    risk = risk_of(capacity, np.arange(2000) // 10 % 20, np.where(weak, "rubble", "ashlar"))
+    weakest, other = (2e-3 * median**-2.5 * np.exp(0.5 * 0.75**2) for median in (2.0, 10.0))
+    # 200 quantiles lack 1 % of the variance
+    assert risk.rate("rubble").rate == pytest.approx(weakest, rel=0.01)
+    assert risk.rate().rate == pytest.approx(0.1 * weakest + 0.9 * other, rel=0.01)
+    edges, shares = risk.disaggregation(60)
+    density = sum(
+        weight * norm.cdf(np.log(edges / median) / 0.3) * edges**-2.5
+        for weight, median in ((0.1, 2.0), (0.9, 10.0))
+    )
+    below = edges < 4.0
+    exact = trapezoid(density[below], np.log(edges[below])) / trapezoid(density, np.log(edges))
+    assert shares[below[1:]].sum() == pytest.approx(exact, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        (lambda risk: risk.rate().probability(-50.0), "years = -50"),
+        (lambda risk: risk.disaggregation(0), "bins = 0"),
+        (lambda risk: risk.capacities("Sa"), "measure 'Sa' is not known"),
+    ],
+)
+def test_questions_without_an_answer_are_refused(ask, words):
+    risk = risk_of(np.linspace(3.0, 5.0, 12), np.arange(12) % 4)
+    with pytest.raises(af.InvalidInput, match=words):
+        ask(risk)
+
+
+def test_scales_the_larger_first_are_refused():
+    with pytest.raises(af.InvalidInput, match="the smaller first"):
+        af.collapse_risk(*tilted_block(), SITE, between=(2.0, 1.0))
+
+
+def test_a_motion_of_nothing_is_refused():
+    analysis, motions = tilted_block()
+    still = af.Motion(np.zeros(50), 0.01, name="still")
+    with pytest.raises(af.InvalidInput, match="'still' is zero along x"):
+        af.collapse_risk(analysis, [*motions, still], SITE)
+
+
 def test_dispersion_is_split_into_its_parts():
     random = np.random.default_rng(2)
     record, alternative = np.arange(1200) % 30, (np.arange(1200) // 30) % 2

@@ -267,6 +267,22 @@ def test_invalid_analyses_are_refused(small_ring):
     assert "collapse needs displacements = 'large'" in found.table["error"].item()
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"precision": 0.0},
+        {"between": (2.0, 0.5)},  # found hinges at its smaller end alone
+        {"between": (-1.0, 2.0)},
+        {"between": (float("nan"), 2.0)},
+        {"between": (0.5, float("inf"))},
+    ],
+)
+def test_ranges_without_a_search_are_refused(small_ring, options):
+    motion = af.Motion.synthetic(duration=0.5, seed=1)
+    with pytest.raises(af.InvalidInput, match=r"two scales above 0"):
+        ida(small_ring, motion, **options)
+
+
 def test_collapse_is_that_of_whole_falls(small_ida):
     small, _, _ = small_ida
     analysis = replace(small.analysis, displacements="large")
