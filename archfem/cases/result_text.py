@@ -187,6 +187,19 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in result.doubts)])
 
 
+def describe_supports(structure: Structure, max_names: int = 4) -> str:
+    """Describe which blocks move and which are fixed; many by their parts, in one line."""
+    groups = []
+    for word, fixed in (("move", False), ("fixed", True)):
+        own = [block for block in structure.blocks if block.fixed is fixed]
+        names = [f"'{block.name}'" for block in own]
+        if len(own) > max_names:
+            parts = Counter(block.part or "unnamed" for block in own)
+            names = [f"{count} of '{part}'" for part, count in parts.items()]
+        groups.append(f"{word}: {join_names(names)}")
+    return f"blocks that {'; '.join(groups)}"
+
+
 def describe_collapse(structure: Structure, collapse: Collapse) -> str:
     """Describe the result of limit analysis: outcome and factor, hinges, sliding joints."""
     joints = structure.joints

@@ -31,8 +31,10 @@ from archfem.dynamics.history import Ending, History
 from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.limit.collapse import Collapse
+from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
+from archfem.statics.equilibrium import support_doubts
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
 from archfem.view.motions import draw_spectra, draw_suite
@@ -123,9 +125,9 @@ def _name_published_files(text: str, folder: Path, command: str) -> str:
 
 
 @contextmanager
-def _record_doubts() -> Iterator[list[str]]:
-    """Yield a list of the warnings of a block, which results repeat as doubts."""
-    doubts: list[str] = []
+def _record_doubts(structure: Structure) -> Iterator[list[str]]:
+    """Yield doubts about the supports of a structure, and then the warnings of a block."""
+    doubts = [f"{DOUBT_MARK}{doubt}" for doubt in support_doubts(structure)]
     handler = logging.Handler(logging.WARNING)
     handler.emit = lambda record: doubts.append(f"{DOUBT_MARK}{record.getMessage()}")  # type: ignore[method-assign]
     logger.addHandler(handler)
@@ -155,7 +157,7 @@ def limit(options: argparse.Namespace) -> None:
     case = Case.read(options.case, options.changes)
     if case.limit is None:
         raise InvalidInput(f"{options.case} has no [limit]: give horizontal = 1.0, or a point load")
-    with _record_doubts() as doubts:
+    with _record_doubts(case.structure) as doubts:
         found = case.limit.solve(case.structure)
     text = "\n".join([result_text.describe_collapse(case.structure, found), *doubts])
     print(f"{case.title}\n{text}")
@@ -167,7 +169,7 @@ def assess(options: argparse.Namespace) -> None:
     case = Case.read(options.case, options.changes)
     motion = case.ground_motion() if case.motion is not None else None
     demand = case.target if case.target is not None else motion
-    with _record_doubts() as doubts:
+    with _record_doubts(case.structure) as doubts:
         found = case.assessment.solve(case.structure, demand, options.parts)
     texts = [f"{name}: {result}" for name, result in found.items()]
     text = "\n\n".join([*texts, *filter(None, ["\n".join(dict.fromkeys(doubts))])])
@@ -188,7 +190,7 @@ def rate(options: argparse.Namespace) -> None:
     case = Case.read(options.case, options.changes)
     changes = [f"rating.{key}={value}" for key, value in given.items()]
     rated = Case.read(options.case, [*options.changes, *changes]) if changes else case
-    with _record_doubts() as doubts:
+    with _record_doubts(case.structure) as doubts:
         found = rate_case(case.structure, rated.rating, case.limit)
     text = "\n".join([str(found), *doubts])
     print(f"{case.title}\n{text}")
@@ -395,7 +397,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     """Print results, write their files, and return the verdict and whether any is in doubt."""
     # `carry_out` yields limit analysis, dead load, pushover, suite and runs in this order.
     runs: dict[str, History] = {}
-    with _record_doubts() as doubts:
+    with _record_doubts(case.structure) as doubts:
         for result in found:
             if isinstance(result, Collapse):
                 text = result_text.describe_collapse(case.structure, result)

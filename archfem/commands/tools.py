@@ -32,7 +32,7 @@ PIP_INSTALL = f"{sys.executable} -m pip install"
 def check(options: argparse.Namespace) -> int:
     """Read a case and its motions, and compute limit analysis and dead load."""
     case = Case.read(options.case, options.changes)
-    print(case.title)
+    print(f"{case.title}\n{result_text.describe_supports(case.structure)}")
     if case.limit is not None and case.limit.live:
         print(result_text.describe_collapse(case.structure, case.limit.solve(case.structure)))
     # Unreadable records are errors before the dead load is computed.
