@@ -20,7 +20,7 @@ from archfem.joints.criteria import (
     longest_duration,
     with_failure_flags,
 )
-from archfem.limit.collapse import Collapse, Outcome
+from archfem.limit.collapse import Collapse, Outcome, describe_crushing
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.masonry.structure import Structure, join_joint_names, join_names
 from archfem.motion.matching import Match
@@ -200,8 +200,8 @@ def describe_supports(structure: Structure, max_names: int = 4) -> str:
     return f"blocks that {'; '.join(groups)}"
 
 
-def describe_collapse(structure: Structure, collapse: Collapse) -> str:
-    """Describe the result of limit analysis: outcome and factor, hinges, sliding joints."""
+def describe_collapse(structure: Structure, collapse: Collapse, strength: float | None) -> str:
+    """Describe the result of limit analysis: outcome and factor, hinges, sliding, crushing."""
     joints = structure.joints
     outcome = f"limit analysis: {collapse.outcome.sentence}"
     # Other outcomes have no finite factor.
@@ -213,6 +213,7 @@ def describe_collapse(structure: Structure, collapse: Collapse) -> str:
     lines += [f"hinges, by the face in contact: {join_names(hinges, '; ')}"] if hinges else []
     lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []
+    lines.append(describe_crushing(strength))
     return "\n".join(lines)
 
 

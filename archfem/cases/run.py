@@ -278,7 +278,7 @@ def carry_out(
     # Unreadable records are errors before the dead load is computed.
     selected = case if pairs is None else case.alone(*pairs)
     selected.check_ground()
-    if case.limit is not None and case.limit.live:
+    if case.limit.live:
         yield case.limit.solve(case.structure)
     at_rest = DeadLoadResult.of(case)
     yield at_rest

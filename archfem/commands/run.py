@@ -37,6 +37,7 @@ from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import support_doubts
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
+from archfem.units import MPa
 from archfem.view.motions import draw_spectra, draw_suite
 from archfem.view.style import Files, write_files
 
@@ -155,11 +156,10 @@ def modes(options: argparse.Namespace) -> None:
 def limit(options: argparse.Namespace) -> None:
     """Find the collapse factor of the loads in [limit], and the mechanism."""
     case = Case.read(options.case, options.changes)
-    if case.limit is None:
-        raise InvalidInput(f"{options.case} has no [limit]: give horizontal = 1.0, or a point load")
     with _record_doubts(case.structure) as doubts:
         found = case.limit.solve(case.structure)
-    text = "\n".join([result_text.describe_collapse(case.structure, found), *doubts])
+    text = result_text.describe_collapse(case.structure, found, case.limit.strength)
+    text = "\n".join([text, *doubts])
     print(f"{case.title}\n{text}")
     _write_results("limit", case, options.out, lambda: results.limit_files(found, text))
 
@@ -171,6 +171,12 @@ def assess(options: argparse.Namespace) -> None:
     demand = case.target if case.target is not None else motion
     with _record_doubts(case.structure) as doubts:
         found = case.assessment.solve(case.structure, demand, options.parts)
+    if case.limit.strength is not None:
+        doubts.append(
+            f"note: joints hinge about their edges, without the given strength of "
+            f"{case.limit.strength / MPa:.3g} MPa: `archfem limit` with horizontal = 1 or -1 in "
+            "[limit] computes alpha_0 with it"
+        )
     texts = [f"{name}: {result}" for name, result in found.items()]
     text = "\n\n".join([*texts, *filter(None, ["\n".join(dict.fromkeys(doubts))])])
     print(f"{case.title}\n{text}")
@@ -400,7 +406,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     with _record_doubts(case.structure) as doubts:
         for result in found:
             if isinstance(result, Collapse):
-                text = result_text.describe_collapse(case.structure, result)
+                text = result_text.describe_collapse(case.structure, result, case.limit.strength)
                 text = "\n".join([text, *doubts])  # of limit analysis, which comes first
                 print(text)
                 write(results.limit_files(result, text), folder)
