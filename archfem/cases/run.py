@@ -47,6 +47,7 @@ logger = logging.getLogger("archfem")
 
 # Names of files in a result folder.
 CASE_FILE = "case.toml"
+RATING_FILE = "rating.toml"  # [rating] as `archfem rate` took it
 HISTORY_FILE = "history.nc"
 
 # Integrates a motion of a case from its dead load, with damping, as `run_time_history` does.

@@ -21,10 +21,19 @@ from archfem._files import (
 from archfem._optional import can_film
 from archfem.cases import result_folder as results
 from archfem.cases import result_text
-from archfem.cases.analysis_keys import rate_case
+from archfem.cases.analysis_keys import parse_rating, rate_case
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults
-from archfem.cases.run import CASE_FILE, DeadLoadResult, Result, Run, carry_out, replace_run
+from archfem.cases.run import (
+    CASE_FILE,
+    RATING_FILE,
+    DeadLoadResult,
+    Result,
+    Run,
+    carry_out,
+    replace_run,
+)
+from archfem.cases.toml_file import format_tables
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions
 from archfem.dynamics.history import Ending, History
@@ -92,22 +101,12 @@ def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
         yield draft
 
 
-def _write_results(
-    command: str,
-    case: Case,
-    out: str | None,
-    draw: Callable[[], Files],
-    changed: Case | None = None,
-) -> None:
-    """Write the results of a command to its folder, if one is given.
-
-    A result alone is of the case that options have changed; beside a run it is of the run's case.
-    """
+def _write_results(command: str, case: Case, out: str | None, draw: Callable[[], Files]) -> None:
+    """Write the results of a command to its folder, if one is given."""
     if out is None:
         return
     folder = create_result_folder(out)
     has_run = "run" in intact_file_list(folder)
-    case = changed if changed is not None and not has_run else case
     with _replace_results(command, case, folder) as draft:
         files = draw()
         if not has_run:  # which has the case of the folder
@@ -194,16 +193,15 @@ def rate(options: argparse.Namespace) -> None:
     keys = ("vehicle", "live", "impact", "dead", "width", "area_load")
     given = {key: value for key in keys if (value := getattr(options, key)) is not None}
     case = Case.read(options.case, options.changes)
-    changes = [f"rating.{key}={value}" for key, value in given.items()]
-    rated = Case.read(options.case, [*options.changes, *changes]) if changes else case
+    rating = {**case.settings.get("rating", {}), **given}
     with _record_doubts(case.structure) as doubts:
-        found = rate_case(case.structure, rated.rating, case.limit)
+        found = rate_case(case.structure, parse_rating(rating), case.limit)
     text = "\n".join([str(found), *doubts])
     print(f"{case.title}\n{text}")
-    texts = {"rating.txt": text, "rating.csv": found.table()}
-    _write_results(
-        "rate", case, options.out, lambda: {**texts, "rating.png": found.plot()}, changed=rated
-    )
+    # the case of the folder, that of a run, may be rated for another vehicle
+    texts = {RATING_FILE: format_tables({"rating": rating}).rstrip()}
+    texts |= {"rating.txt": text, "rating.csv": found.table()}
+    _write_results("rate", case, options.out, lambda: {**texts, "rating.png": found.plot()})
 
 
 def mesh(options: argparse.Namespace) -> None:
