@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from archfem._validation import declared_keys, validate_methods
 from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.toml_file import Table, check_choice, check_table, read_object
@@ -40,7 +42,8 @@ class LimitAnalysis:
         live: loads that grow together; the collapse factor multiplies them. Without any, friction
             and strengths are those of a rating.
         friction: friction law, "coulomb", "nonassociated", or None without sliding.
-        strength: compressive strength of the stones at the joints [Pa], or None.
+        strength: compressive strength of the stones at the joints [Pa], that of [limit] or else
+            the least that [materials] give; or None.
         fill: strength of the fill, or None.
         dead: loads beside self-weight that do not grow.
     """
@@ -124,13 +127,21 @@ def assessment_keys() -> dict[str, Any]:
     return _keys_beside(kinematic_assessment)
 
 
-def parse_limit(table: Any) -> LimitAnalysis:
-    """Return the limit analysis of a case."""
+def find_given_strength(structure: Structure, materials: Table) -> float | None:
+    """Return the least strength that [materials] give for blocks at assessed joints [Pa]."""
+    blocks = [structure.blocks[number] for number in np.unique(structure.pairs[structure.judged])]
+    strengths = {block.material.name: block.material.strength for block in blocks}
+    given = [value for name, value in strengths.items() if "strength" in materials.get(name, ())]
+    return min(filter(None, given), default=None)
+
+
+def parse_limit(table: Any, strength: float | None = None) -> LimitAnalysis:
+    """Return the limit analysis of a case, by default with the strength of its stones."""
     values = check_table(table, limit_keys(), "limit")
     live, dead = _read_loads(values, "limit")
     friction = _check_friction(values.get("friction", "coulomb"), "limit.friction")
     fill = _fill(values["fill"], "limit.fill") if "fill" in values else None
-    return LimitAnalysis(live, friction, values.get("strength"), fill, dead)
+    return LimitAnalysis(live, friction, values.get("strength", strength), fill, dead)
 
 
 def parse_pushover(table: Any) -> PushoverSettings:
@@ -213,21 +224,19 @@ def parse_rating(table: Any) -> Table:
     return options
 
 
-def rate_case(structure: Structure, rating: Table, limit: LimitAnalysis | None) -> Rating:
+def rate_case(structure: Structure, rating: Table, limit: LimitAnalysis) -> Rating:
     """Rate the bridge of a case, by the joints and the fill of its [limit]."""
     options = dict(rating)
     if "vehicle" not in options:
         raise InvalidInput(
             'a rating needs a vehicle: write [rating] with vehicle = "LM1", or give --vehicle LM1'
         )
-    if limit is not None and limit.dead:
+    if limit.dead:
         raise InvalidInput(
             "a rating takes no loads that stay, [limit] dead: leave them out, or ask `archfem "
             "limit` for the factor of the axles as point loads"
         )
-    if limit is not None:
-        options |= limit.resistance
-    return rate(structure, options.pop("vehicle"), **options)
+    return rate(structure, options.pop("vehicle"), **options, **limit.resistance)
 
 
 @dataclass(frozen=True)

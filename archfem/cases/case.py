@@ -58,7 +58,8 @@ class Case:
         motion: checked keys of [motion], or None.
         suite: checked keys of [suite], or None; without motion and suite only the dead load is
             analysed.
-        limit: limit analysis, or None.
+        limit: limit analysis, with the joints, stones and fill of a rating. Without [limit] it has
+            no load.
         pushover: pushover from the dead load, or None.
         rating: arguments of `archfem.rate` from [rating].
         assessment: kinematic assessment; without [assessment] that of the case's motion or suite.
@@ -73,7 +74,7 @@ class Case:
     analysis: Analysis
     motion: dict[str, Any] | None
     suite: dict[str, Any] | None
-    limit: LimitAnalysis | None
+    limit: LimitAnalysis
     pushover: PushoverSettings | None
     rating: Table
     assessment: AssessmentSettings
@@ -140,12 +141,12 @@ class Case:
                 raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
         output = check_table(settings.get("output", {}), OUTPUT_KEYS, "output")
         report = _read_report(settings)
-        motion, suite, limit, push = (
-            settings.get(key) for key in ("motion", "suite", "limit", "pushover")
-        )
+        motion, suite, push = (settings.get(key) for key in ("motion", "suite", "pushover"))
         if motion is not None and suite is not None:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
-        analysis = read_analysis(settings, cached_structure(settings, folder), folder)
+        structure = cached_structure(settings, folder)
+        analysis = read_analysis(settings, structure, folder)
+        strength = analysis_keys.find_given_strength(structure, settings.get("materials", {}))
         if output.get("animation", False) and analysis.record.fields_every is None:
             # a film of each tenth step
             analysis = replace(analysis, record=replace(analysis.record, fields_every=10))
@@ -154,7 +155,7 @@ class Case:
             analysis=analysis,
             motion=None if motion is None else motion_keys.parse_motion(motion),
             suite=None if suite is None else motion_keys.parse_suite(suite),
-            limit=None if limit is None else analysis_keys.parse_limit(limit),
+            limit=analysis_keys.parse_limit(settings.get("limit", {}), strength),
             pushover=None if push is None else analysis_keys.parse_pushover(push),
             rating=analysis_keys.parse_rating(settings.get("rating", {})),
             assessment=analysis_keys.parse_assessment(settings.get("assessment", {})),

@@ -20,7 +20,7 @@ from archfem.joints.criteria import (
     longest_duration,
     with_failure_flags,
 )
-from archfem.limit.collapse import Collapse, Outcome
+from archfem.limit.collapse import Collapse, Outcome, describe_crushing
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.masonry.structure import Structure, join_joint_names, join_names
 from archfem.motion.matching import Match
@@ -187,8 +187,21 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in result.doubts)])
 
 
-def describe_collapse(structure: Structure, collapse: Collapse) -> str:
-    """Describe the result of limit analysis: outcome and factor, hinges, sliding joints."""
+def describe_supports(structure: Structure, max_names: int = 4) -> str:
+    """Describe which blocks move and which are fixed; many by their parts, in one line."""
+    groups = []
+    for word, fixed in (("move", False), ("fixed", True)):
+        own = [block for block in structure.blocks if block.fixed is fixed]
+        names = [f"'{block.name}'" for block in own]
+        if len(own) > max_names:
+            parts = Counter(block.part or "unnamed" for block in own)
+            names = [f"{count} of '{part}'" for part, count in parts.items()]
+        groups.append(f"{word}: {join_names(names)}")
+    return f"blocks that {'; '.join(groups)}"
+
+
+def describe_collapse(structure: Structure, collapse: Collapse, strength: float | None) -> str:
+    """Describe the result of limit analysis: outcome and factor, hinges, sliding, crushing."""
     joints = structure.joints
     outcome = f"limit analysis: {collapse.outcome.sentence}"
     # Other outcomes have no finite factor.
@@ -200,6 +213,7 @@ def describe_collapse(structure: Structure, collapse: Collapse) -> str:
     lines += [f"hinges, by the face in contact: {join_names(hinges, '; ')}"] if hinges else []
     lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []
+    lines.append(describe_crushing(strength))
     return "\n".join(lines)
 
 

@@ -47,6 +47,7 @@ logger = logging.getLogger("archfem")
 
 # Names of files in a result folder.
 CASE_FILE = "case.toml"
+RATING_FILE = "rating.toml"  # [rating] as `archfem rate` took it
 HISTORY_FILE = "history.nc"
 
 # Integrates a motion of a case from its dead load, with damping, as `run_time_history` does.
@@ -278,7 +279,7 @@ def carry_out(
     # Unreadable records are errors before the dead load is computed.
     selected = case if pairs is None else case.alone(*pairs)
     selected.check_ground()
-    if case.limit is not None and case.limit.live:
+    if case.limit.live:
         yield case.limit.solve(case.structure)
     at_rest = DeadLoadResult.of(case)
     yield at_rest

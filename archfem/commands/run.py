@@ -21,20 +21,32 @@ from archfem._files import (
 from archfem._optional import can_film
 from archfem.cases import result_folder as results
 from archfem.cases import result_text
-from archfem.cases.analysis_keys import rate_case
+from archfem.cases.analysis_keys import parse_rating, rate_case
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults
-from archfem.cases.run import CASE_FILE, DeadLoadResult, Result, Run, carry_out, replace_run
+from archfem.cases.run import (
+    CASE_FILE,
+    RATING_FILE,
+    DeadLoadResult,
+    Result,
+    Run,
+    carry_out,
+    replace_run,
+)
+from archfem.cases.toml_file import format_tables
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.limit.collapse import Collapse
+from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
+from archfem.statics.equilibrium import support_doubts
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
+from archfem.units import MPa
 from archfem.view.motions import draw_spectra, draw_suite
 from archfem.view.style import Files, write_files
 
@@ -89,22 +101,12 @@ def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
         yield draft
 
 
-def _write_results(
-    command: str,
-    case: Case,
-    out: str | None,
-    draw: Callable[[], Files],
-    changed: Case | None = None,
-) -> None:
-    """Write the results of a command to its folder, if one is given.
-
-    A result alone is of the case that options have changed; beside a run it is of the run's case.
-    """
+def _write_results(command: str, case: Case, out: str | None, draw: Callable[[], Files]) -> None:
+    """Write the results of a command to its folder, if one is given."""
     if out is None:
         return
     folder = create_result_folder(out)
     has_run = "run" in intact_file_list(folder)
-    case = changed if changed is not None and not has_run else case
     with _replace_results(command, case, folder) as draft:
         files = draw()
         if not has_run:  # which has the case of the folder
@@ -123,9 +125,9 @@ def _name_published_files(text: str, folder: Path, command: str) -> str:
 
 
 @contextmanager
-def _record_doubts() -> Iterator[list[str]]:
-    """Yield a list of the warnings of a block, which results repeat as doubts."""
-    doubts: list[str] = []
+def _record_doubts(structure: Structure) -> Iterator[list[str]]:
+    """Yield doubts about the supports of a structure, and then the warnings of a block."""
+    doubts = [f"{DOUBT_MARK}{doubt}" for doubt in support_doubts(structure)]
     handler = logging.Handler(logging.WARNING)
     handler.emit = lambda record: doubts.append(f"{DOUBT_MARK}{record.getMessage()}")  # type: ignore[method-assign]
     logger.addHandler(handler)
@@ -153,11 +155,10 @@ def modes(options: argparse.Namespace) -> None:
 def limit(options: argparse.Namespace) -> None:
     """Find the collapse factor of the loads in [limit], and the mechanism."""
     case = Case.read(options.case, options.changes)
-    if case.limit is None:
-        raise InvalidInput(f"{options.case} has no [limit]: give horizontal = 1.0, or a point load")
-    with _record_doubts() as doubts:
+    with _record_doubts(case.structure) as doubts:
         found = case.limit.solve(case.structure)
-    text = "\n".join([result_text.describe_collapse(case.structure, found), *doubts])
+    text = result_text.describe_collapse(case.structure, found, case.limit.strength)
+    text = "\n".join([text, *doubts])
     print(f"{case.title}\n{text}")
     _write_results("limit", case, options.out, lambda: results.limit_files(found, text))
 
@@ -167,8 +168,14 @@ def assess(options: argparse.Namespace) -> None:
     case = Case.read(options.case, options.changes)
     motion = case.ground_motion() if case.motion is not None else None
     demand = case.target if case.target is not None else motion
-    with _record_doubts() as doubts:
+    with _record_doubts(case.structure) as doubts:
         found = case.assessment.solve(case.structure, demand, options.parts)
+    if case.limit.strength is not None:
+        doubts.append(
+            f"note: joints hinge about their edges, without the given strength of "
+            f"{case.limit.strength / MPa:.3g} MPa: `archfem limit` with horizontal = 1 or -1 in "
+            "[limit] computes alpha_0 with it"
+        )
     texts = [f"{name}: {result}" for name, result in found.items()]
     text = "\n\n".join([*texts, *filter(None, ["\n".join(dict.fromkeys(doubts))])])
     print(f"{case.title}\n{text}")
@@ -186,16 +193,15 @@ def rate(options: argparse.Namespace) -> None:
     keys = ("vehicle", "live", "impact", "dead", "width", "area_load")
     given = {key: value for key in keys if (value := getattr(options, key)) is not None}
     case = Case.read(options.case, options.changes)
-    changes = [f"rating.{key}={value}" for key, value in given.items()]
-    rated = Case.read(options.case, [*options.changes, *changes]) if changes else case
-    with _record_doubts() as doubts:
-        found = rate_case(case.structure, rated.rating, case.limit)
+    rating = {**case.settings.get("rating", {}), **given}
+    with _record_doubts(case.structure) as doubts:
+        found = rate_case(case.structure, parse_rating(rating), case.limit)
     text = "\n".join([str(found), *doubts])
     print(f"{case.title}\n{text}")
-    texts = {"rating.txt": text, "rating.csv": found.table()}
-    _write_results(
-        "rate", case, options.out, lambda: {**texts, "rating.png": found.plot()}, changed=rated
-    )
+    # the case of the folder, that of a run, may be rated for another vehicle
+    texts = {RATING_FILE: format_tables({"rating": rating}).rstrip()}
+    texts |= {"rating.txt": text, "rating.csv": found.table()}
+    _write_results("rate", case, options.out, lambda: {**texts, "rating.png": found.plot()})
 
 
 def mesh(options: argparse.Namespace) -> None:
@@ -395,10 +401,10 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     """Print results, write their files, and return the verdict and whether any is in doubt."""
     # `carry_out` yields limit analysis, dead load, pushover, suite and runs in this order.
     runs: dict[str, History] = {}
-    with _record_doubts() as doubts:
+    with _record_doubts(case.structure) as doubts:
         for result in found:
             if isinstance(result, Collapse):
-                text = result_text.describe_collapse(case.structure, result)
+                text = result_text.describe_collapse(case.structure, result, case.limit.strength)
                 text = "\n".join([text, *doubts])  # of limit analysis, which comes first
                 print(text)
                 write(results.limit_files(result, text), folder)

@@ -32,9 +32,10 @@ PIP_INSTALL = f"{sys.executable} -m pip install"
 def check(options: argparse.Namespace) -> int:
     """Read a case and its motions, and compute limit analysis and dead load."""
     case = Case.read(options.case, options.changes)
-    print(case.title)
-    if case.limit is not None and case.limit.live:
-        print(result_text.describe_collapse(case.structure, case.limit.solve(case.structure)))
+    print(f"{case.title}\n{result_text.describe_supports(case.structure)}")
+    if case.limit.live:
+        found = case.limit.solve(case.structure)
+        print(result_text.describe_collapse(case.structure, found, case.limit.strength))
     # Unreadable records are errors before the dead load is computed.
     case.check_ground()
     at_rest = DeadLoadResult.of(case)

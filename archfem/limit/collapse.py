@@ -43,6 +43,7 @@ from archfem.masonry.structure import (
     join_names,
     structure_of,
 )
+from archfem.units import MPa
 
 logger = logging.getLogger("archfem")
 
@@ -188,8 +189,9 @@ def collapse_factor(
             "nonassociated" searches states whose joints slide without dilating for the weakest;
             None forbids sliding.
         strength: compressive strength σ of the blocks [Pa], which limits |M| to
-            N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit. Joints of fill in
-            pieces (`jointed_fill`) have their own strength, and not this one.
+            N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit, in a case the
+            least strength that it gives for the stones. Joints of fill in pieces (`jointed_fill`)
+            have their own strength, and not this one.
         fill: strength of blocks softer than their joints, which become weight and pressures on the
             stones (`Fill`), with those that rest on them, or a plastic continuum (`PlasticFill`),
             for which the result has two bounds; None where there are none, or where they are cut
@@ -465,6 +467,13 @@ def _read_joints(
     resultants = np.full((len(whole.joints), 3), np.nan)
     resultants[list(regions.joints)] = blocks.resultants(forces)
     return joint_dataset(whole, resultants)
+
+
+def describe_crushing(strength: float | None) -> str:
+    """Describe at which strength of the stones joints crush, if at all."""
+    if strength is None:
+        return "joints do not crush: no strength of the stones is given"
+    return f"joints crush at {strength / MPa:.3g} MPa, the strength of the stones"
 
 
 def warn_dilatancy(structure: Structure) -> None:

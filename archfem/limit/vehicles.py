@@ -23,7 +23,7 @@ from archfem.limit.backfill import (
     refuse_bonds,
     self_weight_programme,
 )
-from archfem.limit.collapse import Collapse, collapse_factor, warn_locking
+from archfem.limit.collapse import Collapse, collapse_factor, describe_crushing, warn_locking
 from archfem.limit.instability import DeepenedBlocks
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
@@ -255,6 +255,7 @@ class Rating(ResultDisplay):
         dead: partial factor on the weights of stones and fill [-].
         width: width of the bridge over which one vehicle spreads [m].
         area_load: distributed load of the code, where it is adverse, without factors [Pa].
+        strength: compressive strength of the stones at the joints [Pa], or None.
         moving: factors at all places in both directions, on the factored vehicle over factored
             weights, and the collapse at the worst place.
         geometric: geometric factor of safety at the worst place [-]: depth of the joints over the
@@ -272,6 +273,7 @@ class Rating(ResultDisplay):
     dead: float
     width: float
     area_load: float
+    strength: float | None
     moving: MovingLoad
     geometric: float
     by_rule: float
@@ -347,6 +349,7 @@ class Rating(ResultDisplay):
             f"live load by {self.live:g} ({self._source('live')})",
             f"impact by {self.impact:g} ({self._source('impact')})",
             f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
+            describe_crushing(self.strength),
         ]
         return "\n".join(lines)
 
@@ -451,9 +454,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         least = min(width, rule), max(area_load, driven.area_load)
         by_rule = drive(*least, [moving.position]).worst.factor
     geometric = np.nan if is_plastic else _geometric_factor(weighted, moving, options)
-    return Rating(
-        structure, driven, live, impact, dead, width, area_load, moving, geometric, by_rule
-    )
+    factors = live, impact, dead, width, area_load, strength
+    return Rating(structure, driven, *factors, moving, geometric, by_rule)
 
 
 def _find_vehicle(vehicle: str | Vehicle) -> Vehicle:
@@ -644,7 +646,7 @@ def _lay_strips(
             power = load @ np.array(motions).T + np.maximum(sinks, 0.0).sum(axis=0)
             bounds = np.array(resistances) / np.maximum(power, 1e-300)
             best = int(bounds.argmin())
-            if bounds[best] >= (1.0 - 1e-7) * chosen[row][0]:  # beyond the programme's round-off
+            if bounds[best] >= (1.0 - 1e-5) * chosen[row][0]:  # crushing has endless mechanisms
                 break
             adverse = sinks[:, best] > 1e-9 * sinks[:, best].max()
             chosen[row] = solve(axles[row] + road[adverse].sum(axis=0)), adverse

@@ -13,6 +13,7 @@ rigid blocks that no thrust line within friction can hold must not be at rest: t
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import combinations
 from math import sqrt
 from typing import Literal, Protocol, runtime_checkable
 
@@ -432,7 +433,7 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
     structure, joints = dead.model.structure, assessed_joints(dead.joints)
     ratio, names = joints["friction"], joints["name"].values
     limit = 1.0 if friction is None else friction  # rough faces of stone slide at 0.6 to 0.75
-    doubts = []
+    doubts = support_doubts(structure)
     if (steep := (ratio > limit).values).any():
         reason = (
             f"under dead load |V| / N is {float(ratio.max()):.3g} in "
@@ -458,6 +459,44 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
         )
         doubts.append(Doubt(reason, "compare with stiffer joints, or with large displacements"))
     return tuple(doubts)
+
+
+def support_doubts(structure: Structure) -> list[Doubt]:
+    """Return a doubt for fixed blocks that stand within a ring or pier instead of at its ends."""
+    blocks, body = structure.blocks, np.arange(len(structure.blocks))
+    for one, other in structure.pairs:  # fixed blocks side by side are one body
+        if blocks[one].fixed and blocks[other].fixed:
+            body[body == body[other]] = body[one]
+    # faces of each body that touch a part: block, middle of the joint, normal away from the block
+    faces: dict[tuple[int, str], list[tuple[int, Array, Array]]] = {}
+    joints = zip(structure.joints, structure.pairs, structure.normals, strict=True)
+    for joint, (low, high), normal in joints:
+        if blocks[low].fixed != blocks[high].fixed and joint.role != "other":
+            block, outward = (low, normal) if blocks[low].fixed else (high, -normal)
+            of_part = faces.setdefault((int(body[block]), joint.part), [])
+            of_part.append((int(block), joint.middle, outward))
+    doubts = []
+    for (_, part), touching in faces.items():
+        for (first, at, one), (last, beyond, other) in combinations(touching, 2):
+            # both look away from one another, and not upwards, as springings on a pier do
+            away = one @ other < 0.0 < (at - beyond) @ (one - other)
+            if away and one[1] + other[1] < 0.1:
+                doubts.append(_doubt_support(structure, sorted({first, last}), part))
+                break
+    return doubts
+
+
+def _doubt_support(structure: Structure, numbers: Sequence[int], part: str) -> Doubt:
+    """Return the doubt about fixed blocks within a part."""
+    x, y = structure.centroids[numbers].mean(axis=0)
+    names = " and ".join(f"'{structure.blocks[number].name}'" for number in numbers)
+    within = f"stones of '{part}'" if part else "stones"
+    return Doubt(
+        f"{names} at ({x:.2f}, {y:.2f}) m cannot move, but stands between {within}: what it holds "
+        "is far stronger than a structure in which it moves",
+        "take fixed from it, in a drawing by its layer; if it is a support, give the stones on "
+        "either side of it parts of their own",
+    )
 
 
 def _stands_as_rigid_blocks(structure: Structure) -> bool:

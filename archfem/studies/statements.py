@@ -153,7 +153,6 @@ def history_findings(run: History, case: Case) -> dict[str, Any]:
 
 def capacity_findings(case: Case) -> dict[str, Any]:
     """Return the capacity of a case by limit analysis and by pushover, and the order of hinges."""
-    assert case.limit is not None
     collapse = case.limit.solve(case.structure)
     push = pushover(case.analysis, case.limit.live, dead=case.limit.dead)
     steps: dict[int, list[int]] = {}

@@ -451,7 +451,7 @@ def _pair_cases(
     rows: list[tuple[str, ...]] = []
     for name, own in available.items():
         chosen = [pair for pair in own if pairs is None or pair in pairs]
-        if asked.name == "comparison" and not own and cases[name].limit is None:
+        if asked.name == "comparison" and not own and not cases[name].limit.live:
             raise InvalidInput(
                 f"the case of '{name}' has no [suite] to compare under, and no [limit]: "
                 'give it one, or say what to compute, such as compute = "limit"'

@@ -93,19 +93,60 @@ def test_stones_crush_at_the_strength_of_a_limit(ring):
     assert factor < 0.99 * af.collapse_factor(ring, live=live).factor
 
 
+def strength_of(**tables):
+    """Strength of the limit analysis of a bridge whose case has some tables."""
+    arch = {"span": 4.0, "rise": 1.0, "thickness": 0.4, "voussoirs": 5}
+    walls = {"length": 2.0, "height": 1.0, "state": "fixed", "left": {}, "right": {}}
+    bridge = {"arches": {"arch": arch}, "sidewalls": walls, "backfill": {"cover": 0.3}}
+    return af.Case.of({"structure": {"shape": "bridge", **bridge}, **tables}).limit.strength
+
+
+def test_a_given_strength_of_the_stones_is_that_of_the_limit_analysis():
+    """That of the preset is a default, which no limit analysis has; soil is no stone."""
+    assert strength_of() is None
+    assert strength_of(materials={"backfill": {"strength": "0.1 MPa"}}) is None
+    given = {"stone": {"strength": "2 MPa"}, "backfill": {"strength": "0.1 MPa"}}
+    assert strength_of(materials=given) == pytest.approx(2e6)
+    assert strength_of(materials=given, limit={"friction": "none"}) == pytest.approx(2e6)
+    assert strength_of(materials=given, limit={"strength": "3 MPa"}) == pytest.approx(3e6)
+
+
+def test_results_state_the_strength_with_which_joints_crush(tmp_path, capsys):
+    """A column under its weight and an axle: its factor, and that without a given strength."""
+    column = {"shape": "column", "breadth": 0.6, "heights": [1.0, 1.0]}
+    tables = {"structure": column, "limit": {"horizontal": 1.0}}
+    tables["assessment"] = {"spectrum": {"code": "EC8", "ag": 0.2, "ground": "B"}}
+    factors = []
+    for materials, says in (({}, "do not crush"), ({"stone": {"strength": 1e6}}, "crush at 1 MPa")):
+        path = tmp_path / "column.toml"
+        path.write_text(af.Case.of(tables | {"materials": materials}).text())
+        for command in (["limit"], ["rate", "--vehicle", "CS454-single", "--width", "1"]):
+            assert af.commands.main([command[0], str(path), *command[1:]]) == 0
+            said = capsys.readouterr().out
+            assert f"joints {says}" in said
+            factors += re.findall(r"factor (?:of )?(inf|[\d.]+)", said)[:1]
+        assert af.commands.main(["assess", str(path)]) == 0
+        note = "note: joints hinge about their edges, without the given strength of 1 MPa"
+        assert (note in capsys.readouterr().out) == bool(materials)
+    push, rating, weaker_push, weaker_rating = map(float, factors)
+    assert weaker_push < 0.97 * push
+    assert weaker_rating < rating
+
+
 @pytest.mark.slow
 def test_a_case_is_rated_by_its_own_table(ring):
     lorry = {"name": "lorry", "axles": ["20 kN", "40 kN"], "spacings": ["3 m"]}
     rating = parse_rating({"vehicle": lorry, "live": 1.2, "impact": 1.1, "width": "0.5 m"})
     own = af.limit.Vehicle("lorry", (20e3, 40e3), (3.0,))
     expected = af.rate(ring, own, live=1.2, impact=1.1, width=0.5, friction=None)
+    plain = parse_limit({})
     found = rate_case(ring, rating, parse_limit({"friction": "none"}))
     assert found.factor == expected.factor
     # keys of the command count before those of the table
-    heavier = rate_case(ring, rating | {"live": 2.4}, None)
+    heavier = rate_case(ring, rating | {"live": 2.4}, plain)
     assert heavier.live == 2.4
     with pytest.raises(af.InvalidInput, match="a rating needs a vehicle"):
-        rate_case(ring, {}, None)
+        rate_case(ring, {}, plain)
     # a vehicle has the factors of its code, and stones the strength of the limit analysis
     coded = parse_rating({"vehicle": {**lorry, "live": 1.2, "impact": 1.1}, "width": "0.5 m"})
     limit = parse_limit({"friction": "none", "strength": "1 MPa"})

@@ -404,7 +404,7 @@ def test_a_result_without_a_time_history_has_a_report(
     places = partial(vehicles._places_along, steps=10)
     monkeypatch.setattr(vehicles, "_places_along", places)
     path, folder = tmp_path / "case.toml", tmp_path / "out"
-    path.write_text(BRIDGE, encoding="utf-8")
+    path.write_text(f'{BRIDGE}[rating]\nvehicle = "LM2"\nlive = 1.2\n', encoding="utf-8")
     assert af.commands.main([command, str(path), "--out", str(folder), *given]) == 0
     said = capsys.readouterr().out
     assert af.commands.main(["report", str(folder)]) == 0
@@ -412,8 +412,6 @@ def test_a_result_without_a_time_history_has_a_report(
     conclusion = words.split("Inputs and assumptions")[1]  # between the contents and the heading
     assert found in conclusion
     assert "In doubt: joints slide (arch, joint" in conclusion
-    if command == "rate":  # the vehicle of the command line, not that of a case
-        assert af.Case.read(folder / "case.toml").rating["vehicle"] == "LM1"
     factor = re.search(r"factor (?:of )?([\d.]+)", said)[1]
     assert f"{factor}" in words
     assert "Response" not in words
@@ -425,6 +423,10 @@ def test_a_result_without_a_time_history_has_a_report(
     listed = read_file_list(folder)
     assert "case.toml" in listed["run"].files
     assert "case.toml" not in listed[command].files
+    if command == "rate":  # by the vehicle of the command line, also beside the case of a run
+        assert af.commands.main(["report", str(folder)]) == 0
+        words = " ".join(words_of(folder / "report.html").split())
+        assert "rating: vehicle LM1 given rating: live 1.2 given rating: area load, dead" in words
 
 
 def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path):

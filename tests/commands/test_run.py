@@ -418,7 +418,7 @@ def test_limit_analysis_needs_a_load(tmp_path, capsys):
     assert "limit has no load" in capsys.readouterr().err
     path.write_text(LIMIT.partition("[limit]")[0])
     assert af.commands.main(["limit", str(path)]) == 1
-    assert "has no [limit]" in capsys.readouterr().err
+    assert "limit has no load" in capsys.readouterr().err
 
 
 ASSESSMENT = """

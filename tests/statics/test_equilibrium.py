@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 
 import archfem as af
 from archfem.statics import Equilibrium, dead_load, equilibrium, self_weight
-from archfem.statics.equilibrium import _increment_load, dead_load_doubts
+from archfem.statics.equilibrium import _increment_load, dead_load_doubts, support_doubts
 from archfem.statics.newton import Solution
+
+ROOT = Path(__file__).parents[2]
 
 
 def semicircle(share, fidelity):
@@ -179,6 +182,71 @@ def test_one_smooth_joint_among_rough_ones_is_named(stack):
     assert doubt.cause.startswith("the least coefficient of friction is 0.02")
 
 
+def with_fixed(structure, *numbers):
+    """A structure some blocks of which are fixed by mistake."""
+    blocks = list(structure.blocks)
+    for number in numbers:
+        blocks[number] = replace(blocks[number], fixed=True)
+    return replace(structure, blocks=tuple(blocks))
+
+
+@pytest.mark.parametrize("numbers", [[2], [5], [8], [3, 4]])
+def test_a_fixed_voussoir_is_a_doubt_with_its_place(numbers):
+    """Blocks 0 and 10 are the abutments of nine voussoirs; two neighbours are one body."""
+    ring = with_fixed(resting().model.structure, *numbers)
+    dead = af.dead_load(af.build(ring, fidelity="rigid"))
+    (doubt,) = dead_load_doubts(dead)
+    names = " and ".join(f"'{ring.blocks[number].name}'" for number in numbers)
+    x, y = np.mean([ring.blocks[number].centroid for number in numbers], axis=0)
+    assert doubt.cause.startswith(f"{names} at ({x:.2f}, {y:.2f}) m cannot move, but stands")
+    assert "between stones of 'arch'" in doubt.cause
+    assert doubt.remedy.startswith("take fixed from it")
+
+
+def test_a_voussoir_that_extends_its_abutment_is_none():
+    assert support_doubts(with_fixed(resting().model.structure, 1, 2, 9)) == []
+
+
+def test_a_fixed_stone_of_a_pier_or_a_flat_arch_is_a_doubt():
+    pier = af.column(breadth=0.6, heights=[0.5] * 4)
+    flat = af.shapes.flat_arch(span=2.0, thickness=0.4, voussoirs=5, skewback="10 degree")
+    for structure, number in ((pier, 2), (flat, 3)):
+        assert support_doubts(structure) == []
+        (doubt,) = support_doubts(with_fixed(structure, number))
+        assert doubt.cause.startswith(f"'{structure.blocks[number].name}' at (")
+
+
+def test_a_fixed_pier_between_arches_of_one_part_is_none():
+    """A fixed pier carries two stones of one part, whose springings are nearly vertical."""
+    skew = np.tan(np.radians(3.5))
+    faces = [((x, 0.0), (x + side * skew, 1.0)) for x, side in ((1.0, 1), (2.0, -1))]
+    pier = [(0.9, -1.0), (2.1, -1.0), faces[1][0], faces[1][1], faces[0][1], faces[0][0]]
+    stones = [
+        af.Block(((0.0, 0.0), *faces[0], (0.0, 1.0)), af.STONE, "left", part="arches", role="ring"),
+        af.Block(
+            ((3.0, 1.0), faces[1][1], faces[1][0], (3.0, 0.0)),
+            af.STONE,
+            "right",
+            part="arches",
+            role="ring",
+        ),
+        af.Block(tuple(pier), af.STONE, "pier", fixed=True, part="rock", role="other"),
+    ]
+    assert support_doubts(af.masonry.assembled(stones, af.masonry.STONE_TO_STONE)) == []
+
+
+CASES = [*ROOT.glob("meshes/*.toml"), *ROOT.glob("archfem/cases/new/*.toml")]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in CASES if not re.search(r"^\[?case", path.read_text(), re.MULTILINE)],
+    ids=lambda path: path.stem,
+)
+def test_supports_of_shipped_cases_are_none(path):
+    assert support_doubts(af.Case.read(path).structure) == []
+
+
 def smooth(friction):
     """A block that rests on a level joint, which needs no friction."""
     block = af.column(breadth=1.0, heights=[1.0], contact=af.Contact(1e9, 4e8, friction))
@@ -218,6 +286,19 @@ def test_the_check_command_prints_doubts(embrace, code, tmp_path, capsys):
     said = capsys.readouterr().out
     assert ("in doubt: under dead load |V| / N is" in said) == bool(code)
     assert ("toml: ready" in said) != bool(code)
+
+
+def test_commands_name_fixed_blocks_and_doubt_those_within_a_ring(tmp_path, capsys):
+    path, ring = tmp_path / "ring.toml", with_fixed(resting().model.structure, 5)
+    af.Analysis(ring, fidelity="rigid").write(path)
+    assert af.commands.main(["check", str(path)]) == 3
+    said = capsys.readouterr().out
+    fixed = "'left abutment', 'voussoir 5', 'right abutment'"
+    assert f"blocks that move: 8 of 'arch'; fixed: {fixed}\n" in said
+    assert "in doubt: 'voussoir 5' at (0.00, " in said
+    for command in (["rate", "--vehicle", "CS454-single"], ["limit", "--set", "limit.vertical=-1"]):
+        assert af.commands.main([command[0], str(path), *command[1:]]) == 0
+        assert "in doubt: 'voussoir 5' at (0.00, " in capsys.readouterr().out
 
 
 def thin_ring(stiffness, unit_weight=20e3):

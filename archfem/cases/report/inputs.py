@@ -115,7 +115,7 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
 def _command_rows(data: ReportData) -> Iterator[Row]:
     """Yield the keys of static analyses and of the risk that are in the report."""
     for section in (*STATIC_RESULTS, "pushover", "risk"):
-        table = data.case.settings.get(section, {})
+        table = data.read_table(section)
         # a rating has joints and fill of [limit]
         users = ("limit", "rating") if section == "limit" else (section,)
         if not any(f"{name}.txt" in data.files for name in users):

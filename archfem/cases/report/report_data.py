@@ -11,7 +11,8 @@ import xarray as xr
 
 from archfem._files import check_listed, describe_deleted, group_of, path_inside, read_file_list
 from archfem.cases.case import Case
-from archfem.cases.run import CASE_FILE
+from archfem.cases.run import CASE_FILE, RATING_FILE
+from archfem.cases.toml_file import Table, parse_tables
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import ArchfemError
@@ -54,6 +55,12 @@ class ReportData:
         """Fidelity of the runs, which "auto" has selected; without runs that of the case."""
         recorded = {str(run.dataset.attrs.get("fidelity", "")) for run in self.runs.values()}
         return ", ".join(sorted(recorded)) or self.case.analysis.discretisation.name
+
+    def read_table(self, section: str) -> Table:
+        """Return a section of the case; that of a rating is as the command took it."""
+        if section == "rating" and (text := self.read_text(RATING_FILE)) is not None:
+            return dict(parse_tables(text)["rating"])
+        return dict(self.case.settings.get(section, {}))
 
     @property
     def is_static(self) -> bool:
