@@ -361,7 +361,31 @@ def test_stiffness_by_a_finish_is_inferred_and_numbers_have_their_units():
     assert marks["stone to stone: finish"] == ("dressed", "given")
     assert marks["stone to stone: k_n"][1] == marks["stone to stone: k_s"][1] == "inferred"
     assert marks["stone to stone: μ"] == ("0.6", "given")
-    assert marks["motion"][0] == "synthetic: seed 3; duration 6 s; pga 2 m/s²"
+    assert marks["motion: synthetic, seed"] == ("3", "given")
+    assert marks["motion: synthetic, duration"] == ("6 s", "given")
+    assert marks["motion: synthetic, pga"] == ("2 m/s²", "given")
+    assert marks["motion: synthetic, dt"] == ("0.005 s", "default")
+    assert marks["vertical: synthetic, peak"] == ("0.667 of the horizontal", "default")
+
+
+def test_sources_of_a_suite_are_inputs_each_with_its_mark():
+    tables = tomllib.loads(CASE)
+    tables["suite"]["pairs"]["third"] = {
+        "synthetic": {"seed": 7, "duration": "1 s"},
+        "vertical": {"synthetic": {"seed": 9}},
+        "reversed": True,
+    }
+    rows = tabulate_inputs(report_data.ReportData(af.Case.of(tables), {})).rows
+    found = {(name, mark): value for name, value, mark in rows if name.count(": ")}
+    assert found["motion: synthetic, seed", "given"] == "1, 2, 7"
+    assert found["motion: synthetic, duration", "given"] == "1 s"
+    assert found["motion: synthetic, pga", "given"] == "1 m/s², of 2 motions"
+    assert found["motion: synthetic, pga", "default"] == "2.94199 m/s², of 1 motion"
+    assert found["motion: reversed", "given"] == "True, of 1 motion"
+    assert found["vertical: synthetic, peak", "default"] == "0.667 of the horizontal, of 1 motion"
+    assert found["vertical: synthetic, peak", "given"] == "0 of the horizontal, of 1 motion"
+    assert found["vertical: synthetic, seed", "given"] == "9, of 1 motion"
+    assert found["vertical: synthetic, dt", "default"] == "0.005 s, of 1 motion"
 
 
 BRIDGE = """

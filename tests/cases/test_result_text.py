@@ -62,8 +62,15 @@ def test_words_and_tables_obey_the_criteria_of_the_run(run):
 def test_limit_analysis_in_words(ring):
     pushed = af.collapse_factor(ring, live=af.BodyForce(1.0))
     outcome, hinges = describe_collapse(ring, pushed).splitlines()
-    assert outcome.endswith(f"into a mechanism, at a factor of {pushed.factor:.4g} on the load")
+    assert outcome.endswith(f"into a mechanism, at {pushed.factor:.4g} g to the right")
     assert hinges.startswith("hinges, by the face in contact: joint 0 at the intrados; joint 6 at")
+    mirrored = af.collapse_factor(ring, live=af.BodyForce(-2.0))
+    assert mirrored.sentence == pushed.sentence.replace("right", "left")
+    wheel = af.PointLoad(0.5, (0.0, -3e3))
+    loaded = af.collapse_factor(ring, live=wheel)
+    assert loaded.sentence.endswith(f"at {loaded.factor:.4g} times 3 kN at x = 0.5 m")
+    both = af.collapse_factor(ring, live=[wheel, af.BodyForce(1.0)])
+    assert both.sentence.endswith(f"at {both.factor:.4g} times the load")
     slab = af.column(breadth=4.0, heights=[1.0])  # slides before it turns
     assert describe_collapse(slab, af.collapse_factor(slab, live=af.BodyForce(1.0))).endswith(
         f"\nsliding: {slab.joints[0].name}"
