@@ -42,9 +42,9 @@ SECTIONS = (
 )
 OUTPUT_KEYS: Table = {"joints": [(int, str)], "animation": bool, "free_body": str}
 
-# Who signs what: the head of a report
+# Who signs what, against which demand: head and conclusion of a report
 REPORT_KEYS: Table = dict.fromkeys(
-    ("project", "place", "author", "checked_by", "date", "norm"), str
+    ("project", "place", "author", "checked_by", "date", "norm", "demand"), str
 )
 
 
@@ -65,7 +65,7 @@ class Case:
         assessment: kinematic assessment; without [assessment] that of the case's motion or suite.
         risk: hazard, alternatives and sampling of `archfem.collapse_risk`, or None.
         output: checked keys of [output]: pictures and films.
-        report: checked keys of [report]: project, place and the like, for the head of a report.
+        report: checked keys of [report]: project, place and the like, which a report shows.
         settings: tables of the case as they were read, changes included.
         folder: folder that relative file names start from.
     """

@@ -20,7 +20,7 @@ from archfem.joints.criteria import (
     longest_duration,
     with_failure_flags,
 )
-from archfem.limit.collapse import Collapse, Outcome, describe_crushing
+from archfem.limit.collapse import Collapse, describe_crushing
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.masonry.structure import Structure, join_joint_names, join_names
 from archfem.motion.matching import Match
@@ -201,15 +201,11 @@ def describe_supports(structure: Structure, max_names: int = 4) -> str:
 
 
 def describe_collapse(structure: Structure, collapse: Collapse, strength: float | None) -> str:
-    """Describe the result of limit analysis: outcome and factor, hinges, sliding, crushing."""
+    """Describe the result of limit analysis: outcome and load, hinges, sliding, crushing."""
     joints = structure.joints
-    outcome = f"limit analysis: {collapse.outcome.sentence}"
-    # Other outcomes have no finite factor.
-    if collapse.outcome in (Outcome.COLLAPSES, Outcome.BRACKETED):
-        outcome += f", at a factor of {collapse.factor:.4g} on the load"
     hinges = [f"{joints[number].name} at the {side}" for number, side in collapse.hinges]
     sliding = [joints[number].name for number in collapse.sliding]
-    lines = [outcome]
+    lines = [f"limit analysis: {collapse.sentence}"]
     lines += [f"hinges, by the face in contact: {join_names(hinges, '; ')}"] if hinges else []
     lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []

@@ -35,7 +35,7 @@ from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
 from archfem.limit.plastic_fill import PlasticFill
-from archfem.masonry.loads import Action, Settlement, list_loads
+from archfem.masonry.loads import Action, BodyForce, PointLoad, Settlement, list_loads
 from archfem.masonry.structure import (
     HasStructure,
     Structure,
@@ -43,7 +43,7 @@ from archfem.masonry.structure import (
     join_names,
     structure_of,
 )
-from archfem.units import MPa
+from archfem.units import MPa, kN
 
 logger = logging.getLogger("archfem")
 
@@ -124,6 +124,21 @@ class Collapse(ResultDisplay):
     def sliding_names(self) -> tuple[str, ...]:
         """Names of the joints that slide, in the order of `sliding`."""
         return tuple(str(self.joints["name"].values[joint]) for joint in self.sliding)
+
+    @property
+    def sentence(self) -> str:
+        """The outcome, and the load at collapse where there is one."""
+        if self.outcome not in (Outcome.COLLAPSES, Outcome.BRACKETED):
+            return self.outcome.sentence
+        load, unit = (self.live[0] if len(self.live) == 1 else None), 1.0
+        words = " times the load"
+        if isinstance(load, BodyForce) and load.horizontal and not load.vertical:
+            unit = abs(load.horizontal)
+            words = f" g to the {'right' if load.horizontal > 0.0 else 'left'}"
+        elif isinstance(load, PointLoad):
+            words = f" times {np.hypot(*load.force) / kN:.4g} kN at x = {load.x:.4g} m"
+        bounds = dict.fromkeys(f"{unit * bound:.4g}" for bound in (self.factor, self.upper))
+        return f"{self.outcome.sentence}, at {' to '.join(bounds)}{words}"
 
     def _summary(self) -> str:
         """Describe the result in one or two lines."""

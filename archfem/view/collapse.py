@@ -79,10 +79,7 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse, factors: 
     factor = f"{found.factor:.3g} ×{factors}" if np.isfinite(found.factor) else ""
     if found.outcome is not Outcome.INFEASIBLE:  # else nothing was loaded: the weight is too much
         draw_loads(axes, structure, found.live, factor=factor)
-    has_factor = found.outcome in (Outcome.COLLAPSES, Outcome.BRACKETED)
-    bound = "" if found.upper == found.factor else f" to {found.upper:.4g}"
-    reached = f" at a factor of {found.factor:.4g}{bound}" if has_factor else ""
-    set_title(axes, f"{structure.name}: {found.outcome.sentence}{reached}")
+    set_title(axes, f"{structure.name}: {found.sentence}")
     add_legend(axes)
 
 

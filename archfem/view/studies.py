@@ -488,11 +488,11 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()
     for axes in panels[len(shares) :]:
         axes.set_visible(False)
-    for letter, axes, (name, share) in zip("abcdef", panels, shares.items(), strict=False):
+    for axes, (name, share) in zip(panels, shares.items(), strict=False):
         first = axes in panels[::columns]
         label = labels.get(name, name.replace("_", " "))
         style_axes(axes, label, "residual displacement [mm]" if first else "")
-        set_title(axes, f"({letter}) explains {share:.0%}")
+        set_title(axes, f"explains {share:.0%}")
         _draw_property(axes, rows[name].values, heights, falls)
         axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set_yscale("log")

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from string import ascii_lowercase
 from textwrap import fill
 from typing import Any
 
@@ -72,8 +73,27 @@ class Page(Figure):
         """Draw the figure."""
         # a file is drawn twice, and laid out by the first drawing alone
         if not isinstance(self.get_layout_engine(), PlaceHolderLayoutEngine):
+            letter_panels(self)
             disable_math(self)
         super().draw(renderer)
+
+
+def letter_panels(figure: Figure) -> None:
+    """Letter the panels of a figure that has several, before their titles or above them."""
+    # axes that share a place, such as those of a second scale, are one panel; a colour bar is none
+    panels: dict[Any, Axes] = {}
+    for axes in figure.axes:
+        place = axes.get_subplotspec()
+        if place is not None and axes.get_visible() and axes.get_label() != "<colorbar>":
+            panels.setdefault(place, axes)
+    if len(panels) < 2:
+        return
+    for letter, axes in zip(ascii_lowercase, panels.values(), strict=False):
+        text, mark = axes.get_title(), f"({letter})"
+        if text and not text.startswith(mark):
+            axes.title.set_text(f"{mark} {text}")
+        elif not text:
+            axes.set_title(mark, loc="left", fontsize=Size.LABEL, color=Colour.TEXT)
 
 
 def new_figure(width: float, height: float) -> Figure:

@@ -1,4 +1,4 @@
-"""A kinematic assessment: mechanism, capacity curve and the demand of a spectrum."""
+"""A kinematic assessment: (a) mechanism, (b) capacity curve and the demand of a spectrum."""
 
 import archfem as af
 

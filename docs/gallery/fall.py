@@ -1,4 +1,4 @@
-"""A thin ring under a strong motion, from its first hinge to the ground."""
+"""A thin ring under a strong motion, from the first loose block (a) to the ground (d)."""
 
 import archfem as af
 

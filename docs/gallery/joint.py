@@ -1,4 +1,4 @@
-"""Friction and eccentricity of one joint over time."""
+"""One joint over time: (a) friction and (b) eccentricity."""
 
 import archfem as af
 

@@ -1,4 +1,4 @@
-"""A rating: the factor of a vehicle at every place on a bridge, and the worst mechanism."""
+"""A rating: (a) the factor of a vehicle at every place on a bridge, (b) the worst mechanism."""
 
 import archfem as af
 

@@ -16,9 +16,10 @@ from pages import read_page
 
 import archfem as af
 from archfem._files import read_file_list, replace_results
+from archfem.cases import risk_keys
 from archfem.cases.defaults import describe_defaults, list_defaults
-from archfem.cases.report import report, report_data
-from archfem.cases.report.conclusion import build_conclusion
+from archfem.cases.report import conclusion, report, report_data
+from archfem.cases.report.conclusion import build_conclusion, list_facts
 from archfem.cases.report.inputs import tabulate_inputs
 from archfem.cases.report.sections import supported_weight_ratio
 from archfem.cases.run import carry_out, replace_run
@@ -89,13 +90,74 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert f"{float(run.joints['friction'].max()):.3f}" in words
 
 
-def test_the_head_counts_the_doubts_of_all_results(kept, undrawn):
-    with replace_results(kept, "limit", read_file_list(kept)["run"].inputs) as draft:
-        (draft / "limit.txt").write_text("it stands\nin doubt: a made one")
-    page = af.cases.open_results(kept).report()
-    words = " ".join(read_page(page.read_text(encoding="utf-8")).words)
-    assert "In doubt: a made one." in words
-    assert f"doubts, of all results: {words.count('In doubt: ')}" in words
+LIMIT_TEXT = "limit analysis: it turns, at 0.25 g to the left\nin doubt: a made one"
+CHECK_TEXT = (
+    "right: pushed to the right\n"
+    "linear, q = 2, FC = 1.35: capacity 8.212 m/s², demand 2.844 m/s²: passes, "
+    "the spectrum may be 2.89 times as strong\n"
+    "a code: capacity 0.11 m, demand 0.22 m at T = 1.178 s: fails, "
+    "the spectrum may be 0.5 times as strong, up to there nothing moves\n"
+    "note: an upper bound"
+)
+RATING_TEXT = "Rating of 'it' for LM1: factor 1.25 at x = 2 m (the vehicle's middle), passes"
+RISK_TEXT = (
+    "falls at 0.002 a year (0.001 to 0.003 at 90 %), 0.1 in 50 years; median 6 m/s² of pga, so"
+)
+
+
+def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
+    both = "\n\n".join([CHECK_TEXT, CHECK_TEXT.replace("right", "left")])
+    texts = {"limit": LIMIT_TEXT, "assessment": both, "rating": RATING_TEXT, "risk": RISK_TEXT}
+    for name, text in texts.items():
+        with replace_results(kept, name, read_file_list(kept)["run"].inputs) as draft:
+            (draft / f"{name}.txt").write_text(text, encoding="utf-8")
+    found = af.cases.open_results(kept)
+    case = found.case.signed(["report.demand=0.25 g, 475 years", "report.author=A. Mason"])
+    hazard = af.Hazard.from_return_periods({475.0: 3.0, 2475.0: 8.0})
+    case = replace(case, risk=risk_keys.RiskSettings(hazard, {}, {}))
+    data = report_data.ReportData(case, found.runs, found.folder)
+    *sentences, signatures = build_conclusion(data).pieces
+    (table,) = (each for each in sentences if each.kind == "grid")
+    assert table.rows == [
+        ("as stated", "0.25 g, 475 years", "-", "-"),
+        ("time histories", "PGA 0.05 g", "no mechanism in 2 of 2 runs", "-"),
+        ("limit analysis", "-", "a mechanism at 0.25 g to the left (in doubt)", "-"),
+        ("rating", "LM1", "passes, x = 2 m (the vehicle's middle)", "1.25"),
+        *(
+            (f"assessment: {name}, right and left", demand, f"{capacity} (in doubt)", factor)
+            for name, demand, capacity, factor in (
+                ("linear, q = 2, FC = 1.35", "2.844 m/s²", "8.212 m/s², passes", "2.89"),
+                ("a code", "0.22 m", "0.11 m, fails", "0.5"),
+            )
+        ),
+        (
+            "annual rate",
+            "PGA 3, 8 m/s² once in 475, 2475 years",
+            "median PGA 6 m/s², falls at 0.002 a year",
+            "2, 0.75",
+        ),
+    ]
+    texts = [each.text for each in sentences if each.kind == "words"]
+    # each doubt follows the sentence of its result
+    (limit,) = (k for k, text in enumerate(texts) if text.startswith("Limit analysis"))
+    assert texts[limit + 1] == "In doubt: a made one."
+    (checks,) = (k for k, text in enumerate(texts) if text.startswith("Kinematic assessment"))
+    assert "right and left: a code: capacity 0.11 m" in texts[checks]
+    assert texts[checks + 1] == "In doubt: an upper bound."
+    assert dict(list_facts(data))["in doubt"] == "limit analysis, kinematic assessment"
+    assert signatures.rows == [("author", "A. Mason", "", ""), ("checked by", "", "", "")]
+
+
+@pytest.mark.parametrize(
+    ("line", "row"),
+    [
+        ("it turns, at 4.8 times 98 kN at x = 1 m", ("98 kN at x = 1 m", "a mechanism", "4.8")),
+        ("it turns, at 1 to 2 times the load", ("the load", "a mechanism", "1 to 2")),
+        ("limit analysis: it never turns", ("-", "it never turns", "-")),
+    ],
+)
+def test_a_load_that_grows_is_a_row_of_the_capacities(line, row):
+    assert list(conclusion._load_row("limit analysis", line)) == [("limit analysis", *row)]
 
 
 def test_missing_pairs_are_named_and_different_cases_refused(kept, unplotted):
@@ -361,7 +423,31 @@ def test_stiffness_by_a_finish_is_inferred_and_numbers_have_their_units():
     assert marks["stone to stone: finish"] == ("dressed", "given")
     assert marks["stone to stone: k_n"][1] == marks["stone to stone: k_s"][1] == "inferred"
     assert marks["stone to stone: μ"] == ("0.6", "given")
-    assert marks["motion"][0] == "synthetic: seed 3; duration 6 s; pga 2 m/s²"
+    assert marks["motion: synthetic, seed"] == ("3", "given")
+    assert marks["motion: synthetic, duration"] == ("6 s", "given")
+    assert marks["motion: synthetic, pga"] == ("2 m/s²", "given")
+    assert marks["motion: synthetic, dt"] == ("0.005 s", "default")
+    assert marks["vertical: synthetic, peak"] == ("0.667 of the horizontal", "default")
+
+
+def test_sources_of_a_suite_are_inputs_each_with_its_mark():
+    tables = tomllib.loads(CASE)
+    tables["suite"]["pairs"]["third"] = {
+        "synthetic": {"seed": 7, "duration": "1 s"},
+        "vertical": {"synthetic": {"seed": 9}},
+        "reversed": True,
+    }
+    rows = tabulate_inputs(report_data.ReportData(af.Case.of(tables), {})).rows
+    found = {(name, mark): value for name, value, mark in rows if name.count(": ")}
+    assert found["motion: synthetic, seed", "given"] == "1, 2, 7"
+    assert found["motion: synthetic, duration", "given"] == "1 s"
+    assert found["motion: synthetic, pga", "given"] == "1 m/s², of 2 motions"
+    assert found["motion: synthetic, pga", "default"] == "2.94199 m/s², of 1 motion"
+    assert found["motion: reversed", "given"] == "True, of 1 motion"
+    assert found["vertical: synthetic, peak", "default"] == "0.667 of the horizontal, of 1 motion"
+    assert found["vertical: synthetic, peak", "given"] == "0 of the horizontal, of 1 motion"
+    assert found["vertical: synthetic, seed", "given"] == "9, of 1 motion"
+    assert found["vertical: synthetic, dt", "default"] == "0.005 s, of 1 motion"
 
 
 BRIDGE = """
@@ -409,9 +495,9 @@ def test_a_result_without_a_time_history_has_a_report(
     said = capsys.readouterr().out
     assert af.commands.main(["report", str(folder)]) == 0
     words = words_of(folder / "report.html")
-    conclusion = words.split("Inputs and assumptions")[1]  # between the contents and the heading
-    assert found in conclusion
-    assert "In doubt: joints slide (arch, joint" in conclusion
+    concluded = words.split("Inputs and assumptions")[1]  # between the contents and the heading
+    assert found in concluded
+    assert "In doubt: joints slide (arch, joint" in concluded
     factor = re.search(r"factor (?:of )?([\d.]+)", said)[1]
     assert f"{factor}" in words
     assert "Response" not in words
@@ -435,8 +521,8 @@ def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path):
     path.write_text(f"{CASE.partition('[suite]')[0]}[assessment]{spectrum}", encoding="utf-8")
     assert af.commands.main(["assess", str(path), "--out", str(folder)]) == 0
     assert af.commands.main(["report", str(folder)]) == 0
-    conclusion = words_of(folder / "report.html").split("Inputs and assumptions")[1]
-    assert "Kinematic assessment, right: NTC-2018 SLV: capacity" in conclusion
+    concluded = words_of(folder / "report.html").split("Inputs and assumptions")[1]
+    assert "Kinematic assessment, right and left: NTC-2018 SLV: capacity" in concluded
     words = words_of(folder / "report.html")
     assert "ag 0.25" in words.split("Norms and methods")[2]
     inputs = " ".join(words.split("Assumptions, units")[0].split())
@@ -465,7 +551,7 @@ def test_the_conclusion_states_outcomes_falls_and_the_range(kept, unplotted):
     vars(found.runs["second"])["verdict"] = replace(
         verdicts["second"], outcome="fallen", doubts=(af.models.model.Doubt("it leaks", "mend it"),)
     )
-    text = " ".join(piece.text for piece in build_conclusion(data).pieces)
+    text = " ".join(piece.text for piece in build_conclusion(data).pieces if piece.kind == "words")
     assert "The structure forms no mechanism under 1 of 2 motions: first." in text
     assert "The structure falls under 1 of 2 motions: second." in text
     assert "In doubt: 1 of 2 runs: it leaks; mend it." in text

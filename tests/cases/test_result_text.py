@@ -62,9 +62,16 @@ def test_words_and_tables_obey_the_criteria_of_the_run(run):
 def test_limit_analysis_in_words(ring):
     pushed = af.collapse_factor(ring, live=af.BodyForce(1.0))
     outcome, hinges, crushing = describe_collapse(ring, pushed, 2e6).splitlines()
-    assert outcome.endswith(f"into a mechanism, at a factor of {pushed.factor:.4g} on the load")
+    assert outcome.endswith(f"into a mechanism, at {pushed.factor:.4g} g to the right")
     assert hinges.startswith("hinges, by the face in contact: joint 0 at the intrados; joint 6 at")
     assert crushing == "joints crush at 2 MPa, the strength of the stones"
+    mirrored = af.collapse_factor(ring, live=af.BodyForce(-2.0))
+    assert mirrored.sentence == pushed.sentence.replace("right", "left")
+    wheel = af.PointLoad(0.5, (0.0, -3e3))
+    loaded = af.collapse_factor(ring, live=wheel)
+    assert loaded.sentence.endswith(f"at {loaded.factor:.4g} times 3 kN at x = 0.5 m")
+    both = af.collapse_factor(ring, live=[wheel, af.BodyForce(1.0)])
+    assert both.sentence.endswith(f"at {both.factor:.4g} times the load")
     slab = af.column(breadth=4.0, heights=[1.0])  # slides before it turns
     slid, lifted = (af.collapse_factor(slab, live=af.BodyForce(*g)) for g in ((1.0,), (0.0, -1.0)))
     words = describe_collapse(slab, slid, None).splitlines()

@@ -94,7 +94,9 @@ def test_the_mirror_image_of_a_load_has_bounds_that_agree():
         bounds = f"factor {one.lower:.4g} to {one.upper:.4g}"
         assert bounds in str(one)
         axes = one.plot().axes[0]
-        assert axes.get_title().endswith(bounds.replace("factor", "at a factor of"))
+        words = axes.get_title().replace("\n", " ").partition("mechanism, ")[2]
+        place = one.live[0].x
+        assert words == f"{bounds.replace('factor', 'at')} times 1 kN at x = {place:g} m"
         # the triangles that strain, the others are left out
         shaded = next(each for each in axes.collections if each.get_array() is not None)
         assert 0 < len(shaded.get_paths()) < one.fill_motion.sizes["triangle"]

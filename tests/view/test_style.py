@@ -154,3 +154,23 @@ def test_lines_differ_in_grey_and_without_any_of_the_cones():
         seen = [cielab(colour, sight) for colour in Colour.LINES]
         apart = [np.linalg.norm(one - other) for one, other in combinations(seen, 2)]
         assert min(apart) >= 20.0, sight
+
+
+def test_panels_have_letters_in_their_order_and_a_single_one_has_none(tmp_path):
+    figure = new_figure(6.0, 4.0)
+    (first, second), (third, hidden) = figure.subplots(2, 2)
+    hidden.set_visible(False)
+    first.set_title("of the ring")
+    second.twinx()  # a second scale, and a colour bar, are no panels
+    figure.colorbar(third.imshow(np.eye(2)), ax=third)
+    for _ in range(2):  # a figure that is drawn again keeps its letters
+        save(figure, tmp_path / "panels.svg")
+    places = ("center", "left", "left")
+    titles = [axes.get_title(loc=loc) for axes, loc in zip(figure.axes, places, strict=False)]
+    assert titles == ["(a) of the ring", "(b)", "(c)"]
+    texts = [text.get_text() for text in figure.findobj(Text)]
+    assert sum(text.startswith("(") for text in texts) == 3
+    alone = new_figure(3.0, 2.0)
+    alone.subplots()
+    save(alone, tmp_path / "alone.svg")
+    assert not any(text.get_text().startswith("(") for text in alone.findobj(Text))

@@ -2,8 +2,9 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 from importlib import import_module
 from typing import Any
@@ -19,8 +20,11 @@ from archfem.dynamics.verdict import DOUBT_MARK, NO_RANGE
 from archfem.dynamics.verdict_range import property_text
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.joint_closing import describe_closing
-from archfem.units import format_mm
-from archfem.view.pages.document import Section, TextBlock
+from archfem.motion.hazard import MEASURES
+from archfem.units import STANDARD_GRAVITY, format_mm
+from archfem.view.pages.document import Grid, Section, TextBlock
+
+_Row = tuple[str, str, str, str]  # result, demand, capacity or outcome, factor
 
 # Outcomes of runs as verbs
 _VERBS = {
@@ -52,36 +56,66 @@ _FURTHER_RESULTS = {
 }
 
 
+# Results that the conclusion states, in this order, by the files of their commands
+_STATED_RESULTS = {
+    "": "time histories",
+    "limit.txt": "limit analysis",
+    "pushover.txt": "pushover",
+    "rating.txt": "rating",
+    "assessment.txt": "kinematic assessment",
+    "risk.txt": "annual rate of collapse",
+}
+
+_FACTORS = (
+    "; factor: the multiple of the demand at which a check is just passed, at which a load makes a "
+    "mechanism, or, of an annual rate, at which the structure falls with a probability of one half"
+)
+
+# A check of a kinematic assessment
+_CHECK = re.compile(
+    r"(?P<name>.*): capacity (?P<capacity>\S+ \S+), demand (?P<demand>\S+ [^\s:]+).*: "
+    r"(?P<outcome>passes|fails), the spectrum may be (?P<factor>\S+) times"
+)
+
+
 def list_facts(data: ReportData) -> list[tuple[str, str]]:
     """List who signs what, and the principal results by name, which the report shows first."""
     report = data.case.report
-    signed = [(key.replace("_", " "), report[key]) for key in REPORT_KEYS if report.get(key)]
+    signed = [
+        (key.replace("_", " "), report[key])
+        for key in REPORT_KEYS
+        if report.get(key) and key != "demand"  # it stands beside the capacities
+    ]
     runs, structure = list(data.runs.values()), data.case.structure
     blocks = [("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")]
     blocks += [("joints", structure.assessment)] if structure.assessment else []
     if not runs:
         return [*signed, *blocks]
-    # Files of older versions have the acceleration at their steps alone.
-    pga = max(
-        run.dataset.attrs.get("pga", float(np.abs(run.dataset["ground"].values[:, 0]).max()))
-        for run in runs
-    )
+    pga = max(map(_peak_of_ground, runs))
     joints = [assessed_joints(run.joints) for run in runs]
     eccentricity = max(float(abs(each["eccentricity"]).max()) for each in joints)
     opened = " (joints came apart)" if any(bool(each["open"].any()) for each in joints) else ""
     friction = max(float(each["friction"].max()) for each in joints)
     sizes = [("PGA", f"{pga:.2f} m/s²"), ("largest |e|", f"{eccentricity:.3f}{opened}")]
     sizes.append(("largest V / N", result_text.format_ratio(friction)))
-    verdict = ("verdict", summarise_outcomes(data, runs))
-    return [*signed, verdict, *blocks, *sizes]
+    verdict = [("verdict", summarise_outcomes(data, runs))]
+    doubtful = list(dict.fromkeys(result for result, _ in list_doubts(data)))
+    verdict += [("in doubt", ", ".join(doubtful))] if doubtful else []
+    return [*signed, *verdict, *blocks, *sizes]
+
+
+def _peak_of_ground(run: History) -> float:
+    """Return the horizontal peak acceleration of a run [m/s²]."""
+    # Files of older versions have the acceleration at their steps alone.
+    steps = float(np.abs(run.dataset["ground"].values[:, 0]).max())
+    return float(run.dataset.attrs.get("pga", steps))
 
 
 def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
     """Return outcome, and doubts or range, of a run, or how many runs have each outcome."""
     verdict = runs[0].verdict
     if len(runs) > 1:
-        outcomes = result_text.count_outcomes([run.verdict for run in runs])
-        return f"{outcomes}; doubts, of all results: {len(list_doubts(data)) or 'none'}"
+        return result_text.count_outcomes([run.verdict for run in runs])
     if verdict.fall is not None:
         # lost blocks have a line of their own
         verdict = replace(verdict, fall=replace(verdict.fall, time=None))
@@ -92,17 +126,110 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
 
 
 def build_conclusion(data: ReportData) -> Section:
-    """Build the section on outcome, margin and range in sentences, with the doubts beside them."""
-    sentences = [*_conclude_runs(data), *_conclude_joints(data), *_conclude_range(data)]
-    sentences += _conclude_statics(data)
-    blocks = [TextBlock(" ".join(sentences))] if sentences else []
-    blocks += [TextBlock(f"In doubt: {text}.", "doubt") for text in list_doubts(data)]
+    """Build the section on outcomes in sentences, each with its doubts, on margins and range."""
+    blocks, doubts = list[Any](), list_doubts(data)
+    for name, result in _STATED_RESULTS.items():
+        text = " ".join(_conclude_file(data, name) if name else _conclude_histories(data))
+        blocks += [TextBlock(text)] if text else []
+        own = (doubt for about, doubt in doubts if about == result)
+        blocks += [TextBlock(f"In doubt: {doubt}.", "doubt") for doubt in own]
+    if rows := [*_capacity_rows(data)]:
+        head = ("", "demand", "capacity or outcome", "factor")
+        factors = _FACTORS if any(row[3] != "-" for row in rows) else ""
+        blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
     blocks += [TextBlock(text) for text in filter(None, [describe_what_is_not_varied(data)])]
     # a history alone has no folder of further results
     absent = [what for name, what in _FURTHER_RESULTS.items() if name not in data.files]
     if data.folder is not None and absent:
         blocks.append(TextBlock(f"Not computed: {', '.join(absent)}."))
-    return Section("Conclusion", blocks)
+    return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
+
+
+def _build_signatures(report: Mapping[str, str]) -> Grid:
+    """Build the lines to be signed, with the names and the date that are given."""
+    rows = [
+        (who.replace("_", " "), report.get(who, ""), report.get("date", ""), "")
+        for who in ("author", "checked_by")
+    ]
+    return Grid(("", "name", "place, date", "signature"), rows, "", "form")
+
+
+def _capacity_rows(data: ReportData) -> Iterator[_Row]:
+    """Yield demand, capacity or outcome, and factor, of each result; "-" where there is none."""
+    if stated := data.case.report.get("demand"):
+        yield "as stated", stated, "-", "-"
+    if data.runs:
+        verdicts = [run.verdict for run in data.runs.values()]
+        peaks = [f"{_peak_of_ground(run) / STANDARD_GRAVITY:.2f}" for run in data.runs.values()]
+        demand = f"PGA {' to '.join(dict.fromkeys([min(peaks), max(peaks)]))} g"
+        outcome = result_text.count_outcomes(verdicts) if len(peaks) > 1 else verdicts[0].outcome
+        yield "time histories", demand, outcome + _mark_doubt(data, "time histories"), "-"
+    if (computed := data.verdict_range) is not None:
+        motion = computed.dataset.attrs.get("motion")
+        name = f"variations under '{motion}'" if motion else "variations"
+        yield name, "the same motion", computed.count, "-"
+    for name, result in _STATED_RESULTS.items():
+        if text := data.read_text(name):
+            build: dict[str, Callable[[str], Iterator[_Row]]]
+            build = {"assessment.txt": _assessment_rows, "risk.txt": partial(_risk_row, data)}
+            for row in build.get(name, partial(_load_row, result))(text):
+                yield row[0], row[1], row[2] + _mark_doubt(data, result), row[3]
+
+
+def _mark_doubt(data: ReportData, result: str) -> str:
+    """Return the mark of a result in doubt, or nothing."""
+    return " (in doubt)" if any(about == result for about, _ in list_doubts(data)) else ""
+
+
+def _load_row(result: str, text: str) -> Iterator[_Row]:
+    """Yield the row of a load that grows until it makes a mechanism."""
+    first = text.splitlines()[0]
+    if found := re.search(r" for (.*?): factor (\S+) at (.*?), (passes|fails)", first):
+        vehicle, factor, place, outcome = found.groups()
+        yield result, vehicle, f"{outcome}, {place}", factor
+    elif found := re.search(r", at (\S+(?: to \S+)?) times (.*)", first):
+        yield result, found[2], "a mechanism", found[1]
+    elif found := re.search(r", at (.*)", first):
+        yield result, "-", f"a mechanism at {found[1]}", "-"
+    else:
+        yield result, "-", first.partition(": ")[2], "-"
+
+
+def _list_checks(text: str) -> dict[str, list[str]]:
+    """Return the checks of a kinematic assessment, each with the directions in which it holds."""
+    checks: dict[str, list[str]] = {}
+    for part in text.split("\n\n"):
+        for line in filter(_CHECK.match, part.splitlines()):
+            checks.setdefault(line, []).append(part.partition(":")[0])
+    return checks
+
+
+def _assessment_rows(text: str) -> Iterator[_Row]:
+    """Yield a row for each check of a kinematic assessment."""
+    for line, directions in _list_checks(text).items():
+        if found := _CHECK.match(line):
+            name = f"assessment: {found['name']}, {' and '.join(directions)}"
+            yield name, found["demand"], f"{found['capacity']}, {found['outcome']}", found["factor"]
+
+
+def _risk_row(data: ReportData, text: str) -> Iterator[_Row]:
+    """Yield the row of the annual rate: hazard by its return periods, and median of the falls."""
+    found, risk = re.search(r"falls at (.*? a year).*; median (\S+) ", text), data.case.risk
+    if not found or risk is None:
+        return
+    hazard, demand, factors = risk.hazard, "hazard of the site", "-"
+    name, unit = hazard.measure.upper().replace("_AVG", ", mean,"), MEASURES[hazard.measure]
+    if len(hazard.intensity) <= 4:
+        sizes = ", ".join(f"{value:.3g}" for value in hazard.intensity)
+        periods = ", ".join(f"{1.0 / rate:.4g}" for rate in hazard.rate)
+        demand = f"{name} {sizes} {unit} once in {periods} years"
+        factors = ", ".join(f"{float(found[2]) / value:.3g}" for value in hazard.intensity)
+    yield "annual rate", demand, f"median {name} {found[2]} {unit}, falls at {found[1]}", factors
+
+
+def _conclude_histories(data: ReportData) -> list[str]:
+    """Return the sentences on the runs, on the law of their joints, and on their range."""
+    return [*_conclude_runs(data), *_conclude_joints(data), *_conclude_range(data)]
 
 
 def _conclude_runs(data: ReportData) -> Iterator[str]:
@@ -174,34 +301,39 @@ def _conclude_range(data: ReportData) -> Iterator[str]:
         motion = computed.dataset.attrs.get("motion") if len(data.runs) > 1 else None
         under = f" under '{motion}'" if motion else ""
         yield f"Where {varied} {verb} uncertain,{under} the structure {computed.sentence}."
-    if text := data.read_text("risk.txt"):
-        yield sentence(f"the structure {text.splitlines()[0]}")
 
 
-def _conclude_statics(data: ReportData) -> Iterator[str]:
-    """Yield the decisive sentences of limit analysis, pushover, rating and assessment."""
-    for name in ("limit.txt", "pushover.txt", "rating.txt"):
-        if text := data.read_text(name):
-            yield sentence(text.splitlines()[0])
-    for part in (data.read_text("assessment.txt") or "").split("\n\n"):
-        direction = part.partition(":")[0]
-        checks = [line for line in part.splitlines() if re.search(r": (passes|fails)", line)]
-        if checks:
-            yield sentence(f"kinematic assessment, {direction}: {checks[-1]}")
+def _conclude_file(data: ReportData, name: str) -> list[str]:
+    """Return the decisive sentences of the file of a command."""
+    text = data.read_text(name)
+    if not text:
+        return []
+    if name == "risk.txt":
+        return [sentence(f"the structure {text.splitlines()[0]}")]
+    if name != "assessment.txt":
+        return [sentence(text.splitlines()[0])]
+    decisive: dict[str, list[str]] = {}  # the last check of each direction
+    for part in text.split("\n\n"):
+        for line, ways in [*_list_checks(part).items()][-1:]:
+            decisive.setdefault(line, []).extend(ways)
+    return [
+        sentence(f"kinematic assessment, {' and '.join(ways)}: {line}")
+        for line, ways in decisive.items()
+    ]
 
 
-def list_doubts(data: ReportData) -> list[str]:
-    """Return the doubts about all results, each once; of runs with the number that have it."""
+def list_doubts(data: ReportData) -> list[tuple[str, str]]:
+    """Return each result in doubt with its doubt, once; of runs with the number that have it."""
     verdicts = [run.verdict for run in data.runs.values()]
     reasons = Counter(str(doubt) for verdict in verdicts for doubt in verdict.doubts)
-    doubts = list(reasons)
-    if len(verdicts) > 1:
-        doubts = [f"{count} of {len(verdicts)} runs: {text}" for text, count in reasons.items()]
-    for name in ("limit.txt", "rating.txt", "assessment.txt", "risk.txt"):
+    count = len(verdicts)
+    of_runs = [f"{n} of {count} runs: {text}" if count > 1 else text for text, n in reasons.items()]
+    doubts = [("time histories", text) for text in of_runs]
+    for name, result in _STATED_RESULTS.items():
         lines = (data.read_text(name) or "").splitlines()
         # what a kinematic assessment leaves out stands there as a note
         for mark in (DOUBT_MARK, "note: "):
-            doubts += [line.removeprefix(mark) for line in lines if line.startswith(mark)]
+            doubts += [(result, line.removeprefix(mark)) for line in lines if line.startswith(mark)]
     return list(dict.fromkeys(doubts))
 
 
@@ -217,9 +349,11 @@ def describe_what_is_not_varied(data: ReportData) -> str:
     doubts = "" if list_doubts(data) else "The checks of the numbers raise no doubt. "
     if not single:
         return doubts.strip()
+    # the samples of a rate were scaled until they fell
+    scale = "" if "risk.txt" in data.files else ", nor by how much the motion may be scaled"
     return (
         f"{doubts}Not varied: {', '.join(single)}. What another choice of these would change was "
-        "not computed, nor by how much the motion may be scaled."
+        f"not computed{scale}."
     )
 
 

@@ -1,6 +1,6 @@
 """Inputs of a report: each value with its mark given, default or inferred."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from inspect import Parameter, signature
 from typing import Any
 
@@ -73,7 +73,7 @@ def describe_value(value: Any, kind: Any = None) -> str:
     number = isinstance(value, int | float) and not isinstance(value, bool)
     unit = f" {kind}" if number and isinstance(kind, str) and kind not in ("", "1") else ""
     text = f"{value:g}" if isinstance(value, float) else str(value)
-    return text.replace("**2", "²") + unit
+    return (text + unit).replace("**2", "²")
 
 
 def _property_rows(data: ReportData) -> Iterator[Row]:
@@ -142,11 +142,12 @@ def _default_rows(section: str, table: Mapping[str, Any]) -> Iterator[Row]:
 
 
 def _motion_rows(data: ReportData) -> Iterator[Row]:
-    """Yield the source of the motion, its vertical component and its factors."""
+    """Yield the sources of the motions, their components and factors."""
     # as the case writes them, with their units
     motion, suite = (data.case.settings.get(key) for key in ("motion", "suite"))
     if suite is not None:
         yield "motions", f"{len(suite['pairs'])} pairs: {', '.join(suite['pairs'])}", "given"
+        yield from _source_rows(list(suite["pairs"].values()))
         target = suite.get("target")
         yield "target spectrum", describe_value(target) if target else "none", _mark(bool(target))
         matched = "matched to the target" if suite.get("matched") else "as they are"
@@ -154,18 +155,43 @@ def _motion_rows(data: ReportData) -> Iterator[Row]:
         for key, name in (("scale", "scale of the motions"), ("reduction", "reduction factor R")):
             yield name, str(suite.get(key, 1.0)), _mark(key in suite)
     elif motion is not None:
-        for source in ("file", "synthetic", "samples"):
-            if source in motion:
-                kinds = declared_keys(Motion.synthetic) if source == "synthetic" else None
-                text = describe_value(motion[source], kinds)
-                yield "motion", f"{source}: {text}", "given"
-        ratio = motion.get("synthetic", {}).get("vertical_ratio")
-        if "vertical" in motion:
-            yield "vertical motion", describe_value(motion["vertical"]), "given"
-        elif "synthetic" in motion:
-            text = "2/3 of the horizontal" if ratio is None else f"{ratio} of the horizontal"
-            yield "vertical motion", text, _mark(ratio is not None)
+        own = {key: value for key, value in motion.items() if key != "scale"}
+        yield from _source_rows([own])
         yield "scale of the motion", str(motion.get("scale", 1.0)), _mark("scale" in motion)
+
+
+def _source_rows(motions: Sequence[Mapping[str, Any]]) -> Iterator[Row]:
+    """Yield the sources of some motions; values that differ stand in the order of the motions."""
+    rows: dict[tuple[str, str], list[str]] = {}
+    for motion in motions:
+        for name, value, mark in _describe_motion(motion):
+            rows.setdefault((name, mark), []).append(value)
+    for (name, mark), values in rows.items():
+        count = f", of {len(values)} motion{'s' if len(values) > 1 else ''}"
+        some = "" if len(values) == len(motions) else count
+        yield name, ", ".join(dict.fromkeys(values)) + some, mark
+
+
+def _describe_motion(motion: Mapping[str, Any]) -> Iterator[Row]:
+    """Yield the keys of a motion and of its vertical, with the defaults of synthetic ones."""
+    kinds, parameters = declared_keys(Motion.synthetic), signature(Motion.synthetic).parameters
+    parts = {"motion": motion}
+    if "vertical" in motion:
+        vertical = motion["vertical"]
+        parts["vertical"] = vertical if isinstance(vertical, Mapping) else {"file": vertical}
+    for part, table in parts.items():
+        for key, value in table.items():
+            if key not in ("synthetic", "vertical"):
+                yield f"{part}: {key}", describe_value(value), "given"
+        if (made := table.get("synthetic")) is None:
+            continue
+        values = {name: made.get(name, each.default) for name, each in parameters.items()}
+        ratio = values.pop("vertical_ratio")
+        for key, value in values.items():
+            yield f"{part}: synthetic, {key}", describe_value(value, kinds[key]), _mark(key in made)
+        if "vertical" not in motion:
+            text = f"{ratio:.3g} of the horizontal"
+            yield "vertical: synthetic, peak", text, _mark("vertical_ratio" in made)
 
 
 def _model_rows(data: ReportData) -> Iterator[Row]:

@@ -14,6 +14,10 @@ from archfem.errors import InvalidInput
 from archfem.view.pages.document import Document, write_page
 from archfem.view.pages.player import Player
 from archfem.view.pages.word import write_word
+from archfem.view.style import limit_width
+
+# Width of the figures that a report draws [mm]: two stand on a page, with type of 7 points and more
+FIGURE_WIDTH = 128.0
 
 
 def write_report(data: ReportData, path: str | Path) -> Path:
@@ -23,7 +27,9 @@ def write_report(data: ReportData, path: str | Path) -> Path:
     if data.runs:
         footer += " On paper a player shows the instant and the joint that it showed on the screen."
     head = case.title, describe_origin(data), list_facts(data)
-    document = Document(*head, build_sections(data), footer)
+    with limit_width(FIGURE_WIDTH):
+        sections = build_sections(data)
+    document = Document(*head, sections, footer)
     if Path(path).suffix.lower() == ".docx":
         return write_word(path, document)
     return write_page(path, document.page)

@@ -53,8 +53,8 @@ _DEFINITIONS = {
 
 # Of figure and table, with the file of the figure
 _RISK_CAPTIONS = (
-    "Probability of a fall by intensity with its band, hazard of the site, and share of the rate "
-    "by intensity.",
+    "(a) Probability of a fall by intensity with its band, (b) hazard of the site, and (c) share "
+    "of the rate by intensity.",
     "risk.png",
     "Annual rate of collapse, and that of each alternative, with intervals",
 )
@@ -172,7 +172,7 @@ def build_dead_load_sections(data: ReportData) -> list[Section]:
     """Build the sections on dead load, modes, limit analysis, pushover, rating, assessment."""
     collapse = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
     curve = "Load factor over displacement, with the joints in the order of their first hinge."
-    rating = "Factor along the bridge, and mechanism at the worst place."
+    rating = "(a) Factor along the bridge, and (b) mechanism at the worst place."
     shapes, modes = "Shapes of the modes about dead load.", "Modes: effective masses along x and y"
     return [
         Section("Dead load", _build_dead_load(data)),
@@ -223,7 +223,7 @@ def _build_assessment(data: ReportData) -> list[Any]:
     """Build text and pictures of kinematic assessments from the files of the folder."""
     if (text := data.read_text("assessment.txt")) is None:
         return []
-    caption = "Mechanism at the displacement capacity, and capacity curve with demand."
+    caption = "(a) Mechanism at the displacement capacity, and (b) capacity curve with demand."
     names = sorted(name for name in data.files if name.startswith("assessment_"))
     figures = [figure for name in names for figure in data.read_figure(name, caption)]
     return [TextBlock(text, "lines"), *figures]
@@ -251,10 +251,12 @@ def _build_spectra(case: Case, motions: list[Motion]) -> list[Any]:
     # The suite multiplies by scale and divides by R; recorded motions are as applied.
     pairs = tuple(motion.scaled(reduction / scale) for motion in motions)
     suite = Suite(case.suite.get("name", "suite"), pairs, scale=scale, reduction=reduction)
-    caption = (
-        "Response spectra, 5 % damped, before they are divided by the reduction factor "
-        f"R = {reduction:g}; motions were applied divided by it."
-    )
+    caption = "Response spectra, 5 % damped, as applied"
+    if reduction != 1.0:
+        caption = (
+            "Response spectra, 5 % damped, before they are divided by the reduction factor "
+            f"R = {reduction:g}; motions were applied divided by it"
+        )
     blocks: list[Any] = [FigureBlock.of(draw_suite(suite, case.target), caption)]
     if case.target is not None and not case.suite.get("matched", False):
         blocks.append(TextBlock("The motions were not matched to the target."))
@@ -346,7 +348,7 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
     ]
     blocks.append(Grid((), rows, caption))
     if run.fall is not None and "fall_pose" in run.dataset:
-        caption = "Blocks on their way to the ground, over where they stood."
+        caption = "Blocks on their way to the ground, (a) to (d), over where they stood."
         blocks.append(FigureBlock.of(draw_fall(run), caption))
     return blocks
 

@@ -45,6 +45,8 @@ class Grid:
     head: Sequence[str]  # titles of the columns; none for a list of terms and explanations
     rows: Sequence[Sequence[str]]  # cells of each row
     caption: str = ""  # above the table
+    # "numbers"; "words", aligned at their left; or "form", with room to write
+    manner: str = "numbers"
 
     kind = "grid"
 

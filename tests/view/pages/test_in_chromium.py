@@ -7,8 +7,10 @@ import pytest
 from chromium import BROWSER, browser, complaints, opened, printed
 
 import archfem as af
+from archfem.cases.run import carry_out, replace_run
 from archfem.view.pages.document import Document, Section, TextBlock, print_page
 from archfem.view.pages.player_data import Outlines
+from archfem.view.style import new_figure
 
 pytestmark = pytest.mark.slow
 
@@ -113,6 +115,39 @@ def test_a_report_prints_without_cutting_a_figure(small, tmp_path):
         assert complaints(driver) == []
 
 
+TYPE_ON_PAPER = """
+const sizes = [];
+for (const each of document.querySelectorAll("body *")) {
+  const own = [...each.childNodes].some(node => node.nodeType === 3 && node.data.trim());
+  if (!own || !each.getClientRects().length) continue;
+  const size = parseFloat(getComputedStyle(each).fontSize);
+  sizes.push([each.getScreenCTM ? size * each.getScreenCTM().a : size, each.textContent]);
+}
+const widths = [...document.querySelectorAll(".plate img")]
+  .map(each => [parseFloat(each.style.width), each.getBoundingClientRect().width / 96]);
+return [sizes, widths];
+"""
+
+
+def test_type_on_paper_has_seven_points_at_least(small, tmp_path):
+    """Figures are printed at the size for which they were drawn, the widest also."""
+    case, folder = af.Case.read(small).alone("first"), tmp_path / "out"
+    with replace_run(case, folder) as draft:
+        list(carry_out(case, draft))
+        (draft / "limit.txt").write_text("limit analysis")
+        af.view.save(new_figure(9.0, 4.0), draft / "collapse.png")
+    report = af.cases.open_results(folder).report()
+    with browser(wide=665) as driver:  # the width of the text on A4
+        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+        opened(driver, report)
+        sizes, widths = driver.execute_script(TYPE_ON_PAPER)
+    assert len(sizes) > 100
+    small_type = [(0.75 * size, text) for size, text in sizes if 0.75 * size < 6.995]
+    assert small_type == []
+    assert max(drawn for drawn, _ in widths) == pytest.approx(170.0 / 25.4, abs=0.01)
+    assert all(shown == pytest.approx(drawn, abs=0.02) for drawn, shown in widths)
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("wide", [390, 1280])
 def test_a_report_fits_its_screen_and_follows_the_colour_scheme(small, tmp_path, wide, scheme):
@@ -201,6 +236,8 @@ def test_a_report_is_printed_as_pdf(small, tmp_path):
     text = "".join(each.extract_text() for each in pages)
     # players have drawn their data before the page is printed
     assert "reading …" not in text
-    # what moves is not on paper
-    assert "Try it" in page.read_text(encoding="utf-8")
-    assert "Try it" not in text
+    # what moves, and how to record it, is not on paper
+    for screen in ("Try it", "fields_every = 8"):
+        assert screen in page.read_text(encoding="utf-8")
+        assert screen not in text
+    assert "The run contains no displacements" in text

@@ -214,8 +214,13 @@
         this.by = Number((this.most ** Number(by.value)).toPrecision(2));
         this.show(this.time);
       });
-      const messages = [scene.note, scene.every > 1 ? `Of the recorded steps, one in ${scene.every} is shown here.` : ""].filter(Boolean);
-      if (messages.length) { note.textContent = messages.join(" "); note.hidden = false; }
+      const thinned = scene.every > 1 ? `Of the recorded steps, one in ${scene.every} is shown here.` : "";
+      note.hidden = !(scene.note || scene.hint || thinned);
+      note.textContent = `${scene.note} `;
+      // what the reader can do on a screen is of no use on paper
+      const hints = note.appendChild(document.createElement("span"));
+      hints.className = "screen";
+      hints.textContent = `${scene.hint} ${thinned}`;
     }
 
     /** The ground's acceleration. */
