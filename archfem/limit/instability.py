@@ -4,6 +4,7 @@ Limit analysis of the weight is repeated with one property relaxed at a time. Th
 lets the structure stand is the cause, and the least change of it the remedy.
 """
 
+from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy import sparse
 from archfem._typing import Array
 from archfem.limit.backfill import is_balanced, refuse_bonds, self_weight_programme
 from archfem.limit.linear_programme import Programme, RigidBlocks
+from archfem.masonry.block import as_point, say_place
 from archfem.masonry.structure import Structure, join_joint_names
 
 
@@ -61,8 +63,8 @@ def explain_instability(structure: Structure) -> str | None:
     if _stands(dead, friction=unlimited, depth=unlimited):
         moves = [sliding and f"slide ({sliding})", turning and f"hinge ({turning})"]
         return (
-            f"joints {' and '.join(filter(None, moves))}: a stone or a support is missing, or it "
-            "needs both more friction and deeper joints"
+            f"joints {' and '.join(filter(None, moves))}: a stone or a support is missing"
+            f"{_name_ends(structure)}, or it needs both more friction and deeper joints"
         )
     number = int(np.abs(fall.multipliers.reshape(-1, 3)).max(axis=1).argmax())
     block = dead.blocks.structure.blocks[dead.blocks.structure.free[number]].name
@@ -70,6 +72,14 @@ def explain_instability(structure: Structure) -> str | None:
         f"no compression in its joints can hold '{block}', however deep and rough they are: add a "
         "support, or check the outline"
     )
+
+
+def _name_ends(structure: Structure) -> str:
+    """Return the free blocks with one joint, which may lack a neighbour, in words."""
+    count = Counter(number for joint in structure.joints for number in joint.blocks)
+    ends = [structure.blocks[number] for number in structure.free if count[number] == 1]
+    places = [f"'{end.name}' at {say_place(as_point(end.centroid))}" for end in ends[:4]]
+    return f" beside {' or '.join(places)}" if places else ""
 
 
 def _stands(dead: Programme, friction: float | None = None, depth: float = 1.0) -> bool:

@@ -1,6 +1,6 @@
 """Blocks: plane bodies with polygonal or annular outlines, their area and centroid."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -317,39 +317,51 @@ class Block:
         return self._measures[2]
 
 
-def check_simple(outline: Array, name: str) -> None:
+def say_place(point: Point) -> str:
+    """Return a place [m] in words."""
+    return f"({point[0]:.3f}, {point[1]:.3f})"
+
+
+def check_simple(outline: Array, name: str, place: Callable[[Point], str] = say_place) -> None:
     """Refuse an outline that crosses or touches itself."""
     import shapely
 
     polygon = shapely.Polygon(outline)
     if not polygon.is_valid:
+        x, y = shapely.is_valid_reason(polygon).rstrip("]").partition("[")[2].split()
+        where = place((float(x), float(y)))
         raise InvalidStructure(
-            f"the outline of '{name}' crosses or touches itself "
-            f"({shapely.is_valid_reason(polygon)}): correct it there"
+            f"the outline of '{name}' crosses or touches itself at {where}: correct it there"
         )
 
 
 def check_overlaps(
-    outlines: Sequence[Array], names: Sequence[str], thin: float = 0.0, body: Numbers | None = None
+    outlines: Sequence[Array],
+    names: Sequence[str],
+    deep: float = 0.0,
+    body: Numbers | None = None,
+    place: Callable[[Point], str] = say_place,
 ) -> None:
     """Refuse outlines that cross themselves, are the same or overlap; those of a body may do."""
     for outline, name in zip(outlines, names, strict=True):
-        check_simple(outline, name)
+        check_simple(outline, name, place)
     # overlaps of less depth, relative to the size of all outlines, are round-off
-    near = 1e-6 * float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0)))
+    near = max(deep, 1e-6 * float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0))))
     pairs, common, depth = _find_overlaps(outlines, body)
     if not np.any(depth > near):
         return
-    worst = int(np.argmax(depth > near))
+    worst = int(np.argmax(depth))
     both, (first, second) = common[worst], pairs[worst]
-    one, other = names[first], names[second]
-    if both.area > (1.0 - 1e-6) * max(measure_polygon(outlines[k])[0] for k in pairs[worst]):
-        raise InvalidStructure(f"'{one}' and '{other}' are the same: leave one out")
-    remedy = ", or raise snap above that" if depth[worst] < thin else ""
+    one, other, where = names[first], names[second], place((both.centroid.x, both.centroid.y))
+    areas = [measure_polygon(outlines[k])[0] for k in (first, second)]
+    if both.area > (1.0 - 1e-6) * max(areas):
+        raise InvalidStructure(f"'{one}' and '{other}' at {where} are the same: leave one out")
+    count = np.count_nonzero(depth > near)
     raise InvalidStructure(
         f"'{one}' and '{other}' overlap by {1e4 * both.area:.3g} cm², about "
-        f"{1e3 * depth[worst]:.3g} mm deep at ({both.centroid.x:.3f}, {both.centroid.y:.3f}): "
-        f"correct their outlines{remedy}"
+        f"{1e3 * depth[worst]:.3g} mm deep at {where}"
+        f"{f', the deepest of {count} overlaps' if count > 1 else ''}: correct their outlines"
+        f"{', or leave out the one drawn twice' if both.area > 0.5 * min(areas) else ''}"
     )
 
 

@@ -21,7 +21,7 @@ from archfem._display import ResultDisplay
 from archfem._typing import Array, Metres, MetresPerSecondSquared
 from archfem._validation import check_fields, check_number, check_type
 from archfem.errors import InvalidInput, InvalidStructure
-from archfem.masonry.block import Block, Point, as_point, check_overlaps
+from archfem.masonry.block import Block, Point, as_point, check_overlaps, say_place
 from archfem.masonry.materials import Contact
 from archfem.masonry.parts import assign_roles, select_assessed_parts
 from archfem.units import G
@@ -351,10 +351,14 @@ class Structure(ResultDisplay):
         if loose := [block for k, block in enumerate(self.blocks) if k not in held]:
             gaps = {self.blocks[k].name: loose[0].distance_to(self.blocks[k]) for k in held}
             nearest = min(gaps, key=gaps.__getitem__, default=None)
+            away = ""
+            if nearest is not None:
+                away = f", {1e3 * gaps[nearest]:.3g} mm from '{nearest}', "
+                away += "which a larger snap of a drawing joins"
             raise InvalidStructure(
                 f"blocks {[block.name for block in loose]} rest on nothing: join each, through "
                 "others, to a fixed block, which has fixed = true, in a drawing by its layer"
-                + ("" if nearest is None else f"; '{nearest}' is {1e3 * gaps[nearest]:.3g} mm away")
+                f"; '{loose[0].name}' is at {say_place(as_point(loose[0].centroid))}{away}"
             )
 
     def _check_outlines(self) -> None:

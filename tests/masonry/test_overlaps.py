@@ -28,12 +28,18 @@ def test_an_overlap_is_none_up_to_a_millionth_of_all_outlines(share, apart):
 def test_an_overlap_is_reported_with_its_depth_and_its_place():
     """A strip of 2 cm by 1 m, 2 A / P = 0.0196 m deep, a third of the way up the other block."""
     outlines = [box(0.0, 0.0), box(0.98, 0.0), box(5.0, 0.0)]
-    for slight, remedy in ((0.0195, False), (0.0197, True)):
-        with pytest.raises(af.errors.InvalidStructure) as caught:
-            check_overlaps(outlines, [*NAMES, "c"], slight)
-        words = str(caught.value)
-        assert "overlap by 200 cm², about 19.6 mm deep at (0.990, 0.500)" in words
-        assert ("raise snap above that" in words) is remedy
+    check_overlaps(outlines, [*NAMES, "c"], deep=0.0197)
+    with pytest.raises(af.errors.InvalidStructure) as caught:
+        check_overlaps(outlines, [*NAMES, "c"], deep=0.0195)
+    words = "overlap by 200 cm², about 19.6 mm deep at (0.990, 0.500): correct their outlines"
+    assert str(caught.value).endswith(words)
+
+
+def test_the_deepest_of_several_overlaps_is_reported_and_most_of_a_block_may_be_drawn_twice():
+    outlines = [box(0.0, 0.0), box(0.98, 0.0), box(1.3, 0.0)]
+    words = "'b' and 'c' overlap .* at .1.640, 0.500., the deepest of 2 .* one drawn twice$"
+    with pytest.raises(af.errors.InvalidStructure, match=words):
+        check_overlaps(outlines, [*NAMES, "c"])
 
 
 def test_overlaps_of_small_blocks_are_refused_too():

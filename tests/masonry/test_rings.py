@@ -23,6 +23,18 @@ def test_span_and_rise_are_clear(ring):
     assert crown - feet[0][1] == pytest.approx(2.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("embrace", [20.0, 127.3, 200.0])
+def test_ring_by_span_and_embrace(embrace):
+    """The chord of the intrados subtends the embrace: s = 2 r sin(β/2)."""
+    ring = af.circular_arch(span=5.0, embrace=embrace, thickness=0.6, voussoirs=9)
+    radius = 2.5 / np.sin(np.radians(embrace / 2.0))
+    left, right = np.array([ring.joints[0].intrados, ring.joints[-1].intrados])
+    assert right - left == pytest.approx([5.0, 0.0])
+    assert np.linalg.norm([left, right], axis=1) == pytest.approx(radius)
+    crown = max(np.linalg.norm(block.drawn(), axis=1).max() for block in ring.blocks[1:-1])
+    assert crown == pytest.approx(radius + 0.6)
+
+
 def test_over_semicircular_and_single_stone_rings():
     assert len(af.circular_arch(radius=1, thickness=0.2, embrace=200, voussoirs=9).joints) == 10
     assert len(af.circular_arch(radius=1, thickness=0.2, embrace=80, voussoirs=1).blocks) == 3
@@ -36,7 +48,11 @@ def test_over_semicircular_and_single_stone_rings():
         ({"embrace": 400.0}, "embrace 400"),
         ({"voussoirs": 0}, "voussoirs 0"),
         ({"voussoirs": 2.5}, "voussoirs 2.5"),
-        ({"span": 5.0}, "either radius and embrace"),
+        ({"span": 5.0}, "two of its numbers: span and rise, span and embrace, or"),
+        ({"rise": 2.0}, "two of its numbers"),
+        ({"radius": None}, "two of its numbers"),
+        ({"radius": None, "span": 5.0, "rise": 2.0}, "two of its numbers"),
+        ({"radius": None, "span": 0.0}, "twice the radius"),
         ({"radius": None, "embrace": None, "span": 5.0, "rise": 2.6}, "half the span"),
         ({"radius": None, "embrace": None, "span": 1e308, "rise": 1.0}, "make no circle: give"),
         ({"width": 0.0}, "width 0 m"),
@@ -47,6 +63,11 @@ def test_impossible_rings_are_refused(change, says):
     given = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 17}
     with pytest.raises(af.errors.InvalidStructure, match=says):
         af.circular_arch(**{**given, **change})
+
+
+def test_a_negative_span_is_refused():
+    with pytest.raises(af.InvalidInput, match=r"span \[m\] = -5.0 is below 0"):
+        af.circular_arch(span=-5.0, embrace=159.0, thickness=0.5, voussoirs=9)
 
 
 def test_an_angle_that_looks_like_radians_is_refused_with_both_readings():

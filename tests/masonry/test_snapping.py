@@ -1,9 +1,13 @@
 """Outlines that nearly touch, made to touch; and those that are refused."""
 
 import json
+import re
+from itertools import pairwise
 
+import ezdxf
 import numpy as np
 import pytest
+import shapely
 from drawn import assert_same, geojson, square
 
 import archfem as af
@@ -61,29 +65,41 @@ LOWER = {"rock": square(0, -1)}
 @pytest.mark.parametrize(
     ("outlines", "says"),
     [
-        (LOWER | {"a": square(0, 0), "b": square(0.2, 0.2)}, "overlap by 6.4e.03 cm².* outlines$"),
+        (
+            LOWER | {"a": square(0, 0), "b": square(0.2, 0.2)},
+            "overlap by 6.4e.03 cm².* outlines, or leave out the one drawn twice$",
+        ),
         (LOWER | {"a": square(0, -0.004)}, "'rock' and 'a' overlap by 40 cm², about 3.98 mm deep"),
-        (LOWER | {"a": square(0, -0.004)}, "correct their outlines, or raise snap above that$"),
+        (
+            LOWER | {"a": square(0, -0.004)},
+            "correct their outlines, or raise snap from 0.001 to 0.004 m$",
+        ),
         (
             LOWER | {"a": square(0, 0.004)},
-            r"are 4 mm apart at .* \(4 such places, .* raise snap = 0.001 m above",
+            r"faces of 'rock' and 'a' are 4 mm apart at .* m: .* raise snap from 0.001 to 0.004 m$",
         ),
         (
             LOWER | {"a": [[-0.1, 0.003], [2, 0], [2, 1], [0, 1]]},
-            r"are 2.86 mm apart at \(0\.000, 0\.000\) \(2 such places, this is the widest\), just",
+            r"are 2.86 mm apart at \(0, 0\) m: draw faces that touch, or .* of more than 0.005 m",
         ),
         (
             LOWER | {"a": [[-0.1, 0.0033], [1, 0], [1, 1], [-0.1, 1]]},
-            r"are 3 mm apart at \(0\.000, 0\.000\), just more",
+            r"are 3 mm apart at \(0, 0\) m: draw",
         ),
-        (LOWER | {"a": square(0, 0), "b": square(0, 0)}, "'a' and 'b' are the same"),
+        (
+            LOWER | {"a": square(0, 0), "b": square(0, 0)},
+            r"'a' and 'b' at \(0.5, 0.5\) m are the same: leave one out$",
+        ),
         (LOWER | {"a": [[0, 0], [1, 1], [1, 0], [0, 1]]}, "'a' crosses or touches itself"),
         (LOWER | {"a": square(0.998, 0)}, "'rock' and 'a' touch along 2 mm only"),
         (LOWER | {"a": square(3, 3)}, r"\['a'\] rest on nothing"),
-        (LOWER | {"a": [[0, 0], [1, 0], [1, 5e-4]]}, "'a' is no larger than snap 0.001 m"),
+        (
+            LOWER | {"a": [[0, 0], [1, 0], [1, 5e-4]]},
+            "'a' at .* is no larger than snap = 0.001 m.* or lower snap from 0.001 to 8e-05 m",
+        ),
         (
             LOWER | {"a": [[0.0009 * k, 0] for k in range(9)] + [[1, 1]]},
-            "vertex of 'a' at .* by 3.96 mm",
+            "'a' at .* is no larger than snap = 0.001 m.* or lower snap from 0.001 to 0.0008 m",
         ),
     ],
 )
@@ -93,11 +109,71 @@ def test_outlines_that_are_no_structure(tmp_path, outlines, says):
         af.masonry.surveyed(path)
 
 
+def draw_ring(path, gap, off):
+    """Draw nine stones apart, or over one another, with corners off, in mm as DXF or SVG."""
+    rng = np.random.default_rng(1)
+    angles = np.radians(np.linspace(160.0, 20.0, 10))
+    faces = [[(r * np.cos(t), r * np.sin(t)) for r in (2.0, 2.4)] for t in angles]
+    stones = [np.array([*face, *after[::-1]]) for face, after in pairwise(faces)]
+    rocks = [
+        np.array([*face, face[1] + out, face[0] + out])
+        for face, out in ((np.array(faces[0]), [-0.5, -0.3]), (np.array(faces[-1]), [0.5, -0.3]))
+    ]
+    drawing, shapes = ezdxf.new(units=ezdxf.units.MM), ""
+    for layer, outlines in (("STONES", stones), ("ROCK", rocks)):
+        shapes += f'<g id="{layer}">'
+        for points in outlines:
+            along = points[[2, 3]].mean(axis=0) - points[[0, 1]].mean(axis=0)
+            along *= 0.5 * gap / np.linalg.norm(along) * (layer == "STONES")
+            drawn = points + np.outer([1, 1, -1, -1], along) + rng.uniform(-off, off, (4, 2))
+            pairs = (1e3 * drawn).tolist()
+            drawing.modelspace().add_lwpolyline(pairs, close=True, dxfattribs={"layer": layer})
+            text = " ".join(f"{x},{3e3 - y}" for x, y in pairs)
+            shapes += f'<polygon points="{text}"/>'
+        shapes += "</g>"
+    if path.suffix == ".svg":
+        path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{shapes}</svg>')
+    else:
+        drawing.saveas(path)
+    return shapely.MultiPolygon([shapely.Polygon(points) for points in stones])
+
+
+@pytest.mark.parametrize("kind", ["dxf", "svg"])
+@pytest.mark.parametrize(
+    ("gap", "off", "problem"),
+    [
+        (5e-3, 0.0, "apart"),
+        (20e-3, 0.0, "apart"),
+        (-3e-3, 0.0, "overlap"),
+        (-10e-3, 0.0, "overlap"),
+        (0.0, 4e-3, "overlap"),
+        (0.0, 2e-3, "would move"),
+    ],
+)
+def test_the_snap_that_an_error_names_closes_the_ring(tmp_path, kind, gap, off, problem):
+    """And its place, in the drawing's units, is one of the ring."""
+    path = tmp_path / f"ring.{kind}"
+    ring = draw_ring(path, gap, off)
+    layers = {"STONES": af.masonry.Layer(part="arch"), "ROCK": af.masonry.Layer(fixed=True)}
+    with pytest.raises(af.InvalidStructure, match=problem) as caught:
+        af.masonry.surveyed(path, unit="mm", snap=2e-3, layers=layers)
+    found = re.search(
+        r"at \((\S+), (\S+)\) mm.*raise snap from 0.002 to (\S+) m$", str(caught.value)
+    )
+    x, y, snap = map(float, found.groups())
+    place = shapely.Point(1e-3 * x, 1e-3 * (y if kind == "dxf" else 3e3 - y))
+    assert place.distance(ring) < 0.02
+    assert 2e-3 < snap <= max(abs(gap), 2.5 * off, 4e-3) * 1.3
+    assert len(af.masonry.surveyed(path, unit="mm", snap=snap, layers=layers).joints) == 10
+
+
 @pytest.mark.filterwarnings("error")
 def test_a_tolerance_as_large_as_the_blocks_is_refused(tmp_path):
     """All vertices merge to one place, so that edges have no length."""
     path = geojson(tmp_path / "bad.geojson", LOWER | {"a": square(0, 0)})
-    with pytest.raises(af.errors.InvalidStructure, match=r"is no larger than snap 1\.6 m: lower"):
+    with pytest.raises(
+        af.errors.InvalidStructure, match=r"no larger than snap = 1\.6 m: .* to 0\.15 m"
+    ):
         af.masonry.surveyed(path, snap=1.6)
 
 
@@ -142,7 +218,7 @@ def test_vertices_move_by_twice_the_tolerance_at_most(tmp_path, step, refused):
     row = [[step * k, 0.0] for k in range(6)]
     path = geojson(tmp_path / "row.geojson", {"a": [*row, [1, 0], [1, 1], [0, 1]]})
     if refused:
-        words = r"vertex of 'a' at .* would move by 2.38 mm"
+        words = r"corner of 'a' at .* would move by 2.38 mm"
         with pytest.raises(af.errors.InvalidStructure, match=words):
             af.read_outlines(path)
     else:

@@ -149,7 +149,7 @@ def test_check_command(capsys):
     assert main(["check", str(SHIPPED), *changes]) == 3  # in doubt: its soil is not rigid
     assert "51 blocks, 89 joints" in capsys.readouterr().out
     assert main(["check", str(SHIPPED), *changes, "--set", "structure.snap=1 mm"]) == 1
-    assert "raise snap if the survey is rougher" in capsys.readouterr().err
+    assert "or raise snap from 0.001 to 0.002 m" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Rates of collapse: closed form of a lognormal capacity, intervals, parts, continued files."""
 
 import json
+import re
 import tomllib
 from dataclasses import asdict
 from pathlib import Path
@@ -363,6 +364,18 @@ def test_a_hazard_is_a_power_law_points_or_a_row_of_a_file(tmp_path):
         assert hazard.rate_of(0.1 * 9.80665) == pytest.approx(rate)
     with pytest.raises(af.InvalidInput, match="a file names its measure"):
         parse("{ file = 'curves.csv', period = 0.2 }")
+
+
+def test_every_form_of_a_hazard_in_the_guide_is_read(tmp_path):
+    """Rows of its table, each inside the braces of its head; all bring the keys that there are."""
+    page = Path(__file__).parents[2] / "docs" / "howto" / "falls.md"
+    forms = re.findall(r"^\| `(\w+ = [^`]*)` \|", page.read_text(encoding="utf-8"), re.MULTILINE)
+    head = "#,,,\"imt='PGA', investigation_time=50.0\"\nlon,lat,depth,poe-0.1,poe-0.2\n"
+    (tmp_path / "hazard_curve-mean-PGA.csv").write_text(head + "31.16,40.84,0.0,0.4,0.2\n")
+    tables = [tomllib.loads(f"hazard = {{ {form} }}")["hazard"] for form in forms]
+    rates = [risk_keys.parse_hazard(table, tmp_path).rate_of(4.5) for table in tables]
+    assert rates[:3] == pytest.approx([1 / 475, 2.1e-3, 2e-3 * 4.5**-2.5])
+    assert set().union(*tables) | {"measure", "period"} == set(risk_keys.HAZARD_KEYS)
 
 
 @pytest.mark.parametrize("hazard", ["{ rates = [0.1] }", "{ factor = 1.0 }", "{}"])

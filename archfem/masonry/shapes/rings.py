@@ -113,7 +113,7 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
         radius: of the centre line [m]; together with `embrace`.
         embrace: angle between the springing joints [degrees]; a small one with its unit,
             "5 degree".
-        span: clear span, at the intrados [m]; together with `rise`, instead of the two above.
+        span: clear span, at the intrados [m]; together with `rise` or `embrace`.
         rise: clear rise, at the intrados, at most half the span [m].
         width: out of plane [m].
         material: of the stones.
@@ -138,8 +138,6 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
         raise InvalidStructure(
             f"thickness {thickness:.3g} m is not between 0 and twice the radius {radius:.3g} m"
         )
-    if not 0.0 < embrace < 360.0:
-        raise InvalidStructure(f"embrace {embrace:.4g}° is not between 0° and 360°: give degrees")
     voussoirs, pieces = _check_division(embrace, voussoirs, 1 if chords is None else chords)
     half = radians(embrace) / 2.0
     angles = np.linspace(-half, half, voussoirs * pieces + 1)
@@ -294,18 +292,26 @@ def _stack_blocks(
 def _resolve_circle(
     radius: float | None, embrace: Any, span: float | None, rise: float | None, thickness: float
 ) -> tuple[float, float]:
-    """Return radius of the centre line and embrace from either pair of lengths."""
+    """Return radius of the centre line and embrace from one of three pairs."""
     for value, name in ((radius, "radius [m]"), (span, "span [m]"), (rise, "rise [m]")):
         if value is not None:
-            check_number(value, name)
+            check_number(value, name, minimum=0.0)
+    if embrace is not None:
+        embrace = in_degrees(embrace, "embrace")
+        if not 0.0 < embrace < 360.0:
+            raise InvalidStructure(f"embrace {embrace:.4g}° is not between 0° and 360°")
     if radius is not None and embrace is not None and span is None and rise is None:
-        return radius, in_degrees(embrace, "embrace")
-    if span is None or rise is None or radius is not None or embrace is not None:
-        raise InvalidStructure("give a ring either radius and embrace, or span and rise")
+        return radius, embrace
+    if span is None or radius is not None or (rise is None) == (embrace is None):
+        raise InvalidStructure(
+            "give a ring two of its numbers: span and rise, span and embrace, or radius and embrace"
+        )
+    if rise is None:
+        return span / (2.0 * sin(radians(embrace) / 2.0)) + thickness / 2.0, embrace
     if not 0.0 < rise <= span / 2.0:
         raise InvalidStructure(
             f"rise {rise:.4g} m is not between 0 and half the span {span:.4g} m: a circular arch "
-            "is at most a semicircle by span and rise; give radius and embrace beyond"
+            "is at most a semicircle by span and rise; give span and embrace beyond"
         )
     inner = (span / 2.0 * (span / 2.0 / rise) + rise) / 2.0
     if not isfinite(inner):

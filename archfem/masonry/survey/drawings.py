@@ -41,6 +41,21 @@ ANNOTATIONS = (
     *("PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY", "OLE2FRAME", "ACAD_TABLE", "LIGHT", "SUN"),
 )
 MAX_ENTITIES = 100_000  # blocks inserted into blocks may be any number
+UNITS = ("mm", "cm", "m")  # that a drawing without one may have
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Coordinates of a drawing, y upwards or, in SVG files, downwards."""
+
+    factor: float = 1.0  # unit of the coordinates [m]
+    unit: str = "m"  # name of the unit
+    upwards: float = 1.0  # 1 or -1
+
+    def place(self, point: Sequence[float]) -> str:
+        """Return a place [m] in words, in coordinates of the drawing."""
+        x, y = np.round(np.multiply(point, [1.0, self.upwards]), 6) / self.factor + 0.0
+        return f"({x:.6g}, {y:.6g}) {self.unit}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +68,7 @@ class Outline:
     material: str | None = None  # name of the material
     fixed: bool | None = None  # whether the block is fixed
     role: str | None = None  # role of the part
+    frame: Frame = Frame()  # coordinates of the drawing
 
 
 def read_drawing(
@@ -123,12 +139,12 @@ def _check_sizes(outlines: list[Outline]) -> None:
     typical = float(np.median([np.hypot(*np.ptp(each.points, axis=0)) for each in outlines]))
     if 0.02 <= typical <= 20.0:
         return
-    away = np.abs(points).max(axis=0)
-    remedy = 'give the unit of the drawing, e.g. unit = "mm"'
+    away, frame = np.abs(points).max(axis=0), outlines[0].frame
+    problem = f"a block is typically {typical:.3g} m large"
     # longitudes and latitudes make blocks far smaller than a unit
-    if typical < 0.02 and away[0] <= 180.0 and away[1] <= 90.0:
-        remedy += "; coordinates in degrees (CRS84) do not do: export projected metres"
-    raise InvalidInput(f"a block is typically {typical:.3g} m large: {remedy}")
+    if typical < 0.02 and frame == Frame() and away[0] <= 180.0 and away[1] <= 90.0:
+        problem += "; coordinates in degrees (CRS84) do not do, export projected metres"
+    raise _refuse_unit(problem, points, frame)
 
 
 def _read_geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
@@ -137,19 +153,33 @@ def _read_geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Ite
         found = json.loads(read_text(path, "drawing"))
     except (ValueError, RecursionError) as error:
         raise InvalidInput(f"it is not JSON: {error}") from error
-    factor = in_unit(f"1 {unit or 'm'}", "m", "unit")
+    frame = _read_unit(unit or "m")
     if is_assembly(found):
         for name, points, fixed in read_plane_assembly(found):
             if "blocks" not in ignored:
-                points = _check_polygon(points, f"'{name}'", factor)
-                yield Outline(points, name, "blocks", fixed=fixed)
+                points = _check_polygon(points, f"'{name}'", frame.factor)
+                yield Outline(points, name, "blocks", fixed=fixed, frame=frame)
         return
     if not isinstance(found, dict) or not isinstance(found.get("features"), list):
         raise InvalidInput("it is no GeoJSON FeatureCollection: export the outlines as one")
     for number, feature in enumerate(found["features"], 1):
-        outline = _read_feature(_as_table(feature, f"feature {number}"), number, factor)
+        outline = _read_feature(_as_table(feature, f"feature {number}"), number, frame.factor)
         if outline.layer not in ignored:
-            yield outline
+            yield replace(outline, frame=frame)
+
+
+def _read_unit(unit: str, upwards: float = 1.0) -> Frame:
+    """Return the coordinates of a drawing in a unit."""
+    return Frame(in_unit(f"1 {unit}", "m", "unit"), unit, upwards)
+
+
+def _refuse_unit(problem: str, points: Array, frame: Frame = Frame()) -> InvalidInput:
+    """Return the error of a drawing whose unit is not known, with its breadth in likely ones."""
+    breadth = float(np.ptp(points[:, 0])) / frame.factor if len(points) else 0.0
+    sizes = ", ".join(
+        f'{_read_unit(unit).factor * breadth:.3g} m by unit = "{unit}"' for unit in UNITS
+    )
+    return InvalidInput(f"{problem}: give the unit that makes its breadth right, {sizes}")
 
 
 def _as_table(value: Any, name: str) -> dict[str, Any]:
@@ -210,7 +240,7 @@ def _read_dxf(
 ) -> Iterator[Outline]:
     """Read the closed polylines of a DXF file, named by the texts inside them."""
     with _foreign_reader("ezdxf", "DXF drawing"):
-        read, own_unit = _load_dxf(path, ignored)
+        read, frame = _load_dxf(path, ignored)
     if len(read) > MAX_ENTITIES:
         raise InvalidInput(f"it has more than {MAX_ENTITIES} entities: leave out other things")
     polylines = [entity for entity in read if entity.kind in POLYLINES]
@@ -226,16 +256,17 @@ def _read_dxf(
             f"layer '{layer}' has a {kind}{beside}: make a closed polyline of each stone, and "
             "ignore layers of other things"
         )
-    if unit is None and own_unit is None:
-        raise InvalidInput('the drawing does not say its unit ($INSUNITS): give one, e.g. "mm"')
-    factor = in_unit(f"1 {unit}", "m", "unit") if unit is not None else float(own_unit or 1.0)
     points = (complex(*point[:2]) for each in polylines for point in each.points)
     corners = np.array([point for point in points if abs(point) < 1e12])  # others are refused
-    outlines = [_read_polyline(entity, factor, snap, corners) for entity in polylines]
+    frame = frame if unit is None else _read_unit(unit)
+    if frame is None:
+        problem = "the drawing does not say its unit ($INSUNITS)"
+        raise _refuse_unit(problem, np.column_stack([corners.real, corners.imag]))
+    outlines = [_read_polyline(entity, frame, snap, corners) for entity in polylines]
     texts = []
     for entity in read:
         if text := entity.text:
-            place = _check_coordinates(entity.points, f"the text '{text}'", factor)[0]
+            place = _check_coordinates(entity.points, f"the text '{text}'", frame.factor)[0]
             texts.append((text, place))
     counts = Counter[str]()
     for outline in outlines:
@@ -243,8 +274,8 @@ def _read_dxf(
         yield replace(outline, name=_block_name(outline, texts, counts[outline.layer]))
 
 
-def _load_dxf(path: Path, ignored: Collection[str]) -> tuple[list[Entity], float | None]:
-    """Load all entities of a DXF file but ignored layers, and its unit [m] if it has one."""
+def _load_dxf(path: Path, ignored: Collection[str]) -> tuple[list[Entity], Frame | None]:
+    """Load all entities of a DXF file but ignored layers, and its unit if it has one."""
     from ezdxf import units  # slow to import
     from ezdxf.enums import InsertUnits
     from ezdxf.filemanagement import readfile
@@ -270,8 +301,10 @@ def _load_dxf(path: Path, ignored: Collection[str]) -> tuple[list[Entity], float
         else:
             entities.append(Entity(kind, layer, []))
     known = drawing.units  # 0 where the drawing has none
-    factor = units.conversion_factor(known, InsertUnits.Meters) if known else None
-    return entities, factor
+    if not known:
+        return entities, None
+    factor = units.conversion_factor(known, InsertUnits.Meters)
+    return entities, Frame(float(factor), units.decode(known) or "units")
 
 
 def _walk_dxf(
@@ -327,9 +360,9 @@ def _draw_arcs(entity: Entity, corners: Array, snap: float) -> list[tuple[float,
     return drawn
 
 
-def _read_polyline(entity: Entity, factor: float, snap: float, corners: Array) -> Outline:
+def _read_polyline(entity: Entity, frame: Frame, snap: float, corners: Array) -> Outline:
     """Return the outline of a closed polyline, whose ends may be apart by the tolerance."""
-    given, layer = entity.points, entity.layer
+    given, layer, factor = entity.points, entity.layer, frame.factor
     if not given:
         raise InvalidInput(f"a polyline on layer '{layer}' has no vertices: take it out")
     where = f"a polyline at ({given[0][0]:.6g}, {given[0][1]:.6g}) on layer '{layer}'"
@@ -338,11 +371,13 @@ def _read_polyline(entity: Entity, factor: float, snap: float, corners: Array) -
     _check_coordinates(given, where, factor)
     if not entity.closed:
         if (gap := factor * dist(given[0], given[-1])) > snap:
-            apart = f"is not closed, by {1e3 * gap:.3g} mm"
-            raise InvalidInput(f"{where} {apart}: close it, or leave its layer out")
+            raise InvalidInput(
+                f"{where} is not closed, its ends are {1e3 * gap:.3g} mm apart: close the outline "
+                "of a stone; put any other line on a layer with ignore = true"
+            )
         entity = replace(entity, points=given[:-1] if len(given) > 1 else given)
     points = _draw_arcs(entity, corners, snap / factor)
-    return Outline(_check_polygon(points, where, factor), where, layer)
+    return Outline(_check_polygon(points, where, factor), where, layer, frame=frame)
 
 
 def _block_name(outline: Outline, texts: list[tuple[str, Array]], number: int) -> str:
@@ -391,14 +426,14 @@ def _read_svg(
     path: Path, unit: str | None, ignored: Collection[str], snap: float
 ) -> Iterator[Outline]:
     """Read the closed shapes of an SVG file."""
+    text = read_text(path, "drawing")
     if unit is None:
-        raise InvalidInput(
-            "an SVG file has the size on paper alone: give what a unit of its coordinates is at "
-            'the building, e.g. unit = "mm"'
-        )
-    factor = in_unit(f"1 {unit}", "m", "unit")
-    for name, layer, points in read_svg(read_text(path, "drawing"), 0.5 * snap / factor, ignored):
-        yield Outline(_check_polygon(points, f"'{name}'", factor), name, layer)
+        found = [points for _, _, points in read_svg(text, np.inf, ignored)]
+        problem = "an SVG file has the size on paper alone"
+        raise _refuse_unit(problem, np.concatenate([np.zeros((0, 2)), *found]))
+    frame = _read_unit(unit, -1.0)
+    for name, layer, points in read_svg(text, 0.5 * snap / frame.factor, ignored):
+        yield Outline(_check_polygon(points, f"'{name}'", frame.factor), name, layer, frame=frame)
 
 
 def _read_ifc(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
@@ -416,10 +451,10 @@ def _read_ifc(path: Path, unit: str | None, ignored: Collection[str]) -> Iterato
 
 def _read_msh(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
     """Read the physical surfaces of a gmsh mesh."""
-    factor = in_unit(f"1 {unit or 'm'}", "m", "unit")
-    for name, points in read_physical_surfaces(path, factor):
+    frame = _read_unit(unit or "m")
+    for name, points in read_physical_surfaces(path, frame.factor):
         if infer_part(name) not in ignored:
-            yield Outline(points, name, infer_part(name))
+            yield Outline(points, name, infer_part(name), frame=frame)
 
 
 def read_physical_surfaces(path: Path, factor: float = 1.0) -> list[tuple[str, Array]]:

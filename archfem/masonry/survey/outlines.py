@@ -10,6 +10,7 @@ import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
+from math import dist
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +24,14 @@ from archfem._files import atomic_write
 from archfem._typing import Array, Metres, MetresPerSecondSquared
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
-from archfem.masonry.assembly import assembled, by_materials, touching
-from archfem.masonry.block import Block, check_overlaps, check_simple, measure_polygon
+from archfem.masonry.assembly import Touch, assembled, by_materials, touching
+from archfem.masonry.block import (
+    Block,
+    as_point,
+    check_overlaps,
+    check_simple,
+    measure_polygon,
+)
 from archfem.masonry.materials import (
     CONTACT_PRESETS,
     MATERIAL_PRESETS,
@@ -45,6 +52,9 @@ AMBIGUOUS_GAP_RATIO = 5.0
 # Numbers of places: both ends of an edge, and those around each outline
 Edge = tuple[int, int]
 Boundaries = list[list[int]]
+
+# Outlines that touch, the largest displacement of a vertex [m], and common lines
+Closed = tuple[list[Array], float, list[Touch]]
 
 # Materials by name
 Materials = Mapping[str, Material]
@@ -123,13 +133,12 @@ def read_outlines(
     if layers is not None:
         _check_layers(outlines, layers, path)
     try:
-        names = [outline.name for outline in outlines]
-        points, moved = close_gaps([outline.points for outline in outlines], names, snap)
+        points, moved, _ = _close_or_advise(outlines, snap)
         blocks = [
             _make_block(outline, polygon, known.get(outline.layer, Layer()), material, materials)
             for outline, polygon in zip(outlines, points, strict=True)
         ]
-        survey = Survey(_assign_corners(assign_roles(blocks), snap), moved)
+        survey = Survey(_assign_corners(assign_roles(blocks)), moved)
     except (InvalidInput, InvalidStructure) as error:
         raise type(error)(f"{path}: {error}") from error
     logger.info("%s: vertices moved by up to %.3g mm", path, 1e3 * moved)
@@ -195,10 +204,10 @@ def _check_layers(outlines: list[Outline], layers: Mapping[str, Layer], path: st
     there = {outline.layer for outline in outlines}
     if strange := sorted(there - set(layers)):
         stones = [outline for outline in outlines if outline.layer == strange[0]]
-        x, y = stones[0].points.mean(axis=0)
+        about = stones[0].frame.place(stones[0].points.mean(axis=0))
         raise InvalidInput(
             f"{path}: of layer '{strange[0]}' nothing is said: name its part, or ignore it; closed "
-            f"outlines on it: {len(stones)}, the first about ({x:.4g}, {y:.4g}) m"
+            f"outlines on it: {len(stones)}, the first about {about}"
         )
     expected = {name for name, layer in layers.items() if not layer.ignore}
     if missing := sorted(expected - there):
@@ -225,18 +234,9 @@ def _make_block(
     return Block(corners, chosen, outline.name, fixed, part=part, role=role)
 
 
-def _assign_corners(blocks: Sequence[Block], snap: float) -> tuple[Block, ...]:
-    """Return the blocks with corners where four-sided; refuse contacts of ambiguous length."""
-    touches = touching(blocks)
-    for a, b, line in touches:
-        length = float(np.linalg.norm(line[1] - line[0]))
-        if length <= AMBIGUOUS_GAP_RATIO * snap:
-            raise InvalidStructure(
-                f"'{blocks[a].name}' and '{blocks[b].name}' touch along {1e3 * length:.3g} mm "
-                f"only at ({line[0, 0]:.3f}, {line[0, 1]:.3f}): raise snap = {snap:.3g} m above "
-                "that, or correct the drawing"
-            )
-    directions = find_directions(blocks, touches)
+def _assign_corners(blocks: Sequence[Block]) -> tuple[Block, ...]:
+    """Return the blocks with corners where four-sided."""
+    directions = find_directions(blocks, touching(blocks))
     return tuple(replace(b, corners=_find_corners(b, directions.get(b.part))) for b in blocks)
 
 
@@ -298,34 +298,79 @@ def write_outlines(structure: Structure, path: str | Path) -> None:
         draft.write_text(text, encoding="utf-8")
 
 
-def close_gaps(
-    outlines: Sequence[Array], names: Sequence[str], snap: float
-) -> tuple[list[Array], float]:
-    """Return the outlines without gaps below `snap`, and the largest vertex displacement [m]."""
+def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
+    """Close the gaps between outlines; an error names the next tolerances that leave no error."""
     if not snap > 0.0:
         raise InvalidStructure(f"snap {snap!r} m is not above 0: give e.g. 0.001")
-    for name, points in zip(names, outlines, strict=True):
-        check_simple(points, name)
+    for outline in outlines:
+        check_simple(outline.points, outline.name, outline.frame.place)
+    try:
+        return _close_gaps(outlines, snap)
+    except InvalidStructure as error:
+        advice = str(error)
+    # a tolerance above a tenth of the smallest stone would distort it
+    largest = 0.1 * min(abs(measure_polygon(outline.points)[0]) for outline in outlines) ** 0.5
+    values = [
+        digit * 10.0**k for k in range(-6, 1) for digit in (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+    ]
+    higher = [value for value in values if snap < value <= largest]
+    lower = [value for value in values[::-1] if 0.05 * snap <= value < snap]
+    for verb, values in (("raise", higher), ("lower", lower)):
+        if value := next((each for each in values if _closes_all(outlines, each)), None):
+            advice += f", or {verb} snap from {snap:.3g} to {value:.3g} m"
+    raise InvalidStructure(advice)
+
+
+def _closes_all(outlines: list[Outline], snap: float) -> bool:
+    """Return whether a tolerance leaves no error, and no outline without a contact."""
+    try:
+        touches = _close_gaps(outlines, snap)[2]
+    except InvalidStructure:
+        return False
+    return len({number for touch in touches for number in touch[:2]}) == len(outlines)
+
+
+def _close_gaps(outlines: list[Outline], snap: float) -> Closed:
+    """Close the gaps between outlines; refuse what remains ambiguous."""
+    names, place = [outline.name for outline in outlines], outlines[0].frame.place
     # all outlines anticlockwise
-    oriented = [points if measure_polygon(points)[0] > 0.0 else points[::-1] for points in outlines]
+    drawn = [outline.points for outline in outlines]
+    oriented = [points if measure_polygon(points)[0] > 0.0 else points[::-1] for points in drawn]
     given = np.concatenate(oriented)
     places, number = _merge_vertices(oriented, snap)
     parts = np.split(number, np.cumsum([len(points) for points in oriented])[:-1])
     # merged vertices repeat, inside a boundary and across its end
     boundaries = [part[part != np.roll(part, 1)].tolist() or [int(part[0])] for part in parts]
-    owners = [name for name, points in zip(names, oriented, strict=True) for _ in points]
-    _check_moved(places[number] - given, given, owners, snap)
-    for name, boundary in zip(names, boundaries, strict=True):
+    for outline, boundary in zip(outlines, boundaries, strict=True):
         if len(boundary) < 3:
-            raise InvalidStructure(f"'{name}' is no larger than snap {snap:.3g} m: lower snap")
+            where = f"'{outline.name}' at {place(outline.points[0])}"
+            raise InvalidStructure(f"{where} is no larger than snap = {snap:.3g} m: leave it out")
     ties = _find_ties(boundaries, places, snap)
     ties |= _find_bends(boundaries, places, ties, snap)
-    places = _place_tied(places, ties)
-    moved = _check_moved(places[number] - given, given, owners, snap)
-    found = [places[boundary] for boundary in boundaries]
-    check_overlaps(found, names, AMBIGUOUS_GAP_RATIO * snap)
-    _check_gaps(places, boundaries, names, snap)
-    return found, moved
+    placed = _place_tied(places, ties)
+    moved = np.linalg.norm([places[number] - given, placed[number] - given], axis=2).max(axis=0)
+    worst = int(np.argmax(moved))
+    if moved[worst] > 2.0 * snap:
+        # corners inside another outline pull at one another
+        check_overlaps(oriented, names, snap, place=place)
+        owner = np.repeat(names, [len(points) for points in oriented])[worst]
+        raise InvalidStructure(
+            f"the corner of '{owner}' at {place(given[worst])} would move by "
+            f"{1e3 * moved[worst]:.3g} mm to touch all outlines nearer than snap = {snap:.3g} m: "
+            "correct the outlines there, leave out vertices that follow one another so closely"
+        )
+    found = [placed[boundary] for boundary in boundaries]
+    check_overlaps(found, names, place=place)
+    _check_gaps(placed, boundaries, outlines, snap)
+    blocks = [Block(tuple(map(as_point, points)), STONE, "") for points in found]
+    touches = touching(blocks)
+    for a, b, (start, end) in touches:
+        if (length := dist(start, end)) <= AMBIGUOUS_GAP_RATIO * snap:
+            raise InvalidStructure(
+                f"'{names[a]}' and '{names[b]}' touch along {1e3 * length:.3g} mm only at "
+                f"{place(start)}: correct the drawing there"
+            )
+    return found, float(moved[worst]), touches
 
 
 def _edges(boundaries: Boundaries) -> Iterator[tuple[int, int, int]]:
@@ -431,26 +476,10 @@ def _place_tied(places: Array, ties: dict[int, Edge]) -> Array:
     return np.asarray(splu(hold.tocsc()).solve(free))
 
 
-def _check_moved(change: Array, given: Array, owners: Sequence[str], snap: float) -> float:
-    """Return the largest vertex displacement; refuse it above twice the tolerance.
-
-    Short steps may add up to it.
-    """
-    moved = np.linalg.norm(change, axis=1)
-    worst = int(np.argmax(moved))
-    if moved[worst] > 2.0 * snap:
-        x, y = given[worst]
-        raise InvalidStructure(
-            f"the vertex of '{owners[worst]}' at ({x:.3f}, {y:.3f}) would move by "
-            f"{1e3 * moved[worst]:.3g} mm until all nearer than snap = {snap:.3g} m touch: raise "
-            "snap if the survey is rougher than that; lower it, or leave out vertices, if they "
-            "follow one another so closely"
-        )
-    return float(moved[worst])
-
-
-def _check_gaps(places: Array, boundaries: Boundaries, names: Sequence[str], snap: float) -> None:
-    """Refuse blocks with a narrow gap between them."""
+def _check_gaps(
+    places: Array, boundaries: Boundaries, outlines: list[Outline], snap: float
+) -> None:
+    """Refuse blocks with a narrow gap between their faces."""
     import shapely
 
     near = CONTACT_TOLERANCE * float(np.linalg.norm(np.ptp(places, axis=0)))
@@ -459,7 +488,7 @@ def _check_gaps(places: Array, boundaries: Boundaries, names: Sequence[str], sna
     first: dict[int, int] = {}
     for number, boundary in enumerate(boundaries):
         first = dict.fromkeys(boundary, number) | first
-    found = []
+    found: dict[frozenset[int], tuple[float, int]] = {}  # the widest gap of each pair
     for number, a, b in _edges(boundaries):
         along, off, length = _project(places, a, b)
         beside = (off < -near) & (off >= -AMBIGUOUS_GAP_RATIO * snap)
@@ -469,14 +498,14 @@ def _check_gaps(places: Array, boundaries: Boundaries, names: Sequence[str], sna
             middle = shapely.Point(0.5 * (foot + places[place]))
             # a gap filled by a third block is none
             if not len(tree.query(middle, predicate="within")):
-                found.append((float(-off[place]), number, place))
+                pair, gap = frozenset((number, first[place])), (float(-off[place]), place)
+                found[pair] = max(found.get(pair, gap), gap)
     if not found:
         return
-    width, number, place = max(found)
-    x, y = places[place]
-    more = f" ({len(found)} such places, this is the widest)" if len(found) > 1 else ""
+    (width, place), (one, other) = max((gap, sorted(pair)) for pair, gap in found.items())
+    more = f", the widest of {len(found)} gaps" if len(found) > 1 else ""
     raise InvalidStructure(
-        f"'{names[first[place]]}' and '{names[number]}' are {1e3 * width:.3g} mm apart at "
-        f"({x:.3f}, {y:.3f}){more}, just more than snap: raise snap = {snap:.3g} m above that if "
-        f"they touch; if not, draw a gap of more than {AMBIGUOUS_GAP_RATIO * snap:.3g} m"
+        f"the faces of '{outlines[one].name}' and '{outlines[other].name}' are "
+        f"{1e3 * width:.3g} mm apart at {outlines[one].frame.place(places[place])}{more}: draw "
+        f"faces that touch, or an open joint of more than {AMBIGUOUS_GAP_RATIO * snap:.3g} m"
     )

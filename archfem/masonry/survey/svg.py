@@ -66,9 +66,12 @@ def read_svg(
         for number, segments in enumerate(pieces, 1):
             own = name if len(pieces) == 1 else f"{name} {number}"
             moved = [tuple(_move(matrix, point) for point in each) for each in segments]
-            if abs(moved[-1][-1] - moved[0][0]) > near:
+            start, end = moved[0][0], moved[-1][-1]
+            if abs(end - start) > near:
                 raise InvalidInput(
-                    f"'{own}' on layer '{layer}' is not closed: close the path, or ignore its layer"
+                    f"'{own}' at ({start.real:.5g}, {start.imag:.5g}) on layer '{layer}' is not "
+                    f"closed, its ends are {abs(end - start):.3g} units apart: close the path of a "
+                    "stone; put any other line on a layer with ignore = true"
                 )
             points = np.array([point for each in moved for point in _flatten(each, near)])
             yield own, layer, np.column_stack([points.real, -points.imag])
