@@ -344,7 +344,7 @@ def displace_points(turns, arms, states):  # type: ignore
 
 @kernel
 def displace_state(turns, arms, q, moved):  # type: ignore
-    """Store the displacements of points of rigid blocks, except fixed ones, as `displace_points`."""
+    """Store the displacements of points in one state, as of `displace_points`."""
     last, half, x, y = -1, (1.0, 0.0), 0.0, 0.0
     for point in range(len(turns)):
         turn, arm = turns[point], (arms[point, 0], arms[point, 1])
