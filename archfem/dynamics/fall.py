@@ -18,7 +18,7 @@ from archfem.dynamics.history import Ending, History, with_fall
 from archfem.dynamics.rigid_body.bodies import (
     FallFrame,
     LooseBlocks,
-    make_bodies,
+    masses_of,
 )
 from archfem.dynamics.rigid_body.simulation import (
     MAX_COMPARED_BLOCKS,
@@ -62,7 +62,7 @@ def release_blocks(model: Model, state: State) -> ReleasedBlocks:
     """
     poses, velocities = model.rigid_motions(state.q, state.velocity)
     loaded = model if state.memory is None else model.with_memory(state.memory)
-    mass = make_bodies(model.structure, 0.0).mass
+    mass = masses_of(model.structure)
     inertia = np.column_stack([mass[:, 0], mass])
     return ReleasedBlocks(
         LooseBlocks(state.time, poses, velocities, strain_energy=loaded.energy(state.q)),

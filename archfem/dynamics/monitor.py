@@ -24,6 +24,7 @@ from scipy.integrate import trapezoid
 
 from archfem._typing import Array
 from archfem.dynamics.separation import MeetingMonitor
+from archfem.dynamics.solvers.step_scans import scan_corners
 from archfem.dynamics.state import Batch, State
 from archfem.errors import DidNotConverge
 from archfem.models.model import Doubt, Model, Observer
@@ -94,18 +95,15 @@ class CornerDisplacements:
         self._start = observer.corners(observer.read(start.q))
         self.blocks, self._first = np.unique(observer.corner_blocks, return_index=True)
         self.time = np.full(len(self.blocks), start.time)  # of the largest displacement [s]
-        self._square = self._last = np.zeros(len(self.blocks))
+        self._square, self._last = np.zeros((2, len(self.blocks)))
 
     def add(self, times: Array, readings: Array) -> None:
         """Add the times of the next steps, and the readings of the observer at these (steps, r)."""
         # squares are compared, since their order is that of the distances
-        x, y = np.moveaxis(self._observer.corners(readings) - self._start, -1, 0)
-        squares = x * x + y * y
-        squares = np.maximum.reduceat(squares, self._first, axis=1)
-        farthest = squares.argmax(axis=0)
-        largest = squares[farthest, np.arange(len(farthest))]
-        self.time = np.where(largest > self._square, times[farthest], self.time)
-        self._square, self._last = np.maximum(largest, self._square), squares[-1]
+        steps = np.full(len(self.blocks), -1)
+        farthest = self._square, steps, self._last
+        scan_corners(self._observer.corners(readings), self._start, self._first, farthest)
+        self.time = np.where(steps >= 0, times[steps], self.time)
 
     @property
     def largest(self) -> Array:

@@ -17,7 +17,7 @@ from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.state import Batch, State
 from archfem.joints.criteria import Criteria
-from archfem.joints.resultants import joint_dataset
+from archfem.joints.resultants import joint_variables
 from archfem.masonry.stiffness_ratio import list_stones
 from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
@@ -110,8 +110,10 @@ class Recorder:
         readings = batch.read(self._observer)
         drift = self.monitor.add(batch, readings)
         numbers = self.count + np.arange(len(batch.times))
-        due = numbers % self.record.every == 0
-        due[-1] |= last
+        due: Any = slice(None)  # of all steps, which needs no copy
+        if self.record.every > 1:
+            due = numbers % self.record.every == 0
+            due[-1] |= last
         # Ctrl-C may come between any two: the number of resultants, filled last, counts
         rows = {
             "iterations": batch.iterations,
@@ -141,21 +143,18 @@ class Recorder:
         structure, resultants = self.model.structure, self._recorded("resultants")
         times, faces = (self._recorded(name)[: len(resultants)] for name in ("times", "faces"))
         moved = self.model.large_displacements
-        dataset = joint_dataset(
-            structure, resultants, times, self.criteria, faces=faces, moved=moved, rest=self.rest
+        variables, coordinates, attributes = joint_variables(
+            structure, resultants, times, self.criteria, faces, moved, self.rest
         )
-        attributes = {"units": "m/s2", "long_name": "acceleration of the ground"}
-        variables: dict[str, Any] = self._block_displacements()
-        variables["ground"] = ("time", "axis"), motion.at(times), attributes
+        variables |= self._block_displacements()
+        of_ground = {"units": "m/s2", "long_name": "acceleration of the ground"}
+        variables["ground"] = ("time", "axis"), motion.at(times), of_ground
         variables |= self._effort(len(resultants))
-        coordinates: dict[str, Any] = {
-            "block": [block.name for block in structure.blocks],
-            "axis": ["x", "y"],
-        }
+        coordinates["block"] = [block.name for block in structure.blocks]
+        coordinates["axis"] = ["x", "y"]
         self._add_coordinates(variables, coordinates)
-        dataset.coords.update(coordinates)
-        dataset.update(variables)
-        dataset.attrs |= self._attributes(motion, ending, outcome)
+        attributes |= self._attributes(motion, ending, outcome)
+        dataset = xr.Dataset(variables, coordinates, attributes)
         history = History(dataset, structure)
         return history.with_doubts((*self.monitor.doubts, *self._doubt_mass_damping(dataset)))
 

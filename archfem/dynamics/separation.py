@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from archfem._typing import Array, Flags
 from archfem.dynamics.collapse_state import shallowest_depth
 from archfem.dynamics.history import Ending
-from archfem.dynamics.rigid_body.bodies import Bodies, make_bodies
+from archfem.dynamics.rigid_body.bodies import Bodies, make_bodies, masses_of
 from archfem.dynamics.rigid_body.contact_detection import (
     PlacedPieces,
     allocate_pieces,
@@ -66,6 +66,11 @@ class SeparationMonitor:
         """Return the first step of a batch with separated blocks and the reason, or None."""
         observer, structure = self.model.observer(), self.model.structure
         _, rotation, slip = np.moveaxis(observer.faces(batch.read(observer)), -2, 0)
+        # faces overlap at all slips between two at which they do
+        ends = np.stack([slip.min(axis=0), slip.max(axis=0)])
+        is_turned = max(-rotation.min(), rotation.max()) > self.max_rotation
+        if not is_turned and np.all(structure.overlaps(ends)[0] > 0.0):
+            return None
         rotation = np.abs(rotation)
         loose = (rotation > self.max_rotation) | self._find_slid_off(slip)
         # which blocks are fill takes long to find out, and matters once a joint is loose
@@ -275,7 +280,7 @@ def _only_vibrates(model: Model, state: State) -> bool:
     if _largest_rotation(model, state) > 0.02:
         return False
     free = list(model.structure.free)
-    mass, inertia = make_bodies(model.structure, 0.0).mass[free].T
+    mass, inertia = masses_of(model.structure)[free].T
     velocities = model.rigid_motions(state.q, state.velocity)[1][free]
     squares = np.sum(velocities[:, :2] ** 2, axis=1) + inertia / mass * velocities[:, 2] ** 2
     return bool(np.max(squares / (2.0 * G)) <= 2e-4 * shallowest_depth(model.structure))

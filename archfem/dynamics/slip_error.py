@@ -16,6 +16,7 @@ velocity then errs by up to ½ Δt c N₀ |ΔV/N| until it turns or rests again,
 import numpy as np
 
 from archfem._typing import Array
+from archfem.dynamics.solvers.step_scans import add_drifts, scan_shears
 from archfem.dynamics.state import Batch
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
@@ -45,18 +46,18 @@ class SlipError:
         slides = np.isfinite(structure.friction)
         self.joints = np.flatnonzero(judged & slides)  # numbers of the joints that can slide (j,)
         self.total = np.zeros(len(self.joints))  # sum over the steps added (j,) [m]
-        self._least = least_compression(first.resultants[0, judged, 0])[slides[judged]]
-        self._friction = structure.friction[self.joints]
+        least = least_compression(first.resultants[0, judged, 0])[slides[judged]]
         # cohesion of bonds is lost as they break
         cohesion = np.where(structure.tension > 0.0, 0.0, structure.cohesion)
-        self._cohesion, self._gravity = cohesion[self.joints], structure.gravity
+        of_joints = structure.friction[self.joints], cohesion[self.joints], least
+        self._law, self._gravity = (self.joints, *of_joints), structure.gravity
         # relative acceleration of the two blocks by a shear as large as N at rest (j,) [m/s²]
         masses = np.full(len(structure.blocks), np.inf)
         for number in structure.free:
             block = structure.blocks[number]
             masses[number] = structure.width * block.area * structure.density(block)
         compliance = (1.0 / masses[structure.pairs[self.joints]]).sum(axis=1)
-        self._acceleration = 2.0 * self._least * compliance
+        self._acceleration = 2.0 * least * compliance
         self._motion, self._end = motion, float(first.times[-1])
         rows = [row for row in (motion.horizontal, motion.vertical) if row is not None]
         steepest = sum(np.abs(np.diff(row)).max(initial=0.0) for row in rows)
@@ -66,20 +67,23 @@ class SlipError:
         # times at the middle of the last two steps [s], and their V/N and margins
         self._middles, self._rows = np.zeros(0), np.zeros((0, 2, len(self.joints)))
         self._drift = np.zeros(len(self.joints))  # error of the velocity since the last rest [m/s]
+        # lengths, middles, rows and errors of the steps that were estimated last
+        self._estimated = tuple(np.zeros((4, 0)))
 
     def estimate(self, batch: Batch) -> Array:
         """Return the error of the slip in each step that follows those added (steps, j) [m]."""
-        lengths = self._lengths(batch)
+        lengths = batch.times.copy()
+        lengths[0] -= self._end
+        lengths[1:] -= batch.times[:-1]
         middles = np.append(self._middles, batch.times - 0.5 * lengths)
-        rows = np.concatenate([self._rows, self._ratios(batch.resultants)])
-        bends = second_derivatives(middles, rows[:, 0])[-len(lengths) :]
-        # a step slides where it, or one of the two before, reaches the limit
-        margins = np.concatenate([rows[:1, 1], rows[:1, 1], rows[:, 1]])
-        margins = np.minimum(np.minimum(margins[2:], margins[1:-1]), margins[:-2])[-len(lengths) :]
-        margins, squares = np.maximum(margins, 0.0), np.square(lengths)[:, None]
-        variation = squares * np.abs(bends) / 6.0
+        rows, count = np.empty((len(middles), 2, len(self.joints))), len(lengths)
+        rows[: len(self._rows)] = self._rows
+        variation, margins = np.empty((2, count, len(self.joints)))
+        nearest, squares = np.empty(count), np.square(lengths)[:, None]
+        scans = variation, margins, nearest
+        scan_shears(batch.resultants, self._law, lengths, middles, rows, scans)
         # elsewhere the ground cannot vary as much within a step as V lacks to its limit
-        near = margins.min(axis=1, initial=np.inf) < self._largest_slope * lengths
+        near = nearest < self._largest_slope * lengths
         for jump in self._jumps:
             near |= (batch.times - lengths <= jump) & (jump <= batch.times)
         if near.any():
@@ -87,49 +91,20 @@ class SlipError:
             variation[near] = np.maximum(variation[near], ground)
         excess = np.maximum(variation - margins, 0.0)
         errors: Array = 0.5 * squares * self._acceleration * excess
+        self._estimated = lengths, middles, rows, errors
         return errors
 
-    def add(self, batch: Batch, errors: Array) -> None:
-        """Add steps with their errors."""
-        lengths = self._lengths(batch)
-        rows = np.concatenate([self._rows, self._ratios(batch.resultants)])
-        self.total = self.total + errors.sum(axis=0) + self._drifts(lengths, rows)
-        self._middles = np.append(self._middles, batch.times - 0.5 * lengths)[-2:]
-        self._rows, self._end = rows[-2:], float(batch.times[-1])
-
-    def _drifts(self, lengths: Array, rows: Array, near: float = 1e-3) -> Array:
-        """Return the errors of the slip in steps by those of the velocity, and keep these (j,) [m].
-
-        A turn replaces the error of the velocity: of the last one it leaves (a - μ g)/(a + μ g).
-        """
-        slides, ratios = rows[:, 1] < near, rows[:, 0]
-        turns = slides[2:] & slides[:-2] & (ratios[2:] * ratios[:-2] < 0.0)
-        rests = ~(slides[2:] | slides[1:-1])
-        total = np.zeros(len(self.joints))
-        if turns.any() or self._drift.any():
-            turned = self._acceleration * np.abs(ratios[2:] - ratios[:-2]) / np.sqrt(12.0)
-            steps = lengths[len(lengths) - len(turns) :, None]
-            for length, turn, rest, speed in zip(steps, turns, rests, turned * steps, strict=True):
-                self._drift = np.where(turn, speed, np.where(rest, 0.0, self._drift))
-                total += length * self._drift
-        return total
-
-    def _lengths(self, batch: Batch) -> Array:
-        """Return the lengths of the steps (steps,) [s]."""
-        lengths = batch.times.copy()
-        lengths[0] -= self._end
-        lengths[1:] -= batch.times[:-1]
-        return lengths
-
-    def _ratios(self, resultants: Array) -> Array:
-        """Return V/N and what it lacks to the limit (steps, 2, j)."""
-        normal, shear = resultants[:, self.joints, 0], resultants[:, self.joints, 1]
-        limit = self._friction * np.maximum(normal, 0.0) + self._cohesion
-        pressed = np.maximum(normal, self._least)
-        ratios = np.empty((len(normal), 2, len(self.joints)))
-        np.divide(shear, pressed, out=ratios[:, 0])
-        np.divide(limit - np.abs(shear), pressed, out=ratios[:, 1])
-        return ratios
+    def add(self, batch: Batch) -> None:
+        """Add the first of the steps that were estimated last, all but those cut off since."""
+        lengths, middles, rows, errors = self._estimated
+        count = len(batch.times)
+        end = len(rows) - len(lengths) + count
+        self.total = self.total + errors[:count].sum(axis=0)
+        # V/N within a thousandth of its limit counts as sliding
+        sums = self.total, self._drift
+        add_drifts(rows[:end], lengths[:count], self._acceleration, 1e-3, sums)
+        self._middles, self._rows = middles[max(end - 2, 0) : end], rows[max(end - 2, 0) : end]
+        self._end = float(batch.times[-1])
 
     def _vary_ground(self, ends: Array, lengths: Array) -> Array:
         """Return by how much the ground's acceleration leaves its mean in steps (k, 1) [g]."""

@@ -189,13 +189,15 @@ def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) 
     if not len(slip_error.joints):
         return None
     dataset, joints = history.dataset, slip_error.joints
+    worst, error = int(joints[slip_error.total.argmax()]), float(slip_error.total.max())
+    # a thousandth of the depth, by which |e| errs by a fifth of the default tolerance
+    limit = 1e-3 * float(dataset["depth"].values[worst])
+    if error <= limit:
+        return None
     slip = dataset["slip"].transpose("time", "joint").values[:, joints]
-    largest, error = float(np.abs(slip - slip[0]).max()), float(slip_error.total.max())
-    worst = int(joints[slip_error.total.argmax()])
-    depth = float(dataset["depth"].values[worst])
-    # a tenth of the largest slip on average; and a thousandth of the depth, by which |e| errs by a
-    # fifth of the default tolerance
-    limit = max(1e-3 * depth, 0.3 * largest)
+    # a tenth of the largest slip on average
+    largest = float(np.abs(slip - slip[0]).max())
+    limit = max(limit, 0.3 * largest)
     if error <= limit:
         return None
     return Doubt(
@@ -264,7 +266,8 @@ def _take_steps(
         yield from adaptive.batches(start, end)
         return
     for batch in adaptive.stepper.batches(start, dt, end):
-        adaptive.slip_error.add(batch, adaptive.slip_error.estimate(batch))
+        adaptive.slip_error.estimate(batch)
+        adaptive.slip_error.add(batch)
         yield batch
 
 

@@ -118,6 +118,19 @@ def joint_dataset(
         depths, heights of the middles, coefficients of friction and resistances by cohesion of the
         joints, and whether they are assessed, as coordinates; the criteria as attributes.
     """
+    return xr.Dataset(*joint_variables(structure, resultants, time, criteria, faces, moved, rest))
+
+
+def joint_variables(
+    structure: Structure,
+    resultants: Array,
+    time: Array | None,
+    criteria: Criteria | None,
+    faces: Array | None,
+    moved: bool,
+    rest: Array | None,
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """Return variables, coordinates and attributes of `joint_dataset`."""
     dims = ("joint",) if time is None else ("time", "joint")
     depth, criteria = structure.depths, criteria or Criteria()
     values = dict(zip(("N", "V", "M"), np.moveaxis(resultants, -1, 0), strict=True))
@@ -146,7 +159,7 @@ def joint_dataset(
         coordinates[IDLE_COORDINATE] = "joint", idle
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
-    return xr.Dataset(variables, coordinates, criteria.attributes)
+    return variables, coordinates, criteria.attributes
 
 
 def _derive_in_parts(

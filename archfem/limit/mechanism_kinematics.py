@@ -262,7 +262,7 @@ class Verifier:
             InvalidInput: `joints` has several instants, or is of another structure.
         """
         check_instant(self.structure, joints)
-        scaled = _largest_motion(self.blocks, self.freedoms(joints))
+        scaled = self._find_motion(self.freedoms(joints))
         tolerance = 1e-6  # least motion, relative to the largest allowed, that counts as one
         gaps = (self.blocks.kinematics @ (self.blocks.coordinate_units * scaled)).reshape(3, -1)
         working = np.flatnonzero(np.abs(gaps).max(axis=0) > tolerance)
@@ -279,6 +279,20 @@ class Verifier:
         at = None if time is None else float(time)
         moved = Mechanism(kind, " + ".join(roles), numbers, at, free, names, free_names)
         return VerifiedMechanism(moved, counted_mechanism(joints), regions.expand_motion(motion))
+
+    @cached_property
+    def _motions(self) -> dict[bytes, Array]:
+        """Largest motions by the freedoms: many histories share them."""
+        return {}
+
+    def _find_motion(self, freedoms: Array) -> Array:
+        """Return the largest motion that freedoms permit, scaled (3 n_free,)."""
+        pattern = freedoms.tobytes()
+        if pattern not in self._motions:
+            if len(self._motions) >= MAX_KNOWN_PATTERNS:
+                self._motions.clear()
+            self._motions[pattern] = _largest_motion(self.blocks, freedoms)
+        return self._motions[pattern]
 
     def verify_if_moving(self, joints: xr.Dataset) -> VerifiedMechanism | None:
         """Search for a motion as `verify` does, after the fast check of the loops.

@@ -150,8 +150,12 @@ def largest_values(run: History) -> dict[str, float]:
 
 def _largest(run: History, name: str, undefined: float = -np.inf) -> float:
     """Largest magnitude over time and the joints of rings and piers; `undefined` replaces NaN."""
-    sizes = np.abs(run.dataset[name].values[..., run.dataset["judged"].values])
-    return float(np.where(np.isnan(sizes), undefined, sizes).max())
+    values, judged = run.dataset[name].values, run.dataset["judged"].values
+    sizes = np.abs(values if judged.all() else values[..., judged])  # a selection is a copy
+    largest = sizes.max()
+    if np.isnan(largest):
+        largest = np.where(np.isnan(sizes), undefined, sizes).max()
+    return float(largest)
 
 
 def evaluate_scales(

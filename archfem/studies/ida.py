@@ -35,7 +35,7 @@ from archfem.dynamics.motion_scaling import (
 )
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints, with_failure_flags
-from archfem.limit.mechanism_count import Mechanism
+from archfem.limit.mechanism_count import Mechanism, counted_mechanism
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.studies.cache import dead_load_of, ground_motion, lowest_modes
@@ -123,11 +123,11 @@ def _run(result: DeadLoadResult, motion: Motion) -> dict[str, Any]:
     if complete:
         findings = largest_values(run)
         demands = {name: findings[name] for name in DEMAND_LABELS}
-    hinges = assessed_joints(with_failure_flags(run.joints))["hinge"] != 0
+    joints = with_failure_flags(run.joints)
     reached = {
-        "first hinge": bool(hinges.any()),
-        "four failures": run.mechanisms["any joints at once"] is not None,
-        "verified": run.mechanisms["verified"] is not None,
+        "first hinge": bool(assessed_joints(joints)["hinge"].values.any()),
+        "four failures": counted_mechanism(joints) is not None,
+        "verified": run.verified is not None,
     }
     fall = None if run.fall is None else run.fall.kind
     end = {"ending": str(run.ending), "outcome": run.outcome, "fall": fall}

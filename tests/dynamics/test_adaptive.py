@@ -54,7 +54,7 @@ class Known:
 NO_SLIP = SimpleNamespace(
     joints=np.zeros(0, int),
     estimate=lambda batch: np.zeros((len(batch.times), 0)),
-    add=lambda batch, errors: None,
+    add=lambda batch: None,
 )
 """Stands for the error of the slip where no joint can slide."""
 

@@ -141,7 +141,7 @@ def make_bodies(
     edges = np.concatenate([np.roll(points, -1, axis=0) - points for points, _ in pieces])
     # an edge turned clockwise points outward
     across = np.column_stack([edges[:, 1], -edges[:, 0]])
-    mass = np.array([_mass(structure, block) for block in blocks])
+    mass = masses_of(structure)
     smallest = float(np.sqrt(min(blocks[number].area for number in structure.free)))
     closed = min(1e-4 * smallest, 5e-5)
     inverse_mass = np.zeros((len(blocks) + 1, 2))
@@ -188,12 +188,14 @@ def check_rigid_blocks(structure: Structure) -> None:
             )
 
 
-def _mass(structure: Structure, block: Block) -> tuple[float, float]:
-    """Return mass and moment of inertia, zero for fixed blocks."""
-    if block.fixed:
-        return 0.0, 0.0
-    density = structure.density(block) * structure.width
-    return density * block.area, density * block.polar_moment
+def masses_of(structure: Structure) -> Array:
+    """Return mass and moment of inertia of all blocks, zero for fixed ones (b, 2) [kg, kg m²]."""
+    masses = np.zeros((len(structure.blocks), 2))
+    for number in structure.free:
+        block = structure.blocks[number]
+        density = structure.density(block) * structure.width
+        masses[number] = density * block.area, density * block.polar_moment
+    return masses
 
 
 def _friction_table(structure: Structure, default: float | None) -> Array:

@@ -126,7 +126,7 @@ class AdaptiveStepper:
         self._last += list(zip(middles[max(good - 2, 0) : good], scaled, strict=True))
         self._last = self._last[-2:]
         batch = batch.cut(good)
-        self.slip_error.add(batch, slips[:good])
+        self.slip_error.add(batch)
         return batch, float(errors[:good].max())
 
     def _take_steps(self, state: State, dt: float, ends: Array, last: bool) -> Batch | None:
