@@ -305,7 +305,7 @@ def test_motions_of_a_suite_are_shown_before_they_were_scaled_and_reduced(monkey
             given.get("scale", 1.0),
             given.get("reduction", 1.0),
         )
-        assert f"R = {given.get('reduction', 1.0):g};" in caption
+        assert ("R = 4;" in caption) == ("reduction" in given)
     for matched in (True, False):
         case = SimpleNamespace(suite={"matched": matched}, target="some")
         assert len(sections._build_spectra(case, [motion])) == (1 if matched else 2)
