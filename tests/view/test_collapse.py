@@ -152,7 +152,7 @@ def test_a_rating_shows_its_worst_place_and_the_axles_as_given(ring, few_places)
     axles, places = [3.6 * axle for axle in lorry.axles], np.linspace(-9.0, 9.0, 37).tolist()
     moving = af.moving_load(wide, axles, spacings=lorry.spacings, positions=places)
     factors = {"live": 1.5, "impact": 1.2, "dead": 1.0, "geometric": 1.0}
-    factors |= {"area_load": 0.0, "by_rule": np.nan}
+    factors |= {"area_load": 0.0, "by_rule": np.nan, "strength": None}
     found = af.limit.Rating(wide, lorry, width=2.0, moving=moving, **factors)
     upper, lower = draw_rating(found).axes
     place, drawn = lines_of(upper)["worst place"][0], lines_of(upper)
