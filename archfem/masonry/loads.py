@@ -113,14 +113,14 @@ class PointLoad:
 
         outlines = np.array([shapely.Polygon(structure.blocks[n].drawn()) for n in structure.free])
         away = shapely.distance(outlines, shapely.Point(point))
-        near = away <= 1e-3 * structure.size  # chords for arcs, and coordinates in print
-        if not near.any():
-            nearest = structure.blocks[structure.free[int(away.argmin())]].name
+        if away.min() > 1e-3 * structure.size:  # chords for arcs, and coordinates in print
+            name = structure.blocks[structure.free[int(away.argmin())]].name
             raise InvalidInput(
                 f"a point load at ({self.x:.4g}, {self.y:.4g}) m is {away.min():.4g} m away from "
-                f"the nearest block that moves, '{nearest}': move it there"
+                f"the nearest block that moves, '{name}': move it there"
             )
-        return _highest_block(structure, [structure.free[k] for k in np.flatnonzero(near)]), point
+        nearest = np.flatnonzero(away <= away.min() + SAME_PLACE * structure.size)
+        return _highest_block(structure, [structure.free[k] for k in nearest]), point
 
 
 def _highest_block(structure: Structure, numbers: Sequence[int]) -> int:

@@ -143,3 +143,13 @@ def test_of_two_stones_at_one_height_the_first_carries():
     for y in (None, 0.7):
         assert af.PointLoad(0.4, (0.0, -1.0), y=y).place(row)[0] == 1
         assert af.PointLoad(0.7, (0.0, -1.0), y=y).place(row)[0] == 2
+
+
+def test_a_load_beside_a_joint_acts_on_the_stone_that_has_it(stack):
+    """Half a millimetre below a joint it acts on the block below, not on that above."""
+    joint = stack.joints[1]
+    below, above = (
+        af.PointLoad(0.5, (-1.0, 0.0), y=joint.middle[1] + by).place(stack)[0]
+        for by in (-5e-4, 5e-4)
+    )
+    assert (below, above) == (joint.lower, joint.higher)
