@@ -59,6 +59,17 @@ def find_soft_blocks(structure: Structure) -> tuple[int, ...]:
     )
 
 
+def estimate_bending(structure: Structure, number: int) -> float:
+    """Return the first frequency of a block as a beam that is held at its joints [Hz]."""
+    # held at one end, 0.1615 d / L² √(E/ρ), or at both, 1.028 d / L² √(E/ρ) (Euler and Bernoulli)
+    block = structure.blocks[number]
+    away = np.array(block.points) - block.centroid
+    length = 2.0 * float(np.linalg.norm(away, axis=1).max())
+    held = sum(number in joint.blocks for joint in structure.joints)
+    wave = sqrt(block.material.young / structure.density(block))
+    return (0.1615 if held == 1 else 1.028) * block.area / length**3 * wave
+
+
 def find_yielding_blocks(structure: Structure) -> tuple[int, ...]:
     """Return the blocks, of neither rings nor piers, that adapt to others as fill does."""
     # As one rigid body, fill would support each of the rings below. The pieces of a fill with

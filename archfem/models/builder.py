@@ -6,7 +6,11 @@ from dataclasses import replace
 
 from archfem._threads import single_threaded
 from archfem.errors import InvalidInput
-from archfem.masonry.stiffness_ratio import estimate_block_stiffness, find_soft_blocks
+from archfem.masonry.stiffness_ratio import (
+    estimate_bending,
+    estimate_block_stiffness,
+    find_soft_blocks,
+)
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.condensed import condense_blocks
 from archfem.models.discretisation import Discretisation
@@ -113,3 +117,18 @@ def _doubt_soft_blocks(structure: Structure, fidelities: Sequence[str]) -> Itera
                 f"{join_names([structure.blocks[number].name for number in numbers])}",
                 f"'{fidelity}' is wrong for them, use 'full'",
             )
+    # energy of earthquakes ends near 25 Hz; joints far softer than their blocks deform instead
+    slender = {
+        number: frequency
+        for number in structure.free
+        if number not in soft and fidelities[number] in ("rigid", "faces", "condensed")
+        if (frequency := estimate_bending(structure, number)) < 25.0
+        and estimate_block_stiffness(structure, number).ratio < 10.0
+    }
+    if slender:
+        yield Doubt(
+            f"slender blocks bend at {min(slender.values()):.2g} Hz or more, in the seismic band, "
+            f"which their fidelity leaves out: "
+            f"{join_names([structure.blocks[number].name for number in slender])}",
+            "use 'full' for them, or cut them into courses",
+        )

@@ -7,6 +7,7 @@ import pytest
 
 import archfem as af
 from archfem.masonry.stiffness_ratio import (
+    estimate_bending,
     estimate_block_stiffness,
     find_soft_blocks,
     find_yielding_blocks,
@@ -100,3 +101,24 @@ def test_stones_of_no_role_count_whatever_their_joints_are():
     assert min(ratios) < 1.0 < max(ratios)
     assert list_stones(structure) == list(structure.free)
     assert mark_stone_joints(structure).all()
+
+
+def test_slender_blocks_bend_as_beams():
+    """One frequency of a block on its foot, by all nodes and by Euler's beam; and held twice."""
+    contact = af.Contact(1e14, 1e14, friction=None)
+    column = af.column(breadth=0.4, heights=[8.0], contact=contact)
+    beam = 3.516 / (2.0 * np.pi) * np.sqrt(30e9 * 0.4**2 / 12.0 / (20e3 / 9.81)) / 8.0**2
+    assert estimate_bending(column, 1) == pytest.approx(beam, rel=5e-3)  # along its diagonal
+    twice = af.column(breadth=0.4, heights=[8.0, 0.4], contact=contact)
+    assert estimate_bending(twice, 1) / estimate_bending(column, 1) == pytest.approx(
+        6.366, rel=1e-3
+    )
+    for fidelity in ("rigid", "faces", "condensed"):
+        (doubt,) = af.build(column, fidelity=fidelity).doubts
+        assert "bend at 3.9 Hz or more" in str(doubt)
+    assert not af.build(column, fidelity="full", cells=(1, 4)).doubts
+    # too short to bend slowly, and on joints that are far softer than the stone
+    short = af.column(breadth=0.4, heights=[2.0], contact=contact)
+    dry = af.column(breadth=0.4, heights=[8.0])
+    assert not af.build(short, fidelity="faces").doubts
+    assert not af.build(dry, fidelity="faces").doubts
