@@ -120,7 +120,7 @@ class Fragility:
         """
         medians, dispersions = self.resampled.T[:, :, None]
         curves = _curve(check_array(intensity, "intensity"), medians, dispersions)
-        low, high = np.quantile(curves, [0.5 - 0.5 * share, 0.5 + 0.5 * share], axis=0)
+        low, high = np.quantile(curves, _tails(share), axis=0)
         return low, high
 
     def interval(self, share: float = 0.9) -> tuple[float, float]:
@@ -129,7 +129,7 @@ class Fragility:
         Args:
             share: share of the bootstrap samples within the interval [-].
         """
-        low, high = np.quantile(self.resampled[:, 0], [0.5 - 0.5 * share, 0.5 + 0.5 * share])
+        low, high = np.quantile(self.resampled[:, 0], _tails(share))
         return float(low), float(high)
 
     def widened(self, dispersion: float) -> "Fragility":
@@ -261,8 +261,8 @@ def stripe_fragility(
 
     Raises:
         InvalidInput: there are fewer than three levels, counts are out of range, motions are not
-            whole numbers, or the dispersion is undetermined: no motion fails up to one level, and
-            all from the next, or the share of failures does not grow.
+            whole numbers, or the dispersion is undetermined: no motion fails below one level, and
+            all do above it, or the share of failures does not grow.
     """
     x = np.array(check_numbers(levels, "levels"))
     count = check_array(motions, "motions")
@@ -283,10 +283,11 @@ def stripe_fragility(
             "not, and the dispersion is undetermined; try levels between"
         )
     median, dispersion = (float(each[0]) for each in _probit(x, failed[None], count))
-    if dispersion >= 0.999 * DISPERSION_RANGE[1]:
+    if not 1.001 * DISPERSION_RANGE[0] < dispersion < 0.999 * DISPERSION_RANGE[1]:
         raise InvalidInput(
             f"{failed.tolist()} of {count.tolist()} motions fail at levels {x.tolist()}: their "
-            "share hardly grows with the level, which gives no curve; try levels farther apart"
+            "share hardly grows with the level, or from none to all at one of them, and the "
+            "dispersion is undetermined; try levels farther apart, or nearer to that one"
         )
     share = _curve(x, median, dispersion)
     random = np.random.default_rng(check_integer(seed, "seed", minimum=0))
@@ -301,8 +302,16 @@ def stripe_fragility(
     return Fragility(median, dispersion, goodness, misfit, resampled)
 
 
+def _tails(share: float) -> list[float]:
+    """Return the probabilities at both ends of an interval."""
+    half = 0.5 * check_number(share, "share", minimum=0.0, maximum=1.0)
+    return [0.5 - half, 0.5 + half]
+
+
 def _curve(intensity: Array, median: Any, dispersion: Any) -> Array:
     """Lognormal probability; 0 at intensity 0."""
+    if (intensity < 0.0).any():
+        raise InvalidInput(f"intensity {float(intensity.min()):g} is below 0: give none")
     with np.errstate(divide="ignore"):
         return np.asarray(ndtr((np.log(intensity) - np.log(median)) / dispersion))
 

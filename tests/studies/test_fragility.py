@@ -285,3 +285,25 @@ def test_an_annual_rate_needs_a_hazard():
     curve = fragility([1.0, 2.0, 3.0])
     with pytest.raises(af.InvalidInput, match="give Hazard"):
         curve.annual_rate(2e-3)
+
+
+@pytest.mark.parametrize(
+    ("levels", "failures"),
+    [
+        ([1.0, 2.0, 3.0], [0, 5, 10]),  # all of the growth is at one level
+        ([1.0, 1.0, 1.0], [1, 2, 3]),  # which there is only one of
+    ],
+)
+def test_stripes_that_determine_no_dispersion_are_refused(levels, failures):
+    with pytest.raises(af.InvalidInput, match="dispersion is undetermined"):
+        af.studies.stripe_fragility(levels, failures, 10)
+
+
+@pytest.mark.parametrize("share", [-1.0, 2.0, float("nan")])
+def test_shares_outside_0_and_1_are_refused(share):
+    curve = fragility([1.0, 2.0, 3.0])
+    for ask in (curve.interval, lambda share: curve.band([1.0], share)):
+        with pytest.raises(af.InvalidInput, match="share"):
+            ask(share)
+    with pytest.raises(af.InvalidInput, match="below 0"):
+        curve.probability([1.0, -1.0])
