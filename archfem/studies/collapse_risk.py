@@ -485,8 +485,12 @@ class CollapseRisk(ResultDisplay):
         Variance components, 1992, section 3.6); the rest is of properties, and chance.
         """
         low, high = self.capacities()
-        logs = np.log(np.where(np.isfinite(high), np.sqrt(np.maximum(low, 0.1 * high) * high), low))
-        total = float(np.var(logs, ddof=1))
+        bounded = np.isfinite(high)
+        low = np.where(bounded, np.maximum(low, 0.1 * high), low)
+        logs = np.log(np.where(bounded, np.sqrt(low * high), low))
+        # middles of brackets vary by their width too (Sheppard's correction)
+        rounding = float(np.mean(np.log(np.where(bounded, high / low, 1.0)) ** 2)) / 12.0
+        total = max(float(np.var(logs, ddof=1)) - rounding, 0.0)
         parts = {
             name: _variance_component(logs, self._of_answered(name))
             for name in ("record_number", "alternative")

@@ -173,6 +173,20 @@ def test_dispersion_is_split_into_its_parts():
     assert rates["sawn"].rate > rates["hewn"].rate
 
 
+def test_widths_of_brackets_are_no_dispersion():
+    """Of brackets as wide as a run makes them, about capacities without any dispersion but 0.1."""
+    random, width = np.random.default_rng(4), np.log(1.25)
+    logs = np.log(5.0) + 0.1 * random.standard_normal(4000)
+    low = width * np.floor(logs / width)
+    risk = risk_of(np.exp(logs), np.arange(4000) % 20)
+    risk.dataset["lower"].values[:] = np.exp(low)
+    risk.dataset["upper"].values[:] = np.exp(low + width)
+    parts = risk.dispersions()
+    # middles of the brackets deviate by 0.119
+    assert (parts["total"], parts["properties"]) == pytest.approx((0.1, 0.1), rel=0.05)
+    assert parts["total"] == pytest.approx(risk.fragility().dispersion, rel=0.05)
+
+
 def tilted_block():
     """A slender block, which one run decides in milliseconds, and short motions."""
     block = af.column(breadth=0.25, heights=[1.5], contact=af.Contact(1e9, 5e8, 0.7))
