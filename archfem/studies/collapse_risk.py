@@ -525,14 +525,21 @@ class CollapseRisk(ResultDisplay):
         """Reasons why the rate may be wrong, each with its remedy."""
         last, unit = self.hazard.intensity[-1], MEASURES[self.hazard.measure]
         edges, shares = self.disaggregation(240)
-        beyond = float(shares[edges[:-1] > last].sum())
-        if beyond <= LARGEST_EXTRAPOLATED_SHARE:
-            return ()
-        cause = (
-            f"{beyond:.0%} of the rate comes from intensities above {last:.3g} {unit}, the last of "
-            "the hazard, whose slope is extrapolated there"
-        )
-        return (Doubt(cause, "give the hazard at longer return periods"),)
+        beyond, doubts = float(shares[edges[:-1] > last].sum()), []
+        if beyond > LARGEST_EXTRAPOLATED_SHARE:
+            cause = (
+                f"{beyond:.0%} of the rate comes from intensities above {last:.3g} {unit}, the "
+                "last of the hazard, whose slope is extrapolated there"
+            )
+            doubts.append(Doubt(cause, "give the hazard at longer return periods"))
+        count = len(self.dataset["sample"])
+        # a twentieth of all is what the 90 % interval leaves out at each of its ends
+        if (missing := count - len(self.answered)) > 0.05 * count:
+            cause = (
+                f"{missing} of {count} samples have no answer, and the rate is that of the others"
+            )
+            doubts.append(Doubt(cause, "read their `error` in the dataset"))
+        return tuple(doubts)
 
     @property
     def sentence(self) -> str:

@@ -148,6 +148,14 @@ def test_scales_the_larger_first_are_refused():
         af.collapse_risk(*tilted_block(), SITE, between=(2.0, 1.0))
 
 
+@pytest.mark.parametrize("missing", [1, 3])
+def test_many_samples_without_an_answer_are_a_doubt(missing):
+    risk = risk_of(np.geomspace(3.0, 6.0, 40), np.arange(40) % 8)
+    risk.dataset["error"].values = np.array(["it failed"] * missing + [""] * (40 - missing))
+    assert f"{missing} samples have no answer" in risk.sentence
+    assert ("3 of 40 samples have no answer" in str(risk.doubts)) == (missing == 3)
+
+
 def test_a_motion_of_nothing_is_refused():
     analysis, motions = tilted_block()
     still = af.Motion(np.zeros(50), 0.01, name="still")
