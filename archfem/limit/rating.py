@@ -57,6 +57,8 @@ class Rating(ResultDisplay):
         without_pressure: factor of the same loads with no pressure of a `Fill`; NaN without one,
             and where the bridge then does not stand.
         full_pressure: factor of the same loads with all of its passive pressure; else NaN.
+        deepest: factor at the worst place with joints of any depth, where it is below 1 as they
+            slide; else NaN. It differs from stone to stone.
     """
 
     structure: Structure
@@ -72,6 +74,7 @@ class Rating(ResultDisplay):
     strength: float | None = None
     without_pressure: float = np.nan
     full_pressure: float = np.nan
+    deepest: float = np.nan
 
     @property
     def factor(self) -> float:
@@ -197,7 +200,8 @@ class Rating(ResultDisplay):
         if self.moving.worst.fill_motion is not None:
             return "not searched with a plastic fill"
         if np.isnan(self.geometric):
-            return "none, joints of any depth do not carry the vehicle: they slide or crush"
+            carried = f", but slide at {self.deepest:.4g} of it" if self.deepest > 0.0 else ""
+            return f"none, joints of any depth do not carry the vehicle there{carried}"
         text = f"{self.geometric:.3g}"
         if self.geometric < 1.0:
             text += f", below 1: joints are too thin by {100.0 * (1.0 - self.geometric):.2g} %"
@@ -283,10 +287,12 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     if width > (1.0 + 1e-9) * rule or area_load < driven.area_load:
         least = min(width, rule), max(area_load, driven.area_load)
         by_rule = drive(*least, [moving.position]).worst.factor
-    geometric = np.nan if is_plastic else _geometric_factor(weighted, moving, options)
+    geometric, deepest = np.nan, np.nan
+    if not is_plastic:
+        geometric, deepest = _geometric_factor(weighted, moving, options)
     factors = live, impact, dead, width, area_load
-    pressed = _vary_pressure(weighted, moving, options)
-    return Rating(structure, driven, *factors, moving, geometric, by_rule, strength, *pressed)
+    more = by_rule, strength, *_vary_pressure(weighted, moving, options), deepest
+    return Rating(structure, driven, *factors, moving, geometric, *more)
 
 
 def _find_vehicle(vehicle: str | Vehicle) -> Vehicle:
@@ -323,32 +329,35 @@ def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Seq
 
 def _geometric_factor(
     structure: Structure, moving: MovingLoad, options: dict[str, Any], tolerance: float = 1e-4
-) -> float:
-    """Return the depth of joints over the least one that carries the worst row of axles [-]."""
+) -> tuple[float, float]:
+    """Return the depth of joints over the least one that carries the worst row of axles [-].
+
+    Where none does, it is NaN, and the factor of the deepest joints follows.
+    """
     stones, dead = self_weight_programme(structure, **options)
     axles = stones.load([load for load in moving.worst.live if isinstance(load, PointLoad)])
 
-    def is_carried(share: float) -> bool:
+    def factor_of(share: float) -> float:
         blocks = DeepenedBlocks(dead.blocks.structure, share)
         crushing = None if dead.crushing is None else share * dead.crushing
         changed = replace(dead, blocks=blocks, cohesion=share * dead.cohesion, crushing=crushing)
         if not is_balanced(changed.minimise_residual(), changed):
-            return False
+            return np.nan
         optimum = changed.with_load_factor(axles).solve()
-        return optimum is None or -optimum.value >= 1.0
+        return np.inf if optimum is None else -optimum.value
 
     # what narrower joints carry wider ones carry, so that halving finds the least
     low, high = 0.0, 1.0
-    while not moving.worst.factor >= 1.0 and not is_carried(high):
+    while not moving.worst.factor >= 1.0 and not (found := factor_of(high)) >= 1.0:
         low, high = high, 2.0 * high
         if high > 1e3:  # no depth helps
-            return np.nan
+            return np.nan, found
     while high - low > tolerance * high:
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if is_carried(middle) else (middle, high)
+        low, high = (low, middle) if factor_of(middle) >= 1.0 else (middle, high)
         if high < tolerance:
-            return np.inf
-    return 1.0 / high
+            return np.inf, np.nan
+    return 1.0 / high, np.nan
 
 
 def _vary_pressure(

@@ -306,7 +306,15 @@ def test_a_bridge_that_is_too_weak_would_carry_with_deeper_joints():
     slides = af.rate(ring, "lm1")
     assert not slides.passes
     assert np.isnan(slides.geometric)
-    assert "joints of any depth do not carry the vehicle: they slide" in str(slides)
+    none = "none, joints of any depth do not carry the vehicle there"
+    assert f"{none}, but slide at {slides.deepest:.4g} of it" in str(slides)
+    # a vehicle of the weight at which the deepest joints slide is the heaviest that depth helps
+    light, heavy = (
+        af.rate(ring, "lm1", live=1.35 * part * slides.deepest) for part in (0.99, 1.01)
+    )
+    assert 0.0 < light.geometric < 1.0
+    assert np.isnan(heavy.geometric)
+    assert heavy.deepest == pytest.approx(1.0 / 1.01, rel=1e-6)
     found = af.rate(ring, "lm1", friction=None)
     assert found.factor < 1.0
     assert not found.passes
