@@ -35,9 +35,9 @@ from .joints.criteria import Criteria as Criteria
 from .limit.collapse import collapse_factor as collapse_factor
 from .limit.collapse import stands as stands
 from .limit.mechanism_kinematics import verified_mechanism as verified_mechanism
+from .limit.rating import rate as rate
 from .limit.thickness import minimum_thickness as minimum_thickness
 from .limit.vehicles import moving_load as moving_load
-from .limit.vehicles import rate as rate
 from .masonry import shapes as shapes
 from .masonry.block import Block as Block
 from .masonry.joint_closing import joint_stiffness as joint_stiffness

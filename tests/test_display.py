@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 import archfem as af
 from archfem._display import ResultDisplay
 from archfem.dynamics import CollapseState
-from archfem.limit import vehicles
+from archfem.limit import rating
 from archfem.studies import variations
 
 
@@ -24,7 +24,7 @@ def things():
         # the runs of the range, which other tests compute, take most of the time
         stands = CollapseState("stands", None, (), 0.02, 0.01, True)
         patch.setattr(variations, "prepare_runs", lambda *_: lambda _: stands)
-        patch.setattr(vehicles, "_places_along", partial(vehicles._places_along, steps=20))
+        patch.setattr(rating, "_places_along", partial(rating._places_along, steps=20))
         yield one_of_each()
 
 

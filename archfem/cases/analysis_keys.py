@@ -14,7 +14,8 @@ from archfem.joints.criteria import Criteria
 from archfem.limit.backfill import Fill
 from archfem.limit.collapse import Collapse, collapse_factor
 from archfem.limit.plastic_fill import PlasticFill
-from archfem.limit.vehicles import Rating, Vehicle, rate
+from archfem.limit.rating import Rating, rate
+from archfem.limit.vehicles import Vehicle
 from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Settlement
 from archfem.masonry.structure import Structure
 from archfem.motion.design_spectra import DesignSpectrum

@@ -26,7 +26,8 @@ from archfem.dynamics.events import EVENTS
 from archfem.dynamics.recorder import Record
 from archfem.joints.criteria import Criteria
 from archfem.limit.collapse import collapse_factor
-from archfem.limit.vehicles import VEHICLES, Vehicle, rate
+from archfem.limit.rating import rate
+from archfem.limit.vehicles import VEHICLES, Vehicle
 from archfem.masonry.block import Block
 from archfem.masonry.construction import Stage
 from archfem.masonry.joint_closing import CONDITIONS

@@ -13,9 +13,10 @@
     mechanism_kinematics  mechanisms verified by a rigid-block motion
     nonassociated         sliding without dilatancy
     plastic_fill          strength of a plastic fill
+    rating                rating for vehicles of codes
     support_movement      finite movement of a support
     thickness             least thickness
-    vehicles              vehicles over a bridge, rating
+    vehicles              vehicles over a bridge
 
 Imports `masonry`, `joints` and the support modules. Start reading at `collapse`.
 """

@@ -17,6 +17,8 @@ from .mechanism_kinematics import first_verified_mechanism as first_verified_mec
 from .mechanism_kinematics import verified_mechanism as verified_mechanism
 from .nonassociated import NonassociatedBounds as NonassociatedBounds
 from .plastic_fill import PlasticFill as PlasticFill
+from .rating import Rating as Rating
+from .rating import rate as rate
 from .support_movement import End as End
 from .support_movement import Movement as Movement
 from .support_movement import Stage as Stage
@@ -24,7 +26,5 @@ from .support_movement import largest_movement as largest_movement
 from .thickness import minimum_thickness as minimum_thickness
 from .vehicles import VEHICLES as VEHICLES
 from .vehicles import MovingLoad as MovingLoad
-from .vehicles import Rating as Rating
 from .vehicles import Vehicle as Vehicle
 from .vehicles import moving_load as moving_load
-from .vehicles import rate as rate

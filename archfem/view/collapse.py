@@ -19,7 +19,8 @@ from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import Collapse, Outcome
-from archfem.limit.vehicles import MovingLoad, Rating
+from archfem.limit.rating import Rating
+from archfem.limit.vehicles import MovingLoad
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, rigid_motion_matrix

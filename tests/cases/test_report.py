@@ -23,7 +23,7 @@ from archfem.cases.report.conclusion import build_conclusion, list_facts
 from archfem.cases.report.inputs import tabulate_inputs
 from archfem.cases.report.sections import supported_weight_ratio
 from archfem.cases.run import carry_out, replace_run
-from archfem.limit import vehicles
+from archfem.limit import rating
 from archfem.view.pages.document import FigureBlock
 
 CASE = """
@@ -99,7 +99,7 @@ CHECK_TEXT = (
     "the spectrum may be 0.5 times as strong, up to there nothing moves\n"
     "note: an upper bound"
 )
-RATING_TEXT = "Rating of 'it' for LM1: factor 1.25 at x = 2 m (the vehicle's middle), passes"
+RATING_TEXT = "Rating of 'it' for LM1: factor 1.25 with 2 axles at -0.1, 1.1 m, passes"
 RISK_TEXT = (
     "falls at 0.002 a year (0.001 to 0.003 at 90 %), 0.1 in 50 years; median 6 m/s² of pga, so"
 )
@@ -122,7 +122,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         ("as stated", "0.25 g, 475 years", "-", "-"),
         ("time histories", "PGA 0.05 g", "no mechanism in 2 of 2 runs", "-"),
         ("limit analysis", "-", "a mechanism at 0.25 g to the left (in doubt)", "-"),
-        ("rating", "LM1", "passes, x = 2 m (the vehicle's middle)", "1.25"),
+        ("rating", "LM1", "passes, with 2 axles at -0.1, 1.1 m", "1.25"),
         *(
             (f"assessment: {name}, right and left", demand, f"{capacity} (in doubt)", factor)
             for name, demand, capacity, factor in (
@@ -487,8 +487,8 @@ first = { synthetic = { seed = 1 } }
 def test_a_result_without_a_time_history_has_a_report(
     command, given, found, tmp_path, capsys, undrawn, monkeypatch
 ):
-    places = partial(vehicles._places_along, steps=10)
-    monkeypatch.setattr(vehicles, "_places_along", places)
+    places = partial(rating._places_along, steps=10)
+    monkeypatch.setattr(rating, "_places_along", places)
     path, folder = tmp_path / "case.toml", tmp_path / "out"
     path.write_text(f'{BRIDGE}[rating]\nvehicle = "LM2"\nlive = 1.2\n', encoding="utf-8")
     assert af.commands.main([command, str(path), "--out", str(folder), *given]) == 0
@@ -498,6 +498,7 @@ def test_a_result_without_a_time_history_has_a_report(
     concluded = words.split("Inputs and assumptions")[1]  # between the contents and the heading
     assert found in concluded
     assert "In doubt: joints slide (arch, joint" in concluded
+    assert ("Over the pressure of the fill, at that place: " in concluded) == (command == "rate")
     factor = re.search(r"factor (?:of )?([\d.]+)", said)[1]
     assert f"{factor}" in words
     assert "Response" not in words

@@ -8,20 +8,23 @@ import pytest
 from backfilled import arch_bridge
 
 import archfem as af
-from archfem.limit import VEHICLES, Vehicle, vehicles
-from archfem.limit.vehicles import _places_along as places_along
+from archfem.limit import VEHICLES, Vehicle, rating
+from archfem.limit.rating import _places_along as places_along
 
 EXACT = 1e-6
 """Relative: the programme is solved to 1e-9 block weights, corners count as one within 1e-6."""
 
 GRAVEL = af.limit.Fill(friction_angle=35.0)
 
+CLEAR_FROM = 2.0 + 0.5 * 0.4 * 2.5 / 3.125
+"""x of the intrados of the left springing, 0.2 m inside a centre line of 3.125 m of radius."""
+
 
 @pytest.fixture(scope="module", autouse=True)
 def few_places():
     """Places are a thirtieth of the bridge apart, not a hundredth, which takes longer."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(vehicles, "_places_along", partial(vehicles._places_along, steps=30))
+        patch.setattr(rating, "_places_along", partial(rating._places_along, steps=30))
         yield
 
 
@@ -146,7 +149,7 @@ def test_a_vehicle_spreads_over_its_wheels_and_the_fill_up_to_a_lane():
 
 def test_less_than_the_rule_is_stated_beside_the_verdict(monkeypatch):
     """Twice the width has twice the factor; the factor by rule stands in the same line."""
-    monkeypatch.setattr(vehicles, "_places_along", lambda *_: (2.6, 3.1, 3.6))
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (2.6, 3.1, 3.6))
     bridge = arch_bridge(voussoirs=5, cover=0.6, width=6.0)
     axle = Vehicle("axle", (50e3,), live=1.35, impact=1.2, area_load=3e3)
     rule, wide = (af.rate(bridge, axle, fill=GRAVEL, **given) for given in ({}, {"width": 6.0}))
@@ -205,12 +208,17 @@ def test_words_and_table(lorry_rating):
     assert "dead load by 1.1 (given)" in words
     assert "175 kN; given" in words
     assert "over 2 m of width (given)" in words
-    assert f"factor {lorry_rating.factor:.4g} at x = " in repr(lorry_rating)
+    sense = 1.0 if lorry_rating.moving.direction == "right" else -1.0
+    places = sorted(lorry_rating.moving.position + sense * np.array([1.6, -1.6]))
+    (beside,) = (x for x in places if not 0.0 < x < 9.0)  # ends of the fill
+    (x,) = {*places} - {beside}
+    stands = f"1 axle of 2 at {x - CLEAR_FROM:.2f} m from the left of the clear span, "
+    assert f"factor {lorry_rating.factor:.4g} with {stands}" in repr(lorry_rating)
     assert ("passes" in repr(lorry_rating)) == (lorry_rating.factor >= 1.0)
     head, *rows = lorry_rating.table().splitlines()
     assert head.startswith("direction,position")
     assert "of the vehicle's middle [m]" in head
-    assert words.count("(the vehicle's middle)") == 2
+    assert words.count("(the vehicle's middle)") == 1
     factor, geometric = (
         next(k for k, line in enumerate(words.splitlines()) if start in line)
         for start in ("Rating of", "geometric factor")
@@ -220,6 +228,49 @@ def test_words_and_table(lorry_rating):
     assert len(rows) == lorry_rating.moving.factors["factor"].size
     least = min(float(row.split(",")[2]) for row in rows)
     assert least == pytest.approx(lorry_rating.factor, rel=1e-5)  # six digits
+
+
+def test_the_range_over_the_pressure_of_the_fill_is_that_of_collapse_factors(lorry_rating):
+    """Of the same loads at the worst place, on heavier materials: none of it, and all."""
+    weighted = lorry_rating.moving.worst.structure
+    live = list(lorry_rating.moving.worst.live)
+    none, whole = (
+        af.collapse_factor(weighted, live=live, fill=replace(GRAVEL, **pressure)).factor
+        for pressure in ({"mobilisation": 0.0, "active": 0.0}, {"mobilisation": 1.0})
+    )
+    assert lorry_rating.without_pressure == pytest.approx(none, rel=EXACT)
+    assert lorry_rating.full_pressure == pytest.approx(whole, rel=EXACT)
+    assert none < 0.9 * lorry_rating.factor < 0.8 * whole
+    line = f"place: {none:.4g} without it, {lorry_rating.factor:.4g} as given, {whole:.4g} with all"
+    assert f"\nover the pressure of the fill, at that {line}" in str(lorry_rating)
+
+
+def test_a_bridge_that_the_fill_holds_has_no_factor_without_it(monkeypatch):
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (4.5,))
+    found = af.rate(
+        arch_bridge(voussoirs=9, rise=2.4, thickness=0.14), Vehicle("axle", (1e4,)), fill=GRAVEL
+    )
+    assert np.isfinite(found.factor)
+    assert np.isnan(found.without_pressure)
+    assert "place: none, as the bridge does not stand, without it" in str(found)
+
+
+def test_places_of_axles_are_of_the_span_that_is_loaded(monkeypatch):
+    """Of many axles the first and the last, and only those that stand on the structure."""
+    arches = [
+        af.shapes.Arch(span=4.0, rise=1.5, thickness=0.4, voussoirs=5, name=f"{side} arch")
+        for side in ("left", "right")
+    ]
+    pier = af.shapes.Pier(gap=1.0, height=1.0, course=0.5, name="pier")
+    bridge = af.bridge(arches=arches, piers=[pier])
+    inner = [joint.intrados[0] for joint in bridge.joints if joint.part == "right arch"]
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (min(inner) + 1.0,))
+    found = af.rate(bridge, Vehicle("axles", (1e3,) * 9, (0.2,) * 8))
+    name = " m from the left of the clear span of 'right arch', "
+    assert f"with 9 axles at 0.20 to 1.80{name}" in repr(found)
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (min(inner) - 20.0,))
+    found = af.rate(bridge, Vehicle("long", (1e3, 1e3, 1e3), (2.0, 40.0)))
+    assert "with 2 axles of 3 at -1.00 and 1.00 m" in repr(found)
 
 
 @pytest.mark.parametrize(
@@ -255,7 +306,15 @@ def test_a_bridge_that_is_too_weak_would_carry_with_deeper_joints():
     slides = af.rate(ring, "lm1")
     assert not slides.passes
     assert np.isnan(slides.geometric)
-    assert "joints of any depth do not carry the vehicle: they slide" in str(slides)
+    none = "none, joints of any depth do not carry the vehicle there"
+    assert f"{none}, but slide at {slides.deepest:.4g} of it" in str(slides)
+    # a vehicle of the weight at which the deepest joints slide is the heaviest that depth helps
+    light, heavy = (
+        af.rate(ring, "lm1", live=1.35 * part * slides.deepest) for part in (0.99, 1.01)
+    )
+    assert 0.0 < light.geometric < 1.0
+    assert np.isnan(heavy.geometric)
+    assert heavy.deepest == pytest.approx(1.0 / 1.01, rel=1e-6)
     found = af.rate(ring, "lm1", friction=None)
     assert found.factor < 1.0
     assert not found.passes

@@ -308,7 +308,7 @@ def test_a_plastic_fill_bounds_the_vehicle_at_each_place(monkeypatch, caplog):
     assert factors[0] == pytest.approx(alone.lower, rel=1e-6)
     assert moving.worst.upper == pytest.approx(alone.upper, rel=1e-6)
     # a rating takes every fifth of its places: one here
-    monkeypatch.setattr(vehicles, "_places_along", lambda *_: (3.3, *[4.5] * 4))
+    monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (3.3, *[4.5] * 4))
     rating = af.rate(arch_bridge(), vehicles.Vehicle("axle", (1e4,), area_load=2e3), fill=fill)
     assert rating.factor == pytest.approx(factors[0], rel=1e-6)
     assert np.isnan(rating.geometric)

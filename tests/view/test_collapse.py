@@ -10,7 +10,7 @@ import xarray as xr
 from portals import DRY, box, portal
 
 import archfem as af
-from archfem.limit import vehicles
+from archfem.limit import rating
 from archfem.view import (
     draw_capacity,
     draw_collapse,
@@ -91,7 +91,7 @@ def test_the_load_is_drawn_and_named(ring):
 @pytest.fixture
 def few_places(monkeypatch):
     """Places of vehicles are a twentieth of a bridge apart, not a hundredth."""
-    monkeypatch.setattr(vehicles, "_places_along", partial(vehicles._places_along, steps=20))
+    monkeypatch.setattr(rating, "_places_along", partial(rating._places_along, steps=20))
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from archfem.dynamics.history import History
 from archfem.dynamics.verdict import DOUBT_MARK, NO_RANGE
 from archfem.dynamics.verdict_range import property_text
 from archfem.joints.criteria import assessed_joints
+from archfem.limit.rating import PRESSURE_RANGE
 from archfem.masonry.joint_closing import describe_closing
 from archfem.motion.hazard import MEASURES
 from archfem.units import STANDARD_GRAVITY, format_mm
@@ -184,7 +185,7 @@ def _mark_doubt(data: ReportData, result: str) -> str:
 def _load_row(result: str, text: str) -> Iterator[_Row]:
     """Yield the row of a load that grows until it makes a mechanism."""
     first = text.splitlines()[0]
-    if found := re.search(r" for (.*?): factor (\S+) at (.*?), (passes|fails)", first):
+    if found := re.search(r" for (.*?): factor (\S+) (.*?), (passes|fails)", first):
         vehicle, factor, place, outcome = found.groups()
         yield result, vehicle, f"{outcome}, {place}", factor
     elif found := re.search(r", at (\S+(?: to \S+)?) times (.*)", first):
@@ -311,7 +312,8 @@ def _conclude_file(data: ReportData, name: str) -> list[str]:
     if name == "risk.txt":
         return [sentence(f"the structure {text.splitlines()[0]}")]
     if name != "assessment.txt":
-        return [sentence(text.splitlines()[0])]
+        first, *others = text.splitlines()
+        return list(map(sentence, [first, *(x for x in others if x.startswith(PRESSURE_RANGE))]))
     decisive: dict[str, list[str]] = {}  # the last check of each direction
     for part in text.split("\n\n"):
         for line, ways in [*_list_checks(part).items()][-1:]:

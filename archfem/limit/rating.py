@@ -1,0 +1,378 @@
+"""Rating of bridges for vehicles of codes: partial factors, widths, geometric factor of safety."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from archfem._display import ResultDisplay
+from archfem._typing import Array, Metres, Pascals
+from archfem._validation import validate_arguments
+from archfem.errors import InvalidInput
+from archfem.limit.backfill import Fill, is_balanced, self_weight_programme
+from archfem.limit.collapse import describe_crushing
+from archfem.limit.instability import DeepenedBlocks
+from archfem.limit.plastic_fill import PlasticFill
+from archfem.limit.vehicles import (
+    DRIVING_DIRECTIONS,
+    VEHICLES,
+    MovingLoad,
+    Vehicle,
+    axles_on_structure,
+    check_factor,
+    collapse_factors,
+    moving_load,
+    parse_axles,
+    vehicle_positions,
+)
+from archfem.masonry.loads import PointLoad
+from archfem.masonry.structure import HasStructure, Structure, structure_of
+
+# Beginning of the line of a rating on what the pressure of the fill adds
+PRESSURE_RANGE = "over the pressure of the fill, at that place: "
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rating(ResultDisplay):
+    """Rating of a bridge for a vehicle.
+
+    Attributes:
+        structure: the bridge, with its characteristic weights.
+        vehicle: axles, spacings and sources.
+        live: partial factor on the vehicle's weight [-].
+        impact: dynamic factor on the vehicle's weight [-].
+        dead: partial factor on the weights of stones and fill [-].
+        width: width of the bridge over which one vehicle spreads [m].
+        area_load: distributed load of the code, where it is adverse, without factors [Pa].
+        moving: factors at all places in both directions, on the factored vehicle over factored
+            weights, and the collapse at the worst place.
+        geometric: geometric factor of safety at the worst place [-]: depth of the joints over the
+            least share of it, about their middles, that carries the factored vehicle; below 1 where
+            only deeper joints would. Undefined (NaN) where joints of any depth do not carry it,
+            infinite where hinges alone do. Not searched, and NaN, with a plastic fill.
+        by_rule: factor at the worst place with the width by rule and all of the code's distributed
+            load, where others were given; else NaN.
+        strength: compressive strength of the stones at the joints [Pa], or None.
+        without_pressure: factor of the same loads with no pressure of a `Fill`; NaN without one,
+            and where the bridge then does not stand.
+        full_pressure: factor of the same loads with all of its passive pressure; else NaN.
+        deepest: factor at the worst place with joints of any depth, where it is below 1 as they
+            slide; else NaN. It differs from stone to stone.
+    """
+
+    structure: Structure
+    vehicle: Vehicle
+    live: float
+    impact: float
+    dead: float
+    width: float
+    area_load: float
+    moving: MovingLoad
+    geometric: float
+    by_rule: float
+    strength: float | None = None
+    without_pressure: float = np.nan
+    full_pressure: float = np.nan
+    deepest: float = np.nan
+
+    @property
+    def factor(self) -> float:
+        """Rating factor: multiple of the factored vehicle at collapse [-]."""
+        return self.moving.worst.factor
+
+    @property
+    def passes(self) -> bool:
+        """Whether the bridge carries the factored vehicle everywhere; no if it falls unloaded."""
+        return bool(self.factor >= 1.0)
+
+    @property
+    def outcome(self) -> str:
+        """Whether it passes, without what, and the factor by rule where less was given."""
+        names = {"partial": "live", "dynamic": "impact"}
+        missing = [n for n, key in names.items() if self._source(key).startswith("none")]
+        without = [f"{' and '.join(missing)} factor{'s'[: len(missing) - 1]}"] if missing else []
+        without += [self.vehicle.left_out] if self.vehicle.left_out else []
+        words = "passes" if self.passes else "fails"
+        words += f" without {' and '.join(without)}" if without else ""
+        return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
+
+    def _rule_text(self) -> str:
+        """Return the factor with the width by rule and the whole load of the code."""
+        rule, code = self.vehicle.spread_over(self.structure), self.vehicle.area_load
+        load = f" and {code / 1e3:g} kN/m² beside the axles" if code else ""
+        return f"over {rule:.3g} m of width{load}, by rule, {self.by_rule:.4g} at this place"
+
+    def table(self) -> str:
+        """Return factors [-], axles and loaded road at all places [m], as rows of CSV."""
+        head = "direction,position of the vehicle's middle [m],factor [-],axles [-]"
+        rows = [f"{head},road under the distributed load [m]"]
+        for way in DRIVING_DIRECTIONS:
+            here = self.moving.factors.sel(direction=way)
+            values = (here[key].values for key in ("position", "factor", "axles", "loaded"))
+            each = zip(*values, strict=True)
+            rows += [f"{way},{x:.6g},{f:.6g},{n},{length:.4g}" for x, f, n, length in each]
+        return "\n".join(rows)
+
+    def _summary(self) -> str:
+        """Describe the result in one line."""
+        return (
+            f"Rating of '{self.structure.name}' for {self.vehicle.name}: factor {self.factor:.4g} "
+            f"{self._place_text()}, {self.outcome}"
+        )
+
+    def _place_text(self) -> str:
+        """Return where the axles stand at the worst place, in words."""
+        axles = parse_axles(self.vehicle.axles, self.vehicle.spacings)
+        place = self.moving.direction, self.moving.position
+        stand = [load.x for load in axles_on_structure(self.structure, axles, *place)]
+        spans: dict[str, list[float]] = {}
+        for joint in self.structure.joints:
+            if joint.role == "ring":
+                spans.setdefault(joint.part, []).append(joint.intrados[0])
+        if not (spans and stand):
+            return f"at x = {self.moving.position:.3g} m (the vehicle's middle)"
+        ends, mean = {part: (min(xs), max(xs)) for part, xs in spans.items()}, np.mean(stand)
+        # the ring below the axles, or the nearest one
+        ring = min(ends, key=lambda part: max(ends[part][0] - mean, mean - ends[part][1]))
+        first, *others = (f"{x - ends[ring][0]:.2f}" for x in stand)
+        where = " and ".join([", ".join([first, *others[:-1]]), *others[-1:]])
+        where = f"{first} to {others[-1]}" if len(stand) > 4 else where
+        count = f"{len(stand)} axle{'s'[: len(others)]}"
+        count += f" of {len(axles)}" if len(axles) > len(stand) else ""
+        name = f" of '{ring}'" if len(ends) > 1 else ""
+        return f"with {count} at {where} m from the left of the clear span{name}"
+
+    def __str__(self) -> str:
+        """Describe outcome, worst places, mechanism, factors and sources, a line each."""
+        vehicle = self.vehicle
+        own = vehicle.source == vehicle.grade  # "given"
+        source = vehicle.source if own else f"{vehicle.source} ({vehicle.grade})"
+        factors = self.moving.factors["factor"].min("position")
+        least = (f"{way} {float(factors.sel(direction=way)):.4g}" for way in DRIVING_DIRECTIONS)
+        by_rule = self.width == vehicle.spread_over(self.structure)
+        also, beside = "", ""
+        if self.area_load:
+            also = " and on the distributed load × live"
+            beside = f", and {self.area_load / 1e3:g} kN/m² of road where it is adverse"
+        favourable = "EN 1990:2002, Table A2.4(B), favourable; from memory"
+        lines = [
+            f"{self._summary()}",
+            f"the factor is on axles × live × impact{also}; codes with partial factors require 1",
+            *self._describe_pressure(),
+            f"least factor driving {', '.join(least)}",
+            f"{self.moving}",
+            f"geometric factor of safety at that place: {self._geometric_text()}",
+            "it is of the same vehicle; Heyman requires it, often 2 (from memory), and no code",
+            f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN"
+            f"{beside}; {source}",
+            f"over {self.width:.3g} m of width ({vehicle.width_source if by_rule else 'given'})",
+            f"live load by {self.live:g} ({self._source('live')})",
+            f"impact by {self.impact:g} ({self._source('impact')})",
+            f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
+            describe_crushing(self.strength),
+        ]
+        return "\n".join(lines)
+
+    def _describe_pressure(self) -> list[str]:
+        """Return the line on the range of the factor over the pressure of the fill, if any."""
+        if np.isnan(self.full_pressure):
+            return []
+        least = f"{self.without_pressure:.4g}"
+        if np.isnan(self.without_pressure):
+            least = "none, as the bridge does not stand,"
+        return [
+            f"{PRESSURE_RANGE}{least} without it, {self.factor:.4g} as given, "
+            f"{self.full_pressure:.4g} with all of the passive one"
+        ]
+
+    def _source(self, factor: str) -> str:
+        """Return where a factor on the vehicle comes from."""
+        vehicle = self.vehicle
+        value, source = getattr(self, factor), str(getattr(vehicle, f"{factor}_source"))
+        if value != getattr(vehicle, factor):
+            return "given"
+        # a vehicle of one's own has factors of 1 where it gives none
+        return "none given" if value == 1.0 and source == "given" else source
+
+    def _geometric_text(self) -> str:
+        """Return the geometric factor of safety, in words where it is below 1."""
+        if self.moving.worst.fill_motion is not None:
+            return "not searched with a plastic fill"
+        if np.isnan(self.geometric):
+            carried = f", but slide at {self.deepest:.4g} of it" if self.deepest > 0.0 else ""
+            return f"none, joints of any depth do not carry the vehicle there{carried}"
+        text = f"{self.geometric:.3g}"
+        if self.geometric < 1.0:
+            text += f", below 1: joints are too thin by {100.0 * (1.0 - self.geometric):.2g} %"
+        return text
+
+
+@validate_arguments
+def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridge)
+    structure: Structure | HasStructure,
+    vehicle: str | Vehicle,
+    *,
+    live: float | None = None,
+    impact: float | None = None,
+    dead: float = 1.0,
+    width: Metres | None = None,
+    area_load: Pascals | None = None,
+    friction: str | None = "coulomb",
+    strength: Pascals | None = None,
+    fill: Fill | PlasticFill | None = None,
+) -> Rating:
+    """Rate a bridge for a vehicle: the multiple of it, with partial factors, at collapse.
+
+    The vehicle drives over the bridge in both directions (`moving_load`), from on to off in steps
+    of 1/100 of the bridge's length, or 1/20 with a plastic fill. Its axles spread through a fill
+    along the bridge; across it they spread evenly over `width`. The distributed load of its code
+    grows with them, where it is adverse (`moving_load`). The geometric factor of safety is
+    Heyman's: all joints are narrowed about their middles, at unchanged weights and with the vehicle
+    at its worst place, until it is carried no longer; or deepened until it is carried.
+
+    Args:
+        structure: the bridge, or an `archfem.Analysis` of it.
+        vehicle: one of `archfem.limit.VEHICLES` by its name, or one's own.
+        live: partial factor on its weight [-]; by default that of its code.
+        impact: dynamic factor on its weight [-]; by default that of its code, but 1 for LM71, whose
+            factor depends on the span.
+        dead: partial factor on the weights of stones and fill [-]; by default 1, as for weights
+            that stabilise. Weights on one side alone are not increased.
+        width: width over which one vehicle spreads [m]; by default that of the wheels and of the
+            least depth of fill above the rings, at most a lane (`Vehicle.spread_over`).
+        area_load: distributed load beside and below the axles [Pa]; by default that of its code.
+            Where less of it or a larger width is given, `by_rule` is the factor without.
+        friction: as for `collapse_factor`; the geometric factor takes "coulomb" for
+            "nonassociated".
+        strength: as for `collapse_factor`, divided by its partial factor [Pa].
+        fill: as for `collapse_factor`.
+
+    Returns:
+        Factor, worst place, its mechanism, and the factors at all places.
+
+    Raises:
+        InvalidInput: the vehicle is unknown, a factor or the width is out of range, or as for
+            `moving_load`.
+        DidNotConverge: the solver of linear programmes gave up.
+
+    References:
+        Heyman, The Masonry Arch, Ellis Horwood (1982).
+    """
+    structure, driven = structure_of(structure), _find_vehicle(vehicle)
+    live = driven.live if live is None else check_factor(live, "live, factor on the vehicle")
+    impact = driven.impact if impact is None else check_factor(impact, "impact, dynamic factor")
+    check_factor(dead, "dead, factor on the weights")
+    rule = driven.spread_over(structure)
+    width = rule if width is None else width
+    area_load = driven.area_load if area_load is None else area_load
+    if not 0.0 < width <= structure.width:
+        raise InvalidInput(
+            f"width {width:.4g} m is not above 0 and up to that of the bridge, "
+            f"{structure.width:.4g} m: give the part over which one vehicle spreads"
+        )
+    weighted, code = _scale_weights(structure, dead), np.array(driven.axles) * live * impact
+    options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
+
+    def drive(width: float, area_load: float, positions: Sequence[float]) -> MovingLoad:
+        # the structure is modelled over its whole width, of which a vehicle loads a part
+        axles = (structure.width / width * code).tolist()
+        given = options | {"spacings": driven.spacings, "area_load": live * area_load}
+        return moving_load(weighted, axles, positions=positions, **given)
+
+    is_plastic = isinstance(fill, PlasticFill)
+    positions = _places_along(weighted, parse_axles(driven.axles, driven.spacings))
+    moving = drive(width, area_load, positions[::5] if is_plastic else positions)
+    by_rule = np.nan
+    if width > (1.0 + 1e-9) * rule or area_load < driven.area_load:
+        least = min(width, rule), max(area_load, driven.area_load)
+        by_rule = drive(*least, [moving.position]).worst.factor
+    geometric, deepest = np.nan, np.nan
+    if not is_plastic:
+        geometric, deepest = _geometric_factor(weighted, moving, options)
+    factors = live, impact, dead, width, area_load
+    more = by_rule, strength, *_vary_pressure(weighted, moving, options), deepest
+    return Rating(structure, driven, *factors, moving, geometric, *more)
+
+
+def _find_vehicle(vehicle: str | Vehicle) -> Vehicle:
+    """Return a vehicle of the library by its name, or the given one."""
+    if isinstance(vehicle, Vehicle):
+        return vehicle
+    known = {name.lower(): each for name, each in VEHICLES.items()}
+    if vehicle.lower() not in known:
+        raise InvalidInput(
+            f"vehicle {vehicle!r} is not known: use one of {', '.join(VEHICLES)}, or give your own "
+            "as af.limit.Vehicle(name, axles, spacings)"
+        )
+    return known[vehicle.lower()]
+
+
+def _scale_weights(structure: Structure, factor: float) -> Structure:
+    """Return a structure whose blocks weigh a multiple."""
+    if factor == 1.0:
+        return structure
+    blocks = []
+    for block in structure.blocks:
+        material = replace(block.material, unit_weight=factor * block.material.unit_weight)
+        blocks.append(replace(block, material=material))
+    return replace(structure, blocks=tuple(blocks))
+
+
+def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Sequence[float]:
+    """Return places from where the vehicle drives onto the structure to where it leaves [m]."""
+    ends = vehicle_positions(structure, vehicle, None, 2)
+    length = float(np.ptp(ends)) - 2.0 * float(vehicle[0, 1])
+    count = 1 + int(np.ceil(steps * float(np.ptp(ends)) / length))
+    return tuple(np.linspace(ends[0], ends[1], count).tolist())
+
+
+def _geometric_factor(
+    structure: Structure, moving: MovingLoad, options: dict[str, Any], tolerance: float = 1e-4
+) -> tuple[float, float]:
+    """Return the depth of joints over the least one that carries the worst row of axles [-].
+
+    Where none does, it is NaN, and the factor of the deepest joints follows.
+    """
+    stones, dead = self_weight_programme(structure, **options)
+    axles = stones.load([load for load in moving.worst.live if isinstance(load, PointLoad)])
+
+    def factor_of(share: float) -> float:
+        blocks = DeepenedBlocks(dead.blocks.structure, share)
+        crushing = None if dead.crushing is None else share * dead.crushing
+        changed = replace(dead, blocks=blocks, cohesion=share * dead.cohesion, crushing=crushing)
+        if not is_balanced(changed.minimise_residual(), changed):
+            return np.nan
+        optimum = changed.with_load_factor(axles).solve()
+        return np.inf if optimum is None else -optimum.value
+
+    # what narrower joints carry wider ones carry, so that halving finds the least
+    low, high = 0.0, 1.0
+    while not moving.worst.factor >= 1.0 and not (found := factor_of(high)) >= 1.0:
+        low, high = high, 2.0 * high
+        if high > 1e3:  # no depth helps
+            return np.nan, found
+    while high - low > tolerance * high:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if factor_of(middle) >= 1.0 else (middle, high)
+        if high < tolerance:
+            return np.inf, np.nan
+    return 1.0 / high, np.nan
+
+
+def _vary_pressure(
+    structure: Structure, moving: MovingLoad, options: dict[str, Any]
+) -> tuple[float, float]:
+    """Return the factor of the worst loads without pressure of a fill and with all of it."""
+    # At the worst place alone: over all places the least factors differ by up to 0.5 %.
+    if not isinstance(fill := options["fill"], Fill):
+        return np.nan, np.nan
+    row = tuple(load for load in moving.worst.live if isinstance(load, PointLoad))
+    factors = []
+    for part, active in ((0.0, 0.0), (1.0, fill.active)):
+        other = options | {"fill": replace(fill, mobilisation=part, active=active)}
+        stones, dead = self_weight_programme(structure, **other)
+        stands = is_balanced(dead.minimise_residual(), dead)
+        found = collapse_factors(stones, dead, {row: stones.load(row)}, other) if stands else {}
+        factors.append(found.get(row, np.nan))
+    return factors[0], factors[1]
