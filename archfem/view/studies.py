@@ -484,7 +484,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     shares = dict(islice(shares.items(), max_panels))
     columns = min(3, len(shares), int(Size.PAGE / 1.6))
     lines = -(-len(shares) // columns)
-    figure = new_figure(Size.PAGE, 0.7 + 2.1 * lines)
+    figure = new_figure(Size.PAGE, 0.7 + 1.8 * lines)
     panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()
     for axes in panels[len(shares) :]:
         axes.set_visible(False)

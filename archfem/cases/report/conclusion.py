@@ -184,9 +184,9 @@ def _mark_doubt(data: ReportData, result: str) -> str:
 def _load_row(result: str, text: str) -> Iterator[_Row]:
     """Yield the row of a load that grows until it makes a mechanism."""
     first = text.splitlines()[0]
-    if found := re.search(r" for (.*?): factor (\S+) at (.*?), (passes|fails)", first):
+    if found := re.search(r" for (.*?): factor (\S+) at (.*?), ((?:passes|fails).*)", first):
         vehicle, factor, place, outcome = found.groups()
-        yield result, vehicle, f"{outcome}, {place}", factor
+        yield result, vehicle, f"{outcome}, at {place}", factor
     elif found := re.search(r", at (\S+(?: to \S+)?) times (.*)", first):
         yield result, found[2], "a mechanism", found[1]
     elif found := re.search(r", at (.*)", first):
