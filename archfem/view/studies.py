@@ -491,7 +491,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     for axes, (name, share) in zip(panels, shares.items(), strict=False):
         first = axes in panels[::columns]
         label = labels.get(name, name.replace("_", " "))
-        style_axes(axes, label, "residual displacement [mm]" if first else "")
+        style_axes(axes, label, "residual\ndisplacement [mm]" if first else "")
         set_title(axes, f"explains {share:.0%}")
         _draw_property(axes, rows[name].values, heights, falls)
         axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")

@@ -96,7 +96,7 @@ CHECK_TEXT = (
     "linear, q = 2, FC = 1.35: capacity 8.212 m/s², demand 2.844 m/s²: passes, "
     "the spectrum may be 2.89 times as strong\n"
     "a code: capacity 0.11 m, demand 0.22 m at T = 1.178 s: fails, "
-    "the spectrum may be 0.5 times as strong, up to there nothing moves\n"
+    "the spectrum may be 0.5 times as strong, up to there the ground does not move it\n"
     "note: an upper bound"
 )
 RATING_TEXT = "Rating of 'it' for LM1: factor 1.25 at x = 2 m (its middle), passes without all"
@@ -127,7 +127,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
             (f"assessment: {name}, right and left", demand, f"{capacity} (in doubt)", factor)
             for name, demand, capacity, factor in (
                 ("linear, q = 2, FC = 1.35", "2.844 m/s²", "8.212 m/s², passes", "2.89"),
-                ("a code", "0.22 m", "0.11 m, fails", "0.5"),
+                ("a code", "0.22 m", "0.11 m, fails, for the ground does not move it", "0.5"),
             )
         ),
         (
