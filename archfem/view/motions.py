@@ -40,7 +40,7 @@ def draw_motion(motion: Motion) -> Figure:
         The figure, with a column for each component.
     """
     names = motion.components
-    figure = new_figure(Size.COLUMN * (0.4 + 0.6 * len(names)), 4.4)
+    figure = new_figure(Size.COLUMN * (0.4 + 0.6 * len(names)), 3.4)
     axes = figure.subplots(3, len(names), sharex=True, squeeze=False)
     for column, name in zip(axes.T, names, strict=True):
         rows = (
@@ -241,7 +241,7 @@ def _add_common_legend(figure: Figure, axes: Sequence[Axes]) -> None:
 
 def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:
     """Return a figure and its panels side by side."""
-    figure = new_figure(0.75 * Size.COLUMN * max(count, 1.3), 4.2)
+    figure = new_figure(0.75 * Size.COLUMN * max(count, 1.3), 3.4)
     return figure, figure.subplots(1, count, squeeze=False)[0]
 
 

@@ -484,14 +484,14 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     shares = dict(islice(shares.items(), max_panels))
     columns = min(3, len(shares), int(Size.PAGE / 1.6))
     lines = -(-len(shares) // columns)
-    figure = new_figure(Size.PAGE, 0.7 + 2.1 * lines)
+    figure = new_figure(Size.PAGE, 0.7 + 1.8 * lines)
     panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()
     for axes in panels[len(shares) :]:
         axes.set_visible(False)
     for axes, (name, share) in zip(panels, shares.items(), strict=False):
         first = axes in panels[::columns]
         label = labels.get(name, name.replace("_", " "))
-        style_axes(axes, label, "residual displacement [mm]" if first else "")
+        style_axes(axes, label, "residual\ndisplacement [mm]" if first else "")
         set_title(axes, f"explains {share:.0%}")
         _draw_property(axes, rows[name].values, heights, falls)
         axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")

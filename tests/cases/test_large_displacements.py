@@ -131,6 +131,13 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     words = [piece.text for piece in _build_mechanism(data, held) if hasattr(piece, "text")]
     assert words[0] == "Outcome: stands; falls in 1 of 4 variations."
     assert not any("not varied" in line for line in words)
+    # of several motions it is that of one alone
+    both = ReportData(data.case, {"shake": held, "other": held})
+    for motion, own in ((held.dataset.attrs["motion"], True), ("another", False), (None, False)):
+        named = {} if motion is None else {"motion": motion}
+        computed = af.dynamics.VerdictRange(xr.Dataset(rows, attrs=attrs | named))
+        vars(both)["verdict_range"] = computed
+        assert ("1 of 4 variations" in summarise_outcomes(both, [held])) == own
 
 
 def test_a_report_begins_with_the_number_of_lost_stones_and_lists_all_below(held):

@@ -75,7 +75,7 @@ _FACTORS = (
 # A check of a kinematic assessment
 _CHECK = re.compile(
     r"(?P<name>.*): capacity (?P<capacity>\S+ \S+), demand (?P<demand>\S+ [^\s:]+).*: "
-    r"(?P<outcome>passes|fails), the spectrum may be (?P<factor>\S+) times"
+    r"(?P<outcome>passes|fails), the spectrum may be (?P<factor>\S+) times as strong(?P<rest>.*)"
 )
 
 
@@ -120,7 +120,8 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
     if verdict.fall is not None:
         # lost blocks have a line of their own
         verdict = replace(verdict, fall=replace(verdict.fall, time=None))
-    if (found := data.verdict_range) is None:
+    own, found = runs[0].dataset.attrs.get("motion"), data.verdict_range
+    if found is None or (len(data.runs) > 1 and found.dataset.attrs.get("motion") != own):
         return verdict.headline
     # a run cannot know that a range was computed after it
     return verdict.headline.replace(NO_RANGE, f"{found.count} variations")
@@ -185,7 +186,7 @@ def _mark_doubt(data: ReportData, result: str) -> str:
 def _load_row(result: str, text: str) -> Iterator[_Row]:
     """Yield the row of a load that grows until it makes a mechanism."""
     first = text.splitlines()[0]
-    if found := re.search(r" for (.*?): factor (\S+) (.*?), (passes|fails)", first):
+    if found := re.search(r" for (.*?): factor (\S+) (.*?), ((?:passes|fails).*)", first):
         vehicle, factor, place, outcome = found.groups()
         yield result, vehicle, f"{outcome}, {place}", factor
     elif found := re.search(r", at (\S+(?: to \S+)?) times (.*)", first):
@@ -210,7 +211,10 @@ def _assessment_rows(text: str) -> Iterator[_Row]:
     for line, directions in _list_checks(text).items():
         if found := _CHECK.match(line):
             name = f"assessment: {found['name']}, {' and '.join(directions)}"
-            yield name, found["demand"], f"{found['capacity']}, {found['outcome']}", found["factor"]
+            # a check of displacement passes, too, where the ground does not set it in motion
+            rest = found["rest"].replace("up to there the ground", "for the ground")
+            outcome = f"{found['capacity']}, {found['outcome']}{rest}"
+            yield name, found["demand"], outcome, found["factor"]
 
 
 def _risk_row(data: ReportData, text: str) -> Iterator[_Row]:

@@ -162,36 +162,40 @@ def _motion_rows(data: ReportData) -> Iterator[Row]:
 
 def _source_rows(motions: Sequence[Mapping[str, Any]]) -> Iterator[Row]:
     """Yield the sources of some motions; values that differ stand in the order of the motions."""
-    rows: dict[tuple[str, str], list[str]] = {}
+    values: dict[tuple[str, str, str], list[str]] = {}
     for motion in motions:
-        for name, value, mark in _describe_motion(motion):
-            rows.setdefault((name, mark), []).append(value)
-    for (name, mark), values in rows.items():
-        count = f", of {len(values)} motion{'s' if len(values) > 1 else ''}"
-        some = "" if len(values) == len(motions) else count
-        yield name, ", ".join(dict.fromkeys(values)) + some, mark
+        for part, key, value, mark in _describe_motion(motion):
+            values.setdefault((part, mark, key), []).append(value)
+    rows: dict[tuple[str, str], list[str]] = {}
+    for (part, mark, key), of_key in values.items():
+        count = f" (of {len(of_key)} motion{'s' if len(of_key) > 1 else ''})"
+        some = "" if len(of_key) == len(motions) else count
+        words = f"{key.replace('_', ' ')} {', '.join(dict.fromkeys(of_key))}{some}"
+        rows.setdefault((part, mark), []).append(words)
+    for (part, mark), each in rows.items():
+        yield part, "; ".join(each), mark
 
 
-def _describe_motion(motion: Mapping[str, Any]) -> Iterator[Row]:
-    """Yield the keys of a motion and of its vertical, with the defaults of synthetic ones."""
+def _describe_motion(motion: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
+    """Yield component, key, value and mark of the sources of a motion, defaults included."""
     kinds, parameters = declared_keys(Motion.synthetic), signature(Motion.synthetic).parameters
     parts = {"motion": motion}
     if "vertical" in motion:
         vertical = motion["vertical"]
-        parts["vertical"] = vertical if isinstance(vertical, Mapping) else {"file": vertical}
+        parts["vertical motion"] = vertical if isinstance(vertical, Mapping) else {"file": vertical}
     for part, table in parts.items():
         for key, value in table.items():
             if key not in ("synthetic", "vertical"):
-                yield f"{part}: {key}", describe_value(value), "given"
+                yield part, key, describe_value(value), "given"
         if (made := table.get("synthetic")) is None:
             continue
         values = {name: made.get(name, each.default) for name, each in parameters.items()}
         ratio = values.pop("vertical_ratio")
         for key, value in values.items():
-            yield f"{part}: synthetic, {key}", describe_value(value, kinds[key]), _mark(key in made)
+            yield f"{part}, synthetic", key, describe_value(value, kinds[key]), _mark(key in made)
         if "vertical" not in motion:
-            text = f"{ratio:.3g} of the horizontal"
-            yield "vertical: synthetic, peak", text, _mark("vertical_ratio" in made)
+            mark = _mark("vertical_ratio" in made)
+            yield "vertical motion, synthetic", "peak", f"{ratio:.3g} of the horizontal", mark
 
 
 def _model_rows(data: ReportData) -> Iterator[Row]:

@@ -148,7 +148,7 @@ def _build_geometry(case: Case) -> list[Any]:
         f"{len(structure.joints)} joints."
     )
     figure = FigureBlock.of(draw_names(structure), caption)
-    return [TextBlock(extent), figure, _tabulate_parts(structure)]
+    return [TextBlock(extent), _tabulate_parts(structure), figure]
 
 
 def _tabulate_parts(structure: Structure) -> Grid:
@@ -197,7 +197,7 @@ def _build_dead_load(data: ReportData) -> list[Any]:
     else:
         blocks += data.read_figure("dead.png", thrust)
     caption = "Principal compression under dead load."
-    blocks += data.read_result("dead_stress", caption)
+    blocks += data.read_result("dead_stress", caption, table="Largest stresses of each part")
     caption = "A block cut free: forces on it, and their closing."
     return blocks + data.read_figure("free_body.png", caption)
 
@@ -237,7 +237,7 @@ def build_ground_section(data: ReportData) -> Section:
     caption = "Measures of the motions as applied, read at the steps that the runs recorded."
     blocks: list[Any] = [Grid(*result_text.tabulate_motions(motions), caption)]
     if data.case.suite is None:
-        applied = "Ground motion as applied."
+        applied = "Ground motion as applied: acceleration, velocity and displacement."
         blocks += [FigureBlock.of(draw_motion(motion), applied) for motion in motions]
     blocks += _build_spectra(data.case, motions)
     return Section("Ground motion" if len(motions) == 1 else "Ground motions", blocks)

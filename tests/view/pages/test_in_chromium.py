@@ -110,7 +110,7 @@ def test_a_report_prints_without_cutting_a_figure(small, tmp_path):
             "[getComputedStyle(f).breakInside, f.offsetHeight, f.scrollWidth - f.clientWidth])"
         )
         assert len(figures) >= 4
-        high = (297 - 18 - 20) / 25.4 * 96
+        high = (297 - 15 - 17) / 25.4 * 96
         assert all(how == "avoid" and tall <= high and wide <= 0 for how, tall, wide in figures)
         assert complaints(driver) == []
 
