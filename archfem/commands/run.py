@@ -262,11 +262,10 @@ def verdict(options: argparse.Namespace) -> None:
     if options.out is not None:  # a folder that cannot be written is refused before the runs
         create_result_folder(options.out)
     shaken = case if options.pair is None else case.alone(options.pair)
-    if shaken.suite is not None and len(pairs := list(shaken.suite["pairs"])) > 1:
-        raise InvalidInput(f"a range is of one motion: take one of {pairs} by --pair NAME")
+    motion = ground_motion(shaken)
     print(case.title)
     sampling = {"workers": options.workers, "samples": options.samples}
-    computed = verdict_range(case.analysis, ground_motion(shaken), fidelity="rigid", **sampling)
+    computed = verdict_range(case.analysis, motion, fidelity="rigid", **sampling)
     print(computed)
 
     def draw() -> Files:

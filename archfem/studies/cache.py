@@ -63,8 +63,8 @@ def ground_motion(case: Case) -> Motion:
     """
     if case.suite is not None and len(pairs := list(case.suite["pairs"])) > 1:
         raise InvalidInput(
-            f"the suite has {len(pairs)} pairs, but a point of a study has one motion: vary "
-            f'"suite.pair" = {pairs}'
+            f"the suite has {len(pairs)} pairs, and one motion is needed: take one of {pairs} by "
+            '--pair NAME, or vary "suite.pair" in a study'
         )
     if case.suite is not None:
         return ground_suite(case).motions[0]

@@ -56,7 +56,7 @@ from archfem.studies.fragility import (
     fragility,
     integrate_rates,
 )
-from archfem.studies.process_pool import evaluate_with_bar
+from archfem.studies.result_store import evaluate_with_progress
 from archfem.studies.variations import (
     DEFAULT_RANGES,
     Variation,
@@ -208,7 +208,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
             )
             for k in todo
         ]
-        for k, row in evaluate_with_bar(points, bracket_capacity, workers, unit="sample"):
+        for k, row in evaluate_with_progress(points, bracket_capacity, workers, "risk"):
             _store_row(table, k, row)
             if out is not None:
                 write_dataset(table, Path(out), {})

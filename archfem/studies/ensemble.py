@@ -23,7 +23,7 @@ from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.studies.evaluators import PreparedRuns, largest_values
 from archfem.studies.parameter_space import WholePoint
-from archfem.studies.process_pool import evaluate_with_bar
+from archfem.studies.result_store import evaluate_with_progress
 from archfem.studies.variations import change_properties, check_ranges
 
 # Properties that a change may have, as `verdict_range` varies them
@@ -174,7 +174,9 @@ def ensemble(
             parts.append(EnsemblePart(analysis, tuple(change.items()), chosen_runs, run))
             places.append((chosen, number))
     table = _empty_table(analysis, motions, factors, varied)
-    for k, row in evaluate_with_bar([*enumerate(parts)], evaluate_part, workers, unit="part"):
+    for k, row in evaluate_with_progress(
+        [*enumerate(parts)], evaluate_part, workers, name="ensemble"
+    ):
         if row["error"]:
             raise ArchfemError(f"histories of change {dict(parts[k].changes)}: {row['error']}")
         _store_findings(table, places[k], row["found"])

@@ -15,7 +15,7 @@ import signal
 import sys
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from itertools import islice
@@ -35,7 +35,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
 from archfem import _numba
 from archfem._files import temporary_folder
@@ -112,17 +111,6 @@ def evaluate_points(
         yield from pool.rows()
     finally:
         pool.close()
-
-
-def evaluate_with_bar(
-    points: Sequence[tuple[int, StudyPoint]],
-    find: Callable[..., Mapping[str, Any]],
-    workers: int,
-    unit: str,
-) -> Iterator[tuple[int, Row]]:
-    """Evaluate points by a function as `evaluate_points` does, with a bar on a terminal."""
-    finished = evaluate_points(points, Evaluator(find), workers)
-    yield from tqdm(finished, total=len(points), unit=unit, disable=None, leave=False)
 
 
 def count_cores() -> int:

@@ -8,8 +8,8 @@ import logging
 import re
 import shutil
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from math import inf, isfinite, isnan
@@ -28,8 +28,9 @@ from archfem import _files
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, StudyStopped
-from archfem.studies.parameter_space import PAIR_KEY, Axis
-from archfem.studies.process_pool import Row
+from archfem.studies.evaluators import Evaluator
+from archfem.studies.parameter_space import PAIR_KEY, Axis, StudyPoint
+from archfem.studies.process_pool import Row, evaluate_points
 from archfem.studies.shared_results import count_results
 from archfem.units import in_si_unit
 
@@ -218,13 +219,19 @@ class Progress:
     """Counts finished points, on a progress bar or in lines, and in a file of the store."""
 
     def __init__(
-        self, total: int, done: int, failed: int, store: Store | None, shared: Path
+        self,
+        total: int,
+        done: int,
+        failed: int,
+        store: Store | None = None,
+        shared: Path | None = None,
+        name: str = "study",
     ) -> None:
         self._total, self._done_before, self._failed = total, done, failed
-        self._store, self._shared = store, shared
+        self._store, self._shared, self._name = store, shared, name
         self._done, self._start, self._written = 0, monotonic(), -inf
-        self._runs_before, self._point_runs = count_results(shared, "runs"), 0
-        options = {"disable": None, "leave": False, "desc": "study"}
+        self._runs_before, self._point_runs = self._count_runs(), 0
+        options = {"disable": None, "leave": False, "desc": name}
         # without the remaining time of tqdm, which does not count runs
         layout = "{desc}: {percentage:3.0f}% |{bar}| {n_fmt} of {total_fmt}{postfix}"
         self._bar = tqdm(total=total, initial=done, bar_format=layout, **options)
@@ -255,11 +262,15 @@ class Progress:
         if self._store is not None:
             self._store.write_progress(self._status)
 
+    def _count_runs(self) -> int:
+        """Return the number of runs of searches, finished or under way."""
+        return 0 if self._shared is None else count_results(self._shared, "runs")
+
     @property
     def _status(self) -> Status:
         """The progress at this instant."""
         seconds = max(monotonic() - self._start, 1e-9)
-        runs = count_results(self._shared, "runs")
+        runs = self._count_runs()
         new, done = runs - self._runs_before, self._done_before + self._done
         # of the searches that are under way some runs are done
         left = self._point_runs / max(self._done, 1) * (self._total - done)
@@ -274,8 +285,21 @@ class Progress:
             if not self._bar.disable:
                 self._bar.set_postfix_str(str(status).partition(", ")[2])
             elif isinstance(sys.stderr, io.TextIOWrapper):  # not that of a notebook
-                sys.stderr.write(f"study: {status}\n")
+                sys.stderr.write(f"{self._name}: {status}\n")
                 sys.stderr.flush()
+
+
+def evaluate_with_progress(
+    points: Sequence[tuple[int, StudyPoint]],
+    find: Callable[..., Mapping[str, Any]],
+    workers: int,
+    name: str,
+) -> Iterator[tuple[int, Row]]:
+    """Evaluate points by a function as `evaluate_points` does, and show the progress."""
+    with closing(Progress(len(points), 0, 0, name=name)) as progress:
+        for number, row in evaluate_points(points, Evaluator(find), workers):
+            progress.add(failed=bool(row["error"]))
+            yield number, row
 
 
 @validate_arguments

@@ -31,7 +31,7 @@ from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.studies.evaluators import PreparedRuns
 from archfem.studies.parameter_space import WholePoint
-from archfem.studies.process_pool import evaluate_with_bar
+from archfem.studies.result_store import evaluate_with_progress
 
 # What is varied by default: values, of which numbers are the ends of a range
 DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
@@ -136,7 +136,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     changes = [*_single_changes(ranges, neutral), *sample_changes(ranges, samples, seed)]
     variations = [Variation(analysis, motion, _resolve_labels(ranges, each)) for each in changes]
     points = list(enumerate(variations))
-    rows = dict(evaluate_with_bar(points, evaluate_variation, workers, unit="run"))
+    rows = dict(evaluate_with_progress(points, evaluate_variation, workers, "range"))
     dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], neutral)
     dataset["sampled"] = "run", np.arange(len(points)) >= len(points) - samples
     dataset.attrs["motion"] = motion.name

@@ -162,7 +162,9 @@ def test_a_range_is_of_one_motion_of_a_suite(small, unplotted, capsys):
     out = small.parent / "out"
     given = ["verdict", str(small), "--samples", "1", "--out", str(out)]
     assert af.commands.main(given) == 1
-    assert "take one of ['first', 'second'] by --pair NAME" in capsys.readouterr().err
+    assert "2 pairs, and one motion is needed: take one of ['first', 'second'] by --pair NAME" in (
+        capsys.readouterr().err
+    )
     assert af.commands.main([*given, "--pair", "first"]) == 0
     assert xr.load_dataset(out / "verdict_range.nc").attrs["motion"] == "first"
     assert run(small) == 0

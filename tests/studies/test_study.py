@@ -307,6 +307,18 @@ def test_progress_is_reported_where_the_output_is_a_file(
 
 
 @pytest.mark.parametrize("workers", [1, 2])
+def test_progress_of_a_range_is_reported_where_the_output_is_a_file(monkeypatch, capsys, workers):
+    monkeypatch.setattr(result_store, "PROGRESS_INTERVAL", 0.02)
+    column = af.column(breadth=0.5, heights=[1.0])
+    motion = af.Motion.synthetic(duration=1.0, pga=1.0, seed=1)
+    found = af.verdict_range(column, motion, samples=6, workers=workers)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) > 2
+    total = found.dataset.sizes["run"]
+    assert all(re.match(rf"range: \d+ of {total} points done, 0 failed", line) for line in lines)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
 def test_a_repeated_warning_is_logged_once(small_ring, finders, caplog, workers):
     over = {"structure.thickness": [0.5, 0.6, 0.7]}
     af.Study(small_ring, over, "finders_of_tests:noisy").run(workers=workers)

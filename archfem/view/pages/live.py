@@ -83,11 +83,10 @@ def page(
     """Return a page on which a reader changes the arch of an analysis and shakes it.
 
     It needs no connection: stones fall by the time steps of `dynamics.RigidBlockSimulation`,
-    compiled for browsers. About twenty slightly different arches are shaken, and their share of
-    falls is shown. A single ring between two supports can be cut into other stones, and thinner or
-    thicker ones; other structures are shaken as they are. Joints of a finish close in statics: in
-    the thrust line under dead load, and in the largest push at large displacements. Those of the
-    shaking are hard.
+    compiled for browsers. Twenty similar arches are shaken, and their share of falls is shown. A
+    single ring between two supports can be cut into other stones, and thinner or thicker ones;
+    other structures are shaken as they are. Joints of a finish close in statics: in the thrust line
+    under dead load, and in the largest push at large displacements. Those of the shaking are hard.
 
     Args:
         analysis: the analysis; of it the structure, and the thrust line under dead load.

@@ -298,7 +298,7 @@ def test_an_arch_is_drawn_on_a_photo_and_taken_away(tmp_path):
 
         driver.get((DOCS / "try" / "index.html").resolve().as_uri())
         wait_for_runs(driver, 1)
-        for details in driver.find_elements(find, ".live-start summary"):
+        for details in driver.find_elements(find, ".arch > :is(section, div) summary"):
             details.click()
         driver.find_element(find, "#mark").click()
         assert message() == "place a photo or an elevation first"
@@ -335,6 +335,10 @@ def test_an_arch_is_drawn_on_a_photo_and_taken_away(tmp_path):
         unit = driver.find_element(find, "#record-unit option[value='1']")
         unit.click()
         wait(driver, lambda: "up to 0.31 g" in message())
+        strength = driver.find_element(find, "#strength-value").text
+        assert strength == "0.31 g (1.00 × as recorded)"
+        verdict = driver.find_element(find, "#verdict").text
+        assert verdict == "Shaking …" or verdict.startswith(f"record.txt, {strength}: this arch")
         driver.execute_script(CHANGE, "friction", 0.5)
         stage = driver.find_element(find, "#stage")
         driver.execute_script("arguments[0].scrollIntoView({ block: 'center' })", stage)
@@ -538,7 +542,7 @@ def test_mistakes_are_put_right_where_they_are_said(tmp_path):
 
         driver.get((DOCS / "try" / "index.html").resolve().as_uri())
         wait_for_runs(driver, 1)
-        for details in driver.find_elements("css selector", ".live-start summary"):
+        for details in driver.find_elements("css selector", ".arch > :is(section, div) summary"):
             details.click()
         driver.find_element("css selector", "#drawing").send_keys(str(drawing))
         wait(driver, lambda: "3000 m large: choose its unit" in message())

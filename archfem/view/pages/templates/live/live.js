@@ -1,7 +1,7 @@
 // The page: the arch that archfem computed, what the reader changes, and what follows from it.
 "use strict";
 const G = 9.81, RUNS = 20;
-const SPREAD = { friction: 0.05, strength: 0.02, thickness: 0.01 }; // of slightly different arches, relative
+const SPREAD = { friction: 0.05, strength: 0.02, thickness: 0.01 }; // of similar arches, relative
 const PLASTIC = [0.8191725, 0.6710436, 0.5497005]; // shares that spread three properties evenly (R3 sequence)
 
 /** A motion of the reader's choice at a strength in g: recorded, a steady push, or a table that tilts. */
@@ -107,7 +107,7 @@ class Live {
     return { ...given, bodies, joints: given.joints.map((joint) => ({ ...joint, friction: joint.friction * ratio })) };
   }
   showDesign() {
-    const { design } = this, tilt = (Math.atan(design.strength) * 180) / Math.PI;
+    const { design, motion: { kind, strength } } = this, tilt = (Math.atan(design.strength) * 180) / Math.PI;
     this.find("finish").value = design.finish;
     this.find("strength").max = Math.max(2, design.strength); // a record may be stronger
     for (const slider of this.sliders) {
@@ -116,7 +116,7 @@ class Live {
       slider.value = value;
       this.say(`${slider.id}-value`, `${value.toFixed(digits)}${slider.dataset.unit}`);
     }
-    if (this.motion.kind === "tilt") this.say("strength-value", `${tilt.toFixed(0)}°`);
+    if (kind === "tilt" || strength) this.say("strength-value", strength ? `${design.strength.toFixed(2)} g (${(design.strength / strength).toFixed(2)} × as recorded)` : `${tilt.toFixed(0)}°`);
   }
 
   /** Thrust lines, collapse acceleration and the joints that close. */
@@ -140,8 +140,8 @@ class Live {
     const most = resting ? Math.max(...resting.map(Math.abs)) : NaN, percent = Math.round(100 * (1 - 2 * most));
     const millimetres = (value, digits) => `${(1e3 * value).toFixed(digits)} mm`;
     this.say("collapse", !stands ? "it does not stand by itself" : factor === Infinity ? "none: it leans on nothing" : `${factor.toFixed(3)} g, pushed to the ${side > 0 ? "right" : "left"}`);
-    this.say("weight", !stands ? "it falls" : percent >= 0 ? `it stands, with ${percent} % to spare` : "it stands");
-    this.say("line", percent >= 0 ? `${percent} % of half the thickness is left (max |e| = ${most.toFixed(3)})`
+    this.say("weight", !stands ? "it falls" : percent >= 0 ? `it stands: its thrust line keeps ${percent} % of half the thickness from the faces` : "it stands");
+    this.say("line", percent >= 0 ? `max |e| = ${most.toFixed(3)}`
       : stands ? "none is drawn: some joints bear nothing, or too many share the weight"
       : "none: no line stays within the stones and within the friction of all joints");
     const list = (what, own, s = own.length > 1 ? "s" : "") => (own.length ? [`${own.length} ${what}${s}: joint${s} ${own.map(({ joint }) => joint).join(", ")}`] : []);
@@ -166,7 +166,7 @@ class Live {
     });
   }
 
-  /** Shake the arch, and others that differ slightly. */
+  /** Shake the arch, and similar ones. */
   run() {
     const { design, data } = this, { motion, scale } = makeMotion(this.motion, design.strength), count = Math.min(navigator.hardwareConcurrency || 1, 4);
     const runs = range(RUNS).map((k) => {
@@ -195,15 +195,15 @@ class Live {
   /** Outcome in words. */
   tell() {
     const done = this.runs.filter(Boolean), answers = done.filter((run) => !run.failure), fallen = answers.filter((run) => run.fell !== null).length, [own] = this.runs;
-    const soFar = done.length < RUNS ? " so far" : "", millimetres = 1e3 * own?.displacement;
+    const more = done.length < RUNS ? `; ${RUNS - done.length} more follow` : "", millimetres = 1e3 * own?.displacement;
     this.root.dataset.runs = done.length;
-    this.say("share", answers.length ? `${fallen} of ${answers.length}${soFar}` : "…");
+    this.say("share", answers.length ? `${fallen} of ${answers.length}${more}` : "…");
     if (this.isMarking) return this.say("verdict", "Mark your arch on the photo.");
     if (!own || own.failure) return this.say("verdict", own ? `It cannot be followed: ${own.failure}` : "Shaking …");
-    const fate = own.fell === null ? `stands; a stone moves by up to ${millimetres.toFixed(millimetres < 1 ? 2 : 0)} mm.` : `falls: the first stone is lost at ${own.fell.toFixed(2)} s.`;
+    const fate = own.fell === null ? `stands; stones move by up to ${millimetres.toFixed(millimetres < 1 ? 2 : 0)} mm.` : `falls; the first stone is lost at ${own.fell.toFixed(2)} s.`;
     const how = fallen === 0 ? "none fall" : fallen === answers.length ? "all fall" : `${fallen} ${fallen === 1 ? "falls" : "fall"}`;
-    const others = answers.length < 2 ? "Shaking slightly different ones …" : `Of ${answers.length} slightly different arches${soFar}, ${how}.`;
-    this.say("verdict", `Shaken, this arch ${fate} ${others}`);
+    const others = answers.length < 2 ? "Shaking similar ones …" : `Of ${answers.length} similar arches ${how}${more}.`;
+    this.say("verdict", `${this.motion.name}, ${this.find("strength-value").textContent}: this arch ${fate} ${others}`);
   }
   drawGround({ dt, x }, scale) {
     const most = x.reduce((largest, value) => Math.max(largest, Math.abs(value)), 1e-9), every = Math.max(1, Math.floor(x.length / 1500));

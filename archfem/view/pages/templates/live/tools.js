@@ -255,7 +255,7 @@ class Tools {
     drawn.src = `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(copy))}`;
     await drawn.decode();
     const words = (rows) => [...root.querySelectorAll(rows)].map((row) => [...row.children].map((each) => each.selectedOptions?.[0].text ?? each.textContent).filter(Boolean).join(": "));
-    const choices = words(".live-controls label:not([hidden])"), [arch, shaking] = [choices.slice(0, -2), choices.slice(-2)].map((each) => each.join(", "));
+    const choices = words(".live-controls > label:not([hidden])"), [arch, shaking] = [choices.slice(0, -2), choices.slice(-2)].map((each) => each.join(", "));
     const lines = [this.find("verdict").textContent, ...words(".facts div:not([hidden])"), arch, shaking];
     const size = Math.max(width / 60, 12), style = getComputedStyle(document.body);
     const picture = Object.assign(document.createElement("canvas"), { width, height: height + 1.7 * size * (lines.length + 0.6) }), pen = picture.getContext("2d");

@@ -1,4 +1,4 @@
-// A task of the page: the push that closing joints bear, or runs of slightly different arches.
+// A task of the page: the push that closing joints bear, or runs of similar arches.
 onmessage = ({ data: { engine, closing, runs, motion } }) => {
   if (closing) {
     const joints = new ClosingJoints(closing.arch, closing.law);
