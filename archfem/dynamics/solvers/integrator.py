@@ -143,7 +143,7 @@ class Stepper:
             np.full(count, dt),
             energy,
             lambda k: self._state(float(times[k]), series[k + 1], memories[k + 1]),
-            q=series[1 : count + 1, 0, self._place],
+            q=series[1 : count + 1, 0].take(self._place, axis=1),
             faces=faces if faces.size else None,
         )
 
