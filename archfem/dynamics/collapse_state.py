@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from archfem._typing import Array
+from archfem._typing import Array, Flags
 from archfem._validation import validate_arguments
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.errors import InvalidInput
@@ -92,13 +92,12 @@ def classify_collapse(
     start = np.zeros((len(structure.blocks), 3)) if start is None else start
     corners = _place_corners(structure, free)
     origin, farthest, residual = corners(start), 0.0, 0.0
-    sizes = np.sqrt([structure.blocks[number].area for number in free])
+    find_lost = mark_lost(structure)
     lost, time, last = np.zeros(len(free), dtype=bool), None, None
     for last in frames:
         residual = float(np.linalg.norm(corners(last.poses) - origin, axis=1).max())
         farthest = max(farthest, residual)
-        poses = last.poses[free]
-        lost |= (poses[:, 1] < -0.5 * sizes) | (np.abs(poses[:, 2]) > np.pi / 4.0)
+        lost |= find_lost(last.poses)
         if time is None and lost.any():
             time = last.time
     if last is None:
@@ -113,6 +112,15 @@ def classify_collapse(
         farthest,
         residual,
         bool(getattr(last, "resting", False)),
+    )
+
+
+def mark_lost(structure: Structure) -> Callable[[Array], Flags]:
+    """Return a function from poses of all blocks to whether each of the free stones is lost."""
+    stones = list_stones(structure)
+    sizes = np.sqrt([structure.blocks[number].area for number in stones])
+    return lambda poses: (
+        (poses[stones, 1] < -0.5 * sizes) | (np.abs(poses[stones, 2]) > np.pi / 4.0)
     )
 
 

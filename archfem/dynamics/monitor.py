@@ -132,6 +132,8 @@ class RunMonitor:
         self._drift_error: tuple[float, float] | None = None  # first time [s] and drift beyond it
         self._observer = model.observer()
         self._small = not model.large_displacements
+        # whether facets are paired as meshed, of small displacements within large ones
+        self._pairs_facets = not self._small and bool(model.face_mismatch(start.state(0).q)[1])
         self._meeting = MeetingMonitor(model, start.state(0))
         self._met: tuple[float, str] | None = None  # first time [s], and which stones
         self._mismatch = (0.0, "")  # slip over facet length, and the joint
@@ -189,7 +191,7 @@ class RunMonitor:
                 met = self._meeting.find_first(replace(batch, readings=readings))
                 # time of the first meeting of stones outside their joints
                 self._met = None if met is None else (float(batch.times[met[0]]), met[1])
-        else:  # small displacements keep facets paired; these cost a product, hence not every step
+        elif self._pairs_facets:  # these cost a product, hence not every step
             first = -self._steps % facet_check_interval
             for k in range(first, len(batch.times), facet_check_interval):
                 slip = self.model.face_mismatch(batch.state(k).q)

@@ -70,8 +70,8 @@ class GrowingArray:
         """Add rows at the end."""
         end = self._count + len(rows)
         if self._memory is None or end > len(self._memory):
-            # the system provides memory once it is written to: the second half costs nothing
-            grown = np.empty((2 * end, *rows.shape[1:]), rows.dtype)
+            # the system provides memory once it is written to: what is not used costs nothing
+            grown = np.empty((max(2 * end, 8192), *rows.shape[1:]), rows.dtype)
             if self._count:
                 grown[: self._count] = self.rows
             self._memory = grown

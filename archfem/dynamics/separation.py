@@ -37,8 +37,11 @@ class LooseningMonitor:
 
     @classmethod
     def of(cls, model: Model, start: State) -> Self:
-        """Return the monitor of a run."""
-        return cls(SeparationMonitor(model), MeetingMonitor(model, start))
+        """Return the monitor of a run; runs from one state share what it computes once."""
+        derived, key = model.derived, start.q.tobytes()
+        if derived.get("loosening", (b"",))[0] != key:
+            derived["loosening"] = key, cls(SeparationMonitor(model), MeetingMonitor(model, start))
+        return derived["loosening"][1]
 
     def find_end(self, batch: Batch) -> tuple[Ending, str | None, int]:
         """Return how and why blocks become loose within a batch, and after how many steps."""
@@ -118,24 +121,25 @@ class MeetingMonitor:
         observer = self.model.observer()
         readings = batch.read(observer)
         corners, faces = observer.corners(readings), observer.faces(readings)
-        overruns = self._may_overrun(faces)
-        if not overruns and not self._may_meet(corners):
+        overruns = self._find_overruns(faces)
+        steps = np.arange(len(faces)) if self._may_meet(corners) else np.flatnonzero(overruns)
+        if not len(steps):
             return None
         limits, pairs = self._limits.copy(), self.model.structure.pairs[self._joints]
-        if not overruns:
+        if not overruns.any():
             limits[tuple(pairs.T)] = limits[tuple(pairs.T[::-1])] = -np.inf
-        poses, depths = self._fit_motions(corners), self._compressions(faces)
+        poses, depths = self._fit_motions(corners[steps]), self._compressions(faces[steps])
         k, *pair = find_meeting(self._bodies, self._world, poses, limits, pairs, depths)
         if k < 0:
             return None
         names = [*(f"'{block.name}'" for block in self.model.structure.blocks), "the ground"]
-        return k, f"{names[min(pair)]} met {names[max(pair)]}"
+        return int(steps[k]), f"{names[min(pair)]} met {names[max(pair)]}"
 
-    def _may_overrun(self, faces: Array) -> bool:
-        """Return whether a face has slid over its end and turned, with large displacements."""
+    def _find_overruns(self, faces: Array) -> Flags:
+        """Return at which steps a face is over its end and turned, with large displacements."""
         # beyond the overlap a joint is open, and slip × rotation bounds how deep a stone is there
-        _, rotation, slip = np.abs(faces).max(axis=0)
-        return self.model.large_displacements and bool(np.any(rotation * slip > self.tolerance))
+        deep = np.abs(faces[:, 1] * faces[:, 2]) > self.tolerance
+        return deep.any(axis=1) & self.model.large_displacements
 
     def _may_meet(self, corners: Array) -> bool:
         """Return whether any blocks without a joint have moved by more than is between them."""
@@ -164,14 +168,11 @@ class MeetingMonitor:
     @cached_property
     def _gaps(self) -> Array:
         """Gaps at the start of blocks and the ground; infinite with fill (b + 1, b + 1) [m]."""
-        derived, start = self.model.derived, self.start.q.tobytes()
-        if derived.get("gaps", (b"",))[0] != start:
-            motions = self._fit_motions(self._corners[None])[0]
-            gaps = measure_gaps(self._bodies, self._world, motions)
-            fill = list(find_yielding_blocks(self.model.structure))
-            gaps[fill] = gaps[:, fill] = np.inf
-            derived["gaps"] = start, gaps
-        return derived["gaps"][1]
+        motions = self._fit_motions(self._corners[None])[0]
+        gaps = measure_gaps(self._bodies, self._world, motions)
+        fill = list(find_yielding_blocks(self.model.structure))
+        gaps[fill] = gaps[:, fill] = np.inf
+        return gaps
 
     @cached_property
     def _limits(self) -> Array:

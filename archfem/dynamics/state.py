@@ -72,6 +72,8 @@ class Batch:
         state: function from the number of a step to the state at its end.
         fallback: whether a compiled solver failed and SNES took these steps.
         q: coordinates at the ends (steps, n); None to take them from the states.
+        faces: gaps, sines of rotations and slips of joints at the ends, as for `Observer.read_many`
+            (steps, 3, n_joints), if the solver measures them.
         readings: readings of the model's observer at the ends (steps, r), if they are stored.
     """
 
@@ -83,6 +85,7 @@ class Batch:
     state: Callable[[int], State]
     fallback: bool = False
     q: Array | None = None
+    faces: Array | None = None
     readings: Array | None = None
 
     def read(self, observer: Observer) -> Array:
@@ -94,7 +97,7 @@ class Batch:
         if self.readings is not None:
             return self.readings
         if self.q is not None:
-            return observer.read_many(self.q)
+            return observer.read_many(self.q, self.faces)
         return np.array([observer.read(self.state(k).q) for k in range(len(self.times))])
 
     def with_readings(self, observer: Observer) -> "Batch":
@@ -127,7 +130,8 @@ def join_batches(batches: Sequence[Batch]) -> Batch:
         number = int(np.searchsorted(ends, k, side="right"))
         return parts[number].state(k - int(ends[number]) + len(parts[number].times))
 
-    names = "times", "resultants", "iterations", "smallest_step", "energy", "q"
+    names = ["times", "resultants", "iterations", "smallest_step", "energy", "q"]
+    names += [] if parts[0].faces is None else ["faces"]
     arrays: Any = {name: np.concatenate([getattr(p, name) for p in parts]) for name in names}
     return Batch(**arrays, state=state)
 

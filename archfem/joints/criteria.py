@@ -171,6 +171,8 @@ def sliding_ratio(
     normal: Array, eccentricity: Array, coefficients: Array, cohesions: Array
 ) -> Array:
     """Return |V| / N at which joints slide, μ + c A / N; undefined (NaN) where they are open."""
+    if not np.any(cohesions):
+        return np.where(normal > 0.0, coefficients, np.nan)
     # Plane faces without tension are closed over 3 (1/2 - |e|) of the depth, at most all of it.
     # That is exact for exact joints between such faces; where faces bend, or points represent parts
     # of a joint, it is an estimate once the joint opens, within the area of a point.

@@ -191,7 +191,10 @@ def first_verified_mechanism(
         The motion and its class at that instant; None where no ring and no pier ever moves.
     """
     verifier, joints = get_verifier(structure), with_failure_flags(joints, criteria)
-    freedoms = verifier.freedoms(joints)
+    side, slides, apart, shear = verifier.find_failures(joints)
+    instants = np.flatnonzero(((side != 0) | slides | apart).any(axis=1))
+    failures = (values[instants] for values in (side, slides, apart, np.sign(shear)))
+    freedoms = dict(zip(instants.tolist(), joint_freedoms(*failures), strict=True))
     # Instants with the same pattern of freedoms share the answer, and each motion is solved once.
     moves: dict[bytes, bool] = {}
     mechanisms: dict[int, VerifiedMechanism] = {}
@@ -208,9 +211,8 @@ def first_verified_mechanism(
             moves[pattern] = permitted and verify(instant).kind != "none"
         return instant if moves[pattern] else None
 
-    instants = np.flatnonzero(freedoms.any(axis=1))
     duration = Criteria.of(joints).duration
-    first = find_lasting(instants, joints["time"].values, duration, find_motion)
+    first = find_lasting(freedoms, joints["time"].values, duration, find_motion)
     if first is None:
         return None
     found = verify(first)
@@ -319,12 +321,21 @@ class Verifier:
             may open, the sense in which a joint may slip, 1 or -1; 0 where it may not, and 2 where
             it may in either sense.
         """
-        numbers = list(self.rigid_regions.joints)
-        side, slides, apart, shear = (
+        side, slides, apart, shear = self.find_failures(joints)
+        return joint_freedoms(side, slides, apart, np.sign(shear))
+
+    def find_failures(self, joints: xr.Dataset) -> tuple[NDArray[Any], ...]:
+        """Return flags and V of the joints of the rigid regions, each (…, n_joints).
+
+        Flags are the face of a hinge, whether friction is used up, and whether the joint is open.
+        """
+        numbers: Any = list(self.rigid_regions.joints)
+        if len(numbers) == joints.sizes["joint"]:
+            numbers = slice(None)  # of all joints, which needs no copy
+        return tuple(
             joints.variables[name].transpose(..., "joint").values[..., numbers]
             for name in ("hinge", "slide", "open", "V")
         )
-        return joint_freedoms(side, slides, apart, np.sign(shear))
 
 
 def joint_freedoms(side: NDArray[Any], slides: Flags, apart: Flags, sense: NDArray[Any]) -> Array:

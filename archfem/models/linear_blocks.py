@@ -234,8 +234,9 @@ class LinearObserver(Observer):
         """Return gaps, rotations and slips of joints, then corner displacements, in a row (r,)."""
         return np.asarray(self.matrix @ q + self.offset)
 
-    def read_many(self, states: Array) -> Array:
+    def read_many(self, states: Array, faces: Array | None = None) -> Array:
         """Return the rows of `read` for many states (steps, r)."""
+        del faces
         return np.asarray((self.matrix @ states.T).T + self.offset)
 
     def joint_ends(self, q: Array) -> Array:

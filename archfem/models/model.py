@@ -228,8 +228,12 @@ class Observer(Protocol):
     def read(self, q: Array) -> Array:
         """Return gaps, rotations and slips of joints, then corner displacements, in a row (r,)."""
 
-    def read_many(self, states: Array) -> Array:
-        """Return the rows of `read` for many states (steps, r)."""
+    def read_many(self, states: Array, faces: Array | None = None) -> Array:
+        """Return the rows of `read` for many states (steps, r).
+
+        `faces` are gaps, twice the sines of half the rotations, and slips of the joints, where they
+        are known (steps, 3, n_joints).
+        """
 
     def joint_ends(self, q: Array) -> Array:
         """Return the displacements of both ends of each joint (n_joints, 2, 2) [m].

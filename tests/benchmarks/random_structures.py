@@ -258,9 +258,7 @@ def by_joints(built: af.Structure, motion: af.Motion, *, measure: bool) -> Compa
     if not measure:
         return found
     states = run.dataset["q"].values
-    observer = model.observer()
-    gap, rotation, slip = np.moveaxis(observer.faces(observer.read_many(states)), -2, 0)
-    turn = 2.0 * np.sin(0.5 * rotation)
+    gap, slip, turn = np.moveaxis(model.measures(states), -1, 0)
     own = 0.5 * np.maximum(built.depths - np.abs(slip), 0.0) * np.abs(turn) - gap
     poses = np.array([model.rigid_motions(q, q)[0] for q in states])
     overlaps = deepest_overlaps(built, poses, np.maximum(own, 0.0))

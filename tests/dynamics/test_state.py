@@ -45,7 +45,7 @@ def test_a_batch_is_cut_and_read():
     times, rows = np.arange(1.0, 5.0), np.arange(16.0).reshape(4, 4)
     states = [af.dynamics.State(t, np.full(2, t), *np.zeros((2, 2))) for t in times]
     given = (times, np.zeros((4, 1, 3)), np.arange(4), times, rows, lambda k: states[k])
-    gauges = SimpleNamespace(read=lambda q: 2.0 * q, read_many=lambda q: 3.0 * q)
+    gauges = SimpleNamespace(read=lambda q: 2.0 * q, read_many=lambda q, faces: 3.0 * q)
     whole = Batch(*given)
     assert whole.cut(4) is whole
     part = whole.cut(2)

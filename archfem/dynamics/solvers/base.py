@@ -76,14 +76,14 @@ def evaluate_step(
 @entry
 def advance(series, memories, results, ground, system):  # type: ignore
     """Take steps until the end, or until one does not converge; returns how many were taken."""
-    resultants, iterations, energies = results
+    resultants, iterations, energies, faces = results
     start_run(system, series[0], memories[0])
     for step in range(len(resultants)):
         states = series[step : step + 2]
         iterations[step] = solve_step(system, step, states, ground[0, step])
         if iterations[step] < 0:
             return step
-        filled = resultants[step], energies[step]
+        filled = resultants[step], energies[step], faces[step]
         evaluate_step(system, step, states, ground[1, step], filled, memories[step + 1])
     return len(resultants)
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from archfem._typing import Array
 from archfem.dynamics.solvers import base
 from archfem.dynamics.solvers.equation import Equation
+from archfem.dynamics.solvers.rigid_chains import ChainSystem
 from archfem.dynamics.solvers.snes import SnesSolver
 from archfem.dynamics.state import Batch, State, Step
 from archfem.errors import DidNotConverge
@@ -134,7 +135,7 @@ class Stepper:
         arrays = self.allocate_batch(state, dt, times)
         series, memories, results, *_ = arrays
         count = self._advance(*arrays)
-        resultants, iterations, energy = (each[:count] for each in results)
+        resultants, iterations, energy, faces = (each[:count] for each in results)
         return Batch(
             times[:count],
             resultants,
@@ -142,7 +143,8 @@ class Stepper:
             np.full(count, dt),
             energy,
             lambda k: self._state(float(times[k]), series[k + 1], memories[k + 1]),
-            q=series[1 : count + 1, 0, self._place],
+            q=series[1 : count + 1, 0].take(self._place, axis=1),
+            faces=faces if faces.size else None,
         )
 
     def _state(self, time: float, vectors: Array, memory: Array) -> State:
@@ -172,7 +174,11 @@ class Stepper:
         if state.memory is not None and self.equation.memory_size:
             memories[0] = state.memory
         iterations = np.zeros(steps, dtype=np.int64)
-        results = (np.empty((steps, joints, 3)), iterations, np.empty((steps, 4)))
         if dt not in self._systems:
             self._systems[dt] = self.solver.system(dt)
+        measured = 3 if isinstance(self._systems[dt], ChainSystem) else 0
+        results = (
+            *(np.empty((steps, joints, 3)), iterations, np.empty((steps, 4))),
+            np.empty((steps, measured, joints)),
+        )
         return series, memories, results, self.equation.ground(times, dt), self._systems[dt]

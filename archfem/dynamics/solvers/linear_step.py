@@ -252,7 +252,8 @@ def _update_images(linear, work, ends):  # type: ignore
 
 def _evaluate_linear_step(system, step, states, ground, results, memory):  # type: ignore
     """Evaluate resultants, energies and memory of a step."""
-    linear, law, work, (resultants, energy) = system.linear, system.linear.law, system.work, results
+    linear, law, work = system.linear, system.linear.law, system.work
+    resultants, energy, _ = results
     images = work.images[step % 2], work.images[(step + 1) % 2]
     if law.gain == 0.0:
         _gaps_at_end(linear, work, states[1])

@@ -558,7 +558,7 @@ def _solve_large_step(system, step, states, ground):  # type: ignore
 
 def _evaluate_large_step(system, step, states, ground, results, memory):  # type: ignore
     """Copy mean resultants and memory, and evaluate the energies of a step."""
-    resultants, energy = results
+    resultants, energy, _ = results
     for joint in range(len(resultants)):
         for k in range(3):
             resultants[joint, k] = system.forces.resultants[joint, k]

@@ -517,8 +517,8 @@ def _solve_chain_step(system, step, states, ground):  # type: ignore
 
 
 def _evaluate_chain_step(system, step, states, ground, results, memory):  # type: ignore
-    """Copy mean resultants and memory, and evaluate the energies of a step."""
-    (resultants, energy), work, slip = results, system.work, system.slip
+    """Copy mean resultants, measures and memory, and evaluate the energies of a step."""
+    (resultants, energy, faces), work, slip = results, system.work, system.slip
     dt, lag, drag = system.step
     energy[0] = energy[1] = energy[2] = energy[3] = 0.0
     for at in range(0, system.joint.shape[1], WIDTH):
@@ -529,6 +529,9 @@ def _evaluate_chain_step(system, step, states, ground, results, memory):  # type
     for joint in range(len(resultants)):
         for k in range(3):
             resultants[joint, k] = system.resultants[k, joint]
+        side = system.joint[ORIENTATION, joint]
+        faces[0, joint], faces[1, joint] = system.end[0, joint], side * system.end[2, joint]
+        faces[2, joint] = side * system.end[1, joint]
     for k in range(len(system.mass)):
         speed, move = states[1, 1, k], work.move[k]
         energy[0] += 0.5 * system.mass[k] * speed * speed

@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from archfem._numba import allocating_entry, entry, inlined_kernel, kernel
+from archfem._numba import allocating_entry, entry, inlined_kernel
 from archfem._typing import Array
 
 
@@ -331,27 +331,21 @@ def rotation_stiffness(rotation, push):  # type: ignore
 
 @allocating_entry
 def displace_points(turns, arms, states):  # type: ignore
-    """Return the displacements of points of rigid blocks in many states (k, 2 m) [m].
+    """Return the displacements of points of rigid blocks in many states (k, m, 2) [m].
 
     A point has the number of its block's rotation, after x and y, or -1 where it is fixed (m,), and
     its place relative to the centroid (m, 2).
     """
-    moved = np.zeros((len(states), 2 * len(turns)))
+    moved = np.zeros((len(states), len(turns), 2))
     for k in range(len(states)):
-        displace_state(turns, arms, states[k], moved[k])
+        last, half, x, y = -1, (1.0, 0.0), 0.0, 0.0
+        for point in range(len(turns)):
+            turn, arm = turns[point], (arms[point, 0], arms[point, 1])
+            if turn < 0:
+                continue
+            if turn != last:  # points are listed block by block
+                last, half = turn, cosine_sine(0.5 * states[k, turn])
+                x, y = states[k, turn - 2], states[k, turn - 1]
+            (dx, dy), _ = _rotate_arm(arm, (0.0, 0.0), half)
+            moved[k, point, 0], moved[k, point, 1] = x + dx, y + dy
     return moved
-
-
-@kernel
-def displace_state(turns, arms, q, moved):  # type: ignore
-    """Store the displacements of points in one state, as of `displace_points`."""
-    last, half, x, y = -1, (1.0, 0.0), 0.0, 0.0
-    for point in range(len(turns)):
-        turn, arm = turns[point], (arms[point, 0], arms[point, 1])
-        if turn < 0:
-            continue
-        if turn != last:  # points are listed block by block
-            last, half = turn, cosine_sine(0.5 * q[turn])
-            x, y = q[turn - 2], q[turn - 1]
-        (dx, dy), _ = _rotate_arm(arm, (0.0, 0.0), half)
-        moved[2 * point], moved[2 * point + 1] = x + dx, y + dy

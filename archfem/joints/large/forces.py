@@ -13,7 +13,6 @@ from archfem._numba import allocating_entry, entry, inlined_kernel, kernel
 from archfem._typing import Array
 from archfem.joints.large.face_kinematics import (
     FaceKinematics,
-    displace_state,
     face_forces,
     face_pose,
     force_derivative,
@@ -108,24 +107,13 @@ def _add_initial_measures(joints, segment, measures):  # type: ignore
 
 
 @allocating_entry
-def read_states(joints, turns, arms, states):  # type: ignore
-    """Return openings, rotations [rad] and slips of joints, and then displacements of points.
-
-    The former are in a row of each state (k, 3 n_joints + 2 m). The latter are those of
-    `displace_points`, and may be of no points.
-    """
-    count = joints.joint_count
-    rows = np.zeros((len(states), 3 * count + 2 * len(turns)))
-    measures, sums = np.empty((count, 3)), np.empty((count, 4))
+def measure_states(joints, states):  # type: ignore
+    """Return opening, slip and rotation of the structure's joints (k, n_joints, 3) [m, m, -]."""
+    measures = np.zeros((len(states), joints.joint_count, 3))
+    sums = np.empty((joints.joint_count, 4))
     for k in range(len(states)):
-        measures[:] = 0.0
-        _measure_state(joints, states[k], sums, measures)
-        for joint in range(count):
-            rows[k, joint], rows[k, 2 * count + joint] = measures[joint, 0], measures[joint, 1]
-            # the measure of rotation is 2 sin(θ/2)
-            rows[k, count + joint] = 2.0 * np.arcsin(0.5 * measures[joint, 2])
-        displace_state(turns, arms, states[k], rows[k, 3 * count :])
-    return rows
+        _measure_state(joints, states[k], sums, measures[k])
+    return measures
 
 
 @kernel

@@ -24,7 +24,7 @@ from archfem.joints.large.forces import (
     compute_step_forces,
     facet_slips,
     joint_energy,
-    read_states,
+    measure_states,
 )
 from archfem.joints.large.rates import assemble_rates, find_rate_pairs
 from archfem.joints.operator import Pattern
@@ -169,13 +169,6 @@ class RotatingCells(Cells):
         elastic.eliminate_zeros()
         return arms, elastic
 
-    @property
-    def rigid_points(self) -> tuple[Any, Array]:
-        """Coordinates of rotations, and arms, of points of rigid blocks; none if any is elastic."""
-        arms, elastic = self._arms
-        count = 0 if elastic.nnz else len(arms)
-        return self.turns[:count], arms[:count]
-
     def select(self, points: Any) -> "RotatingCells":
         """Return some of the points alone, without polygons."""
         places, block, turns = self.places[points], self.block[points], self.turns[points]
@@ -186,7 +179,8 @@ class RotatingCells(Cells):
         arms, elastic = self._arms
         if not elastic.nnz:
             states = _plain(np.atleast_2d(q))
-            return displace_points(self.turns, arms, states).reshape(*q.shape[:-1], -1, 2)
+            moved = displace_points(self.turns, arms, states)
+            return moved.reshape(*q.shape[:-1], *moved.shape[1:])
         rx, ry = arms.T
         # once for each block, and then for its points
         frames, frame = self._frames
@@ -404,6 +398,11 @@ class LargeDisplacementModel(Model):
         """Return N, V, M of every joint about the middle of the overlap (n_joints, 3)."""
         return self._instant(q).resultants
 
+    def measures(self, q: Array) -> Array:
+        """Return opening, slip and rotation of every joint (…, n_joints, 3) [m, m, -]."""
+        measures = measure_states(self.joints, _plain(np.atleast_2d(q)))
+        return measures.reshape(*q.shape[:-1], *measures.shape[1:])
+
     def face_mismatch(self, q: Array) -> tuple[float, str]:
         """Return the largest slip between paired facets, over their length, and its joint."""
         law = self.joints.face_law
@@ -531,14 +530,17 @@ class LargeObserver(Observer):
         """Return gaps, rotations and slips of joints, then corner displacements, in a row (r,)."""
         return self.read_many(q[None])[0]
 
-    def read_many(self, states: Array) -> Array:
+    def read_many(self, states: Array, faces: Array | None = None) -> Array:
         """Return the rows of `read` for many states (steps, r)."""
-        turns, arms = self.corner_cells.rigid_points
-        rows = read_states(self.model.joints, turns, arms, _plain(states))
-        if len(turns):
-            return rows
-        corners = self.corner_cells.displacement(states).reshape(len(states), -1)
-        return np.concatenate([rows, corners], axis=1)
+        if faces is None:
+            faces = np.moveaxis(self.model.measures(states)[..., [0, 2, 1]], -1, 1)
+        count = 3 * self.joint_count
+        rows = np.empty((len(states), count + 2 * len(self.corner_blocks)))
+        places = rows[:, :count].reshape(faces.shape)  # a view
+        places[:] = faces
+        places[:, 1] = 2.0 * np.arcsin(0.5 * faces[:, 1])
+        rows[:, count:] = self.corner_cells.displacement(states).reshape(len(states), -1)
+        return rows
 
     def joint_ends(self, q: Array) -> Array:
         """Return the displacements of both ends of each joint's overlap (n_joints, 2, 2) [m]."""
