@@ -151,6 +151,8 @@ class Rating(ResultDisplay):
         factors = self.moving.factors["factor"].min("position")
         least = (f"{way} {float(factors.sel(direction=way)):.4g}" for way in DRIVING_DIRECTIONS)
         by_rule = self.width == vehicle.spread_over(self.structure)
+        rule = f"{vehicle.wheels:g} m of wheels, with the fill at most {vehicle.lane:g} m; "
+        rule += vehicle.width_source
         also, beside = "", ""
         if self.area_load:
             also = " and on the distributed load × live"
@@ -166,7 +168,7 @@ class Rating(ResultDisplay):
             "it is of the same vehicle; Heyman requires it, often 2 (from memory), and no code",
             f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN"
             f"{beside}; {source}",
-            f"over {self.width:.3g} m of width ({vehicle.width_source if by_rule else 'given'})",
+            f"over {self.width:.3g} m of width ({rule if by_rule else 'given'})",
             f"live load by {self.live:g} ({self._source('live')})",
             f"impact by {self.impact:g} ({self._source('impact')})",
             f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",

@@ -102,7 +102,11 @@ class Vehicle:
         """
         ring = [block for block in structure.blocks if block.role == "ring"]
         points = np.concatenate([block.drawn() for block in ring] or [np.zeros((0, 2))])
-        tops = [[block.top(x) for block in structure.blocks] for x in points[:, 0].tolist()]
+        # a corner at the end of the fill misses the fill by rounding, and does not a micrometre aside
+        tops = [
+            [block.top(x + aside) for block in structure.blocks for aside in (-1e-6, 0.0, 1e-6)]
+            for x in points[:, 0].tolist()
+        ]
         covers = [
             max(top for top in above if top is not None) - y
             for above, y in zip(tops, points[:, 1], strict=True)

@@ -147,6 +147,15 @@ def test_a_vehicle_spreads_over_its_wheels_and_the_fill_up_to_a_lane():
         assert VEHICLES[name].spread_over(replace(bridge, width=1.2)) == 1.2
 
 
+def test_the_depth_of_fill_is_found_beside_its_ends_too():
+    """The fill ends above a corner of the ring, which rounding may put outside it."""
+    for number in range(60):
+        span = 4.0 + 0.1 * number
+        arch = af.shapes.Arch(span=span, rise=0.25 * span, thickness=0.55, voussoirs=15)
+        bridge = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.45), width=5.0)
+        assert Vehicle("axle", (1e5,)).spread_over(bridge) == pytest.approx(1.95, abs=1e-9), span
+
+
 def test_less_than_the_rule_is_stated_beside_the_verdict(monkeypatch):
     """Twice the width has twice the factor; the factor by rule stands in the same line."""
     monkeypatch.setattr(rating, "_places_along", lambda *_: (2.6, 3.1, 3.6))
