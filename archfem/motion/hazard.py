@@ -18,6 +18,7 @@ from archfem._validation import (
     check_choice,
     check_number,
     check_numbers,
+    validate_arguments,
     validate_methods,
 )
 from archfem.errors import InvalidInput
@@ -84,6 +85,7 @@ class Hazard:
         object.__setattr__(self, "rate", y)
 
     @classmethod
+    @validate_arguments
     def power(
         cls, factor: float, exponent: float, *, measure: str = "pga", period: float | None = None
     ) -> "Hazard":
@@ -102,6 +104,7 @@ class Hazard:
         return cls(ends, factor * ends**-exponent, measure=measure, period=period)
 
     @classmethod
+    @validate_arguments
     def from_return_periods(cls, points: Mapping[float, float], **options: object) -> "Hazard":
         """Return the curve through intensities of return periods, as codes give them.
 
@@ -116,6 +119,7 @@ class Hazard:
         return cls(intensities, 1.0 / np.array(periods), **options)  # type: ignore[arg-type]
 
     @classmethod
+    @validate_arguments
     def read(cls, path: str | Path, site: int = 0) -> "Hazard":
         """Read a hazard curve of OpenQuake, a CSV file of probabilities of exceedance.
 
@@ -128,25 +132,35 @@ class Hazard:
             InvalidInput: there is no such file, row, or column.
         """
         try:
-            lines = Path(path).read_text(encoding="utf-8").splitlines()
-        except OSError as error:
-            raise InvalidInput(f"hazard curve {path}: {error.strerror}: give a file") from error
+            lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            raise InvalidInput(f"hazard curve {path}: {error}: give a text file") from error
         head = " ".join(line for line in lines if line.startswith("#"))
         years = re.search(r"investigation_time=([\d.]+)", head)
-        measure = re.search(r"imt='?\"?(PGA|PGV|SA)(?:\(([\d.]+)\))?", head)
+        measure = re.search(r"imt='?\"?(?:(PGA|PGV)|(SA)\(([\d.]+)\))", head)
         rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
         if years is None or measure is None or not 0 <= site < len(rows):
             raise InvalidInput(
                 f"hazard curve {path}: no row {site}, or its first line does not name "
                 "investigation_time and imt (PGA, PGV or SA(…)): export it by OpenQuake as CSV"
             )
-        name, unit = OPENQUAKE_UNITS[measure.group(1)]
-        found = {key[4:]: value for key, value in rows[site].items() if key.startswith("poe-")}
-        x, poe = np.array([*found], float) * unit, np.array([*found.values()], float)
-        # a rate of zero has no logarithm, and equal probabilities are those of all intensities
+        name, unit = OPENQUAKE_UNITS[measure.group(1) or measure.group(2)]
+        found = {key[4:]: value for key, value in rows[site].items() if key and key[:4] == "poe-"}
+        try:
+            x, poe = np.array([*found], float) * unit, np.array([*found.values()], float)
+        except ValueError as error:
+            raise InvalidInput(f"hazard curve {path}, row {site}: {error}") from error
+        falls = (poe >= 0.0).all() and (poe <= 1.0).all() and (np.diff(poe) <= 0.0).all()
+        if not falls or float(years.group(1)) <= 0.0:
+            raise InvalidInput(
+                f"hazard curve {path}, row {site}: probabilities {poe.tolist()} in "
+                f"{years.group(1)} years: they are from 1 to 0, and none is larger than the one "
+                "before; the file is damaged"
+            )
+        # a rate of zero has no logarithm; of equal probabilities the largest intensity has the rate
         rates = -np.log1p(-np.minimum(poe, 1.0 - 1e-12)) / float(years.group(1))
-        kept = (rates > 0.0) & (np.diff(rates, prepend=np.inf) < 0.0)
-        period = measure.group(2)
+        kept = (rates > 0.0) & (np.diff(rates, append=-1.0) < 0.0)
+        period = measure.group(3)
         return cls(x[kept], rates[kept], measure=name, period=float(period) if period else None)
 
     def rate_of(self, intensity: float | Sequence[float] | Array) -> Array:

@@ -59,6 +59,52 @@ def test_intensities_of_a_wrong_unit_are_refused(points, options):
         af.Hazard.from_return_periods({1.0: 0.1} | points, **options)
 
 
+def hazard_file(folder, probabilities, measure="PGA"):
+    """A file of OpenQuake with four intensities, after a mark of byte order."""
+    path = folder / "curve.csv"
+    head = f"\ufeff#,,,\"investigation_time=50.0, imt='{measure}'\"\n"
+    path.write_text(
+        f"{head}lon,lat,depth,poe-0.1,poe-0.2,poe-0.4,poe-0.8\n31,40,0,{probabilities}\n",
+        encoding="utf-8",
+    )
+    return path
+
+
+def test_of_equal_probabilities_the_largest_intensity_has_the_rate(tmp_path):
+    """Rates between them would be too low from the smallest."""
+    site = af.Hazard.read(hazard_file(tmp_path, "0.9,0.9,0.1,0.01"))
+    assert site.intensity == pytest.approx(9.80665 * np.array([0.2, 0.4, 0.8]))
+    assert site.rate_of(9.80665 * 0.2) == pytest.approx(-np.log(0.1) / 50.0)
+
+
+@pytest.mark.parametrize(
+    ("probabilities", "words"),
+    [
+        ("nan,0.3,0.1,0.01", "damaged"),  # the rest alone made a curve
+        ("0.9,0.1,0.3,0.01", "damaged"),
+        ("0.9,-0.1,0.01,0.001", "damaged"),
+        ("1.9,0.3,0.1,0.01", "damaged"),
+        ("0.9,0.3", "damaged"),
+        ("0.9,0.3,x,0.01", "row 0: could not convert"),
+    ],
+)
+def test_damaged_probabilities_are_refused(tmp_path, probabilities, words):
+    with pytest.raises(af.InvalidInput, match=words):
+        af.Hazard.read(hazard_file(tmp_path, probabilities))
+
+
+def test_a_measure_of_another_kind_is_refused(tmp_path):
+    """Its period was dropped, and that of the structure taken."""
+    with pytest.raises(af.InvalidInput, match="does not name"):
+        af.Hazard.read(hazard_file(tmp_path, "0.9,0.3,0.1,0.01", measure="SA(0.3,0.1)"))
+
+
+def test_wrong_arguments_of_a_curve_are_named():
+    for call in (lambda: af.Hazard.power("a", 2.0), lambda: af.Hazard.from_return_periods([475])):
+        with pytest.raises(af.InvalidInput, match="give a"):
+            call()
+
+
 def test_a_power_law_of_velocities_ends_where_no_unit_is_wrong():
     site = af.Hazard.power(2e-5, 2.5, measure="pgv")
     assert float(site.rate_of(0.3)) == pytest.approx(2e-5 * 0.3**-2.5)

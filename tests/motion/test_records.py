@@ -629,6 +629,15 @@ def test_a_step_that_is_stated_twice_is_the_same_to_a_hundredth(write):
                 read_channels(path, dt=0.01)
 
 
+@pytest.mark.parametrize("given", [{}, {"column": 2, "dt": 0.01}])
+def test_times_that_run_backwards_are_refused(write, given):
+    """With a step and a column stated, the samples were read from their end."""
+    rows = [f"{0.01 * k:.2f},{np.sin(k):.5f}" for k in reversed(range(40))]
+    path = write("\n".join(["time [s],acceleration [m/s2]", *rows, ""]))
+    with pytest.raises(af.InvalidInput, match="run backwards"):
+        af.Motion.read(path, **given)
+
+
 def test_a_first_column_is_time_where_nine_in_ten_steps_grow(write):
     """One of twenty steps goes back, which is an error; with three it is another component."""
     for back, says in (([9], "time is not uniform"), ([5, 9, 13], "2 columns could be")):

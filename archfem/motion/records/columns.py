@@ -25,6 +25,10 @@ def read(
     text = _count_seconds(text)
     rows, rest, lines, comments = _read_table(text)
     unit = _find_unit(text, comments, units)
+    falls = np.diff(rows[:, 0])
+    # even steps: accelerations may fall as well
+    if _is_time(rows[::-1]) and np.ptp(falls) < 0.5 * abs(falls.mean()):
+        raise text.error("the times of the first column run backwards: reverse its rows", lines[0])
     step = _find_step(text, rows, lines, _list_stated_steps(comments, dt))
     first = 1 if _is_time(rows) else 0
     directions = _find_directions(comments, rows.shape[1], first)
