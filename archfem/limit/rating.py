@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from archfem._display import ResultDisplay
 from archfem._typing import Array, Metres, Pascals
@@ -27,7 +28,12 @@ from archfem.limit.vehicles import (
     vehicle_positions,
 )
 from archfem.masonry.loads import PointLoad
-from archfem.masonry.structure import HasStructure, Structure, structure_of
+from archfem.masonry.structure import (
+    CONTACT_TOLERANCE,
+    HasStructure,
+    Structure,
+    structure_of,
+)
 
 # Beginning of the line of a rating on what the pressure of the fill adds
 PRESSURE_RANGE = "over the pressure of the fill, at that place: "
@@ -227,7 +233,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     """Rate a bridge for a vehicle: the multiple of it, with partial factors, at collapse.
 
     The vehicle drives over the bridge in both directions (`moving_load`), from on to off in steps
-    of 1/100 of the bridge's length, or 1/20 with a plastic fill. Its axles spread through a fill
+    of 1/100 of the bridge's length, or 1/20 with a plastic fill; without fill also where an axle
+    stands at an end of a stone, beside the least factors of these. Its axles spread through a fill
     along the bridge; across it they spread evenly over `width`. The distributed load of its code
     grows with them, where it is adverse (`moving_load`). The geometric factor of safety is
     Heyman's: all joints are narrowed about their middles, at unchanged weights and with the vehicle
@@ -283,8 +290,11 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         return moving_load(weighted, axles, positions=positions, **given)
 
     is_plastic = isinstance(fill, PlasticFill)
-    positions = _places_along(weighted, parse_axles(driven.axles, driven.spacings))
+    axles = parse_axles(driven.axles, driven.spacings)
+    positions = _places_along(weighted, axles)
     moving = drive(width, area_load, positions[::5] if is_plastic else positions)
+    if fill is None and (ends := _places_at_ends(weighted, axles, moving)):
+        moving = _join(moving, drive(width, area_load, ends))
     by_rule = np.nan
     if width > (1.0 + 1e-9) * rule or area_load < driven.area_load:
         least = min(width, rule), max(area_load, driven.area_load)
@@ -327,6 +337,33 @@ def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Seq
     length = float(np.ptp(ends)) - 2.0 * float(vehicle[0, 1])
     count = 1 + int(np.ceil(steps * float(np.ptp(ends)) / length))
     return tuple(np.linspace(ends[0], ends[1], count).tolist())
+
+
+def _places_at_ends(
+    structure: Structure, vehicle: Array, moving: MovingLoad, share: float = 1.05
+) -> list[float]:
+    """Return places where an axle stands at an end of a stone, near those of least factors [m]."""
+    # A mechanism resists an axle least at an end of the stone on which it stands, where the factor
+    # jumps from stone to stone. A fill spreads axles over both.
+    corners = np.concatenate([structure.blocks[number].points[:, 0] for number in structure.free])
+    beside = 2.0 * CONTACT_TOLERANCE * structure.size
+    ends = np.unique(np.concatenate([corners - beside, corners + beside]))
+    least, places = moving.factors["factor"], set[float]()
+    for sense, way in ((1.0, "right"), (-1.0, "left")):
+        factors = least.sel(direction=way).values
+        low = np.isfinite(factors) & (factors <= share * moving.worst.factor)
+        for place in least["position"].values[low]:
+            for ahead in vehicle[:, 1]:
+                after = int(np.searchsorted(ends, place + sense * ahead))
+                places |= {float(x - sense * ahead) for x in ends[max(after - 1, 0) : after + 1]}
+    return sorted(places - {*least["position"].values.tolist()})
+
+
+def _join(first: MovingLoad, second: MovingLoad) -> MovingLoad:
+    """Return the factors at the places of both, and the worse collapse."""
+    factors = xr.concat([first.factors, second.factors], "position").sortby("position")
+    worse = min(first, second, key=lambda each: each.worst.factor)
+    return replace(worse, factors=factors)
 
 
 def _geometric_factor(

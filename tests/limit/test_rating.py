@@ -197,6 +197,26 @@ def test_the_geometric_factor_of_a_ring_is_one_of_thickness():
         assert (factor >= 1.0) == carries
 
 
+@pytest.mark.parametrize("spacings", [(), (1.3,)])
+def test_the_least_factor_of_bare_stones_is_at_the_end_of_one(spacings, monkeypatch):
+    """Whichever places are sampled; places beside it come near to it from above."""
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+    vehicle = Vehicle("axles", (20e3,) * (1 + len(spacings)), spacings)
+    factors = []
+    for steps in (30, 41):
+        monkeypatch.setattr(rating, "_places_along", partial(places_along, steps=steps))
+        found = af.rate(ring, vehicle)
+        factors.append(found.factor)
+        drawn = found.moving.factors["factor"]
+        assert float(drawn.min()) == pytest.approx(found.factor, rel=EXACT)
+        assert (np.diff(drawn["position"]) > 0.0).all()
+    assert factors[0] == pytest.approx(factors[1], rel=1e-4)  # within hundredths of a millimetre
+    around = np.linspace(-0.05, 0.05, 41) + found.moving.position
+    near = af.moving_load(ring, vehicle.axles, spacings=spacings, positions=around.tolist()).worst
+    assert factors[0] <= (1.0 + EXACT) * near.factor / vehicle.live
+    assert near.factor == pytest.approx(factors[0], rel=0.02)
+
+
 def test_vehicles_have_sources_and_grades():
     assert {"LM1", "LM2", "LM71", "LM71-train", "CS454-single", "HL93-truck"} <= set(VEHICLES)
     for name, vehicle in VEHICLES.items():
@@ -273,6 +293,7 @@ def test_places_of_axles_are_of_the_span_that_is_loaded(monkeypatch):
     pier = af.shapes.Pier(gap=1.0, height=1.0, course=0.5, name="pier")
     bridge = af.bridge(arches=arches, piers=[pier])
     inner = [joint.intrados[0] for joint in bridge.joints if joint.part == "right arch"]
+    monkeypatch.setattr(rating, "_places_at_ends", lambda *_: [])
     monkeypatch.setattr(rating, "_places_along", lambda *_: (min(inner) + 1.0,))
     found = af.rate(bridge, Vehicle("axles", (1e3,) * 9, (0.2,) * 8))
     name = " m from the left of the clear span of 'right arch', "
