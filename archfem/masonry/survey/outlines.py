@@ -299,7 +299,7 @@ def write_outlines(structure: Structure, path: str | Path) -> None:
 
 
 def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
-    """Close the gaps between outlines; an error names the next tolerances that leave no error."""
+    """Close the gaps between outlines; an error names the next tolerance that leaves no error."""
     if not snap > 0.0:
         raise InvalidStructure(f"snap {snap!r} m is not above 0: give e.g. 0.001")
     for outline in outlines:
@@ -315,9 +315,10 @@ def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
     ]
     higher = [value for value in values if snap < value <= largest]
     lower = [value for value in values[::-1] if 0.05 * snap <= value < snap]
-    for verb, values in (("raise", higher), ("lower", lower)):
-        if value := next((each for each in values if _closes_all(outlines, each)), None):
-            advice += f", or {verb} snap from {snap:.3g} to {value:.3g} m"
+    for value in higher + lower:
+        if _closes_all(outlines, value):
+            verb = "raise" if value > snap else "lower"
+            raise InvalidStructure(f"{advice}, or {verb} snap from {snap:.3g} to {value:.3g} m")
     raise InvalidStructure(advice)
 
 
@@ -506,6 +507,7 @@ def _check_gaps(
     more = f", the widest of {len(found)} gaps" if len(found) > 1 else ""
     raise InvalidStructure(
         f"the faces of '{outlines[one].name}' and '{outlines[other].name}' are "
-        f"{1e3 * width:.3g} mm apart at {outlines[one].frame.place(places[place])}{more}: draw "
-        f"faces that touch, or an open joint of more than {AMBIGUOUS_GAP_RATIO * snap:.3g} m"
+        f"{1e3 * width:.3g} mm apart at {outlines[one].frame.place(places[place])}{more}, an "
+        f"open joint only by a snap below {width / AMBIGUOUS_GAP_RATIO:.3g} m: draw faces "
+        "that touch"
     )
