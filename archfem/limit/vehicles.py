@@ -102,7 +102,7 @@ class Vehicle:
         """
         ring = [block for block in structure.blocks if block.role == "ring"]
         points = np.concatenate([block.drawn() for block in ring] or [np.zeros((0, 2))])
-        # a corner at the end of the fill misses the fill by rounding, and does not a micrometre aside
+        # a corner at the end of the fill may miss it by rounding, but not a micrometre aside
         tops = [
             [block.top(x + aside) for block in structure.blocks for aside in (-1e-6, 0.0, 1e-6)]
             for x in points[:, 0].tolist()
