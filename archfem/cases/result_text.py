@@ -176,15 +176,22 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
         f"{model.size} coordinates ({result.seconds:.2f} s with the dead load)"
     ]
     lines += [] if model.prediction is None else [f"model: {model.prediction.text}"]
-    lines.append(
-        f"dead load: |e| ≤ {float(abs(joints['eccentricity']).max()):.3f}, "
-        f"V/N ≤ {float(joints['friction'].max()):.3f}, "
-        f"N ≥ {float(joints['N'].min()) / kN:.2f} kN"
-    )
+    lines.append(f"dead load: {_describe_largest(joints)}")
+    if structure.heads.any():
+        heads = result.dead.joints.isel(joint=structure.heads)
+        lines[-1] += f"; of head joints, which do not count, {_describe_largest(heads)}"
     lines += filter(None, [structure.assessment, defaults(result.case)])
     if result.strength_use is not None:
         lines.append(f"dead load: {strength_use_text(result.strength_use)}")
     return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in result.doubts)])
+
+
+def _describe_largest(joints: xr.Dataset) -> str:
+    """Return the largest |e| and V / N of joints, and their smallest compression."""
+    return (
+        f"|e| ≤ {float(abs(joints['eccentricity']).max()):.3f}, "
+        f"V/N ≤ {float(joints['friction'].max()):.3f}, N ≥ {float(joints['N'].min()) / kN:.2f} kN"
+    )
 
 
 def describe_supports(structure: Structure, max_names: int = 4) -> str:

@@ -28,6 +28,7 @@ from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.history import Ending, History, partial_history
 from archfem.dynamics.schemes import Viscous
+from archfem.dynamics.slip_error import least_compression
 from archfem.dynamics.time_history import time_history
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints
@@ -460,10 +461,13 @@ def _compare_start(
     # either run may have ended before, by an event or a failed step
     end = min(float(history.time[-1]), float(run.time[-1]))
     sizes = []
+    # as in the control of the steps: |e| of a joint that carries next to nothing decides nothing
+    least = least_compression(assessed_joints(history.joints)["N"].values[0])
     for each in (history, run):
         joints = assessed_joints(each.joints.sel(time=slice(None, end)))
-        sizes.append(abs(joints["eccentricity"]).max("time").values)
-    worst = float(np.nanmax(np.abs(sizes[0] - sizes[1]), initial=0.0))
+        pressed = np.maximum(joints["N"].values, least) * joints["depth"].values
+        sizes.append(np.abs(joints["M"].values / pressed).max(axis=0))
+    worst = float(np.abs(sizes[0] - sizes[1]).max(initial=0.0))
     return worst, end, dead.model.fidelity
 
 

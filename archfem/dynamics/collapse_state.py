@@ -20,7 +20,7 @@ from archfem.units import format_mm
 # Kinds of collapse, in order of severity
 COLLAPSE_STATES = ("stands", "dislocated", "partly fallen", "fallen")
 
-# Displacement above which a structure is dislocated, over the depth of the shallowest joint [-]
+# Displacement above which a structure is dislocated, over the depth of the shallowest part [-]
 DISLOCATION = 0.1
 
 # Kinds of collapse with lost blocks
@@ -35,7 +35,7 @@ class CollapseState:
     has turned by more than 45°, wherever it comes to rest. Fill does not count. The structure
 
     - *stands*: no block is lost, and none is displaced by more than a tenth of the depth of the
-      shallowest joint of rings and piers;
+      joints of the shallowest ring or pier, the median of each;
     - is *dislocated*: no block is lost, but some are displaced further;
     - is *partly fallen*: blocks are lost, but a ring retains all of its own;
     - is *fallen*: every ring has lost a block. Where there is no ring, the piers count instead,
@@ -127,7 +127,7 @@ def mark_lost(structure: Structure) -> Callable[[Array], Flags]:
 def _collapse_kind(structure: Structure, lost: list[int], residual: float) -> str:
     """Return the kind of collapse."""
     if not lost:
-        return COLLAPSE_STATES[int(residual > DISLOCATION * shallowest_depth(structure))]
+        return COLLAPSE_STATES[int(residual > DISLOCATION * shallowest_part(structure)[0])]
     blocks = structure.blocks
     roles = {blocks[number].role for number in structure.free}
     role = next((role for role in ("ring", "pier") if role in roles), None)
@@ -141,13 +141,13 @@ def doubt_collapse(structure: Structure, fall: CollapseState) -> Iterator[Doubt]
     """Yield doubts of a structure that has not fallen but was near another kind of collapse."""
     if fall.kind in FALLEN_STATES:
         return
-    depth = shallowest_depth(structure)
+    depth = shallowest_part(structure)[0]
     # Of 200 random structures, 7 stand although rigid blocks fall or move farther: all moved by
     # more than 0.6, as did 14 of the others. A stack overturns at about 1.
     if fall.displacement > 0.6 * depth:
         yield Doubt(
             f"a corner was displaced by {format_mm(fall.displacement)}, "
-            f"{fall.displacement / depth:.2g} of the depth of the shallowest joint: other joints "
+            f"{fall.displacement / depth:.2g} of the depth of the shallowest part: other joints "
             "or time steps may let it fall",
             "state a range, `verdict_range`",
         )
@@ -167,10 +167,24 @@ def doubt_collapse(structure: Structure, fall: CollapseState) -> Iterator[Doubt]
         )
 
 
-def shallowest_depth(structure: Structure) -> float:
-    """Return the depth of the shallowest joint of rings and piers [m]."""
-    depths = structure.depths[structure.judged] if structure.judged.any() else structure.depths
-    return float(depths.min())
+def shallowest_part(structure: Structure) -> tuple[float, str]:
+    """Return the least depth of a ring or pier, the median of its joints [m], and its name."""
+    judged = structure.judged if structure.judged.any() else np.ones_like(structure.judged)
+    parts = np.array([joint.part for joint in structure.joints])
+    # the median, as a sliver at the edge of a wall says nothing of the wall
+    return min(
+        (float(np.median(structure.depths[judged & (parts == part)])), str(part))
+        for part in np.unique(parts[judged])
+    )
+
+
+def describe_dislocation(structure: Structure) -> str:
+    """Return beyond which residual displacement a structure is dislocated, and by which part."""
+    depth, part = shallowest_part(structure)
+    return (
+        f"dislocated beyond {format_mm(DISLOCATION * depth)} of residual displacement, a tenth of "
+        f"the median depth of the joints of {part or 'the ring'}"
+    )
 
 
 def _place_corners(structure: Structure, blocks: Sequence[int]) -> Callable[[Array], Array]:

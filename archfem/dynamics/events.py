@@ -24,7 +24,6 @@ from archfem.joints.criteria import (
     Criteria,
     DurationCounter,
     check_criteria,
-    find_idle_joints,
     judge_joints,
     sliding_ratio,
     tension_margin,
@@ -51,13 +50,13 @@ class FailureState:
     sense: NDArray[np.int8]  # sign of the shear force of each sliding joint, else 0 (n,)
     slides: NDArray[np.bool_]  # whether friction is exhausted (n,)
     apart: NDArray[np.bool_]  # whether the joint has lost contact (n,)
-    idle: NDArray[np.bool_]  # whether it carries no force at rest, and so never counts (n,)
+    head: NDArray[np.bool_]  # whether it is a head joint, and so never counts (n,)
     joint_states: Callable[[], xr.Dataset]  # labels and flags of all joints, by `joint_dataset`
 
     @property
     def failed(self) -> NDArray[np.bool_]:
         """Whether each joint has failed (n,)."""
-        return ((self.side != 0) | self.slides | self.apart) & ~self.idle
+        return ((self.side != 0) | self.slides | self.apart) & ~self.head
 
 
 @dataclass(eq=False)
@@ -71,7 +70,6 @@ class FailureScan:
     criteria: Criteria
     numbers: Sequence[int]  # of the scanned joints
     query: Callable[[FailureState], frozenset[str]]
-    rest: Array | None = None  # N, V, M of all joints at rest, where the run starts there
 
     def __post_init__(self) -> None:
         structure, numbers = self.structure, np.array(self.numbers, dtype=np.intp)
@@ -93,9 +91,7 @@ class FailureScan:
         failures = np.count_nonzero(hinges | slides | apart, axis=1)
         senses = np.where(hinges, np.sign(e), 0.0), np.where(slides, np.sign(forces[..., 1]), 0.0)
         states = np.stack([*senses, slides, apart], axis=1).astype(np.int8)
-        idle = np.zeros(len(self._numbers), dtype=bool)
-        if self.rest is not None:
-            idle = find_idle_joints(self.rest[:, 0], self.structure.tension)[self._numbers]
+        head = self.structure.heads[self._numbers]
         for step, count in enumerate(failures.tolist()):
             if count < min_failures:
                 yield frozenset()
@@ -104,14 +100,14 @@ class FailureScan:
             if key not in self._cache:
                 side, sense, slid, loose = states[step]
                 joints = partial(self.joint_states, resultants[step])
-                flags = slid.astype(bool), loose.astype(bool), idle
+                flags = slid.astype(bool), loose.astype(bool), head
                 state = FailureState(side, sense, *flags, joints)
                 self._cache[key] = self.query(state)
             yield self._cache[key]
 
     def joint_states(self, resultants: Array) -> xr.Dataset:
         """Return the resultants and failure flags of all joints at a step, as a dataset."""
-        return joint_dataset(self.structure, resultants, criteria=self.criteria, rest=self.rest)
+        return joint_dataset(self.structure, resultants, criteria=self.criteria)
 
 
 @dataclass(frozen=True, eq=False)
@@ -463,12 +459,6 @@ def start_monitor(until: StopCondition, structure: Structure, criteria: Criteria
     if isinstance(until, Event):
         return until.start_monitor(structure, criteria)
     return lambda resultants, step: until(structure, resultants)
-
-
-def set_rest(monitor: EventMonitor | None, rest: Array | None) -> None:
-    """Give a monitor N, V, M of all joints at rest, by which idle ones do not count."""
-    if isinstance(monitor, FailureMonitor):
-        monitor.scan.rest = rest
 
 
 def first_event(

@@ -16,7 +16,11 @@ from archfem._display import ResultDisplay, call_late_bound
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._typing import Array
 from archfem._validation import check_type, validate_arguments, validate_methods
-from archfem.dynamics.collapse_state import COLLAPSE_STATES, CollapseState
+from archfem.dynamics.collapse_state import (
+    COLLAPSE_STATES,
+    CollapseState,
+    describe_dislocation,
+)
 from archfem.dynamics.export import write_vtk, write_xdmf
 from archfem.dynamics.verdict import (
     ALL_DEFINITIONS,
@@ -28,7 +32,12 @@ from archfem.dynamics.verdict import (
     total_duration_remark,
 )
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.criteria import Criteria, describe_assessed_joints, with_failure_flags
+from archfem.joints.criteria import (
+    HEAD_COORDINATE,
+    Criteria,
+    describe_assessed_joints,
+    with_failure_flags,
+)
 from archfem.joints.resultants import select_joint, write_joint_table
 from archfem.limit.mechanism_count import Mechanism, counted_mechanism, demirel_aldemir_mechanism
 from archfem.limit.mechanism_kinematics import (
@@ -282,6 +291,8 @@ class History(ResultDisplay):
         attrs, joints, mechanisms = self.dataset.attrs, self.joints, self.mechanisms
         finished = attrs.get("ended") == Ending.FINISHED or "outcome" not in attrs
         remarks = [] if finished else [f"the run {self.outcome}"]
+        if self.structure is not None and self.fall is not None and self.fall.time is None:
+            remarks.append(describe_dislocation(self.structure))
         remarks += extremes_remark(self.dataset)
         remarks += brief_mechanism_remarks(joints, self.structure, mechanisms)
         if mechanisms["any joints at once"] is not None:
@@ -364,6 +375,8 @@ class History(ResultDisplay):
             dataset = dataset.assign_coords(
                 role=("joint", roles), judged=("joint", structure.judged)
             )
+            if structure.heads.any():
+                dataset.coords[HEAD_COORDINATE] = "joint", structure.heads
         elif "role" not in dataset.coords:
             raise InvalidInput(
                 f"{path} does not say which parts are rings and piers, as files of earlier "

@@ -95,7 +95,6 @@ class Recorder:
     dt: float | None  # constant time step [s]; None for steps of varying length
     record: Record  # which steps are recorded
     criteria: Criteria  # for the failure flags of joints
-    rest: Array | None = None  # N, V, M of all joints at rest, where the run starts there
     fallback: int = 0  # number of steps at which a compiled solver fell back to SNES
     count: int = 0  # number of steps added, the start of the run among them
     _rows: dict[str, "GrowingArray"] = field(default_factory=lambda: defaultdict(GrowingArray))
@@ -144,7 +143,7 @@ class Recorder:
         times, faces = (self._recorded(name)[: len(resultants)] for name in ("times", "faces"))
         moved = self.model.large_displacements
         variables, coordinates, attributes = joint_variables(
-            structure, resultants, times, self.criteria, faces, moved, self.rest
+            structure, resultants, times, self.criteria, faces, moved
         )
         variables |= self._block_displacements()
         of_ground = {"units": "m/s2", "long_name": "acceleration of the ground"}

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archfem._typing import Array, Flags
-from archfem.dynamics.collapse_state import shallowest_depth
+from archfem.dynamics.collapse_state import shallowest_part
 from archfem.dynamics.history import Ending
 from archfem.dynamics.rigid_body.bodies import Bodies, make_bodies, masses_of
 from archfem.dynamics.rigid_body.contact_detection import (
@@ -275,7 +275,7 @@ def _only_vibrates(model: Model, state: State) -> bool:
     """Return whether blocks move too weakly to overturn on a ground at rest.
 
     The kinetic energy of each block suffices to raise it by less than 2e-4 of the depth of the
-    shallowest joint, and no joint is rotated by more than 0.02 rad.
+    shallowest part, and no joint is rotated by more than 0.02 rad.
     """
     # A column of slenderness 20, tilted by 0.02 rad, has to rise by 4.5e-3 of its width to overturn
     if _largest_rotation(model, state) > 0.02:
@@ -284,7 +284,7 @@ def _only_vibrates(model: Model, state: State) -> bool:
     mass, inertia = masses_of(model.structure)[free].T
     velocities = model.rigid_motions(state.q, state.velocity)[1][free]
     squares = np.sum(velocities[:, :2] ** 2, axis=1) + inertia / mass * velocities[:, 2] ** 2
-    return bool(np.max(squares / (2.0 * G)) <= 2e-4 * shallowest_depth(model.structure))
+    return bool(np.max(squares / (2.0 * G)) <= 2e-4 * shallowest_part(model.structure)[0])
 
 
 def _largest_rotation(model: Model, state: State) -> float:

@@ -126,12 +126,12 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         check_large_displacement_scheme(scheme)
     model, start, viscous = _resolve_start(model, start, damping, newton)
     equation = Equation(model, motion, viscous, scheme or Conserving())
-    if is_at_rest := isinstance(start, Equilibrium):
+    if isinstance(start, Equilibrium):
         start = equation.at_rest(start.q, memory=start.model.memory)
     start.check(model)
     stepper = stepper_for(method, equation, newton)
     first = start_batch(stepper, start, dt or 0.005)  # typical where steps vary in length
-    recorder = _make_recorder(stepper, first, dt, record or Record(), criteria, is_at_rest)
+    recorder = _make_recorder(stepper, first, dt, record or Record(), criteria)
     adaptive = AdaptiveStepper(stepper, tolerance, first, SlipError(model.structure, motion, first))
     try:
         recorder.add(first)
@@ -175,7 +175,8 @@ def _state_tolerance(history: History, tolerance: float, share: float) -> Histor
     history.dataset.attrs |= {"tolerance": tolerance, "tolerance_unmet": share}
     doubt = Doubt(
         f"the shortest steps erred by more than {tolerance:g} in |e| in {share:.0%} of the run",
-        "compare with a constant dt of 0.1 ms or less, or with more damping",
+        "compare with constant steps of 0.1 ms or less (`--set analysis.dt=1e-4`), "
+        "or with more damping",
     )
     return history.with_doubts((*history.doubts, doubt)) if share > 0.02 else history
 
@@ -244,14 +245,12 @@ def _make_recorder(
     dt: float | None,
     record: Record,
     criteria: Criteria,
-    is_at_rest: bool,
 ) -> Recorder:
-    """Return the recorder of a run, with its validity checks and, if it starts there, the rest."""
+    """Return the recorder of a run, with its validity checks."""
     equation = stepper.equation
     damps, drag = isinstance(equation.scheme, HHT), equation.drag
     monitor = RunMonitor(equation.model, first, damps=damps, mass_damping=drag)
-    rest = first.resultants[0] if is_at_rest else None
-    return Recorder(monitor, first.state(0), stepper.name, dt, record, criteria, rest)
+    return Recorder(monitor, first.state(0), stepper.name, dt, record, criteria)
 
 
 # What may end a run: an event, and blocks that become loose where displacements are large
@@ -276,7 +275,6 @@ def _run_steps(
 ) -> tuple[Ending, str]:
     """Record steps up to an event or the end of the motion; return how and why the run ended."""
     start = recorder.state
-    events.set_rest(monitors[0], recorder.rest)
     duration, is_announced = round(end - start.time, 4), False
     # the pace is that after the first batch, which may wait for compilation
     begun = since = 0.0

@@ -176,10 +176,11 @@ def total_duration_remark(joints: xr.Dataset) -> str:
     steps = step_lengths(flags["time"].values)
     total = float(steps[flags.transpose("joint", "time").values[0]].sum())
     longest = float(longest_duration(flags)[0])
-    return (
-        f"{Criteria.of(joints).failures}{_assessed_word(joints)} joints and more fail at once for "
-        f"{duration_text(total)} in all, {duration_text(longest)} at the longest"
-    )
+    required, word = Criteria.of(joints).failures, _assessed_word(joints)
+    subject = f"{required}{word} joints and more fail at once"
+    if required == 1:
+        subject = f"one{word} joint or more fails"
+    return f"{subject} for {duration_text(total)} in all, {duration_text(longest)} at the longest"
 
 
 def _assessed_word(joints: xr.Dataset) -> str:
@@ -198,7 +199,7 @@ def doubt_unassessed_joints(joints: xr.Dataset, structure: Structure) -> list[Do
     left_out = [
         number
         for number, joint in enumerate(structure.joints)
-        if not (judged[number] or soft & set(joint.blocks))
+        if not (judged[number] or structure.heads[number] or soft & set(joint.blocks))
         and (not is_large or carrying & {blocks[k].role for k in joint.blocks})
     ]
     own = joints.isel(joint=left_out)

@@ -28,7 +28,8 @@ class VerdictRange(ResultDisplay):
             `displacement` and `residual`, the largest of a corner and that at the end [m]; `time`
             of the first lost block [s]; `error`, the text of a run without an answer, or "";
             `sampled`, whether the run is of the Latin hypercube.
-            Its attributes `k_n` and `k_s` are the mean stiffnesses of the joints as given [N/m³].
+            Its attribute `motion` is the name of the motion, empty where motions are varied;
+            `k_n` and `k_s` are the mean stiffnesses of the joints as given [N/m³].
     """
 
     dataset: xr.Dataset
@@ -121,6 +122,7 @@ class VerdictRange(ResultDisplay):
             text += f": {self._describe_falls()}"
         low, high = self.interval()
         text += f"; of those sampled {self.share:.0%} fall ({low:.0%} to {high:.0%})"
+        text += f", under '{motion}' alone" if (motion := self.dataset.attrs.get("motion")) else ""
         return text + (f"; {missing} have no answer" if missing else "")
 
     def _describe_falls(self) -> str:
@@ -189,7 +191,7 @@ class VerdictRange(ResultDisplay):
                 for label, chosen in groups
             ]
             rows.append([property_text(name), f"{share:.0%}", ", ".join(cells)])
-        return align_columns(["property", "explains", "falls"], rows)
+        return align_columns(["property", "share of the damage's variance", "falls"], rows)
 
     def __str__(self) -> str:
         """Sentence, and a line for each property."""

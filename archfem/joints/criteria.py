@@ -23,8 +23,8 @@ Found = TypeVar("Found")
 # Coordinate of a dataset with the tensile strengths of its joints; absent without bonds
 TENSION_COORDINATE = "tension"
 
-# Coordinate of a dataset with the joints that carry no force at rest; absent where all do
-IDLE_COORDINATE = "idle"
+# Coordinate of a dataset with the head joints of walls; absent without any
+HEAD_COORDINATE = "head"
 
 # Prefix of dataset attributes with the criteria
 CRITERIA_PREFIX = "criteria_"
@@ -229,13 +229,6 @@ def tension_margin(normal: Array, tension: Array) -> Array:
     return np.where(tension > 0.0, np.abs(normal), normal)
 
 
-def find_idle_joints(normal: Array, tension: Array) -> NDArray[np.bool_]:
-    """Return which joints carry no force at rest, from normal forces and tensile strengths."""
-    margin = tension_margin(normal, tension)
-    # above the round-off of equilibria, below what a stone of a structure weighs
-    return np.asarray(margin <= 1e-6 * margin.max(initial=0.0))
-
-
 def with_failure_flags(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
     """Return joints with the failure flags and attributes of some criteria."""
     if criteria is None and "hinge" in joints:
@@ -252,6 +245,8 @@ def with_failure_flags(joints: xr.Dataset, criteria: Criteria | None = None) -> 
         forces = tension_margin(forces, joints[TENSION_COORDINATE].values)
     result = joints.assign(failure_flags(e.dims, forces, ratios, limits, criteria.hinge))
     assessed = np.isin(joints["part"].values.astype(str), select_assessed_parts(part_roles(joints)))
+    if HEAD_COORDINATE in joints.coords:
+        assessed &= ~joints[HEAD_COORDINATE].values
     result.coords["judged"] = (joints["part"].dims, assessed)
     others = {k: value for k, value in joints.attrs.items() if not k.startswith(CRITERIA_PREFIX)}
     result.attrs = others | criteria.attributes
@@ -273,18 +268,18 @@ def sliding_limits(joints: xr.Dataset, criteria: Criteria) -> Array:
 
 
 def find_failed_joints(joints: xr.Dataset) -> xr.DataArray:
-    """Return whether each joint hinges, slides or is open; never of joints idle at rest.
+    """Return whether each joint hinges, slides or is open; never of head joints of a wall.
 
-    A joint that carries no force at rest, as the head joints of a wall do, is no part of what
-    carries: that it is open, or that a small force leaves its middle, is no failure.
+    A wall in bond stands on its bed joints: that a head joint is open, or that its small force
+    leaves its middle, is no failure.
     """
     hinge = joints["hinge"]
     slides, is_open = (
         joints.variables[name].transpose(*hinge.dims).values for name in ("slide", "open")
     )
     failed = hinge.copy(data=(hinge.values != 0) | slides | is_open)
-    if IDLE_COORDINATE in joints.coords:
-        failed = failed & ~joints[IDLE_COORDINATE]
+    if HEAD_COORDINATE in joints.coords:
+        failed = failed & ~joints[HEAD_COORDINATE]
     return failed.rename("failed")
 
 
@@ -341,7 +336,7 @@ def eccentricity_magnitude(joints: xr.Dataset) -> xr.DataArray:
 
 @validate_arguments
 def assessed_joints(joints: xr.Dataset) -> xr.Dataset:
-    """Return the joints of rings and piers, or all where there are neither, with their numbers.
+    """Return the joints of rings and piers, or all where there are neither, without head joints.
 
     Args:
         joints: with the coordinate `judged`, as made by `joint_dataset`.
@@ -354,4 +349,6 @@ def assessed_joints(joints: xr.Dataset) -> xr.Dataset:
 def describe_assessed_joints(joints: xr.Dataset) -> str:
     """Describe which joints are assessed, and which are not; empty where all are."""
     names, parts, judged = (np.atleast_1d(joints[key].values) for key in ("name", "part", "judged"))
-    return describe_assessment(names.astype(str).tolist(), parts.astype(str).tolist(), judged)
+    heads = np.atleast_1d(joints.coords.get(HEAD_COORDINATE, xr.zeros_like(joints["judged"])))
+    words = names.astype(str).tolist(), parts.astype(str).tolist()
+    return describe_assessment(*words, judged, heads)

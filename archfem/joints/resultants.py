@@ -23,11 +23,10 @@ from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
-    IDLE_COORDINATE,
+    HEAD_COORDINATE,
     TENSION_COORDINATE,
     Criteria,
     failure_flags,
-    find_idle_joints,
     sliding_ratio,
     tension_margin,
 )
@@ -87,7 +86,6 @@ def joint_dataset(
     *,
     faces: Array | None = None,
     moved: bool = False,
-    rest: Array | None = None,
 ) -> xr.Dataset:
     """Return labelled resultants, with eccentricity, mobilised friction and flags of failure.
 
@@ -109,16 +107,15 @@ def joint_dataset(
             (steps, 3, n_joints) [m, rad, m]; None without displacements.
         moved: whether displacements may be large: eccentricity is then from the middle of the
             overlap of both faces, as a fraction of its length, and cohesion acts on that length.
-        rest: N, V, M at rest (n_joints, 3) [N, N, N m]; joints without a force there are `idle`,
-            a coordinate, and never count as failed. None where it is not known.
 
     Returns:
         Variables N, V, M, eccentricity and friction, `opening`, `rotation` and `slip` if `faces`
         is given, and `failure_flags`, over joint, or over time and joint; names, parts, roles,
         depths, heights of the middles, coefficients of friction and resistances by cohesion of the
-        joints, and whether they are assessed, as coordinates; the criteria as attributes.
+        joints, whether they are assessed, and in walls whether they are head joints, as
+        coordinates; the criteria as attributes.
     """
-    return xr.Dataset(*joint_variables(structure, resultants, time, criteria, faces, moved, rest))
+    return xr.Dataset(*joint_variables(structure, resultants, time, criteria, faces, moved))
 
 
 def joint_variables(
@@ -128,7 +125,6 @@ def joint_variables(
     criteria: Criteria | None,
     faces: Array | None,
     moved: bool,
-    rest: Array | None,
 ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     """Return variables, coordinates and attributes of `joint_dataset`."""
     dims = ("joint",) if time is None else ("time", "joint")
@@ -155,8 +151,8 @@ def joint_variables(
         coordinates["cohesion_limit"] = dims, limits, {"units": "N"}
     if structure.tension.any():
         coordinates[TENSION_COORDINATE] = "joint", structure.tension, {"units": "Pa"}
-    if rest is not None and (idle := find_idle_joints(rest[:, 0], structure.tension)).any():
-        coordinates[IDLE_COORDINATE] = "joint", idle
+    if structure.heads.any():
+        coordinates[HEAD_COORDINATE] = "joint", structure.heads
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
     return variables, coordinates, criteria.attributes

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from archfem._validation import validate_arguments
 from archfem.joints.criteria import (
-    IDLE_COORDINATE,
+    HEAD_COORDINATE,
     Criteria,
     assessed_joints,
     find_failed_joints,
@@ -85,8 +85,9 @@ class Mechanism:
             return ""
         wide = "" if self.opening is None else f"by up to {format_mm(self.opening)}"
         if self.closes is None:
-            text = f"they failed one after the other within {duration_text(self.duration)}"
-            return f"{text}, and open {wide}" if wide else text
+            span = f"joint by joint within {duration_text(self.duration)}"
+            text = f"it forms {span if self.duration > 0.0 else 'at once'}"
+            return f"{text}, opens {wide}" if wide else text
         text = f"it lasts {duration_text(self.duration)}" + (f", opens {wide}" if wide else "")
         end = "closes again" if self.closes else "has not closed when the record ends"
         return f"{text} and {end}"
@@ -292,8 +293,8 @@ def follow_mechanism(
     times = joints["time"].values
     begin = int(np.flatnonzero(times == found.time)[0])
     own = np.isin(joints["joint"].values, found.joints)
-    if flags is None:  # idle joints take part in a verified motion
-        flags = _flags_over_time(joints.drop_vars(IDLE_COORDINATE, errors="ignore"))
+    if flags is None:  # head joints take part in a verified motion
+        flags = _flags_over_time(joints.drop_vars(HEAD_COORDINATE, errors="ignore"))
     all_failed = flags.values[begin:, own].all(axis=1)
     count = len(all_failed) if all_failed.all() else int(all_failed.argmin())
     duration = float(step_lengths(times)[begin : begin + count].sum())

@@ -35,9 +35,9 @@ def assembled(
 
     Joints across a ring or a pier are first, named and numbered along it: "main arch, joint 0" is
     its left springing, "north pier, base" its foot, "north pier, joint 1" the next one above. Their
-    intrados is the end closer to the centre of the ring, in a pier the left one. Other joints are
-    named "one block to other block"; their "intrados" is the left end, or the lower one where they
-    are vertical.
+    intrados is the end closer to the centre of the ring, in a pier the left one. Other joints, and
+    all of a wall in bond, are named "one block to other block"; their "intrados" is the left end,
+    or the lower one where they are vertical.
 
     A joint belongs to the part of its blocks. Between two parts it belongs to that of the free
     block; then to the ring it crosses, as a springing does, or to the pier above it; then to a part
@@ -76,9 +76,13 @@ def assembled(
             else:
                 others.append(joint)
     all_joints = list(joints)
+    # in a wall, a pier with joints along it too, a number would not say where a joint is
+    walls = {joint.part for joint in others if joint.role == "pier" and _is_inner(joint, blocks)}
+    unnamed: list[Joint] = []
     for part, direction in directions.items():
-        all_joints += _order_joints(across[part], part, direction, blocks)
-    all_joints += _name_joints(others, blocks)
+        ordered = _order_joints(across[part], part, direction, blocks)
+        (unnamed if part in walls else all_joints).extend(ordered)
+    all_joints += _name_joints([*unnamed, *others], blocks)
     return Structure(blocks, tuple(all_joints), width, gravity, name)
 
 
@@ -204,6 +208,11 @@ def _order_joints(
         name = f"{part}, {word}" if part else word
         named.append(replace(joint, intrados=inner, extrados=outer, name=name))
     return named
+
+
+def _is_inner(joint: Joint, blocks: Sequence[Block]) -> bool:
+    """Return whether a joint separates two free stones of its part."""
+    return all(not blocks[k].fixed and blocks[k].part == joint.part for k in joint.blocks)
 
 
 def _is_foot(joint: Joint, blocks: Sequence[Block]) -> bool:

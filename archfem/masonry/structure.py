@@ -90,7 +90,10 @@ Shape = TypeVar("Shape", bound=Callable[..., "Structure"])
 
 
 def describe_assessment(
-    names: Sequence[str], parts: Sequence[str], judged: NDArray[np.bool_]
+    names: Sequence[str],
+    parts: Sequence[str],
+    judged: NDArray[np.bool_],
+    heads: NDArray[np.bool_],
 ) -> str:
     """Describe which joints are assessed, and which are not; empty where all are."""
     if judged.all():
@@ -98,7 +101,9 @@ def describe_assessment(
     labels = np.array([part or "unnamed" for part in parts])
     left_out = [str(name) for name, own in zip(names, judged, strict=True) if not own]
     if len(left_out) > 4:  # too many to be named
-        left_out = [f"{count} of {part}" for part, count in Counter(labels[~judged]).items()]
+        words = np.where(heads, "head joints ", "")[~judged]
+        counts = Counter(zip(words, labels[~judged], strict=True))
+        left_out = [f"{count} {word}of {part}" for (word, part), count in counts.items()]
     return (
         f"assessed: {np.count_nonzero(judged)} of {len(judged)} joints (rings and piers: "
         f"{join_names(list(dict.fromkeys(labels[judged])))}); not assessed: "
@@ -386,16 +391,32 @@ class Structure(ResultDisplay):
         return np.array([block.centroid for block in self.blocks])
 
     @cached_property
+    def heads(self) -> NDArray[np.bool_]:
+        """Whether each joint is a head joint of a wall (n_joints,).
+
+        That is a joint nearer to the vertical than to the horizontal, between two stones of one
+        part that is no ring. Both stones have bed joints.
+        """
+        steep = np.abs(self.normals[:, 0]) > np.abs(self.normals[:, 1])
+        bedded = {k for pair in self.pairs[~steep].tolist() for k in pair} & set(self.free)
+        parts = [block.part for block in self.blocks]
+        inner = [
+            joint.role != "ring" and bedded >= {a, b} and parts[a] == parts[b]
+            for joint, (a, b) in zip(self.joints, self.pairs.tolist(), strict=True)
+        ]
+        return steep & np.array(inner, dtype=bool)
+
+    @cached_property
     def judged(self) -> NDArray[np.bool_]:
-        """Whether each joint belongs to an assessed part, a ring or pier (n_joints,)."""
+        """Whether each joint counts: of a ring or pier, and no head joint (n_joints,)."""
         parts = select_assessed_parts({joint.part: joint.role for joint in self.joints})
-        return np.array([joint.part in parts for joint in self.joints], dtype=bool)
+        return ~self.heads & np.array([joint.part in parts for joint in self.joints], dtype=bool)
 
     @cached_property
     def assessment(self) -> str:
         """Which joints are assessed and which are not, in words; empty where all are."""
         names, parts = zip(*((joint.name, joint.part) for joint in self.joints), strict=True)
-        return describe_assessment(names, parts, self.judged)
+        return describe_assessment(names, parts, self.judged, self.heads)
 
     @cached_property
     def weight(self) -> float:

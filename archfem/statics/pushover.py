@@ -371,7 +371,6 @@ def _label_result(path: Path, criteria: Criteria, outcome: str) -> Pushover:
         criteria,
         faces=faces,
         moved=large,
-        rest=path.resultants[0],
     )
     joints = joints.rename(time="step").assign_coords(step=np.arange(count))
     curve = xr.Dataset(

@@ -139,7 +139,9 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     rows = dict(evaluate_with_progress(points, evaluate_variation, workers, "range"))
     dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], neutral)
     dataset["sampled"] = "run", np.arange(len(points)) >= len(points) - samples
-    dataset.attrs["motion"] = motion.name
+    labelled = [values for values in ranges.values() if isinstance(values, dict)]
+    several = any(isinstance(value, Motion) for each in labelled for value in each.values())
+    dataset.attrs["motion"] = "" if several else motion.name
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
     dataset.attrs["k_s"] = float(np.mean([contact.shear_stiffness for contact in contacts]))

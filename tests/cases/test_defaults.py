@@ -71,6 +71,25 @@ def test_results_name_them():
     assert describe_defaults(case) in describe_dead_load(af.cases.DeadLoadResult.of(case))
 
 
+def test_head_joints_are_apart_in_the_line_of_the_dead_load(tmp_path):
+    """Two stones side by side under a third: their joint carries nothing."""
+    corners = {"a": (0, 0, 1, 1), "b": (1, 0, 2, 1), "c": (0, 1, 2, 2), "ground": (0, -1, 2, 0)}
+    blocks = []
+    for name, (left, low, right, high) in corners.items():
+        outline = [(left, low), (right, low), (right, high), (left, high)]
+        part, role = ("ground", "other") if name == "ground" else ("wall", "pier")
+        fixed = name == "ground"
+        blocks.append(af.Block(outline, af.STONE, name, fixed=fixed, part=part, role=role))
+    wall = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.6))
+    case = af.Case.read(af.Analysis(wall, fidelity="rigid").write(tmp_path / "wall.toml"))
+    text = describe_dead_load(af.cases.DeadLoadResult.of(case))
+    (line,) = [each for each in text.splitlines() if each.startswith("dead load: |e|")]
+    beds, heads = line.split("; of head joints, which do not count, ")
+    assert beds.endswith(f"N ≥ {1e-3 * af.STONE.unit_weight:.2f} kN")  # c rests on a and b
+    assert heads.endswith("N ≥ 0.00 kN")
+    assert "not assessed: a to b" in text
+
+
 def test_check_explains_each_default_by_its_key(tmp_path, capsys):
     path = tmp_path / "case.toml"
     path.write_text(af.Case.of({**BARE, "model": {"fidelity": "rigid"}}).text(), encoding="utf-8")

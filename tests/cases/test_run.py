@@ -185,10 +185,10 @@ def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, mo
     """By the largest |e| of each joint, until either run ends; 0.03 is in no doubt."""
     begun = []
 
-    def history(*rows):
+    def history(*rows, normal=(1.0, 1.0)):
         """A joint pressed by 1 N, 1 m deep, has e = M; records are 0.1 s apart."""
         resultants = np.zeros((len(rows), 2, 3))
-        resultants[..., 0], resultants[..., 2] = 1.0, rows
+        resultants[..., 0], resultants[..., 2] = normal, rows
         time = 0.1 * np.arange(len(rows))
         joints = af.joints.joint_dataset(stack, resultants, time)
         return SimpleNamespace(time=time, joints=joints)
@@ -216,6 +216,9 @@ def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, mo
         "within the first 0.1 s fidelity 'rigid' differs from 'faces' by 0.032 in the largest |e| "
         "of a joint"
     )
+    # a joint that carries 0.5 % of the other, with |e| of 0 and 0.4
+    centred, eccentric = (history((0.0, 0.0), (0.1, m), normal=(1.0, 0.005)) for m in (0.0, 0.002))
+    assert doubts(centred, eccentric) == []
     longer = history((0.0, 0.0), (0.1, -0.2), (0.4, 0.4))
     assert doubts(coarse, longer) == doubts(longer, coarse) == []
     assert begun[0].horizontal.tolist() == motion.horizontal[:51].tolist()

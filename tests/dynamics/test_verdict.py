@@ -10,6 +10,8 @@ from portals import DRY, box
 
 import archfem as af
 from archfem.dynamics import MECHANISM_DEFINITIONS
+from archfem.dynamics.collapse_state import describe_dislocation
+from archfem.dynamics.verdict import total_duration_remark
 from archfem.joints.criteria import find_failed_joints
 from archfem.limit import mechanism_over_record
 from archfem.masonry.joint_closing import describe_closing
@@ -297,11 +299,11 @@ def test_an_event_ends_a_run_of_any_steps_in_its_first_mechanism(paced, model, m
     assert len(held) == 1 or held[-2] - before < 1e-3
 
 
-def bonded_wall():
-    """Four courses of three stones of 0.5 m by 0.25 m in running bond: nine head joints."""
+def bonded_wall(first=0.25):
+    """Four courses of three stones of 0.5 m by 0.25 m in running bond: ten head joints."""
     blocks = [box(-0.5, -0.5, 2.0, 0.0, "ground", fixed=True, part="ground")]
     for course in range(4):
-        inner = (0.5, 1.0) if course % 2 else (0.25, 0.75, 1.25)
+        inner = (0.5, 1.0) if course % 2 else (first, 0.75, 1.25)
         for left, right in pairwise((0.0, *inner, 1.5)):
             outline = left, 0.25 * course, right, 0.25 * (course + 1)
             blocks.append(box(*outline, f"stone {len(blocks)}", part="wall", role="pier"))
@@ -313,35 +315,37 @@ def wall_model(request):
     return af.build(bonded_wall(), fidelity="rigid", displacements=request.param)
 
 
-def test_head_joints_without_a_force_at_rest_are_no_failures(wall_model):
+def test_head_joints_of_a_wall_are_no_failures(wall_model):
     """Nothing has failed in a wall at rest, nor under a hundredth of its friction."""
     still = af.Motion(0.03 * np.sin(40.0 * np.arange(0.0, 0.2, 0.005)), 0.005)
     given = {"dt": 0.005, "damping": af.StiffnessDamping(0.05, 20.0)}
     run = af.time_history(wall_model, still, until=af.dynamics.CountedMechanism(), **given)
     heads = np.abs(wall_model.structure.normals[:, 0]) > 0.5
-    np.testing.assert_array_equal(run.joints["idle"].values, heads)
+    np.testing.assert_array_equal(run.joints["head"].values, heads)
+    np.testing.assert_array_equal(run.joints["judged"].values, ~heads)
     assert heads.sum() == 10
+    assert run.verdict.assessed.endswith("not assessed: 10 head joints of wall")
     assert not find_failed_joints(run.joints).any()
     assert not any(run.verdict.mechanisms.values())
     assert run.ending is af.dynamics.Ending.FINISHED
-    # without what is known of the rest, their small forces and gaps count
-    assert mechanism_over_record(run.joints.drop_vars("idle")) is not None
+    # taken for bed joints, their small forces and gaps count
+    assert mechanism_over_record(run.joints.drop_vars("head")) is not None
 
 
 def test_bed_joints_of_a_wall_still_fail_and_move(wall_model, tmp_path):
-    """By sliding; idle joints count in no number, and take part in the verified motion.
+    """By sliding; head joints count in no number, and take part in the verified motion.
 
     A vibration doubles a force that begins at once, at most: friction of 0.3 holds below 0.15 g.
     """
     pulse = af.Motion(6.0 * np.sin(10.0 * np.arange(0.0, 0.3, 0.005)), 0.005)
     given = {"dt": 0.005, "damping": af.StiffnessDamping(0.05, 20.0)}
     run = af.time_history(wall_model, pulse, **given)
-    counted, idle = run.mechanism, np.flatnonzero(run.joints["idle"])
+    counted, heads = run.mechanism, np.flatnonzero(run.joints["head"])
     assert 6.0 * np.sin(10.0 * counted.time) > 0.5 * 0.3 * 9.81
-    assert not set(counted.joints) & set(idle)
+    assert not set(counted.joints) & set(heads)
     ended = af.time_history(wall_model, pulse, until=af.dynamics.CountedMechanism(), **given)
     assert ended.time[-1] == counted.time
-    bare = run.joints.drop_vars("idle")
+    bare = run.joints.drop_vars("head")
     found, other = (
         af.limit.first_verified_mechanism(run.structure, each) for each in (run.joints, bare)
     )
@@ -350,5 +354,59 @@ def test_bed_joints_of_a_wall_still_fail_and_move(wall_model, tmp_path):
     assert again.mechanism.joints == counted.joints
 
 
-def test_joints_of_a_ring_are_never_idle(run):
-    assert "idle" not in run.joints.coords
+def test_head_joints_that_carry_at_rest_do_not_count_either():
+    """A wall on two fixed stones, of which the middle sags: its head joints are pressed at rest."""
+    blocks = [
+        box(left, -0.5, left + 0.5, 0.0, f"foot at {left}", fixed=True, part="foot", role="other")
+        for left in (0.0, 1.0)
+    ]
+    for course, inner in enumerate([(0.25, 0.75, 1.25), (0.5, 1.0), (0.25, 0.75, 1.25)]):
+        for left, right in pairwise((0.0, *inner, 1.5)):
+            outline = left, 0.25 * course, right, 0.25 * (course + 1)
+            blocks.append(box(*outline, f"stone {len(blocks)}", part="wall", role="pier"))
+    wall = af.masonry.assembled(blocks, DRY)
+    joints = af.dead_load(af.build(wall, fidelity="rigid")).joints
+    assert float(joints["N"].values[wall.heads].max()) > 0.1 * float(joints["N"].max())
+    flags = joints["slide"] | joints["open"] | (joints["hinge"] != 0)
+    assert flags.values[wall.heads].any()
+    assert not find_failed_joints(joints).values[wall.heads].any()
+
+
+def test_the_median_joint_of_the_shallowest_part_sets_what_is_dislocated(wall_model):
+    """Of bed joints of 0.05 to 0.5 m, not of a sliver; a pier of 0.1 m beside it is shallower."""
+    wall = bonded_wall(0.45)
+    assert wall.depths[wall.judged].min() == pytest.approx(0.05)
+    assert describe_dislocation(wall) == (
+        "dislocated beyond 25 mm of residual displacement, a tenth of the median depth of the "
+        "joints of wall"
+    )
+    post = box(1.8, 0.0, 1.9, 0.5, "post", part="post", role="pier")
+    beside = af.masonry.assembled([*wall.blocks, post], DRY)
+    assert describe_dislocation(beside).startswith("dislocated beyond 10 mm")
+    still = af.Motion(np.zeros(20), 0.005)
+    run = af.time_history(wall_model, still, dt=0.005)
+    said = describe_dislocation(wall_model.structure) in str(run.verdict)
+    assert said == wall_model.large_displacements
+
+
+def test_a_single_joint_that_is_a_mechanism_is_named_in_the_singular():
+    """A joint that hinges from 0.1 s on, of two, where one makes a mechanism."""
+    column = af.column(breadth=0.5, heights=[1.0, 1.0])
+    time = np.arange(0.0, 1.0, 0.1)
+    forces = np.tile([1e4, 0.0, 0.0], (10, 2, 1))
+    forces[1:, 0, 2] = 0.49 * 0.5 * 1e4
+    joints = af.joints.joint_dataset(column, forces, time, criteria=af.Criteria(failures=1))
+    assert total_duration_remark(joints) == (
+        "one joint or more fails for 900 ms in all, 900 ms at the longest"
+    )
+    assert mechanism_over_record(joints).course == "it forms at once"
+
+
+def test_a_stack_and_a_flat_row_of_stones_have_no_head_joints(run):
+    assert "head" not in run.joints.coords
+    assert not run.structure.heads.any()
+    blocks = [box(k, 0.0, k + 1.0, 1.0, f"stone {k}", part="row", role="pier") for k in range(3)]
+    ends = [
+        box(x, 0.0, x + 1.0, 1.0, f"end {x}", fixed=True, part="end", role="other") for x in (-1, 3)
+    ]
+    assert not af.masonry.assembled([*blocks, *ends], DRY).heads.any()

@@ -42,6 +42,14 @@ def test_runs_beside_the_sample_count_for_the_sentence_alone():
     assert "; of those sampled 50% fall (1% to 99%)" in found.sentence
 
 
+def test_the_sentence_names_the_only_motion():
+    """An interval of one motion holds for that motion; without a name motions are varied."""
+    found = made_up([False] * 4, sign=list("aabb"))
+    assert found.sentence == "falls in 0 of 4; of those sampled 0% fall (0% to 60%)"
+    found.dataset.attrs["motion"] = "synthetic 1"
+    assert found.sentence.endswith("(0% to 60%), under 'synthetic 1' alone")
+
+
 def test_a_run_without_an_answer_neither_stands_nor_falls():
     names = ["x", "x", "y", "y", "y"]
     found = made_up(

@@ -212,7 +212,7 @@ def test_a_pier_of_several_stones_a_course():
         box(1.0, 1.0, 3.0, 2.0, "c", part="pier"),
     ]
     found = assembled([ground, *stones], af.masonry.STONE_TO_STONE)
-    names = ["pier, base 1", "pier, base 2", "pier, joint 1", "pier, joint 2", "a to b"]
+    names = ["ground to a", "ground to b", "a to c", "b to c", "a to b"]
     assert [joint.name for joint in found.joints] == names
 
 
