@@ -207,6 +207,16 @@ def describe_supports(structure: Structure, max_names: int = 4) -> str:
     return f"blocks that {'; '.join(groups)}"
 
 
+def describe_depths(structure: Structure) -> str:
+    """Describe the depths of the assessed joints, in one line."""
+    depths = np.where(structure.judged, structure.depths, np.inf)
+    median = float(np.median(depths[structure.judged]))
+    return (
+        f"depth of joints: {format_mm(float(depths.min()))} at least, at "
+        f"{structure.joints[int(depths.argmin())].name}; median {format_mm(median)}"
+    )
+
+
 def describe_collapse(structure: Structure, collapse: Collapse, strength: float | None) -> str:
     """Describe the result of limit analysis: outcome and load, hinges, sliding, crushing."""
     joints = structure.joints

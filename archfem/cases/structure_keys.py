@@ -31,7 +31,7 @@ from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, Contact
 from archfem.masonry.shapes import bridges, rings
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.structure import Joint, Structure, join_names
-from archfem.masonry.survey.outlines import Layer, surveyed
+from archfem.masonry.survey.outlines import Layer, Survey, read_outlines, surveyed
 
 Described = TypeVar("Described")
 
@@ -222,6 +222,16 @@ def _outline_arguments(values: dict[str, Any], settings: Table, folder: Path) ->
     names = sorted({*MATERIAL_PRESETS, *settings.get("materials", {})})
     drawn["materials"] = {name: _resolve_preset(settings, "materials", name) for name in names}
     return drawn
+
+
+def read_survey(settings: Table, folder: Path) -> Survey | None:
+    """Read the drawing of a case alone, without joints; None where it has no drawing."""
+    if (table := settings["structure"]).get("shape") != "outlines":
+        return None
+    values = check_table(table, shape_keys("outlines"), "structure")
+    given = _outline_arguments(_resolve_names(surveyed, values, settings), settings, folder)
+    names = inspect.signature(read_outlines).parameters
+    return read_outlines(**{name: given[name] for name in names if name in given})
 
 
 def _build_parts(part: Callable[..., Described], table: Table, section: str) -> list[Described]:

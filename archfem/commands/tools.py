@@ -20,6 +20,7 @@ from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.examples import copy_example, list_example_titles, read_example, write_new_case
 from archfem.cases.run import HISTORY_FILE, DeadLoadResult, dead_load_of_case
+from archfem.cases.structure_keys import read_survey
 from archfem.cases.toml_file import parse_tables
 from archfem.commands.cli import ExitCode
 from archfem.dynamics.history import History
@@ -32,7 +33,11 @@ PIP_INSTALL = f"{sys.executable} -m pip install"
 def check(options: argparse.Namespace) -> int:
     """Read a case and its motions, and compute limit analysis and dead load."""
     case = Case.read(options.case, options.changes)
-    print(f"{case.title}\n{result_text.describe_supports(case.structure)}")
+    print(case.title)
+    if (survey := read_survey(case.settings, case.folder)) is not None:
+        print(survey)
+    print(result_text.describe_supports(case.structure))
+    print(result_text.describe_depths(case.structure))
     if case.limit.live:
         found = case.limit.solve(case.structure)
         print(result_text.describe_collapse(case.structure, found, case.limit.strength))

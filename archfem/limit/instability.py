@@ -4,7 +4,7 @@ Limit analysis of the weight is repeated with one property relaxed at a time. Th
 lets the structure stand is the cause, and the least change of it the remedy.
 """
 
-from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,26 +60,64 @@ def explain_instability(structure: Structure) -> str | None:
             f"joints hinge ({turning}): it stands if they are {least:.3g} times as deep, at the "
             "same weight; no friction helps"
         )
+    speeds = np.abs(fall.multipliers.reshape(-1, 3)).max(axis=1)
+    rigid = dead.blocks.structure
+    missing = _name_interruption(rigid, np.array(rigid.free)[speeds > 1e-6 * speeds.max()])
     if _stands(dead, friction=unlimited, depth=unlimited):
         moves = [sliding and f"slide ({sliding})", turning and f"hinge ({turning})"]
         return (
-            f"joints {' and '.join(filter(None, moves))}: a stone or a support is missing"
-            f"{_name_ends(structure)}, or it needs both more friction and deeper joints"
+            f"joints {' and '.join(filter(None, moves))}: "
+            f"{missing or 'a stone or a support is missing'}, or it needs both more friction and "
+            "deeper joints"
         )
-    number = int(np.abs(fall.multipliers.reshape(-1, 3)).max(axis=1).argmax())
-    block = dead.blocks.structure.blocks[dead.blocks.structure.free[number]].name
-    return (
+    block = rigid.blocks[rigid.free[int(speeds.argmax())]].name
+    return missing or (
         f"no compression in its joints can hold '{block}', however deep and rough they are: add a "
         "support, or check the outline"
     )
 
 
-def _name_ends(structure: Structure) -> str:
-    """Return the free blocks with one joint, which may lack a neighbour, in words."""
-    count = Counter(number for joint in structure.joints for number in joint.blocks)
-    ends = [structure.blocks[number] for number in structure.free if count[number] == 1]
-    places = [f"'{end.name}' at {say_place(as_point(end.centroid))}" for end in ends[:4]]
-    return f" beside {' or '.join(places)}" if places else ""
+def _name_interruption(structure: Structure, moving: Sequence[int]) -> str:
+    """Return where a chain of moving blocks ends: at a gap, or at nothing; empty if nowhere."""
+    near: dict[int, set[int]] = {number: set() for number in range(len(structure.blocks))}
+    for one, other in structure.pairs:
+        near[one].add(int(other))
+        near[other].add(int(one))
+    blocks = structure.blocks
+    # a block that touches a support alone may hang below it, and ends no chain
+    ends = [n for n in moving if len(near[n]) == 1 and not any(blocks[k].fixed for k in near[n])]
+    named = [f"'{blocks[n].name}' at {say_place(as_point(blocks[n].centroid))}" for n in ends]
+    for end, name in zip(ends, named, strict=True):
+        own = (end, *near[end], *_connected_supports(structure, near, [end]))
+        others = [n for n in near if n not in own]
+        others = [n for n in others if blocks[n].fixed or len(near[n]) == 1]
+        gaps = {n: blocks[end].distance_to(blocks[n]) for n in others}
+        other = min(gaps, key=gaps.__getitem__, default=end)
+        # a missing stone is hardly larger than the one beside it
+        if other != end and gaps[other] <= 1.5 * np.hypot(*np.ptp(blocks[end].points, axis=0)):
+            return (
+                f"it is interrupted, {gaps[other]:.3g} m from {name} to '{blocks[other].name}': "
+                "add the stone between them, which may be on an ignored layer"
+            )
+    if not ends:
+        return ""
+    held = _connected_supports(structure, near, ends)
+    only = f", and only '{blocks[held[0]].name}' holds the others" if len(held) == 1 else ""
+    rest = f"{' and '.join(named[:2])} rest{'s' * (len(ends) == 1)} on nothing"
+    return f"{rest}{only}: add a support, or the stones that are missing"
+
+
+def _connected_supports(
+    structure: Structure, near: Mapping[int, set[int]], starts: Sequence[int]
+) -> list[int]:
+    """Return the fixed blocks that blocks touch, themselves or through others that move."""
+    found, left = set(starts), list(starts)
+    while left:
+        number = left.pop()
+        if not structure.blocks[number].fixed:
+            left += near[number] - found
+            found |= near[number]
+    return sorted(number for number in found if structure.blocks[number].fixed)
 
 
 def _stands(dead: Programme, friction: float | None = None, depth: float = 1.0) -> bool:

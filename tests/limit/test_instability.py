@@ -101,10 +101,36 @@ def test_the_joint_that_slides_and_the_block_that_nothing_holds_are_named():
     assert text.startswith("no compression in its joints can hold 'hanging'")
 
 
-def test_an_arch_without_its_keystone_is_said_to_lack_a_stone():
-    ring = af.circular_arch(radius=3.0, thickness=0.6, embrace=150.0, voussoirs=7)
-    blocks = [block for k, block in enumerate(ring.blocks) if k != ring.free[3]]
-    text = explain_instability(af.masonry.assembled(blocks, af.Contact(1e10, 4e9, 0.6)))
-    ends = "beside 'voussoir 3' at (-1.093, 2.786) or 'voussoir 5' at (1.093, 2.786), or it needs"
-    assert f"a stone or a support is missing {ends}" in text
-    assert "()" not in text
+def ring_without(*missing, embrace=150.0):
+    """A ring of nine stones and two supports without some of its blocks."""
+    ring = af.circular_arch(radius=3.0, thickness=0.4, embrace=embrace, voussoirs=9)
+    blocks = [block for block in ring.blocks if block.name not in missing]
+    return af.masonry.assembled(blocks, af.Contact(1e10, 4e9, 0.6))
+
+
+def test_an_arch_without_its_keystone_is_said_to_be_interrupted():
+    text = explain_instability(ring_without("voussoir 5", embrace=60.0))
+    assert "joints slide (arch, joints 0 and 7) and hinge (" in text
+    assert text.endswith(", or it needs both more friction and deeper joints")
+    for ring in (text, explain_instability(ring_without("voussoir 5"))):
+        assert "interrupted, 0." in ring
+        assert "m from 'voussoir 4' at " in ring
+        assert " to 'voussoir 6': add the stone between them" in ring
+
+
+def test_a_ring_on_one_support_is_named_with_its_end():
+    """Without the right support; and without the stone above it, which lies nearer to the end."""
+    whole = ring_without()
+    right = max((b for b in whole.blocks if b.fixed), key=lambda block: block.centroid[0])
+    left = min((b for b in whole.blocks if b.fixed), key=lambda block: block.centroid[0])
+    end = "voussoir 9"
+    with pytest.raises(af.DidNotConverge, match=f"'{end}' at .* rests on nothing") as caught:
+        af.dead_load(af.build(ring_without(right.name), fidelity="rigid"))
+    assert f"and only '{left.name}' holds the others: add a support, or" in str(caught.value)
+    text = explain_instability(ring_without(end))
+    assert "m from 'voussoir 8' at " in text
+    assert f" to '{right.name}': add the stone between them" in text
+    text = explain_instability(ring_without("voussoir 4", "voussoir 5", "voussoir 6"))
+    assert "'voussoir 3' at " in text
+    assert "'voussoir 7' at " in text
+    assert "rest on nothing: add a support, or the stones that are missing" in text

@@ -1,6 +1,7 @@
 """Drawings read: GeoJSON and DXF, units and layers; and files that are none."""
 
 import json
+import re
 import resource
 import struct
 from itertools import pairwise
@@ -417,3 +418,58 @@ def test_lines_in_place_of_outlines_are_counted(tmp_path):
     drawing.saveas(tmp_path / "lines.dxf")
     with pytest.raises(af.InvalidInput, match="no polylines, but 2 LINE: make a closed one"):
         af.read_outlines(tmp_path / "lines.dxf")
+
+
+def test_the_unit_of_a_drawing_is_judged_before_its_open_ends(tmp_path):
+    """In metres that are millimetres, ends 0.5 mm apart would be 0.5 m."""
+    drawing = ezdxf.new(units=ezdxf.units.M)
+    for k in range(3):
+        corners = [(700.0 * x, 700.0 * y) for x, y in square(k, 0)]
+        drawing.modelspace().add_lwpolyline([*corners, (corners[0][0] + 0.5, corners[0][1])])
+    drawing.saveas(tmp_path / "a.dxf")
+    with pytest.raises(af.InvalidInput, match=r"typically 990 m large.* 2.1 m by unit = \"mm\""):
+        read_drawing(tmp_path / "a.dxf")
+    drawing.units = ezdxf.units.MM
+    drawing.saveas(tmp_path / "a.dxf")
+    assert [outline.name for outline in read_drawing(tmp_path / "a.dxf")] == [
+        *("layer 0, stone 1", "layer 0, stone 2", "layer 0, stone 3")
+    ]
+
+
+@pytest.mark.parametrize("kind", ["dxf", "geojson"])
+def test_check_says_how_a_drawing_was_read(tmp_path, capsys, kind):
+    """Unit, the corner that snap moved by 3 mm, one outline that is ignored, least depth."""
+    stones = {"ROCK": square(0, -1000, 1000), "WALL": square(0, 3, 1000), "NOTE": square(0, 9, 800)}
+    if kind == "dxf":
+        drawing = ezdxf.new(units=ezdxf.units.MM)
+        for layer, points in stones.items():
+            drawing.modelspace().add_lwpolyline(points, close=True, dxfattribs={"layer": layer})
+        drawing.saveas(tmp_path / "a.dxf")
+    else:
+        path = geojson(tmp_path / "a.geojson", stones)
+        path.write_text(re.sub(r'"name": ("\w+")', r'"name": \1, "part": \1', path.read_text()))
+    (tmp_path / "a.toml").write_text(
+        f"""
+[structure]
+shape = "outlines"
+file = "a.{kind}"
+unit = "mm"
+snap = "4 mm"
+
+[structure.layers]
+ROCK = {{ fixed = true }}
+WALL = {{ role = "pier" }}
+NOTE = {{ ignore = true }}
+
+[model]
+fidelity = "rigid"
+"""
+    )
+    assert af.commands.main(["check", str(tmp_path / "a.toml")]) == 0
+    said = capsys.readouterr().out
+    assert (
+        "drawing: read in mm, corners moved by up to 1.5 mm; ignored outlines: 1 on 'NOTE'" in said
+    )
+    assert re.search(
+        r"depth of joints: 1000 mm at least, at WALL, \w+ ?\d?; median 1000 mm", said
+    ), said

@@ -9,7 +9,7 @@ import json
 import re
 from cmath import rect
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -57,6 +57,10 @@ class Frame:
         x, y = np.round(np.multiply(point, [1.0, self.upwards]), 6) / self.factor + 0.0
         return f"({x:.6g}, {y:.6g}) {self.unit}"
 
+    def length(self, value: float) -> str:
+        """Return a length [m] in words, in the unit of the drawing."""
+        return f"{value / self.factor:.3g} {self.unit}"
+
 
 @dataclass(frozen=True, eq=False)
 class Outline:
@@ -72,9 +76,15 @@ class Outline:
 
 
 def read_drawing(
-    path: str | Path, unit: str | None = None, ignored: Collection[str] = (), snap: float = 1e-3
+    path: str | Path,
+    unit: str | None = None,
+    ignored: Counter[str] | None = None,
+    snap: float = 1e-3,
 ) -> list[Outline]:
-    """Read the closed polygons of a drawing, without ignored layers; arcs stray by half of snap."""
+    """Read the closed polygons of a drawing; arcs stray by half of snap.
+
+    Outlines on the layers that are keys of `ignored` are left out, and counted there.
+    """
     path = Path(path)
     readers = {".geojson": _read_geojson, ".json": _read_geojson, ".msh": _read_msh}
     readers |= {".dxf": partial(_read_dxf, snap=snap), ".svg": partial(_read_svg, snap=snap)}
@@ -83,7 +93,7 @@ def read_drawing(
         raise InvalidInput(f"{path} is no drawing: give a .geojson, .dxf, .svg, .ifc or .msh file")
     check_file(path, "drawing", max_bytes=2**25)
     try:
-        outlines = list(read(path, unit, ignored))
+        outlines = list(read(path, unit, ignored or Counter()))
         _check_sizes(outlines)
     except InvalidInput as error:
         raise InvalidInput(f"{path}: {error}") from error
@@ -129,17 +139,23 @@ def _check_sizes(outlines: list[Outline]) -> None:
     """Refuse a drawing without outlines, with too many, or whose unit is evidently wrong."""
     if not outlines:
         raise InvalidInput("it has no closed outlines to read")
-    points = np.concatenate([each.points for each in outlines])
-    if len(points) > 20_000:  # every edge is compared with every vertex
+    points = sum(len(each.points) for each in outlines)
+    if points > 20_000:  # every edge is compared with every vertex
         raise InvalidInput(
-            f"it has {len(points)} vertices, and there is room for 20000: leave out those along "
+            f"it has {points} vertices, and there is room for 20000: leave out those along "
             "straight edges"
         )
+    _check_unit([each.points for each in outlines], outlines[0].frame)
+
+
+def _check_unit(polygons: Sequence[Array], frame: Frame) -> None:
+    """Refuse polygons [m] whose size shows that the unit is wrong."""
     # the median diagonal is insensitive to a few long blocks, such as a fill
-    typical = float(np.median([np.hypot(*np.ptp(each.points, axis=0)) for each in outlines]))
+    typical = float(np.median([np.hypot(*np.ptp(each, axis=0)) for each in polygons]))
     if 0.02 <= typical <= 20.0:
         return
-    away, frame = np.abs(points).max(axis=0), outlines[0].frame
+    points = np.concatenate(polygons)
+    away = np.abs(points).max(axis=0)
     problem = f"a block is typically {typical:.3g} m large"
     # longitudes and latitudes make blocks far smaller than a unit
     if typical < 0.02 and frame == Frame() and away[0] <= 180.0 and away[1] <= 90.0:
@@ -147,7 +163,7 @@ def _check_sizes(outlines: list[Outline]) -> None:
     raise _refuse_unit(problem, points, frame)
 
 
-def _read_geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
+def _read_geojson(path: Path, unit: str | None, ignored: Counter[str]) -> Iterator[Outline]:
     """Read the polygons of a GeoJSON file, or the blocks of a plane assembly of compas."""
     try:
         found = json.loads(read_text(path, "drawing"))
@@ -156,7 +172,9 @@ def _read_geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Ite
     frame = _read_unit(unit or "m")
     if is_assembly(found):
         for name, points, fixed in read_plane_assembly(found):
-            if "blocks" not in ignored:
+            if "blocks" in ignored:
+                ignored["blocks"] += 1
+            else:
                 points = _check_polygon(points, f"'{name}'", frame.factor)
                 yield Outline(points, name, "blocks", fixed=fixed, frame=frame)
         return
@@ -164,7 +182,9 @@ def _read_geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Ite
         raise InvalidInput("it is no GeoJSON FeatureCollection: export the outlines as one")
     for number, feature in enumerate(found["features"], 1):
         outline = _read_feature(_as_table(feature, f"feature {number}"), number, frame.factor)
-        if outline.layer not in ignored:
+        if outline.layer in ignored:
+            ignored[outline.layer] += 1
+        else:
             yield replace(outline, frame=frame)
 
 
@@ -236,7 +256,7 @@ class Entity:
 
 
 def _read_dxf(
-    path: Path, unit: str | None, ignored: Collection[str], snap: float
+    path: Path, unit: str | None, ignored: Counter[str], snap: float
 ) -> Iterator[Outline]:
     """Read the closed polylines of a DXF file, named by the texts inside them."""
     with _foreign_reader("ezdxf", "DXF drawing"):
@@ -262,6 +282,10 @@ def _read_dxf(
     if frame is None:
         problem = "the drawing does not say its unit ($INSUNITS)"
         raise _refuse_unit(problem, np.column_stack([corners.real, corners.imag]))
+    # before ends are compared, whose distance a wrong unit would misstate
+    known = [np.multiply(each.points, frame.factor)[:, :2] for each in polylines if each.points]
+    if corners.size and len(corners) == sum(map(len, known)):
+        _check_unit(known, frame)
     outlines = [_read_polyline(entity, frame, snap, corners) for entity in polylines]
     texts = []
     for entity in read:
@@ -274,7 +298,7 @@ def _read_dxf(
         yield replace(outline, name=_block_name(outline, texts, counts[outline.layer]))
 
 
-def _load_dxf(path: Path, ignored: Collection[str]) -> tuple[list[Entity], Frame | None]:
+def _load_dxf(path: Path, ignored: Counter[str]) -> tuple[list[Entity], Frame | None]:
     """Load all entities of a DXF file but ignored layers, and its unit if it has one."""
     from ezdxf import units  # slow to import
     from ezdxf.enums import InsertUnits
@@ -308,7 +332,7 @@ def _load_dxf(path: Path, ignored: Collection[str]) -> tuple[list[Entity], Frame
 
 
 def _walk_dxf(
-    space: Any, ignored: Collection[str], parent: str | None = None
+    space: Any, ignored: Counter[str], parent: str | None = None
 ) -> Iterator[tuple[Any, str]]:
     """Yield entities and their layers, also those of inserted blocks, but ignored layers."""
     lost: list[tuple[Any, str]] = []  # of a block, which ezdxf does not transform
@@ -320,6 +344,7 @@ def _walk_dxf(
         # within a block, layer 0 is that of the insert
         layer = parent if parent is not None and entity.dxf.layer == "0" else entity.dxf.layer
         if layer in ignored:
+            ignored[layer] += entity.dxftype() in POLYLINES
             continue
         copied = entity.dxftype() == "INSERT" and entity.mcount > 1
         for each in entity.multi_insert() if copied else (entity,):
@@ -391,7 +416,14 @@ def _block_name(outline: Outline, texts: list[tuple[str, Array]], number: int) -
             f"{outline.name} has the texts {inside} in it: leave the one that is its name, and "
             "put notes on a layer that is not read"
         )
-    return inside[0] if inside else f"{outline.layer} {number}"
+    if inside:
+        return inside[0]
+    # a number alone, such as layer 0 of entities without one, is no name
+    return (
+        f"layer {outline.layer}, stone {number}"
+        if outline.layer.isdigit()
+        else f"{outline.layer} {number}"
+    )
 
 
 def _check_polygon(given: Any, name: str, factor: float) -> Array:
@@ -423,7 +455,7 @@ def _check_coordinates(given: Any, name: str, factor: float) -> Array:
 
 
 def _read_svg(
-    path: Path, unit: str | None, ignored: Collection[str], snap: float
+    path: Path, unit: str | None, ignored: Counter[str], snap: float
 ) -> Iterator[Outline]:
     """Read the closed shapes of an SVG file."""
     text = read_text(path, "drawing")
@@ -436,7 +468,7 @@ def _read_svg(
         yield Outline(_check_polygon(points, f"'{name}'", frame.factor), name, layer, frame=frame)
 
 
-def _read_ifc(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
+def _read_ifc(path: Path, unit: str | None, ignored: Counter[str]) -> Iterator[Outline]:
     """Read the solids of an IFC file as an elevation, each on the layer of its class."""
     if unit is not None:
         raise InvalidInput(f"an IFC file states its unit: leave unit = {unit!r} out")
@@ -449,12 +481,14 @@ def _read_ifc(path: Path, unit: str | None, ignored: Collection[str]) -> Iterato
             yield Outline(_check_polygon(points, f"'{solid.name}'", 1.0), solid.name, kind)
 
 
-def _read_msh(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
+def _read_msh(path: Path, unit: str | None, ignored: Counter[str]) -> Iterator[Outline]:
     """Read the physical surfaces of a gmsh mesh."""
     frame = _read_unit(unit or "m")
     for name, points in read_physical_surfaces(path, frame.factor):
-        if infer_part(name) not in ignored:
-            yield Outline(points, name, infer_part(name), frame=frame)
+        if (part := infer_part(name)) in ignored:
+            ignored[part] += 1
+        else:
+            yield Outline(points, name, part, frame=frame)
 
 
 def read_physical_surfaces(path: Path, factor: float = 1.0) -> list[tuple[str, Array]]:

@@ -7,6 +7,7 @@ at most `snap` is made straight. Remaining overlaps and narrow gaps are ambiguou
 
 import json
 import logging
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
@@ -43,7 +44,7 @@ from archfem.masonry.materials import (
 )
 from archfem.masonry.parts import Direction, assign_roles, find_directions
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
-from archfem.masonry.survey.drawings import Outline, read_drawing, read_physical_curves
+from archfem.masonry.survey.drawings import Frame, Outline, read_drawing, read_physical_curves
 from archfem.units import G, in_unit
 
 # Gaps and contacts up to this multiple of the tolerance are taken for errors of the survey [-]
@@ -88,10 +89,21 @@ class Survey:
     Attributes:
         blocks: blocks in the order of the file.
         moved: largest displacement of a vertex by snapping [m].
+        frame: unit of the coordinates.
+        ignored: number of outlines on each ignored layer.
     """
 
     blocks: tuple[Block, ...]
     moved: float
+    frame: Frame
+    ignored: Mapping[str, int]
+
+    def __str__(self) -> str:
+        left = [f"{count} on '{layer}'" for layer, count in self.ignored.items() if count]
+        return (
+            f"drawing: read in {self.frame.unit}, corners moved by up to "
+            f"{self.frame.length(self.moved)}; ignored outlines: {', '.join(left) or 'none'}"
+        )
 
 
 @validate_arguments
@@ -128,7 +140,7 @@ def read_outlines(
             unknown or contradict one another.
     """
     known = layers or {}
-    ignored = [name for name, layer in known.items() if layer.ignore]
+    ignored = Counter({name: 0 for name, layer in known.items() if layer.ignore})
     outlines = read_drawing(path, unit, ignored, snap)
     if layers is not None:
         _check_layers(outlines, layers, path)
@@ -138,11 +150,10 @@ def read_outlines(
             _make_block(outline, polygon, known.get(outline.layer, Layer()), material, materials)
             for outline, polygon in zip(outlines, points, strict=True)
         ]
-        survey = Survey(_assign_corners(assign_roles(blocks)), moved)
+        made = _assign_corners(assign_roles(blocks))
     except (InvalidInput, InvalidStructure) as error:
         raise type(error)(f"{path}: {error}") from error
-    logger.info("%s: vertices moved by up to %.3g mm", path, 1e3 * moved)
-    return survey
+    return Survey(made, moved, outlines[0].frame, ignored)
 
 
 @validate_arguments
@@ -315,10 +326,13 @@ def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
     ]
     higher = [value for value in values if snap < value <= largest]
     lower = [value for value in values[::-1] if 0.05 * snap <= value < snap]
-    for value in higher + lower:
-        if _closes_all(outlines, value):
-            verb = "raise" if value > snap else "lower"
-            raise InvalidStructure(f"{advice}, or {verb} snap from {snap:.3g} to {value:.3g} m")
+    frame = outlines[0].frame
+    for verb, values in (("raise", higher), ("lower", lower)):
+        if value := next((each for each in values if _closes_all(outlines, each)), None):
+            advice += f", or {verb} snap from {snap / frame.factor:.3g} to {frame.length(value)}"
+            if value > 2.0 * snap:
+                advice += ", which also closes real openings up to that"
+            break
     raise InvalidStructure(advice)
 
 
@@ -333,7 +347,8 @@ def _closes_all(outlines: list[Outline], snap: float) -> bool:
 
 def _close_gaps(outlines: list[Outline], snap: float) -> Closed:
     """Close the gaps between outlines; refuse what remains ambiguous."""
-    names, place = [outline.name for outline in outlines], outlines[0].frame.place
+    names, frame = [outline.name for outline in outlines], outlines[0].frame
+    place, near = frame.place, frame.length(snap)
     # all outlines anticlockwise
     drawn = [outline.points for outline in outlines]
     oriented = [points if measure_polygon(points)[0] > 0.0 else points[::-1] for points in drawn]
@@ -345,7 +360,7 @@ def _close_gaps(outlines: list[Outline], snap: float) -> Closed:
     for outline, boundary in zip(outlines, boundaries, strict=True):
         if len(boundary) < 3:
             where = f"'{outline.name}' at {place(outline.points[0])}"
-            raise InvalidStructure(f"{where} is no larger than snap = {snap:.3g} m: leave it out")
+            raise InvalidStructure(f"{where} is no larger than snap = {near}: leave it out")
     ties = _find_ties(boundaries, places, snap)
     ties |= _find_bends(boundaries, places, ties, snap)
     placed = _place_tied(places, ties)
@@ -357,7 +372,7 @@ def _close_gaps(outlines: list[Outline], snap: float) -> Closed:
         owner = np.repeat(names, [len(points) for points in oriented])[worst]
         raise InvalidStructure(
             f"the corner of '{owner}' at {place(given[worst])} would move by "
-            f"{1e3 * moved[worst]:.3g} mm to touch all outlines nearer than snap = {snap:.3g} m: "
+            f"{1e3 * moved[worst]:.3g} mm to touch all outlines nearer than snap = {near}: "
             "correct the outlines there, leave out vertices that follow one another so closely"
         )
     found = [placed[boundary] for boundary in boundaries]
@@ -504,10 +519,10 @@ def _check_gaps(
     if not found:
         return
     (width, place), (one, other) = max((gap, sorted(pair)) for pair, gap in found.items())
+    frame = outlines[one].frame
     more = f", the widest of {len(found)} gaps" if len(found) > 1 else ""
     raise InvalidStructure(
         f"the faces of '{outlines[one].name}' and '{outlines[other].name}' are "
-        f"{1e3 * width:.3g} mm apart at {outlines[one].frame.place(places[place])}{more}, an "
-        f"open joint only by a snap below {width / AMBIGUOUS_GAP_RATIO:.3g} m: draw faces "
-        "that touch"
+        f"{1e3 * width:.3g} mm apart at {frame.place(places[place])}{more}: draw faces that "
+        f"touch, or an open joint of more than {frame.length(AMBIGUOUS_GAP_RATIO * snap)}"
     )

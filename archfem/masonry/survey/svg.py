@@ -8,7 +8,7 @@ executed, and no other file is read.
 import re
 from cmath import phase, rect
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from math import ceil, cos, radians, sin, sqrt, tan, tau
 from xml.etree import ElementTree as XML
@@ -41,12 +41,12 @@ Segment = tuple[complex, ...]
 
 
 def read_svg(
-    text: str, near: float, ignored: Collection[str] = ()
+    text: str, near: float, ignored: Counter[str] | None = None
 ) -> Iterator[tuple[str, str, Array]]:
     """Yield name, layer and vertices (n, 2) of the closed shapes, y upwards, in units of the file.
 
-    Shapes in ignored layers are left out. Chords deviate from curves by at most `near`, by which
-    ends of a closed shape may be apart.
+    Shapes in layers that are keys of `ignored` are left out, and counted there. Chords deviate
+    from curves by at most `near`, by which ends of a closed shape may be apart.
     """
     if "<!ENTITY" in text:
         raise InvalidInput("it defines entities, which are not read: save it as plain SVG")
@@ -56,9 +56,10 @@ def read_svg(
         raise InvalidInput(f"it is no SVG: {error}") from error
     if _kind(root) != "svg":
         raise InvalidInput(f"it is no SVG: its root is '{_kind(root)}'")
-    numbers = Counter[str]()
+    numbers, ignored = Counter[str](), ignored or Counter()
     for element, layer, matrix in _walk(root, "drawing", np.eye(3)):
         if layer in ignored:
+            ignored[layer] += 1
             continue
         numbers[layer] += 1
         name = element.get("id") or f"{layer} {numbers[layer]}"
