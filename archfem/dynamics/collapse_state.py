@@ -12,7 +12,7 @@ from archfem._typing import Array, Flags
 from archfem._validation import validate_arguments
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.errors import InvalidInput
-from archfem.masonry.stiffness_ratio import list_stones
+from archfem.masonry.stiffness_ratio import find_soft_blocks, list_stones
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt
 from archfem.units import format_mm
@@ -184,6 +184,19 @@ def describe_dislocation(structure: Structure) -> str:
     return (
         f"dislocated beyond {format_mm(DISLOCATION * depth)} of residual displacement, a tenth of "
         f"the median depth of the joints of {part or 'the ring'}"
+    )
+
+
+def doubt_soft_blocks(structure: Structure) -> tuple[Doubt, ...]:
+    """Return the doubt of falls in which soft blocks, as fill in one piece, are rigid bodies."""
+    soft = [structure.blocks[number].name for number in find_soft_blocks(structure)]
+    if not soft:
+        return ()
+    return (
+        Doubt(
+            f"a fall takes soft blocks for rigid bodies, each in one piece: {join_names(soft)}",
+            'cut them with jointed_fill (law = "jointed" in a case)',
+        ),
     )
 
 

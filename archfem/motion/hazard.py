@@ -2,6 +2,7 @@
 
 Rates are straight lines in double logarithm between the points that are given, and beyond them
 along the last lines. Probabilities in a time T are those of a Poisson process, 1 - exp(-rate T).
+Curves of sites steepen with the intensity, so that a rate beyond the last point is often too large.
 """
 
 import csv
@@ -28,6 +29,13 @@ MEASURES = {"pga": "m/s²", "pgv": "m/s", "sa": "m/s²", "sa_avg": "m/s²"}
 
 # Largest intensity of a hazard curve [m/s² or m/s]: the unit of a larger one must be wrong
 LARGEST = {"pga": 200.0, "pgv": 20.0, "sa": 200.0, "sa_avg": 200.0}
+
+# Return period of the design earthquake in most codes, 10 % in 50 years [year]
+DESIGN_PERIOD = 475.0
+
+# Longest return period of maps for codes, 2 % in 50 years, to which power laws are fitted [year]:
+# rarer intensities are extrapolated
+LONGEST_PERIOD = 2475.0
 
 # Names that OpenQuake gives to measures, and their unit in ours
 OPENQUAKE_UNITS = {"PGA": ("pga", 9.80665), "PGV": ("pgv", 0.01), "SA": ("sa", 9.80665)}
@@ -89,7 +97,7 @@ class Hazard:
     def power(
         cls, factor: float, exponent: float, *, measure: str = "pga", period: float | None = None
     ) -> "Hazard":
-        """Return the curve rate = factor · intensity^(-exponent).
+        """Return the curve rate = factor · intensity^(-exponent), by points at 475 and 2475 years.
 
         Args:
             factor: annual rate at intensity 1 in SI units [1/year].
@@ -99,9 +107,10 @@ class Hazard:
         """
         if not (factor > 0.0 and exponent > 0.0):
             raise InvalidInput(f"hazard {factor} · a^-{exponent}: give two numbers above 0")
-        check_choice(measure, "measure", tuple(MEASURES))
-        ends = np.array([0.01, LARGEST[measure]])
-        return cls(ends, factor * ends**-exponent, measure=measure, period=period)
+        periods = np.array([DESIGN_PERIOD, LONGEST_PERIOD])
+        with np.errstate(over="ignore"):  # an infinite intensity is refused
+            points = (factor * periods) ** (1.0 / exponent)
+        return cls(points, 1.0 / periods, measure=measure, period=period)
 
     @classmethod
     @validate_arguments
@@ -172,8 +181,23 @@ class Hazard:
         given = check_array(intensity, "intensity")
         if (given <= 0.0).any():
             raise InvalidInput(f"intensity {float(given.min()):g}: a rate needs one above 0")
-        x = np.log(given)
-        points, values = np.log(self.intensity), np.log(self.rate)
-        piece = np.clip(np.searchsorted(points, x) - 1, 0, len(points) - 2)
-        slopes = np.diff(values) / np.diff(points)
-        return np.asarray(np.exp(values[piece] + slopes[piece] * (x - points[piece])))
+        return _along(given, self.intensity, self.rate)
+
+    def intensity_of(self, years: float | Sequence[float] | Array) -> Array:
+        """Return the intensities of return periods, the inverse of `rate_of`.
+
+        Args:
+            years: return periods, above 0, of any shape [year].
+        """
+        given = check_array(years, "years")
+        if (given <= 0.0).any():
+            raise InvalidInput(f"return period {float(given.min()):g}: give one above 0")
+        return _along(given, 1.0 / self.rate, self.intensity)
+
+
+def _along(x: Array, points: Array, values: Array) -> Array:
+    """Return values at x > 0 along straight lines in double logarithm, the last ones continued."""
+    x, points, values = np.log(x), np.log(points), np.log(values)
+    piece = np.clip(np.searchsorted(points, x) - 1, 0, len(points) - 2)
+    slopes = np.diff(values) / np.diff(points)
+    return np.asarray(np.exp(values[piece] + slopes[piece] * (x - points[piece])))

@@ -12,8 +12,10 @@ References:
 
 import json
 import logging
+import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, astuple, dataclass, replace
 from functools import cached_property
 from math import exp, inf, nan, sqrt
 from pathlib import Path
@@ -37,17 +39,18 @@ from archfem._validation import (
     validate_methods,
 )
 from archfem.dynamics.analysis import Analysis
-from archfem.dynamics.collapse_state import FALLEN_STATES
+from archfem.dynamics.collapse_state import FALLEN_STATES, doubt_soft_blocks
 from archfem.dynamics.motion_scaling import admissible_range, check_search
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt
-from archfem.motion.hazard import MEASURES, Hazard
+from archfem.motion.hazard import DESIGN_PERIOD, MEASURES, Hazard
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.motion.suite import Suite
+from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.modes import modes
 from archfem.studies.fragility import (
     Fragility,
@@ -71,8 +74,12 @@ logger = logging.getLogger("archfem")
 # Properties that are varied by default; the alternatives of joint rules are for `alternatives`
 VARIED = ("k_n", "k_s", "friction", "damping_ratio")
 
-# Number of samples before the others begin their search at the median of these [-]
+# Number of samples before the others begin their search at the median of these, and the smallest
+# number of answers with which a lognormal is fitted [-]
 FIRST_ROUND = 8
+
+# Variables of the table that are results
+RESULTS = ("lower", "upper", "runs", "error")
 
 # Peak acceleration at which those begin [m/s²]
 FIRST_PEAK = 2.0
@@ -156,7 +163,8 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
             stones with 5 % of damping.
         motions: records; their own scales do not matter.
         hazard: of the site.
-        samples: number of samples, at least 8.
+        samples: number of samples, at least 8. With a larger one than that of `out` the samples
+            kept there stay, and a further hypercube is added.
         vary: as for `verdict_range`, of properties alone; by default "k_n", "k_s", "friction" and
             "damping_ratio".
         alternatives: by label, a weight and an analysis or a structure, such as joints of other
@@ -172,7 +180,8 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
 
     Raises:
         InvalidInput: an argument is out of range, or `out` is of other arguments.
-        DidNotConverge: a structure does not stand under dead load, or no run has an answer.
+        DidNotConverge: a structure does not stand under dead load, fewer than half of the first 8
+            samples have an answer, or fewer than 8 of all.
     """
     check_type(hazard, Hazard, "hazard", "give an archfem.Hazard")
     check_integer(samples, "samples", minimum=FIRST_ROUND)
@@ -183,18 +192,16 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
         raise InvalidInput(f"{len(records)} motion: give several records, seven or more at best")
     tree = _resolve_alternatives(analysis, alternatives)
     ranges = _check_varied(vary or {})
-    draws = sample_changes(ranges, samples, seed)
-    random = np.random.default_rng(seed)
-    labels = _draw_labels({label: weight for label, (weight, _) in tree.items()}, samples, random)
-    order = _deal_records(len(records), samples, random)
+    weights = {label: weight for label, (weight, *_) in tree.items()}
+    blocks = _size_blocks(out, samples)
+    parts = [_draw_samples(ranges, weights, len(records), *block, seed) for block in blocks]
+    draws = [row for part in parts for row in part[0]]
+    labels, order = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     table = _describe_samples(ranges, draws, labels, order)
-    table = table.assign(_measure_records(tree, records, hazard))
-    inputs = [each.fingerprint for _, each in tree.values()]
-    table.attrs |= {
-        "hazard": json.dumps(_write_hazard(hazard)),
-        "inputs": json.dumps([*inputs, width, list(between), seed]),
-    }
-    table = _continue_file(out, table)
+    table = table.assign(_measure_records(next(iter(tree.values()))[2], records, hazard))
+    table.attrs |= _describe_inputs(tree, hazard, [width, list(between), seed])
+    table.attrs["blocks"] = json.dumps([size for _, size in blocks])
+    _continue_file(out, table)
     for begin, end in ((0, FIRST_ROUND), (FIRST_ROUND, samples)):
         todo = [k for k in range(begin, end) if not table["runs"].values[k]]
         scales = _first_scales(table, hazard.measure, begin)
@@ -212,7 +219,56 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
             _store_row(table, k, row)
             if out is not None:
                 write_dataset(table, Path(out), {})
-    return CollapseRisk(table)
+    found = CollapseRisk(table)
+    found.check_answered()
+    return found
+
+
+def _size_blocks(out: str | Path | None, samples: int) -> list[tuple[int, int]]:
+    """Return beginning and size of each hypercube: those of a file, and one of what is added."""
+    sizes = [samples]
+    if out is not None and Path(out).exists():
+        kept = read_dataset(out, "file of a risk")
+        sizes = json.loads(kept.attrs.get("blocks", f"[{kept.sizes.get('sample', 0)}]"))
+        if (added := samples - sum(sizes)) < 0:
+            raise InvalidInput(
+                f"{out} has {sum(sizes)} samples, and a part of a Latin hypercube is none: give "
+                f"samples = {sum(sizes)} or more, or name another file"
+            )
+        sizes += [added] if added else []
+    return [(sum(sizes[:k]), size) for k, size in enumerate(sizes)]
+
+
+def _draw_samples(
+    ranges: Mapping[str, Any],
+    weights: Mapping[str, float],
+    records: int,
+    begin: int,
+    size: int,
+    seed: int,
+) -> tuple[list[dict[str, Any]], Any, Any]:
+    """Return properties, alternative and record of the samples of one hypercube."""
+    # that of samples added later has a seed of its own, and leaves those before as they are
+    own = int(np.random.SeedSequence([seed, begin]).generate_state(1)[0]) if begin else seed
+    random = np.random.default_rng(own)
+    labels = _draw_labels(weights, size, random)
+    return sample_changes(ranges, size, own), labels, _deal_records(records, size, random)
+
+
+def _describe_inputs(
+    tree: Mapping[str, tuple[float, Analysis, Equilibrium]], hazard: Hazard, options: list[Any]
+) -> dict[str, str]:
+    """Return hazard, digests of the inputs, and doubts of the structures, as texts."""
+    doubts = [
+        doubt
+        for _, each, rest in tree.values()
+        for doubt in (*rest.model.doubts, *doubt_soft_blocks(each.structure))
+    ]
+    return {
+        "hazard": json.dumps(_write_hazard(hazard)),
+        "inputs": json.dumps([*(each.fingerprint for _, each, _ in tree.values()), *options]),
+        "doubts": json.dumps([astuple(doubt) for doubt in dict.fromkeys(doubts)]),
+    }
 
 
 def _check_varied(vary: Mapping[str, Any]) -> dict[str, Any]:
@@ -229,8 +285,8 @@ def _check_varied(vary: Mapping[str, Any]) -> dict[str, Any]:
 
 def _resolve_alternatives(
     analysis: Analysis | Structure, alternatives: Mapping[str, tuple[float, Any]] | None
-) -> dict[str, tuple[float, Analysis]]:
-    """Return weight and analysis of each alternative, weights adding up to 1."""
+) -> dict[str, tuple[float, Analysis, Equilibrium]]:
+    """Return weight, analysis and dead load of each alternative, weights adding up to 1."""
     given = dict(alternatives or {"as given": (1.0, analysis)})
     weights = [check_number(weight, "weight", minimum=0.0) for weight, _ in given.values()]
     if not sum(weights) > 0.0:
@@ -240,8 +296,8 @@ def _resolve_alternatives(
         if isinstance(each, Structure) and isinstance(analysis, Analysis):
             each = replace(analysis, structure=each)
         falling = replace(as_falling(each), record=Record(whole_fall=False))
-        falling.dead_load()  # a structure that does not stand is refused before any run
-        tree[label] = weight / sum(weights), falling
+        # a structure that does not stand is refused before any run
+        tree[label] = weight / sum(weights), falling, falling.dead_load()
     return tree
 
 
@@ -259,10 +315,9 @@ def _deal_records(records: int, count: int, random: np.random.Generator) -> Any:
 
 
 def _measure_records(
-    tree: Mapping[str, tuple[float, Analysis]], records: Sequence[Motion], hazard: Hazard
+    rest: Equilibrium, records: Sequence[Motion], hazard: Hazard
 ) -> dict[str, Any]:
     """Return the intensities of the records, unscaled, by measure, each over `record`."""
-    rest = next(iter(tree.values()))[1].dead_load()
     period = 1.0 / float(modes(rest.model, 1, rest).frequencies[0])
     band = np.geomspace(0.2 * period, 3.0 * period, 10)
     rows = []
@@ -295,21 +350,25 @@ def _describe_samples(
     return xr.Dataset(columns, attrs={"properties": json.dumps(list(ranges))})
 
 
-def _continue_file(out: str | Path | None, table: xr.Dataset) -> xr.Dataset:
-    """Return the table of a file if it is of the same arguments, else the new one."""
+def _continue_file(out: str | Path | None, table: xr.Dataset) -> None:
+    """Store the results that a file has of the same samples, its first ones."""
     if out is None or not Path(out).exists():
-        return table
+        return
     kept = read_dataset(out, "file of a risk")
+    count = kept.sizes.get("sample", 0)
+    first = table.isel(sample=slice(count))
     same = all(
-        key in kept and np.array_equal(kept[key].values, table[key].values)
-        for key in table
-        if key not in ("lower", "upper", "runs", "error")
+        key in kept and np.array_equal(kept[key].values, first[key].values)
+        for key in first
+        if key not in RESULTS
     )
-    if not same or any(kept.attrs.get(key) != value for key, value in table.attrs.items()):
+    keys = ("properties", "hazard", "inputs")
+    if not same or any(kept.attrs.get(key) != table.attrs[key] for key in keys):
         raise InvalidInput(
             f"{out} has samples of other arguments: name another file, or delete this one"
         )
-    return kept.load()
+    for name in RESULTS:
+        table[name].values[:count] = kept[name].values
 
 
 def _first_scales(table: xr.Dataset, measure: str, begin: int) -> Array:
@@ -319,11 +378,7 @@ def _first_scales(table: xr.Dataset, measure: str, begin: int) -> Array:
     if not begin:
         return np.asarray(FIRST_PEAK / unscaled)
     found = CollapseRisk(table.isel(sample=slice(begin)))
-    if not len(found.answered):
-        raise DidNotConverge(
-            f"none of the first {begin} samples has a capacity: {table['error'].values[0]}",
-            last=None,
-        )
+    found.check_answered(FIRST_ROUND // 2)  # of fewer than half the rate would say nothing
     low, high = found.capacities(name)
     middle = np.where(np.isfinite(high), np.sqrt(np.maximum(low, high / 4.0) * high), 2.0 * low)
     return np.asarray(float(np.median(middle)) / unscaled)
@@ -367,6 +422,36 @@ class CollapseRisk(ResultDisplay):
         """Numbers of the samples with a capacity (n,)."""
         return np.flatnonzero((self.dataset["runs"] > 0) & (self.dataset["error"] == ""))
 
+    def check_answered(self, needed: int = FIRST_ROUND) -> None:
+        """Refuse too few samples with an answer.
+
+        Args:
+            needed: number of those that are needed.
+
+        Raises:
+            DidNotConverge: there are fewer.
+        """
+        if len(self.answered) < needed:
+            raise DidNotConverge(
+                f"{self._describe_missing()}; a rate needs {FIRST_ROUND} answers: cure that, or "
+                "give more samples",
+                last=None,
+            )
+
+    def _describe_missing(self) -> str:
+        """Say how many samples have no answer, with the most common reason and its remedy."""
+        errors = [" ".join(str(error).split()) for error in self.dataset["error"].values]
+        failed = [error for error in errors if error]
+        if not failed:
+            return f"{len(errors) - len(self.answered)} of {len(errors)} samples were not run yet"
+        # reasons are the same that differ in names and numbers alone
+        kinds = [re.sub(r"'[^']*'|\d[\d.e+-]*", "", error) for error in failed]
+        kind, often = Counter(kinds).most_common(1)[0]
+        reason = failed[kinds.index(kind)].partition(": ")[2]
+        share = "" if often == len(failed) else f", {often} of them"
+        verb = "has" if len(failed) == 1 else "have"
+        return f"{len(failed)} of {len(errors)} samples {verb} no answer{share} because {reason}"
+
     def capacities(self, measure: str | None = None) -> tuple[Array, Array]:
         """Return the brackets of the intensity at which each answered sample falls, each (n,).
 
@@ -393,7 +478,9 @@ class CollapseRisk(ResultDisplay):
 
         Raises:
             InvalidInput: more than half of the samples never fall.
+            DidNotConverge: fewer than 8 samples have an answer.
         """
+        self.check_answered()
         name = measure or self.hazard.measure
         if name not in self._known_curves:
             low, high = self.capacities(name)
@@ -450,7 +537,9 @@ class CollapseRisk(ResultDisplay):
 
         Raises:
             InvalidInput: there is no such alternative, or it has fewer than 8 answered samples.
+            DidNotConverge: fewer than 8 samples have an answer.
         """
+        self.check_answered()
         if alternative in self._known_rates:
             return self._known_rates[alternative]
         labels = self._of_answered("alternative")
@@ -525,20 +614,18 @@ class CollapseRisk(ResultDisplay):
         """Reasons why the rate may be wrong, each with its remedy."""
         last, unit = self.hazard.intensity[-1], MEASURES[self.hazard.measure]
         edges, shares = self.disaggregation(240)
-        beyond, doubts = float(shares[edges[:-1] > last].sum()), []
+        beyond = float(shares[edges[:-1] > last].sum())
+        doubts = [Doubt(*each) for each in json.loads(self.dataset.attrs.get("doubts", "[]"))]
         if beyond > LARGEST_EXTRAPOLATED_SHARE:
             cause = (
-                f"{beyond:.0%} of the rate comes from intensities above {last:.3g} {unit}, the "
-                "last of the hazard, whose slope is extrapolated there"
+                f"{beyond:.0%} of the rate comes from intensities above {last:.3g} {unit}, once in "
+                f"{1.0 / self.hazard.rate[-1]:.4g} years, where the hazard is extrapolated"
             )
-            doubts.append(Doubt(cause, "give the hazard at longer return periods"))
+            doubts.append(Doubt(cause, "give its points at longer return periods"))
         count = len(self.dataset["sample"])
         # a twentieth of all is what the 90 % interval leaves out at each of its ends
-        if (missing := count - len(self.answered)) > 0.05 * count:
-            cause = (
-                f"{missing} of {count} samples have no answer, and the rate is that of the others"
-            )
-            doubts.append(Doubt(cause, "read their `error` in the dataset"))
+        if count - len(self.answered) > 0.05 * count:
+            doubts.append(Doubt(f"the rate is that of some: {self._describe_missing()}", ""))
         return tuple(doubts)
 
     @property
@@ -546,13 +633,15 @@ class CollapseRisk(ResultDisplay):
         """The rate, and what it rests on."""
         curve, parts = self.fragility(), self.dispersions()
         records = len(np.unique(self._of_answered("record_number")))
+        times = curve.median / float(self.hazard.intensity_of(DESIGN_PERIOD))
         failed = len(self.dataset["sample"]) - len(self.answered)
         known = ", ".join(f"{name} {x:.2f}" for name, x in parts.items() if name != "total")
         shares = "its parts unknown, with one sample a record" if "nan" in known else known
         text = (
             f"falls at {self.rate()}; median {curve.median:.3g} "
-            f"{MEASURES[self.hazard.measure]} of {self.hazard.measure}, dispersion "
-            f"{curve.dispersion:.2f} ({shares}); {self.best_measure} has the least dispersion; "
+            f"{MEASURES[self.hazard.measure]} of {self.hazard.measure}, {times:.2g} times that of "
+            f"{DESIGN_PERIOD:g} years, dispersion {curve.dispersion:.2f} ({shares}); "
+            f"{self.best_measure} has the least dispersion; "
             f"{len(self.answered)} samples under {records} records"
         )
         return text + (f"; {failed} samples have no answer" if failed else "")

@@ -132,7 +132,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         ),
         (
             "annual rate",
-            "PGA 3, 8 m/s² once in 475, 2475 years",
+            "PGA 3, 8 m/s² once in 475, 2475 years, rate 0.0134 a^-1.68",
             "median PGA 6 m/s², falls at 0.002 a year",
             "2, 0.75",
         ),
@@ -145,6 +145,16 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert "right and left: a code: capacity 0.11 m" in texts[checks]
     assert texts[checks + 1] == "In doubt: an upper bound."
     assert dict(list_facts(data))["in doubt"] == "limit analysis, kinematic assessment"
+    # of a law, and of a curve of many points, the intensities of return periods of codes
+    law, points = af.Hazard.power(0.02116, 3.0), 1.0 + np.arange(6.0)
+    for site, demand in (
+        (law, "PGA 2.16, 3.74 m/s² once in 475, 2475 years, rate 0.0212 a^-3"),
+        (af.Hazard(points, law.rate_of(points)), "PGA 2.16 m/s² once in 475 years"),
+    ):
+        settings = risk_keys.RiskSettings(site, {}, {})
+        data = report_data.ReportData(replace(case, risk=settings), found.runs, found.folder)
+        (table,) = (each for each in build_conclusion(data).pieces[:-1] if each.kind == "grid")
+        assert (table.rows[-1][1], table.rows[-1][3][:4]) == (demand, "2.78")
     assert signatures.rows == [("author", "A. Mason", "", ""), ("checked by", "", "", "")]
 
 

@@ -10,6 +10,25 @@ def test_a_power_law_is_that_law():
     site = af.Hazard.power(2e-3, 2.5)
     x = np.array([1e-3, 0.3, 1.0, 7.0, 500.0])  # also beyond the points
     assert site.rate_of(x) == pytest.approx(2e-3 * x**-2.5, rel=1e-12)
+    # its points are those of codes, and none is made up
+    assert 1.0 / site.rate == pytest.approx([475.0, 2475.0], rel=1e-12)
+    periods = np.array([1.0, 475.0, 1e5])
+    assert site.intensity_of(periods) == pytest.approx((2e-3 * periods) ** 0.4, rel=1e-12)
+    with pytest.raises(af.InvalidInput, match="return period -1"):
+        site.intensity_of(-1.0)
+
+
+@pytest.mark.parametrize(("factor", "exponent"), [(1.0, 1.0), (0.02, 1e-3)])
+def test_a_law_of_another_unit_is_refused(factor, exponent):
+    """At 2475 years 2475 m/s², or more than a number can be."""
+    with pytest.raises(af.InvalidInput, match=r"hazard reaches 2475|= inf"):
+        af.Hazard.power(factor, exponent)
+
+
+def test_intensities_of_return_periods_are_those_of_their_rates():
+    site = af.Hazard.from_return_periods({30.0: 0.5, 475.0: 4.0, 2475.0: 7.0, 9975.0: 9.0})
+    x = np.array([0.1, 0.5, 3.0, 4.0, 6.0, 20.0])
+    assert site.intensity_of(1.0 / site.rate_of(x)) == pytest.approx(x, rel=1e-12)
 
 
 def test_return_periods_are_met_and_joined_in_logarithms():

@@ -3,7 +3,7 @@
 import json
 import re
 import tomllib
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +80,20 @@ def test_a_rate_from_beyond_the_last_point_of_the_hazard_is_in_doubt(last):
         assert f"{share:.0%} of the rate comes from intensities above {last:g}" in str(risk)
 
 
+@pytest.mark.parametrize(("factor", "doubted"), [(2e-3, True), (0.05, False)])
+def test_a_rate_from_beyond_the_periods_of_codes_is_in_doubt_with_a_law(factor, doubted):
+    """Of 2e-3 a^-2.5 the intensity at 2475 years is 1.9 m/s², of 0.05 a^-2.5 6.86 m/s²."""
+    risk = risk_of(5.0 * np.exp(0.4 * norm.ppf((np.arange(400) + 0.5) / 400)), np.arange(400) % 20)
+    law = af.Hazard.power(factor, 2.5)
+    risk.dataset.attrs["hazard"] = json.dumps(
+        {"intensity": law.intensity.tolist(), "rate": law.rate.tolist(), "measure": "pga"}
+    )
+    words = f"above {(2475.0 * factor) ** 0.4:.3g} m/s², once in 2475 years"
+    assert (words in str(risk)) == doubted == bool(risk.doubts)
+    ratio = 5.0 / (475.0 * factor) ** 0.4
+    assert f"of pga, {ratio:.2g} times that of 475 years" in risk.sentence
+
+
 def test_the_interval_holds_the_rate_as_often_as_it_says():
     """Each record has one sample: ln λ varies by b² β² / n (1 + b² β² / 2)."""
     random, inside, widths = np.random.default_rng(1), 0, []
@@ -153,7 +167,28 @@ def test_many_samples_without_an_answer_are_a_doubt(missing):
     risk = risk_of(np.geomspace(3.0, 6.0, 40), np.arange(40) % 8)
     risk.dataset["error"].values = np.array(["it failed"] * missing + [""] * (40 - missing))
     assert f"{missing} samples have no answer" in risk.sentence
-    assert ("3 of 40 samples have no answer" in str(risk.doubts)) == (missing == 3)
+    assert ("3 of 40 samples have no answer because" in str(risk.doubts)) == (missing == 3)
+
+
+def slid(time, joint):
+    return f"DidNotConverge: by t = {time} s the faces of '{joint}' had slid; take fewer cells"
+
+
+def test_the_most_common_reason_is_given_of_samples_without_an_answer():
+    risk = risk_of(np.geomspace(3.0, 6.0, 12), np.arange(12) % 3)
+    errors = ["InvalidInput: another", slid(1.92, "stone 30"), slid(2.5e-1, "stone 1"), *[""] * 9]
+    risk.dataset["error"].values = np.array(errors, object)
+    (doubt,) = (str(each) for each in risk.doubts if "answer" in str(each))
+    reason = slid(1.92, "stone 30").removeprefix("DidNotConverge: ")
+    assert doubt.endswith(f"3 of 12 samples have no answer, 2 of them because {reason}")
+    few = CollapseRisk(risk.dataset.isel(sample=slice(10)))
+    for ask in (few.rate, few.fragility, lambda: str(few)):
+        with pytest.raises(af.DidNotConverge, match=r"3 of 10 .* take fewer cells; a rate needs 8"):
+            ask()
+    few = CollapseRisk(few.dataset.assign(error=("sample", np.array([""] * 10))))
+    few.dataset["runs"].values[:4] = 0
+    with pytest.raises(af.DidNotConverge, match="4 of 10 samples were not run yet"):
+        few.rate()
 
 
 def test_a_motion_of_nothing_is_refused():
@@ -273,6 +308,27 @@ def test_samples_are_kept_and_continued(tmp_path, monkeypatch, quick_runs):
         af.collapse_risk(analysis, motions, SITE, **options | {"seed": 1})
 
 
+def test_samples_are_added_to_those_of_a_file(tmp_path, quick_runs):
+    analysis, motions = tilted_block()
+    options = {"out": tmp_path / "risk.nc", "precision": 0.02}
+    first = af.collapse_risk(analysis, motions, SITE, samples=10, **options).dataset
+    more = af.collapse_risk(analysis, motions, SITE, samples=26, **options).dataset
+    for name in ("friction", "record_number", "lower", "upper"):
+        np.testing.assert_array_equal(more[name].values[:10], first[name].values)
+    # those added are a Latin hypercube: one in each sixteenth of the range
+    added = more["friction"].values[10:]
+    assert sorted(np.floor((added + 0.1) / 0.2 * 16.0).astype(int)) == list(range(16))
+    assert (more["runs"].values > 0).all()
+    again = af.collapse_risk(analysis, motions, SITE, samples=26, **options).dataset
+    xr.testing.assert_identical(again, more)
+    third = af.collapse_risk(analysis, motions, SITE, samples=27, **options).dataset
+    np.testing.assert_array_equal(third["friction"].values[:26], more["friction"].values)
+    with pytest.raises(af.InvalidInput, match=r"has 27 samples.*give samples = 27 or more"):
+        af.collapse_risk(analysis, motions, SITE, samples=26, **options)
+    with pytest.raises(af.InvalidInput, match="other arguments"):
+        af.collapse_risk(analysis, motions, SITE, samples=40, seed=1, **options)
+
+
 def thin_arch(finish):
     """A semicircle of seven stones, t/R = 0.125, with joints of a finish."""
     size = {"radius": 4.0, "thickness": 0.5, "embrace": 180.0, "voussoirs": 7, "chords": 1}
@@ -320,8 +376,24 @@ def test_runs_without_any_answer_are_an_error(monkeypatch):
         raise af.DidNotConverge("made to fail", last=None)
 
     monkeypatch.setattr(af.studies.collapse_risk, "prepare_runs", fail)
-    with pytest.raises(af.DidNotConverge, match=r"first 8 samples has a capacity.*made to fail"):
+    with pytest.raises(af.DidNotConverge, match=r"8 of 8 samples .* because made to fail"):
         af.collapse_risk(*tilted_block(), SITE, samples=9)
+
+
+def test_soft_fill_that_falls_in_one_piece_is_a_doubt(quick_runs):
+    analysis, motions = tilted_block()
+    block = analysis.structure.blocks[-1]
+    soil = af.Material(6.25e6, 0.2, 18e3, name="soil")
+    blocks = (*analysis.structure.blocks[:-1], replace(block, material=soil))
+    soft = replace(analysis, structure=replace(analysis.structure, blocks=blocks))
+    options = {"samples": 16, "precision": 0.02}
+    tree = {"stone": (1.0, analysis), "soil": (1.0, soft)}
+    found = af.collapse_risk(analysis, motions, SITE, alternatives=tree, **options)
+    words = f"for rigid bodies, each in one piece: {block.name}"
+    assert sum(words in str(doubt) for doubt in found.doubts) == 1
+    assert words in str(found)
+    alone = af.collapse_risk(analysis, motions, SITE, **options)
+    assert words not in str(alone)
 
 
 def test_too_few_records_are_refused():

@@ -21,7 +21,7 @@ from archfem.dynamics.verdict_range import property_text
 from archfem.joints.criteria import assessed_joints
 from archfem.limit.rating import PRESSURE_RANGE
 from archfem.masonry.joint_closing import describe_closing
-from archfem.motion.hazard import MEASURES
+from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.units import STANDARD_GRAVITY, format_mm
 from archfem.view.pages.document import Grid, Section, TextBlock
 
@@ -222,13 +222,17 @@ def _risk_row(data: ReportData, text: str) -> Iterator[_Row]:
     found, risk = re.search(r"falls at (.*? a year).*; median (\S+) ", text), data.case.risk
     if not found or risk is None:
         return
-    hazard, demand, factors = risk.hazard, "hazard of the site", "-"
+    hazard = risk.hazard
     name, unit = hazard.measure.upper().replace("_AVG", ", mean,"), MEASURES[hazard.measure]
-    if len(hazard.intensity) <= 4:
-        sizes = ", ".join(f"{value:.3g}" for value in hazard.intensity)
-        periods = ", ".join(f"{1.0 / rate:.4g}" for rate in hazard.rate)
-        demand = f"{name} {sizes} {unit} once in {periods} years"
-        factors = ", ".join(f"{float(found[2]) / value:.3g}" for value in hazard.intensity)
+    few = len(hazard.intensity) <= 4
+    years = 1.0 / hazard.rate if few else np.array([DESIGN_PERIOD])
+    sizes = hazard.intensity_of(years)
+    listed = ", ".join(f"{value:.3g}" for value in sizes)
+    demand = f"{name} {listed} {unit} once in {', '.join(f'{each:.4g}' for each in years)} years"
+    if len(sizes) == 2:  # one line in double logarithm
+        slope = float(np.log(years[1] / years[0]) / np.log(sizes[1] / sizes[0]))
+        demand += f", rate {float(sizes[0]) ** slope / years[0]:.3g} a^-{slope:.3g}"
+    factors = ", ".join(f"{float(found[2]) / value:.3g}" for value in sizes)
     yield "annual rate", demand, f"median {name} {found[2]} {unit}, falls at {found[1]}", factors
 
 
