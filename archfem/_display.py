@@ -4,11 +4,19 @@ A result such as a history is defined left of the room that draws it. Its method
 and `report` are therefore bound when they are called, through one table that a test resolves.
 """
 
+import io
+import sys
 from collections.abc import Mapping
 from enum import StrEnum
 from html import escape
 from importlib import import_module
+from time import monotonic
 from typing import Any, Self
+
+from tqdm import tqdm
+
+# Time between lines of progress where the output is no terminal [s]
+PROGRESS_INTERVAL = 5.0
 
 # "Class.method": "module:function" below archfem; the function takes the instance first.
 LATE_BOUND_METHODS: Mapping[str, str] = {
@@ -88,3 +96,28 @@ class ResultDisplay:
     def _repr_html_(self) -> str:
         """Return the summary as HTML; names may contain a <."""
         return f"<pre>{escape(self._summary())}</pre>"
+
+
+class ProgressReport:
+    """Progress of a long search: a bar on a terminal, elsewhere a line every five seconds."""
+
+    def __init__(self, name: str, total: int) -> None:
+        layout = "{desc}: |{bar}| {n_fmt} of {total_fmt}{postfix}"
+        self._bar = tqdm(total=total, bar_format=layout, desc=name, disable=None, leave=False)
+        self._name, self._shown = name, monotonic()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()
+
+    def show(self, text: str, done: int = 0) -> None:
+        """Show a text, and count what is done since the last one."""
+        self._bar.update(done)
+        self._bar.set_postfix_str(text)
+        late = self._bar.disable and monotonic() - self._shown >= PROGRESS_INTERVAL
+        if late and isinstance(sys.stderr, io.TextIOWrapper):  # not that of a notebook
+            sys.stderr.write(f"{self._name}: {text}\n")
+            sys.stderr.flush()
+            self._shown = monotonic()

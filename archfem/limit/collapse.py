@@ -20,17 +20,16 @@ import xarray as xr
 from archfem._display import ExplainedWord, ResultDisplay
 from archfem._typing import Array, Pascals
 from archfem._validation import validate_arguments
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import InvalidInput
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import (
     BlocksWithFill,
     Fill,
-    check_options,
     is_balanced,
     refuse_bonds,
     self_weight_programme,
 )
-from archfem.limit.fill_bounds import bound_factor
+from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
@@ -131,12 +130,15 @@ class Collapse(ResultDisplay):
         if self.outcome not in (Outcome.COLLAPSES, Outcome.BRACKETED):
             return self.outcome.sentence
         load, unit = (self.live[0] if len(self.live) == 1 else None), 1.0
+        points = [action for action in self.live if isinstance(action, PointLoad)]
         words = " times the load"
         if isinstance(load, BodyForce) and load.horizontal and not load.vertical:
             unit = abs(load.horizontal)
             words = f" g to the {'right' if load.horizontal > 0.0 else 'left'}"
-        elif isinstance(load, PointLoad):
-            words = f" times {np.hypot(*load.force) / kN:.4g} kN at x = {load.x:.4g} m"
+        elif points and len(points) == len(self.live):
+            sizes = join_names([f"{np.hypot(*point.force) / kN:.4g}" for point in points])
+            places = join_names([f"{point.x:.4g}" for point in points])
+            words = f" times {sizes} kN at x = {places} m"
         bounds = dict.fromkeys(f"{unit * bound:.4g}" for bound in (self.factor, self.upper))
         return f"{self.outcome.sentence}, at {' to '.join(bounds)}{words}"
 
@@ -403,15 +405,13 @@ def _bound_collapse(
             "a settlement and a plastic fill: the bounds are of loads that grow; give the fill as "
             "af.limit.Fill, or a load"
         )
-    check_options(friction, strength)
-    bounds = bound_factor(structure, live, friction, strength, fill, dead)
-    lower, upper = bounds.below.factor, bounds.above.factor
-    if np.isnan(lower) and not np.isnan(upper):
-        raise DidNotConverge(
-            f"whether it stands under its own weight is not known: on the finest mesh, of "
-            f"{len(bounds.filled.mesh.triangles)} triangles, no equilibrium was found and none is "
-            "excluded; give the fill some cohesion, or gap = 0.1 and look at the structure"
-        )
+    search = refine_bounds(structure, live, friction, strength, fill, dead)
+    return read_bounds(structure, bound_least_factor({"load": search})["load"], friction)
+
+
+def read_bounds(structure: Structure, bounds: FillBounds, friction: str | None) -> Collapse:
+    """Return the result of `collapse_factor` from bounds with a plastic fill, without its loads."""
+    lower, upper = bounds.lower, bounds.above.factor
     blocks, regions = bounds.filled.blocks, bounds.filled.regions
     outcome = Outcome.COLLAPSES if np.isfinite(upper) else Outcome.UNBOUNDED
     outcome = Outcome.INFEASIBLE if np.isnan(upper) else outcome

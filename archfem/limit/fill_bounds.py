@@ -22,18 +22,27 @@ Int. J. Numer. Anal. Meth. Geomech. 31 (2007) 835-865.
 """
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, sin
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from scipy import sparse
 
+from archfem._display import ProgressReport
 from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.limit.backfill import SELF_WEIGHT, BlocksWithFill, Fill, hold_backed, sum_body_forces
+from archfem.limit.backfill import (
+    SELF_WEIGHT,
+    BlocksWithFill,
+    Fill,
+    check_options,
+    hold_backed,
+    sum_body_forces,
+)
 from archfem.limit.cone_programme import Rows, solve_cones
 from archfem.limit.fill_mesh import HELD, SURFACE, FillMesh, mesh_fill
 from archfem.limit.linear_programme import RigidBlocks
@@ -290,14 +299,13 @@ class FilledBlocks:
         found[self._moving] = above.multipliers
         return found.reshape(-1, 2)
 
-    def strains(self, above: Bound) -> Array:
-        """Return the largest size of strain rates in each triangle, times its area (t,)."""
+    def strain_rates(self, above: Bound) -> Array:
+        """Return gradients of the velocities of the bound from above, by corner (t, 3, 2, 2)."""
         velocity = self.velocities(above)
-        rates = np.zeros((3, len(self.mesh.triangles), 2, 2))
+        rates = np.zeros((len(self.mesh.triangles), 3, 2, 2))
         for corner, node, slope in self._shape_gradients():
-            rates[corner] += velocity[node][:, :, None] * slope[:, None, :]
-        sizes = np.linalg.norm(rates + np.swapaxes(rates, 2, 3), axis=(2, 3))
-        return np.asarray(self.mesh.areas * sizes.max(axis=0))
+            rates[:, corner] += velocity[node][:, :, None] * slope[:, None, :]
+        return rates
 
     def _solve(self, equations: Rows, limits: Rows, stones: Rows, first: int) -> Bound:
         """Add balance and limits of the stones, and solve the programme."""
@@ -410,11 +418,32 @@ class FillBounds:
     above: Bound
 
     @property
+    def lower(self) -> float:
+        """Factor from below [-]."""
+        return self.below.factor
+
+    @property
     def gap(self) -> float:
         """Distance of the bounds over the upper one [-]."""
         if self.below.factor == self.above.factor:
             return 0.0
         return (self.above.factor - self.below.factor) / abs(self.above.factor)
+
+    def widest(self) -> Flags:
+        """Return triangles that make half of the gap, as far as it is within triangles (t,)."""
+        # The gap is the power of the difference of both states of stress on the velocities from
+        # above, a sum of terms >= 0 (Ciria, Peraire and Bonet, Int. J. Numer. Meth. Eng. 75 (2008)
+        # 1740-1772): within triangles, along stones, and in joints. Along stones meshes are refined
+        # with the triangles beside.
+        difference = self.above.stress - self.below.stress
+        rates = self.filled.strain_rates(self.above)
+        rates = np.stack([rates[..., 0, 0], rates[..., 1, 1], rates[..., 0, 1] + rates[..., 1, 0]])
+        power = self.filled.mesh.areas * np.einsum("tck,ktc->t", difference, rates)
+        order = np.argsort(-power)
+        total = np.cumsum(power[order])
+        chosen = np.zeros(len(order), dtype=bool)
+        chosen[order[: np.searchsorted(total, 0.5 * total[-1]) + 1]] = True
+        return chosen
 
     @property
     def contact_stress(self) -> xr.Dataset:
@@ -440,7 +469,9 @@ class FillBounds:
         """Velocities of the fill's triangles and their strain rates, of the bound from above."""
         mesh = self.filled.mesh
         velocity = self.filled.velocities(self.above)[: len(mesh.points)]
-        strain = self.filled.strains(self.above) / mesh.areas
+        rates = self.filled.strain_rates(self.above)
+        sizes = np.linalg.norm(rates + np.swapaxes(rates, 2, 3), axis=(2, 3))
+        strain = sizes.max(axis=1)
         return xr.Dataset(
             {
                 "velocity": (("point", "axis"), velocity),
@@ -454,7 +485,7 @@ class FillBounds:
         )
 
 
-def bound_factor(
+def refine_bounds(
     structure: Structure,
     live: Sequence[Action],
     friction: str | None,
@@ -463,8 +494,10 @@ def bound_factor(
     dead: Sequence[Action] = (),
     first: int = 250,
     most: int = 5000,
-) -> FillBounds:
-    """Bound the factor of live actions, on meshes that are refined until the bounds are near.
+) -> Iterator[FillBounds]:
+    """Yield bounds of the factor of live actions, on finer and finer meshes until they are near.
+
+    Each mesh contains the stresses of the ones before, so that bounds from below never decrease.
 
     Args:
         structure: structure with its fill.
@@ -478,7 +511,9 @@ def bound_factor(
 
     Raises:
         InvalidInput: there is no fill, or the friction has no associated flow.
+        DidNotConverge: whether it stands without live actions is not known on the finest mesh.
     """
+    check_options(friction, strength)
     structure = hold_backed(structure, fill.backing)
     regions = find_rigid_regions(structure)
     soil = tuple(number for number in structure.free if number not in regions.blocks)
@@ -497,39 +532,74 @@ def bound_factor(
     size = float(np.sqrt(4.0 / np.sqrt(3.0) * area / first))
     mesh = mesh_fill(structure, soil, size, fill.holds_ends)
     best = None
-    while True:
+    while best is None or len(best.filled.mesh.triangles) <= most:
         loads = live, [SELF_WEIGHT, *dead]
         filled = _load_blocks(structure, regions, loads, friction, strength, fill, mesh)
         try:
-            bounds = FillBounds(filled, filled.bound_below(), filled.bound_above())
+            best = FillBounds(filled, filled.bound_below(), filled.bound_above())
         except DidNotConverge:
             if best is None:
                 raise
             break
-        best, count = bounds, len(mesh.triangles)
-        below, above = bounds.below.factor, bounds.above.factor
-        logger.info("plastic fill of %d triangles: factor %.5g to %.5g", count, below, above)
+        yield best
         # no equilibrium with all velocities of this mesh is none with those of a finer one
-        if bounds.gap <= fill.gap or np.isnan(above):
-            return bounds
-        if count > most:
-            break
-        mesh = mesh.refined(_choose_triangles(filled.strains(bounds.above)))
+        if best.gap <= fill.gap or np.isnan(best.above.factor):
+            return
+        mesh = mesh.refined(best.widest())
+    _doubt_bounds(best, fill.gap)
+
+
+def _doubt_bounds(best: FillBounds, gap: float) -> None:
+    """Warn of bounds that are far apart on the finest mesh; refuse where there is no lower one."""
+    count = len(best.filled.mesh.triangles)
+    if np.isnan(best.below.factor):
+        raise DidNotConverge(
+            f"whether it stands under its own weight is not known: on the finest mesh, of "
+            f"{count} triangles, no equilibrium was found and none is "
+            "excluded; give the fill some cohesion, or gap = 0.1 and look at the structure"
+        )
     logger.warning(
         "bounds %.4g and %.4g are further apart than the gap of %.2g: both hold, and finer meshes "
         "than %d triangles are not solved",
-        *(best.below.factor, best.above.factor, fill.gap, len(best.filled.mesh.triangles)),
+        *(best.below.factor, best.above.factor, gap, count),
     )
-    return best
 
 
-def _choose_triangles(strains: Array) -> Flags:
-    """Return the triangles that strain most, with half of all strain together (t,)."""
-    order = np.argsort(-strains)
-    total = np.cumsum(strains[order])
-    chosen = np.zeros(len(order), dtype=bool)
-    chosen[order[: np.searchsorted(total, 0.5 * total[-1]) + 1]] = True
-    return chosen
+def bound_least_factor(
+    searches: Mapping[Any, Iterator[FillBounds]],
+) -> dict[Any, FillBounds]:
+    """Return bounds of several loads, of which the one of the least factor is as near as required.
+
+    Bounds from below grow on finer meshes. A load whose bound exceeds the least one is therefore
+    not the worst, and keeps its coarse mesh. Ctrl-C leaves the bounds that were found, once all
+    loads have some.
+    """
+    found: dict[Any, FillBounds] = {}
+    lower = upper = np.nan
+    with ProgressReport("plastic fill", len(searches)) as progress:
+        try:
+            for load, search in searches.items():
+                found[load] = next(search)
+                progress.show(f"place {len(found)} of {len(searches)}", 1)
+            while True:
+                # without equilibrium on its mesh, NaN, a load comes first
+                least = min(found, key=lambda load: np.nan_to_num(found[load].lower, nan=-1.0))
+                bounds = found[least]
+                lower, upper = bounds.lower, bounds.above.factor
+                count = len(bounds.filled.mesh.triangles)
+                progress.show(f"least factor {lower:.4g} to {upper:.4g}, {count} triangles")
+                if (finer := next(searches[least], None)) is None:
+                    return found
+                found[least] = finer
+        except KeyboardInterrupt:
+            if np.isnan(lower):
+                raise
+            logger.warning(
+                "interrupted: the factor %.4g is the least of bounds from below that all hold; "
+                "finer meshes would raise it, at most to %.4g",
+                *(lower, upper),
+            )
+            return found
 
 
 def _load_blocks(

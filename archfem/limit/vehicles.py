@@ -3,14 +3,13 @@
 import logging
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from tqdm import tqdm
 
 from archfem._display import ResultDisplay
 from archfem._typing import Array, Metres, Newtons, Numbers, Pascals
@@ -23,7 +22,8 @@ from archfem.limit.backfill import (
     refuse_bonds,
     self_weight_programme,
 )
-from archfem.limit.collapse import Collapse, collapse_factor, warn_locking
+from archfem.limit.collapse import Collapse, collapse_factor, read_bounds, warn_locking
+from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
 from archfem.limit.plastic_fill import PlasticFill
@@ -225,11 +225,15 @@ def moving_load(
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
     distinct = tuple(dict.fromkeys((*rows[0], *rows[1])))
     strips = _cut_road(structure, check_number(area_load, "area_load [Pa]", minimum=0.0))
-    laid, factor_of = _solve_rows(structure, distinct, strips, options)
+    laid, factor_of, bounds = _solve_rows(structure, distinct, strips, options)
     factors = np.array([[factor_of[row] for row in rows_one_way] for rows_one_way in rows])
     direction, place = _find_worst(factors, on_bridge)
-    live = laid[rows[direction][place]]
-    worst = collapse_factor(structure, live=list(live), **options)
+    row = rows[direction][place]
+    if row in bounds:
+        worst = read_bounds(structure, bounds[row], friction)
+        worst = replace(worst, live=laid[row], structure=structure)
+    else:
+        worst = collapse_factor(structure, live=list(laid[row]), **options)
     if friction == "nonassociated":
         factors[direction, place] = worst.factor  # by the whole search: may be a weaker state
     length = area_load and -strips[0].force[1] / (area_load * structure.width)  # of a strip
@@ -313,8 +317,8 @@ def _cut_road(structure: Structure, area_load: float, count: int = 40) -> AxleRo
 
 def _solve_rows(
     structure: Structure, rows: Sequence[AxleRow], strips: AxleRow, options: dict[str, Any]
-) -> tuple[dict[AxleRow, AxleRow], dict[AxleRow, float]]:
-    """Return each row of axles with the adverse strips, and its collapse factor."""
+) -> tuple[dict[AxleRow, AxleRow], dict[AxleRow, float], dict[AxleRow, FillBounds]]:
+    """Return each row of axles with the adverse strips, its factor and its bounds."""
     laid, fill = {row: row for row in rows}, options["fill"]
     if is_plastic := isinstance(fill, PlasticFill):
         keys = ("friction_angle", "cohesion", "spread", "backing")
@@ -327,15 +331,19 @@ def _solve_rows(
             laid, loads = _lay_strips(dead, loads, strips, [stones.load([s]) for s in strips])
     if not is_plastic:
         factors = collapse_factors(stones, dead, loads, options) if stands else {}
-        return laid, {row: factors.get(laid[row], np.nan) for row in rows}
+        return laid, {row: factors.get(laid[row], np.nan) for row in rows}, {}
     if strips:
         logger.warning(
             "the distributed load stands where it is adverse to the stones with the fill as "
             "pressure, %s: other parts may be worse with a plastic fill",
             "af.limit.Fill" if stands else "but these do not stand so, and it is left out",
         )
-    factors = _bound_factors(structure, tuple(laid.values()), options)
-    return laid, {row: factors[laid[row]] for row in rows}
+    searches = {
+        row: refine_bounds(structure, list(laid[row]), **options) for row in rows if laid[row]
+    }
+    bounds = bound_least_factor(searches)
+    factors = {row: bounds[row].lower if row in bounds else np.inf for row in rows}
+    return laid, factors, bounds
 
 
 def _lay_strips(
@@ -402,17 +410,6 @@ def collapse_factors(
     if np.inf in factors.values():
         warn_locking(stones.whole, options["friction"])
     return factors
-
-
-def _bound_factors(
-    structure: Structure, rows: Sequence[AxleRow], options: dict[str, Any]
-) -> dict[AxleRow, float]:
-    """Return the lower bound of each row of axles with a plastic fill."""
-    shown = tqdm(rows, unit="place", disable=None, leave=False)
-    return {
-        row: collapse_factor(structure, live=list(row), **options).lower if row else np.inf
-        for row in shown
-    }
 
 
 def _search_nonassociated(

@@ -25,6 +25,7 @@ import xarray as xr
 from tqdm import tqdm
 
 from archfem import _files
+from archfem._display import PROGRESS_INTERVAL
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, StudyStopped
@@ -38,9 +39,6 @@ logger = logging.getLogger("archfem")
 
 # Files of the table as NetCDF, CSV and for Excel
 RESULT_FILES = "results.nc", "results.csv", "results.xlsx", "results.parquet"
-
-# Time between lines of progress where the output is no terminal [s]
-PROGRESS_INTERVAL = 5.0
 
 
 class Store:

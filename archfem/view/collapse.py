@@ -143,7 +143,8 @@ def draw_rating(found: Rating) -> Figure:
     live = [replace(load, force=tuple(force / share for force in load.force)) for load in axles]
     factors, worst = "" if code == 1.0 else f" {code:.3g} ×", found.moving.worst
     worst = replace(worst, live=live)
-    return _draw_factors(found.moving, worst, title, factors, strips, required=1.0)
+    load = f"{found.vehicle.name} on {found.width:.3g} m of width"
+    return _draw_factors(found.moving, worst, title, load, factors, strips, required=1.0)
 
 
 @validate_arguments
@@ -159,7 +160,8 @@ def draw_moving_load(found: MovingLoad) -> Figure:
     """
     title = f"least factor {found.worst.factor:.3g}, driving {found.direction}"
     axles, strips = _split_loads(found)
-    return _draw_factors(found, replace(found.worst, live=axles), title, strips=strips)
+    worst = replace(found.worst, live=axles)
+    return _draw_factors(found, worst, title, "the vehicle", strips=strips)
 
 
 def _split_loads(found: MovingLoad) -> tuple[list[PointLoad], list[PointLoad]]:
@@ -173,6 +175,7 @@ def _draw_factors(
     found: MovingLoad,
     worst: Collapse,
     title: str,
+    load: str,
     factors: str = "",
     strips: Sequence[PointLoad] = (),
     *,
@@ -206,6 +209,8 @@ def _draw_factors(
     upper.legend(frameon=False, fontsize=Size.LABEL)
     draw_structure(structure, axes=lower)
     _draw_mechanism(lower, structure, worst, factors)
+    if np.isfinite(worst.factor):
+        set_title(lower, f"{structure.name}: a mechanism at {worst.factor:.3g} ×{factors} {load}")
     if strips:
         places = np.array([load.place(structure)[1] for load in strips])
         style = {"color": Colour.LOAD, "ls": "", "marker": "v", "ms": 3.0, "zorder": 9}

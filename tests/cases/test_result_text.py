@@ -70,6 +70,8 @@ def test_limit_analysis_in_words(ring):
     wheel = af.PointLoad(0.5, (0.0, -3e3))
     loaded = af.collapse_factor(ring, live=wheel)
     assert loaded.sentence.endswith(f"at {loaded.factor:.4g} times 3 kN at x = 0.5 m")
+    axles = af.collapse_factor(ring, live=[wheel, af.PointLoad(1.0, (0.0, -2e3))])
+    assert axles.sentence.endswith(f"at {axles.factor:.4g} times 3, 2 kN at x = 0.5, 1 m")
     both = af.collapse_factor(ring, live=[wheel, af.BodyForce(1.0)])
     assert both.sentence.endswith(f"at {both.factor:.4g} times the load")
     slab = af.column(breadth=4.0, heights=[1.0])  # slides before it turns

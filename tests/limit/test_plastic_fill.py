@@ -12,7 +12,7 @@ import archfem as af
 from archfem.errors import InvalidInput
 from archfem.limit import PlasticFill
 from archfem.limit.cone_programme import solve_cones
-from archfem.limit.fill_bounds import bound_factor
+from archfem.limit.fill_bounds import refine_bounds
 from archfem.limit.fill_mesh import HELD, SURFACE, mesh_fill
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 
@@ -117,7 +117,11 @@ def test_a_narrower_gap_is_within_a_wider_one():
 def test_bounds_of_the_finest_mesh_that_is_solved_are_returned(monkeypatch, caplog):
     """A programme that does not converge loses nothing, and the gap that remains is stated."""
     load = [af.PointLoad(x=3.3, force=(0.0, -1e3))]
-    coarse = bound_factor(arch_bridge(), load, "coulomb", None, replace(FILL, gap=0.9), first=60)
+
+    def bound(fill):
+        return list(refine_bounds(arch_bridge(), load, "coulomb", None, fill, first=60))[-1]
+
+    coarse = bound(replace(FILL, gap=0.9))
     solved = []
 
     def fails_later(*programme):
@@ -125,12 +129,12 @@ def test_bounds_of_the_finest_mesh_that_is_solved_are_returned(monkeypatch, capl
         return solve_cones(*programme) if len(solved) <= 2 else None
 
     monkeypatch.setattr("archfem.limit.fill_bounds.solve_cones", fails_later)
-    found = bound_factor(arch_bridge(), load, "coulomb", None, replace(FILL, gap=1e-3), first=60)
+    found = bound(replace(FILL, gap=1e-3))
     assert (found.below.factor, found.above.factor) == (coarse.below.factor, coarse.above.factor)
     assert "further apart than the gap of 0.001" in caplog.text
     solved += [()] * 2
     with pytest.raises(af.DidNotConverge, match="second-order cone programme"):
-        bound_factor(arch_bridge(), load, "coulomb", None, FILL, first=60)
+        bound(FILL)
 
 
 def test_a_stronger_fill_carries_more():

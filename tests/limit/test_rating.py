@@ -175,8 +175,9 @@ def test_less_than_the_rule_is_stated_beside_the_verdict(monkeypatch):
     assert np.isnan(rule.by_rule)
     assert repr(rule).endswith("passes")
     train = replace(VEHICLES["LM71"], axles=(1e3,), spacings=())
-    left = "passes without dynamic factor and the 80 kN/m beside the axles (LM71-train)"
-    assert repr(af.rate(bridge, train, fill=GRAVEL)).endswith(left)
+    found = af.rate(bridge, train, fill=GRAVEL)
+    left = f"at most {found.factor:.4g} without the 80 kN/m beside the axles (LM71-train)"
+    assert repr(found).endswith(f"passes if the code's impact is {left}")
 
 
 def test_places_are_a_hundredth_of_the_bridge_apart():
@@ -254,6 +255,11 @@ def test_words_and_table(lorry_rating):
     )
     assert words.splitlines()[factor + 1].endswith("codes with partial factors require 1")
     assert "Heyman requires it" in words.splitlines()[geometric + 1]
+    hinges = [joint for joint, _ in lorry_rating.moving.worst.hinges]
+    (line,) = (line for line in words.splitlines() if line.startswith("hinges at x = "))
+    for x, joint in zip(line.removeprefix("hinges at x = ").split(","), hinges, strict=True):
+        ends = lorry_rating.structure.ends[joint][:, 0]
+        assert ends.min() - 0.01 < float(x.removesuffix(" m")) < ends.max() + 0.01
     assert len(rows) == lorry_rating.moving.factors["factor"].size
     least = min(float(row.split(",")[2]) for row in rows)
     assert least == pytest.approx(lorry_rating.factor, rel=1e-5)  # six digits
@@ -304,31 +310,29 @@ def test_places_of_axles_are_of_the_span_that_is_loaded(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("vehicle", "given", "says"),
+    ("vehicle", "given", "missing"),
     [
-        pytest.param(
-            "own", {}, "passes without partial and dynamic factors", marks=pytest.mark.slow
-        ),
-        pytest.param("own", {"live": 1.5}, "passes without dynamic factor", marks=pytest.mark.slow),
-        pytest.param(
-            "own", {"impact": 1.3}, "passes without partial factor", marks=pytest.mark.slow
-        ),
-        ("own", {"live": 1.5, "impact": 1.3}, "passes"),
-        ("by span", {"live": 1.45}, "passes without dynamic factor"),
-        ("LM2", {}, "passes"),
+        ("own", {}, "live × impact"),
+        pytest.param("own", {"live": 1.5}, "impact", marks=pytest.mark.slow),
+        pytest.param("own", {"impact": 1.3}, "live", marks=pytest.mark.slow),
+        ("own", {"live": 1.5, "impact": 1.3}, ""),
+        ("by span", {"live": 1.45}, "impact"),
+        ("LM2", {}, ""),
     ],
 )
-def test_a_vehicle_without_factors_passes_in_so_many_words(vehicle, given, says):
+def test_a_vehicle_without_factors_passes_on_a_condition(vehicle, given, missing):
     """Those of LM2 are in its weights, and the one of LM71 depends on the span."""
     stone = column_under_axle(width=100.0)
     own, light = Vehicle("axle", (10e3,)), VEHICLES["LM2"]
     by_span = replace(own, impact_source=VEHICLES["LM71"].impact_source)
     driven = {"own": own, "by span": by_span, "LM2": light}[vehicle]
     found = af.rate(stone, replace(driven, wheels=100.0, lane=100.0), **given)
-    assert str(found).splitlines()[0].endswith(f"(the vehicle's middle), {says}")
+    condition = f" if the code's {missing} is at most {found.factor:.4g}" if missing else ""
+    assert str(found).splitlines()[0].endswith(f"(the vehicle's middle), passes{condition}")
+    assert ("no code's live × impact is in it" in str(found)) == (missing == "live × impact")
     (live, impact) = (line for line in str(found).splitlines() if line[:6] in ("live l", "impact"))
-    assert ("(none" in live) == ("partial" in says)
-    assert ("(none" in impact) == ("dynamic" in says)
+    assert ("(none" in live) == ("live" in missing)
+    assert ("(none" in impact) == ("impact" in missing)
 
 
 def test_a_bridge_that_is_too_weak_would_carry_with_deeper_joints():

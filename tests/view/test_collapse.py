@@ -139,6 +139,7 @@ def test_a_rating_shows_factors_over_the_middle_and_the_mechanism(coarse_ring, f
     drawn = lines[f"driving {found.moving.direction}"]
     assert np.nanmin(drawn[:, 1]) == pytest.approx(found.factor, rel=1e-6)
     assert f"factor {found.factor:.3g}" in upper.get_title()
+    assert " m of width" in lower.get_title().replace("\n", " ")
     assert len(lines_of(lower)["hinge"]) == len(found.moving.worst.hinges)
     assert upper.get_xlim() == lower.get_xlim()
     labels = lower.get_legend_handles_labels()[1]
