@@ -211,8 +211,9 @@ def _assessment_rows(text: str) -> Iterator[_Row]:
     for line, directions in _list_checks(text).items():
         if found := _CHECK.match(line):
             name = f"assessment: {found['name']}, {' and '.join(directions)}"
-            # a check of displacement passes, too, where the ground does not set it in motion
-            rest = found["rest"].replace("up to there the ground", "for the ground")
+            # a check of displacement passes, too, where the mechanism does not begin to move
+            unmoved = bool(found["rest"]) and found["outcome"] == "passes"
+            rest = ", for the mechanism does not begin to move" if unmoved else ""
             outcome = f"{found['capacity']}, {found['outcome']}{rest}"
             yield name, found["demand"], outcome, found["factor"]
 
@@ -329,9 +330,12 @@ def _conclude_file(data: ReportData, name: str) -> list[str]:
 
 
 def list_doubts(data: ReportData) -> list[tuple[str, str]]:
-    """Return each result in doubt with its doubt, once; of runs with the number that have it."""
+    """Return each result in doubt with its doubt, once; of runs with the number that have it.
+
+    Remedies are for who computes, and stand in the files of the results alone.
+    """
     verdicts = [run.verdict for run in data.runs.values()]
-    reasons = Counter(str(doubt) for verdict in verdicts for doubt in verdict.doubts)
+    reasons = Counter(doubt.cause for verdict in verdicts for doubt in verdict.doubts)
     count = len(verdicts)
     of_runs = [f"{n} of {count} runs: {text}" if count > 1 else text for text, n in reasons.items()]
     doubts = [("time histories", text) for text in of_runs]
@@ -339,7 +343,9 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
         lines = (data.read_text(name) or "").splitlines()
         # what a kinematic assessment leaves out stands there as a note
         for mark in (DOUBT_MARK, "note: "):
-            doubts += [(result, line.removeprefix(mark)) for line in lines if line.startswith(mark)]
+            texts = [line.removeprefix(mark) for line in lines if line.startswith(mark)]
+            # a remedy follows its doubt behind a semicolon, as in `Doubt`
+            doubts += [(result, text.rpartition("; ")[0] or text) for text in texts]
     return list(dict.fromkeys(doubts))
 
 

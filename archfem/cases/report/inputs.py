@@ -124,6 +124,8 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
             yield f"{section}: {key.replace('_', ' ')}", describe_value(value), "given"
         if section in _FUNCTIONS:
             yield from _default_rows(section, table)
+        if section == "assessment" and "fill" in data.case.assessment.options.keys() - table:
+            yield "assessment: fill", "that of the limit analysis", "inferred"
         if section == "rating" and (own := _RATING_KEYS - table.keys()):
             words = ", ".join(sorted(own)).replace("_", " ")
             yield f"rating: {words}", "of the code, see below", "default"

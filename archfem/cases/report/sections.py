@@ -23,7 +23,6 @@ from archfem.cases.report.report_data import (
     ReportData,
     build_live_page,
     build_player,
-    missing_note,
 )
 from archfem.dynamics.history import SIGN_CONVENTION, History
 from archfem.dynamics.recorder import library_versions
@@ -124,7 +123,7 @@ def build_input_section(data: ReportData) -> Section:
     assumptions = [
         ("structure", "plane; forces are those of the whole width"),
         ("blocks", "rigid" if data.is_static else blocks.get(fidelity, f"by part: {fidelity}")),
-        ("joints", "dry: no tension but where a bond is given; Coulomb friction; no crushing"),
+        ("joints", _describe_joints(data)),
         ("displacements", "of any size" if large else "small: equilibrium where blocks stood"),
         ("ground", "rigid, moves as one; abutments and foundations are fixed to it"),
         ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
@@ -134,6 +133,16 @@ def build_input_section(data: ReportData) -> Section:
     ]
     table = Grid((), assumptions, "Assumptions, units and signs")
     return Section("Inputs and assumptions", [tabulate_inputs(data), table])
+
+
+def _describe_joints(data: ReportData) -> str:
+    """Say what joints resist, and in which results they crush."""
+    law, mark = "dry: no tension but where a bond is given; Coulomb friction", "joints crush at "
+    for name in ("limit", "rating"):
+        for line in (data.read_text(f"{name}.txt") or "").splitlines():
+            if line.startswith(mark):
+                return f"{law}; crushing in limit analysis alone, at {line.removeprefix(mark)}"
+    return f"{law}; no crushing"
 
 
 def _build_geometry(case: Case) -> list[Any]:
@@ -265,10 +274,10 @@ def _build_spectra(case: Case, motions: list[Motion]) -> list[Any]:
 
 def build_run_sections(data: ReportData) -> list[Section]:
     """Build the sections on the response of one run, or of all pairs and of each."""
-    remedy = "`archfem run` again runs the pairs that are left."
     if not data.runs:
         return []
-    missing = [missing_note(f"runs of {', '.join(data.missing)}", remedy)] if data.missing else []
+    absent = f"Not among the results: runs of {', '.join(data.missing)}."
+    missing = [TextBlock(absent, "missing")] if data.missing else []
     if data.case.suite is None:
         (name,) = data.runs
         return [
@@ -328,7 +337,7 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
     verdict, fall = run.verdict, run.verdict.fall
     lines = [
         f"Outcome: {summarise_outcomes(data, [run])}",
-        *(f"In doubt: {doubt}" for doubt in verdict.doubts),
+        *(f"In doubt: {doubt.cause}" for doubt in verdict.doubts),
     ]
     lines += (
         [f"lost: {describe_lost(fall, len(fall.blocks))}"]
