@@ -80,7 +80,9 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert "Ground motions" in words
     assert "Not among the results" not in words
     assert "Not computed: limit analysis, a rating for a vehicle, a kinematic assess" in words
-    assert "The structure forms no mechanism under all 2 motions." in words
+    assert (
+        "For motions of PGA 0.05 g: the structure forms no mechanism under all 2 motions." in words
+    )
     assert "Not varied: one set of properties, one model and time step." in words
     assert "another case" not in words
     case = af.Case.read(kept / "case.toml")
@@ -145,6 +147,12 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         ),
     ]
     texts = [each.text for each in sentences if each.kind == "words"]
+    assert texts[0] == (
+        "For 0.25 g, 475 years and motions of PGA 0.05 g: the structure forms no mechanism under "
+        "all 2 motions. It fails with a least margin of 0.5 on the spectrum, by assessment: a "
+        "code, right and left. In doubt, for reasons given below: limit analysis, kinematic "
+        "assessment."
+    )
     # each doubt follows the sentence of its result
     (limit,) = (k for k, text in enumerate(texts) if text.startswith("Limit analysis"))
     assert texts[limit + 1] == "In doubt: a made one."
@@ -399,8 +407,8 @@ def test_every_input_has_its_mark():
         "breadth": ("1 m", "given"),
         "gravity": ("9.81 m/s²", "default"),
         "stone: E": ("5 GPa", "given"),
-        "stone: weight": ("20 kN/m³", "default"),
-        "stone to stone: μ": ("0.6", "default"),
+        "stone: weight": ("20 kN/m³ (table 2 of Demirel and Aldemir (2021))", "default"),
+        "stone to stone: μ": ("0.6 (dry stone has 0.4 to 0.8)", "default"),
         "stone to stone: cohesion": ("2 kPa", "given"),
         "reduction factor R": ("2.0", "given"),
         "scale of the motions": ("1.0", "default"),
@@ -566,7 +574,7 @@ def test_a_history_alone_has_a_report_and_a_film_by_the_command_line(
 ):
     path = Path(shutil.move(kept / "first" / "history.nc", tmp_path / "moved.nc"))
     assert af.commands.main(["report", str(path)]) == 0
-    assert "The structure forms no mechanism under the motion 'first'." in words_of(
+    assert "the structure forms no mechanism under the motion 'first'." in words_of(
         tmp_path / "moved.html"
     )
     given = ["--out", str(tmp_path / "film.gif"), "--size", "480x320", "--fps", "5"]
@@ -582,7 +590,7 @@ def test_the_conclusion_states_outcomes_falls_and_the_range(kept, unplotted):
         verdicts["second"], outcome="fallen", doubts=(af.models.model.Doubt("it leaks", "mend it"),)
     )
     text = " ".join(piece.text for piece in build_conclusion(data).pieces if piece.kind == "words")
-    assert "The structure forms no mechanism under 1 of 2 motions: first." in text
+    assert "the structure forms no mechanism under 1 of 2 motions: first." in text
     assert "The structure falls under 1 of 2 motions: second." in text
     assert "In doubt: 1 of 2 runs: it leaks." in text  # the remedy is not for the client
     assert "raise no doubt" not in text
