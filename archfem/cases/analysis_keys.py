@@ -270,8 +270,8 @@ class AssessmentSettings:
         return found
 
 
-def parse_assessment(table: Any) -> AssessmentSettings:
-    """Return the kinematic assessment of a case."""
+def parse_assessment(table: Any, fill: Fill | PlasticFill | None = None) -> AssessmentSettings:
+    """Return the kinematic assessment of a case, by default with the fill of its limit analysis."""
     options = check_table(table, assessment_keys(), "assessment")
     spectrum = None
     if "spectrum" in options:
@@ -288,6 +288,8 @@ def parse_assessment(table: Any) -> AssessmentSettings:
         options["limit_state"] = read_object(LimitState, state, "assessment.limit_state")
     if "fill" in options:
         options["fill"] = _fill(options["fill"], "assessment.fill")
+    elif isinstance(fill, Fill):  # no finite motion is known with a plastic fill
+        options["fill"] = fill
     if "loads" in options:
         loads = options["loads"]
         options["loads"] = [read_object(AttachedLoad, load, "assessment.loads") for load in loads]

@@ -147,6 +147,8 @@ class Case:
         structure = cached_structure(settings, folder)
         analysis = read_analysis(settings, structure, folder)
         strength = analysis_keys.find_given_strength(structure, settings.get("materials", {}))
+        limit = analysis_keys.parse_limit(settings.get("limit", {}), strength)
+        assessed = settings.get("assessment", {})
         if output.get("animation", False) and analysis.record.fields_every is None:
             # a film of each tenth step
             analysis = replace(analysis, record=replace(analysis.record, fields_every=10))
@@ -155,10 +157,10 @@ class Case:
             analysis=analysis,
             motion=None if motion is None else motion_keys.parse_motion(motion),
             suite=None if suite is None else motion_keys.parse_suite(suite),
-            limit=analysis_keys.parse_limit(settings.get("limit", {}), strength),
+            limit=limit,
             pushover=None if push is None else analysis_keys.parse_pushover(push),
             rating=analysis_keys.parse_rating(settings.get("rating", {})),
-            assessment=analysis_keys.parse_assessment(settings.get("assessment", {})),
+            assessment=analysis_keys.parse_assessment(assessed, limit.fill),
             risk=None if (risk := settings.get("risk")) is None else parse_risk(risk, folder),
             output=output,
             report=report,

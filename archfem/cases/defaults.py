@@ -10,6 +10,8 @@ from archfem.masonry.joint_closing import FINISHED_KEYS, finish_range
 from archfem.masonry.materials import Contact, Material
 from archfem.units import GPa, MPa, kN, mm
 
+HINGE_REASON = "8 % short of the edge, as in Demirel and Aldemir (2021)"
+
 _PAPER = "table 2 of Demirel and Aldemir (2021)"
 
 # Values of materials and contacts that decide: name in texts, unit as number and text, and source
@@ -77,8 +79,8 @@ def _list_settings(case: Case) -> Iterator[Default]:
             yield Default("", "no damping", "analysis.damping", reason)
     given = case.settings.get("criteria", {})
     if "hinge" not in given:
-        reason = "8 % short of the edge, as in Demirel and Aldemir (2021)"
-        yield Default("", f"hinge at |e| {criteria.hinge:g}", "criteria.hinge", reason)
+        words = f"hinge at |e| {criteria.hinge:g}"
+        yield Default("", words, "criteria.hinge", HINGE_REASON)
     if "failures" not in given:
         words, reason = f"mechanism of {criteria.failures} joints", "Heyman (1966): four hinges"
         yield Default("", words, "criteria.failures", reason)

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._files import align_columns
+from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.defaults import describe_defaults, explain_defaults
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
@@ -20,15 +21,17 @@ from archfem.joints.criteria import (
     longest_duration,
     with_failure_flags,
 )
+from archfem.limit.backfill import Fill
 from archfem.limit.collapse import Collapse, describe_crushing
 from archfem.limit.mechanism_count import Mechanism, duration_text
+from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.structure import Structure, join_joint_names, join_names
 from archfem.motion.matching import Match
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_text, utilisation_text
-from archfem.units import STANDARD_GRAVITY, format_mm, kN
+from archfem.units import STANDARD_GRAVITY, format_mm, kN, kPa
 
 
 class ResultTable(NamedTuple):
@@ -217,8 +220,19 @@ def describe_depths(structure: Structure) -> str:
     )
 
 
-def describe_collapse(structure: Structure, collapse: Collapse, strength: float | None) -> str:
-    """Describe the result of limit analysis: outcome and load, hinges, sliding, crushing."""
+def describe_fill(fill: Fill | PlasticFill | None) -> str:
+    """Describe how a fill acts on the stones of limit analysis; "" without its strength."""
+    if fill is None:
+        return ""
+    strength = f"friction angle {fill.friction_angle:g}°, cohesion {fill.cohesion / kPa:g} kPa"
+    if isinstance(fill, PlasticFill):
+        return f"fill: a plastic body, {strength}"
+    share = f"{fill.active:.2g} of the active and at most {fill.mobilisation:.2g} of the passive"
+    return f"fill: weight, and {share} pressure, {strength}"
+
+
+def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnalysis) -> str:
+    """Describe the result of limit analysis: load, hinges, sliding, crushing, and the fill."""
     joints = structure.joints
     hinges = [f"{joints[number].name} at the {side}" for number, side in collapse.hinges]
     sliding = [joints[number].name for number in collapse.sliding]
@@ -226,7 +240,7 @@ def describe_collapse(structure: Structure, collapse: Collapse, strength: float 
     lines += [f"hinges, by the face in contact: {join_names(hinges, '; ')}"] if hinges else []
     lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []
-    lines.append(describe_crushing(strength))
+    lines += filter(None, [describe_crushing(limit.strength), describe_fill(limit.fill)])
     return "\n".join(lines)
 
 

@@ -157,7 +157,7 @@ def limit(options: argparse.Namespace) -> None:
     case = Case.read(options.case, options.changes)
     with _record_doubts(case.structure) as doubts:
         found = case.limit.solve(case.structure)
-    text = result_text.describe_collapse(case.structure, found, case.limit.strength)
+    text = result_text.describe_collapse(case.structure, found, case.limit)
     text = "\n".join([text, *doubts])
     print(f"{case.title}\n{text}")
     _write_results("limit", case, options.out, lambda: results.limit_files(found, text))
@@ -172,12 +172,13 @@ def assess(options: argparse.Namespace) -> None:
         found = case.assessment.solve(case.structure, demand, options.parts)
     if case.limit.strength is not None:
         doubts.append(
-            f"note: joints hinge about their edges, without the given strength of "
-            f"{case.limit.strength / MPa:.3g} MPa: `archfem limit` with horizontal = 1 or -1 in "
-            "[limit] computes alpha_0 with it"
+            f"note: joints hinge about their edges: that stones crush at the given "
+            f"{case.limit.strength / MPa:.3g} MPa would lower alpha_0; `archfem limit` with "
+            "horizontal = 1 or -1 in [limit] computes it so"
         )
     texts = [f"{name}: {result}" for name, result in found.items()]
-    text = "\n\n".join([*texts, *filter(None, ["\n".join(dict.fromkeys(doubts))])])
+    texts.append(result_text.describe_fill(case.assessment.options.get("fill")))
+    text = "\n\n".join(filter(None, [*texts, "\n".join(dict.fromkeys(doubts))]))
     print(f"{case.title}\n{text}")
 
     def draw() -> Files:
@@ -403,7 +404,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     with _record_doubts(case.structure) as doubts:
         for result in found:
             if isinstance(result, Collapse):
-                text = result_text.describe_collapse(case.structure, result, case.limit.strength)
+                text = result_text.describe_collapse(case.structure, result, case.limit)
                 text = "\n".join([text, *doubts])  # of limit analysis, which comes first
                 print(text)
                 write(results.limit_files(result, text), folder)

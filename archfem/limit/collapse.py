@@ -374,7 +374,8 @@ def _solve_collapse(
         bound = solutions.bracket[int(support is not None)] if solutions else np.inf
         if np.isfinite(bound):
             logger.warning(
-                "no state without dilatancy was found; the factor is only a bound: %s", solutions
+                "no state without dilatancy was found, and the factor is only a bound: %s",
+                solutions,
             )
             unbounded, at_rest = Outcome.BRACKETED, _without_forces(at_rest)
         factor = bound if np.isfinite(bound) else np.inf
@@ -497,7 +498,7 @@ def warn_dilatancy(structure: Structure) -> None:
     if steepest > 0.0:
         logger.warning(
             "joints dilate by up to %.3g, which friction='nonassociated' neglects: the factor is "
-            "that of joints which slide flat, 'coulomb' gives that of joints which dilate by μ",
+            "that of joints which slide flat; 'coulomb' gives that of joints which dilate by μ",
             steepest,
         )
 
@@ -517,7 +518,7 @@ def warn_locking(structure: Structure, friction: str | None) -> None:
     if friction is not None and any(block.grain for block in structure.blocks):
         logger.warning(
             "an infinite factor is that of a fill in pieces which dilates by tan φ as it slides: "
-            "it may lock between the stones, as soil does not. Cut smaller pieces, or give "
+            "it may lock between the stones, as soil does not; cut smaller pieces, or give "
             "fill=af.limit.Fill(…) for the structure before it was cut"
         )
 

@@ -48,7 +48,7 @@ from archfem.masonry.structure import HasStructure, Structure, join_joint_names,
 class PathEnd(ExplainedWord):
     """Reason for which the path of a mechanism ends."""
 
-    FALLS = "falls", "at the end it falls without any of the force that moves it"
+    FALLS = "falls", "at the end of the path it falls by its weight alone"
     LOCKS = "locks", "at the end its contacts permit no further motion"
     COLLIDES = "collides", "at the end it runs into blocks that it has no joint with"
     ENDURES = "endures", "it still needs a force where the path is cut off"

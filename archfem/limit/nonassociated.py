@@ -206,7 +206,7 @@ class NonassociatedBounds:
         limits = f"all lie from {lower:.4g} to {upper:.4g}"
         if np.isinf(upper):
             limits = f"none is below {lower:.4g}"
-        return f"solutions without dilatancy {text} ({successful} of {tried} starts); {limits}"
+        return f"solutions without dilatancy {text} ({successful} of {tried} starts), and {limits}"
 
 
 def search_nonassociated(

@@ -156,7 +156,7 @@ class AssessmentCheck:
     def __str__(self) -> str:
         """Describe capacity, demand and outcome in one line."""
         period = "" if np.isnan(self.period) else f" at T = {self.period:.3f} s"
-        rest = ", up to there the ground does not set the mechanism in motion"
+        rest = " before the mechanism begins to move"
         return (
             f"{self.name}: capacity {self.capacity:.4g} {self.unit}, demand {self.demand:.4g} "
             f"{self.unit}{period}: {'passes' if self.passes else 'fails'}, the spectrum may be "
@@ -343,7 +343,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         blocks: names or numbers of blocks; only joints that touch them may move.
         loads: loads that stay with their blocks, such as floors and ties.
         fill: strength of the fill, a `Fill`; None leaves its pressure out. The bounds of a
-            `PlasticFill` have no finite motion.
+            `PlasticFill` have no finite motion. In a case that of [limit], unless one is given.
         limit_state: rules of the displacement check: "NTC-2018 SLV" (d_u* = 0.4 d₀*, T = 1.68 π
             √(d_u*/a*), 8 % damping; Circolare 7/2019, C8.7.1.2.1.6 and .8), "NTC-2018 SLC" (0.6,
             1.56 π, 10 %; there), "NTC-2008 SLV" (0.4, secant period at 0.4 d_u*, 5 %; Circolare
@@ -623,33 +623,33 @@ class _Oscillator:
         if self.placed.fill is not None:
             found.append(
                 "the pressures of the fill on the stones are those of the weights as built, all "
-                "along the motion; that the fill stays in place is not checked"
+                "along the motion, and that the fill stays in place is not checked"
             )
         elif self.fill:
             found.append(
                 "the fill counts as weight and mass on the stones; its pressure on them, which "
-                "may hold an arch back or push a wall out, is left out: give fill for it"
+                "may hold an arch back or push a wall out, is left out; give fill for it"
             )
         if any(any(load.force) for load in self.placed.loads):
             found.append(
-                "constant forces count from the start of the motion to its end: attach only those "
+                "constant forces count from the start of the motion to its end; attach only those "
                 "whose presence is verified up to collapse"
             )
         if factor < (1.0 - 1e-3) * collapse:
             found.append(
-                f"sliding that dilates (associated flow) would raise alpha_0 to {collapse:.4g}; "
-                "faces slide flat here"
+                f"sliding that dilates (associated flow) would raise alpha_0 to {collapse:.4g}, "
+                "and faces slide flat here"
             )
         if self.holds < len(self.path.factors) - 1:
             found.append(
                 f"beyond d* = {float(self.curve['d'][self.holds]):.3g} m joints open or slide that "
-                "the mechanism keeps closed: there the curve is an upper bound, which a time "
-                "history with large displacements can test"
+                "the mechanism keeps closed: there the curve is an upper bound; a time history "
+                "with large displacements can test it"
             )
         if self.path.end is not PathEnd.FALLS:
             found.append(
-                f"alpha does not vanish: {self.path.end.sentence}; the displacement check counts "
-                "the end of the path as d_0*"
+                f"alpha does not vanish: {self.path.end.sentence}, and the displacement check "
+                "counts the end of the path as d_0*"
             )
         return found
 

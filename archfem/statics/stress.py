@@ -85,7 +85,8 @@ def strength_use(model: Model, q: Array) -> xr.Dataset:
 
     Returns:
         Over block: compression and tension [Pa], both positive; strength [Pa], and use,
-        compression over strength [-], NaN where the block has no strength.
+        compression over strength [-], NaN where the block has no strength. All are NaN in rigid
+        blocks beside meshed ones.
 
     Raises:
         InvalidInput: the blocks are rigid, or q is not one vector of coordinates.
@@ -188,6 +189,9 @@ def strength_use_table(use: xr.Dataset) -> str:
     rows = []
     for part in dict.fromkeys(use["part"].values):
         in_part = use.isel(block=np.flatnonzero(use["part"].values == part))
+        if in_part["compression"].isnull().all():
+            rows.append([str(part) or "(no name)", "not computed (rigid)", *["-"] * 4])
+            continue
         pressed, pulled = _largest(in_part, "compression"), _largest(in_part, "tension")
         share = float(pressed["use"])
         use_text = "-" if np.isnan(share) else f"{share:.2%}"
@@ -288,8 +292,8 @@ def _fit_planes(cells: Cells, min_cells: int = 4) -> sparse.csr_matrix:
 
 
 def _largest(use: xr.Dataset, key: str) -> xr.Dataset:
-    """Return the block with the largest value of a variable."""
-    return use.isel(block=int(np.argmax(use[key].values)))
+    """Return the block with the largest known value of a variable."""
+    return use.isel(block=int(np.nanargmax(use[key].values)))
 
 
 def _block_label(block: xr.Dataset) -> str:
@@ -299,16 +303,25 @@ def _block_label(block: xr.Dataset) -> str:
 
 
 def _peak_stresses(model: Model, fields: Array) -> Array:
-    """Return the largest compression and tension of free blocks, at least 0 (frames, 2, blocks)."""
+    """Return the largest compression and tension of free blocks, at least 0 (frames, 2, blocks).
+
+    Those of rigid blocks beside meshed ones are NaN.
+    """
     cells, free = model.cells, model.structure.free
     operator = corner_stress_operator(cells)
     corners = np.unique(np.concatenate(cells.polygons))
     owner = np.searchsorted(free, cells.block[corners])
+    # but for round-off, rigid motions give no stress; others give about E over the size of a cell
+    entries = np.asarray(abs(_cell_stress_operator(cells)).sum(axis=1)).reshape(-1, 3)
+    young = np.array([block.material.young for block in model.structure.blocks])
+    meshed = entries.max(axis=1) > 1e-6 * young[cells.owner]
+    rigid = ~np.isin(free, cells.owner[meshed])
     peaks = np.zeros((len(fields), 2, len(free)))
     for (compression, tension), q in zip(peaks, fields, strict=True):
         largest, least = principal_values(*(operator @ q).reshape(-1, 3)[corners].T)
         np.maximum.at(compression, owner, -least)
         np.maximum.at(tension, owner, largest)
+    peaks[:, :, rigid] = np.nan
     return peaks
 
 

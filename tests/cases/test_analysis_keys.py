@@ -126,7 +126,9 @@ def test_results_state_the_strength_with_which_joints_crush(tmp_path, capsys):
             assert f"joints {says}" in said
             factors += re.findall(r"(?:factor|mechanism, at) (inf|[\d.]+)", said)[:1]
         assert af.commands.main(["assess", str(path)]) == 0
-        note = "note: joints hinge about their edges, without the given strength of 1 MPa"
+        note = (
+            "note: joints hinge about their edges: that stones crush at the given 1 MPa would lower"
+        )
         assert (note in capsys.readouterr().out) == bool(materials)
     push, rating, weaker_push, weaker_rating = map(float, factors)
     assert weaker_push < 0.97 * push
@@ -304,6 +306,11 @@ def test_assessment_of_a_case_has_the_arguments_of_python():
     assert settings.spectrum == af.Eurocode8(ag=0.2, ground="B")
     assert settings.directions == (-1.0,)
     assert parse_assessment({}).directions == (1.0, -1.0)
+    # the fill is that of the limit analysis, but for one of its own or a plastic one
+    fill, own = af.limit.Fill(friction_angle=35.0), {"fill": {"friction_angle": 30}}
+    assert parse_assessment({}, fill).options["fill"] is fill
+    assert parse_assessment(own, fill).options["fill"].friction_angle == 30.0
+    assert not parse_assessment({}, af.limit.PlasticFill(friction_angle=35.0)).options
     assert settings.options == {
         "friction": None,
         "loads": [af.masonry.AttachedLoad(1, (0.0, 2.0), weight=5e3)],

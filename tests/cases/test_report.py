@@ -21,7 +21,7 @@ from archfem.cases.defaults import describe_defaults, list_defaults
 from archfem.cases.report import conclusion, report, report_data
 from archfem.cases.report.conclusion import build_conclusion, list_facts
 from archfem.cases.report.inputs import tabulate_inputs
-from archfem.cases.report.sections import supported_weight_ratio
+from archfem.cases.report.sections import build_input_section, supported_weight_ratio
 from archfem.cases.run import carry_out, replace_run
 from archfem.limit import rating
 from archfem.view.pages.document import FigureBlock
@@ -80,7 +80,9 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert "Ground motions" in words
     assert "Not among the results" not in words
     assert "Not computed: limit analysis, a rating for a vehicle, a kinematic assess" in words
-    assert "The structure forms no mechanism under all 2 motions." in words
+    assert (
+        "For motions of PGA 0.05 g: the structure forms no mechanism under all 2 motions." in words
+    )
     assert "Not varied: one set of properties, one model and time step." in words
     assert "another case" not in words
     case = af.Case.read(kept / "case.toml")
@@ -90,14 +92,18 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert f"{float(run.joints['friction'].max()):.3f}" in words
 
 
-LIMIT_TEXT = "limit analysis: it turns, at 0.25 g to the left\nin doubt: a made one"
+LIMIT_TEXT = (
+    "limit analysis: it turns, at 0.25 g to the left\n"
+    "joints crush at 20 MPa, the strength\n"
+    "in doubt: a made one; mend it"
+)
 CHECK_TEXT = (
     "right: pushed to the right\n"
     "linear, q = 2, FC = 1.35: capacity 8.212 m/s², demand 2.844 m/s²: passes, "
     "the spectrum may be 2.89 times as strong\n"
     "a code: capacity 0.11 m, demand 0.22 m at T = 1.178 s: fails, "
-    "the spectrum may be 0.5 times as strong, up to there the ground does not move it\n"
-    "note: an upper bound"
+    "the spectrum may be 0.5 times as strong before the mechanism begins to move\n"
+    "note: an upper bound; compare it with a run"
 )
 RATING_TEXT = "Rating of 'it' for LM1: factor 1.25 with 2 axles at -0.1, 1.1 m, passes without all"
 RISK_TEXT = (
@@ -117,6 +123,9 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     case = replace(case, risk=risk_keys.RiskSettings(hazard, {}, {}))
     data = report_data.ReportData(case, found.runs, found.folder)
     *sentences, signatures = build_conclusion(data).pieces
+    assumed = dict(build_input_section(data).pieces[1].rows)
+    assert "no crushing" not in assumed["joints"]
+    assert assumed["joints"].endswith("crushing in limit analysis alone, at 20 MPa, the strength")
     (table,) = (each for each in sentences if each.kind == "grid")
     assert table.rows == [
         ("as stated", "0.25 g, 475 years", "-", "-"),
@@ -127,7 +136,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
             (f"assessment: {name}, right and left", demand, f"{capacity} (in doubt)", factor)
             for name, demand, capacity, factor in (
                 ("linear, q = 2, FC = 1.35", "2.844 m/s²", "8.212 m/s², passes", "2.89"),
-                ("a code", "0.22 m", "0.11 m, fails, for the ground does not move it", "0.5"),
+                ("a code", "0.22 m", "0.11 m, fails", "0.5"),
             )
         ),
         (
@@ -138,6 +147,12 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         ),
     ]
     texts = [each.text for each in sentences if each.kind == "words"]
+    assert texts[0] == (
+        "For 0.25 g, 475 years and motions of PGA 0.05 g: the structure forms no mechanism under "
+        "all 2 motions. It fails with a least margin of 0.5 on the spectrum, by assessment: a "
+        "code, right and left. In doubt, for reasons given below: limit analysis, kinematic "
+        "assessment."
+    )
     # each doubt follows the sentence of its result
     (limit,) = (k for k, text in enumerate(texts) if text.startswith("Limit analysis"))
     assert texts[limit + 1] == "In doubt: a made one."
@@ -402,8 +417,8 @@ def test_every_input_has_its_mark():
         "breadth": ("1 m", "given"),
         "gravity": ("9.81 m/s²", "default"),
         "stone: E": ("5 GPa", "given"),
-        "stone: weight": ("20 kN/m³", "default"),
-        "stone to stone: μ": ("0.6", "default"),
+        "stone: weight": ("20 kN/m³ (table 2 of Demirel and Aldemir (2021))", "default"),
+        "stone to stone: μ": ("0.6 (dry stone has 0.4 to 0.8)", "default"),
         "stone to stone: cohesion": ("2 kPa", "given"),
         "reduction factor R": ("2.0", "given"),
         "scale of the motions": ("1.0", "default"),
@@ -546,12 +561,30 @@ def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path):
     assert "player" not in words  # of a run that there is not
 
 
+def test_an_assessment_takes_the_fill_of_the_limit_analysis(undrawn, tmp_path, capsys):
+    path, folder = tmp_path / "case.toml", tmp_path / "out"
+    path.write_text(BRIDGE, encoding="utf-8")
+    assert af.commands.main(["assess", str(path), "--out", str(folder)]) == 0
+    pressed = capsys.readouterr().out
+    assert "of the passive pressure, friction angle 35°" in pressed
+    assert af.commands.main(["report", str(folder)]) == 0
+    inputs = " ".join(words_of(folder / "report.html").split())
+    assert "assessment: fill that of the limit analysis inferred" in inputs
+    path.write_text(BRIDGE.replace('fill = { friction_angle = "35 degree" }', ""))
+    capsys.readouterr()
+    assert af.commands.main(["assess", str(path)]) == 0
+    alone = capsys.readouterr().out
+    assert "is left out; give fill for it" in alone
+    factors = [float(re.search(r"alpha_0 = ([\d.]+)", text)[1]) for text in (pressed, alone)]
+    assert factors[0] > 1.05 * factors[1]
+
+
 def test_a_history_alone_has_a_report_and_a_film_by_the_command_line(
     kept, unplotted, tmp_path, capsys
 ):
     path = Path(shutil.move(kept / "first" / "history.nc", tmp_path / "moved.nc"))
     assert af.commands.main(["report", str(path)]) == 0
-    assert "The structure forms no mechanism under the motion 'first'." in words_of(
+    assert "the structure forms no mechanism under the motion 'first'." in words_of(
         tmp_path / "moved.html"
     )
     given = ["--out", str(tmp_path / "film.gif"), "--size", "480x320", "--fps", "5"]
@@ -567,7 +600,7 @@ def test_the_conclusion_states_outcomes_falls_and_the_range(kept, unplotted):
         verdicts["second"], outcome="fallen", doubts=(af.models.model.Doubt("it leaks", "mend it"),)
     )
     text = " ".join(piece.text for piece in build_conclusion(data).pieces if piece.kind == "words")
-    assert "The structure forms no mechanism under 1 of 2 motions: first." in text
+    assert "the structure forms no mechanism under 1 of 2 motions: first." in text
     assert "The structure falls under 1 of 2 motions: second." in text
-    assert "In doubt: 1 of 2 runs: it leaks; mend it." in text
+    assert "In doubt: 1 of 2 runs: it leaks." in text  # the remedy is not for the client
     assert "raise no doubt" not in text

@@ -5,8 +5,10 @@ import re
 import pytest
 
 import archfem as af
+from archfem.cases.analysis_keys import parse_limit
 from archfem.cases.result_text import (
     describe_collapse,
+    describe_fill,
     describe_run,
     describe_run_quality,
     describe_verdicts,
@@ -61,10 +63,15 @@ def test_words_and_tables_obey_the_criteria_of_the_run(run):
 
 def test_limit_analysis_in_words(ring):
     pushed = af.collapse_factor(ring, live=af.BodyForce(1.0))
-    outcome, hinges, crushing = describe_collapse(ring, pushed, 2e6).splitlines()
+    limit = parse_limit({"strength": 2e6, "fill": {"friction_angle": 35}})
+    outcome, hinges, crushing, fill = describe_collapse(ring, pushed, limit).splitlines()
     assert outcome.endswith(f"into a mechanism, at {pushed.factor:.4g} g to the right")
     assert hinges.startswith("hinges, by the face in contact: joint 0 at the intrados; joint 6 at")
     assert crushing == "joints crush at 2 MPa, the strength of the stones"
+    assert "at most 0.33 of the passive pressure, friction angle 35°, cohesion 0 kPa" in fill
+    plastic = {"law": "plastic", "friction_angle": 30, "cohesion": "5 kPa"}
+    plastic = parse_limit({"fill": plastic}).fill
+    assert describe_fill(plastic) == "fill: a plastic body, friction angle 30°, cohesion 5 kPa"
     mirrored = af.collapse_factor(ring, live=af.BodyForce(-2.0))
     assert mirrored.sentence == pushed.sentence.replace("right", "left")
     wheel = af.PointLoad(0.5, (0.0, -3e3))
@@ -76,11 +83,11 @@ def test_limit_analysis_in_words(ring):
     assert both.sentence.endswith(f"at {both.factor:.4g} times the load")
     slab = af.column(breadth=4.0, heights=[1.0])  # slides before it turns
     slid, lifted = (af.collapse_factor(slab, live=af.BodyForce(*g)) for g in ((1.0,), (0.0, -1.0)))
-    words = describe_collapse(slab, slid, None).splitlines()
+    words = describe_collapse(slab, slid, parse_limit({})).splitlines()
     assert words[1] == f"sliding: {slab.joints[0].name}"
     first = "limit analysis: this load never overturns it"
     last = "joints do not crush: no strength of the stones is given"
-    assert describe_collapse(slab, lifted, None).splitlines() == [first, last]
+    assert describe_collapse(slab, lifted, parse_limit({})).splitlines() == [first, last]
 
 
 def test_verdicts_of_several_runs_are_counted(run):

@@ -241,7 +241,7 @@ def test_a_mechanism_that_the_ground_does_not_start_passes():
     assert found.passes
     # without these words a capacity below the demand reads as if it failed
     assert str(found.displacement).endswith(
-        "3.7 times as strong, up to there the ground does not set the mechanism in motion"
+        "3.7 times as strong before the mechanism begins to move"
     )
     assert found.displacement.at_rest
     assert not found.linear.at_rest

@@ -21,6 +21,7 @@ from archfem.dynamics.verdict_range import property_text
 from archfem.joints.criteria import assessed_joints
 from archfem.limit.rating import PRESSURE_RANGE
 from archfem.masonry.joint_closing import describe_closing
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.units import STANDARD_GRAVITY, format_mm
 from archfem.view.pages.document import Grid, Section, TextBlock
@@ -129,13 +130,14 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
 
 def build_conclusion(data: ReportData) -> Section:
     """Build the section on outcomes in sentences, each with its doubts, on margins and range."""
-    blocks, doubts = list[Any](), list_doubts(data)
+    rows, doubts = [*_capacity_rows(data)], list_doubts(data)
+    blocks: list[Any] = [TextBlock(text) for text in filter(None, [_build_lead(data, rows)])]
     for name, result in _STATED_RESULTS.items():
         text = " ".join(_conclude_file(data, name) if name else _conclude_histories(data))
         blocks += [TextBlock(text)] if text else []
         own = (doubt for about, doubt in doubts if about == result)
         blocks += [TextBlock(f"In doubt: {doubt}.", "doubt") for doubt in own]
-    if rows := [*_capacity_rows(data)]:
+    if rows:
         head = ("", "demand", "capacity or outcome", "factor")
         factors = _FACTORS if any(row[3] != "-" for row in rows) else ""
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
@@ -145,6 +147,26 @@ def build_conclusion(data: ReportData) -> Section:
     if data.folder is not None and absent:
         blocks.append(TextBlock(f"Not computed: {', '.join(absent)}."))
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
+
+
+def _build_lead(data: ReportData, rows: Sequence[_Row]) -> str:
+    """Answer in a few sentences: demand, outcomes, variations, least margin, results in doubt."""
+    checks = [(float(row[3]), row[0]) for row in rows if row[0].startswith("assessment: ")]
+    if not data.runs and not checks:
+        return ""  # a load has one result, which says all
+    stated = [data.case.report["demand"]] if data.case.report.get("demand") else []
+    stated += [f"motions of {demand}" for name, demand, *_ in rows if name == "time histories"]
+    lead = [f"the structure {text}" for text in _describe_outcomes(data)]
+    if data.verdict_range is not None:
+        lead.append(f"it {data.verdict_range.count} variations of its properties")
+    if checks:
+        factor, check = min(checks)
+        outcome = "passes" if factor >= 1.0 else "fails"
+        lead.append(f"it {outcome} with a least margin of {factor:g} on the spectrum, by {check}")
+    doubtful = ", ".join(dict.fromkeys(result for result, _ in list_doubts(data)))
+    lead += [f"in doubt, for reasons given below: {doubtful}"] if doubtful else []
+    lead[0] = f"for {' and '.join(stated)}: {lead[0]}" if stated else lead[0]
+    return " ".join(map(sentence, lead))
 
 
 def _build_signatures(report: Mapping[str, str]) -> Grid:
@@ -211,8 +233,9 @@ def _assessment_rows(text: str) -> Iterator[_Row]:
     for line, directions in _list_checks(text).items():
         if found := _CHECK.match(line):
             name = f"assessment: {found['name']}, {' and '.join(directions)}"
-            # a check of displacement passes, too, where the ground does not set it in motion
-            rest = found["rest"].replace("up to there the ground", "for the ground")
+            # a check of displacement passes, too, where the mechanism does not begin to move
+            unmoved = bool(found["rest"]) and found["outcome"] == "passes"
+            rest = ", for the mechanism does not begin to move" if unmoved else ""
             outcome = f"{found['capacity']}, {found['outcome']}{rest}"
             yield name, found["demand"], outcome, found["factor"]
 
@@ -241,17 +264,22 @@ def _conclude_histories(data: ReportData) -> list[str]:
     return [*_conclude_runs(data), *_conclude_joints(data), *_conclude_range(data)]
 
 
-def _conclude_runs(data: ReportData) -> Iterator[str]:
-    """Yield sentences on the outcomes of the runs, and on displacements and mechanisms."""
+def _describe_outcomes(data: ReportData) -> Iterator[str]:
+    """Yield what the structure does under some of the motions, and under which."""
     by_verb: dict[str, list[str]] = {}
     for name, run in data.runs.items():
         by_verb.setdefault(_VERBS[run.verdict.outcome], []).append(name)
-    count, verdicts = len(data.runs), [run.verdict for run in data.runs.values()]
+    count = len(data.runs)
     for verb, names in by_verb.items():
         under = f"{len(names)} of {count} motions: {', '.join(names)}"
         if len(names) == count:
             under = f"all {count} motions" if count > 1 else f"the motion '{names[0]}'"
-        yield f"The structure {verb} under {under}."
+        yield f"{verb} under {under}"
+
+
+def _conclude_runs(data: ReportData) -> Iterator[str]:
+    """Yield sentences on incomplete runs, on falls, displacements and mechanisms."""
+    count, verdicts = len(data.runs), [run.verdict for run in data.runs.values()]
     for name, run in data.runs.items():
         if run.verdict.incomplete:
             yield f"The run under '{name}' {run.verdict.incomplete}."
@@ -333,9 +361,12 @@ def _conclude_file(data: ReportData, name: str) -> list[str]:
 
 
 def list_doubts(data: ReportData) -> list[tuple[str, str]]:
-    """Return each result in doubt with its doubt, once; of runs with the number that have it."""
+    """Return each result in doubt with its doubt, once; of runs with the number that have it.
+
+    Remedies are for who computes, and stand in the files of the results alone.
+    """
     verdicts = [run.verdict for run in data.runs.values()]
-    reasons = Counter(str(doubt) for verdict in verdicts for doubt in verdict.doubts)
+    reasons = Counter(doubt.cause for verdict in verdicts for doubt in verdict.doubts)
     count = len(verdicts)
     of_runs = [f"{n} of {count} runs: {text}" if count > 1 else text for text, n in reasons.items()]
     doubts = [("time histories", text) for text in of_runs]
@@ -343,8 +374,17 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
         lines = (data.read_text(name) or "").splitlines()
         # what a kinematic assessment leaves out stands there as a note
         for mark in (DOUBT_MARK, "note: "):
-            doubts += [(result, line.removeprefix(mark)) for line in lines if line.startswith(mark)]
+            texts = [line.removeprefix(mark) for line in lines if line.startswith(mark)]
+            # a remedy follows its doubt behind a semicolon, as in `Doubt`
+            doubts += [(result, text.rpartition("; ")[0] or text) for text in texts]
     return list(dict.fromkeys(doubts))
+
+
+def list_elastic_fill(data: ReportData) -> list[str]:
+    """Return the materials of blocks that yield to others, if they are elastic bodies in a run."""
+    blocks = [data.case.structure.blocks[k] for k in find_yielding_blocks(data.case.structure)]
+    bodies = [block for block in blocks if "full" in data.fidelity or "rigid" not in data.fidelity]
+    return list(dict.fromkeys(block.material.name for block in bodies)) if data.runs else []
 
 
 def describe_what_is_not_varied(data: ReportData) -> str:
@@ -353,6 +393,7 @@ def describe_what_is_not_varied(data: ReportData) -> str:
         return ""
     single = ["one motion"] if len(data.runs) == 1 else []
     single += [] if data.verdict_range else ["one set of properties"]
+    single += ["stiffness and strength of the fill"] if list_elastic_fill(data) else []
     predicted = all("predicted_error" in run.dataset.attrs for run in data.runs.values())
     if not predicted and "accuracy.txt" not in data.files:
         single.append("one model" if "dt" in list_varied(data) else "one model and time step")

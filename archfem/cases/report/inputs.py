@@ -5,7 +5,7 @@ from inspect import Parameter, signature
 from typing import Any
 
 from archfem._validation import declared_keys
-from archfem.cases.defaults import DECIDING_VALUES, list_default_keys
+from archfem.cases.defaults import DECIDING_VALUES, HINGE_REASON, list_default_keys
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.structure_keys import shape_keys
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
@@ -95,12 +95,14 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
         section = "materials" if isinstance(item, Material) else "contacts"
         defaults = list_default_keys(case, item)
         given = case.settings.get(section, {}).get(item.name, {})
-        for key, (word, unit, name, *_) in DECIDING_VALUES[section].items():
+        for key, (word, unit, name, reason) in DECIDING_VALUES[section].items():
             value = getattr(item, key)
             text = "not known" if value is None else f"{value / unit:.4g}{name}"
             text = "never slides" if text == "inf" else text
             mark = _mark(key not in defaults and value is not None)
             inferred = "finish" in given and key not in given and mark == "given"
+            if mark == "default" and value is not None:
+                text += f" ({reason.partition(';')[0]})"
             yield f"{item.name}: {word}", text, "inferred" if inferred else mark
         if "finish" in given:
             yield f"{item.name}: finish", given["finish"], "given"
@@ -124,6 +126,8 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
             yield f"{section}: {key.replace('_', ' ')}", describe_value(value), "given"
         if section in _FUNCTIONS:
             yield from _default_rows(section, table)
+        if section == "assessment" and "fill" in data.case.assessment.options.keys() - table:
+            yield "assessment: fill", "that of the limit analysis", "inferred"
         if section == "rating" and (own := _RATING_KEYS - table.keys()):
             words = ", ".join(sorted(own)).replace("_", " ")
             yield f"rating: {words}", "of the code, see below", "default"
@@ -147,7 +151,9 @@ def _motion_rows(data: ReportData) -> Iterator[Row]:
     motion, suite = (data.case.settings.get(key) for key in ("motion", "suite"))
     if suite is not None:
         yield "motions", f"{len(suite['pairs'])} pairs: {', '.join(suite['pairs'])}", "given"
-        yield from _source_rows(list(suite["pairs"].values()))
+        before = ", before matching" if suite.get("matched") else ""
+        for part, values, mark in _source_rows(list(suite["pairs"].values())):
+            yield f"{part}{before}", values, mark
         target = suite.get("target")
         yield "target spectrum", describe_value(target) if target else "none", _mark(bool(target))
         matched = "matched to the target" if suite.get("matched") else "as they are"
@@ -243,7 +249,8 @@ def _criteria_rows(data: ReportData) -> Iterator[Row]:
     until = settings.get("analysis", {}).get("until")
     own = until.get("criteria", {}) if isinstance(until, Mapping) else {}
     given = settings.get("criteria", own) or {}
-    yield "a joint hinges where", f"|e| ≥ {criteria.hinge:g}", _mark("hinge" in given)
+    reason = "" if "hinge" in given else f" ({HINGE_REASON})"
+    yield "a joint hinges where", f"|e| ≥ {criteria.hinge:g}{reason}", _mark("hinge" in given)
     limit = "its own limit, μ + c A / N"
     limit = limit if criteria.friction is None else f"{criteria.friction:g}"
     yield "a joint slides where |V| / N reaches", limit, _mark("friction" in given)

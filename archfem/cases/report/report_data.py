@@ -127,11 +127,6 @@ def rebuild_motion(run: History, name: str) -> Motion:
     return Motion(horizontal, dt, vertical if vertical.any() else None, name)
 
 
-def missing_note(what: str, remedy: str) -> TextBlock:
-    """Return the paragraph on a result that does not exist."""
-    return TextBlock(f"Not among the results: {what}. {remedy}", "missing")
-
-
 def build_player(case: Case, run: History, title: str, players: int = 1) -> Player:
     """Return the player of a run; blocks stand still if it has no recorded displacements."""
     model, reason = _rebuild_model(case, run)

@@ -15,6 +15,7 @@ from archfem.cases.report.conclusion import (
     build_conclusion,
     describe_lost,
     describe_mechanism,
+    list_elastic_fill,
     sentence,
     summarise_outcomes,
 )
@@ -23,7 +24,6 @@ from archfem.cases.report.report_data import (
     ReportData,
     build_live_page,
     build_player,
-    missing_note,
 )
 from archfem.dynamics.history import SIGN_CONVENTION, History
 from archfem.dynamics.recorder import library_versions
@@ -33,6 +33,7 @@ from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
+from archfem.statics.mechanism_assessment import LIMIT_STATES, LimitState
 from archfem.statics.stress import utilisation_text
 from archfem.units import kN
 from archfem.view.collapse import draw_fall
@@ -48,7 +49,7 @@ _DEFINITIONS = {
     "ring and pier at once": "of a ring and a pier together",
     "one part over the record": "of one ring or one pier, each from its first failure on",
     "verified": "that permit a motion of the blocks",
-    "Demirel and Aldemir": "of one ring, as that paper words it",
+    "Demirel and Aldemir": "of one ring, as worded in Buildings 11 (2021)",
 }
 
 # Of figure and table, with the file of the figure
@@ -124,7 +125,7 @@ def build_input_section(data: ReportData) -> Section:
     assumptions = [
         ("structure", "plane; forces are those of the whole width"),
         ("blocks", "rigid" if data.is_static else blocks.get(fidelity, f"by part: {fidelity}")),
-        ("joints", "dry: no tension but where a bond is given; Coulomb friction; no crushing"),
+        ("joints", _describe_joints(data)),
         ("displacements", "of any size" if large else "small: equilibrium where blocks stood"),
         ("ground", "rigid, moves as one; abutments and foundations are fixed to it"),
         ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
@@ -132,8 +133,21 @@ def build_input_section(data: ReportData) -> Section:
         ("e", "eccentricity M / (N h), h the depth of the joint: ±0.5 at its edges"),
         ("V / N", "mobilised friction |V| / N: at its limit μ, with c A / N added, it slides"),
     ]
+    if fill := list_elastic_fill(data):
+        words = "elastic in histories: it carries tension, and neither yields nor slides inside"
+        assumptions.insert(2, ("fill", f"{words}; its E ({', '.join(fill)}) is among the inputs"))
     table = Grid((), assumptions, "Assumptions, units and signs")
     return Section("Inputs and assumptions", [tabulate_inputs(data), table])
+
+
+def _describe_joints(data: ReportData) -> str:
+    """Say what joints resist, and in which results they crush."""
+    law, mark = "dry: no tension but where a bond is given; Coulomb friction", "joints crush at "
+    for name in ("limit", "rating"):
+        for line in (data.read_text(f"{name}.txt") or "").splitlines():
+            if line.startswith(mark):
+                return f"{law}; crushing in limit analysis alone, at {line.removeprefix(mark)}"
+    return f"{law}; no crushing"
 
 
 def _build_geometry(case: Case) -> list[Any]:
@@ -226,7 +240,29 @@ def _build_assessment(data: ReportData) -> list[Any]:
     caption = "(a) Mechanism at the displacement capacity, and (b) capacity curve with demand."
     names = sorted(name for name in data.files if name.startswith("assessment_"))
     figures = [figure for name in names for figure in data.read_figure(name, caption)]
-    return [TextBlock(text, "lines"), *figures]
+    return [TextBlock(text, "lines"), *figures, _define_assessment(data)]
+
+
+def _define_assessment(data: ReportData) -> Grid:
+    """Tabulate the quantities of a kinematic assessment, their rules, and codes that are mixed."""
+    state = data.case.assessment.options.get("limit_state", "NTC-2018 SLV")
+    rules = state if isinstance(state, LimitState) else LIMIT_STATES[state]
+    demand = f"the spectrum, {100.0 * rules.damping:g} % damped, at that period"
+    rows = [
+        ("alpha_0", "multiple of the weights, as horizontal forces, that begins the mechanism"),
+        ("e*, M*", "share and mass that take part: M* = (Σ P δ)² / (g Σ P δ²), e* = g M* / Σ P"),
+        ("a_0*, d_0*", "acceleration that begins it, and displacement at which it resists nothing"),
+        ("T_s", "secant period at 0.16 d_0*"),
+        (rules.name, f"capacity {rules.share:g} d_0*; demand {demand}; {rules.source}"),
+    ]
+    own = [data.case.settings.get(key, {}) for key in ("assessment", "suite")]
+    spectrum = own[0].get("spectrum") or own[1].get("target") or {}
+    code = str(spectrum.get("code", "NTC"))
+    if rules.name.startswith("NTC") and not code.startswith("NTC"):
+        rows.append(
+            ("codes", f"a check of NTC with a spectrum of {code}, which it was not made for")
+        )
+    return Grid((), rows, "Quantities of the assessment; Circolare 7/2019, C8.7.1.2.1")
 
 
 def build_ground_section(data: ReportData) -> Section:
@@ -265,10 +301,10 @@ def _build_spectra(case: Case, motions: list[Motion]) -> list[Any]:
 
 def build_run_sections(data: ReportData) -> list[Section]:
     """Build the sections on the response of one run, or of all pairs and of each."""
-    remedy = "`archfem run` again runs the pairs that are left."
     if not data.runs:
         return []
-    missing = [missing_note(f"runs of {', '.join(data.missing)}", remedy)] if data.missing else []
+    absent = f"Not among the results: runs of {', '.join(data.missing)}."
+    missing = [TextBlock(absent, "missing")] if data.missing else []
     if data.case.suite is None:
         (name,) = data.runs
         return [
@@ -328,7 +364,7 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
     verdict, fall = run.verdict, run.verdict.fall
     lines = [
         f"Outcome: {summarise_outcomes(data, [run])}",
-        *(f"In doubt: {doubt}" for doubt in verdict.doubts),
+        *(f"In doubt: {doubt.cause}" for doubt in verdict.doubts),
     ]
     lines += (
         [f"lost: {describe_lost(fall, len(fall.blocks))}"]
@@ -425,11 +461,12 @@ def build_method_section(data: ReportData) -> Section:
     """Build the section on norms and methods."""
     norm = [("norm", data.case.report["norm"])] if data.case.report.get("norm") else []
     sources = (("suite", "target"), ("assessment", "spectrum"))
-    spectra = [
-        ("design spectrum", describe_value(table[key]))
+    given = [
+        describe_value(table[key])
         for section, key in sources
         if key in (table := data.case.settings.get(section, {}))
     ]
+    spectra = [("design spectrum", each) for each in dict.fromkeys(given)]
     used = [row[1:] for row in _METHODS if not row[0] or row[0] in data.files]
     used = [row for row in used if data.runs or row[0] != "joints, criteria"]
     return Section("Norms and methods", [Grid((), [*norm, *spectra, *used])])
