@@ -197,12 +197,11 @@ def _add_case_commands(commands: Any) -> None:
     about = "does it fall, whatever its uncertain properties are?"
     add_to = add("verdict", about, "folder for table and picture (none)", required=False)
     add_to("--workers", type=int, default=1, help="processes for the runs (1)")
-    add_to(
-        "--samples",
-        type=int,
-        default=236,
-        help="runs beside those of one changed property each (236)",
-    )
+    about = "runs beside those of one changed property each (236)"
+    add_to("--samples", type=int, default=236, help=about)
+    add_to("--pair", metavar="NAME", help="motion of a [suite] of several")
+    about = "at which factor on its motion does it fall, or form a mechanism?"
+    add_to = add("scale", about, "folder for the table (none)", required=False)
     add_to("--pair", metavar="NAME", help="motion of a [suite] of several")
     about = "annual rate of collapse, from the hazard and the sampling of [risk]"
     add("risk", about)("--workers", type=int, default=1, help="processes for the runs (1)")

@@ -37,6 +37,12 @@ from archfem.cases.toml_file import format_tables
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions
 from archfem.dynamics.history import Ending, History
+from archfem.dynamics.motion_scaling import (
+    CollapseScale,
+    MechanismScales,
+    collapse_scale,
+    mechanism_scales,
+)
 from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.limit.collapse import Collapse
@@ -274,6 +280,27 @@ def verdict(options: argparse.Namespace) -> None:
         return files | {"verdict_range.txt": str(computed), "verdict_range.png": computed.plot()}
 
     _write_results("verdict", case, options.out, draw)
+
+
+def scale(options: argparse.Namespace) -> int:
+    """Scale the motion of a case until it falls, or forms a mechanism in small displacements."""
+    from archfem.studies.cache import ground_motion
+
+    case = Case.read(options.case, options.changes)
+    if options.out is not None:  # a folder that cannot be written is refused before the runs
+        create_result_folder(options.out)
+    motion = ground_motion(case if options.pair is None else case.alone(options.pair))
+    found: CollapseScale | MechanismScales
+    search = collapse_scale if case.analysis.displacements == "large" else mechanism_scales
+    with _record_doubts(case.structure) as doubts:
+        found = search(case.analysis, motion)
+    doubts += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
+    text = "\n".join([f"{motion.name}: {found}", *dict.fromkeys(doubts), "", found.table()])
+    print(f"{case.title}\n{text}")
+    _write_results("scale", case, options.out, lambda: {"scale.txt": text})
+    if found.interrupted:
+        raise KeyboardInterrupt
+    return ExitCode.DOUBTFUL if doubts else 0
 
 
 def report(options: argparse.Namespace) -> None:

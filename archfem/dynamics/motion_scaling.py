@@ -35,6 +35,7 @@ from archfem.models.model import Model
 from archfem.motion.motion import Motion
 from archfem.motion.signal_processing import MAX_PEAK_ACCELERATION
 from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.units import STANDARD_GRAVITY
 
 logger = logging.getLogger("archfem")
 
@@ -51,6 +52,7 @@ class ScaledRun:
     ending: Ending
     outcome: str  # ending in words
     fall: CollapseState | None = None  # state of collapse; None for small displacements
+    doubts: tuple[str, ...] = ()  # reasons why the run may be wrong
 
     @property
     def is_interrupted(self) -> bool:
@@ -104,11 +106,27 @@ class MechanismScales:
     definitions: tuple[str, ...]  # for which the structure has enough joints
     runs: tuple[ScaledRun, ...] = ()  # in order of their scales
     interrupted: bool = False  # whether Ctrl-C ended the search
+    pga: float | None = None  # peak of the motion [m/s²]
+
+    def __repr__(self) -> str:
+        """Return the scales around the first mechanism by any definition, in one line."""
+        first = min(self.definitions, key=lambda definition: self[definition].upper)
+        bracket = self[first]
+        met = "nor at any scale that was tried"
+        if bracket.run:
+            met = f"first mechanism at {_say_scale(bracket.upper, self.pga)}, by {first}"
+        return _say_bracket("no mechanism", bracket.lower, self.pga, met)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Reasons why the scales of the first mechanism may be wrong."""
+        first = min(self.definitions, key=lambda definition: self[definition].upper)
+        return _doubts_of_bracket(self, first)
 
     def with_run(self, run: ScaledRun) -> "MechanismScales":
         """Return the search with one more run."""
         runs = sorted([*self.runs, run], key=lambda each: each.scale)
-        return MechanismScales(self.definitions, tuple(runs), run.is_interrupted)
+        return replace(self, runs=tuple(runs), interrupted=run.is_interrupted)
 
     def __getitem__(self, definition: str) -> Bracket:
         """Bracket of a definition; without bounds if the structure has too few joints for it."""
@@ -202,10 +220,12 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
         options = {"start": start, "damping": damping, "criteria": criteria, "method": solver}
         record = Record(whole_fall=False)  # mechanisms come before a fall
         run = _run_as_far(model, scaled, dt=dt, until=EveryMechanism(), record=record, **options)
-        return ScaledRun(scale, first_mechanisms(run), run.ending, run.outcome)
+        doubts = tuple(map(str, run.doubts))
+        return ScaledRun(scale, first_mechanisms(run), run.ending, run.outcome, doubts=doubts)
 
     definitions = (*applicable_definitions(start.model.structure, criteria), "verified")
-    return search_scales(run_scaled, definitions, precision, admissible_range(between, motion))
+    found = search_scales(run_scaled, definitions, precision, admissible_range(between, motion))
+    return replace(found, pga=motion.pga)
 
 
 def _run_as_far(model: Model | Analysis, motion: Motion, **options: Any) -> History:
@@ -214,6 +234,40 @@ def _run_as_far(model: Model | Analysis, motion: Motion, **options: Any) -> Hist
         return time_history(model, motion, **options)
     except DidNotConverge as error:
         return partial_history(error)
+
+
+def _say_scale(scale: float, pga: float | None) -> str:
+    """Return a scale in words: as a peak acceleration where that of the motion is known."""
+    if pga is None:
+        return f"{scale:#.3g} × the motion"
+    return f"{scale * pga / STANDARD_GRAVITY:#.3g} g ({scale:#.3g} × the motion)"
+
+
+def _say_bracket(state: str, lower: float, pga: float | None, met: str) -> str:
+    """Return a bracket in words, from the state at its lower bound to what is met above it."""
+    if not lower:
+        return f"{met}; at no smaller scale that was tried it survives"
+    return f"{state} at {_say_scale(lower, pga)}, {met}"
+
+
+def _doubts_of_bracket(scales: MechanismScales, definition: str) -> tuple[str, ...]:
+    """Return reasons why a bracket may be wrong: runs broken off, not monotonic, or in doubt."""
+    bracket, doubts = scales[definition], list[str]()
+    for note, values in {
+        "it survives also": bracket.above,
+        "runs without an answer were": bracket.unanswered,
+    }.items():
+        if values:
+            doubts.append(
+                f"{note} at {', '.join(f'{value:#.3g}' for value in values)} × the motion"
+            )
+    if scales.interrupted:
+        doubts.append("the search was interrupted")
+    bounds = [run for run in scales.runs if run.scale in (bracket.lower, bracket.upper)]
+    doubts += [
+        f"at {run.scale:#.3g} × the motion: {doubt}" for run in bounds for doubt in run.doubts
+    ]
+    return tuple(doubts)
 
 
 def check_search(precision: float, between: Sequence[float]) -> None:
@@ -293,9 +347,43 @@ class CollapseScale:
 
     Attributes:
         searches: runs made, by time step [s].
+        pga: peak of the motion [m/s²].
     """
 
     searches: dict[float, MechanismScales]
+    pga: float | None = None
+
+    def __repr__(self) -> str:
+        """Return the scales around the fall in one line; a dislocated structure has not fallen."""
+        falls = [fall for dt in self.searches for at, fall in self.falls(dt) if at == self.lower]
+        parted = any(fall is not None and fall.kind == "dislocated" for fall in falls)
+        state = "dislocated, not fallen," if parted else "stands"
+        met = "falls at no scale that was tried"
+        if self.upper < inf:
+            met = f"falls at {_say_scale(self.upper, self.pga)}"
+        elif any(self.bracket(dt).run for dt in self.searches):
+            met = "falls with some of the time steps only"
+        return _say_bracket(state, self.lower, self.pga, met)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended the search."""
+        return any(search.interrupted for search in self.searches.values())
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Reasons why the scales may be wrong."""
+        doubts = []
+        brackets = {dt: self.bracket(dt) for dt in self.searches}
+        if max(b.lower for b in brackets.values()) >= min(b.upper for b in brackets.values()):
+            found = (
+                f"{b.lower:#.3g} to {b.upper:#.3g} by {1e3 * dt:g} ms" for dt, b in brackets.items()
+            )
+            doubts.append(f"its time steps disagree: it falls from {', '.join(found)}")
+        for dt, search in self.searches.items():
+            own = _doubts_of_bracket(search, COLLAPSE_DEFINITION)
+            doubts += [f"by a time step of {1e3 * dt:g} ms, {doubt}" for doubt in own]
+        return tuple(doubts)
 
     def bracket(self, dt: float) -> Bracket:
         """Return the bracket of collapse that was found with one time step.
@@ -419,11 +507,14 @@ def collapse_scale(
 
     def run_scaled(step: float, scale: float) -> ScaledRun:
         run = _run_as_far(model, motion.scaled(scale), start=begin, damping=damping, dt=step)
-        return ScaledRun(scale, {}, run.ending, run.outcome, run.fall)
+        doubts = tuple(map(str, run.doubts))
+        return ScaledRun(scale, {}, run.ending, run.outcome, run.fall, doubts)
 
     limits = admissible_range(between, motion)
     searches = {}
     for step in steps:
         run_at = partial(run_scaled, step)
         searches[step] = search_scales(run_at, (COLLAPSE_DEFINITION,), precision, limits)
-    return CollapseScale(searches)
+        if searches[step].interrupted:
+            break
+    return CollapseScale(searches, motion.pga)

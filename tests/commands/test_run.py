@@ -173,6 +173,47 @@ def test_a_range_is_of_one_motion_of_a_suite(small, unplotted, capsys):
     assert re.search(r"uncertain, under \S*first\S* the structure falls", page)
 
 
+@pytest.mark.parametrize(
+    ("displacements", "head", "says"),
+    [
+        (
+            "large",
+            "step",
+            r"tap: (stands|dislocated, not fallen,) at \S+ g \(\S+ × the motion\), falls",
+        ),
+        ("small", "mechanism", r"tap: no mechanism at \S+ g \(.*, first mechanism at .*, by "),
+    ],
+)
+def test_scale_command(tmp_path, undrawn, capsys, displacements, head, says):
+    """A slender block under half a sine of 0.4 s, which does not topple below b / h = 0.25 g."""
+    pulse = 2.5 * np.sin(np.pi * np.linspace(0.0, 1.0, 41))
+    np.savetxt(tmp_path / "tap.txt", [*pulse, *np.zeros(60)])
+    (tmp_path / "block.toml").write_text(
+        f"""
+title = "Block"
+structure = {{ shape = "column", breadth = 0.25, heights = [1.0] }}
+model = {{ fidelity = "rigid", displacements = "{displacements}" }}
+motion = {{ file = "tap.txt", dt = 0.01, units = "m/s2" }}
+"""
+    )
+    given = ["scale", str(tmp_path / "block.toml"), "--out", str(tmp_path / "out")]
+    code = af.commands.main(given)
+    said = capsys.readouterr().out
+    text = (tmp_path / "out" / "scale.txt").read_text(encoding="utf-8")
+    assert code == (3 if "in doubt: " in text else 0)
+    assert said.startswith("Block\n" + text.rstrip())
+    assert re.match(says.replace("tap", "tap.*"), text), text
+    assert f"\n\n{head} " in text
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        *("archfem.json", "case.toml", "scale.txt")
+    }
+    assert 0.9 * 0.25 < float(re.search(r"(?:falls|first mechanism) at (\S+) g", text)[1]) < 0.8
+    assert af.commands.main([*given, "--set", "motion.scale=2"]) == code
+    again = (tmp_path / "out" / "scale.txt").read_text(encoding="utf-8")
+    factor = [float(re.search(r"\((\S+) × ", each)[1]) for each in (text, again)]
+    assert factor[0] / factor[1] == pytest.approx(2.0, rel=0.1)
+
+
 @pytest.mark.slow
 def test_an_interrupted_suite_continues_with_the_motions_left(small, undrawn, capsys):
     def broken_off(case, motion, *given):

@@ -1,5 +1,6 @@
 """Scale factors at first mechanism: closed form, whole runs, the search on made-up runs."""
 
+from dataclasses import replace
 from functools import partial
 from math import inf
 
@@ -236,8 +237,58 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     assert (found.lower, found.upper) == (1.0, 2.5)
     assert found.above == (2.7, 3.0)
     assert found.bracket(0.005).upper == 2.5
+    assert str(found) == "stands at 1.00 × the motion, falls at 2.50 × the motion"
+    assert [doubt.partition(" at ")[0] for doubt in found.doubts] == [
+        "by a time step of 10 ms, it survives also",
+        "by a time step of 5 ms, it survives also",
+    ]
     never = CollapseScale({0.01: fallen(1.0, -2.0), 0.005: fallen(1.0, 2.0)})
     assert (never.lower, never.upper, never.above) == (1.0, inf, ())
+    assert str(never) == "stands at 1.00 × the motion, falls with some of the time steps only"
+    assert never.doubts == (
+        "its time steps disagree: it falls from 1.00 to 2.00 by 10 ms, 2.00 to inf by 5 ms",
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "scales", "says"),
+    [
+        ("stands", (1.0, -2.0), "stands at 0.500 g (1.00 × the motion), falls at 1.00 g (2.00 × "),
+        (
+            "dislocated",
+            (1.0, -2.0),
+            "dislocated, not fallen, at 0.500 g (1.00 × the motion), falls",
+        ),
+        ("stands", (1.0, 2.0), "stands at 1.00 g (2.00 × the motion), falls at no scale that was"),
+        ("stands", (-1.0, -2.0), "falls at 0.500 g (1.00 × the motion); at no smaller scale that"),
+    ],
+)
+def test_a_fall_is_said_in_g(kind, scales, says):
+    found = fallen(*scales)
+    runs = [
+        replace(r, fall=replace(r.fall, kind=r.fall.kind if r.fall.kind == "fallen" else kind))
+        for r in found.runs
+    ]
+    runs[0] = replace(runs[0], doubts=("energy drifts",))
+    found = CollapseScale({0.005: replace(found, runs=tuple(runs))}, pga=0.5 * 9.80665)
+    assert str(found).startswith(says)
+    bound = scales[0] in (found.lower, -found.upper)
+    doubts = ("by a time step of 5 ms, at 1.00 × the motion: energy drifts",)
+    assert found.doubts == (doubts if bound else ())
+
+
+def test_a_first_mechanism_is_said_in_g():
+    found = searched({**dict.fromkeys(DEFINITIONS, beyond(2.5)), "verified": beyond(2.0)})
+    found = replace(found, pga=9.80665)
+    lower, upper = found["verified"].lower, found["verified"].upper
+    assert str(found) == (
+        f"no mechanism at {lower:#.3g} g ({lower:#.3g} × the motion), first mechanism at "
+        f"{upper:#.3g} g ({upper:#.3g} × the motion), by verified"
+    )
+    assert found.doubts == ()
+    none = searched(dict.fromkeys(DEFINITIONS, beyond(inf)))
+    assert str(none).endswith("nor at any scale that was tried")
+    assert "interrupted" in replace(none, interrupted=True).doubts[0]
 
 
 def test_no_bracket_rests_on_a_run_without_an_answer():
@@ -271,7 +322,7 @@ def test_collapse_is_not_sought_beyond_five_g(between, limits, monkeypatch):
     ranges = []
     monkeypatch.setattr(
         "archfem.dynamics.motion_scaling.search_scales",
-        lambda shaken, what, precision, found: ranges.append(found),
+        lambda _, what, precision, found: ranges.append(found) or MechanismScales(what),
     )
     block = af.column(breadth=1.0, heights=[1.0])
     model = af.build(block, fidelity="rigid", displacements="large")

@@ -99,10 +99,11 @@ class Survey:
     ignored: Mapping[str, int]
 
     def __str__(self) -> str:
-        left = [f"{count} on '{layer}'" for layer, count in self.ignored.items() if count]
+        counts = [f"{count} on '{layer}'" for layer, count in self.ignored.items() if count]
+        moved = self.frame.length(round(self.moved, 9))  # less than a nanometre is round-off
         return (
-            f"drawing: read in {self.frame.unit}, corners moved by up to "
-            f"{self.frame.length(self.moved)}; ignored outlines: {', '.join(left) or 'none'}"
+            f"drawing: read in {self.frame.unit}, corners moved by up to {moved}; "
+            f"ignored outlines: {', '.join(counts) or 'none'}"
         )
 
 
