@@ -39,7 +39,7 @@ MAX_START_COUNT = 40
 MAX_FULL_SEARCH_JOINTS = 150
 
 # Shares of the friction at which solutions are followed upwards [-]; solutions followed at once
-FRICTION_SHARES = (0.6, 0.7, 0.8, 0.85, 0.9, 0.95)
+FRICTION_SHARES = (0.7, 0.8, 0.85, 0.9, 0.925, 0.95, 0.975, 0.99)
 MAX_FOLLOWED = 3
 
 # Rise of the factor with the last of the friction that is never a jump [-]
