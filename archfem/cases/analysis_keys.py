@@ -1,7 +1,7 @@
 """Sections [limit], [pushover], [rating] and [assessment]: capacity, kinematic assessment."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -79,6 +79,14 @@ class LimitAnalysis:
                 'point = { x = "1.4 m", force = ["0 kN", "-1 kN"] }'
             )
         return collapse_factor(structure, live=self.live, dead=self.dead, **self.resistance)
+
+    def solve_opposite(self, structure: Structure) -> Collapse | None:
+        """Solve with the load in the other sense; None unless all of it is horizontal."""
+        loads = [load for load in self.live if isinstance(load, BodyForce) and not load.vertical]
+        if len(loads) < len(self.live):
+            return None
+        opposite = [BodyForce(-load.horizontal) for load in loads]
+        return replace(self, live=opposite).solve(structure)
 
 
 @dataclass(frozen=True)

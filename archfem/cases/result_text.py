@@ -240,8 +240,17 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     lines += [f"hinges, by the face in contact: {join_names(hinges, '; ')}"] if hinges else []
     lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []
-    lines += filter(None, [describe_crushing(limit.strength), describe_fill(limit.fill)])
+    crushing = describe_crushing(limit.strength, structure)
+    lines += filter(None, [crushing, describe_fill(limit.fill)])
     return "\n".join(lines)
+
+
+def describe_opposite(collapse: Collapse, opposite: Collapse) -> str:
+    """Describe the result of the same load in the other sense, and which of both is less."""
+    rank = "less" if opposite.factor < collapse.factor else "not less"
+    if np.isclose(opposite.factor, collapse.factor, rtol=1e-4):
+        rank = "the same"
+    return f"in the other sense: {opposite.sentence} ({rank})"
 
 
 def describe_pushover(push: Pushover) -> str:

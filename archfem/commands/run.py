@@ -163,7 +163,10 @@ def limit(options: argparse.Namespace) -> None:
     case = Case.read(options.case, options.changes)
     with _record_doubts(case.structure) as doubts:
         found = case.limit.solve(case.structure)
+        opposite = case.limit.solve_opposite(case.structure)
     text = result_text.describe_collapse(case.structure, found, case.limit)
+    if opposite is not None:
+        text = f"{text}\n{result_text.describe_opposite(found, opposite)}"
     text = "\n".join([text, *doubts])
     print(f"{case.title}\n{text}")
     _write_results("limit", case, options.out, lambda: results.limit_files(found, text))

@@ -55,10 +55,7 @@ class Outcome(ExplainedWord):
     INFEASIBLE = "infeasible", "it does not stand under its own weight"
     SETTLES = "settles", "it follows its support and stands"
     LOCKS = "locks", "it cannot follow this movement of its support"
-    BRACKETED = (
-        "bracketed",
-        "no state without dilatancy was found, and none lies beyond this bound",
-    )
+    BRACKETED = "bracketed", "no state without dilatancy was found"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -139,8 +136,17 @@ class Collapse(ResultDisplay):
             sizes = join_names([f"{np.hypot(*point.force) / kN:.4g}" for point in points])
             places = join_names([f"{point.x:.4g}" for point in points])
             words = f" times {sizes} kN at x = {places} m"
-        bounds = dict.fromkeys(f"{unit * bound:.4g}" for bound in (self.factor, self.upper))
-        return f"{self.outcome.sentence}, at {' to '.join(bounds)}{words}"
+        elif isinstance(load, Settlement):
+            words = " N m"
+        low, high = (f"{unit * bound:.4g}" for bound in (self.factor, self.upper))
+        place = f"at {low}" if low == high else f"at {low} to {high}"
+        if self.outcome is Outcome.BRACKETED:
+            place = f"which is not below {low}, nor above {high}"
+            if np.isinf(self.upper):
+                place = f"which is at least {low}"
+            elif low == high or abs(self.factor) <= 1e-9 * abs(self.upper):
+                place = f"which is at most {high}"
+        return f"{self.outcome.sentence}, {place}{words}"
 
     def _summary(self) -> str:
         """Describe the result in one or two lines."""
@@ -254,6 +260,8 @@ def collapse_factor(
             stones.warn_of_sliding_fill(loads, stays, result.factor)
     if np.isinf(result.factor):
         warn_locking(structure, friction)
+    if friction is None:
+        warn_idle_joints(result)
     warn_bonds(structure, result)
     actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
     return replace(result, live=actions, dead=stays, structure=structure)
@@ -370,19 +378,12 @@ def _solve_collapse(
         warn_dilatancy(structure)
         optimum, solutions = search_nonassociated(programme, associated, scale)
     if optimum is None:
-        at_rest = replace(fall, multipliers=np.zeros_like(fall.multipliers))
-        bound = solutions.bracket[int(support is not None)] if solutions else np.inf
-        if np.isfinite(bound):
-            logger.warning(
-                "no state without dilatancy was found, and the factor is only a bound: %s",
-                solutions,
-            )
-            unbounded, at_rest = Outcome.BRACKETED, _without_forces(at_rest)
-        factor = bound if np.isfinite(bound) else np.inf
-        result = _read_result(stones, dead, unbounded, factor, at_rest)
+        result = _read_without_optimum(stones, dead, unbounded, fall, solutions)
         return replace(result, solutions=solutions)
     result = _read_result(stones, programme, bounded, scale * optimum.value, optimum, support)
     result = replace(result, solutions=solutions)
+    if solutions is not None and solutions.jumps:
+        warn_jump(solutions)
     if not isinstance(live, Settlement):
         failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
         if friction is not None and not structure.tension.any():  # bonds that hold stay closed
@@ -390,6 +391,26 @@ def _solve_collapse(
     if friction == "coulomb":
         warn_sliding(result.sliding_names, result.factor)
     return result
+
+
+def _read_without_optimum(
+    stones: BlocksWithFill,
+    dead: Programme,
+    unbounded: Outcome,
+    fall: Optimum,
+    solutions: NonassociatedBounds | None,
+) -> Collapse:
+    """Return the result where no factor limits the load, or none was found between its bounds."""
+    at_rest = replace(fall, multipliers=np.zeros_like(fall.multipliers))
+    lower, upper = solutions.bracket if solutions else (np.inf, np.inf)
+    bound = upper if unbounded is Outcome.LOCKS else lower
+    if not np.isfinite(bound):
+        return _read_result(stones, dead, unbounded, np.inf, at_rest)
+    logger.warning(
+        "no state without dilatancy was found, and the factor is only a bound: %s", solutions
+    )
+    result = _read_result(stones, dead, Outcome.BRACKETED, bound, _without_forces(at_rest))
+    return replace(result, upper=upper)
 
 
 def _bound_collapse(
@@ -485,11 +506,18 @@ def _read_joints(
     return joint_dataset(whole, resultants)
 
 
-def describe_crushing(strength: float | None) -> str:
+def describe_crushing(strength: float | None, structure: Structure) -> str:
     """Describe at which strength of the stones joints crush, if at all."""
-    if strength is None:
+    if strength is not None:
+        return f"joints crush at {strength / MPa:.3g} MPa, the strength of the stones"
+    stones = [structure.blocks[number].material.strength for number in structure.free]
+    least = min(filter(None, stones), default=None)
+    if least is None:
         return "joints do not crush: no strength of the stones is given"
-    return f"joints crush at {strength / MPa:.3g} MPa, the strength of the stones"
+    return (
+        f"joints do not crush: the default strength of {least / MPa:.3g} MPa is not used; "
+        "strength in [limit] gives one"
+    )
 
 
 def warn_dilatancy(structure: Structure) -> None:
@@ -521,6 +549,28 @@ def warn_locking(structure: Structure, friction: str | None) -> None:
             "it may lock between the stones, as soil does not; cut smaller pieces, or give "
             "fill=af.limit.Fill(…) for the structure before it was cut"
         )
+
+
+def warn_idle_joints(result: Collapse) -> None:
+    """Warn of joints without force, which never slide although they would open freely."""
+    normal = result.joints["N"].values
+    if idle := np.count_nonzero(normal <= 1e-6 * normal.max(initial=0.0)):
+        logger.warning(
+            "friction None locks %d joints that carry nothing, such as head joints: no part of a "
+            "wall in bond can lift along a stepped crack, so that the factor %.4g is no bound; "
+            "friction='nonassociated' lets it",
+            *(idle, result.factor),
+        )
+
+
+def warn_jump(solutions: NonassociatedBounds) -> None:
+    """Warn of a factor that rises suddenly with friction, as where the weakest is not found."""
+    share, factor = solutions.path[-1]
+    logger.warning(
+        "a weaker solution without dilatancy is likely: the least found is %.4g, but %.4g with "
+        "%.3g times the friction, from which the factor should rise little",
+        *(solutions.between[0], factor, share),
+    )
 
 
 def warn_bonds(structure: Structure, result: Collapse) -> None:

@@ -14,6 +14,9 @@ changed at random and the alternation continues. To descend from a solution, the
 limited to values a little worse than its own. The gap is always that of the whole programme, so
 that any pair with a vanishing gap is a solution.
 
+In walls with much friction most starts end at sliding of the whole, or at none. Toe wedges are
+found where friction is less, and their forces, which are admissible with more of it, lead upwards.
+
 References: Drucker, J. Appl. Mech. 21 (1954) 71-74. Ferris and Tin-Loi, Int. J. Mech. Sci. 43
 (2001) 209-224. Konno, Math. Program. 11 (1976) 14-27.
 """
@@ -34,6 +37,13 @@ MAX_START_COUNT = 40
 
 # Joints up to which every start is tried and normal forces are bounded one by one
 MAX_FULL_SEARCH_JOINTS = 150
+
+# Shares of the friction at which solutions are followed upwards [-]; solutions followed at once
+FRICTION_SHARES = (0.7, 0.8, 0.85, 0.9, 0.925, 0.95, 0.975, 0.99)
+MAX_FOLLOWED = 3
+
+# Rise of the factor with the last of the friction that is never a jump [-]
+MAX_SUDDEN_RISE = 0.05
 
 # Relative gap that counts as zero [-]: programmes are solved to 1e-9
 GAP_TOLERANCE = 1e-7
@@ -176,6 +186,7 @@ class NonassociatedBounds:
             where it has none.
         starts: number of states from which the search started, and of those that reached a
             solution.
+        path: shares of the friction, and factors of the weakest solution with each of them.
         unbalanced: largest residual of the balance of the returned solution [mean block weights].
         excess: largest |V| - c A - μ N, relative to the largest N [-].
         opening: largest opening of an end that carries force, relative to the largest gap [-]; NaN
@@ -187,6 +198,7 @@ class NonassociatedBounds:
     bracket: tuple[float, float]
     between: tuple[float, float]
     starts: tuple[int, int]
+    path: tuple[tuple[float, float], ...] = ()
     unbalanced: float = np.nan
     excess: float = np.nan
     opening: float = np.nan
@@ -201,12 +213,27 @@ class NonassociatedBounds:
         weakest, strongest = self.between
         text = "were not found"
         if np.isfinite(weakest):
-            text = f"found from {weakest:.4g} to {strongest:.4g}"
-        # a load that no associated factor limits has a lower bound alone
+            text = f"found from {weakest:.4g}, the least, to {strongest:.4g}"
         limits = f"all lie from {lower:.4g} to {upper:.4g}"
-        if np.isinf(upper):
+        if np.isinf(upper):  # a load that no associated factor limits has a lower bound alone
             limits = f"none is below {lower:.4g}"
-        return f"solutions without dilatancy {text} ({successful} of {tried} starts), and {limits}"
+        elif abs(lower) <= GAP_TOLERANCE * abs(upper):
+            limits = f"none is above {upper:.4g}: no lower bound is known"
+        return (
+            f"solutions without dilatancy {text} (by {successful} of {tried} starting states), "
+            f"and {limits}"
+        )
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the factor rises far faster with the last of the friction than before."""
+        # as where the path to a toe wedge is lost, and sliding of the whole wall is found
+        if len(self.path) < 2 or not np.isfinite(self.between[0]):
+            return False
+        shares, factors = np.transpose([*self.path, (1.0, self.between[0])])
+        rises = np.diff(factors) / np.diff(shares)
+        usual = max(0.0, rises[:-1].max()) * (1.0 - shares[-2])
+        return bool(factors[-1] - factors[-2] > 3.0 * usual + MAX_SUDDEN_RISE * abs(factors[-1]))
 
 
 def search_nonassociated(
@@ -216,7 +243,9 @@ def search_nonassociated(
     # the number of starts falls with the joints squared
     joints = len(programme.blocks.structure.depths)
     number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
-    starts = starting_forces(programme, start, number, 0)
+    followed, path = _follow_friction(programme)
+    starts = followed + _free_head_joints(programme)
+    starts += starting_forces(programme, start, number, 0)
     solutions = _find_solutions(programme, starts)
     for seed in (1, 2, 3):  # in walls one start of four leads to a solution
         if not solutions and joints > MAX_FULL_SEARCH_JOINTS:
@@ -239,10 +268,39 @@ def search_nonassociated(
     bounds = NonassociatedBounds(
         (min(limits), max(limits)), (min(values), max(values)), (len(starts), successful)
     )
+    bounds = replace(bounds, path=tuple((share, scale * value) for share, value in path))
     if not solutions:
         return None, bounds
     weakest = max(solutions, key=lambda iterate: iterate.state.value)
     return weakest.state, _with_residuals(programme, weakest, bounds)
+
+
+def _follow_friction(programme: Programme) -> tuple[list[Array], list[tuple[float, float]]]:
+    """Return forces of solutions with nearly all friction, and shares and objectives on the way."""
+    followed: list[Array] = []
+    path = []
+    for share in FRICTION_SHARES:
+        reduced, starts = replace(programme, friction=share * programme.friction), followed
+        with suppress(DidNotConverge):  # it might not stand with so little friction
+            if (associated := reduced.solve()) is not None:
+                starts = [associated.forces, *followed]
+        states = [iterate.state for iterate in _find_solutions(reduced, starts)]
+        states.sort(key=lambda state: -state.value)
+        if states:
+            path.append((share, states[0].value))
+        followed = [*(state.forces for state in states), *followed][:MAX_FOLLOWED]
+    return followed, path
+
+
+def _free_head_joints(programme: Programme) -> list[Array]:
+    """Return forces of the associated optimum whose steep joints have no friction, if any."""
+    # head joints along the crack of a toe wedge carry nothing
+    normals = programme.blocks.structure.normals
+    steep = (np.abs(normals[:, 0]) > np.abs(normals[:, 1])) & np.isfinite(programme.friction)
+    with suppress(DidNotConverge):  # it might not stand without this friction
+        freed = replace(programme, friction=np.where(steep, 0.0, programme.friction)).solve()
+        return [] if freed is None else [freed.forces]
+    return []
 
 
 def _find_solutions(programme: Programme, starts: Sequence[Array]) -> list[AlternatingIterate]:

@@ -183,7 +183,7 @@ class Rating(ResultDisplay):
             f"live load by {self.live:g} ({self._source('live')})",
             f"impact by {self.impact:g} ({self._source('impact')})",
             f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
-            describe_crushing(self.strength),
+            describe_crushing(self.strength, self.structure),
         ]
         return "\n".join(lines)
 

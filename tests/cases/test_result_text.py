@@ -1,6 +1,7 @@
 """Results as text and tables."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -9,6 +10,7 @@ from archfem.cases.analysis_keys import parse_limit
 from archfem.cases.result_text import (
     describe_collapse,
     describe_fill,
+    describe_opposite,
     describe_run,
     describe_run_quality,
     describe_verdicts,
@@ -81,12 +83,19 @@ def test_limit_analysis_in_words(ring):
     assert axles.sentence.endswith(f"at {axles.factor:.4g} times 3, 2 kN at x = 0.5, 1 m")
     both = af.collapse_factor(ring, live=[wheel, af.BodyForce(1.0)])
     assert both.sentence.endswith(f"at {both.factor:.4g} times the load")
+    for factor, rank in ((0.9, "less"), (1.1, "not less"), (1.00001, "the same")):
+        other = replace(mirrored, factor=factor * pushed.factor, upper=factor * pushed.factor)
+        words = describe_opposite(pushed, other)
+        assert words == f"in the other sense: {other.sentence} ({rank})"
     slab = af.column(breadth=4.0, heights=[1.0])  # slides before it turns
     slid, lifted = (af.collapse_factor(slab, live=af.BodyForce(*g)) for g in ((1.0,), (0.0, -1.0)))
     words = describe_collapse(slab, slid, parse_limit({})).splitlines()
     assert words[1] == f"sliding: {slab.joints[0].name}"
     first = "limit analysis: this load never overturns it"
-    last = "joints do not crush: no strength of the stones is given"
+    last = (
+        "joints do not crush: the default strength of 56 MPa is not used; strength in [limit] "
+        "gives one"
+    )
     assert describe_collapse(slab, lifted, parse_limit({})).splitlines() == [first, last]
 
 

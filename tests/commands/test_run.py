@@ -393,7 +393,14 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     joints = pd.read_csv(out / "limit.csv")
     assert joints["N"].to_numpy() == pytest.approx(found.joints["N"].values, rel=1e-9)
     assert af.commands.main(["limit", str(path), "--set", "limit.horizontal=0.5"]) == 0
-    assert f"at {found.factor:.4g} g to the right" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f"at {found.factor:.4g} g to the right" in said
+    assert (
+        f"in the other sense: {found.outcome.sentence}, at {found.factor:.4g} g to the left" in said
+    )
+    assert "(the same)" in said
+    assert af.commands.main(["limit", str(path), "--set", "limit.vertical=-1"]) == 0
+    assert "in the other sense" not in capsys.readouterr().out
 
 
 def test_an_assessment_takes_the_strength_of_a_fill():

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import archfem as af
 from archfem.limit import collapse
 
 
@@ -64,3 +65,23 @@ def test_joints_that_hold_by_more_cohesion_than_is_closed_are_named(
     if count:
         assert warned().startswith(f"{count} joints such as 'bed {min(failing)}' fail partly open")
         assert "factor 0.3142 is" in warned()
+
+
+def test_friction_none_is_doubted_where_it_locks_joints_that_carry_nothing(caplog):
+    """Two stones beside each other: the joint between them is idle; a pile has none such."""
+    boxes = [(0.0, 1.0), (1.0, 2.0)]
+    stones = [
+        af.Block([(a, 0.0), (b, 0.0), (b, 0.5), (a, 0.5)], af.STONE, f"stone {a:g}")
+        for a, b in boxes
+    ]
+    ground = [(-1.0, -0.5), (3.0, -0.5), (3.0, 0.0), (-1.0, 0.0)]
+    course = [af.Block(ground, af.STONE, "ground", fixed=True), *stones]
+    beside = af.masonry.assembled(course, af.Contact(1e9, 4e8, friction=0.6))
+    af.collapse_factor(beside, live=af.BodyForce(1.0), friction=None)
+    assert "friction None locks" in caplog.text
+    caplog.clear()
+    for friction in ("coulomb", "nonassociated"):
+        af.collapse_factor(beside, live=af.BodyForce(1.0), friction=friction)
+    pile = af.column(breadth=1.0, heights=[1.0, 1.0])
+    af.collapse_factor(pile, live=af.BodyForce(1.0), friction=None)
+    assert "friction None locks" not in caplog.text

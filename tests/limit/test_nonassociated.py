@@ -195,6 +195,82 @@ def test_walls_of_ferris_and_tin_loi(number):
     assert found.factor == pytest.approx(LEAST[number], rel=1e-4)
 
 
+def least_toe_wedge(structure, height=HEIGHT):
+    """Least factor of rigid wedges above cracks that climb by half stones: weight and arms alone.
+
+    Each has the last brick of a course, and all that rests on it, and turns about its outer corner.
+    """
+    bricks = [np.array(structure.blocks[k].outline) for k in structure.free]
+    boxes = [(round(b[:, 1].min() / height), b[:, 0].min(), b[:, 0].max()) for b in bricks]
+    courses = max(course for course, *_ in boxes) + 1
+    factors = []
+    for first in range(courses):
+        toe = max(end for course, _, end in boxes if course == first)
+        crack = max(start for course, start, _ in boxes if course == first)
+        work = rise = 0.0
+        for course in range(first, courses):
+            ends = [(a, b) for k, a, b in boxes if k == course and b > crack + 1e-9]
+            ends = [(a, b) for a, b in ends if course > first or a > crack - 1e-9]
+            crack = min(a for a, _ in ends)
+            work += sum((b - a) * (toe - (a + b) / 2.0) for a, b in ends)
+            rise += sum((b - a) * (course - first + 0.5) * height for a, b in ends)
+        factors.append(work / rise)
+    return min(factors)
+
+
+ROUGH_WALL = [FOUR, FOUR_CUT] * 4
+
+
+@pytest.mark.usefixtures("few_starts")
+@pytest.mark.parametrize(
+    "friction", [1.0, *(pytest.param(mu, marks=pytest.mark.slow) for mu in (0.8, 1.2))]
+)
+def test_a_rough_wall_fails_by_a_wedge_above_a_stepped_crack(friction):
+    """The rigid wedge is a solution with any friction that holds it; the associated one slides."""
+    structure = wall(ROUGH_WALL, friction)
+    wedge = least_toe_wedge(structure)
+    assert wedge == pytest.approx(0.6349, abs=1e-4)
+    found = af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated")
+    check(structure, SIDEWAYS, found)
+    assert 0.9 * wedge < found.factor < wedge
+    assert found.solutions.bracket[1] > 1.05 * wedge
+    assert not found.solutions.jumps
+    assert "no lower bound is known" in str(found.solutions)
+
+
+def test_a_wedge_that_is_lost_is_doubted(monkeypatch, caplog):
+    """Without starts from its neighbour the search finds sliding of the whole, at μ."""
+    monkeypatch.setattr(nonassociated, "MAX_START_COUNT", 1)
+    monkeypatch.setattr(nonassociated, "_free_head_joints", lambda programme: [])
+    monkeypatch.setattr(nonassociated, "descend", lambda *given, **options: iter([]))
+    follow = nonassociated._follow_friction
+    monkeypatch.setattr(
+        nonassociated, "_follow_friction", lambda programme: ([], follow(programme)[1])
+    )
+    found = af.collapse_factor(wall(ROUGH_WALL, 1.0), live=SIDEWAYS, friction="nonassociated")
+    assert found.factor == pytest.approx(1.0)
+    assert found.solutions.jumps
+    assert "a weaker solution without dilatancy is likely: the least found is 1, but 0." in (
+        caplog.text
+    )
+
+
+def test_a_factor_jumps_where_it_rises_far_faster_than_before():
+    def jumps(*factors):
+        shares = (0.8, 0.9)[: len(factors) - 1]
+        path = tuple(zip(shares, factors[:-1], strict=True))
+        last = factors[-1]
+        return nonassociated.NonassociatedBounds((0.0, 9.0), (last, last), (9, 9), path).jumps
+
+    assert not jumps(0.8, 0.9, 1.0)  # sliding, in proportion to friction
+    assert not jumps(0.5, 0.5, 0.52)
+    assert jumps(0.5, 0.5, 0.53)
+    assert not jumps(0.5, 0.6, 0.9)
+    assert jumps(0.5, 0.6, 1.0)
+    assert not jumps(0.5, 1.0)  # one solution on the way shows no trend
+    assert not jumps(0.5, 0.5, np.nan)
+
+
 def test_a_wall_is_searched_from_more_states_where_the_first_lead_nowhere(monkeypatch):
     structure = af.circular_arch(
         radius=3.0, thickness=0.6, embrace=120.0, voussoirs=7, contact=rough(0.5)
@@ -338,8 +414,15 @@ def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
     found = af.collapse_factor(structure, live=push, friction="nonassociated")
     upper = af.collapse_factor(structure, live=push).factor
     assert found.outcome is Outcome.BRACKETED
-    assert found.solutions.bracket == pytest.approx((found.factor, upper))
-    assert 0.0 < found.factor < upper
+    assert found.solutions.bracket == pytest.approx((found.factor, found.upper))
+    assert 0.0 < found.factor < found.upper == pytest.approx(upper)
+    assert found.sentence == (
+        f"no state without dilatancy was found, which is not below {found.factor:.4g}, nor above "
+        f"{upper:.4g} times 1 kN at x = 0 m"
+    )
+    unknown = replace(found, factor=0.0)
+    assert f"was found, which is at most {upper:.4g} times 1 kN" in unknown.sentence
+    assert "which is at least" in replace(found, upper=np.inf).sentence
     assert np.isnan(found.joints["N"]).all()
 
 
@@ -443,7 +526,7 @@ def test_bounds_are_those_of_the_weakest_and_the_strongest_solution(monkeypatch)
     state, bounds = nonassociated.search_nonassociated(programme, optimum, -1.0)
     assert state.value == -0.3
     assert bounds.between == (0.3, 0.5)
-    assert bounds.starts == (41, 3)
+    assert bounds.starts == (44, 3)  # three from less friction, the associated one and 40
     assert bounds.bracket[1] == pytest.approx(optimum.unknowns[0])
 
 
