@@ -18,7 +18,7 @@ from archfem._display import call_late_bound
 from archfem._files import align_columns
 from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.analysis import Analysis, takes_analysis
-from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState
+from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_soft_blocks
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.recorder import Record
@@ -31,7 +31,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import Structure
-from archfem.models.model import Model
+from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 from archfem.motion.signal_processing import MAX_PEAK_ACCELERATION
 from archfem.statics.equilibrium import Equilibrium, dead_load
@@ -293,9 +293,11 @@ class CollapseScale:
 
     Attributes:
         searches: runs made, by time step [s].
+        doubts: reasons why the scales may be wrong, each with its remedy.
     """
 
     searches: dict[float, MechanismScales]
+    doubts: tuple[Doubt, ...] = ()
 
     def bracket(self, dt: float) -> Bracket:
         """Return the bracket of collapse that was found with one time step.
@@ -426,4 +428,4 @@ def collapse_scale(
     for step in steps:
         run_at = partial(run_scaled, step)
         searches[step] = search_scales(run_at, (COLLAPSE_DEFINITION,), precision, limits)
-    return CollapseScale(searches)
+    return CollapseScale(searches, doubt_soft_blocks(begin.model.structure))
