@@ -263,7 +263,7 @@ def risk(options: argparse.Namespace) -> int:
     return ExitCode.DOUBTFUL if found.doubts else 0
 
 
-def verdict(options: argparse.Namespace) -> None:
+def verdict(options: argparse.Namespace) -> int:
     """Run a case over joint rules, stiffness, friction and damping: how often does it fall?"""
     from archfem.studies.cache import ground_motion
     from archfem.studies.variations import verdict_range
@@ -283,6 +283,7 @@ def verdict(options: argparse.Namespace) -> None:
         return files | {"verdict_range.txt": str(computed), "verdict_range.png": computed.plot()}
 
     _write_results("verdict", case, options.out, draw)
+    return ExitCode.DOUBTFUL if computed.doubts else 0
 
 
 def scale(options: argparse.Namespace) -> int:

@@ -187,17 +187,13 @@ def describe_dislocation(structure: Structure) -> str:
     )
 
 
-def doubt_soft_blocks(structure: Structure) -> tuple[Doubt, ...]:
+def doubt_soft_blocks(*structures: Structure) -> tuple[Doubt, ...]:
     """Return the doubt of falls in which soft blocks, as fill in one piece, are rigid bodies."""
-    soft = [structure.blocks[number].name for number in find_soft_blocks(structure)]
-    if not soft:
-        return ()
-    return (
-        Doubt(
-            f"a fall takes soft blocks for rigid bodies, each in one piece: {join_names(soft)}",
-            'cut them with jointed_fill (law = "jointed" in a case)',
-        ),
-    )
+    soft = [each.blocks[number].name for each in structures for number in find_soft_blocks(each)]
+    names = join_names([*dict.fromkeys(soft)])
+    cause = f"a fall takes soft blocks for rigid bodies, each in one piece: {names}"
+    remedy = 'cut them with jointed_fill (law = "jointed" in a case)'
+    return (Doubt(cause, remedy),) if soft else ()
 
 
 def _place_corners(structure: Structure, blocks: Sequence[int]) -> Callable[[Array], Array]:

@@ -17,6 +17,7 @@ from archfem.dynamics.collapse_state import (
     FALLEN_STATES,
     classify_collapse,
     doubt_collapse,
+    doubt_soft_blocks,
     mark_lost,
 )
 from archfem.dynamics.history import Ending, History, with_fall
@@ -211,6 +212,7 @@ def _doubt_fall(structure: Structure, dataset: xr.Dataset) -> Iterator[Doubt]:
 
     Loose blocks may keep more at impacts, and slide otherwise, than the joints of the model.
     """
+    yield from doubt_soft_blocks(structure)
     share, violation = (dataset.attrs[f"fall_{key}"] for key in ("unsettled", "violation"))
     if share > 0.02:
         yield Doubt(

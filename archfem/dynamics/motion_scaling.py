@@ -18,7 +18,7 @@ from archfem._display import call_late_bound
 from archfem._files import align_columns
 from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.analysis import Analysis, takes_analysis
-from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState
+from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_soft_blocks
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.recorder import Record
@@ -31,7 +31,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import Structure
-from archfem.models.model import Model
+from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 from archfem.motion.signal_processing import MAX_PEAK_ACCELERATION
 from archfem.statics.equilibrium import Equilibrium, dead_load
@@ -348,10 +348,12 @@ class CollapseScale:
     Attributes:
         searches: runs made, by time step [s].
         pga: peak of the motion [m/s²].
+        of_model: doubts that concern every run, whatever its scale.
     """
 
     searches: dict[float, MechanismScales]
     pga: float | None = None
+    of_model: tuple[Doubt, ...] = ()
 
     def __repr__(self) -> str:
         """Return the scales around the fall in one line; a dislocated structure has not fallen."""
@@ -373,7 +375,7 @@ class CollapseScale:
     @property
     def doubts(self) -> tuple[str, ...]:
         """Reasons why the scales may be wrong."""
-        doubts = []
+        doubts = [str(doubt) for doubt in self.of_model]
         brackets = {dt: self.bracket(dt) for dt in self.searches}
         if max(b.lower for b in brackets.values()) >= min(b.upper for b in brackets.values()):
             found = (
@@ -517,4 +519,4 @@ def collapse_scale(
         searches[step] = search_scales(run_at, (COLLAPSE_DEFINITION,), precision, limits)
         if searches[step].interrupted:
             break
-    return CollapseScale(searches, motion.pga)
+    return CollapseScale(searches, motion.pga, doubt_soft_blocks(begin.model.structure))

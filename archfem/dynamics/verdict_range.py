@@ -1,5 +1,6 @@
 """Range of a verdict over uncertain properties: share of falls, and the decisive properties."""
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,8 @@ from archfem._netcdf import read_dataset, write_dataset
 from archfem._typing import Array
 from archfem._validation import validate_methods
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
+from archfem.dynamics.verdict import DOUBT_MARK
+from archfem.models.model import Doubt
 
 
 @validate_methods
@@ -29,7 +32,8 @@ class VerdictRange(ResultDisplay):
             of the first lost block [s]; `error`, the text of a run without an answer, or "";
             `sampled`, whether the run is of the Latin hypercube.
             Its attribute `motion` is the name of the motion, empty where motions are varied;
-            `k_n` and `k_s` are the mean stiffnesses of the joints as given [N/m³].
+            `k_n` and `k_s` are the mean stiffnesses of the joints as given [N/m³], and `doubts` has
+            those of the structures as JSON.
     """
 
     dataset: xr.Dataset
@@ -105,6 +109,11 @@ class VerdictRange(ResultDisplay):
         return rankdata(damage)
 
     @property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Reasons why the outcomes may be wrong, each with its remedy."""
+        return tuple(Doubt(*each) for each in json.loads(self.dataset.attrs.get("doubts", "[]")))
+
+    @property
     def count(self) -> str:
         """How often the structure falls."""
         return f"falls in {int(self.falls[self.answered].sum())} of {int(self.answered.sum())}"
@@ -121,7 +130,11 @@ class VerdictRange(ResultDisplay):
         if 0 < falls.sum() < len(falls):
             text += f": {self._describe_falls()}"
         low, high = self.interval()
-        text += f"; of those sampled {self.share:.0%} fall ({low:.0%} to {high:.0%})"
+        count = int((self.answered & self.dataset["sampled"].values).sum())
+        text += (
+            f"; of {count} in a Latin hypercube {self.share:.0%} fall "
+            f"({low:.0%} to {high:.0%} at 95%)"
+        )
         text += f", under '{motion}' alone" if (motion := self.dataset.attrs.get("motion")) else ""
         return text + (f"; {missing} have no answer" if missing else "")
 
@@ -181,7 +194,7 @@ class VerdictRange(ResultDisplay):
         return cls(read_dataset(path, "file of a verdict's range"))
 
     def table(self) -> str:
-        """Return the share of the variance that each property explains, and falls by value."""
+        """Return falls by value, and what each property explains of the damage if any falls."""
         falls, rows = self.falls[self.answered], []
         data = self.answers
         for name, share in self.importance().items():
@@ -190,12 +203,15 @@ class VerdictRange(ResultDisplay):
                 f"{label}: {int(falls[chosen].sum())} of {int(chosen.sum())}"
                 for label, chosen in groups
             ]
-            rows.append([property_text(name), f"{share:.0%}", ", ".join(cells)])
-        return align_columns(["property", "share of the damage's variance", "falls"], rows)
+            explained = [f"{share:.0%}"] if falls.any() else []
+            rows.append([property_text(name), *explained, ", ".join(cells)])
+        head = ["share of the damage's variance"] if falls.any() else []
+        return align_columns(["property", *head, "falls"], rows)
 
     def __str__(self) -> str:
-        """Sentence, and a line for each property."""
-        return f"{self.sentence}\n{self.table()}"
+        """Sentence, doubts, and a line for each property."""
+        doubts = [f"{DOUBT_MARK}{doubt}" for doubt in self.doubts]
+        return "\n".join([self.sentence, *doubts, self.table()])
 
     def _summary(self) -> str:
         return f"VerdictRange: {self.sentence}"

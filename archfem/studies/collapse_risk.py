@@ -259,11 +259,8 @@ def _describe_inputs(
     tree: Mapping[str, tuple[float, Analysis, Equilibrium]], hazard: Hazard, options: list[Any]
 ) -> dict[str, str]:
     """Return hazard, digests of the inputs, and doubts of the structures, as texts."""
-    doubts = [
-        doubt
-        for _, each, rest in tree.values()
-        for doubt in (*rest.model.doubts, *doubt_soft_blocks(each.structure))
-    ]
+    doubts = [doubt for *_, rest in tree.values() for doubt in rest.model.doubts]
+    doubts += doubt_soft_blocks(*(each.structure for _, each, _ in tree.values()))
     return {
         "hazard": json.dumps(_write_hazard(hazard)),
         "inputs": json.dumps([*(each.fingerprint for _, each, _ in tree.values()), *options]),
@@ -665,7 +662,8 @@ class CollapseRisk(ResultDisplay):
         return "\n".join([self.sentence, *doubts, self.table()])
 
     def _summary(self) -> str:
-        return f"CollapseRisk: {self.sentence}"
+        rate, median, *_ = self.sentence.split("; ")
+        return f"CollapseRisk: {rate}; {median}"
 
     def save(self, path: str | Path) -> Path:
         """Write all samples to a NetCDF file, which `read` reads.

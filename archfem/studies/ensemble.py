@@ -15,10 +15,12 @@ import xarray as xr
 from archfem._display import ResultDisplay
 from archfem._validation import check_number, check_type, validate_arguments, validate_methods
 from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.collapse_state import FALLEN_STATES, doubt_soft_blocks
 from archfem.dynamics.history import History, classify_outcome
 from archfem.dynamics.verdict import ALL_DEFINITIONS
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.masonry.structure import Structure
+from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.studies.evaluators import PreparedRuns, largest_values
@@ -79,6 +81,12 @@ class Ensemble(ResultDisplay):
     def outcome(self) -> xr.DataArray:
         """Outcome of each history, as of `Verdict` (motions, scales[, changes])."""
         return self.dataset["outcome"]
+
+    @property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Reasons why falls may be wrong, each with its remedy; `history` has those of a run."""
+        falls = np.isin(self.outcome.values, FALLEN_STATES).any()
+        return doubt_soft_blocks(self.analysis.structure) if falls else ()
 
     def history(self, motion: int, scale: int = 0, change: int = 0) -> History:
         """Compute one history as a whole, with joints over time and fields if they are recorded.

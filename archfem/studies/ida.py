@@ -23,7 +23,7 @@ from archfem.cases.motion_keys import write_motion
 from archfem.cases.run import DeadLoadResult
 from archfem.cases.toml_file import check_choice
 from archfem.dynamics.analysis import Analysis
-from archfem.dynamics.collapse_state import CollapseState
+from archfem.dynamics.collapse_state import CollapseState, doubt_soft_blocks
 from archfem.dynamics.events import applicable_definitions
 from archfem.dynamics.history import Ending, partial_history
 from archfem.dynamics.motion_scaling import (
@@ -36,6 +36,7 @@ from archfem.dynamics.motion_scaling import (
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints, with_failure_flags
 from archfem.limit.mechanism_count import Mechanism, counted_mechanism
+from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.studies.cache import dead_load_of, ground_motion, lowest_modes
@@ -160,9 +161,11 @@ class Ida(ResultDisplay):
             first mode [s], and by limit state the smallest failing scale, with ", survives" the
             largest surviving scale below it, and with ", survives above" the number of surviving
             runs above it; over `motion` and `entry` the `scale` and the demands of each run.
+        doubts: reasons why scales of collapse may be wrong, each with its remedy.
     """
 
     table: xr.Dataset
+    doubts: tuple[Doubt, ...] = ()
 
     def _summary(self) -> str:
         """Return the peak accelerations at which limit states are reached."""
@@ -352,7 +355,10 @@ def ida(
     axis = Axis("motion", ("motion",), tuple((name,) for name in names))
     evaluator = Evaluator(search_limit_states, options)
     study = Study.of_points(f"{case.title}: IDA", evaluator, (axis,), points)
-    return Ida(study.run(folder, workers=workers, client=client))
+    table = study.run(folder, workers=workers, client=client)
+    large = case.analysis.displacements == "large"
+    falls = large and COLLAPSE_DEFINITION in (limits or LIMIT_STATES)
+    return Ida(table, doubt_soft_blocks(case.structure) if falls else ())
 
 
 def _points(

@@ -5,8 +5,9 @@ and all together, by a Latin hypercube. The result is the share of runs in which
 falls, and the properties that decide it.
 """
 
+import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from functools import partial
 from math import inf
 from typing import Any
@@ -17,7 +18,11 @@ from scipy.stats import qmc
 
 from archfem._validation import check_integer, check_number, validate_arguments
 from archfem.dynamics.analysis import Analysis
-from archfem.dynamics.collapse_state import CollapseState, classify_collapse
+from archfem.dynamics.collapse_state import (
+    CollapseState,
+    classify_collapse,
+    doubt_soft_blocks,
+)
 from archfem.dynamics.damping import damping_kind, resolve_effective_damping, vary_damping
 from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.recorder import Record
@@ -139,9 +144,12 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     rows = dict(evaluate_with_progress(points, evaluate_variation, workers, "range"))
     dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], neutral)
     dataset["sampled"] = "run", np.arange(len(points)) >= len(points) - samples
-    labelled = [values for values in ranges.values() if isinstance(values, dict)]
-    several = any(isinstance(value, Motion) for each in labelled for value in each.values())
+    named = [each for row in ranges.values() if isinstance(row, dict) for each in row.values()]
+    several = any(isinstance(each, Motion) for each in named)
     dataset.attrs["motion"] = "" if several else motion.name
+    structures = [analysis.structure, *(each for each in named if isinstance(each, Structure))]
+    doubts = (*rest.model.doubts, *doubt_soft_blocks(*structures))
+    dataset.attrs["doubts"] = json.dumps([astuple(doubt) for doubt in doubts])
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
     dataset.attrs["k_s"] = float(np.mean([contact.shear_stiffness for contact in contacts]))

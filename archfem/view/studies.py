@@ -492,14 +492,16 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         first = axes in panels[::columns]
         label = labels.get(name, name.replace("_", " "))
         style_axes(axes, label, "residual\ndisplacement [mm]" if first else "")
-        set_title(axes, f"explains {share:.0%}")
+        if falls.any():
+            set_title(axes, f"{share:.0%} of the damage")
         _draw_property(axes, rows[name].values, heights, falls)
         axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set_yscale("log")
         axes.set_ylim(0.7e-3 * top, 4.0 * top)
     add_legend_below(figure, 2, handles=panels[0].get_legend_handles_labels()[0])
     text = verdicts.sentence
-    text += f"\neach other property explains {max(others):.0%} at most" if others else ""
+    if others and falls.any():
+        text += f"\neach other property explains {max(others):.0%} of it at most"
     set_figure_title(figure, text)
     return figure
 

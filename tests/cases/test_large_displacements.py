@@ -1,5 +1,6 @@
 """Cases whose displacements may be large: refused settings, and all files of a run."""
 
+import json
 import tomllib
 
 import numpy as np
@@ -134,6 +135,14 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     words = [piece.text for piece in _build_mechanism(data, held) if hasattr(piece, "text")]
     assert words[0] == "Outcome: stands; falls in 1 of 4 variations."
     assert not any("not varied" in line for line in words)
+    doubted = ReportData(data.case, data.runs)
+    reason = json.dumps([("fill is rigid", "cut it")])
+    range_ = af.dynamics.VerdictRange(xr.Dataset(rows, attrs=attrs | {"doubts": reason}))
+    vars(doubted)["verdict_range"] = range_
+    pieces = build_conclusion(doubted).pieces
+    assert "In doubt: fill is rigid; cut it." in [getattr(each, "text", "") for each in pieces]
+    (table,) = (each for each in pieces[:-1] if each.kind == "grid")
+    assert ("variations", "the same motion", "falls in 1 of 4 (in doubt)", "-") in table.rows
     # of several motions it is that of one alone
     both = ReportData(data.case, {"shake": held, "other": held})
     for motion, own in ((held.dataset.attrs["motion"], True), ("another", False), (None, False)):

@@ -1,5 +1,6 @@
 """Commands on cases: printed results and written files."""
 
+import json
 import re
 import tomllib
 from dataclasses import replace
@@ -13,6 +14,7 @@ import xarray as xr
 import archfem as af
 from archfem.cases.run import carry_out
 from archfem.commands.run import print_results
+from archfem.studies import variations
 
 RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
 
@@ -156,6 +158,21 @@ def run_with(small, shake):
     """Carry out a case as `archfem run` does, with another function that runs a motion."""
     case, out = af.Case.read(small), small.parent / "out"
     print_results(case, carry_out(case, out, run_motion=shake), out)
+
+
+def test_a_range_in_doubt_has_the_exit_code_of_doubts(small, unplotted, monkeypatch, capsys):
+    compute = variations.verdict_range
+
+    def doubted(*arguments, **options):
+        found = compute(*arguments, **options)
+        found.dataset.attrs["doubts"] = json.dumps([("fill is rigid", "cut it")])
+        return found
+
+    monkeypatch.setattr(variations, "verdict_range", doubted)
+    out = small.parent / "out"
+    given = ["verdict", str(small), "--samples", "1", "--pair", "first", "--out", str(out)]
+    assert af.commands.main(given) == 3
+    assert "fill is rigid; cut it" in (out / "verdict_range.txt").read_text(encoding="utf-8")
 
 
 def test_a_range_is_of_one_motion_of_a_suite(small, unplotted, capsys):

@@ -1,5 +1,7 @@
 """Statistics of a range of verdicts against closed forms and made-up runs."""
 
+import json
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -39,7 +41,32 @@ def test_runs_beside_the_sample_count_for_the_sentence_alone():
     found = made_up([True, False, False, True], [False, False, True, True], sign=list("aabb"))
     assert found.share == 0.5
     assert found.sentence.startswith("falls in 2 of 4: ")
-    assert "; of those sampled 50% fall (1% to 99%)" in found.sentence
+    assert "; of 2 in a Latin hypercube 50% fall (1% to 99% at 95%)" in found.sentence
+
+
+def test_no_share_of_the_damage_is_given_where_nothing_falls():
+    columns = {"residual": [0.0, 1.0, 2.0, 3.0], "sign": list("aabb")}
+    none, one = (made_up([falls, False, False, False], **columns) for falls in (False, True))
+    assert none.table().split() == [
+        "property",
+        "falls",
+        "sign",
+        *("a:", "0", "of", "2,", "b:", "0", "of", "2"),
+    ]
+    assert "share of the damage's variance" in one.table()
+    assert "%" in one.table()
+    for found, shown in ((none, False), (one, True)):
+        (axes, *_) = found.plot().axes
+        titles = [axes.get_title(loc=place) for place in ("left", "center", "right")]
+        assert any("of the damage" in title for title in titles) == shown
+
+
+def test_doubts_follow_the_sentence_and_are_kept(tmp_path):
+    found = made_up([True, False], sign=list("ab"))
+    assert found.doubts == ()
+    found.dataset.attrs["doubts"] = json.dumps([("fill is rigid", "cut it")])
+    kept = VerdictRange.read(found.save(tmp_path / "range.nc"))
+    assert str(kept).splitlines()[1].endswith("fill is rigid; cut it")
 
 
 def test_the_sentence_names_the_only_motion():

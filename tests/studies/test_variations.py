@@ -178,6 +178,32 @@ def test_damping_that_is_given_is_varied(column, motion, monkeypatch, given, kin
     assert used[1] == given
 
 
+@pytest.mark.parametrize("kind", ["run", "scale", "verdict_range", "ensemble", "ida"])
+def test_falls_of_soft_blocks_in_one_piece_are_doubted(kind):
+    """A slender block that overturns, of soil and of stone."""
+    block = af.column(breadth=0.25, heights=[1.5], contact=af.Contact(1e9, 5e8, 0.7))
+    soil = af.Material(6.25e6, 0.2, 18e3, name="soil")
+    blocks = (*block.blocks[:-1], replace(block.blocks[-1], material=soil))
+    times = np.arange(0.0, 0.6, 0.005)
+    pulse = af.Motion(np.where(times < 0.5, 4.0, 0.0), 0.005, name="pulse")
+    words = f"for rigid bodies, each in one piece: {blocks[-1].name}; cut them with jointed_fill"
+    for structure, doubted in ((replace(block, blocks=blocks), True), (block, False)):
+        analysis = af.Analysis(
+            structure, fidelity="rigid", displacements="large", damping="effective", dt=0.005
+        )
+        find = {
+            "run": lambda analysis: analysis.run(pulse),
+            "scale": lambda analysis: analysis.scale(pulse, precision=0.9),
+            "verdict_range": lambda analysis: analysis.verdict_range(pulse, vary=HELD, samples=1),
+            "ensemble": lambda analysis: af.ensemble(analysis, pulse),
+            "ida": lambda analysis: af.ida(
+                analysis, pulse, limits=["collapse"], precision=0.9, between=(0.5, 2.0)
+            ),
+        }
+        found = find[kind](analysis)
+        assert any(words in str(doubt) for doubt in found.doubts) == doubted
+
+
 def test_by_default_damping_is_that_of_effective_modes(column):
     given = af.Analysis(column, fidelity="rigid", displacements="large", damping="effective")
     model, rest = given.model, given.dead_load()

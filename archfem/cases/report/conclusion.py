@@ -58,6 +58,9 @@ _FURTHER_RESULTS = {
 }
 
 
+# Result that the conclusion states with the time histories
+_VARIATIONS = "variations"
+
 # Results that the conclusion states, in this order, by the files of their commands
 _STATED_RESULTS = {
     "": "time histories",
@@ -135,7 +138,8 @@ def build_conclusion(data: ReportData) -> Section:
     for name, result in _STATED_RESULTS.items():
         text = " ".join(_conclude_file(data, name) if name else _conclude_histories(data))
         blocks += [TextBlock(text)] if text else []
-        own = (doubt for about, doubt in doubts if about == result)
+        about_these = (result,) if name else (result, _VARIATIONS)
+        own = (doubt for about, doubt in doubts if about in about_these)
         blocks += [TextBlock(f"In doubt: {doubt}.", "doubt") for doubt in own]
     if rows:
         head = ("", "demand", "capacity or outcome", "factor")
@@ -190,8 +194,8 @@ def _capacity_rows(data: ReportData) -> Iterator[_Row]:
         yield "time histories", demand, outcome + _mark_doubt(data, "time histories"), "-"
     if (computed := data.verdict_range) is not None:
         motion = computed.dataset.attrs.get("motion")
-        name = f"variations under '{motion}'" if motion else "variations"
-        yield name, "the same motion", computed.count, "-"
+        name = f"{_VARIATIONS} under '{motion}'" if motion else _VARIATIONS
+        yield name, "the same motion", computed.count + _mark_doubt(data, _VARIATIONS), "-"
     for name, result in _STATED_RESULTS.items():
         if text := data.read_text(name):
             build: dict[str, Callable[[str], Iterator[_Row]]]
@@ -265,7 +269,7 @@ def _conclude_histories(data: ReportData) -> list[str]:
 
 
 def _describe_outcomes(data: ReportData) -> Iterator[str]:
-    """Yield what the structure does under some of the motions, and under which."""
+    """Yield the outcomes of the structure under some of the motions, and under which."""
     by_verb: dict[str, list[str]] = {}
     for name, run in data.runs.items():
         by_verb.setdefault(_VERBS[run.verdict.outcome], []).append(name)
@@ -370,6 +374,8 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
     count = len(verdicts)
     of_runs = [f"{n} of {count} runs: {text}" if count > 1 else text for text, n in reasons.items()]
     doubts = [("time histories", text) for text in of_runs]
+    if data.verdict_range is not None:
+        doubts += [(_VARIATIONS, str(doubt)) for doubt in data.verdict_range.doubts]
     for name, result in _STATED_RESULTS.items():
         lines = (data.read_text(name) or "").splitlines()
         # what a kinematic assessment leaves out stands there as a note

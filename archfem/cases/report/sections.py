@@ -422,7 +422,7 @@ def build_check_section(data: ReportData) -> Section:
     table = "Models in the order of their errors, with times"
     blocks += data.read_result("accuracy", caption, table=table)
     caption = "Residual displacement over each property; falls are above the line."
-    table = "Share of the damage that each property explains, and falls by its value"
+    table = "Falls by the value of each property, and the share of the damage that it explains"
     blocks += data.read_result("verdict_range", caption, table=table)
     return Section("Checks of the numbers, and range of the verdict", blocks)
 
