@@ -575,7 +575,7 @@ def bound_least_factor(
     loads have some.
     """
     found: dict[Any, FillBounds] = {}
-    lower = upper = np.nan
+    lower = np.nan
     with ProgressReport("plastic fill", len(searches)) as progress:
         try:
             for load, search in searches.items():
@@ -597,7 +597,7 @@ def bound_least_factor(
             logger.warning(
                 "interrupted: the factor %.4g is the least of bounds from below that all hold; "
                 "finer meshes would raise it, at most to %.4g",
-                *(lower, upper),
+                *(lower, min(each.above.factor for each in found.values())),
             )
             return found
 

@@ -193,8 +193,9 @@ def moving_load(
             plastic fill that is found with the fill as `Fill`, and a warning says so.
         friction: as for `collapse_factor`.
         strength: as for `collapse_factor` [Pa].
-        fill: as for `collapse_factor`. A plastic fill takes some seconds at each place; factors
-            are its lower bounds.
+        fill: as for `collapse_factor`. With a plastic fill factors are lower bounds, the least
+            one on meshes as fine as its `gap` requires, others on coarser ones; Ctrl-C ends that
+            refinement.
 
     Returns:
         Factors over both directions and all positions: infinite where the vehicle never makes a

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._validation import validate_arguments
+from archfem.cases.analysis_keys import rate_case
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.run import DeadLoadResult, log_prefix
@@ -191,6 +192,14 @@ def evaluate_limit(case: Case) -> Findings:
     }
 
 
+def evaluate_rating(case: Case) -> Findings:
+    """Return the rating factor of a case, where the vehicle stands, and the range over pressure."""
+    found = rate_case(case.structure, case.rating, case.limit)
+    names = ("factor", "without_pressure", "full_pressure", "geometric")
+    findings: Findings = {name: float(getattr(found, name)) for name in names}
+    return findings | {"position": found.moving.position, "hinges": len(found.moving.worst.hinges)}
+
+
 def evaluate_comparison(
     case: Case, scales: Mapping[str, Any] | None = None, statements: bool = False
 ) -> Findings:
@@ -255,11 +264,13 @@ NAMED_EVALUATORS: Mapping[str, Callable[..., Findings]] = {
     "scales": evaluate_scales,
     "dead load": evaluate_dead_load,
     "limit": evaluate_limit,
+    "rating": evaluate_rating,
     "comparison": evaluate_comparison,
 }
 
 # SI units of findings by function; findings without one are ratios, counts or words
 FINDING_UNITS: Mapping[Callable[..., Mapping[str, Any]], Mapping[str, str]] = {
+    evaluate_rating: {"position": "m"},
     evaluate_history: {
         "rotation": "rad",
         **dict.fromkeys(("opening", "slip", "largest_displacement", "residual_displacement"), "m"),

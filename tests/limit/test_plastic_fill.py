@@ -12,7 +12,7 @@ import archfem as af
 from archfem.errors import InvalidInput
 from archfem.limit import PlasticFill
 from archfem.limit.cone_programme import solve_cones
-from archfem.limit.fill_bounds import refine_bounds
+from archfem.limit.fill_bounds import bound_least_factor, refine_bounds
 from archfem.limit.fill_mesh import HELD, SURFACE, mesh_fill
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 
@@ -135,6 +135,46 @@ def test_bounds_of_the_finest_mesh_that_is_solved_are_returned(monkeypatch, capl
     solved += [()] * 2
     with pytest.raises(af.DidNotConverge, match="second-order cone programme"):
         bound(FILL)
+
+
+def test_the_least_of_several_loads_is_that_of_each_on_its_own(monkeypatch, capsys):
+    """Other loads keep bounds of coarse meshes, above the least one; progress is shown in lines."""
+    monkeypatch.setattr("archfem._display.PROGRESS_INTERVAL", 0.0)
+    loads = [[af.PointLoad(x, (0.0, -1e3))] for x in (4.5, 3.3, 2.5)]
+
+    def search(load):
+        return refine_bounds(arch_bridge(), load, "coulomb", None, replace(FILL, gap=0.1), first=60)
+
+    alone = [list(search(load)) for load in loads]
+    least = min(range(3), key=lambda k: alone[k][-1].lower)
+    found = bound_least_factor({k: search(load) for k, load in enumerate(loads)})
+    assert min(found, key=lambda k: found[k].lower) == least
+    assert found[least].lower == pytest.approx(alone[least][-1].lower, rel=ROUNDING)
+    assert found[least].gap <= 0.1
+    assert sum(len(each.filled.mesh.triangles) for each in found.values()) < sum(
+        len(each[-1].filled.mesh.triangles) for each in alone
+    )
+    for each in alone:  # finer meshes never lower a bound from below
+        lower = [bounds.lower for bounds in each]
+        assert (np.diff(lower) >= -ROUNDING * lower[-1]).all()
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "plastic fill: place 1 of 3"
+    assert lines[3].startswith("plastic fill: least factor ")
+
+
+def test_an_interrupted_search_leaves_bounds_once_each_load_has_some(caplog):
+    load = [af.PointLoad(x=3.3, force=(0.0, -1e3))]
+    coarse = next(refine_bounds(arch_bridge(), load, "coulomb", None, FILL, first=60))
+
+    def interrupted(*bounds):
+        yield from bounds
+        raise KeyboardInterrupt
+
+    found = bound_least_factor({"load": interrupted(coarse)})
+    assert found == {"load": coarse}
+    assert f"interrupted: the factor {coarse.lower:.4g} is the least" in caplog.text
+    with pytest.raises(KeyboardInterrupt):
+        bound_least_factor({"load": interrupted(coarse), "other": interrupted()})
 
 
 def test_a_stronger_fill_carries_more():

@@ -535,9 +535,18 @@ def test_limit_analysis_needs_no_pairs(small, tmp_path):
     text = (
         'case = "small.toml"\nset = ["limit.horizontal=1.0"]\nvary.structure.breadth = [1.0, 2.0]\n'
     )
-    for compute, points in (("limit", 2), ("dead load", 2), ("history", 4)):
+    for compute, points in (("limit", 2), ("rating", 2), ("dead load", 2), ("history", 4)):
         path.write_text(f'{text}compute = "{compute}"\n')
         assert len(af.Study.read(path).points) == points
+
+
+def test_a_study_of_ratings_has_the_factors_of_rate(small):
+    axle = '{ name = "axle", axles = ["10 kN"], live = 1.5, impact = 1.2 }'
+    case = af.Case.read(small, [f"rating.vehicle={axle}"])
+    table = af.Study(case, {"rating.dead": [1.0, 2.0]}, "rating").run(workers=1)
+    for dead, factor in zip((1.0, 2.0), table["factor"].values, strict=True):
+        vehicle = af.limit.Vehicle("axle", (10e3,), live=1.5, impact=1.2)
+        assert factor == af.rate(case.structure, vehicle, dead=dead).factor
 
 
 def test_pairs_that_all_fail_have_their_errors(small, tmp_path, monkeypatch):
