@@ -71,7 +71,7 @@ def tabulate_joints(joints: xr.Dataset, dead: xr.Dataset | None = None) -> Resul
 
 # Columns of `tabulate_runs` before those of the mechanisms
 RUN_COLUMNS = (
-    *("pair", "outcome", "doubts", "max |ax|", "max |ay|", "max |e|", "joint", "max V/N", "apart"),
+    *("pair", "outcome", "doubts", "max |ax|", "max |ay|", "max |e|", "joint", "max V/N", "opened"),
     *("displacement", "residual"),
 )
 

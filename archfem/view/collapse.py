@@ -295,7 +295,7 @@ def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
     style_axes(axes, "spectral displacement d* [m]", "spectral acceleration a* [m/s²]")
     axes.set(xlim=(0.0, 1.1 * max(last, check.demand)), ylim=(0.0, top))
     outcome = "passes" if check.passes else "fails"
-    rest = ", up to which nothing moves" if check.at_rest else ""
+    rest = ", at which it begins to move" if check.at_rest else ""
     set_title(axes, f"{check.name}: {outcome}, ratio {check.ratio:.2f}{rest}")
 
 

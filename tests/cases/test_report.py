@@ -16,12 +16,17 @@ from pages import read_page
 
 import archfem as af
 from archfem._files import read_file_list, replace_results
-from archfem.cases import risk_keys
+from archfem.cases import result_text, risk_keys
 from archfem.cases.defaults import describe_defaults, list_defaults
 from archfem.cases.report import conclusion, report, report_data
 from archfem.cases.report.conclusion import build_conclusion, list_facts
 from archfem.cases.report.inputs import tabulate_inputs
-from archfem.cases.report.sections import build_input_section, supported_weight_ratio
+from archfem.cases.report.sections import (
+    build_input_section,
+    build_joint_section,
+    supported_weight_ratio,
+)
+from archfem.cases.result_text import ResultTable
 from archfem.cases.run import carry_out, replace_run
 from archfem.limit import rating
 from archfem.view.pages.document import FigureBlock
@@ -575,8 +580,45 @@ def test_an_assessment_takes_the_fill_of_the_limit_analysis(undrawn, tmp_path, c
     assert af.commands.main(["assess", str(path)]) == 0
     alone = capsys.readouterr().out
     assert "is left out; give fill for it" in alone
+    # the bridge is symmetric, and is drawn once
+    pages = words_of(folder / "report.html")
+    assert pages.count("its mirror image") == 1
+    assert len([name for name in read_file_list(folder)["assess"].files if "png" in name]) == 2
+    assert "NTC-2018 SLV capacity 0.4 d_0*" in " ".join(pages.split())
     factors = [float(re.search(r"alpha_0 = ([\d.]+)", text)[1]) for text in (pressed, alone)]
     assert factors[0] > 1.05 * factors[1]
+
+
+def test_a_fill_is_stated_as_elastic_and_not_varied(kept):
+    tables = {key: value for key, value in tomllib.loads(BRIDGE).items() if key != "assessment"}
+    tables["model"] = {"fidelity": {"backfill": "full", "rest": "rigid"}}
+    tables["suite"] |= {"matched": True, "target": {"code": "EC8", "ag": 0.2, "ground": "B"}}
+    case = af.Case.of(tables)
+    data = report_data.ReportData(case, af.cases.open_results(kept).runs)
+    vars(data)["fidelity"] = "backfill: full, rest: rigid"
+    inputs, assumed = build_input_section(data).pieces
+    assert "carries tension" in dict(assumed.rows)["fill"]
+    words = {(name, mark): value for name, value, mark in inputs.rows}
+    assert words["backfill: E", "default"].startswith("0.00625 GPa (table 2 of")
+    assert "pga 2.94199 m/s²" in words["motion, synthetic, before matching", "default"]
+    stated = conclusion.describe_what_is_not_varied(data)
+    assert "one set of properties, stiffness and strength of the fill, one model" in stated
+    vars(data)["fidelity"] = "rigid"
+    assert "fill" not in conclusion.describe_what_is_not_varied(data)
+
+
+def test_long_tables_of_joints_stand_in_two_halves(kept, monkeypatch):
+    found = af.cases.open_results(kept)
+    data = report_data.ReportData(found.case, found.runs)
+    rows = [[f"joint {k}", "0.1", "0.1", "0.1", "0.1", "-"] for k in range(13)]
+    table = ResultTable(["joint", "e dead", "e min", "e max", "max V/N", "open from"], rows)
+    monkeypatch.setattr(result_text, "tabulate_joints", lambda *_: table)
+    first, second = build_joint_section(data).pieces
+    assert "under 'first'" in first.caption
+    assert "under 'second'" in second.caption
+    assert first.head == [*table.head[:5], *table.head[:5]]
+    assert [row[0] for row in first.rows] == [f"joint {k}" for k in range(7)]
+    assert [row[5] for row in first.rows] == [*(f"joint {k}" for k in range(7, 13)), ""]
 
 
 def test_a_history_alone_has_a_report_and_a_film_by_the_command_line(

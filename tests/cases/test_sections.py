@@ -215,7 +215,7 @@ def test_a_table_of_runs_has_the_largest_of_each(runs):
         assert row["max |e|"] == f"{e.max():.3f}"
         assert row["joint"] == str(run.joints["name"].values[e.max(axis=0).argmax()])
         assert row["max V/N"] == f"{float(run.joints['friction'].max()):.3f}"
-        assert row["apart"] == "-"
+        assert row["opened"] == "-"
         assert row["end"] == "reached 0.10 s"
     assert rows[-1]["pair"] == "all"
     assert rows[-1]["residual"] == "-"
@@ -239,7 +239,7 @@ def test_an_open_joint_is_the_most_eccentric_unless_another_exceeds_its_edge(run
         table = tabulate_runs({"one": shaken})
         row = dict(zip(table.head, table.rows[0], strict=True))
         assert row["joint"] == str(joints["name"].values[expected])
-        assert row["apart"] == "1 joints"
+        assert row["opened"] == "1 joints"
 
 
 def test_a_table_of_joints_has_when_they_hinged_first_and_how_long_at_most(runs):

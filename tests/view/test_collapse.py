@@ -121,7 +121,7 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(coarse_ring):
     # the ground acceleration is the nearer bound here: 0.3 g on ground B, S = 1.2
     rest = found.a_0_star / 1.2 / (0.3 * 1.2 * 9.80665)
     title = right.get_title().replace("\n", " ")
-    assert title.endswith(f"ratio {rest:.2f}, up to which nothing moves")
+    assert title.endswith(f"ratio {rest:.2f}, at which it begins to move")
     figure.draw_without_rendering()
     piers = af.arch_on_piers(radius=3, thickness=0.6, voussoirs=7, pier_breadth=1.2, courses=[1.5])
     locked = af.kinematic_assessment(piers, found.spectrum, part="left pier")

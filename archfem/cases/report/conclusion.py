@@ -13,7 +13,7 @@ import numpy as np
 
 from archfem.cases import result_text
 from archfem.cases.case import REPORT_KEYS
-from archfem.cases.report.report_data import ReportData
+from archfem.cases.report.report_data import NOTE_MARK, ReportData
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict import DOUBT_MARK, NO_RANGE
@@ -269,7 +269,7 @@ def _conclude_histories(data: ReportData) -> list[str]:
 
 
 def _describe_outcomes(data: ReportData) -> Iterator[str]:
-    """Yield the outcomes of the structure under some of the motions, and under which."""
+    """Yield each outcome with the motions that lead to it."""
     by_verb: dict[str, list[str]] = {}
     for name, run in data.runs.items():
         by_verb.setdefault(_VERBS[run.verdict.outcome], []).append(name)
@@ -365,10 +365,7 @@ def _conclude_file(data: ReportData, name: str) -> list[str]:
 
 
 def list_doubts(data: ReportData) -> list[tuple[str, str]]:
-    """Return each result in doubt with its doubt, once; of runs with the number that have it.
-
-    Remedies are for who computes, and stand in the files of the results alone.
-    """
+    """Return each result in doubt with its doubt, once; of runs with the number that have it."""
     verdicts = [run.verdict for run in data.runs.values()]
     reasons = Counter(doubt.cause for verdict in verdicts for doubt in verdict.doubts)
     count = len(verdicts)
@@ -378,11 +375,8 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
         doubts += [(_VARIATIONS, str(doubt)) for doubt in data.verdict_range.doubts]
     for name, result in _STATED_RESULTS.items():
         lines = (data.read_text(name) or "").splitlines()
-        # what a kinematic assessment leaves out stands there as a note
-        for mark in (DOUBT_MARK, "note: "):
-            texts = [line.removeprefix(mark) for line in lines if line.startswith(mark)]
-            # a remedy follows its doubt behind a semicolon, as in `Doubt`
-            doubts += [(result, text.rpartition("; ")[0] or text) for text in texts]
+        for mark in (DOUBT_MARK, NOTE_MARK):
+            doubts += [(result, line.removeprefix(mark)) for line in lines if line.startswith(mark)]
     return list(dict.fromkeys(doubts))
 
 

@@ -14,6 +14,7 @@ from archfem.cases.case import Case
 from archfem.cases.run import CASE_FILE, RATING_FILE
 from archfem.cases.toml_file import Table, parse_tables
 from archfem.dynamics.history import History
+from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import ArchfemError
 from archfem.models.builder import build
@@ -24,6 +25,9 @@ from archfem.view.pages.document import FigureBlock, TextBlock
 from archfem.view.pages.live import LivePage, describe_arch, list_motions
 from archfem.view.pages.player import Player
 from archfem.view.pages.player_data import MAX_PACKED_BYTES, Scene
+
+# Before what a kinematic assessment leaves out
+NOTE_MARK = "note: "
 
 # Results of limit analysis, for which blocks are rigid
 STATIC_RESULTS = ("limit", "rating", "assessment")
@@ -103,11 +107,17 @@ class ReportData:
         return "" if self.folder is None else describe_deleted(self.folder)
 
     def read_text(self, name: str) -> str | None:
-        """Return the text of a file of the folder, or None."""
+        """Return the text of a file of the folder, or None; its doubts are without remedies.
+
+        Remedies are for who computes. As in `Doubt`, they follow behind the last semicolon.
+        """
         if name not in self.files:
             return None
         check_listed(self.files[name], content := self.files[name].read_bytes())
-        return content.decode("utf-8").strip()
+        lines = content.decode("utf-8").strip().splitlines()
+        doubts = [line.startswith((DOUBT_MARK, NOTE_MARK)) and "; " in line for line in lines]
+        cut = zip(lines, doubts, strict=True)
+        return "\n".join(line.rpartition("; ")[0] if doubt else line for line, doubt in cut)
 
     def read_figure(self, name: str, caption: str) -> list[FigureBlock]:
         """Return the picture of a file of the folder, or an empty list."""

@@ -86,6 +86,7 @@ def build_sections(data: ReportData) -> list[Section]:
         *build_run_sections(data),
         Section("Annual rate of collapse", data.read_result("risk", *_RISK_CAPTIONS)),
         build_check_section(data),
+        build_joint_section(data),
         build_method_section(data),
         build_source_section(data),
         *build_live_sections(data),
@@ -239,6 +240,10 @@ def _build_assessment(data: ReportData) -> list[Any]:
         return []
     caption = "(a) Mechanism at the displacement capacity, and (b) capacity curve with demand."
     names = sorted(name for name in data.files if name.startswith("assessment_"))
+    sizes = [line for line in text.splitlines() if line.startswith("alpha_0 = ")]
+    if len(sizes) == len(names) == 2 and sizes[0] == sizes[1]:
+        names = names[:1]
+        caption = f"{caption[:-1]}, to the right; those to the left are its mirror image."
     figures = [figure for name in names for figure in data.read_figure(name, caption)]
     return [TextBlock(text, "lines"), *figures, _define_assessment(data)]
 
@@ -330,11 +335,16 @@ def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
         blocks.append(TextBlock(f"The run is not complete: {run.outcome}.", "doubt"))
     blocks.append(build_player(case, run, title, players))
     if case.suite is None:
-        blocks += _build_envelopes(data)
-    table = result_text.tabulate_joints(run.joints, data.dead)
-    blocks.append(_shorten_joint_table(table, run.verdict.assessed))
+        blocks += [*_build_envelopes(data), _tabulate_joints(data, run)]
     blocks.append(TextBlock(sentence(utilisation_text(case.structure, run.joints))))
     return blocks
+
+
+def build_joint_section(data: ReportData) -> Section:
+    """Build the section of long tables: the joints of each run of a suite."""
+    runs = {} if data.case.suite is None else data.runs
+    tables = [_tabulate_joints(data, run, f" under '{name}'") for name, run in runs.items()]
+    return Section("Joints of each run", tables)
 
 
 def _build_envelopes(data: ReportData) -> list[FigureBlock]:
@@ -343,20 +353,29 @@ def _build_envelopes(data: ReportData) -> list[FigureBlock]:
     return [FigureBlock.of(figure, caption) for figure in draw_envelopes(data.runs, data.dead)]
 
 
-def _shorten_joint_table(table: result_text.ResultTable, assessed: str) -> Grid:
+def _tabulate_joints(data: ReportData, run: History, label: str = "") -> Grid:
     """Return the table of joints without empty columns; the caption names these, and the joints."""
-    head, rows = table
+    (head, rows), assessed = (
+        result_text.tabulate_joints(run.joints, data.dead),
+        run.verdict.assessed,
+    )
     # Most joints neither slide nor open in most runs.
     filled = [k for k in range(len(head)) if any(row[k] != "-" for row in rows)]
     empty = {title.split()[0] for k, title in enumerate(head) if k not in filled}
     notes = {"hinge": "No joint hinged.", "slide": "No joint slid.", "open": "None came apart."}
     caption = (
-        "Criteria per joint: eccentricity under dead load, least and largest, largest V / N, and "
-        "when and how long at most the joint hinged, slid and was open."
+        f"Criteria per joint{label}: eccentricity under dead load, least and largest, largest "
+        "V / N, and when and how long at most the joint hinged, slid and was open."
     )
     caption = " ".join([caption, *(note for flag, note in notes.items() if flag in empty)])
     caption += f" {sentence(assessed)}" if assessed else ""
-    return Grid([head[k] for k in filled], [[row[k] for k in filled] for row in rows], caption)
+    head, cells = [head[k] for k in filled], [[row[k] for k in filled] for row in rows]
+    if len(head) <= 5 and len(cells) > 12:  # in two halves side by side
+        half = (len(cells) + 1) // 2
+        blank = [[""] * len(head)] * (2 * half - len(cells))
+        right = cells[half:] + blank
+        head, cells = [*head, *head], [a + b for a, b in zip(cells[:half], right, strict=True)]
+    return Grid(head, cells, caption)
 
 
 def _build_mechanism(data: ReportData, run: History) -> list[Any]:
@@ -377,12 +396,13 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
     law = describe_closing(data.case.structure)
     own = [line for line in verdict.remarks if not law or not line.startswith(law)]
     blocks += [TextBlock(sentence(line)) for line in own]
-    caption = "Definitions of a mechanism: failed joints that it needs, and the first one"
-    rows = [
-        [name, _DEFINITIONS[name], "none" if found is None else str(found)]
-        for name, found in verdict.mechanisms.items()
-    ]
-    blocks.append(Grid((), rows, caption))
+    if data.case.suite is None or any(verdict.mechanisms.values()):
+        caption = "Definitions of a mechanism: failed joints that it needs, and the first one"
+        rows = [
+            [name, _DEFINITIONS[name], "none" if found is None else str(found)]
+            for name, found in verdict.mechanisms.items()
+        ]
+        blocks.append(Grid((), rows, caption))
     if run.fall is not None and "fall_pose" in run.dataset:
         caption = "Blocks on their way to the ground, (a) to (d), over where they stood."
         blocks.append(FigureBlock.of(draw_fall(run), caption))
@@ -392,16 +412,15 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
 def _build_suite_response(data: ReportData) -> list[Any]:
     """Build the tables of all runs, and their envelopes."""
     (head, rows), columns = result_text.tabulate_runs(data.runs), len(result_text.RUN_COLUMNS)
-    # The mechanisms have too many columns for a page: a line of text for each run instead.
+    # The mechanisms have too many columns for a page: a line for each definition instead.
     mechanisms = []
-    for row in rows:
-        cells = zip(head[columns:], row[columns:], strict=True)
-        named = (f"{title}: {cell}" for title, cell in cells if cell != "-")
-        mechanisms.append((row[0], "; ".join(named)))
+    for title, *cells in zip(head[columns:], *(row[columns:] for row in rows), strict=True):
+        named = [f"{row[0]}: {cell}" for row, cell in zip(rows, cells, strict=True) if cell != "-"]
+        mechanisms += [(title, _DEFINITIONS.get(title, ""), "; ".join(named))] if named else []
     caption = "Outcome, PGA, and the critical joint of each run"
     return [
         Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption),
-        Grid([], mechanisms, "Mechanism and end of each run"),
+        Grid([], mechanisms, "Mechanisms by definition, the failed joints that it needs, and end"),
         *_build_envelopes(data),
     ]
 
