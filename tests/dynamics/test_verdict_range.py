@@ -72,9 +72,9 @@ def test_doubts_follow_the_sentence_and_are_kept(tmp_path):
 def test_the_sentence_names_the_only_motion():
     """An interval of one motion holds for that motion; without a name motions are varied."""
     found = made_up([False] * 4, sign=list("aabb"))
-    assert found.sentence == "falls in 0 of 4; of those sampled 0% fall (0% to 60%)"
+    assert found.sentence == "falls in 0 of 4; of 4 in a Latin hypercube 0% fall (0% to 60% at 95%)"
     found.dataset.attrs["motion"] = "synthetic 1"
-    assert found.sentence.endswith("(0% to 60%), under 'synthetic 1' alone")
+    assert found.sentence.endswith("(0% to 60% at 95%), under 'synthetic 1' alone")
 
 
 def test_a_run_without_an_answer_neither_stands_nor_falls():
