@@ -173,11 +173,10 @@ def test_tables_state_what_is_assessed(other, ring):
         assert (SENTENCE in table.splitlines()) == said
         assert (of_history(run).get("assessed") == SENTENCE) == said
         case = SimpleNamespace(structure=model.structure, report={})
-        facts = conclusion.list_facts(report_data.ReportData(case, {"one": run}))
+        data = report_data.ReportData(case, {"one": run})
+        facts = conclusion.list_facts(data)
         assert (("joints", SENTENCE) in facts) == said
-        grid = sections._shorten_joint_table(
-            result_text.tabulate_joints(run.joints), run.verdict.assessed
-        )
+        grid = sections._tabulate_joints(data, run)
         assert grid.caption.endswith(f" A{SENTENCE[1:]}.") == said
 
 
