@@ -263,7 +263,8 @@ INNER_OPTIONS: Any = KERNEL_OPTIONS | {
 # Compiles a function that allocates no arrays.
 kernel: Any = numba.njit(**INNER_OPTIONS)
 
-# Compiles a kernel as part of its callers.
+# Compiles a kernel as part of its callers. Any other call passes all numbers of its tuples by the
+# stack, over 2 kB for a system of steps, which takes as long as the law of several joints.
 inlined_kernel: Any = numba.njit(**INNER_OPTIONS, forceinline=True)
 
 # Compiles a kernel whose sums may be reordered, so that several terms are added at a time.

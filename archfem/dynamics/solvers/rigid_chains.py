@@ -183,7 +183,7 @@ def _load_four(rows, first, at):  # type: ignore
     )
 
 
-@kernel
+@inlined_kernel
 def _move_stones(stones, before, after, begins):  # type: ignore
     """Evaluate the rotations of all stones over the step."""
     for number in range(len(before) // 3):
@@ -233,7 +233,7 @@ def _face_place(system, at, side, cosine, sine):  # type: ignore
     return (x + (less * rx - more * ry), y + (more * rx + less * ry)), (c, s)
 
 
-@kernel
+@inlined_kernel
 def _start_joints(system, at):  # type: ignore
     """Store what joints are at the start of a step, where the stones are then."""
     rows, joint, law = system.start, system.joint, system.law
@@ -316,7 +316,7 @@ def _measure_joints(system, at):  # type: ignore
     return (start, end, (rates, now, step)), (low_half, high_half)
 
 
-@kernel
+@inlined_kernel
 def _evaluate_joints(system, at):  # type: ignore
     """Store the mean forces of joints over the step, their derivatives and resultants."""
     (start, end, (rates, now, step)), (low_half, high_half) = _measure_joints(system, at)
@@ -350,7 +350,7 @@ def _evaluate_joints(system, at):  # type: ignore
     return reverses
 
 
-@kernel
+@inlined_kernel
 def _couple_joints(system, at):  # type: ignore
     """Store the derivatives of the forces of joints on both stones, four blocks of three by three.
 
@@ -416,6 +416,7 @@ def _start_chain_run(system, state, memory):  # type: ignore
             number += 1
 
 
+# called from two places: twice its code would not fit into the processor's cache
 @kernel
 def _chain_residual(system, work, iteration):  # type: ignore
     """Evaluate the forces out of balance at the trial displacements."""
@@ -448,7 +449,7 @@ def _add_squares(values, count):  # type: ignore
     return total
 
 
-@kernel
+@inlined_kernel
 def _add_forces(system, factor, first, total):  # type: ignore
     """Add forces of joints on their stones, times a factor, to a vector."""
     stone, forces = system.stone, system.forces
@@ -459,7 +460,7 @@ def _add_forces(system, factor, first, total):  # type: ignore
                 total[place + k] += factor * forces[row + k, joint]
 
 
-@kernel
+@inlined_kernel
 def _chain_correction(system, work, iteration, reuse, hold):  # type: ignore
     """Solve for the correction of Δq."""
     correction, stone, count = work.correction, system.stone, len(system.law.face_law.depth)
@@ -547,7 +548,7 @@ def _evaluate_chain_step(system, step, states, ground, results, memory):  # type
             number += 1
 
 
-@kernel
+@inlined_kernel
 def _joint_energies(system, at, lag):  # type: ignore
     """Return the energy that joints lose in a step, and what they store at its end."""
     law, rows, end = system.law, system.start, system.end

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from archfem._numba import kernel, summing_kernel
+from archfem._numba import inlined_kernel, summing_kernel
 
 # Shares of a correction that a line search tries, at most
 MAX_SEARCH_EVALUATIONS = 14
@@ -34,7 +34,7 @@ class Correction(NamedTuple):
     reverse: Any  # turns it around
 
 
-@kernel
+@inlined_kernel
 def add_share(system, work, before, share):  # type: ignore
     """Go from a share of the correction to another; returns the largest entry of all of it."""
     move, correction, largest, added = work.move, work.correction, 0.0, share - before
@@ -54,7 +54,7 @@ def residual_work(system, work):  # type: ignore
     return total
 
 
-@kernel
+@inlined_kernel
 def reverse_correction(system, work):  # type: ignore
     """Turn the correction around."""
     for k in range(len(system.weight)):
@@ -65,7 +65,7 @@ def line_search(evaluate_residual: Any, correction: Correction) -> Any:
     """Return the compiled search along a correction."""
     _, add, work_along, reverse = correction
 
-    @kernel
+    @inlined_kernel
     def search_line(system, work, iteration, before, whole):  # type: ignore
         """Add the correction, or unless `whole` the share at which the residual does no work."""
         start, share, evaluations = work_along(system, work), 1.0, 0
@@ -107,7 +107,7 @@ def newton_driver(evaluate_residual: Any, correction: Correction) -> Any:
     """Return the compiled driver of iterations for small or for large displacements."""
     find_correction, search_line = correction.find, line_search(evaluate_residual, correction)
 
-    @kernel
+    @inlined_kernel
     def newton_solve(system, work, tolerances, limits):  # type: ignore
         """Iterate until the residual vanishes; returns evaluations, negative if it does not.
 

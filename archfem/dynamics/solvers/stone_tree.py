@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from archfem._numba import kernel
+from archfem._numba import inlined_kernel
 from archfem.dynamics.solvers.equation import Equation
 
 
@@ -72,7 +72,7 @@ def _middle_of(links: Any, stone: int) -> int:
     return way[len(way) // 2]
 
 
-@kernel
+@inlined_kernel
 def add_joint_blocks(coupling, joint, stones, parent, blocks):  # type: ignore
     """Add the derivatives of a joint to the blocks of both its stones."""
     low, high = stones
@@ -90,7 +90,7 @@ def add_joint_blocks(coupling, joint, stones, parent, blocks):  # type: ignore
                 below[child, i, k] += back if is_low else across
 
 
-@kernel
+@inlined_kernel
 def eliminate_stones(parent, blocks):  # type: ignore
     """Factorise the tangent: invert D, and store F; returns whether all of it is finite."""
     diagonal, right, below, factor = blocks[0], blocks[1], blocks[2], blocks[3]
@@ -119,7 +119,7 @@ def eliminate_stones(parent, blocks):  # type: ignore
     return np.isfinite(total)
 
 
-@kernel
+@inlined_kernel
 def substitute_stones(parent, blocks, x):  # type: ignore
     """Solve with the factor, x in place of the right side."""
     count = len(parent)
