@@ -8,6 +8,7 @@ singular. Loads may depend on the coordinates where blocks rotate far.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import hypot
 
 import numpy as np
@@ -36,6 +37,9 @@ RESIDUAL_TOLERANCE = 1e-9
 
 # Row and right side of the added equation, and the length of the step
 Goal = tuple[Array, float, float]
+
+# Finds the next equilibrium of a path, whose steps are small: what slid in creep stays there
+_solve_next = partial(solve_or_relax, in_proportion=False)
 
 # First displacement, relative to the structure's size [-]
 FIRST_DISPLACEMENT = 1e-6
@@ -229,7 +233,7 @@ class LoadPath(EquilibriumPath):
         q, factor = self.states[-1], self.factors[-1] + increment
         load = self._permanent_load(q) + factor * self.load.forces(q)
         try:
-            model, solution = solve_or_relax(EquilibriumSolver(len(q)), self.model, load, q)
+            model, solution = _solve_next(EquilibriumSolver(len(q)), self.model, load, q)
         except DidNotConverge:
             return False
         if self.load.displacement(solution.q) - self.load.displacement(self.states[0]) > farthest:
@@ -422,7 +426,7 @@ class SupportPath(EquilibriumPath):
         multiple = self.multiples[-1] + distance * self.unit[0] / self.corner_displacement
         model, solver = self._model_at(multiple), EquilibriumSolver(self.model.size)
         try:
-            model, solution = solve_or_relax(solver, model, self.dead, self._predict(multiple))
+            model, solution = _solve_next(solver, model, self.dead, self._predict(multiple))
         except DidNotConverge:
             return False
         self.multiples.append(multiple)

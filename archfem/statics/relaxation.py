@@ -233,10 +233,13 @@ def solve_or_relax(
     load: Array,
     start: Array,
     check: Callable[[Model], None] | None = None,
+    *,
+    in_proportion: bool = True,
 ) -> tuple[Model, Solution]:
     """Find an equilibrium by Newton's method, and where that fails by relaxation.
 
-    The check comes between them, and may raise the reason for which there is none.
+    The check comes between them, and may raise the reason for which there is none. Slips of creep
+    stay, as on a path in small steps, or give way to those that grow in proportion to the load.
     """
     try:
         return solve_irreversible(solver, model, load, start)
@@ -246,6 +249,8 @@ def solve_or_relax(
         relaxed, crept = relax(solver, model, load, start)
         if has_irreversible_joints(model):
             return solve_irreversible(solver, relaxed, load, crept.q)
+        if not in_proportion:
+            return relaxed, crept
         # Creep makes joints slide to and fro, and its end depends on its steps. Of the equilibria
         # near it that one is taken whose slips grow in proportion to the load.
         try:
