@@ -80,7 +80,7 @@ def _evaluate_step(system, step, states, ground, results, memory):
     if slides(system):
 
         def evaluated(system, step, states, ground, results, memory):
-            resultants, energy = results
+            resultants, energy, _ = results
             memory[:] = system.work[1]
             moved = states[1, 0, 0] - states[0, 0, 0]
             resultants[0, 0] = system.mass * GRAVITY

@@ -69,7 +69,7 @@ def solve_step(system: Any, step: Any, states: Any, ground: Any) -> Any:
 def evaluate_step(
     system: Any, step: Any, states: Any, ground: Any, results: Any, memory: Any
 ) -> Any:
-    """Evaluate resultants, energies and memory of a step that has converged; overloaded."""
+    """Evaluate resultants, energies, faces and memory of a step that converged; overloaded."""
     raise NotImplementedError
 
 
