@@ -1,7 +1,7 @@
 """Stiffness of blocks relative to their joints, and their lowest internal frequency."""
 
 from dataclasses import dataclass, replace
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 
@@ -60,14 +60,16 @@ def find_soft_blocks(structure: Structure) -> tuple[int, ...]:
 
 
 def estimate_bending(structure: Structure, number: int) -> float:
-    """Return the first frequency of a block as a beam that is held at its joints [Hz]."""
+    """Return the first frequency of a block as a beam held at its joints; infinite along one [Hz]."""
     # held at one end, 0.1615 d / L² √(E/ρ), or at both, 1.028 d / L² √(E/ρ) (Euler and Bernoulli)
     block = structure.blocks[number]
     away = np.array(block.points) - block.centroid
     length = 2.0 * float(np.linalg.norm(away, axis=1).max())
-    held = sum(number in joint.blocks for joint in structure.joints)
+    depths = [joint.depth for joint in structure.joints if number in joint.blocks]
+    if max(depths) > 0.5 * length:  # a course that lies on another one
+        return inf
     wave = sqrt(block.material.young / structure.density(block))
-    return (0.1615 if held == 1 else 1.028) * block.area / length**3 * wave
+    return (0.1615 if len(depths) == 1 else 1.028) * block.area / length**3 * wave
 
 
 def find_yielding_blocks(structure: Structure) -> tuple[int, ...]:

@@ -122,3 +122,5 @@ def test_slender_blocks_bend_as_beams():
     dry = af.column(breadth=0.4, heights=[8.0])
     assert not af.build(short, fidelity="faces").doubts
     assert not af.build(dry, fidelity="faces").doubts
+    # a course that lies on another one along its length is held by it
+    assert estimate_bending(af.column(breadth=8.0, heights=[0.4], contact=contact), 1) == np.inf
