@@ -60,13 +60,13 @@ def find_soft_blocks(structure: Structure) -> tuple[int, ...]:
 
 
 def estimate_bending(structure: Structure, number: int) -> float:
-    """Return the first frequency of a block as a beam held at its joints; infinite along one [Hz]."""
+    """Return the first frequency of a block as a beam held at its joints, or infinity [Hz]."""
     # held at one end, 0.1615 d / L² √(E/ρ), or at both, 1.028 d / L² √(E/ρ) (Euler and Bernoulli)
     block = structure.blocks[number]
     away = np.array(block.points) - block.centroid
     length = 2.0 * float(np.linalg.norm(away, axis=1).max())
     depths = [joint.depth for joint in structure.joints if number in joint.blocks]
-    if max(depths) > 0.5 * length:  # a course that lies on another one
+    if max(depths) > 0.5 * length:  # held along its length, as a course by another
         return inf
     wave = sqrt(block.material.young / structure.density(block))
     return (0.1615 if len(depths) == 1 else 1.028) * block.area / length**3 * wave
