@@ -98,6 +98,13 @@ class ResultDisplay:
         return f"<pre>{escape(self._summary())}</pre>"
 
 
+def write_progress_line(name: str, text: str) -> None:
+    """Write a line of progress, but not into a notebook."""
+    if isinstance(sys.stderr, io.TextIOWrapper):
+        sys.stderr.write(f"{name}: {text}\n")
+        sys.stderr.flush()
+
+
 class ProgressReport:
     """Progress of a long search: a bar on a terminal, elsewhere a line every five seconds."""
 
@@ -116,8 +123,6 @@ class ProgressReport:
         """Show a text, and count what is done since the last one."""
         self._bar.update(done)
         self._bar.set_postfix_str(text)
-        late = self._bar.disable and monotonic() - self._shown >= PROGRESS_INTERVAL
-        if late and isinstance(sys.stderr, io.TextIOWrapper):  # not that of a notebook
-            sys.stderr.write(f"{self._name}: {text}\n")
-            sys.stderr.flush()
+        if self._bar.disable and monotonic() - self._shown >= PROGRESS_INTERVAL:
+            write_progress_line(self._name, text)
             self._shown = monotonic()

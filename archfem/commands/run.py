@@ -265,14 +265,12 @@ def risk(options: argparse.Namespace) -> int:
 
 def verdict(options: argparse.Namespace) -> int:
     """Run a case over joint rules, stiffness, friction and damping: how often does it fall?"""
-    from archfem.studies.cache import ground_motion
     from archfem.studies.variations import verdict_range
 
     case = Case.read(options.case, options.changes)
     if options.out is not None:  # a folder that cannot be written is refused before the runs
         create_result_folder(options.out)
-    shaken = case if options.pair is None else case.alone(options.pair)
-    motion = ground_motion(shaken)
+    motion = _choose_motion(case, options)
     print(case.title)
     sampling = {"workers": options.workers, "samples": options.samples}
     computed = verdict_range(case.analysis, motion, fidelity="rigid", **sampling)
@@ -286,14 +284,19 @@ def verdict(options: argparse.Namespace) -> int:
     return ExitCode.DOUBTFUL if computed.doubts else 0
 
 
-def scale(options: argparse.Namespace) -> int:
-    """Scale the motion of a case until it falls, or forms a mechanism in small displacements."""
+def _choose_motion(case: Case, options: argparse.Namespace) -> Motion:
+    """Return the motion of a case, or the pair of its suite that is named."""
     from archfem.studies.cache import ground_motion
 
+    return ground_motion(case if options.pair is None else case.alone(options.pair))
+
+
+def scale(options: argparse.Namespace) -> int:
+    """Scale the motion of a case until it falls, or forms a mechanism in small displacements."""
     case = Case.read(options.case, options.changes)
     if options.out is not None:  # a folder that cannot be written is refused before the runs
         create_result_folder(options.out)
-    motion = ground_motion(case if options.pair is None else case.alone(options.pair))
+    motion = _choose_motion(case, options)
     found: CollapseScale | MechanismScales
     search = collapse_scale if case.analysis.displacements == "large" else mechanism_scales
     with _record_doubts(case.structure) as doubts:

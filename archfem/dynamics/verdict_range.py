@@ -1,6 +1,5 @@
 """Range of a verdict over uncertain properties: share of falls, and the decisive properties."""
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ from archfem._typing import Array
 from archfem._validation import validate_methods
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.dynamics.verdict import DOUBT_MARK
-from archfem.models.model import Doubt
+from archfem.models.model import Doubt, read_doubts
 
 
 @validate_methods
@@ -111,7 +110,7 @@ class VerdictRange(ResultDisplay):
     @property
     def doubts(self) -> tuple[Doubt, ...]:
         """Reasons why the outcomes may be wrong, each with its remedy."""
-        return tuple(Doubt(*each) for each in json.loads(self.dataset.attrs.get("doubts", "[]")))
+        return read_doubts(self.dataset.attrs.get("doubts", "[]"))
 
     @property
     def count(self) -> str:

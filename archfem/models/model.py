@@ -4,8 +4,10 @@ Masonry, joint laws and meshes serve to build a `Model`; statics, dynamics, pict
 it through this interface alone, whatever its fidelity and whether displacements are small or large.
 """
 
+import json
+from collections.abc import Iterable
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cached_property
 from typing import Any, Protocol, Self, runtime_checkable
 
@@ -147,6 +149,16 @@ class Doubt:
     def __str__(self) -> str:
         """Cause and remedy as one sentence."""
         return f"{self.cause}; {self.remedy}" if self.remedy else self.cause
+
+
+def write_doubts(doubts: Iterable[Doubt]) -> str:
+    """Return doubts as JSON, each once, as results keep them."""
+    return json.dumps([astuple(doubt) for doubt in dict.fromkeys(doubts)])
+
+
+def read_doubts(text: str) -> tuple[Doubt, ...]:
+    """Return the doubts that `write_doubts` wrote."""
+    return tuple(Doubt(*each) for each in json.loads(text))
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import logging
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, astuple, dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from math import exp, inf, nan, sqrt
 from pathlib import Path
@@ -45,7 +45,7 @@ from archfem.dynamics.recorder import Record
 from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.structure import Structure
-from archfem.models.model import Doubt
+from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES, Hazard
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
@@ -264,7 +264,7 @@ def _describe_inputs(
     return {
         "hazard": json.dumps(_write_hazard(hazard)),
         "inputs": json.dumps([*(each.fingerprint for _, each, _ in tree.values()), *options]),
-        "doubts": json.dumps([astuple(doubt) for doubt in dict.fromkeys(doubts)]),
+        "doubts": write_doubts(doubts),
     }
 
 
@@ -612,7 +612,7 @@ class CollapseRisk(ResultDisplay):
         last, unit = self.hazard.intensity[-1], MEASURES[self.hazard.measure]
         edges, shares = self.disaggregation(240)
         beyond = float(shares[edges[:-1] > last].sum())
-        doubts = [Doubt(*each) for each in json.loads(self.dataset.attrs.get("doubts", "[]"))]
+        doubts = [*read_doubts(self.dataset.attrs.get("doubts", "[]"))]
         if beyond > LARGEST_EXTRAPOLATED_SHARE:
             cause = (
                 f"{beyond:.0%} of the rate comes from intensities above {last:.3g} {unit}, once in "

@@ -3,11 +3,9 @@
 The table is an `xarray.Dataset`, written as NetCDF, CSV and Parquet.
 """
 
-import io
 import logging
 import re
 import shutil
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass
@@ -25,7 +23,7 @@ import xarray as xr
 from tqdm import tqdm
 
 from archfem import _files
-from archfem._display import PROGRESS_INTERVAL
+from archfem._display import PROGRESS_INTERVAL, write_progress_line
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, StudyStopped
@@ -282,9 +280,8 @@ class Progress:
             status = self._status
             if not self._bar.disable:
                 self._bar.set_postfix_str(str(status).partition(", ")[2])
-            elif isinstance(sys.stderr, io.TextIOWrapper):  # not that of a notebook
-                sys.stderr.write(f"{self._name}: {status}\n")
-                sys.stderr.flush()
+            else:
+                write_progress_line(self._name, str(status))
 
 
 def evaluate_with_progress(

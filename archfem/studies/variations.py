@@ -5,9 +5,8 @@ and all together, by a Latin hypercube. The result is the share of runs in which
 falls, and the properties that decide it.
 """
 
-import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
 from typing import Any
@@ -33,6 +32,7 @@ from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.joint_closing import FINISHES, with_finish
 from archfem.masonry.structure import Structure
+from archfem.models.model import write_doubts
 from archfem.motion.motion import Motion
 from archfem.studies.evaluators import PreparedRuns
 from archfem.studies.parameter_space import WholePoint
@@ -149,7 +149,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     dataset.attrs["motion"] = "" if several else motion.name
     structures = [analysis.structure, *(each for each in named if isinstance(each, Structure))]
     doubts = (*rest.model.doubts, *doubt_soft_blocks(*structures))
-    dataset.attrs["doubts"] = json.dumps([astuple(doubt) for doubt in doubts])
+    dataset.attrs["doubts"] = write_doubts(doubts)
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
     dataset.attrs["k_s"] = float(np.mean([contact.shear_stiffness for contact in contacts]))

@@ -133,8 +133,14 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
 
 def build_conclusion(data: ReportData) -> Section:
     """Build the section on outcomes in sentences, each with its doubts, on margins and range."""
-    rows, doubts = [*_capacity_rows(data)], list_doubts(data)
-    blocks: list[Any] = [TextBlock(text) for text in filter(None, [_build_lead(data, rows)])]
+    doubts = list_doubts(data)
+    doubtful = list(dict.fromkeys(result for result, _ in doubts))
+    rows = [
+        (name, demand, outcome + (" (in doubt)" if result in doubtful else ""), factor)
+        for result, (name, demand, outcome, factor) in _capacity_rows(data)
+    ]
+    lead = _build_lead(data, rows, doubtful)
+    blocks: list[Any] = [TextBlock(lead)] if lead else []
     for name, result in _STATED_RESULTS.items():
         text = " ".join(_conclude_file(data, name) if name else _conclude_histories(data))
         blocks += [TextBlock(text)] if text else []
@@ -153,7 +159,7 @@ def build_conclusion(data: ReportData) -> Section:
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
 
 
-def _build_lead(data: ReportData, rows: Sequence[_Row]) -> str:
+def _build_lead(data: ReportData, rows: Sequence[_Row], doubtful: Sequence[str]) -> str:
     """Answer in a few sentences: demand, outcomes, variations, least margin, results in doubt."""
     checks = [(float(row[3]), row[0]) for row in rows if row[0].startswith("assessment: ")]
     if not data.runs and not checks:
@@ -167,8 +173,7 @@ def _build_lead(data: ReportData, rows: Sequence[_Row]) -> str:
         factor, check = min(checks)
         outcome = "passes" if factor >= 1.0 else "fails"
         lead.append(f"it {outcome} with a least margin of {factor:g} on the spectrum, by {check}")
-    doubtful = ", ".join(dict.fromkeys(result for result, _ in list_doubts(data)))
-    lead += [f"in doubt, for reasons given below: {doubtful}"] if doubtful else []
+    lead += [f"in doubt, for reasons given below: {', '.join(doubtful)}"] if doubtful else []
     lead[0] = f"for {' and '.join(stated)}: {lead[0]}" if stated else lead[0]
     return " ".join(map(sentence, lead))
 
@@ -182,31 +187,26 @@ def _build_signatures(report: Mapping[str, str]) -> Grid:
     return Grid(("", "name", "place, date", "signature"), rows, "", "form")
 
 
-def _capacity_rows(data: ReportData) -> Iterator[_Row]:
-    """Yield demand, capacity or outcome, and factor, of each result; "-" where there is none."""
+def _capacity_rows(data: ReportData) -> Iterator[tuple[str, _Row]]:
+    """Yield each result with its demand, capacity or outcome, and factor; "-" where is none."""
     if stated := data.case.report.get("demand"):
-        yield "as stated", stated, "-", "-"
+        yield "", ("as stated", stated, "-", "-")
     if data.runs:
         verdicts = [run.verdict for run in data.runs.values()]
         peaks = [f"{_peak_of_ground(run) / STANDARD_GRAVITY:.2f}" for run in data.runs.values()]
         demand = f"PGA {' to '.join(dict.fromkeys([min(peaks), max(peaks)]))} g"
         outcome = result_text.count_outcomes(verdicts) if len(peaks) > 1 else verdicts[0].outcome
-        yield "time histories", demand, outcome + _mark_doubt(data, "time histories"), "-"
+        yield "time histories", ("time histories", demand, outcome, "-")
     if (computed := data.verdict_range) is not None:
         motion = computed.dataset.attrs.get("motion")
         name = f"{_VARIATIONS} under '{motion}'" if motion else _VARIATIONS
-        yield name, "the same motion", computed.count + _mark_doubt(data, _VARIATIONS), "-"
+        yield _VARIATIONS, (name, "the same motion", computed.count, "-")
     for name, result in _STATED_RESULTS.items():
         if text := data.read_text(name):
             build: dict[str, Callable[[str], Iterator[_Row]]]
             build = {"assessment.txt": _assessment_rows, "risk.txt": partial(_risk_row, data)}
             for row in build.get(name, partial(_load_row, result))(text):
-                yield row[0], row[1], row[2] + _mark_doubt(data, result), row[3]
-
-
-def _mark_doubt(data: ReportData, result: str) -> str:
-    """Return the mark of a result in doubt, or nothing."""
-    return " (in doubt)" if any(about == result for about, _ in list_doubts(data)) else ""
+                yield result, row
 
 
 def _load_row(result: str, text: str) -> Iterator[_Row]:
@@ -372,7 +372,7 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
     of_runs = [f"{n} of {count} runs: {text}" if count > 1 else text for text, n in reasons.items()]
     doubts = [("time histories", text) for text in of_runs]
     if data.verdict_range is not None:
-        doubts += [(_VARIATIONS, str(doubt)) for doubt in data.verdict_range.doubts]
+        doubts += [(_VARIATIONS, doubt.cause) for doubt in data.verdict_range.doubts]
     for name, result in _STATED_RESULTS.items():
         lines = (data.read_text(name) or "").splitlines()
         for mark in (DOUBT_MARK, NOTE_MARK):
@@ -382,9 +382,11 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
 
 def list_elastic_fill(data: ReportData) -> list[str]:
     """Return the materials of blocks that yield to others, if they are elastic bodies in a run."""
-    blocks = [data.case.structure.blocks[k] for k in find_yielding_blocks(data.case.structure)]
-    bodies = [block for block in blocks if "full" in data.fidelity or "rigid" not in data.fidelity]
-    return list(dict.fromkeys(block.material.name for block in bodies)) if data.runs else []
+    if not data.runs or ("rigid" in data.fidelity and "full" not in data.fidelity):
+        return []
+    structure = data.case.structure
+    bodies = [structure.blocks[number] for number in find_yielding_blocks(structure)]
+    return list(dict.fromkeys(block.material.name for block in bodies))
 
 
 def describe_what_is_not_varied(data: ReportData) -> str:

@@ -355,10 +355,8 @@ def _build_envelopes(data: ReportData) -> list[FigureBlock]:
 
 def _tabulate_joints(data: ReportData, run: History, label: str = "") -> Grid:
     """Return the table of joints without empty columns; the caption names these, and the joints."""
-    (head, rows), assessed = (
-        result_text.tabulate_joints(run.joints, data.dead),
-        run.verdict.assessed,
-    )
+    head, rows = result_text.tabulate_joints(run.joints, data.dead)
+    assessed = run.verdict.assessed
     # Most joints neither slide nor open in most runs.
     filled = [k for k in range(len(head)) if any(row[k] != "-" for row in rows)]
     empty = {title.split()[0] for k, title in enumerate(head) if k not in filled}
