@@ -372,7 +372,7 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
     of_runs = [f"{n} of {count} runs: {text}" if count > 1 else text for text, n in reasons.items()]
     doubts = [("time histories", text) for text in of_runs]
     if data.verdict_range is not None:
-        doubts += [(_VARIATIONS, doubt.cause) for doubt in data.verdict_range.doubts]
+        doubts += [(_VARIATIONS, str(doubt)) for doubt in data.verdict_range.doubts]
     for name, result in _STATED_RESULTS.items():
         lines = (data.read_text(name) or "").splitlines()
         for mark in (DOUBT_MARK, NOTE_MARK):
