@@ -415,7 +415,7 @@ def test_the_study_files_of_the_documentation_are_read(tmp_path):
     for text in files:
         (tmp_path / "study.toml").write_text(text, encoding="utf-8")
         counts.append(len(af.Study.read(tmp_path / "study.toml").points))
-    assert counts == [3 * 64, 2 * 3 * 2]
+    assert counts == [3 * 64]
 
 
 def test_cases_with_a_suite_are_computed_under_each_pair(small, tmp_path):
