@@ -3,7 +3,6 @@
 FEniCSx has no wheels. What is large or seldom needed is an extra of archfem, as `archfem[film]`.
 """
 
-import logging
 import os
 import sys
 from collections.abc import Iterator
@@ -12,7 +11,7 @@ from ctypes import CDLL
 from importlib.util import find_spec
 from typing import NamedTuple
 
-from archfem.errors import NotInstalled
+from archfem.errors import NotInstalled, logger
 
 
 class Requirement(NamedTuple):
@@ -84,7 +83,7 @@ def can_film() -> bool:
     if find_spec("imageio") is not None:
         return True
     message = missing_package_message("imageio", "no film is written")
-    logging.getLogger("archfem").warning(message)
+    logger.warning(message)
     return False
 
 

@@ -1,6 +1,10 @@
 """Exception classes, one for each remedy; messages give the value, the reason and the remedy."""
 
+import logging
 from typing import Any
+
+# Receives the warnings of all rooms
+logger = logging.getLogger("archfem")
 
 
 class ArchfemError(Exception):

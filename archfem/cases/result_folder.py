@@ -3,7 +3,6 @@
 The files of a run appear in its folder together, when all of them exist (`archfem._files`).
 """
 
-import logging
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -25,7 +24,7 @@ from archfem.cases.run import (
 )
 from archfem.cases.toml_file import read_tables
 from archfem.dynamics.history import History
-from archfem.errors import ArchfemError, InvalidInput
+from archfem.errors import ArchfemError, InvalidInput, logger
 from archfem.limit.collapse import Collapse
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_table
@@ -36,8 +35,6 @@ from archfem.view.statics import draw_free_body
 from archfem.view.stress import draw_stress
 from archfem.view.structure import draw_during, draw_names
 from archfem.view.style import Files
-
-logger = logging.getLogger("archfem")
 
 
 @validate_methods

@@ -30,7 +30,7 @@ from archfem.dynamics.history import Ending, History, partial_history
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.slip_error import least_compression
 from archfem.dynamics.time_history import time_history
-from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
+from archfem.errors import ArchfemError, DidNotConverge, InvalidInput, logger
 from archfem.joints.criteria import assessed_joints
 from archfem.limit.collapse import Collapse
 from archfem.masonry.stiffness_ratio import soften_joints
@@ -44,7 +44,6 @@ from archfem.statics.stress import strength_use
 if TYPE_CHECKING:
     from archfem.view.pages.player import Player
 
-logger = logging.getLogger("archfem")
 
 # Names of files in a result folder.
 CASE_FILE = "case.toml"

@@ -14,7 +14,6 @@ stiffness the block rolls over its edge instead, and r depends on damping: near 
 with more. There is no closed form, so r is measured on a block released from a tilt.
 """
 
-import logging
 from dataclasses import dataclass, replace
 from math import atan, exp, log, pi, sqrt, tau
 
@@ -33,7 +32,7 @@ from archfem.dynamics.schemes import (
 )
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.selection import stepper_for
-from archfem.errors import InvalidInput
+from archfem.errors import InvalidInput, logger
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.shapes.rings import column
@@ -43,8 +42,6 @@ from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Start, Subject, dead_load, resolve_start, self_weight
 from archfem.statics.modes import Modes, modes
 from archfem.units import G
-
-logger = logging.getLogger("archfem")
 
 # Share of the mass along x up to the first effective mode (EN 1998-1, 4.3.3.3.1(3)) [-]
 FIRST_MASS_SHARE = 0.05

@@ -21,11 +21,7 @@ from archfem.dynamics.collapse_state import (
     mark_lost,
 )
 from archfem.dynamics.history import Ending, History, with_fall
-from archfem.dynamics.rigid_body.bodies import (
-    FallFrame,
-    LooseBlocks,
-    masses_of,
-)
+from archfem.dynamics.rigid_body.bodies import FallFrame, LooseBlocks, masses_of
 from archfem.dynamics.rigid_body.simulation import (
     MAX_COMPARED_BLOCKS,
     MAX_STEP_CHANGE,

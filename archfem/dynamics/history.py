@@ -1,6 +1,5 @@
 """History of a run: recorded joints and fields, first mechanisms, verdict, and its file."""
 
-import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -16,11 +15,7 @@ from archfem._display import ResultDisplay, call_late_bound
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._typing import Array
 from archfem._validation import check_type, validate_arguments, validate_methods
-from archfem.dynamics.collapse_state import (
-    COLLAPSE_STATES,
-    CollapseState,
-    describe_dislocation,
-)
+from archfem.dynamics.collapse_state import COLLAPSE_STATES, CollapseState, describe_dislocation
 from archfem.dynamics.export import write_vtk, write_xdmf
 from archfem.dynamics.verdict import (
     ALL_DEFINITIONS,
@@ -31,7 +26,7 @@ from archfem.dynamics.verdict import (
     extremes_remark,
     total_duration_remark,
 )
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.joints.criteria import (
     HEAD_COORDINATE,
     Criteria,
@@ -48,8 +43,6 @@ from archfem.limit.mechanism_kinematics import (
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Model
-
-logger = logging.getLogger("archfem")
 
 SIGN_CONVENTION = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "

@@ -6,7 +6,6 @@ first two share one model, and the second runs about the peaks of the first alon
 selection takes about as long as the run for which it selects.
 """
 
-import logging
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +17,7 @@ from archfem._validation import check_number, check_type
 from archfem.dynamics import error_estimation
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
-from archfem.errors import InvalidInput
+from archfem.errors import InvalidInput, logger
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.stiffness_ratio import find_soft_blocks
 from archfem.masonry.structure import Structure
@@ -27,8 +26,6 @@ from archfem.models.discretisation import Discretisation
 from archfem.models.linear_blocks import build_rigid_model
 from archfem.models.model import Doubt, Model, Prediction
 from archfem.motion.motion import Motion
-
-logger = logging.getLogger("archfem")
 
 # Fidelity, cells and time step [s] of the settings tried. The first two share a mesh: the error of
 # the step is the larger, and a second mesh costs as much to build as the window to run

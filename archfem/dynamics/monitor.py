@@ -15,7 +15,6 @@ The checks do not depend on how many steps a solver takes at a time: bounds are 
 step of a batch.
 """
 
-import logging
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,10 +25,8 @@ from archfem._typing import Array
 from archfem.dynamics.separation import MeetingMonitor
 from archfem.dynamics.solvers.step_scans import scan_corners
 from archfem.dynamics.state import Batch, State
-from archfem.errors import DidNotConverge
+from archfem.errors import DidNotConverge, logger
 from archfem.models.model import Doubt, Model, Observer
-
-logger = logging.getLogger("archfem")
 
 
 @dataclass(frozen=True, eq=False)

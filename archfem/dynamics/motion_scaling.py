@@ -4,7 +4,6 @@ Incremental dynamic analysis: runs at increasing and decreasing scales until eac
 bracketed, then at the geometric mean of the widest bracket.
 """
 
-import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -27,7 +26,7 @@ from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict import MECHANISM_DEFINITIONS
 from archfem.dynamics.verdict_range import VerdictRange
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import Structure
@@ -36,8 +35,6 @@ from archfem.motion.motion import Motion
 from archfem.motion.signal_processing import MAX_PEAK_ACCELERATION
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.units import STANDARD_GRAVITY
-
-logger = logging.getLogger("archfem")
 
 # Limit state of large displacements, in place of a definition of mechanisms
 COLLAPSE_DEFINITION = "collapse"

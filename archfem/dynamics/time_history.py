@@ -5,7 +5,6 @@ and recorded. Where displacements are large and blocks separate, the run continu
 blocks until they rest (`dynamics.fall`).
 """
 
-import logging
 from collections.abc import Iterable, Iterator
 from time import monotonic
 from typing import Any
@@ -39,15 +38,13 @@ from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.solvers.selection import stepper_for
 from archfem.dynamics.state import Batch, State
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.joints.criteria import Criteria
 from archfem.models.model import Doubt, Model, check_model
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.newton import Newton
 from archfem.units import format_mm
-
-logger = logging.getLogger("archfem")
 
 
 @takes_analysis
@@ -240,11 +237,7 @@ def _check_types(**arguments: Any) -> None:
 
 
 def _make_recorder(
-    stepper: Stepper,
-    first: Batch,
-    dt: float | None,
-    record: Record,
-    criteria: Criteria,
+    stepper: Stepper, first: Batch, dt: float | None, record: Record, criteria: Criteria
 ) -> Recorder:
     """Return the recorder of a run, with its validity checks."""
     equation = stepper.equation

@@ -181,11 +181,7 @@ def _derive_in_parts(
 
 
 def _derive_variables(
-    structure: Structure,
-    criteria: Criteria,
-    moved: bool,
-    resultants: Array,
-    faces: Array | None,
+    structure: Structure, criteria: Criteria, moved: bool, resultants: Array, faces: Array | None
 ) -> dict[str, Any]:
     """Return eccentricity, friction, opening and failure flags of joints as variables."""
     dims = ("time", "joint")[3 - resultants.ndim :]

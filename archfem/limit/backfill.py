@@ -6,7 +6,6 @@ gives the active and the passive pressure on the stones' faces (Rankine), and a 
 spreads in a fan down to the stones that it meets first (Flamant).
 """
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,7 +19,7 @@ from scipy import sparse
 
 from archfem._typing import Array, Degrees, Flags, Metres, Numbers, Pascals
 from archfem._validation import check_choice, check_number, check_type
-from archfem.errors import InvalidInput
+from archfem.errors import InvalidInput, logger
 from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
@@ -28,8 +27,6 @@ from archfem.masonry.loads import Action, BodyForce, PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 from archfem.units import in_degrees
-
-logger = logging.getLogger("archfem")
 
 SELF_WEIGHT = BodyForce(0.0, -1.0)
 

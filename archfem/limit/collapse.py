@@ -10,7 +10,6 @@ closed part only, as in elastic joints. Limit analysis takes it over the whole j
 it remains depends on where the thrust of the state is.
 """
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -20,7 +19,7 @@ import xarray as xr
 from archfem._display import ExplainedWord, ResultDisplay
 from archfem._typing import Array, Pascals
 from archfem._validation import validate_arguments
-from archfem.errors import InvalidInput
+from archfem.errors import InvalidInput, logger
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import (
     BlocksWithFill,
@@ -43,8 +42,6 @@ from archfem.masonry.structure import (
     structure_of,
 )
 from archfem.units import MPa, kN
-
-logger = logging.getLogger("archfem")
 
 
 class Outcome(ExplainedWord):
@@ -445,12 +442,7 @@ def read_bounds(structure: Structure, bounds: FillBounds, friction: str | None) 
     result = Collapse(lower, outcome, hinges, slides, joints, regions.expand_motion(motion))
     if friction is not None:
         warn_sliding(result.sliding_names, result.factor)
-    return replace(
-        result,
-        soil=bounds.contact_stress,
-        fill_motion=bounds.fill_motion,
-        upper=upper,
-    )
+    return replace(result, soil=bounds.contact_stress, fill_motion=bounds.fill_motion, upper=upper)
 
 
 def _without_forces(optimum: Optimum) -> Optimum:

@@ -3,7 +3,6 @@
 References: Goulart and Chen, Clarabel: an interior-point solver for conic programs (2024).
 """
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,8 +12,7 @@ from scipy import sparse
 
 from archfem._optional import require_package
 from archfem._typing import Array, Numbers
-
-logger = logging.getLogger("archfem")
+from archfem.errors import logger
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,6 @@ References: Sloan, Int. J. Numer. Anal. Meth. Geomech. 12 (1988) 61-77. Makrodim
 Int. J. Numer. Anal. Meth. Geomech. 31 (2007) 835-865.
 """
 
-import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -34,7 +33,7 @@ from scipy import sparse
 
 from archfem._display import ProgressReport
 from archfem._typing import Array, Flags, Numbers
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.limit.backfill import (
     SELF_WEIGHT,
     BlocksWithFill,
@@ -51,8 +50,6 @@ from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.loads import Action, BodyForce, PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
-
-logger = logging.getLogger("archfem")
 
 
 @dataclass(frozen=True, eq=False)
@@ -565,9 +562,7 @@ def _doubt_bounds(best: FillBounds, gap: float) -> None:
     )
 
 
-def bound_least_factor(
-    searches: Mapping[Any, Iterator[FillBounds]],
-) -> dict[Any, FillBounds]:
+def bound_least_factor(searches: Mapping[Any, Iterator[FillBounds]]) -> dict[Any, FillBounds]:
     """Return bounds of several loads, of which the one of the least factor is as near as required.
 
     Bounds from below grow on finer meshes. A load whose bound exceeds the least one is therefore

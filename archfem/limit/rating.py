@@ -28,12 +28,7 @@ from archfem.limit.vehicles import (
     vehicle_positions,
 )
 from archfem.masonry.loads import PointLoad
-from archfem.masonry.structure import (
-    CONTACT_TOLERANCE,
-    HasStructure,
-    Structure,
-    structure_of,
-)
+from archfem.masonry.structure import CONTACT_TOLERANCE, HasStructure, Structure, structure_of
 
 # Beginning of the line of a rating on what the pressure of the fill adds
 PRESSURE_RANGE = "over the pressure of the fill, at that place: "

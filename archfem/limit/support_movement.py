@@ -17,7 +17,6 @@ end that is nearer to contact. The rates of openings and slip are exact for corn
 that the forces of hinges act where the hinges are.
 """
 
-import logging
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -28,7 +27,7 @@ from scipy import sparse
 from archfem._display import ExplainedWord
 from archfem._typing import Array
 from archfem._validation import validate_arguments
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.limit.backfill import SELF_WEIGHT
 from archfem.limit.collapse import stands
 from archfem.limit.displaced_blocks import PlacedBlocks
@@ -37,8 +36,6 @@ from archfem.limit.nonassociated import RESISTANCE_MARGIN, normal_forces, shear_
 from archfem.masonry.block import rotate
 from archfem.masonry.loads import Settlement
 from archfem.masonry.structure import Structure, join_joint_names, join_names
-
-logger = logging.getLogger("archfem")
 
 # First and longest step, as a share of the full movement [-]
 MAX_MOVEMENT_STEP = 0.01

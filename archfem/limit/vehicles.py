@@ -1,6 +1,5 @@
 """Vehicles over a bridge: collapse factor at every position of a row of axles, and its rating."""
 
-import logging
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +13,7 @@ import xarray as xr
 from archfem._display import ResultDisplay
 from archfem._typing import Array, Metres, Newtons, Numbers, Pascals
 from archfem._validation import check_number, check_numbers
-from archfem.errors import InvalidInput
+from archfem.errors import InvalidInput, logger
 from archfem.limit.backfill import (
     BlocksWithFill,
     Fill,
@@ -32,7 +31,6 @@ from archfem.masonry.structure import HasStructure, Structure, structure_of
 
 DRIVING_DIRECTIONS = ("right", "left")
 
-logger = logging.getLogger("archfem")
 
 # Axles that stand on the structure, from left to right, or these and a distributed load
 AxleRow = tuple[PointLoad, ...]

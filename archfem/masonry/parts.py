@@ -9,7 +9,6 @@ and for few stones to their centroids as well. Only directions are derived from 
 pointed arches are covered.
 """
 
-import logging
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import Field, dataclass, replace
@@ -18,13 +17,11 @@ from typing import Any, ClassVar, Protocol, TypeVar
 import numpy as np
 
 from archfem._typing import Array
-from archfem.errors import InvalidStructure
+from archfem.errors import InvalidStructure, logger
 from archfem.masonry.block import Block
 
 # Rings and piers are assessed; other parts follow their support.
 PART_ROLES = ("ring", "pier", "other")
-
-logger = logging.getLogger("archfem")
 
 
 class Member(Protocol):

@@ -90,10 +90,7 @@ Shape = TypeVar("Shape", bound=Callable[..., "Structure"])
 
 
 def describe_assessment(
-    names: Sequence[str],
-    parts: Sequence[str],
-    judged: NDArray[np.bool_],
-    heads: NDArray[np.bool_],
+    names: Sequence[str], parts: Sequence[str], judged: NDArray[np.bool_], heads: NDArray[np.bool_]
 ) -> str:
     """Describe which joints are assessed, and which are not; empty where all are."""
     if judged.all():

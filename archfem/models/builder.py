@@ -1,11 +1,10 @@
 """Building a model of a structure from its discretisation."""
 
-import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from archfem._threads import single_threaded
-from archfem.errors import InvalidInput
+from archfem.errors import InvalidInput, logger
 from archfem.masonry.stiffness_ratio import (
     estimate_bending,
     estimate_block_stiffness,
@@ -16,8 +15,6 @@ from archfem.models.condensed import condense_blocks
 from archfem.models.discretisation import Discretisation
 from archfem.models.linear_blocks import build_rigid_model
 from archfem.models.model import Doubt, Model
-
-logger = logging.getLogger("archfem")
 
 
 @single_threaded

@@ -1,6 +1,5 @@
 """Spectral matching of a motion by wavelets in the time domain."""
 
-import logging
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -10,7 +9,7 @@ import numpy as np
 
 from archfem._typing import Array
 from archfem._validation import validate_arguments
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.motion import response_spectra, signal_processing
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
@@ -19,7 +18,6 @@ from archfem.units import STANDARD_GRAVITY
 
 Target = Callable[[Array], Array]
 
-logger = logging.getLogger("archfem")
 
 # A wavelet has decayed to 2e-9 after this many of its widths.
 WAVELET_HALF_LENGTH = 4.5

@@ -17,7 +17,6 @@ References:
     Circolare 21 January 2019 n. 7 C.S.LL.PP. on the NTC 2018, C8.7.1.2.1.1 to C8.7.1.2.1.8.
 """
 
-import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
@@ -30,7 +29,7 @@ from archfem._display import ResultDisplay
 from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import check_fields, check_number, is_one_of, validate_arguments
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.limit.backfill import BlocksWithFill, Fill, FillProfile, attach_fill
 from archfem.limit.collapse import collapse_factor
 from archfem.limit.displaced_blocks import (
@@ -63,8 +62,6 @@ from archfem.motion.design_spectra import (
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import response_spectrum
 from archfem.units import STANDARD_GRAVITY
-
-logger = logging.getLogger("archfem")
 
 
 @dataclass(frozen=True)

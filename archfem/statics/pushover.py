@@ -364,14 +364,7 @@ def _label_result(path: Path, criteria: Criteria, outcome: str) -> Pushover:
     steps = np.arange(count, dtype=float)
     structure, faces = path.model.structure, path.faces
     large = path.model.large_displacements
-    joints = joint_dataset(
-        structure,
-        path.resultants,
-        steps,
-        criteria,
-        faces=faces,
-        moved=large,
-    )
+    joints = joint_dataset(structure, path.resultants, steps, criteria, faces=faces, moved=large)
     joints = joints.rename(time="step").assign_coords(step=np.arange(count))
     curve = xr.Dataset(
         {

@@ -1,6 +1,5 @@
 """Evaluation of points on a cluster, by the scheduler of Dask distributed."""
 
-import logging
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack
@@ -11,12 +10,10 @@ from distributed import Client, KilledWorker, as_completed
 from distributed.comm import CommClosedError
 
 from archfem.cases.provenance import describe_version
-from archfem.errors import InvalidInput, StudyStopped
+from archfem.errors import InvalidInput, StudyStopped, logger
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import Point
 from archfem.studies.process_pool import Row, evaluate_batch, make_row
-
-logger = logging.getLogger("archfem")
 
 # A scheduler must answer within this time [s].
 SCHEDULER_TIMEOUT = 10.0

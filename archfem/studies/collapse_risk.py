@@ -11,7 +11,6 @@ References:
 """
 
 import json
-import logging
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -52,13 +51,7 @@ from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.modes import modes
-from archfem.studies.fragility import (
-    Fragility,
-    Rate,
-    fit_brackets,
-    fragility,
-    integrate_rates,
-)
+from archfem.studies.fragility import Fragility, Rate, fit_brackets, fragility, integrate_rates
 from archfem.studies.result_store import evaluate_with_progress
 from archfem.studies.variations import (
     DEFAULT_RANGES,
@@ -68,8 +61,6 @@ from archfem.studies.variations import (
     prepare_runs,
     sample_changes,
 )
-
-logger = logging.getLogger("archfem")
 
 # Properties that are varied by default; the alternatives of joint rules are for `alternatives`
 VARIED = ("k_n", "k_s", "friction", "damping_ratio")

@@ -40,12 +40,10 @@ from archfem import _numba
 from archfem._files import temporary_folder
 from archfem._validation import check_integer
 from archfem.cases.provenance import describe_version
-from archfem.errors import ArchfemError, InvalidInput, StudyStopped
+from archfem.errors import ArchfemError, InvalidInput, StudyStopped, logger
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import PAIR_KEY, StudyPoint, describe_changes
 from archfem.studies.shared_results import share_results
-
-logger = logging.getLogger("archfem")
 
 # Evaluated point: `found`, a flat table; `error`, its text or ""; `ours`, whether the error is one
 # of archfem's, which the same case would raise again

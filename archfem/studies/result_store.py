@@ -3,7 +3,6 @@
 The table is an `xarray.Dataset`, written as NetCDF, CSV and Parquet.
 """
 
-import logging
 import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -26,14 +25,12 @@ from archfem import _files
 from archfem._display import PROGRESS_INTERVAL, write_progress_line
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._validation import validate_arguments
-from archfem.errors import InvalidInput, StudyStopped
+from archfem.errors import InvalidInput, StudyStopped, logger
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import PAIR_KEY, Axis, StudyPoint
 from archfem.studies.process_pool import Row, evaluate_points
 from archfem.studies.shared_results import count_results
 from archfem.units import in_si_unit
-
-logger = logging.getLogger("archfem")
 
 # Files of the table as NetCDF, CSV and for Excel
 RESULT_FILES = "results.nc", "results.csv", "results.xlsx", "results.parquet"

@@ -4,7 +4,6 @@ A study file has the same parts whatever it computes: one case or several, what 
 computed of each. `Comparison` is the study of cases under the pairs of their suites.
 """
 
-import logging
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import replace
@@ -21,7 +20,7 @@ from archfem.cases.run import Run, carry_out, replace_run
 from archfem.cases.toml_file import check_table, read_tables, refuse_unknown
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import Ending
-from archfem.errors import ArchfemError, InvalidInput
+from archfem.errors import ArchfemError, InvalidInput, logger
 from archfem.motion.motion import Motion
 from archfem.studies.comparison import (
     Finding,
@@ -44,8 +43,6 @@ from archfem.studies.parameter_space import (
 from archfem.studies.process_pool import Row, evaluate_points
 from archfem.studies.result_store import Progress, Store, build_table, load_table_libraries, status
 from archfem.studies.statements import Statement, column_label, read_statements, statement_table
-
-logger = logging.getLogger("archfem")
 
 STUDY_KEYS: Mapping[str, Any] = {
     **{"title": str, "case": str, "cases": dict, "set": [str], "pairs": [str]},

@@ -17,11 +17,7 @@ from scipy.stats import qmc
 
 from archfem._validation import check_integer, check_number, validate_arguments
 from archfem.dynamics.analysis import Analysis
-from archfem.dynamics.collapse_state import (
-    CollapseState,
-    classify_collapse,
-    doubt_soft_blocks,
-)
+from archfem.dynamics.collapse_state import CollapseState, classify_collapse, doubt_soft_blocks
 from archfem.dynamics.damping import damping_kind, resolve_effective_damping, vary_damping
 from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.recorder import Record

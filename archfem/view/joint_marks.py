@@ -3,7 +3,6 @@
 Also the state to be drawn: its model, coordinates and joint resultants.
 """
 
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
+from archfem.errors import logger
 from archfem.joints.criteria import Criteria, with_failure_flags
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.linear_programme import RigidBlocks
@@ -25,8 +25,6 @@ DRAWN_DISPLACEMENT = 0.06
 
 # Variables of a joint dataset from which marks are derived
 MARKED_QUANTITIES = ("eccentricity", "V", "hinge", "slide", "open")
-
-logger = logging.getLogger("archfem")
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,12 +14,7 @@ from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import (
-    Criteria,
-    describe_assessed_joints,
-    envelope,
-    with_failure_flags,
-)
+from archfem.joints.criteria import Criteria, describe_assessed_joints, envelope, with_failure_flags
 from archfem.joints.resultants import check_instant
 from archfem.limit.mechanism_kinematics import verified_mechanism
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement

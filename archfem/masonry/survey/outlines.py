@@ -6,7 +6,6 @@ at most `snap` is made straight. Remaining overlaps and narrow gaps are ambiguou
 """
 
 import json
-import logging
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,15 +23,9 @@ from scipy.spatial import cKDTree
 from archfem._files import atomic_write
 from archfem._typing import Array, Metres, MetresPerSecondSquared
 from archfem._validation import validate_arguments
-from archfem.errors import InvalidInput, InvalidStructure
+from archfem.errors import InvalidInput, InvalidStructure, logger
 from archfem.masonry.assembly import Touch, assembled, by_materials, touching
-from archfem.masonry.block import (
-    Block,
-    as_point,
-    check_overlaps,
-    check_simple,
-    measure_polygon,
-)
+from archfem.masonry.block import Block, as_point, check_overlaps, check_simple, measure_polygon
 from archfem.masonry.materials import (
     CONTACT_PRESETS,
     MATERIAL_PRESETS,
@@ -59,8 +52,6 @@ Closed = tuple[list[Array], float, list[Touch]]
 
 # Materials by name
 Materials = Mapping[str, Material]
-
-logger = logging.getLogger("archfem")
 
 
 @dataclass(frozen=True, kw_only=True)

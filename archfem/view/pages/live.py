@@ -14,11 +14,7 @@ from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.fall import with_sliding_joints
-from archfem.dynamics.rigid_body.simulation import (
-    TRIED_STEPS,
-    RigidBlockSimulation,
-    prepare_steps,
-)
+from archfem.dynamics.rigid_body.simulation import TRIED_STEPS, RigidBlockSimulation, prepare_steps
 from archfem.errors import InvalidInput
 from archfem.masonry.joint_closing import FINISHES, joint_stiffness
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
@@ -75,10 +71,7 @@ class LivePage(StandalonePage):
 
 @validate_arguments
 def page(
-    analysis: Analysis,
-    path: str | Path | None = None,
-    *,
-    motions: Sequence[Motion] = (),
+    analysis: Analysis, path: str | Path | None = None, *, motions: Sequence[Motion] = ()
 ) -> LivePage:
     """Return a page on which a reader changes the arch of an analysis and shakes it.
 
