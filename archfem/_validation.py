@@ -129,6 +129,25 @@ def check_number(value: Any, name: str, *, minimum: float = -inf, maximum: float
     return float(value)
 
 
+def check_between(
+    value: Any,
+    name: str,
+    low: float,
+    high: float = inf,
+    *,
+    ends: str = "()",
+    remedy: str = "",
+    error: type[ArchfemError] = InvalidInput,
+) -> float:
+    """Return a finite number between bounds, of which a parenthesis in `ends` excludes one."""
+    number = check_number(value, name)
+    reaches = number > low if ends[0] == "(" else number >= low
+    if reaches and (number < high if ends[1] == ")" else number <= high):
+        return number
+    limits = f"between {low:g} and {high:g}" if high < inf else f"above {low:g}"
+    raise error(f"{name} = {short_repr(value)} is not {limits}{remedy and ': '}{remedy}")
+
+
 def check_words(value: Any, name: str, remedy: str = "give words") -> None:
     """Refuse all but text, and text with characters that no terminal prints and no file holds."""
     check_type(value, str, name, remedy)
@@ -147,10 +166,12 @@ def is_one_of(value: Any, known: Collection[Any]) -> bool:
     return isinstance(value, (str, *_NUMBER_TYPES, NoneType)) and value in known
 
 
-def check_choice(value: Any, name: str, choices: Collection[Any]) -> None:
-    """Refuse a value that is not one of some strings or numbers."""
-    if not is_one_of(value, choices):
-        raise InvalidInput(f"{name} {short_repr(value)} is not known: use one of {choices}")
+def check_choice(value: Any, name: str, choices: Collection[Any], remedy: str = "") -> Any:
+    """Return a value that must be one of some strings or numbers."""
+    if is_one_of(value, choices):
+        return value
+    known = f"use one of {list(choices)}"
+    raise InvalidInput(f"{name} = {short_repr(value)} is not known: {known}{remedy}")
 
 
 def is_number(value: Any) -> bool:

@@ -25,8 +25,8 @@ def model():
 MADE = [
     (lambda: af.BodyForce("x"), r"horizontal \[g\] = 'x' is not a finite number"),
     (lambda: af.BodyForce(0.1, (0.0, 1.0)), r"vertical \[g\] = \(0.0, 1.0\) is not a finite"),
-    (lambda: af.BodyForce(1.7e308), r"horizontal = 1.7e\+308 g is more than 1000 g: give"),
-    (lambda: af.BodyForce(0.0, -1001.0), "vertical = -1001 g is more than 1000 g"),
+    (lambda: af.BodyForce(1.7e308), r"horizontal \[g\] = 1.7e\+308 is not between"),
+    (lambda: af.BodyForce(0.0, -1001.0), r"vertical \[g\] = -1001.0 is not between"),
     (lambda: af.PointLoad(0, (1e17, -1.0)), r"load of \(1e\+17, -1.0\) N is above 1e"),
     (lambda: af.PointLoad(0, -1), r"force \(x, y\) \[N\] = -1 is not a row of values: give \(a, b"),
     (lambda: af.PointLoad(0, (0, -1, 2)), r"has 3 values: give \(a, b\)"),
@@ -35,7 +35,7 @@ MADE = [
     (lambda: af.Settlement(0, 0.01), r"motion .* = 0.01 is not a row of values: give \(a, b, c\)"),
     (lambda: af.Settlement(0, (0.01, 0.0)), r"has 2 values: give \(a, b, c\)"),
     (lambda: af.Settlement(1.5, (0.0, 0.0, 0.0)), "block = 1.5 is not a whole number"),
-    (lambda: af.Criteria(hinge=2), r"criteria hinge = 2: \|e\| of a hinge is above 0 and"),
+    (lambda: af.Criteria(hinge=2), r"criteria hinge \[-\] = 2 is not between 0 and 0.5"),
     (lambda: af.Criteria(hinge="0.46"), "criteria hinge .* = '0.46' is not a finite"),
     (lambda: af.Criteria(failures=2.5), "criteria failures = 2.5 is not a whole number"),
     (lambda: af.CountedMechanism(kinds="local"), "kinds = 'local': give some of"),
@@ -47,7 +47,7 @@ MADE = [
     (lambda: af.Rayleigh("5 %", (8.0, 16.0)), "damping ratio .* = '5 %' is not a finite number"),
     (lambda: af.Rayleigh(0.05, 8.0), r"damping frequencies \[Hz\] = 8.0 is not a row of values"),
     (lambda: af.Rayleigh(0.05, (8.0, 16.0, 24.0)), "has 3 values"),
-    (lambda: af.Rayleigh(0.05, (8.0, 16.0), joints=None), "damping joints = None: use one of"),
+    (lambda: af.Rayleigh(0.05, (8.0, 16.0), joints=None), "damping joints = None is not known"),
     (lambda: af.HHT("x"), "HHT alpha .* = 'x' is not a finite number"),
     (lambda: af.dynamics.Newmark(None), "Newmark beta .* = None is not a finite number"),
     (lambda: af.statics.Newton(tolerance="x"), "tolerance of a solve .* = 'x'"),
@@ -75,9 +75,9 @@ MADE = [
     (lambda: af.Material(30e9, 0.2, 2000.0), "looks like kg/m³: .* have 1.962e.04"),
     (lambda: af.Material(30e9, 0.2, 1e-300), "is not between 0.001 N/m³ and"),
     (lambda: af.Tbec2018(1.0, 1e300, "ZC"), r"S_1 1e\+300 g: both are between 0 and 10 g"),
-    (lambda: af.Eurocode8(1e300, "B"), "expected g, from 0 to 2"),
+    (lambda: af.Eurocode8(1e300, "B"), "is not between 0 and 2"),
     (lambda: af.motion.TableSpectrum([1.0, 2.0], [1.0, 1e300]), "more than 10 g"),
-    (lambda: af.StiffnessDamping(0.05, 1e-300), "is not between 1 mHz and 1 MHz"),
+    (lambda: af.StiffnessDamping(0.05, 1e-300), "is not between 0.001 and 1e"),
     (lambda: af.Material("30 GPa", 0.2, 2e4), "young of 'material' = '30 GPa' is not a finite"),
     (lambda: af.Contact(1e9, None), "shear_stiffness of 'contact' = None is not a finite number"),
     (lambda: af.Tbec2018("1", 0.3, "ZC"), "map value S_S .* = '1' is not a finite number"),
@@ -100,7 +100,7 @@ MADE = [
     (lambda: af.response_spectrum(QUAKE, 10**400), "periods 1000.* s are no numbers"),
     (lambda: QUAKE.at(np.nan), "times = nan: one is not a number"),
     (lambda: af.Contact(1e9, 1e9, np.zeros(3)), "friction of 'contact' = array.* is not a finite"),
-    (lambda: af.stands(RING, friction=np.zeros(3)), r"friction array.* is not known: use one of"),
+    (lambda: af.stands(RING, friction=np.zeros(3)), r"friction = array.* is not known: use one of"),
     (lambda: af.minimum_thickness(int), r"build\(100\) is a int: make a structure"),
     (lambda: af.response_spectrum(3.0, [0.1]), "motion is a float: give a Motion"),
     (lambda: af.response_spectrum(QUAKE, [0.1], damping="5 %"), "damping ratio .* = '5 %'"),
@@ -130,7 +130,7 @@ MADE = [
         r"name = 'a\\ud800' has '\\ud800', wh",
     ),
     (lambda: af.Motion(np.zeros(5), 0.01, name="a\x1b[31m"), r"name of a motion = .* has '\\x1b'"),
-    (lambda: af.motion.Ntc2018(0.3, 2.5, 0.3, site=[]), r"subsoil \[\] is unknown: use A"),
+    (lambda: af.motion.Ntc2018(0.3, 2.5, 0.3, site=[]), r"subsoil = \[\] is not known: use one of"),
     (
         lambda: af.shapes.pointed_arch(span=3, rise=2, thickness=0.4, voussoirs=2**31),
         "voussoirs = 2147483648 is above 10000, the most there is room for",
@@ -225,7 +225,7 @@ def test_cells_of_any_integer_and_row():
         ({"motion": 0.3}, "motion is a float: give a Motion"),
         ({"model": RING}, "model is a Structure: build one"),
         ({"dt": "0.005"}, r"dt \[s\] = '0.005' is not a finite number"),
-        ({"dt": 5}, "dt 5 s is not between 1e-06 and 0.1 s"),
+        ({"dt": 5}, r"dt \[s\] = 5 is not between 1e-06 and 0.1"),
         ({"start": "rest"}, "start is a str: give dead_load"),
         ({"damping": 0.05}, r"damping = 0.05: give 'effective', .*Rayleigh\(0.05"),
         ({"scheme": "hht"}, r"scheme is a str: give Conserving\(\), Newmark\(\) or HHT"),
@@ -285,7 +285,7 @@ def test_a_start_of_another_structure_is_refused(model, tmp_path):
 
 @pytest.mark.parametrize("dt", [1e-12, 1.9e-14])
 def test_steps_that_are_too_short_are_refused_before_memory_is_taken(model, dt):
-    with pytest.raises(af.InvalidInput, match=r"is not between 1e-06 and 0\.1 s"):
+    with pytest.raises(af.InvalidInput, match=r"is not between 1e-06 and 0\.1"):
         af.time_history(model, QUAKE, dt=dt)
 
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from archfem._validation import declared_keys, validate_methods
+from archfem._validation import check_choice, declared_keys, validate_methods
 from archfem.cases.motion_keys import build_spectrum
-from archfem.cases.toml_file import Table, check_choice, check_table, read_object
+from archfem.cases.toml_file import Table, check_table, read_object
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.backfill import Fill
@@ -188,14 +188,14 @@ def _read_loads(values: Table, section: str) -> tuple[tuple[Action, ...], tuple[
 
 def _check_friction(value: Any, key: str) -> str | None:
     """Return the friction law of limit analysis; None without sliding."""
-    law = check_choice(value, FRICTION_LAWS, key)
+    law = check_choice(value, key, FRICTION_LAWS)
     return None if law == "none" else law
 
 
 def _fill(table: Any, key: str) -> Fill | PlasticFill:
     """Return the strength of the fill."""
     word = table.get("law", "pressure") if isinstance(table, Mapping) else "pressure"
-    law = FILL_LAWS[check_choice(word, tuple(FILL_LAWS), f"{key}.law")]
+    law = FILL_LAWS[check_choice(word, f"{key}.law", FILL_LAWS)]
     fill = check_table(table, declared_keys(law) | {"law": str}, key)
     fill.pop("law", None)
     if "friction_angle" not in fill:

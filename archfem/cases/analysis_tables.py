@@ -9,9 +9,9 @@ from dataclasses import is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from archfem._validation import declared_keys, given_fields
+from archfem._validation import check_choice, declared_keys, given_fields
 from archfem.cases.provenance import name_from
-from archfem.cases.toml_file import Table, check_choice, check_table, read_object, split_key_path
+from archfem.cases.toml_file import Table, check_table, read_object, split_key_path
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.events import EVENTS, StopCondition, registered_criteria
 from archfem.dynamics.recorder import Record
@@ -104,7 +104,7 @@ def write_value(value: Any) -> Any:
 def _read_damping(given: str | Table) -> Viscous | EffectiveDamping:
     """Return damping, whose kind follows from the keys of its table."""
     if isinstance(given, str):
-        check_choice(given, ("effective",), "analysis.damping")
+        check_choice(given, "analysis.damping", ("effective",))
         return EffectiveDamping()
     kinds = {"modes": EffectiveDamping, "frequency": StiffnessDamping, "frequencies": Rayleigh}
     table, cls = dict(given), next((kinds[key] for key in kinds if key in given), EffectiveDamping)
@@ -132,7 +132,7 @@ def _write_damping(damping: Viscous | EffectiveDamping) -> dict[str, Any]:
 def _read_named(given: str | Table, known: Mapping[str, type], section: str) -> Any:
     """Return the object of a word, or of a table with this word as `name`."""
     table = {"name": given} if isinstance(given, str) else dict(given)
-    name = check_choice(table.pop("name", None), known, section)
+    name = check_choice(table.pop("name", None), section, known)
     return read_object(known[name], table, section)
 
 
@@ -150,7 +150,7 @@ def _read_event(given: str | Table) -> StopCondition:
     table = {"name": given} if isinstance(given, str) else dict(given)
     criteria = table.pop("criteria", None)
     if isinstance(given, str):
-        check_choice(given, (*EVENTS, *registered_criteria), "analysis.until")
+        check_choice(given, "analysis.until", (*EVENTS, *registered_criteria))
     event: Any = _read_named(table, EVENTS, "analysis.until")
     if criteria is None:
         return event
@@ -183,7 +183,7 @@ def _read_stages(table: Any, structure: Structure) -> Sequence[Stage] | None:
             read_object(Stage, {"name": f"stage {k}", **stage}, f"dead_load.stages[{k}]")
             for k, stage in enumerate(given)
         ]
-    usual = check_choice(given, ("none", "usual"), "dead_load.stages") == "usual"
+    usual = check_choice(given, "dead_load.stages", ("none", "usual")) == "usual"
     if "layers" in values and not usual:
         raise InvalidInput("dead_load.layers needs stages = 'usual': add that, or take layers out")
     return usual_stages(structure, values.get("layers", 4)) if usual else None

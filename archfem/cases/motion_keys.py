@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import declared_keys
-from archfem.cases.toml_file import Table, check_choice, check_table, format_tables
+from archfem._validation import check_choice, declared_keys
+from archfem.cases.toml_file import Table, check_table, format_tables
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import (
     DesignSpectrum,
@@ -134,7 +134,7 @@ def build_target_spectrum(settings: Table) -> DesignSpectrum | None:
 def build_spectrum(table: Table, section: str) -> DesignSpectrum:
     """Return the design spectrum of a table with its code, whose accelerations are in g."""
     values = dict(table)
-    code = check_choice(values.pop("code", None), registered_spectra, f"{section}.code")
+    code = check_choice(values.pop("code", None), f"{section}.code", registered_spectra)
     spectrum = registered_spectra[code]
     values = check_table(values, declared_keys(spectrum), section)
     try:

@@ -18,9 +18,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from archfem._validation import declared_keys, given_fields
+from archfem._validation import check_choice, declared_keys, given_fields
 from archfem.cases.provenance import hash_file, list_input_files
-from archfem.cases.toml_file import Table, check_choice, check_table
+from archfem.cases.toml_file import Table, check_table
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.own_law import JointLaw, build_registered_law, registered_laws
 from archfem.masonry.assembly import assembled
@@ -108,7 +108,7 @@ def build_structure(settings: Table, folder: Path = Path()) -> Structure:
 def _build_shape(settings: Table, folder: Path) -> Structure:
     """Build the structure of a case by its shape."""
     table, functions = settings.get("structure", {}), list_shapes()
-    name = check_choice(table.get("shape"), functions, "structure.shape")
+    name = check_choice(table.get("shape"), "structure.shape", functions)
     if name == "blocks":
         return _read_blocks(settings)
     values = check_table(table, shape_keys(name), "structure")
@@ -169,7 +169,7 @@ def _read_part(
 def _divide_fill(structure: Structure, table: Table) -> Structure:
     """Divide the backfill of a structure into pieces, if the case says so."""
     fill = check_table(table, fill_keys(), "structure.fill")
-    law = check_choice(fill.pop("law", "elastic"), ("elastic", "jointed"), "structure.fill.law")
+    law = check_choice(fill.pop("law", "elastic"), "structure.fill.law", ("elastic", "jointed"))
     if law == "elastic":
         if fill:
             raise InvalidInput(f"structure.fill has {sorted(fill)}: they need law = 'jointed'")
@@ -288,7 +288,7 @@ def _resolve_preset(settings: Table, section: str, name: str) -> Any:
 
 def _read_finish(table: dict[str, Any], section: str) -> dict[str, Any]:
     """Take the finish from the table of a contact, and return its law for usual stone."""
-    finish = check_choice(table.pop("finish"), CONDITIONS, f"{section}.finish")
+    finish = check_choice(table.pop("finish"), f"{section}.finish", CONDITIONS)
     if both := sorted({*FINISHED_KEYS, "law"}.intersection(table)):
         raise InvalidInput(
             f"{section} has a finish and {join_names(both)}, which follows from it: leave out one"
@@ -299,7 +299,7 @@ def _read_finish(table: dict[str, Any], section: str) -> dict[str, Any]:
 def _joint_law(table: Table, section: str) -> JointLaw:
     """Return a joint law that a module of the user has registered."""
     values = dict(table)
-    name = check_choice(values.pop("name", None), registered_laws, f"{section}.name")
+    name = check_choice(values.pop("name", None), f"{section}.name", registered_laws)
     keys = declared_keys(registered_laws[name])
     if units := [k for k, v in values.items() if isinstance(v, str) and keys.get(k) == "1"]:
         raise InvalidInput(

@@ -18,7 +18,7 @@ from typing import Any
 
 from archfem._files import read_text
 from archfem._typing import NumberOrWord
-from archfem._validation import declared_keys, is_one_of, short_repr
+from archfem._validation import declared_keys, short_repr
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import suggest_name
 from archfem.units import in_degrees, in_unit
@@ -210,14 +210,6 @@ def refuse_unknown(table: Table, keys: Iterable[str], section: str = "") -> None
         if key not in keys:
             hint = suggest_name(key, keys) or f"the keys are {sorted(keys)}"
             raise InvalidInput(f"unknown key '{section + '.' if section else ''}{key}': {hint}")
-
-
-def check_choice(value: Any, choices: Iterable[str], key: str) -> str:
-    """Return a word that must be one of several."""
-    words = list(choices)
-    if not is_one_of(value, words):
-        raise InvalidInput(f"{key} = {short_repr(value)} is not known: use one of {words}")
-    return str(value)
 
 
 def _convert_row(values: Any, kind: Any, key: str) -> list[Any]:

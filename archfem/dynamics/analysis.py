@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeVar
 from archfem._display import call_late_bound
 from archfem._files import hash_value
 from archfem._typing import Metres, Seconds
-from archfem._validation import check_fields, check_number, given_fields, validate_methods
+from archfem._validation import check_between, check_fields, given_fields, validate_methods
 from archfem.dynamics import schemes
 from archfem.dynamics.events import StopCondition, resolve_criteria
 from archfem.dynamics.history import History
@@ -108,8 +108,7 @@ class Analysis:
         object.__setattr__(self, "damping", schemes.interpret_damping(self.damping))
         check_fields(self)
         object.__setattr__(self, "cells", self.discretisation.cells)
-        if not 0.0 < check_number(self.tolerance, "tolerance on |e| [-]") < 1.0:
-            raise InvalidInput(f"tolerance {self.tolerance:g} on |e| is not between 0 and 1")
+        check_between(self.tolerance, "tolerance on |e| [-]", 0.0, 1.0)
         if self.dt is not None:
             schemes.check_time_step(self.dt)
         if self.selects_model and self.mesh_file is not None:

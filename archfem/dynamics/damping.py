@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from archfem._typing import Array
-from archfem._validation import check_number, check_type, validate_arguments
+from archfem._validation import check_between, check_number, check_type, validate_arguments
 from archfem.dynamics.schemes import (
     EFFECTIVE_MASS_SHARE,
     EffectiveDamping,
@@ -110,10 +110,7 @@ def effective_mode_range(
     max_count: int = 1024,
 ) -> EffectiveModeRange:
     """Find the first and the last mode effective along x; the number of modes doubles as needed."""
-    if not FIRST_MASS_SHARE < check_number(mass_share, "share of the mass [-]") < 1.0:
-        raise InvalidInput(
-            f"share {mass_share} of the mass is not between {FIRST_MASS_SHARE} and 1: 90 % is 0.9"
-        )
+    check_between(mass_share, "share of the mass [-]", FIRST_MASS_SHARE, 1.0)
     computed, shares = _modes_with_share(model, start, mass_share, initial_count, max_count)
     first = int(np.searchsorted(shares, FIRST_MASS_SHARE)) + 1
     last = min(int(np.searchsorted(shares, mass_share)) + 1, len(shares))

@@ -18,7 +18,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
-from archfem._validation import is_one_of, report_user_errors, validate_arguments
+from archfem._validation import check_choice, report_user_errors, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     Criteria,
@@ -228,8 +228,7 @@ class CountedMechanism:
     def __post_init__(self) -> None:
         check_criteria(self.criteria)
         _check_kinds(self.kinds)
-        if not is_one_of(self.over, ("instant", "record")):
-            raise InvalidInput(f"over = {self.over!r}: count failures over 'instant' or 'record'")
+        check_choice(self.over, "over", ("instant", "record"))
         if self.over == "record" and "local" not in self.kinds:
             raise InvalidInput(
                 f"kinds = {self.kinds!r}: over='record' counts in one ring or pier, and its "

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from archfem._validation import check_number, check_type
+from archfem._validation import check_between, check_type
 from archfem.dynamics import error_estimation
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
@@ -100,8 +100,7 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
         DidNotConverge: for "auto", the structure does not stand under its own weight.
     """
     check_type(structure, Structure, "structure", "give a Structure, e.g. circular_arch(…)")
-    if not 0.0 < check_number(tolerance, "tolerance on |e| [-]") < 1.0:
-        raise InvalidInput(f"tolerance {tolerance:g} on |e| is not between 0 and 1: try 0.005")
+    check_between(tolerance, "tolerance on |e| [-]", 0.0, 1.0, remedy="try 0.005")
     if isinstance(fidelity, str) and fidelity == "auto":
         if mesh_file is not None:
             raise InvalidInput(

@@ -12,7 +12,14 @@ from math import pi
 import numpy as np
 
 from archfem._typing import Hertz
-from archfem._validation import check_number, check_numbers, is_one_of, short_repr
+from archfem._validation import (
+    check_between,
+    check_choice,
+    check_number,
+    check_numbers,
+    is_one_of,
+    short_repr,
+)
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 
@@ -101,14 +108,9 @@ class StiffnessDamping:
         """Refuse negative damping, frequencies out of range and unknown options."""
         _check_ratio(self.ratio)
         if self.restitution is not None:
-            ratio = check_number(self.restitution, "restitution")
-            if not 0.0 < ratio <= 1.0:
-                raise InvalidInput(f"restitution {ratio:g} is not between 0 and 1: leave it out")
+            check_between(self.restitution, "restitution", 0.0, 1.0, ends="(]")
         _check_joints(self.joints)
-        if not 1e-3 <= check_number(self.frequency, "damping frequency [Hz]") <= 1e6:
-            raise InvalidInput(
-                f"damping frequency {self.frequency} Hz is not between 1 mHz and 1 MHz: try 8.0"
-            )
+        check_between(self.frequency, "damping frequency [Hz]", 1e-3, 1e6, ends="[]")
 
     @property
     def stiffness(self) -> float:
@@ -142,11 +144,8 @@ class EffectiveDamping:
         """Refuse values out of range and unknown options."""
         _check_ratio(self.ratio)
         _check_joints(self.joints)
-        kinds = ("stiffness", "rayleigh")
-        if not is_one_of(self.kind, kinds):
-            raise InvalidInput(f"damping kind = {self.kind!r}: use one of {kinds}")
-        if not 0.0 < check_number(self.mass_share, "damping share [-]") < 1.0:
-            raise InvalidInput(f"share {self.mass_share} of the mass is not between 0 and 1")
+        check_choice(self.kind, "damping kind", ("stiffness", "rayleigh"))
+        check_between(self.mass_share, "share of the mass [-]", 0.0, 1.0)
 
 
 def interpret_damping(damping: object) -> Viscous | EffectiveDamping | None:
@@ -163,21 +162,16 @@ def interpret_damping(damping: object) -> Viscous | EffectiveDamping | None:
 
 def check_time_step(dt: object) -> float:
     """Return a time step [s]; refuse those that are slips of the unit."""
-    if not MIN_TIME_STEP <= check_number(dt, "dt [s]") <= 0.1:
-        raise InvalidInput(f"dt {dt!r} s is not between {MIN_TIME_STEP:g} and 0.1 s")
-    return float(dt)  # type: ignore[arg-type]
+    return check_between(dt, "dt [s]", MIN_TIME_STEP, 0.1, ends="[]")
 
 
 def _check_ratio(ratio: float) -> None:
-    if not 0.0 <= check_number(ratio, "damping ratio [-]") < 1.0:
-        raise InvalidInput(f"damping ratio {ratio} is not between 0 and 1: 5 % is 0.05")
+    check_between(ratio, "damping ratio [-]", 0.0, 1.0, ends="[)", remedy="5 % is 0.05")
 
 
 def _check_joints(joints: str) -> None:
     # closed part of the joints, all joints as if closed, blocks only
-    damped_joints = ("closed", "initial", "none")
-    if not is_one_of(joints, damped_joints):
-        raise InvalidInput(f"damping joints = {joints!r}: use one of {damped_joints}")
+    check_choice(joints, "damping joints", ("closed", "initial", "none"))
 
 
 @dataclass(frozen=True)
@@ -223,8 +217,7 @@ class HHT:
 
     def __post_init__(self) -> None:
         """Refuse values outside the range of stability."""
-        if not -1.0 / 3.0 - 1e-12 <= check_number(self.alpha, "HHT alpha [-]") <= 0.0:
-            raise InvalidInput(f"HHT alpha {self.alpha} is not between -1/3 and 0")
+        check_between(self.alpha, "HHT alpha [-]", -1.0 / 3.0 - 1e-12, 0.0, ends="[]")
 
     @property
     def beta(self) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from tqdm import tqdm
 
 from archfem._threads import single_threaded
-from archfem._validation import check_number, check_type, validate_arguments
+from archfem._validation import check_between, check_type, validate_arguments
 from archfem.dynamics import events
 from archfem.dynamics.analysis import Analysis, takes_analysis
 from archfem.dynamics.damping import resolve_effective_damping
@@ -213,8 +213,7 @@ def _resolve_steps(
     if tolerance is not None:
         if dt is not None:
             raise InvalidInput(f"dt = {dt!r} s and tolerance = {tolerance!r}: give one of both")
-        if not 0.0 < check_number(tolerance, "tolerance on |e| [-]") < 1.0:
-            raise InvalidInput(f"tolerance {tolerance!r} on |e| is not between 0 and 1: try 0.005")
+        check_between(tolerance, "tolerance on |e| [-]", 0.0, 1.0, remedy="try 0.005")
         return None, tolerance
     if dt is None and model.prediction:
         return model.prediction.dt, default

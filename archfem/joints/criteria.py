@@ -13,8 +13,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array, Seconds
-from archfem._validation import check_integer, check_number, check_type, validate_arguments
-from archfem.errors import InvalidInput
+from archfem._validation import (
+    check_between,
+    check_integer,
+    check_number,
+    check_type,
+    validate_arguments,
+)
 from archfem.masonry.parts import select_assessed_parts
 from archfem.masonry.structure import describe_assessment
 
@@ -118,11 +123,8 @@ class Criteria:
 
     def __post_init__(self) -> None:
         """Refuse limits that no joint, or every joint, would pass."""
-        if not 0.0 < check_number(self.hinge, "criteria hinge [-]") <= 0.5:
-            raise InvalidInput(
-                f"criteria hinge = {self.hinge!r}: |e| of a hinge is above 0 and at most 0.5, the "
-                "edge of the joint; 0.46 is usual"
-            )
+        remedy = "|e| is 0.5 at the edge of a joint; 0.46 is usual for a hinge"
+        check_between(self.hinge, "criteria hinge [-]", 0.0, 0.5, ends="(]", remedy=remedy)
         check_integer(self.failures, "criteria failures")
         if self.friction is not None:
             check_number(self.friction, "criteria friction [-]", minimum=0.0)

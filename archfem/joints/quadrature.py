@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archfem._typing import Array
-from archfem._validation import check_integer, is_one_of
+from archfem._validation import check_choice, check_integer
 from archfem.errors import InvalidInput
 from archfem.joints.contact_law import ContactLaw
 from archfem.masonry.structure import Structure
@@ -48,19 +48,15 @@ class Quadrature:
     def __post_init__(self) -> None:
         """Check the rule and its number of points."""
         rules = ("lobatto", "trapezoidal", "nodal", "gauss", "exact")
-        if not is_one_of(self.rule, rules):
-            raise InvalidInput(f"quadrature {self.rule!r} is not known: use one of {rules}")
+        check_choice(self.rule, "quadrature", rules)
         if self.points is None:
             return
         if self.rule in ("nodal", "exact"):
             raise InvalidInput(
                 f"{self.rule} quadrature has points of its own, not {self.points}: leave points out"
             )
-        minimum, maximum = (1 if self.rule == "gauss" else 2), 64
-        if not minimum <= check_integer(self.points, "quadrature points") <= maximum:
-            raise InvalidInput(
-                f"{self.points} {self.rule} points on a facet: give between {minimum} and {maximum}"
-            )
+        minimum = 1 if self.rule == "gauss" else 2
+        check_integer(self.points, f"{self.rule} points on a facet", minimum=minimum, maximum=64)
 
     def count(self, degree: int) -> int:
         """Return the number of points on one facet.

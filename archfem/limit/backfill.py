@@ -18,7 +18,7 @@ import xarray as xr
 from scipy import sparse
 
 from archfem._typing import Array, Degrees, Flags, Metres, Numbers, Pascals
-from archfem._validation import check_choice, check_number, check_type
+from archfem._validation import check_between, check_choice, check_number, check_type
 from archfem.errors import InvalidInput, logger
 from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
@@ -87,22 +87,13 @@ class Fill:
     def __post_init__(self) -> None:
         """Refuse values outside their range, most of them wrong units."""
         read_strength(self, "mobilisation", "active")
-        if self.cohesion > 1e6:
-            raise InvalidInput(
-                f"fill, cohesion {self.cohesion:.4g} Pa is above 1 MPa: give Pa; with so much it "
-                "is masonry, to be modelled by blocks"
-            )
+        remedy = "with more it is masonry, to be modelled by blocks"
+        check_between(self.cohesion, "fill, cohesion [Pa]", 0.0, 1e6, ends="[]", remedy=remedy)
         for key in ("mobilisation", "active"):
-            if getattr(self, key) > 1.0:
-                raise InvalidInput(
-                    f"fill, {key} {getattr(self, key):.4g} is above 1: give a part of the pressure"
-                )
+            check_number(getattr(self, key), f"fill, {key}, a part of the pressure", maximum=1.0)
         check_choice(self.dispersal, "fill, dispersal", ("boussinesq", "uniform"))
-        if not 0.1 <= self.spread <= 80.0:
-            raise InvalidInput(
-                f"fill, spread {self.spread:.4g}° is not between 0.1° and 80°: give degrees from "
-                "the vertical; 1 in 2 is 26.6"
-            )
+        remedy = "give degrees from the vertical; 1 in 2 is 26.6"
+        check_between(self.spread, "fill, spread [degrees]", 0.1, 80.0, ends="[]", remedy=remedy)
 
     @property
     def passive_coefficient(self) -> float:
@@ -558,8 +549,8 @@ def refuse_bonds(structure: Structure) -> None:
 def check_options(friction: str | None, strength: float | None) -> None:
     """Refuse unknown options."""
     check_choice(friction, "friction", ("coulomb", "nonassociated", None))
-    if strength is not None and not check_number(strength, "strength [Pa]") > 0.0:
-        raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
+    if strength is not None:
+        check_between(strength, "strength [Pa]", 0.0, remedy="leave it out for no limit")
 
 
 def self_weight_programme(

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import radians, tan
 
 from archfem._typing import Degrees, Metres, Pascals
-from archfem.errors import InvalidInput
+from archfem._validation import check_number
 from archfem.limit.backfill import read_strength
 
 
@@ -50,13 +50,9 @@ class PlasticFill:
         """Refuse values outside their range, most of them wrong units."""
         read_strength(self, "roughness", "adhesion", "gap")
         for key in ("roughness", "adhesion"):
-            if getattr(self, key) > 1.0:
-                raise InvalidInput(
-                    f"fill, {key} {getattr(self, key):.4g} is above 1: the fill fails beside the "
-                    "stone before it slides on it"
-                )
-        if self.gap < 1e-3:
-            raise InvalidInput(f"fill, gap {self.gap:.3g} is below 0.001: give 0.03 for 3 %")
+            # else it fails beside the stone before it slides on it
+            check_number(getattr(self, key), f"fill, {key}", maximum=1.0)
+        check_number(self.gap, "fill, gap [-]", minimum=1e-3)
 
     @property
     def angle(self) -> float:

@@ -26,7 +26,7 @@ from scipy import sparse
 
 from archfem._display import ExplainedWord
 from archfem._typing import Array
-from archfem._validation import validate_arguments
+from archfem._validation import check_between, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.limit.backfill import SELF_WEIGHT
 from archfem.limit.collapse import stands
@@ -174,8 +174,7 @@ def largest_movement(
         >>> round(af.limit.largest_movement(ring, spread, friction=None).largest, 4)
         0.2269
     """
-    if not 1e-8 <= tolerance <= MAX_MOVEMENT_STEP:
-        raise InvalidInput(f"tolerance {tolerance:.3g} is not between 1e-8 and {MAX_MOVEMENT_STEP}")
+    check_between(tolerance, "tolerance", 1e-8, MAX_MOVEMENT_STEP, ends="[]")
     if friction not in ("coulomb", None):
         raise InvalidInput(f"friction {friction!r} is not known here: use 'coulomb' or None")
     support = settlement.added(structure, np.zeros((len(structure.blocks), 3)))

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from archfem._validation import check_type, validate_arguments
+from archfem._validation import check_between, check_type, validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.limit.backfill import Fill
 from archfem.limit.collapse import stands
@@ -46,8 +46,7 @@ def minimum_thickness(
         >>> round(af.minimum_thickness(semicircle, friction=None, tolerance=1e-4), 3)
         0.096
     """
-    if not 1e-9 <= tolerance < 1.0:
-        raise InvalidInput(f"tolerance {tolerance:.3g} is not between 1e-9 and 1")
+    check_between(tolerance, "tolerance", 1e-9, 1.0, ends="[)")
 
     def is_stable(thickness: float) -> bool:
         return stands(build(thickness), friction=friction, strength=strength, fill=fill)

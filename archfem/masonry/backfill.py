@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from archfem._typing import Angle, Array, Metres, Pascals
-from archfem._validation import check_number, validate_arguments
+from archfem._validation import check_between, check_number, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.assembly import assembled
 from archfem.masonry.block import Block
@@ -87,8 +87,8 @@ def jointed_fill(
 
 def _fill_contact(angle: float, cohesion: float) -> Contact:
     """Return a contact with the strength of the fill."""
-    if not 0.0 <= angle < 60.0:
-        raise InvalidInput(f"angle of friction {angle:g}° is not from 0 to 60°: soil has about 30°")
+    remedy = "soil has about 30°"
+    check_between(angle, "angle of friction [°]", 0.0, 60.0, ends="[)", remedy=remedy)
     return Contact(1e3, 1e3, tan(radians(angle)), "fill", cohesion)
 
 
@@ -101,8 +101,7 @@ def _check_fill(structure: Structure, soft: Sequence[int], size: float) -> None:
         )
     if any(structure.blocks[number].grain for number in soft):
         raise InvalidInput("the fill is cut into pieces already: cut the structure it was made of")
-    if not size > 0.0:
-        raise InvalidInput(f"size {size:g} m of the pieces is not above 0: give a length in m")
+    check_between(size, "size of the pieces [m]", 0.0, remedy="give a length in m")
     area = sum(structure.blocks[number].area for number in soft)
     count = area / (size**2 * sqrt(3.0) / 8.0)
     if not 2.0 <= count <= 20_000:  # more cannot be solved in reasonable time

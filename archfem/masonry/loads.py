@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from archfem._typing import Array, Metres, Newtons
-from archfem._validation import check_integer, check_number, check_numbers
+from archfem._validation import check_between, check_integer, check_number, check_numbers
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 
@@ -37,12 +37,9 @@ class BodyForce:
     def __post_init__(self) -> None:
         """Check that the values are multiples of g."""
         for name in ("horizontal", "vertical"):
-            value = check_number(getattr(self, name), f"body force, {name} [g]")
-            if abs(value) > 1e3:  # a mistake of units
-                raise InvalidInput(
-                    f"body force, {name} = {value:.4g} g is more than 1000 g: give a multiple of "
-                    "g, such as 0.3"
-                )
+            remedy = "give a multiple of g, such as 0.3"
+            value = getattr(self, name)
+            check_between(value, f"body force, {name} [g]", -1e3, 1e3, ends="[]", remedy=remedy)
 
 
 @dataclass(frozen=True)

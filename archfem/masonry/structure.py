@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from archfem._display import ResultDisplay
 from archfem._typing import Array, Metres, MetresPerSecondSquared
-from archfem._validation import check_fields, check_number, check_type
+from archfem._validation import check_between, check_fields, check_type
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_overlaps, say_place
 from archfem.masonry.materials import Contact
@@ -200,12 +200,8 @@ class Structure(ResultDisplay):
         check_fields(self)
         object.__setattr__(self, "blocks", assign_roles(self.blocks, self.joints))
         object.__setattr__(self, "joints", assign_roles(self.joints, self.blocks))
-        if not 1e-3 <= check_number(self.width, "width [m]") < 1e4:
-            raise InvalidStructure(
-                f"width {self.width:.3g} m is not between 1 mm and 10 km: give metres"
-            )
-        if not 0.1 <= check_number(self.gravity, "gravity [m/s²]") < 1e3:
-            raise InvalidStructure(f"gravity {self.gravity:.3g} m/s² is not between 0.1 and 1000")
+        check_between(self.width, "width [m]", 1e-3, 1e4, ends="[)", error=InvalidStructure)
+        check_between(self.gravity, "gravity [m/s²]", 0.1, 1e3, ends="[)", error=InvalidStructure)
         for kind, things in (("block", self.blocks), ("joint", self.joints)):
             counts = Counter(thing.name for thing in things)
             if twice := sorted(name for name, count in counts.items() if count > 1):

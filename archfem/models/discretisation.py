@@ -5,7 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from archfem._typing import Metres
-from archfem._validation import check_integer, check_number, check_sequence, is_one_of, short_repr
+from archfem._validation import (
+    check_between,
+    check_choice,
+    check_integer,
+    check_sequence,
+    is_one_of,
+)
 from archfem.errors import InvalidInput
 from archfem.joints.quadrature import Quadrature
 
@@ -58,15 +64,11 @@ class Discretisation:
         """Check the values, and that they do not exclude each other."""
         _check_fidelity(self.fidelity)
         object.__setattr__(self, "cells", _check_cells(self.cells))
-        shapes, displacements = ("quadrilateral", "triangle"), ("small", "large")
-        if not is_one_of(self.cell, shapes):
-            raise InvalidInput(f"cell {short_repr(self.cell)} is not known: use one of {shapes}")
+        check_choice(self.cell, "cell", ("quadrilateral", "triangle"))
         size, points = self.max_cell_size, self.quadrature_points
-        if size is not None and not check_number(size, "max_cell_size [m]") > 0.0:
-            raise InvalidInput(f"max_cell_size = {size!r} m: give a size above 0, e.g. 0.5")
-        if not is_one_of(self.displacements, displacements):
-            given = short_repr(self.displacements)
-            raise InvalidInput(f"displacements {given} are not known: use one of {displacements}")
+        if size is not None:
+            check_between(size, "max_cell_size [m]", 0.0, remedy="give e.g. 0.5")
+        check_choice(self.displacements, "displacements", ("small", "large"))
         if self.displacements == "large" and self.fidelity == "monolithic":
             raise InvalidInput(
                 "large displacements do not exist with fidelity 'monolithic': use 'full', which is "
@@ -76,8 +78,7 @@ class Discretisation:
             raise InvalidInput(
                 f"mesh_file = {str(self.mesh_file)!r}: fidelity 'rigid' has no mesh to read"
             )
-        if not is_one_of(self.degree, (1, 2)):
-            raise InvalidInput(f"degree {short_repr(self.degree)}: elements are of degree 1 or 2")
+        check_choice(self.degree, "degree", (1, 2))
         if self.rule.rule == "trapezoidal" and self.fidelity == "monolithic" and points:
             raise InvalidInput(
                 f"trapezoidal quadrature with {points} points is not written in UFL: leave "
@@ -124,17 +125,13 @@ def _check_fidelity(fidelity: object) -> None:
         unknown = sorted({str(name) for name in values if not is_one_of(name, of_blocks)})
         if unknown:
             raise InvalidInput(f"fidelities {unknown} are not known: use some of {of_blocks}")
-    elif not is_one_of(fidelity, MODEL_FIDELITIES):
-        raise InvalidInput(
-            f"fidelity {short_repr(fidelity)} is not known: use one of {MODEL_FIDELITIES}, or "
-            "'auto' in `build`"
-        )
+    else:
+        check_choice(fidelity, "fidelity", MODEL_FIDELITIES, ", or 'auto' in `build`")
 
 
 def _check_cells(cells: object) -> tuple[int, int]:
     """Return numbers of cells through the thickness and along a block; refuse impossible ones."""
     through, along = check_sequence(cells, "cells through the thickness and along each block", 2)
     for key, count in (("through", through), ("along", along)):
-        if check_integer(count, f"cells {key}") > 1000:
-            raise InvalidInput(f"cells {key} = {count!r}: give at most 1000")
+        check_integer(count, f"cells {key}", maximum=1000)
     return int(through), int(along)

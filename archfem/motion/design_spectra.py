@@ -9,10 +9,11 @@ import numpy as np
 from archfem._typing import Array, Seconds
 from archfem._validation import (
     check_array,
+    check_between,
+    check_choice,
     check_fields,
     check_number,
     check_own_keys,
-    is_one_of,
     report_user_errors,
     validate_arguments,
 )
@@ -172,8 +173,7 @@ class Tbec2018(CodeSpectrum):
         check_fields(self)
         if self.site == "ZF":
             raise InvalidInput("ground class ZF has no code spectrum: it needs a site study")
-        if self.site not in self._short_period_factors:
-            raise InvalidInput(f"ground class {self.site!r} is unknown: use ZA, ZB, ZC, ZD or ZE")
+        check_choice(self.site, "ground class", self._short_period_factors)
 
     @property
     def sds(self) -> float:
@@ -250,9 +250,7 @@ class Eurocode8(CodeSpectrum):
     damping: OtherDamping = 0.05
 
     def __post_init__(self) -> None:
-        ag = check_number(self.ag, "design ground acceleration [g]")
-        if not 0.0 < ag < 2.0:
-            raise InvalidInput(f"design ground acceleration {ag:g} g: expected g, from 0 to 2")
+        check_between(self.ag, "design ground acceleration [g]", 0.0, 2.0)
         check_fields(self)
         if self.type not in self._ground_types or self.ground not in self._ground_types[1]:
             raise InvalidInput(
@@ -381,20 +379,11 @@ class Ntc2018(CodeSpectrum):
     damping: OtherDamping = 0.05
 
     def __post_init__(self) -> None:
-        if not is_one_of(self.site, self._subsoil_factors):
-            raise InvalidInput(f"subsoil {self.site!r} is unknown: use A, B, C, D or E")
-        if not (
-            _check_positive(self.ag, "a_g [g]") < 2.0
-            and 0.05 < check_number(self.tc_star, "T_C* [s]") < 2.0
-        ):
-            raise InvalidInput(
-                f"a_g {self.ag:g} g and T_C* {self.tc_star:g} s: expected a_g in g, below 2, and "
-                "T_C* in seconds, 0.05 to 2"
-            )
-        if not 2.2 <= check_number(self.f0, "F_0") < 5.0:
-            raise InvalidInput(f"F_0 {self.f0:g} is not from 2.2 to 5")
-        if not 1.0 <= check_number(self.topography, "topography S_T") <= 1.4:
-            raise InvalidInput(f"topography {self.topography:g} is not from 1 to 1.4")
+        check_choice(self.site, "subsoil", self._subsoil_factors)
+        check_between(self.ag, "a_g [g]", 0.0, 2.0)
+        check_between(self.tc_star, "T_C* [s]", 0.05, 2.0)
+        check_between(self.f0, "F_0", 2.2, 5.0, ends="[)")
+        check_between(self.topography, "topography S_T", 1.0, 1.4, ends="[]")
         check_oscillators(np.zeros(1), self.damping)
 
     @property
@@ -447,12 +436,10 @@ class Asce2022(CodeSpectrum):
     tl: Seconds
 
     def __post_init__(self) -> None:
-        _check_positive(self.sds, "S_DS [g]")
-        _check_positive(self.sd1, "S_D1 [g]")
-        if not _check_positive(self.tl, "T_L [s]") > self.sd1 / self.sds:
-            raise InvalidInput(
-                f"T_L {self.tl:g} s is not beyond T_S = S_D1/S_DS = {self.sd1 / self.sds:.3g} s"
-            )
+        check_between(self.sds, "S_DS [g]", 0.0)
+        check_between(self.sd1, "S_D1 [g]", 0.0)
+        end = self.sd1 / self.sds
+        check_between(self.tl, "T_L [s]", end, remedy="it is beyond T_S = S_D1/S_DS")
 
     def _branches(self) -> tuple[SpectrumBranches, SpectrumBranches | None]:
         end = self.sd1 / self.sds
@@ -493,7 +480,7 @@ class Eurocode2024(CodeSpectrum):
 
     def __post_init__(self) -> None:
         for key in ("s_alpha", "s_beta", "f_alpha", "f_beta", "topography"):
-            _check_positive(getattr(self, key), f"Eurocode 8 (2024), {key}")
+            check_between(getattr(self, key), f"Eurocode 8 (2024), {key}", 0.0)
         rise, falls, far = self.corners
         if not rise < falls < far:
             raise InvalidInput(
@@ -511,13 +498,6 @@ class Eurocode2024(CodeSpectrum):
     def _branches(self) -> tuple[SpectrumBranches, SpectrumBranches | None]:
         level = self.topography * self.f_alpha * self.s_alpha
         return SpectrumBranches(level, 1.0 / 2.5, self.corners, longest=4.0, start=0.02), None
-
-
-def _check_positive(value: float, name: str) -> float:
-    """Return a number that must be positive."""
-    if not check_number(value, name) > 0.0:
-        raise InvalidInput(f"{name} = {value!r}: expected more than 0")
-    return value
 
 
 # Spectra that case files can name, with those of the user

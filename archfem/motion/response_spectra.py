@@ -12,6 +12,7 @@ from scipy import integrate, linalg
 
 from archfem._typing import Array
 from archfem._validation import (
+    check_between,
     check_number,
     check_type,
     check_unmasked,
@@ -123,8 +124,7 @@ def check_oscillators(periods: Array, damping: float) -> None:
     """Refuse negative periods, and damping ratios outside 0 to 1."""
     if not (np.all(np.isfinite(periods)) and np.all(np.asarray(periods) >= 0.0)):
         raise InvalidInput("periods of a spectrum: expected finite values from 0 s upwards")
-    if not 0.0 <= check_number(damping, "damping ratio [-]") < 1.0:
-        raise InvalidInput(f"damping ratio {damping!r}: expected from 0 to below 1 (5 % is 0.05)")
+    check_between(damping, "damping ratio [-]", 0.0, 1.0, ends="[)", remedy="5 % is 0.05")
 
 
 def _find_parabola_peak(row: Array) -> tuple[float, float]:

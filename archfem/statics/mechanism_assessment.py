@@ -28,7 +28,7 @@ import xarray as xr
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
 from archfem._typing import Array
-from archfem._validation import check_fields, check_number, is_one_of, validate_arguments
+from archfem._validation import check_between, check_choice, check_fields, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.limit.backfill import BlocksWithFill, Fill, FillProfile, attach_fill
 from archfem.limit.collapse import collapse_factor
@@ -95,12 +95,8 @@ class LimitState:
         check_fields(self)
         limits = {"share": 1.0, "secant_share": 1.0, "period_factor": 10.0, "damping": 0.5}
         for key, most in limits.items():
-            value = check_number(getattr(self, key), f"{self.name}, {key} [-]")
-            if not 0.0 < value <= most:
-                raise InvalidInput(
-                    f"{self.name}, {key} = {value:.4g} is not above 0 and up to {most:g}: give a "
-                    "ratio, such as 0.4 for 40 %"
-                )
+            options: Any = {"ends": "(]", "remedy": "give a ratio, such as 0.4 for 40 %"}
+            check_between(getattr(self, key), f"{self.name}, {key} [-]", 0.0, most, **options)
 
 
 # Sources of displacement checks; the 2019 values were read in a transcription of the Circolare.
@@ -370,17 +366,14 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         >>> round(found.alpha_0, 4), round(found.d_0_star, 4), found.displacement.passes
         (0.25, 0.3, True)
     """
-    if not isinstance(limit_state, LimitState) and not is_one_of(limit_state, LIMIT_STATES):
-        raise InvalidInput(
-            f"limit_state {limit_state!r} is not known: use one of {list(LIMIT_STATES)}, or give "
-            "the rules of another code as a LimitState"
-        )
-    rules = limit_state if isinstance(limit_state, LimitState) else LIMIT_STATES[limit_state]
+    rules = limit_state
+    if not isinstance(rules, LimitState):
+        other = ", or give the rules of another code as a LimitState"
+        rules = LIMIT_STATES[check_choice(rules, "limit_state", LIMIT_STATES, other)]
     if abs(direction) != 1.0:
         raise InvalidInput(f"direction {direction!r}: give 1 to the right or -1 to the left")
     for name, value, most in (("q", q, 10.0), ("confidence_factor", confidence_factor, 2.0)):
-        if not 1.0 <= check_number(value, f"{name} [-]") <= most:
-            raise InvalidInput(f"{name} {value:.4g} is not between 1 and {most:g}")
+        check_between(value, f"{name} [-]", 1.0, most, ends="[]")
     structure = structure_of(structure)
     _check_structure(structure, friction, loads)
     filled = None if fill is None else attach_fill(structure, fill)

@@ -17,7 +17,7 @@ from scipy import sparse
 
 from archfem._optional import require_package
 from archfem._typing import Array
-from archfem._validation import check_fields, check_number, check_type
+from archfem._validation import check_between, check_fields, check_type
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.statics.newton_iteration import Equations, Residual, ScipyNewton, Tangent
 
@@ -56,8 +56,7 @@ class Newton:
 
     def __post_init__(self) -> None:
         """Refuse tolerances that no solve could reach, and options without names."""
-        if not 0.0 < check_number(self.tolerance, "tolerance of a solve [-]") < 1.0:
-            raise InvalidInput(f"tolerance {self.tolerance:g} of a solve is not between 0 and 1")
+        check_between(self.tolerance, "tolerance of a solve [-]", 0.0, 1.0)
         check_type(self.petsc, Mapping, "petsc", 'give a dictionary, e.g. {"snes_monitor": ""}')
         check_fields(self)
         if unused := UNUSED_TESTS & {*self.petsc}:

@@ -14,7 +14,7 @@ import xarray as xr
 from archfem._display import ResultDisplay
 from archfem._threads import single_threaded
 from archfem._typing import Array
-from archfem._validation import check_choice, check_fields, check_type
+from archfem._validation import check_between, check_choice, check_fields, check_type
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria, with_failure_flags
 from archfem.joints.resultants import joint_dataset, select_joint
@@ -57,8 +57,7 @@ class Stop:
     def __post_init__(self) -> None:
         """Refuse rules that are met at once, or never."""
         check_fields(self)
-        if not 0.0 <= self.slope < 1.0:
-            raise InvalidInput(f"slope {self.slope:.3g} is not between 0 and 1")
+        check_between(self.slope, "slope [-]", 0.0, 1.0, ends="[)")
         if not (self.displacement > 0.0 and self.steps >= 1):
             raise InvalidInput(
                 f"displacement {self.displacement:.3g} and steps {self.steps} must be above 0"

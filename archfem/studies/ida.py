@@ -17,11 +17,10 @@ import xarray as xr
 
 from archfem._display import ResultDisplay
 from archfem._typing import Array
-from archfem._validation import validate_arguments, validate_methods
+from archfem._validation import check_choice, validate_arguments, validate_methods
 from archfem.cases.case import Case, case_of
 from archfem.cases.motion_keys import write_motion
 from archfem.cases.run import DeadLoadResult
-from archfem.cases.toml_file import check_choice
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import CollapseState, doubt_soft_blocks
 from archfem.dynamics.events import applicable_definitions
@@ -197,7 +196,7 @@ class Ida(ResultDisplay):
         Raises:
             InvalidInput: limit state or measure are unknown.
         """
-        check_choice(limit, self.limits, "limit")
+        check_choice(limit, "limit", self.limits)
         unscaled, power = self._measure(measure)
         valid = np.isfinite(unscaled)
         low, high = (self.table[name].values for name in (f"{limit}, survives", limit))
@@ -235,7 +234,7 @@ class Ida(ResultDisplay):
             InvalidInput: measure or demand are unknown.
         """
         unscaled, power = self._measure(measure)
-        check_choice(demand, DEMAND_LABELS, "demand")
+        check_choice(demand, "demand", DEMAND_LABELS)
         for k, name in enumerate(self.table["motion"].values):
             scale = self.table["scale"].values[k]
             valid = np.isfinite(scale)  # shorter rows are padded
@@ -244,7 +243,7 @@ class Ida(ResultDisplay):
 
     def _measure(self, measure: str) -> tuple[Array, int]:
         """A measure of the unscaled motions, and the power of the scale with which it grows."""
-        check_choice(measure, MEASURE_LABELS, "measure")
+        check_choice(measure, "measure", MEASURE_LABELS)
         return self.table[measure].values, 2 if measure == "arias" else 1
 
     def fractiles(self, intensity: Array, measure: str = "pga", demand: str = "rotation") -> Array:
@@ -346,7 +345,7 @@ def ida(
         (2004) 523-553 for hunt and fill.
     """
     for limit in limits or ():
-        check_choice(limit, LIMIT_STATES, "limits")
+        check_choice(limit, "limits", LIMIT_STATES)
     check_search(precision, between)
     options: Findings = {"limits": None if limits is None else list(limits), "precision": precision}
     options["between"] = [float(scale) for scale in between]

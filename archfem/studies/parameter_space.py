@@ -15,11 +15,11 @@ import numpy as np
 from scipy import stats
 from scipy.stats import qmc
 
-from archfem._validation import check_integer, short_repr
+from archfem._validation import check_choice, check_integer, short_repr
 from archfem.cases.analysis_tables import complete_path
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_sections
-from archfem.cases.toml_file import check_choice, check_table, refuse_unknown, set_value
+from archfem.cases.toml_file import check_table, refuse_unknown, set_value
 from archfem.errors import InvalidInput
 
 # Sections of a case that define its model
@@ -157,7 +157,7 @@ def _sample_axis(random: Mapping[str, Any], samples: Mapping[str, Any] | None) -
     samplers = {"latin": qmc.LatinHypercube, "sobol": qmc.Sobol}
     settings = check_table(samples, {"count": int, "method": str, "seed": int}, "samples")
     count = check_integer(settings.get("count"), "samples.count")
-    method = check_choice(settings.get("method", "latin"), samplers, "samples.method")
+    method = check_choice(settings.get("method", "latin"), "samples.method", samplers)
     if method == "sobol" and log2(count) % 1.0:
         raise InvalidInput(
             f"samples.count = {count}: a Sobol sequence is balanced for powers of 2 alone; give "

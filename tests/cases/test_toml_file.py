@@ -6,8 +6,8 @@ import time
 import pytest
 
 import archfem as af
+from archfem._validation import check_choice
 from archfem.cases.toml_file import (
-    check_choice,
     merge_tables,
     parse_change,
     remove_key,
@@ -69,10 +69,10 @@ def test_an_invalid_quantity_is_refused(value, says):
 
 
 def test_a_choice_must_be_one_of_the_known_words():
-    assert check_choice("a", {"a": 1, "b": 2}, "section.key") == "a"
+    assert check_choice("a", "section.key", {"a": 1, "b": 2}) == "a"
     for wrong in ("c", None, ["a"]):
         with pytest.raises(af.InvalidInput, match=r"section.key = .* is not known: use one of"):
-            check_choice(wrong, ("a", "b"), "section.key")
+            check_choice(wrong, "section.key", ("a", "b"))
 
 
 def test_tables_override_those_of_another_case():

@@ -127,17 +127,17 @@ def test_rayleigh_damping_has_its_ratio_at_both_ends(ring):
 def test_too_few_effective_modes():
     with pytest.raises(af.InvalidInput, match=r"mode 1 alone has 75\.3 % of the mass along x"):
         effective_mode_range(block(), mass_share=0.5)
-    with pytest.raises(af.InvalidInput, match=r"share 5\.0 of the mass"):
+    with pytest.raises(af.InvalidInput, match=r"share of the mass \[-\] = 5\.0 is not"):
         effective_mode_range(block(), mass_share=5.0)
-    with pytest.raises(af.InvalidInput, match="damping kind = 'mass': use one of"):
+    with pytest.raises(af.InvalidInput, match="damping kind = 'mass' is not known"):
         effective_damping(block(), kind="mass")
 
 
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ((5.0, 8.0), "ratio 5.0"),
-        ((0.05, 0.0), "damping frequency 0.0 Hz is not between 1 mHz"),
+        ((5.0, 8.0), r"ratio \[-\] = 5.0 is"),
+        ((0.05, 0.0), r"damping frequency \[Hz\] = 0.0 is not between 0.001"),
         ((0.05, (8.0, 16.0)), "is not a finite number"),
         ((0.05, 8.0, "open"), "joints = 'open'"),
     ],

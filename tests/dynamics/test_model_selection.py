@@ -155,7 +155,7 @@ def test_a_choice_may_be_of_large_displacements(chosen):
     """They are built once, of the choice; nothing is left to doubt about their size."""
     assert chosen.of(0.3, 0.3, turn=0.004, displacements="large").small_displacement_error == 0.0
     assert not chosen.model.doubts
-    with pytest.raises(af.InvalidInput, match="displacements 'huge' are not known"):
+    with pytest.raises(af.InvalidInput, match="displacements = 'huge' is not known"):
         chosen.of(0.3, 0.3, displacements="huge")
 
 

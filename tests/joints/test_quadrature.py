@@ -74,9 +74,9 @@ def test_lobatto_has_points_at_the_ends_and_gauss_has_not():
     [
         (("simpson",), "'simpson' is not known"),
         (("nodal", 4), "leave points out"),
-        (("lobatto", 1), "1 lobatto points"),
-        (("trapezoidal", 1), "1 trapezoidal points"),
-        (("gauss", 65), "65 gauss points on a facet: give between 1 and 64"),
+        (("lobatto", 1), "lobatto points on a facet = 1 is not"),
+        (("trapezoidal", 1), "trapezoidal points on a facet = 1 is not"),
+        (("gauss", 65), "gauss points on a facet = 65 is above 64"),
     ],
 )
 def test_refusals(arguments, says):

@@ -81,7 +81,7 @@ def test_a_uniform_fan_of_one_in_two():
         ({"friction_angle": 70.0}, "give degrees"),
         ({"friction_angle": -1.0}, "below 0"),
         ({"friction_angle": "35"}, "has no unit"),
-        ({"cohesion": 2e6}, "give Pa"),
+        ({"cohesion": 2e6}, r"\[Pa\] = 2000000.0 is not between"),
         ({"mobilisation": 1.5}, "a part of the pressure"),
         ({"active": 3.0}, "a part of the pressure"),
         ({"dispersal": "elastic"}, "is not known"),

@@ -214,8 +214,8 @@ def test_a_wall_slides_under_the_seismic_pressure_of_its_fill():
     ("change", "words"),
     [
         ({"friction_angle": 70.0}, "friction_angle 70° is neither 0 nor between"),
-        ({"roughness": 1.2}, "roughness 1.2 is above 1"),
-        ({"gap": 0.0}, "gap 0 is below 0.001"),
+        ({"roughness": 1.2}, "roughness = 1.2 is above 1"),
+        ({"gap": 0.0}, r"gap \[-\] = 0.0 is below 0.001"),
         ({"cohesion": -1.0}, "cohesion"),
     ],
 )

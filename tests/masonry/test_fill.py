@@ -274,7 +274,7 @@ def test_pieces_fill_the_body_and_are_soil_still():
 @pytest.mark.parametrize(
     ("size", "angle", "words"),
     [
-        (0.5, 70.0, "not from 0 to 60"),
+        (0.5, 70.0, "not between 0 and 60"),
         (0.0, 30.0, "not above 0"),
         (1e-3, 30.0, "give a size with which"),
         (50.0, 30.0, "give a size with which"),

@@ -179,7 +179,7 @@ def test_measured_walls_follow_the_law(wall, kind, expected, misfit, verified):
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        (((30e9, 0.5, "rough"), {}), "condition 'rough' is not known"),
+        (((30e9, 0.5, "rough"), {}), "condition = 'rough' is not known"),
         (((30e9, 0.0), {}), r"spacing \[m\] = 0.0 is below 0.001"),
         (((30e9, 500.0), {}), r"spacing \[m\] = 500.0 is above 100"),
         (((30.0, 0.5), {}), r"young \[Pa\] = 30.0 is below 1e"),
@@ -243,7 +243,7 @@ def test_a_finish_gives_the_law_of_the_weaker_stone():
     assert chosen.joints[1:] == mixed.joints[1:]
     with pytest.raises(af.InvalidInput, match="'joint 3' of 'stone to stone' is a joint of soil"):
         af.masonry.with_finish(wall, "hewn", wall.joints[3].contact)
-    with pytest.raises(af.InvalidInput, match="finish 'polished' is not known"):
+    with pytest.raises(af.InvalidInput, match="finish = 'polished' is not known"):
         af.masonry.with_finish(wall, "polished")
 
 

@@ -13,7 +13,7 @@ from archfem.masonry import BACKFILL, SOIL_TO_STONE, STONE_TO_STONE
         (lambda: af.Material(30e9, 0.5, 20e3), "poisson 0.5"),
         (lambda: af.Material(30e9, 0.2, 2e6), "unit_weight 2e"),
         (lambda: af.Material(30e9, 0.2, 20.0), "looks like kN/m³: .* have 2e.04"),
-        (lambda: af.Material(30e9, 0.2, 20e3, -1.0), "strength -1"),
+        (lambda: af.Material(30e9, 0.2, 20e3, -1.0), r"\[Pa\] = -1.0 is below 1000"),
         (lambda: af.Contact(1.48, 0.3e9), "normal_stiffness 1.48"),
         (lambda: af.Contact(1.48e9, 0.3e9, -0.1), "friction -0.1"),
         (lambda: af.Contact(1e9, 1e9, 0.5, dilatancy=15.0), "dilatancy 15 .* between 0 and 0.5"),

@@ -22,7 +22,7 @@ WALL = {"length": 2.0, "height": 2.3, "above": 0.8}
         (lambda: af.shapes.Arch(**RING | {"thickness": 4e3}), "'arch': thickness 4000 m"),
         (
             lambda: af.shapes.Arch(**RING | {"rise": None}, embrace=360.0),
-            "embrace 360° is not between",
+            r"embrace \[°\] = 360.0 is not between",
         ),
         (lambda: af.shapes.Arch(**RING, measured="extrados"), "measured = 'extrados' is unknown"),
         (lambda: af.shapes.Arch(**RING | {"rise": 2.1}), "rise 2.1 m is above half the span 4 m"),

@@ -45,7 +45,7 @@ def test_over_semicircular_and_single_stone_rings():
     [
         ({"thickness": -0.1}, "thickness -0.1 m is not between"),
         ({"thickness": 7.0}, "twice the radius"),
-        ({"embrace": 400.0}, "embrace 400"),
+        ({"embrace": 400.0}, r"embrace \[°\] = 400"),
         ({"voussoirs": 0}, "voussoirs 0"),
         ({"voussoirs": 2.5}, "voussoirs 2.5"),
         ({"span": 5.0}, "two of its numbers: span and rise, span and embrace, or"),
@@ -55,8 +55,8 @@ def test_over_semicircular_and_single_stone_rings():
         ({"radius": None, "span": 0.0}, "twice the radius"),
         ({"radius": None, "embrace": None, "span": 5.0, "rise": 2.6}, "half the span"),
         ({"radius": None, "embrace": None, "span": 1e308, "rise": 1.0}, "make no circle: give"),
-        ({"width": 0.0}, "width 0 m"),
-        ({"gravity": -9.81}, "gravity -9.81"),
+        ({"width": 0.0}, r"width \[m\] = 0.0 is not"),
+        ({"gravity": -9.81}, r"gravity .* = -9.81"),
     ],
 )
 def test_impossible_rings_are_refused(change, says):

@@ -8,7 +8,7 @@ import archfem as af
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        ({"fidelity": "exact"}, "fidelity 'exact' is not known"),
+        ({"fidelity": "exact"}, "fidelity = 'exact' is not known"),
         ({"cells": (4, 4, 4)}, "has 3 values"),
         ({"quadrature": "simpson"}, "'simpson' is not known"),
     ],

@@ -235,7 +235,7 @@ def test_invalid_input_is_refused(call, message):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"slope": 1.5}, "slope 1.5 is not between 0 and 1"),
+        ({"slope": 1.5}, r"slope \[-\] = 1.5 is not between 0 and 1"),
         ({"steps": 0}, "steps 0 must be above 0"),
     ],
 )

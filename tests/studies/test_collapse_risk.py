@@ -148,7 +148,7 @@ def test_alternatives_far_apart_add_their_rates():
     [
         (lambda risk: risk.rate().probability(-50.0), "years = -50"),
         (lambda risk: risk.disaggregation(0), "bins = 0"),
-        (lambda risk: risk.capacities("Sa"), "measure 'Sa' is not known"),
+        (lambda risk: risk.capacities("Sa"), "measure = 'Sa' is not known"),
     ],
 )
 def test_questions_without_an_answer_are_refused(ask, words):

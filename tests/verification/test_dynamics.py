@@ -202,11 +202,11 @@ def test_closed_and_initial_damping_differ_only_where_joints_open(stack):
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: af.Rayleigh(5.0, (8.0, 16.0)), "ratio 5.0"),
+        (lambda: af.Rayleigh(5.0, (8.0, 16.0)), r"ratio \[-\] = 5.0 is"),
         (lambda: af.Rayleigh(0.05, (16.0, 8.0)), "lower one first"),
         (lambda: af.Rayleigh(0.05, (8.0, 16.0), "open"), "joints = 'open'"),
         (lambda: af.dynamics.Newmark(0.0, 0.5), "not stable"),
-        (lambda: af.HHT(0.2), "HHT alpha 0.2"),
+        (lambda: af.HHT(0.2), r"HHT alpha \[-\] = 0.2"),
     ],
 )
 def test_refusals(make, says):

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from archfem._typing import Angle, Metres
-from archfem._validation import check_type, is_number, short_repr
+from archfem._validation import check_between, check_type, is_number, short_repr
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Point
 from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE, Contact, Material
@@ -57,9 +57,8 @@ class Arch:
         if self.rise is None:
             embrace = in_degrees(self.embrace, f"'{self.name}': embrace")
             object.__setattr__(self, "embrace", embrace)
-            if not 0.0 < embrace < 360.0:
-                problem = f"embrace {embrace:.4g}° is not between 0° and 360°"
-                raise InvalidStructure(f"'{self.name}': {problem}")
+            name = f"'{self.name}': embrace [°]"
+            check_between(embrace, name, 0.0, 360.0, error=InvalidStructure)
         elif self.rise > self.span / 2.0:
             raise InvalidStructure(
                 f"'{self.name}': rise {self.rise:.4g} m is above half the span {self.span:.4g} m: "

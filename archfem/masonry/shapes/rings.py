@@ -14,7 +14,13 @@ from typing import Any
 import numpy as np
 
 from archfem._typing import Angle, Array, Metres, MetresPerSecondSquared
-from archfem._validation import check_integer, check_number, check_numbers, validate_arguments
+from archfem._validation import (
+    check_between,
+    check_integer,
+    check_number,
+    check_numbers,
+    validate_arguments,
+)
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_points
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
@@ -45,8 +51,7 @@ class RingGeometry:
         check_integer(self.voussoirs * self.chords, "voussoirs times chords", maximum=10**6)
         for key, value in {"thickness": self.thickness, **lengths}.items():
             # A ring of a kilometre is a mistake of units.
-            if not 0.0 < check_number(value, f"{key} [m]") < 1e3:
-                raise InvalidStructure(f"{key} {value:.4g} m is not between 0 and 1000 m")
+            check_between(value, f"{key} [m]", 0.0, 1e3, error=InvalidStructure)
 
     def split(self, inner: Array, outer: Array) -> list[Faces]:
         """Divide points along intrados and extrados, from left to right, into those of stones."""
@@ -298,8 +303,7 @@ def _resolve_circle(
             check_number(value, name, minimum=0.0)
     if embrace is not None:
         embrace = in_degrees(embrace, "embrace")
-        if not 0.0 < embrace < 360.0:
-            raise InvalidStructure(f"embrace {embrace:.4g}° is not between 0° and 360°")
+        check_between(embrace, "embrace [°]", 0.0, 360.0, error=InvalidStructure)
     if radius is not None and embrace is not None and span is None and rise is None:
         return radius, embrace
     if span is None or radius is not None or (rise is None) == (embrace is None):
@@ -473,8 +477,8 @@ def flat_arch(
     ring = RingGeometry(thickness, voussoirs, 1, width, material, contact, gravity)
     ring.check(span=span)
     angle = in_degrees(skewback, "skewback")
-    if not 0.0 < angle < 60.0:
-        raise InvalidStructure(f"skewback {angle:.4g}° is not between 0° and 60°: try 20°")
+    options: Any = {"remedy": "try 20°", "error": InvalidStructure}
+    check_between(angle, "skewback [°]", 0.0, 60.0, **options)
     # All joints meet in one point below, so that the top is the soffit enlarged from there.
     growth = 1.0 + thickness * tan(np.radians(angle)) / (span / 2.0)
 

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._typing import Array
+from archfem._validation import check_between
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.units import mm
@@ -149,8 +150,8 @@ class FrameTiming:
 def even_timing(known: Array, fps: float, seconds: float | None) -> FrameTiming:
     """Return evenly spaced times for a film of some length, at most one for each known field."""
     for key, value in (("fps", fps), ("seconds", seconds)):
-        if value is not None and not 0.0 < value < 1e4:
-            raise InvalidInput(f"{key} {value:.4g} is not between 0 and 10000")
+        if value is not None:
+            check_between(value, key, 0.0, 1e4)
     length = float(known[-1] - known[0])
     seconds = seconds or max(length, 1.0 / fps)
     count = min(len(known), max(1, round(seconds * fps)))

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.colors import Colormap, Normalize, PowerNorm
 
 from archfem._typing import Array
-from archfem._validation import check_choice
+from archfem._validation import check_between, check_choice
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.models.model import Cells, Model, check_coordinate_count
@@ -55,8 +55,8 @@ def check_options(
             "rigid blocks have no stress: use colour='displacement', or build and run the model "
             "with fidelity='full'"
         )
-    if magnification is not None and not 0.0 < magnification < 1e12:
-        raise InvalidInput(f"magnification {magnification:.4g} is not above 0")
+    if magnification is not None:
+        check_between(magnification, "magnification", 0.0, 1e12)
     smallest = (480, 320)  # the texts do not fit into a smaller frame
     if len(size) != 2 or any(n % 2 or n < least for n, least in zip(size, smallest, strict=True)):
         raise InvalidInput(

@@ -151,12 +151,15 @@ def test_stress_is_seen_in_elastic_blocks(coarse):
     ("options", "said"),
     [
         ({"colour": "stress"}, r"rigid blocks have no stress: .*fidelity='full'"),
-        ({"colour": "mood"}, r"colour 'mood' is not known: use one of \('displacement', 'stress'"),
-        ({"magnification": -2.0}, r"magnification -2 is not above 0"),
+        (
+            {"colour": "mood"},
+            r"colour = 'mood' is not known: use one of \['displacement', 'stress'",
+        ),
+        ({"magnification": -2.0}, r"magnification = -2.0 is not between 0 and"),
         ({"size": (641, 400)}, r"size \(641, 400\): give an even width and height"),
         ({"size": (64, 40)}, r"at least \(480, 320\) pixels"),
-        ({"fps": 0.0}, r"fps 0 is not between"),
-        ({"seconds": -1.0}, r"seconds -1 is not between"),
+        ({"fps": 0.0}, r"fps = 0.0 is not between"),
+        ({"seconds": -1.0}, r"seconds = -1.0 is not between"),
     ],
 )
 def test_impossible_options_are_refused(model, run, tmp_path, options, said):
