@@ -77,7 +77,7 @@ archbench-quick: .venv/compiled  ## archfem on the scenes of Arch-Bench against 
 	$(PYTHON) -m archbench.run --quick
 
 wasm: .venv/ready  ## the kernels of pages, as WebAssembly (2 min); after a change of their sources
-	$(PYTHON) -m archfem.view.pages.wasm.exporter
+	$(PYTHON) docs/page_kernels.py
 	$(PYTHON) docs/try_page.py
 
 .venv/bench: .venv/ready

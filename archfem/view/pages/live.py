@@ -22,7 +22,9 @@ from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.units import G
 from archfem.view.pages.document import StandalonePage, render
-from archfem.view.pages.wasm.exporter import LAYOUT, WASM
+
+# Kernels of the simulation, and the names and types of their arguments, both by `make wasm`
+WASM, LAYOUT = (Path(__file__).parent / "wasm" / f"kernels.{kind}" for kind in ("wasm", "json"))
 
 # Stones above which a page would take minutes for its runs
 MAX_STONES = 60

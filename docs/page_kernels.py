@@ -1,10 +1,10 @@
-"""Export of the time steps of loose blocks to WebAssembly, from the sources that Python runs.
+"""Write the time steps of loose blocks as WebAssembly for pages, from the sources of Python.
 
 Numba compiles a wrapper with plain pointers and numbers as arguments, without optimisation, since
 its own would be for this processor. LLVM optimises that code for wasm32, and zig links it with a C
 library and the few functions of numba's runtime that kernels call.
 
-Run as `python -m archfem.view.pages.wasm.exporter`, or `make wasm`.
+Run as `make wasm`, which also writes `docs/try`.
 """
 
 import hashlib
@@ -21,15 +21,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-FOLDER = Path(__file__).parent
-WASM, LAYOUT = FOLDER / "kernels.wasm", FOLDER / "kernels.json"
+import archfem
+from archfem.view.pages.live import LAYOUT, WASM
+
 EXPORTED = "advance_steps"
 
-_KERNELS = Path(__file__).parents[3] / "dynamics" / "rigid_body"
+RUNTIME = Path(__file__).with_suffix(".c")
+_KERNELS = Path(archfem.__file__).parent / "dynamics" / "rigid_body"
 SOURCES = (
     *(_KERNELS / f"{name}.py" for name in ("bodies", "contact_detection", "time_stepping")),
-    FOLDER / "exporter.py",
-    FOLDER / "runtime.c",
+    Path(__file__),
+    RUNTIME,
 )
 
 # Environment of the export: code for no special processor, apart from the usual compiled code
@@ -160,7 +162,7 @@ def link(content: bytes) -> bytes:
         path.write_bytes(content)
         exports = [f"-Wl,--export={name}" for name in (EXPORTED, "take")]
         command = [sys.executable, "-m", "ziglang", "cc", "--target=wasm32-wasi", "-Os", "-s"]
-        command += ["-mexec-model=reactor", *exports, str(path), str(FOLDER / "runtime.c")]
+        command += ["-mexec-model=reactor", *exports, str(path), str(RUNTIME)]
         subprocess.run([*command, "-o", str(target)], check=True)
         return target.read_bytes()
 
@@ -186,5 +188,5 @@ if __name__ == "__main__":
     else:  # numba reads its settings when it is imported
         with TemporaryDirectory() as cache:
             environment = os.environ | SETTINGS | {"NUMBA_CACHE_DIR": cache}
-            command = [sys.executable, "-m", "archfem.view.pages.wasm.exporter"]
+            command = [sys.executable, __file__]
             sys.exit(subprocess.run(command, env=environment, check=False).returncode)
