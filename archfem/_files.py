@@ -132,8 +132,9 @@ def atomic_write(path: Path, *, flush: bool = True) -> Iterator[Path]:
         with _explain_write_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             for name in os.listdir(path.parent):
-                if name.startswith(begin) and name.endswith(end):
-                    _remove_draft_of_killed(path.with_name(name), name[len(begin) : -len(end)])
+                is_draft = name.startswith(begin) and name.endswith(end)
+                if is_draft and not _is_running(name[len(begin) : -len(end)]):
+                    path.with_name(name).unlink(missing_ok=True)
             draft.unlink(missing_ok=True)  # a link that another has made
             yield draft
             if flush:
@@ -158,12 +159,6 @@ def _explain_write_errors(path: Path) -> Iterator[None]:
                 error.errno, f"{path} could not be written, for the disk is full: make room there"
             ) from error
         raise InvalidInput(_write_error(path, error)) from error
-
-
-def _remove_draft_of_killed(draft: Path, process: str) -> None:
-    """Remove a draft unless its process, a number, is running."""
-    if not _is_running(process):
-        draft.unlink(missing_ok=True)
 
 
 def _is_running(process: str) -> bool:

@@ -121,7 +121,9 @@ class MeetingMonitor:
         observer = self.model.observer()
         readings = batch.read(observer)
         corners, faces = observer.corners(readings), observer.faces(readings)
-        overruns = self._find_overruns(faces)
+        # beyond the overlap a joint is open, and slip × rotation bounds how deep a stone is there
+        deep = np.abs(faces[:, 1] * faces[:, 2]) > self.tolerance
+        overruns = deep.any(axis=1) & self.model.large_displacements
         steps = np.arange(len(faces)) if self._may_meet(corners) else np.flatnonzero(overruns)
         if not len(steps):
             return None
@@ -134,12 +136,6 @@ class MeetingMonitor:
             return None
         names = [*(f"'{block.name}'" for block in self.model.structure.blocks), "the ground"]
         return int(steps[k]), f"{names[min(pair)]} met {names[max(pair)]}"
-
-    def _find_overruns(self, faces: Array) -> Flags:
-        """Return at which steps a face is over its end and turned, with large displacements."""
-        # beyond the overlap a joint is open, and slip × rotation bounds how deep a stone is there
-        deep = np.abs(faces[:, 1] * faces[:, 2]) > self.tolerance
-        return deep.any(axis=1) & self.model.large_displacements
 
     def _may_meet(self, corners: Array) -> bool:
         """Return whether any blocks without a joint have moved by more than is between them."""

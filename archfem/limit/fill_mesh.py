@@ -5,7 +5,6 @@ inside are those of equilateral triangles. Delaunay's triangulation of both has 
 outline once points are added where one is missing.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -210,7 +209,8 @@ def _triangulate(outline: Array, size: float, most: int = 12) -> tuple[Array, Nu
         points = np.concatenate([outline, inside])
         triangles = Delaunay(points).simplices
         kept = triangles[_is_within(points[triangles].mean(axis=1), outline)]
-        found = {frozenset(side) for side in _list_sides(kept)}
+        sides = kept[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        found = set(map(frozenset, sides.tolist()))
         count = len(outline)
         missing = [k for k in range(count) if frozenset((k, (k + 1) % count)) not in found]
         if not missing:
@@ -221,12 +221,6 @@ def _triangulate(outline: Array, size: float, most: int = 12) -> tuple[Array, Nu
         f"a fill of {count} points along its outline cannot be divided into triangles of "
         f"{size:.3g} m: look whether its outline crosses or touches itself"
     )
-
-
-def _list_sides(triangles: Numbers) -> Iterator[tuple[int, int]]:
-    """Yield the ends of all sides."""
-    for a, b, c in triangles.tolist():
-        yield from ((a, b), (b, c), (c, a))
 
 
 def _turn_left(points: Array, triangles: Numbers) -> Numbers:

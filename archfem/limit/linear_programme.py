@@ -17,7 +17,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -52,7 +51,6 @@ def solve_linear(
     method: str = "highs-ds",
 ) -> OptimizeResult | None:
     """Minimise a cost under equations and limits A x <= b; None where it is unbounded."""
-    equations, limits = (_small_as_array(*each) for each in (equations, limits))
     # Residuals are of order one. Where round-off stops the solver, presolve changes its path; then
     # a coarser tolerance lets it end, or the interior point. Without a cost presolve comes first:
     # it finds at once that fine pieces of fill do not stand, where the simplex method stalls.
@@ -67,12 +65,6 @@ def solve_linear(
         if result.status in (0, 3):
             return result if result.status == 0 else None
     raise DidNotConverge(f"the linear programme found no state: {result.message}")
-
-
-def _small_as_array(matrix: Any, values: Array | None, small: int = 20_000) -> tuple[Any, Any]:
-    """Return a small sparse matrix as an array: SciPy converts sparse ones four times."""
-    is_small = sparse.issparse(matrix) and matrix.shape[0] * matrix.shape[1] <= small
-    return (matrix.toarray() if is_small else matrix), values
 
 
 @dataclass(frozen=True, eq=False)

@@ -309,7 +309,10 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     positions = _places_along(weighted, axles)
     moving = drive(width, area_load, positions[::5] if is_plastic else positions)
     if fill is None and (ends := _places_at_ends(weighted, axles, moving)):
-        moving = _join(moving, drive(width, area_load, ends))
+        at_ends = drive(width, area_load, ends)
+        everywhere = xr.concat([moving.factors, at_ends.factors], "position").sortby("position")
+        worse = min(moving, at_ends, key=lambda each: each.worst.factor)
+        moving = replace(worse, factors=everywhere)
     by_rule = np.nan
     if width > (1.0 + 1e-9) * rule or area_load < driven.area_load:
         least = min(width, rule), max(area_load, driven.area_load)
@@ -372,13 +375,6 @@ def _places_at_ends(
                 after = int(np.searchsorted(ends, place + sense * ahead))
                 places |= {float(x - sense * ahead) for x in ends[max(after - 1, 0) : after + 1]}
     return sorted(places - {*least["position"].values.tolist()})
-
-
-def _join(first: MovingLoad, second: MovingLoad) -> MovingLoad:
-    """Return the factors at the places of both, and the worse collapse."""
-    factors = xr.concat([first.factors, second.factors], "position").sortby("position")
-    worse = min(first, second, key=lambda each: each.worst.factor)
-    return replace(worse, factors=factors)
 
 
 def _geometric_factor(

@@ -142,7 +142,9 @@ def read_outlines(
             _make_block(outline, polygon, known.get(outline.layer, Layer()), material, materials)
             for outline, polygon in zip(outlines, points, strict=True)
         ]
-        made = _assign_corners(assign_roles(blocks))
+        made = assign_roles(blocks)
+        directions = find_directions(made, touching(made))
+        made = tuple(replace(b, corners=_find_corners(b, directions.get(b.part))) for b in made)
     except (InvalidInput, InvalidStructure) as error:
         raise type(error)(f"{path}: {error}") from error
     return Survey(made, moved, outlines[0].frame, ignored)
@@ -235,12 +237,6 @@ def _make_block(
     role = outline.role or layer.role or ""
     corners = tuple((float(x), float(y)) for x, y in points)
     return Block(corners, chosen, outline.name, fixed, part=part, role=role)
-
-
-def _assign_corners(blocks: Sequence[Block]) -> tuple[Block, ...]:
-    """Return the blocks with corners where four-sided."""
-    directions = find_directions(blocks, touching(blocks))
-    return tuple(replace(b, corners=_find_corners(b, directions.get(b.part))) for b in blocks)
 
 
 def _find_corners(block: Block, direction: Direction | None) -> tuple[int, int, int, int] | None:

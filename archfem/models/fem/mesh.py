@@ -441,11 +441,12 @@ def _generate(structure: Structure, settings: Discretisation) -> None:
     geo = gmsh.model.geo
     corners = [geo.addPoint(x, y, 0.0) for x, y in edges.points]
     lines = [_add_lines(division, edge, corners) for edge in range(len(edges.ends))]
+    backwards = [[-line for line in reversed(along)] for along in lines]
     for number, block in enumerate(structure.blocks):
         loop = [
             line
             for start, edge in zip(edges.boundaries[number], edges.around[number], strict=True)
-            for line in _orient_lines(lines[edge], start == edges.ends[edge, 0])
+            for line in (lines if start == edges.ends[edge, 0] else backwards)[edge]
         ]
         surface = geo.addPlaneSurface([geo.addCurveLoop(loop)], number + 1)
         if block.corners is not None:
@@ -473,11 +474,6 @@ def _add_lines(division: Division, edge: int, corners: list[int]) -> list[int]:
     for line in lines:
         geo.mesh.setTransfiniteCurve(line, unit + 1)
     return lines
-
-
-def _orient_lines(lines: list[int], forward: bool) -> list[int]:
-    """Return the lines along an edge, or back along it."""
-    return lines if forward else [-line for line in reversed(lines)]
 
 
 def _mesh_blocks(division: Division) -> None:

@@ -54,7 +54,12 @@ class JointSegments:
             if _is_plane(model, begin, end):
                 segments.append((number, begin, 0.0, depths[number]))
                 continue
-            _check_exact(model, number)
+            if not isinstance(model.operator.law, Facets):  # they bend between springs
+                raise InvalidInput(
+                    f"the faces of joint '{model.structure.joints[number].name}' bend, and large "
+                    "displacements of such joints exist with exact quadrature only: leave "
+                    "quadrature out, or take fidelity 'faces' or 'rigid'"
+                )
             for point in range(begin, end, 2):
                 low, high = points.offset[point : point + 2]
                 segments.append((number, point, 0.5 * (low + high), abs(high - low)))
@@ -103,16 +108,6 @@ def _is_plane(model: LinearBlockModel, begin: int, end: int) -> bool:
         if largest > PLANE_FACE_TOLERANCE * np.abs(used).max(initial=0.0):
             return False
     return True
-
-
-def _check_exact(model: LinearBlockModel, number: int) -> None:
-    """Refuse faces that bend between springs."""
-    if not isinstance(model.operator.law, Facets):
-        raise InvalidInput(
-            f"the faces of joint '{model.structure.joints[number].name}' bend, and large "
-            "displacements of such joints exist with exact quadrature only: leave quadrature out, "
-            "or take fidelity 'faces' or 'rigid'"
-        )
 
 
 def build_large_joints(
