@@ -45,6 +45,9 @@ OPTIONAL_PACKAGES = {
         "pyvista's viewer of a run", "'apt-get install libegl1 libgl1', elsewhere Mesa's libEGL"
     ),
     "trame": Requirement("pyvista's HTML pages", "pip install 'archfem[notebooks]'"),
+    "meshio": Requirement(
+        "meshes of gmsh, and files other than .dxf and .vtu,", "pip install 'archfem[exchange]'"
+    ),
     "imageio": Requirement("films", "pip install 'archfem[film]'"),
     "pyvista": Requirement("its viewer and its films", "pip install 'archfem[film]'"),
     "ifcopenshell": Requirement("IFC files", "pip install 'archfem[ifc]'"),

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archfem._files import atomic_write
+from archfem._optional import require_package
 from archfem._typing import Array, Numbers
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
@@ -231,13 +232,8 @@ def _write_with_meshio(
     solids: Solids, displacement: Array, data: dict[str, NDArray[Any]], path: Path
 ) -> Path:
     """Write a file in one of meshio's formats."""
-    try:
+    with require_package("meshio"):
         import meshio
-    except ImportError as error:
-        raise InvalidInput(
-            f"{path.suffix} is written with meshio, which is not installed: pip install "
-            "'archfem[exchange]', or write .dxf or .vtu"
-        ) from error
     # meshio stores the cells of each type together
     types: dict[str, list[int]] = {}
     for number, polygon in enumerate(solids.cells.polygons):

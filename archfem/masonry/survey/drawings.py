@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from archfem._files import atomic_write, check_file, read_text
+from archfem._optional import require_package
 from archfem._typing import Array, Numbers
 from archfem._validation import short_repr
 from archfem.errors import InvalidInput
@@ -521,12 +522,8 @@ def _load_msh(
     path: Path, factor: float, dimension: int, corners: Mapping[str, int]
 ) -> tuple[Array, dict[int, str], dict[int, list[Numbers]]]:
     """Load points [m], and names and corners of cells of physical groups by tag, with meshio."""
-    try:
+    with require_package("meshio"):
         import meshio
-    except ImportError as error:
-        raise InvalidInput(
-            "meshes are read with meshio, which is not installed: pip install 'archfem[exchange]'"
-        ) from error
     with _foreign_reader("meshio", "mesh of gmsh"):
         read = meshio.gmsh.read(path)
         tags = read.cell_data.get("gmsh:physical", [])  # none where nothing is tagged
