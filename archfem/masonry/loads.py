@@ -38,8 +38,7 @@ class BodyForce:
         """Check that the values are multiples of g."""
         for name in ("horizontal", "vertical"):
             remedy = "give a multiple of g, such as 0.3"
-            value = getattr(self, name)
-            check_between(value, f"body force, {name} [g]", -1e3, 1e3, ends="[]", remedy=remedy)
+            check_between(getattr(self, name), f"body force, {name} [g]", -1e3, 1e3, remedy=remedy)
 
 
 @dataclass(frozen=True)

@@ -13,20 +13,15 @@ from archfem._typing import (
     Pascals,
     PascalsPerMetre,
 )
-from archfem._validation import check_number, check_words, is_one_of
+from archfem._validation import check_between, check_number, check_words, is_one_of
 from archfem.errors import InvalidInput
 from archfem.units import G, GPa, MPa, kN
 
 
-def _check_range(
-    item: Any, key: str, low: float, high: float, unit: str, words: str, remedy: str
-) -> None:
-    """Check that a field is a number between two values, which are given in words too."""
-    value = check_number(getattr(item, key), f"{key} of '{item.name}'")
-    if not low <= value <= high:
-        raise InvalidInput(
-            f"{key} {value:.3g}{unit} of '{item.name}' is not between {words}: {remedy}"
-        )
+def _check_range(item: Any, key: str, low: float, high: float, remedy: str) -> None:
+    """Check that a field is a number between two values."""
+    name = f"{key} of '{item.name}'"
+    check_between(getattr(item, key), name, low, high, ends="[]", remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -55,17 +50,13 @@ class Material:
         check_words(self.name, "name of a material")
         if self.stands_for is not None:
             check_words(self.stands_for, f"stands_for of '{self.name}'")
-        most = 1e6 if self.stands_for else 250.0
-        weight_range = 1e-3, most * kN, " N/m³", f"0.001 N/m³ and {most:g} kN/m³"
+        heaviest = (1e6 if self.stands_for else 250.0) * kN
         heavy = "give a weight, not a density, in N/m³, e.g. 20 * kN"
         heavy += "; a block that carries more than itself says so, stands_for='press'"
         inside = nextafter(-1.0, 0.0), nextafter(0.5, 0.0)  # the bounds of ν make no material
-        for row in (
-            ("young", 1e3, 1e13, " Pa", "1 kPa and 10 TPa", "give it in Pa, e.g. 30 * GPa"),
-            ("poisson", *inside, "", "-1 and 0.5", "stone has about 0.2"),
-            ("unit_weight", *weight_range, heavy),
-        ):
-            _check_range(self, *row)
+        _check_range(self, "young", 1e3, 1e13, "give it in Pa, e.g. 30 * GPa")
+        _check_range(self, "poisson", *inside, "stone has about 0.2")
+        _check_range(self, "unit_weight", 1e-3, heaviest, heavy)
         # no building material weighs as little in N/m³ as soils and stones do in these units
         for low, high, unit, factor in ((1e3, 4e3, "kg/m³", G), (5.0, 50.0, "kN/m³", kN)):
             if low <= self.unit_weight <= high:
@@ -149,27 +140,25 @@ class Contact:
             object.__setattr__(self, "friction", inf)
         else:
             remedy = "give the coefficient, not the angle, or None for a joint that never slides"
-            _check_range(self, "friction", 0.0, 10.0, "", "0 and 10", remedy)
-        stiffness_range = 1e3, 1e16, " Pa/m", "1 kPa/m and 10 PPa/m"
+            _check_range(self, "friction", 0.0, 10.0, remedy)
         for key in ("normal_stiffness", "shear_stiffness"):
-            _check_range(self, key, *stiffness_range, "give it in Pa/m: 1 MPa/mm is 1e9")
-        remedy = "give it in Pa, e.g. 5 * kPa"
-        _check_range(self, "cohesion", 0.0, 1e9, " Pa", "0 and 1 GPa", remedy)
+            _check_range(self, key, 1e3, 1e16, "give it in Pa/m: 1 MPa/mm is 1e9")
+        _check_range(self, "cohesion", 0.0, 1e9, "give it in Pa, e.g. 5 * kPa")
         # teeth are less steep than friction, and a bond ends at the apex of Coulomb's limit
         steepest = self.coefficient if self.slides else 0.0
         remedy = (
             "give tan ψ, not the angle, up to the coefficient of friction, which includes it; a "
             "joint that never slides does not dilate"
         )
-        _check_range(self, "dilatancy", 0.0, steepest, "", f"0 and {steepest:.3g}", remedy)
+        _check_range(self, "dilatancy", 0.0, steepest, remedy)
         apex = self.cohesion / self.coefficient if 0.0 < self.coefficient < inf else 1e9
         remedy = (
             "give the tensile strength in Pa, up to cohesion / friction, where Coulomb's limit ends"
         )
-        _check_range(self, "tension", 0.0, apex, " Pa", f"0 and {apex:.3g} Pa", remedy)
+        _check_range(self, "tension", 0.0, apex, remedy)
         if self.closure is not None:
             remedy = "give the largest closing in m, e.g. 0.1e-3, or None for a linear joint"
-            _check_range(self, "closure", 1e-7, 1.0, " m", "0.1 µm and 1 m", remedy)
+            _check_range(self, "closure", 1e-7, 1.0, remedy)
             if self.tension > 0.0:
                 raise InvalidInput(
                     f"tension {self.tension:.3g} Pa of '{self.name}' beside a closure: a bonded "

@@ -9,18 +9,21 @@ from archfem.masonry import BACKFILL, SOIL_TO_STONE, STONE_TO_STONE
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: af.Material(30.0, 0.2, 20e3), "young 30 Pa"),
-        (lambda: af.Material(30e9, 0.5, 20e3), "poisson 0.5"),
-        (lambda: af.Material(30e9, 0.2, 2e6), "unit_weight 2e"),
+        (lambda: af.Material(30.0, 0.2, 20e3), "young of .* = 30.0 is not between"),
+        (lambda: af.Material(30e9, 0.5, 20e3), "poisson of .* = 0.5 is not between"),
+        (lambda: af.Material(30e9, 0.2, 2e6), "unit_weight of .* = 2000000.0 is not"),
         (lambda: af.Material(30e9, 0.2, 20.0), "looks like kN/m³: .* have 2e.04"),
         (lambda: af.Material(30e9, 0.2, 20e3, -1.0), r"\[Pa\] = -1.0 is below 1000"),
-        (lambda: af.Contact(1.48, 0.3e9), "normal_stiffness 1.48"),
-        (lambda: af.Contact(1.48e9, 0.3e9, -0.1), "friction -0.1"),
-        (lambda: af.Contact(1e9, 1e9, 0.5, dilatancy=15.0), "dilatancy 15 .* between 0 and 0.5"),
-        (lambda: af.Contact(1e9, 1e9, 0.5, dilatancy=-0.1), "dilatancy -0.1"),
+        (lambda: af.Contact(1.48, 0.3e9), "normal_stiffness of .* = 1.48 is not"),
+        (lambda: af.Contact(1.48e9, 0.3e9, -0.1), "friction of .* = -0.1 is not"),
+        (
+            lambda: af.Contact(1e9, 1e9, 0.5, dilatancy=15.0),
+            "dilatancy of .* = 15.0 .* between 0 and 0.5",
+        ),
+        (lambda: af.Contact(1e9, 1e9, 0.5, dilatancy=-0.1), "dilatancy of .* = -0.1 is not"),
         (lambda: af.Contact(1e9, 1e9, None, dilatancy=0.1), "never slides does not dilate"),
-        (lambda: af.Contact(1e9, 1e9, 0.5, tension=-1.0), "tension -1"),
-        (lambda: af.Contact(1e9, 1e9, 0.5, cohesion=1e3, tension=2.1e3), "between 0 and 2e.03 Pa"),
+        (lambda: af.Contact(1e9, 1e9, 0.5, tension=-1.0), "tension of .* = -1.0 is not"),
+        (lambda: af.Contact(1e9, 1e9, 0.5, cohesion=1e3, tension=2.1e3), "between 0 and 2000:"),
     ],
 )
 def test_wrong_units_are_refused(make, says):
@@ -32,7 +35,7 @@ def test_a_block_that_stands_for_a_press_may_weigh_more_than_any_material():
     with pytest.raises(af.errors.InvalidInput, match="stands_for='press'"):
         af.Material(30e9, 0.2, 1e6)
     assert af.Material(30e9, 0.2, 1e6, stands_for="press").unit_weight == 1e6
-    with pytest.raises(af.errors.InvalidInput, match="and 250 kN/m³"):
+    with pytest.raises(af.errors.InvalidInput, match="and 250000"):
         af.Material(30e9, 0.2, 1e6, stands_for="")
 
 

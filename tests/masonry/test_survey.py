@@ -95,7 +95,7 @@ def test_layers_must_be_those_of_the_file(tmp_path, stack):
         af.errors.InvalidInput, match=r"no outlines on layer 'colum': its layers are \['col"
     ):
         af.read_outlines(path, layers=layers | {"colum": af.masonry.Layer()})
-    with pytest.raises(af.errors.InvalidStructure, match=r"snap 0\.0 m is not above 0"):
+    with pytest.raises(af.errors.InvalidStructure, match=r"snap \[m\] = 0\.0 is not above 0"):
         af.read_outlines(path, snap=0.0)
 
 

@@ -22,7 +22,7 @@ from scipy.spatial import cKDTree
 
 from archfem._files import atomic_write
 from archfem._typing import Array, Metres, MetresPerSecondSquared
-from archfem._validation import validate_arguments
+from archfem._validation import check_between, validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure, logger
 from archfem.masonry.assembly import Touch, assembled, by_materials, touching
 from archfem.masonry.block import Block, as_point, check_overlaps, check_simple, measure_polygon
@@ -299,8 +299,7 @@ def write_outlines(structure: Structure, path: str | Path) -> None:
 
 def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
     """Close the gaps between outlines; an error names the next tolerance that leaves no error."""
-    if not snap > 0.0:
-        raise InvalidStructure(f"snap {snap!r} m is not above 0: give e.g. 0.001")
+    check_between(snap, "snap [m]", 0.0, remedy="give e.g. 0.001", error=InvalidStructure)
     for outline in outlines:
         check_simple(outline.points, outline.name, outline.frame.place)
     try:
