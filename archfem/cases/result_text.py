@@ -21,17 +21,15 @@ from archfem.joints.criteria import (
     longest_duration,
     with_failure_flags,
 )
-from archfem.limit.backfill import Fill
-from archfem.limit.collapse import Collapse, describe_crushing
+from archfem.limit.collapse import Collapse, describe_crushing, describe_fill
 from archfem.limit.mechanism_count import Mechanism, duration_text
-from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.structure import Structure, join_joint_names, join_names
 from archfem.motion.matching import Match
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_text, utilisation_text
-from archfem.units import STANDARD_GRAVITY, format_mm, kN, kPa
+from archfem.units import STANDARD_GRAVITY, format_mm, kN
 
 
 class ResultTable(NamedTuple):
@@ -218,17 +216,6 @@ def describe_depths(structure: Structure) -> str:
         f"depth of joints: {format_mm(float(depths.min()))} at least, at "
         f"{structure.joints[int(depths.argmin())].name}; median {format_mm(median)}"
     )
-
-
-def describe_fill(fill: Fill | PlasticFill | None) -> str:
-    """Describe how a fill acts on the stones of limit analysis; "" without its strength."""
-    if fill is None:
-        return ""
-    strength = f"friction angle {fill.friction_angle:g}°, cohesion {fill.cohesion / kPa:g} kPa"
-    if isinstance(fill, PlasticFill):
-        return f"fill: a plastic body, {strength}"
-    share = f"{fill.active:.2g} of the active and at most {fill.mobilisation:.2g} of the passive"
-    return f"fill: weight, and {share} pressure, {strength}"
 
 
 def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnalysis) -> str:

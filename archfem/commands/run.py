@@ -45,7 +45,7 @@ from archfem.dynamics.motion_scaling import (
 )
 from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
-from archfem.limit.collapse import Collapse
+from archfem.limit.collapse import Collapse, describe_fill
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
@@ -186,7 +186,7 @@ def assess(options: argparse.Namespace) -> None:
             "horizontal = 1 or -1 in [limit] computes it so"
         )
     texts = [f"{name}: {result}" for name, result in found.items()]
-    texts.append(result_text.describe_fill(case.assessment.options.get("fill")))
+    texts.append(describe_fill(case.assessment.options.get("fill")))
     text = "\n\n".join(filter(None, [*texts, "\n".join(dict.fromkeys(doubts))]))
     print(f"{case.title}\n{text}")
 

@@ -30,6 +30,10 @@ from archfem.units import in_degrees
 
 SELF_WEIGHT = BodyForce(0.0, -1.0)
 
+# Horizontal strength of backing [Pa]: rubble in lime mortar has 1 to 2 MPa (from memory). A finite
+# one makes factors continuous in the level of the backing.
+BACKING_STRENGTH = 1e6
+
 
 @dataclass(frozen=True, kw_only=True)
 class Fill:
@@ -64,8 +68,10 @@ class Fill:
             half-plane under a line load, or "uniform", evenly on each level.
         spread: half the angle of the fan, from the vertical [degrees]. The part that Boussinesq's
             stresses would carry outside of it is distributed inside.
-        backing: level, a y coordinate, up to which masonry behind the haunches holds stones of
-            rings and piers: those with their centroid below it do not move [m]; None for none.
+        backing: level, a y coordinate, up to which there is masonry behind the haunches, not fill
+            [m]; None for none. It holds the stones' faces horizontally, without tension, by up to
+            `BACKING_STRENGTH`: faces beside the ground against the ground, those above a pier
+            against each other. It never pushes.
 
     References:
         Gilbert, RING Theory and Modelling Guide, University of Sheffield (2005). Rankine, Phil.
@@ -336,6 +342,8 @@ class FillContacts:
     toward: Array  # sense of the pressure along x, 1 or -1 (n,)
     least: Array  # active pressure at both ends (n, 2) [Pa]
     most: Array  # mobilised passive pressure at both ends (n, 2) [Pa]
+    backed: Flags  # whether the piece is beside backing, not fill (n,)
+    partner: Numbers  # piece on which the same backing presses, or the piece itself (n,)
 
     def thrust(self, pressure: Array, width: float) -> tuple[Array, Array]:
         """Return points and resultants (n, 2) of pressures that are linear along each piece."""
@@ -358,12 +366,10 @@ class BlocksWithFill:
         """Stones and fill in strips."""
         return FillProfile(self.whole, self.rigid_regions.place >= 0)
 
-    @cached_property
-    def contacts(self) -> FillContacts:
-        """Pieces of the stones' faces on which the fill presses."""
+    def _faces(self) -> list[tuple[int, Array, float]]:
+        """Return region, ends and outward sense along x of each face of a stone below the fill."""
         soil, normals = set(find_yielding_blocks(self.whole)), self.whole.normals
-        block, ends, toward, stress = [], [], [], []
-        pieces, level = 8, 1e-9  # pieces a face; rise over length of a face without side pressure
+        faces, level = [], 1e-9  # rise over length of a face without side pressure
         for number, joint in enumerate(self.whole.joints):
             stone = next((b for b in joint.blocks if b not in soil), joint.lower)
             other = joint.blocks[0] + joint.blocks[1] - stone
@@ -371,19 +377,59 @@ class BlocksWithFill:
             bare = self.rigid_regions.place[stone] < 0 or self.whole.blocks[stone].fixed
             if bare or other not in soil or abs(out[0]) <= level or out[1] < -level:
                 continue
-            along = np.linspace(0.0, 1.0, pieces + 1)[:, None]
-            points = joint.ends[0] + along * np.diff(joint.ends, axis=0)
-            side = float(np.sign(out[0]))
+            faces.append((self.rigid_regions.place[stone], joint.ends, float(np.sign(out[0]))))
+        return faces
+
+    @cached_property
+    def contacts(self) -> FillContacts:
+        """Pieces of the stones' faces on which the fill presses, or that the backing holds."""
+        assert self.fill is not None
+        block, ends, toward, stress = [], [], [], []
+        faces, shares = self._faces(), np.linspace(0.0, 1.0, 9)  # eight pieces a face
+        slabs = self._cut_backing([ends[:, 1] for _, ends, _ in faces], shares)
+        for region, (start, end), side in faces:
+            # beside backing, cuts are at the heights of those of the face across it
+            at = (slabs - start[1]) / (end[1] - start[1])
+            near = self._profile.near / abs(end[1] - start[1])
+            above = start[1] + shares * (end[1] - start[1]) > slabs.max(initial=-np.inf)
+            cuts = [shares[[0, -1]], shares[above], at[(at > near) & (at < 1.0 - near)]]
+            along = np.unique(np.concatenate(cuts))[:, None]
+            points = start + along * (end - start)
             over = np.array([self._profile.overburden(point, side) for point in points])
-            block += [self.rigid_regions.place[stone]] * pieces
-            toward += [-side] * pieces
+            block += [region] * (len(points) - 1)
+            toward += [-side] * (len(points) - 1)
             ends += list(pairwise(points))
             stress += list(pairwise(over))
-        assert self.fill is not None
         least, most = self.fill.pressures(np.array(stress, dtype=float).reshape(-1, 2))
-        faces = np.array(ends, dtype=float).reshape(-1, 2, 2)
-        senses = np.array(toward, dtype=float)
-        return FillContacts(np.array(block, dtype=np.intp), faces, senses, least, most)
+        pieces, senses = np.array(ends, dtype=float).reshape(-1, 2, 2), np.array(toward)
+        middle = pieces.mean(axis=1)
+        slab = np.searchsorted(slabs, middle[:, 1])
+        backed = slab < len(slabs)
+        least[backed], most[backed] = 0.0, BACKING_STRENGTH
+        # of neighbours in a slab, a face to the right and one to the left have backing between them
+        order, partner = np.lexsort((middle[:, 0], slab)), np.arange(len(slab))
+        left, right = order[:-1], order[1:]
+        across = backed[left] & (slab[left] == slab[right]) & (senses[left] < senses[right])
+        partner[right[across]] = left[across]
+        numbers = np.array(block, dtype=np.intp)
+        return FillContacts(numbers, pieces, senses, least, most, backed, partner)
+
+    def _cut_backing(self, faces: Sequence[Array], shares: Array) -> Array:
+        """Return the heights at which the backing is cut into level slabs, the last its top [m]."""
+        assert self.fill is not None
+        if (level := self.fill.backing) is None:
+            return np.zeros(0)
+        check_number(level, "fill, backing")
+        heights = np.concatenate([start + shares * (end - start) for start, end in faces])
+        lowest, highest = heights.min(), heights.max()
+        if not lowest < level < highest:
+            raise InvalidInput(
+                f"fill, backing {level:.4g} m holds {'all' if level > lowest else 'none'} of the "
+                f"stones, whose faces below the fill are {lowest:.4g} to {highest:.4g} m high: "
+                "give a level between"
+            )
+        heights = np.unique([*heights[heights < level], level])
+        return heights[np.append(np.diff(heights) > self._profile.near, True)]
 
     def load(self, actions: Sequence[BodyForce | PointLoad]) -> Array:
         """Return the generalised forces of actions on the free stones (3 n_free,) [N, N, N m]."""
@@ -445,7 +491,11 @@ class BlocksWithFill:
         """Return the generalised forces of each contact's pressure range (3 n_free, n)."""
         contacts = self.contacts
         points, forces = contacts.thrust(contacts.most - contacts.least, self.whole.width)
-        return sparse.csr_matrix(self._apply_forces(contacts.block, points, forces).T)
+        single = self._apply_forces(contacts.block, points, forces).T
+        # backing presses as much on one side as on the other: one unknown for both
+        count = np.arange(len(contacts.partner))
+        pairs = sparse.csr_matrix((np.ones(len(count)), (count, contacts.partner)))
+        return sparse.csr_matrix(single @ pairs)
 
     def pressure_dataset(self, share: Array) -> xr.Dataset | None:
         """Return the pressures of the fill over contact, or None where there is none."""
@@ -453,6 +503,7 @@ class BlocksWithFill:
             return None
         contacts = self.contacts
         share = share[len(share) - len(contacts.block) :]  # a load factor may stand before them
+        share = share[contacts.partner]
         least, most = contacts.least.mean(axis=1), contacts.most.mean(axis=1)
         pressures = {"pressure": least + share * (most - least), "least": least, "most": most}
         variables = {key: ("contact", value, {"units": "Pa"}) for key, value in pressures.items()}
@@ -462,6 +513,7 @@ class BlocksWithFill:
             "x": (ends, contacts.ends[:, :, 0], {"units": "m"}),
             "y": (ends, contacts.ends[:, :, 1], {"units": "m"}),
             "toward": ("contact", contacts.toward),
+            "backed": ("contact", contacts.backed),
         }
         return xr.Dataset(variables, coordinates)
 
@@ -511,7 +563,6 @@ def attach_fill(structure: Structure, fill: object) -> BlocksWithFill:
             f"this analysis cannot take a {type(fill).__name__}: only collapse_factor bounds a "
             "plastic fill, and moving_load and rate by it; give af.limit.Fill here"
         )
-    structure = hold_backed(structure, None if fill is None else fill.backing)
     soil = find_yielding_blocks(structure)
     names = [structure.blocks[number].name for number in soil]
     # Fill cut into pieces has the strength of its joints: its pieces are rigid as stones are.

@@ -22,6 +22,7 @@ from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, logger
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import (
+    BACKING_STRENGTH,
     BlocksWithFill,
     Fill,
     is_balanced,
@@ -41,7 +42,7 @@ from archfem.masonry.structure import (
     join_names,
     structure_of,
 )
-from archfem.units import MPa, kN
+from archfem.units import MPa, kN, kPa
 
 
 class Outcome(ExplainedWord):
@@ -509,6 +510,31 @@ def describe_crushing(strength: float | None, structure: Structure) -> str:
     return (
         f"joints do not crush: the default strength of {least / MPa:.3g} MPa is not used; "
         "strength in [limit] gives one"
+    )
+
+
+# by the table of load tests in docs/theory/fill.md
+PLASTIC_EVIDENCE = (
+    "too strong for 4 of 7 bridges under load tests: state the range to law 'pressure'"
+)
+
+
+def describe_fill(fill: Fill | PlasticFill | None) -> str:
+    """Describe how a fill acts on the stones of limit analysis; "" without its strength."""
+    if fill is None:
+        return ""
+    strength = f"friction angle {fill.friction_angle:g}°, cohesion {fill.cohesion / kPa:g} kPa"
+    if isinstance(fill, PlasticFill):
+        text = f"fill: a plastic body, {strength}, {PLASTIC_EVIDENCE}"
+        holds = "stones below are fixed"
+    else:
+        share = (
+            f"{fill.active:.2g} of the active and at most {fill.mobilisation:.2g} of the passive"
+        )
+        text = f"fill: weight, and {share} pressure, {strength}"
+        holds = f"it holds faces horizontally, by up to {BACKING_STRENGTH / MPa:g} MPa"
+    return (
+        text if fill.backing is None else f"{text}; backing up to y = {fill.backing:g} m: {holds}"
     )
 
 

@@ -12,7 +12,7 @@ from archfem._typing import Array, Metres, Pascals
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import Fill, is_balanced, self_weight_programme
-from archfem.limit.collapse import describe_crushing
+from archfem.limit.collapse import describe_crushing, describe_fill
 from archfem.limit.instability import DeepenedBlocks
 from archfem.limit.plastic_fill import PlasticFill
 from archfem.limit.vehicles import (
@@ -28,7 +28,13 @@ from archfem.limit.vehicles import (
     vehicle_positions,
 )
 from archfem.masonry.loads import PointLoad
-from archfem.masonry.structure import CONTACT_TOLERANCE, HasStructure, Structure, structure_of
+from archfem.masonry.structure import (
+    CONTACT_TOLERANCE,
+    HasStructure,
+    Structure,
+    join_names,
+    structure_of,
+)
 
 # Beginning of the line of a rating on what the pressure of the fill adds
 PRESSURE_RANGE = "over the pressure of the fill, at that place: "
@@ -60,6 +66,9 @@ class Rating(ResultDisplay):
         full_pressure: factor of the same loads with all of its passive pressure; else NaN.
         deepest: factor at the worst place with joints of any depth, where it is below 1 as they
             slide; else NaN. It differs from stone to stone.
+        without_backing: factor of the same loads without the backing of a `Fill`; NaN without one,
+            and where the bridge then does not stand.
+        fill: strength of the fill, or None.
     """
 
     structure: Structure
@@ -76,6 +85,8 @@ class Rating(ResultDisplay):
     without_pressure: float = np.nan
     full_pressure: float = np.nan
     deepest: float = np.nan
+    without_backing: float = np.nan
+    fill: Fill | PlasticFill | None = None
 
     @property
     def factor(self) -> float:
@@ -91,10 +102,21 @@ class Rating(ResultDisplay):
     def outcome(self) -> str:
         """Whether it passes, on which condition, and the factor by rule where less was given."""
         words = "passes" if self.passes else "fails"
+        needed = self._needs() if self.passes else []
+        words += f" only with the {' and the '.join(needed)}" if needed else ""
         if missing := self._missing_factors():
             words += f" if the code's {missing} is at most {self.factor:.4g}" if self.passes else ""
         words += f" without {self.vehicle.left_out}" if self.vehicle.left_out else ""
         return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
+
+    def _needs(self) -> list[str]:
+        """Return the parts of the fill without any of which the bridge fails at this place."""
+        fill, parts = self.fill, list[str]()
+        if isinstance(fill, Fill):
+            parts += [] if self.without_pressure >= 1.0 else ["pressure of the fill"]
+            backed = fill.backing is not None and not self.without_backing >= 1.0
+            parts += ["backing"] if backed else []
+        return parts
 
     def _missing_factors(self) -> str:
         """Return the factors of a code that neither the vehicle nor its user gave, in words."""
@@ -125,27 +147,40 @@ class Rating(ResultDisplay):
             f"{self._place_text()}, {self.outcome}"
         )
 
-    def _place_text(self) -> str:
-        """Return where the axles stand at the worst place, in words."""
-        axles = parse_axles(self.vehicle.axles, self.vehicle.spacings)
-        place = self.moving.direction, self.moving.position
-        stand = [load.x for load in axles_on_structure(self.structure, axles, *place)]
+    @property
+    def _spans(self) -> dict[str, tuple[float, float]]:
+        """Clear span of each ring, from its left to its right end [m]."""
         spans: dict[str, list[float]] = {}
         for joint in self.structure.joints:
             if joint.role == "ring":
                 spans.setdefault(joint.part, []).append(joint.intrados[0])
+        return {part: (min(xs), max(xs)) for part, xs in spans.items()}
+
+    def _place_text(self) -> str:
+        """Return where the axles stand at the worst place, in words: those over rings that fail."""
+        axles = parse_axles(self.vehicle.axles, self.vehicle.spacings)
+        place = self.moving.direction, self.moving.position
+        stand = [load.x for load in axles_on_structure(self.structure, axles, *place)]
+        worst, joints = self.moving.worst, self.structure.joints
+        spans, moves = self._spans, {joints[number].part for number, _ in worst.hinges}
+        moves |= {joints[number].part for number in worst.sliding}
+        over: dict[str, list[float]] = {}
+        for x in stand if len(spans) > 1 else []:
+            # the ring below the axle, or the nearest one
+            part = min(spans, key=lambda name: max(spans[name][0] - x, x - spans[name][1]))
+            if part in moves:
+                over.setdefault(f"'{part}'", []).append(x)
+        if over:
+            stand = [x for here in over.values() for x in here]
         if not (spans and stand):
             return f"at x = {self.moving.position:.3g} m (the vehicle's middle)"
-        ends, mean = {part: (min(xs), max(xs)) for part, xs in spans.items()}, np.mean(stand)
-        # the ring below the axles, or the nearest one
-        ring = min(ends, key=lambda part: max(ends[part][0] - mean, mean - ends[part][1]))
-        first, *others = (f"{x - ends[ring][0]:.2f}" for x in stand)
+        first, *others = (f"{x:.2f}" for x in sorted(stand))
         where = " and ".join([", ".join([first, *others[:-1]]), *others[-1:]])
         where = f"{first} to {others[-1]}" if len(stand) > 4 else where
         count = f"{len(stand)} axle{'s'[: len(others)]}"
         count += f" of {len(axles)}" if len(axles) > len(stand) else ""
-        name = f" of '{ring}'" if len(ends) > 1 else ""
-        return f"with {count} at {where} m from the left of the clear span{name}"
+        name = f" over {join_names(list(over))}" if over else ""
+        return f"with {count}{name} at x = {where} m"
 
     def __str__(self) -> str:
         """Describe outcome, worst places, mechanism, factors and sources, a line each."""
@@ -167,9 +202,11 @@ class Rating(ResultDisplay):
             f"the factor is on axles × live × impact{also}; codes with partial factors require 1",
             *self._describe_missing(),
             *self._describe_pressure(),
+            *self._describe_backing(),
             f"least factor driving {', '.join(least)}",
             f"{self.moving}",
             *self._describe_hinges(),
+            *self._describe_spans(),
             f"geometric factor of safety at that place: {self._geometric_text()}",
             "it is of the same vehicle; Heyman requires it, often 2 (from memory), and no code",
             f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN"
@@ -179,6 +216,7 @@ class Rating(ResultDisplay):
             f"impact by {self.impact:g} ({self._source('impact')})",
             f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
             describe_crushing(self.strength, self.structure),
+            *filter(None, [describe_fill(self.fill)]),
         ]
         return "\n".join(lines)
 
@@ -194,6 +232,15 @@ class Rating(ResultDisplay):
             f"{self.full_pressure:.4g} with all of the passive one"
         ]
 
+    def _describe_backing(self) -> list[str]:
+        """Return the line on what the backing adds, if there is some."""
+        if not isinstance(self.fill, Fill) or self.fill.backing is None:
+            return []
+        least = f"{self.without_backing:.4g}"
+        if np.isnan(self.without_backing):
+            least = "the bridge does not stand"
+        return [f"without the backing but with the pressure, at that place: {least}"]
+
     def _describe_missing(self) -> list[str]:
         """Return the line on what codes ask of a vehicle without any factors, if it is one."""
         if self._missing_factors() != "live × impact":
@@ -208,6 +255,14 @@ class Rating(ResultDisplay):
         joints = self.structure.joints
         ends = [getattr(joints[number], side) for number, side in self.moving.worst.hinges]
         return [f"hinges at x = {', '.join(f'{x:.2f}' for x, _ in ends)} m"] if ends else []
+
+    def _describe_spans(self) -> list[str]:
+        """Return the line on where the rings are on the x axis of all places, if there are some."""
+        spans = (
+            f"from {low:.2f} to {high:.2f} m{f' ({part!r})' if len(self._spans) > 1 else ''}"
+            for part, (low, high) in self._spans.items()
+        )
+        return [f"every x is that of the case and the picture; clear span {' and '.join(spans)}"]
 
     def _source(self, factor: str) -> str:
         """Return where a factor on the vehicle comes from."""
@@ -321,8 +376,14 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     if not is_plastic:
         geometric, deepest = _geometric_factor(weighted, moving, options)
     factors = live, impact, dead, width, area_load
-    more = by_rule, strength, *_vary_pressure(weighted, moving, options), deepest
-    return Rating(structure, driven, *factors, moving, geometric, *more)
+    without, full, unbacked = _vary_fill(weighted, moving, options)
+    more: dict[str, Any] = {
+        "strength": strength,
+        "without_pressure": without,
+        "full_pressure": full,
+    }
+    more |= {"deepest": deepest, "without_backing": unbacked, "fill": fill}
+    return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
 
 
 def _find_vehicle(vehicle: str | Vehicle) -> Vehicle:
@@ -410,19 +471,22 @@ def _geometric_factor(
     return 1.0 / high, np.nan
 
 
-def _vary_pressure(
+def _vary_fill(
     structure: Structure, moving: MovingLoad, options: dict[str, Any]
-) -> tuple[float, float]:
-    """Return the factor of the worst loads without pressure of a fill and with all of it."""
+) -> tuple[float, float, float]:
+    """Return the factor of the worst loads without pressure, with all of it, without backing."""
     # At the worst place alone: over all places the least factors differ by up to 0.5 %.
     if not isinstance(fill := options["fill"], Fill):
-        return np.nan, np.nan
+        return np.nan, np.nan, np.nan
     row = tuple(load for load in moving.worst.live if isinstance(load, PointLoad))
-    factors = []
-    for part, active in ((0.0, 0.0), (1.0, fill.active)):
-        other = options | {"fill": replace(fill, mobilisation=part, active=active)}
-        stones, dead = self_weight_programme(structure, **other)
+
+    def factor_of(other: Fill) -> float:
+        given = options | {"fill": other}
+        stones, dead = self_weight_programme(structure, **given)
         stands = is_balanced(dead.minimise_residual(), dead)
-        found = collapse_factors(stones, dead, {row: stones.load(row)}, other) if stands else {}
-        factors.append(found.get(row, np.nan))
-    return factors[0], factors[1]
+        found = collapse_factors(stones, dead, {row: stones.load(row)}, given) if stands else {}
+        return found.get(row, np.nan)
+
+    without = factor_of(replace(fill, mobilisation=0.0, active=0.0))
+    full = factor_of(replace(fill, mobilisation=1.0))
+    return without, full, np.nan if fill.backing is None else factor_of(replace(fill, backing=None))

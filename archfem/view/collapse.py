@@ -13,6 +13,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from archfem._typing import Array
 from archfem._validation import validate_arguments
@@ -68,10 +69,15 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse, factors: 
     """Draw mechanism, hinges, thrust line and loads over a structure that is drawn already."""
     if found.fill_motion is not None:
         _draw_fill(axes, structure, found)
+    elif found.soil is not None and found.soil["backed"].any():
+        _hatch_backing(
+            axes, structure, float(found.soil["y"].values[found.soil["backed"].values].max())
+        )
     if found.motion.any():
         motion = scale_motion(structure, found.motion)
         _draw_motion(axes, outline_moving_blocks(structure, motion), "mechanism")
-        _mark_hinges(axes, structure, found, motion, {"label": "hinge", "ms": 7.5})
+        # on the undeformed joints, whose x is that of the text
+        _mark_hinges(axes, structure, found, 0.0 * motion, {"label": "hinge", "ms": 7.5})
         _mark_sliding(axes, structure, found.sliding)
     # limit analysis counts the joints of all stones
     soft = set(find_yielding_blocks(structure))
@@ -113,6 +119,17 @@ def _draw_fill(axes: Axes, structure: Structure, found: Collapse) -> None:
             label="pressure of the fill",
         )
     )
+
+
+def _hatch_backing(axes: Axes, structure: Structure, level: float) -> None:
+    """Hatch the fill below the level of the backing."""
+    blocks = [structure.blocks[number].drawn() for number in find_yielding_blocks(structure)]
+    style = {"facecolors": "none", "edgecolors": Colour.GREY, "linewidths": 0.0, "hatch": "xxx"}
+    backing = PolyCollection(blocks, label="backing", **style)
+    axes.add_collection(backing)
+    (left, low), (right, _) = outline_bounds(structure)
+    box = Rectangle((left, low), right - left, level - low, transform=axes.transData)
+    backing.set_clip_path(box)
 
 
 def draw_collapse_result(found: Collapse) -> Figure:

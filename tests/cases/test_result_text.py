@@ -9,7 +9,6 @@ import archfem as af
 from archfem.cases.analysis_keys import parse_limit
 from archfem.cases.result_text import (
     describe_collapse,
-    describe_fill,
     describe_opposite,
     describe_run,
     describe_run_quality,
@@ -17,6 +16,7 @@ from archfem.cases.result_text import (
     tabulate_joints,
     tabulate_runs,
 )
+from archfem.limit.collapse import describe_fill
 from archfem.limit.mechanism_count import duration_text
 
 
@@ -73,7 +73,13 @@ def test_limit_analysis_in_words(ring):
     assert "at most 0.33 of the passive pressure, friction angle 35°, cohesion 0 kPa" in fill
     plastic = {"law": "plastic", "friction_angle": 30, "cohesion": "5 kPa"}
     plastic = parse_limit({"fill": plastic}).fill
-    assert describe_fill(plastic) == "fill: a plastic body, friction angle 30°, cohesion 5 kPa"
+    assert describe_fill(plastic).startswith(
+        "fill: a plastic body, friction angle 30°, cohesion 5 kPa, too strong for 4 of 7 bridges"
+    )
+    backed = describe_fill(replace(plastic, backing=0.5))
+    assert backed.endswith("; backing up to y = 0.5 m: stones below are fixed")
+    backed = describe_fill(replace(limit.fill, backing=0.5))
+    assert backed.endswith("up to y = 0.5 m: it holds faces horizontally, by up to 1 MPa")
     mirrored = af.collapse_factor(ring, live=af.BodyForce(-2.0))
     assert mirrored.sentence == pushed.sentence.replace("right", "left")
     wheel = af.PointLoad(0.5, (0.0, -3e3))

@@ -5,8 +5,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from backfilled import arch_bridge, column_above, fill_of, row_of_stones
+from backfilled import (
+    arch_bridge,
+    column_above,
+    faces_of,
+    fill_of,
+    rectangle,
+    retaining_wall,
+    row_of_stones,
+)
 from scipy.integrate import quad
+from scipy.optimize import linprog
 
 import archfem as af
 from archfem.limit import Fill
@@ -297,13 +306,112 @@ def test_the_residual_may_be_the_rounding_of_all_blocks_that_move(free, share, s
     assert is_balanced(fall, dead) is stands
 
 
-@pytest.mark.parametrize(
-    "law", [af.limit.Fill, pytest.param(af.limit.PlasticFill, marks=pytest.mark.slow)]
-)
-def test_backing_holds_the_stones_below_its_level(law):
+def push_with_backing(structure, level):
+    """Horizontal pull that brings a backed ring down: a linear programme by other means [g].
+
+    Backing presses on each of many thin slices of a face by up to its strength. Nothing slides.
+    """
+    ring = [n for n in structure.free if structure.blocks[n].role == "ring"]
+    joints = [j for j in structure.joints if set(j.blocks) & set(ring) and j.role == "ring"]
+    columns, bounds, dead = [], [], np.zeros(3 * len(ring))
+    pull = np.zeros(3 * len(ring))
+
+    def add(target, number, point, force, sense=1.0):
+        if number in ring:
+            row = 3 * ring.index(number)
+            moment = point[0] * force[1] - point[1] * force[0]
+            target[row : row + 3] += sense * np.array([force[0], force[1], moment])
+
+    for joint in joints:
+        along = joint.ends[1] - joint.ends[0]
+        along /= np.linalg.norm(along)
+        across = structure.centroids[joint.blocks[1]] - structure.centroids[joint.blocks[0]]
+        across -= along * (across @ along)
+        across /= np.linalg.norm(across)
+        for point, force, low in (
+            *((end, across, 0.0) for end in joint.ends),
+            (joint.ends[0], along, None),
+        ):
+            columns.append(np.zeros(3 * len(ring)))
+            add(columns[-1], joint.blocks[1], point, force)
+            add(columns[-1], joint.blocks[0], point, force, -1.0)
+            bounds.append((low, None))
+    for number in ring:
+        block = structure.blocks[number]
+        weight = block.area * block.material.unit_weight * structure.width
+        above, x = column_above(structure, number)
+        face = faces_of(structure, number)[0]
+        foot = x, np.interp(x, *face.T)
+        for target, direction in ((dead, (0.0, -1.0)), (pull, (1.0, 0.0))):
+            for point, size in ((structure.centroids[number], weight), (foot, above)):
+                add(target, number, point, size * np.array(direction))
+        out = np.sign(face.mean(axis=0)[0] - 4.5)
+        share = np.linspace(0.0, 1.0, 201)
+        points = face[0] + (0.5 * (share[1:] + share[:-1]))[:, None] * (face[1] - face[0])
+        height = abs(face[1, 1] - face[0, 1]) / 200.0
+        for point in points[points[:, 1] < level]:
+            columns.append(np.zeros(3 * len(ring)))
+            add(columns[-1], number, point, (-out, 0.0))
+            bounds.append((0.0, 1e6 * height * structure.width))
+    matrix = np.column_stack([*columns, pull])
+    cost = np.append(np.zeros(len(columns)), -1.0)
+    return -linprog(cost, A_eq=matrix, b_eq=-dead, bounds=[*bounds, (0.0, None)]).fun
+
+
+def test_backing_holds_faces_up_to_its_level_as_in_an_independent_programme():
+    """It holds less than fixed stones would, and no small step of the level adds much."""
+    structure, load = arch_bridge(), af.BodyForce(1.0, 0.0)
+    fill = Fill(friction_angle=35.0, mobilisation=0.0, active=0.0)
+    levels = [*np.arange(0.5, 1.0, 0.02)]
+    found = [
+        af.collapse_factor(
+            structure, live=load, friction=None, fill=replace(fill, backing=level)
+        ).factor
+        for level in levels
+    ]
+    assert np.diff(found).min() > 0.0
+    assert (np.diff(found) / found[:-1]).max() < 0.05
+    for level, factor in list(zip(levels, found, strict=True))[::8]:
+        assert push_with_backing(structure, level) == pytest.approx(factor, rel=5e-3)
+
+
+@pytest.mark.parametrize("level", [0.05, 0.1, 0.2])
+def test_backing_behind_a_wall_by_hand(level):
+    """A wall turns about its toe when the backing crushes: λ W H/2 = W b/2 + S h²/2."""
+    wall, fill = retaining_wall(), Fill(friction_angle=35.0, mobilisation=0.0, active=0.0)
+    weight, moment = 2.0 * af.STONE.unit_weight, 0.5e6 * level**2
+    found = af.collapse_factor(
+        wall, live=af.BodyForce(1.0, 0.0), friction=None, fill=replace(fill, backing=level)
+    )
+    assert found.factor == pytest.approx((weight * 0.5 + moment) / weight, rel=1e-9)
+
+
+def test_backing_between_two_walls_is_a_strut():
+    """Both turn about their toes at once: the sum of the weights' moments over that of the push."""
+    rough, stone = af.masonry.STONE_TO_STONE, af.STONE.unit_weight
+    blocks = [
+        rectangle(-2.0, -1.0, 6.0, 0.0, "rock", fixed=True),
+        rectangle(-1.0, 0.0, 0.0, 2.0, "slender"),
+        rectangle(0.0, 0.0, 2.0, 2.0, "soil", af.masonry.BACKFILL),
+        rectangle(2.0, 0.0, 4.0, 2.0, "thick"),
+    ]
+    structure = af.masonry.assembled(
+        blocks, lambda a, b: af.masonry.SOIL_TO_STONE if "soil" in (a.name, b.name) else rough
+    )
+    fill = Fill(friction_angle=35.0, mobilisation=0.0, active=0.0, backing=1.5)
+    found = af.collapse_factor(structure, live=af.BodyForce(1.0, 0.0), friction=None, fill=fill)
+    assert found.factor == pytest.approx((2.0 * 0.5 + 4.0 * 1.0) / (2.0 + 4.0), rel=1e-9)
+    pressed = found.soil.where(found.soil.backed, drop=True)
+    height = np.ptp(pressed.y.values, axis=1)
+    thrust = (pressed.toward * pressed.pressure * height).groupby("block").sum()
+    assert thrust[0] == pytest.approx(-thrust[1])
+    assert abs(float(thrust[0])) > 0.01 * stone
+
+
+@pytest.mark.slow
+def test_backing_fixes_the_stones_below_its_level_in_a_plastic_fill():
     """As of a bridge whose lowest stones are fixed; they do not move, and it carries more."""
-    if law is af.limit.PlasticFill:
-        pytest.importorskip("clarabel")
+    pytest.importorskip("clarabel")
     structure = arch_bridge()
     stones = [n for n in structure.free if structure.blocks[n].role == "ring"]
     level = float(np.sort(structure.centroids[stones, 1])[7]) + 1e-3
@@ -317,7 +425,7 @@ def test_backing_holds_the_stones_below_its_level(law):
         ),
     )
     load = af.PointLoad(x=3.6, force=(0.0, -1e3))
-    fill = law(friction_angle=35.0, cohesion=2e3)
+    fill = af.limit.PlasticFill(friction_angle=35.0, cohesion=2e3)
     free, same, backed = (
         af.collapse_factor(each, live=load, fill=replace(fill, backing=backing))
         for each, backing in ((structure, None), (fixed, None), (structure, level))

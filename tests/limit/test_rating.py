@@ -242,7 +242,7 @@ def test_words_and_table(lorry_rating):
     places = sorted(lorry_rating.moving.position + sense * np.array([1.6, -1.6]))
     (beside,) = (x for x in places if not 0.0 < x < 9.0)  # ends of the fill
     (x,) = {*places} - {beside}
-    stands = f"1 axle of 2 at {x - CLEAR_FROM:.2f} m from the left of the clear span, "
+    stands = f"1 axle of 2 at x = {x:.2f} m, "
     assert f"factor {lorry_rating.factor:.4g} with {stands}" in repr(lorry_rating)
     assert ("passes" in repr(lorry_rating)) == (lorry_rating.factor >= 1.0)
     head, *rows = lorry_rating.table().splitlines()
@@ -260,6 +260,9 @@ def test_words_and_table(lorry_rating):
     for x, joint in zip(line.removeprefix("hinges at x = ").split(","), hinges, strict=True):
         ends = lorry_rating.structure.ends[joint][:, 0]
         assert ends.min() - 0.01 < float(x.removesuffix(" m")) < ends.max() + 0.01
+    span = f"clear span from {CLEAR_FROM:.2f} to {9.0 - CLEAR_FROM:.2f} m"
+    assert f"\nevery x is that of the case and the picture; {span}\n" in words
+    assert words.endswith("passive pressure, friction angle 35°, cohesion 0 kPa")
     assert len(rows) == lorry_rating.moving.factors["factor"].size
     least = min(float(row.split(",")[2]) for row in rows)
     assert least == pytest.approx(lorry_rating.factor, rel=1e-5)  # six digits
@@ -302,11 +305,39 @@ def test_places_of_axles_are_of_the_span_that_is_loaded(monkeypatch):
     monkeypatch.setattr(rating, "_places_at_ends", lambda *_: [])
     monkeypatch.setattr(rating, "_places_along", lambda *_: (min(inner) + 1.0,))
     found = af.rate(bridge, Vehicle("axles", (1e3,) * 9, (0.2,) * 8))
-    name = " m from the left of the clear span of 'right arch', "
-    assert f"with 9 axles at 0.20 to 1.80{name}" in repr(found)
+    first, last = min(inner) + 0.2, min(inner) + 1.8
+    assert f"with 9 axles over 'right arch' at x = {first:.2f} to {last:.2f} m, " in repr(found)
+    # an axle in front, on the other arch, takes no part
+    found = af.rate(bridge, Vehicle("tractor", (1e3, 50e3, 50e3), (4.0, 1.0)))
+    (fails,) = {bridge.joints[k].part for k, _ in found.moving.worst.hinges}
+    assert len(found.moving.worst.live) == 3
+    assert f"with 2 axles of 3 over '{fails}' at x = " in repr(found)
     monkeypatch.setattr(rating, "_places_along", lambda *_: (min(inner) - 20.0,))
     found = af.rate(bridge, Vehicle("long", (1e3, 1e3, 1e3), (2.0, 40.0)))
-    assert "with 2 axles of 3 at -1.00 and 1.00 m" in repr(found)
+    assert f"with 1 axle of 3 over 'right arch' at x = {min(inner) + 1.0:.2f} m" in repr(found)
+
+
+def test_a_verdict_says_which_parts_of_the_fill_it_rests_on(lorry_rating):
+    """The factor without the pressure, or without the backing, is below 1 or none."""
+    assert lorry_rating.outcome.startswith("passes if")
+    soft = replace(lorry_rating, without_pressure=0.99)
+    assert soft.outcome.startswith("passes only with the pressure of the fill if")
+    backed = replace(soft, fill=replace(GRAVEL, backing=0.5), without_backing=np.nan)
+    words = "passes only with the pressure of the fill and the backing"
+    assert backed.outcome.startswith(words)
+    without = "\nwithout the backing but with the pressure, at that place: "
+    assert f"{without}the bridge does not stand\n" in str(backed)
+    assert f"{without}1.01\n" in str(replace(backed, without_backing=1.01))
+
+
+def test_a_rating_with_backing_has_the_factor_without_it(monkeypatch):
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (6.5,))
+    backed, axle = replace(GRAVEL, backing=0.6), Vehicle("axle", (1e4,))
+    found = af.rate(arch_bridge(voussoirs=9), axle, fill=backed)
+    plain = af.rate(arch_bridge(voussoirs=9), axle, fill=GRAVEL)
+    assert found.without_backing == pytest.approx(plain.factor, rel=EXACT)
+    assert found.factor > 1.02 * plain.factor
+    assert np.isnan(plain.without_backing)
 
 
 @pytest.mark.parametrize(

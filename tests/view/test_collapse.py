@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import xarray as xr
+from backfilled import arch_bridge
 from portals import DRY, box, portal
 
 import archfem as af
@@ -140,7 +141,8 @@ def test_a_rating_shows_factors_over_the_middle_and_the_mechanism(coarse_ring, f
     assert np.nanmin(drawn[:, 1]) == pytest.approx(found.factor, rel=1e-6)
     assert f"factor {found.factor:.3g}" in upper.get_title()
     assert " m of width" in lower.get_title().replace("\n", " ")
-    assert len(lines_of(lower)["hinge"]) == len(found.moving.worst.hinges)
+    ends = [getattr(coarse_ring.joints[k], side) for k, side in found.moving.worst.hinges]
+    np.testing.assert_allclose(lines_of(lower)["hinge"], ends)
     assert upper.get_xlim() == lower.get_xlim()
     labels = lower.get_legend_handles_labels()[1]
     assert f"live load: {found.factor:.3g} × 5 kN" in labels  # both axles are equal
@@ -180,6 +182,17 @@ def test_a_rating_marks_where_the_distributed_load_stands(coarse_ring, few_place
     np.testing.assert_allclose(marked, sinks)
     assert axle.force[1] == -5e3
     assert 0 < len(strips) < 40
+
+
+def test_backing_is_hatched_up_to_its_level():
+    structure, load = arch_bridge(voussoirs=9), af.BodyForce(1.0)
+    for level in (None, 0.5):
+        fill = af.limit.Fill(friction_angle=35.0, backing=level)
+        axes = af.collapse_factor(structure, live=load, friction=None, fill=fill).plot().axes[0]
+        assert ("backing" in axes.get_legend_handles_labels()[1]) == (level is not None)
+    (hatched,) = (each for each in axes.collections if each.get_label() == "backing")
+    corners = axes.transData.inverted().transform(hatched.clipbox.corners())
+    assert corners[:, 1].max() == pytest.approx(0.5)
 
 
 def test_a_moving_load_shows_factors_over_its_middle_and_the_mechanism(coarse_ring):
