@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import groupby
+from math import inf
 from typing import NamedTuple
 
 from archfem.cases.case import Case
@@ -27,6 +28,16 @@ DECIDING_VALUES = {
         "friction": ("μ", 1.0, "", "dry stone has 0.4 to 0.8; 0.6 is customary"),
     },
 }
+
+
+def value_text(section: str, key: str, value: float | None) -> str:
+    """Return a deciding value with its unit; E of soils is in MPa."""
+    _, unit, name, _ = DECIDING_VALUES[section][key]
+    if value is None or value == inf:
+        return "not known" if value is None else "never slides"
+    if key == "young" and value < 0.1 * GPa:
+        unit, name = MPa, " MPa"
+    return f"{value / unit:.4g}{name}"
 
 
 class Default(NamedTuple):
@@ -61,8 +72,8 @@ def _list_properties(case: Case) -> Iterator[Default]:
     for item in dict.fromkeys(items):
         section = "materials" if isinstance(item, Material) else "contacts"
         for key in list_default_keys(case, item):
-            word, unit, name, reason = DECIDING_VALUES[section][key]
-            words = f"{word} {getattr(item, key) / unit:g}{name}"
+            word, *_, reason = DECIDING_VALUES[section][key]
+            words = f"{word} {value_text(section, key, getattr(item, key))}"
             yield Default(item.name, words, f"{section}.{format_key(item.name)}.{key}", reason)
 
 

@@ -3,7 +3,7 @@
 The files of a run appear in its folder together, when all of them exist (`archfem._files`).
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,6 +13,7 @@ from archfem._optional import can_film
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
+from archfem.cases.result_text import state_outcome
 from archfem.cases.run import (
     CASE_FILE,
     HISTORY_FILE,
@@ -25,7 +26,7 @@ from archfem.cases.run import (
 from archfem.cases.toml_file import read_tables
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError, InvalidInput, logger
-from archfem.limit.collapse import Collapse
+from archfem.limit.collapse import Collapse, Outcome
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_table
 from archfem.view.collapse import draw_fall
@@ -178,17 +179,21 @@ def _read_case(place: Path, inputs: Path | None) -> Case:
         raise type(error)(f"{path}: {error}") from error
 
 
-def limit_files(collapse: Collapse, text: str) -> Files:
+def limit_files(collapse: Collapse, text: str, doubts: Sequence[str]) -> Files:
     """Return text, joints at collapse and mechanism of a limit analysis."""
     columns = ["name", "N", "V", "M", "eccentricity"]
     joints = collapse.joints.to_dataframe()[columns].to_csv(index=False).rstrip()
-    return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot()}
+    factor = f"{collapse.factor:.4g}" if collapse.outcome is Outcome.COLLAPSES else "-"
+    given = collapse.sentence, doubts, "the given load", factor
+    stated = state_outcome("limit analysis", *given).as_file("limit")
+    return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot(), **stated}
 
 
 def pushover_files(push: Pushover, text: str) -> Files:
     """Return text, curve and picture of a pushover."""
     curve = push.curve.to_dataframe().to_csv().rstrip()
-    return {"pushover.txt": text, "pushover.csv": curve, "pushover.png": push.plot()}
+    stated = state_outcome("pushover", repr(push).removeprefix("Pushover: ")).as_file("pushover")
+    return {"pushover.txt": text, "pushover.csv": curve, "pushover.png": push.plot(), **stated}
 
 
 def dead_load_files(result: DeadLoadResult) -> Files:

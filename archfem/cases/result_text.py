@@ -1,8 +1,9 @@
 """Results as text: sentences, and tables which the command line prints and the report shows."""
 
+import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -23,13 +24,21 @@ from archfem.joints.criteria import (
 )
 from archfem.limit.collapse import Collapse, describe_crushing, describe_fill
 from archfem.limit.mechanism_count import Mechanism, duration_text
+from archfem.limit.rating import Rating
 from archfem.masonry.structure import Structure, join_joint_names, join_names
+from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import Match
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity
+from archfem.statics.mechanism_assessment import AssessmentCheck, KinematicAssessment
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_text, utilisation_text
 from archfem.units import STANDARD_GRAVITY, format_mm, kN
+
+# Before what a kinematic assessment leaves out
+NOTE_MARK = "note: "
+
+Row = Sequence[str]  # result, demand, capacity or outcome, factor; "-" where there is none
 
 
 class ResultTable(NamedTuple):
@@ -227,7 +236,7 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     lines += [f"hinges, by the face in contact: {join_names(hinges, '; ')}"] if hinges else []
     lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []
-    crushing = describe_crushing(limit.strength, structure)
+    crushing = describe_crushing(limit.strength)
     lines += filter(None, [crushing, describe_fill(limit.fill)])
     return "\n".join(lines)
 
@@ -301,3 +310,68 @@ def _mechanism_cell(mechanisms: Mapping[str, Mechanism | None], definition: str)
 def _seconds(value: float) -> str:
     """Format a time; "-" if undefined."""
     return "-" if np.isnan(value) else f"{value:.3f} s"
+
+
+class Statement(NamedTuple):
+    """Decisive sentences of a result, its rows among the capacities, and its doubts."""
+
+    sentences: Sequence[str]
+    rows: Sequence[Row]
+    doubts: Sequence[str] = ()  # lines of the text, or without their mark
+
+    def as_file(self, name: str) -> dict[str, str]:
+        """Return name and content of the file beside the text of a result."""
+        plain = (doubt.removeprefix(DOUBT_MARK).removeprefix(NOTE_MARK) for doubt in self.doubts)
+        doubts = list(dict.fromkeys(map(cut_remedy, plain)))
+        return {f"{name}.json": json.dumps(self._replace(doubts=doubts)._asdict(), indent=1)}
+
+
+def cut_remedy(doubt: str) -> str:
+    """Return a doubt without its remedy, which is for who computes, behind the last semicolon."""
+    return doubt.rpartition("; ")[0] or doubt
+
+
+def state_outcome(
+    result: str, words: str, doubts: Sequence[str] = (), demand: str = "-", factor: str = "-"
+) -> Statement:
+    """State one outcome, which is the capacity too."""
+    return Statement([f"{result}: {words}"], [(result, demand, words, factor)], doubts)
+
+
+def state_rating(found: Rating, doubts: Sequence[str]) -> Statement:
+    """State the factor of a vehicle, and what the pressure of the fill adds."""
+    row = "rating", found.vehicle.name, f"{found.outcome}, {found.place}", f"{found.factor:.4g}"
+    return Statement([repr(found), *found.describe_pressure()], [row], doubts)
+
+
+def state_assessments(found: Mapping[str, KinematicAssessment], doubts: list[str]) -> Statement:
+    """State each check of an assessment with the directions in which it holds; the last decides."""
+    checks: dict[str, tuple[AssessmentCheck, list[str]]] = {}
+    for direction, result in found.items():
+        for check in result.checks:
+            checks.setdefault(str(check), (check, []))[1].append(direction)
+    last = [str(result.checks[-1]) for result in found.values()]
+    rows, sentences = [], []
+    for text, (check, directions) in checks.items():
+        ways, outcome = " and ".join(directions), "passes" if check.passes else "fails"
+        if check.passes and check.at_rest:
+            outcome += ", for the mechanism does not begin to move"
+        demand, capacity = (f"{x:.4g} {check.unit}" for x in (check.demand, check.capacity))
+        name = f"assessment: {check.name}, {ways}"
+        rows.append((name, demand, f"{capacity}, {outcome}", f"{check.ratio:.3g}"))
+        sentences += [f"kinematic assessment, {ways}: {text}"] if text in last else []
+    notes = (note for result in found.values() for note in result.notes)
+    return Statement(sentences, rows, [*doubts, *notes])
+
+
+def state_risk(found: Any) -> Statement:  # of `archfem.studies`, a room to the right
+    """State the annual rate, the hazard by its return periods, and the median of the falls."""
+    hazard, median = found.hazard, found.fragility().median
+    name, unit = hazard.measure.upper().replace("_AVG", ", mean,"), MEASURES[hazard.measure]
+    years = 1.0 / hazard.rate if len(hazard.rate) <= 4 else np.array([DESIGN_PERIOD])
+    sizes = hazard.intensity_of(years)
+    listed = ", ".join(f"{value:.3g}" for value in sizes)
+    demand = f"{name} {listed} {unit} once in {', '.join(f'{each:.4g}' for each in years)} years"
+    outcome = f"median {name} {median:.3g} {unit}, falls at {found.rate().rate:.2g} a year"
+    row = "annual rate", demand, outcome, ", ".join(f"{median / value:.3g}" for value in sizes)
+    return Statement([f"the structure {found.sentence}"], [row], list(map(str, found.doubts)))

@@ -188,8 +188,8 @@ def _add_case_commands(commands: Any) -> None:
     add_to("--live", type=float, help="partial factor on the vehicle (of its code)")
     add_to("--impact", type=float, help="dynamic factor on the vehicle (of its code)")
     add_to("--dead", type=float, help="partial factor on the weights (1)")
-    add_to("--width", type=float, help="width that carries one vehicle [m] (by rule)")
-    add_to("--area-load", type=float, help="load beside the axles [Pa] (of its code)")
+    add_to("--width", help="width that carries one vehicle [m] (by rule)")
+    add_to("--area-load", help="load beside the axles [Pa] (of its code)")
     add_to("--out", metavar="DIR", help="folder for text, table and picture (none)")
     add("mesh", "write the mesh of a case as a gmsh file", "")(
         "--out", required=True, metavar="FILE.msh", help="the mesh file"

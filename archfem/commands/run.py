@@ -33,7 +33,7 @@ from archfem.cases.run import (
     carry_out,
     replace_run,
 )
-from archfem.cases.toml_file import format_tables
+from archfem.cases.toml_file import format_tables, parse_change
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions
 from archfem.dynamics.history import Ending, History
@@ -52,7 +52,7 @@ from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import support_doubts
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
-from archfem.units import MPa
+from archfem.units import STANDARD_GRAVITY, MPa
 from archfem.view.motions import draw_spectra, draw_suite
 from archfem.view.style import Files, write_files
 
@@ -164,12 +164,11 @@ def limit(options: argparse.Namespace) -> None:
     with _record_doubts(case.structure) as doubts:
         found = case.limit.solve(case.structure)
         opposite = case.limit.solve_opposite(case.structure)
-    text = result_text.describe_collapse(case.structure, found, case.limit)
-    if opposite is not None:
-        text = f"{text}\n{result_text.describe_opposite(found, opposite)}"
-    text = "\n".join([text, *doubts])
+    lines = [result_text.describe_collapse(case.structure, found, case.limit)]
+    lines += [] if opposite is None else [result_text.describe_opposite(found, opposite)]
+    text = "\n".join([*lines, *doubts])
     print(f"{case.title}\n{text}")
-    _write_results("limit", case, options.out, lambda: results.limit_files(found, text))
+    _write_results("limit", case, options.out, lambda: results.limit_files(found, text, doubts))
 
 
 def assess(options: argparse.Namespace) -> None:
@@ -181,8 +180,8 @@ def assess(options: argparse.Namespace) -> None:
         found = case.assessment.solve(case.structure, demand, options.parts)
     if case.limit.strength is not None:
         doubts.append(
-            f"note: joints hinge about their edges: that stones crush at the given "
-            f"{case.limit.strength / MPa:.3g} MPa would lower alpha_0; `archfem limit` with "
+            f"{result_text.NOTE_MARK}joints hinge about their edges: that stones crush at the "
+            f"given {case.limit.strength / MPa:.3g} MPa would lower alpha_0; `archfem limit` with "
             "horizontal = 1 or -1 in [limit] computes it so"
         )
     texts = [f"{name}: {result}" for name, result in found.items()]
@@ -193,7 +192,8 @@ def assess(options: argparse.Namespace) -> None:
     def draw() -> Files:
         mechanisms = [k for k, result in enumerate(found.values()) if result.path is not None]
         figures = {f"assessment_{k}.png": list(found.values())[k].plot() for k in mechanisms}
-        return {"assessment.txt": text, **figures}
+        stated = result_text.state_assessments(found, doubts).as_file("assessment")
+        return {"assessment.txt": text, **stated, **figures}
 
     _write_results("assess", case, options.out, draw)
 
@@ -201,7 +201,10 @@ def assess(options: argparse.Namespace) -> None:
 def rate(options: argparse.Namespace) -> None:
     """Rate the bridge of a case for a vehicle, by the joints and the fill of its [limit]."""
     keys = ("vehicle", "live", "impact", "dead", "width", "area_load")
-    given = {key: value for key in keys if (value := getattr(options, key)) is not None}
+    # as in --set, so that a length may have a unit
+    given = dict(
+        parse_change(f"{key}={x}") for key in keys if (x := getattr(options, key)) is not None
+    )
     case = Case.read(options.case, options.changes)
     rating = {**case.settings.get("rating", {}), **given}
     with _record_doubts(case.structure) as doubts:
@@ -211,6 +214,7 @@ def rate(options: argparse.Namespace) -> None:
     # the case of the folder, that of a run, may be rated for another vehicle
     texts = {RATING_FILE: format_tables({"rating": rating}).rstrip()}
     texts |= {"rating.txt": text, "rating.csv": found.table()}
+    texts |= result_text.state_rating(found, doubts).as_file("rating")
     _write_results("rate", case, options.out, lambda: {**texts, "rating.png": found.plot()})
 
 
@@ -259,6 +263,7 @@ def risk(options: argparse.Namespace) -> int:
     )
     print(found)
     files: Files = {"risk.txt": str(found), "risk.nc": found.save, "risk.png": found.plot()}
+    files |= result_text.state_risk(found).as_file("risk")
     _write_results("risk", case, options.out, lambda: files)
     return ExitCode.DOUBTFUL if found.doubts else 0
 
@@ -268,34 +273,29 @@ def verdict(options: argparse.Namespace) -> int:
     from archfem.studies.variations import verdict_range
 
     case = Case.read(options.case, options.changes)
-    if options.out is not None:  # a folder that cannot be written is refused before the runs
-        create_result_folder(options.out)
     motion = _choose_motion(case, options)
     print(case.title)
     sampling = {"workers": options.workers, "samples": options.samples}
     computed = verdict_range(case.analysis, motion, fidelity="rigid", **sampling)
     print(computed)
-
-    def draw() -> Files:
-        files: Files = {"verdict_range.nc": computed.save}
-        return files | {"verdict_range.txt": str(computed), "verdict_range.png": computed.plot()}
-
-    _write_results("verdict", case, options.out, draw)
+    own: Files = {"verdict_range.nc": computed.save, "verdict_range.txt": str(computed)}
+    draw = computed.plot
+    _write_results("verdict", case, options.out, lambda: own | {"verdict_range.png": draw()})
     return ExitCode.DOUBTFUL if computed.doubts else 0
 
 
 def _choose_motion(case: Case, options: argparse.Namespace) -> Motion:
-    """Return the motion of a case, or the pair of its suite that is named."""
+    """Return the motion of a case, or the pair of its suite that is named; make the folder."""
     from archfem.studies.cache import ground_motion
 
+    if options.out is not None:  # a folder that cannot be written is refused before the runs
+        create_result_folder(options.out)
     return ground_motion(case if options.pair is None else case.alone(options.pair))
 
 
 def scale(options: argparse.Namespace) -> int:
     """Scale the motion of a case until it falls, or forms a mechanism in small displacements."""
     case = Case.read(options.case, options.changes)
-    if options.out is not None:  # a folder that cannot be written is refused before the runs
-        create_result_folder(options.out)
     motion = _choose_motion(case, options)
     found: CollapseScale | MechanismScales
     search = collapse_scale if case.analysis.displacements == "large" else mechanism_scales
@@ -304,7 +304,10 @@ def scale(options: argparse.Namespace) -> int:
     doubts += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
     text = "\n".join([f"{motion.name}: {found}", *dict.fromkeys(doubts), "", found.table()])
     print(f"{case.title}\n{text}")
-    _write_results("scale", case, options.out, lambda: {"scale.txt": text})
+    demand = f"'{motion.name}', PGA {motion.pga / STANDARD_GRAVITY:.2f} g"
+    stated = result_text.state_outcome("scale of the motion", repr(found), doubts, demand)
+    files: Files = {"scale.txt": text, **stated.as_file("scale")}
+    _write_results("scale", case, options.out, lambda: files)
     if found.interrupted:
         raise KeyboardInterrupt
     return ExitCode.DOUBTFUL if doubts else 0
@@ -441,7 +444,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
                 text = result_text.describe_collapse(case.structure, result, case.limit)
                 text = "\n".join([text, *doubts])  # of limit analysis, which comes first
                 print(text)
-                write(results.limit_files(result, text), folder)
+                write(results.limit_files(result, text, doubts), folder)
             elif isinstance(result, DeadLoadResult):
                 at_rest = result
                 print(result_text.describe_dead_load(at_rest))

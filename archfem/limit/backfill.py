@@ -24,6 +24,7 @@ from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
 from archfem.masonry.loads import Action, BodyForce, PointLoad
+from archfem.masonry.materials import STONE
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 from archfem.units import in_degrees
@@ -597,11 +598,16 @@ def refuse_bonds(structure: Structure) -> None:
         )
 
 
-def check_options(friction: str | None, strength: float | None) -> None:
-    """Refuse unknown options."""
+def check_options(structure: Structure, friction: str | None, strength: float | None) -> float:
+    """Refuse unknown options, and return the strength at which joints crush, infinite for none."""
     check_choice(friction, "friction", ("coulomb", "nonassociated", None))
-    if strength is not None:
+    if strength is None:
+        stones = (structure.blocks[k] for k in np.unique(structure.pairs[structure.judged]))
+        own = {block.material.strength for block in stones} - {None, STONE.strength}
+        return min(filter(None, own), default=np.inf)
+    if strength != np.inf:
         check_between(strength, "strength [Pa]", 0.0, remedy="leave it out for no limit")
+    return strength
 
 
 def self_weight_programme(
@@ -613,13 +619,13 @@ def self_weight_programme(
 ) -> tuple[BlocksWithFill, Programme]:
     """Return the rigid stones, and the linear programme of self-weight and other dead loads."""
     check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
-    check_options(friction, strength)
+    strength = check_options(structure, friction, strength)
     stones = attach_fill(structure, fill)
     rigid = stones.rigid_regions.structure
     blocks = RigidBlocks(rigid)
     coefficient = rigid.friction if friction is not None else np.full(len(rigid.joints), np.inf)
     crushing = None
-    if strength is not None:
+    if np.isfinite(strength):
         # pieces of fill have the strength of their joints, and none of stone
         is_piece = np.array([block.grain for block in rigid.blocks])[rigid.pairs].any(axis=1)
         crushing = blocks.crushing_forces(strength)

@@ -210,9 +210,10 @@ def collapse_factor(
             "nonassociated" searches states whose joints slide without dilating for the weakest;
             None forbids sliding.
         strength: compressive strength σ of the blocks [Pa], which limits |M| to
-            N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit, in a case the
-            least strength that it gives for the stones. Joints of fill in pieces (`jointed_fill`)
-            have their own strength, and not this one.
+            N h/2 - N²/(2 σ w), by a rectangular stress block. By default it is the least that the
+            materials at assessed joints have, or are given in a case; that of the preset `STONE`
+            does not count. Infinite for no limit. Joints of fill in pieces (`jointed_fill`) have
+            their own strength, and not this one.
         fill: strength of blocks softer than their joints, which become weight and pressures on the
             stones (`Fill`), with those that rest on them, or a plastic continuum (`PlasticFill`),
             for which the result has two bounds; None where there are none, or where they are cut
@@ -284,8 +285,7 @@ def stands(
         structure: supports are its fixed blocks; or an `archfem.Analysis` of it.
         friction: "coulomb" or "nonassociated", here the same, holds |V| <= c A + μ N; None
             forbids sliding.
-        strength: compressive strength of the blocks [Pa], as for `collapse_factor`; None for no
-            limit.
+        strength: as for `collapse_factor` [Pa].
         fill: strength of the fill, as for `collapse_factor`; None where there is none.
 
     Returns:
@@ -499,18 +499,11 @@ def _read_joints(
     return joint_dataset(whole, resultants)
 
 
-def describe_crushing(strength: float | None, structure: Structure) -> str:
+def describe_crushing(strength: float | None) -> str:
     """Describe at which strength of the stones joints crush, if at all."""
-    if strength is not None:
-        return f"joints crush at {strength / MPa:.3g} MPa, the strength of the stones"
-    stones = [structure.blocks[number].material.strength for number in structure.free]
-    least = min(filter(None, stones), default=None)
-    if least is None:
+    if strength is None or np.isinf(strength):
         return "joints do not crush: no strength of the stones is given"
-    return (
-        f"joints do not crush: the default strength of {least / MPa:.3g} MPa is not used; "
-        "strength in [limit] gives one"
-    )
+    return f"joints crush at {strength / MPa:.3g} MPa, the strength of the stones"
 
 
 # by the table of load tests in docs/theory/fill.md

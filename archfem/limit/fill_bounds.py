@@ -78,7 +78,7 @@ class FilledBlocks:
     dead: Array  # generalised forces on the free stones that stay (3 n_free,) [mean block weights]
     dead_pull: Array  # multiple of the fill's weight that stays, along x and y (2,) [-]
     friction: Array  # coefficients of the joints, inf where they do not slide (n_joints,) [-]
-    strength: float | None  # compressive strength of the stones [Pa]
+    strength: float  # compressive strength of the stones, infinite for no limit [Pa]
 
     @property
     def stress_unit(self) -> float:
@@ -377,7 +377,7 @@ class FilledBlocks:
 
     def _crushing_cones(self, first: int, size: int) -> list[tuple[sparse.csr_matrix, Array]]:
         """Return N² <= 2 σ w h F at both ends of the joints, by which stones crush."""
-        if self.strength is None:
+        if np.isinf(self.strength):
             return []
         count, tension = len(self.friction), self.blocks.tension
         crushing = 2.0 * self.blocks.crushing_forces(self.strength)
@@ -500,7 +500,7 @@ def refine_bounds(
         structure: structure with its fill.
         live: actions that grow together.
         friction: of the joints, "coulomb" or None.
-        strength: compressive strength of the stones [Pa]; None for no limit.
+        strength: as for `collapse_factor` [Pa].
         fill: strength of the fill.
         dead: actions beside self-weight that do not grow.
         first: number of triangles of the first mesh, about.
@@ -510,7 +510,7 @@ def refine_bounds(
         InvalidInput: there is no fill, or the friction has no associated flow.
         DidNotConverge: whether it stands without live actions is not known on the finest mesh.
     """
-    check_options(friction, strength)
+    strength = check_options(structure, friction, strength)
     structure = hold_backed(structure, fill.backing)
     regions = find_rigid_regions(structure)
     soil = tuple(number for number in structure.free if number not in regions.blocks)
@@ -602,7 +602,7 @@ def _load_blocks(
     regions: RigidRegions,
     loads: tuple[Sequence[Action], Sequence[Action]],
     friction: str | None,
-    strength: float | None,
+    strength: float,
     fill: PlasticFill,
     mesh: FillMesh,
 ) -> FilledBlocks:

@@ -336,7 +336,7 @@ def collapse_path(
             "a fill does not follow the stones on a path: under horizontal forces "
             "af.kinematic_assessment(…, fill=…) follows them with its pressures as built"
         )
-    found = collapse_factor(structure, live=grows, friction=friction, dead=dead)
+    found = collapse_factor(structure, live=grows, friction=friction, dead=dead, strength=np.inf)
     if found.outcome is not Outcome.COLLAPSES:
         raise InvalidInput(f"{found.outcome.sentence}: there is no mechanism to follow")
     placed = PlacedBlocks.at_rest(structure, _attach_actions(structure, dead))

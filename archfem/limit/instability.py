@@ -37,7 +37,7 @@ class DeepenedBlocks(RigidBlocks):
 def explain_instability(structure: Structure) -> str | None:
     """Return why rigid blocks cannot rest under their weight, and the remedy; None if they can."""
     refuse_bonds(structure)
-    stones, dead = self_weight_programme(structure, "coulomb", None, None)
+    stones, dead = self_weight_programme(structure, "coulomb", np.inf, None)
     fall = dead.minimise_residual()
     if is_balanced(fall, dead):
         return None

@@ -11,7 +11,7 @@ from archfem._display import ResultDisplay
 from archfem._typing import Array, Metres, Pascals
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
-from archfem.limit.backfill import Fill, is_balanced, self_weight_programme
+from archfem.limit.backfill import Fill, check_options, is_balanced, self_weight_programme
 from archfem.limit.collapse import describe_crushing, describe_fill
 from archfem.limit.instability import DeepenedBlocks
 from archfem.limit.plastic_fill import PlasticFill
@@ -36,9 +36,6 @@ from archfem.masonry.structure import (
     structure_of,
 )
 
-# Beginning of the line of a rating on what the pressure of the fill adds
-PRESSURE_RANGE = "over the pressure of the fill, at that place: "
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Rating(ResultDisplay):
@@ -60,7 +57,8 @@ class Rating(ResultDisplay):
             infinite where hinges alone do. Not searched, and NaN, with a plastic fill.
         by_rule: factor at the worst place with the width by rule and all of the code's distributed
             load, where others were given; else NaN.
-        strength: compressive strength of the stones at the joints [Pa], or None.
+        strength: compressive strength of the stones at the joints [Pa]; infinite where it does not
+            count.
         without_pressure: factor of the same loads with no pressure of a `Fill`; NaN without one,
             and where the bridge then does not stand.
         full_pressure: factor of the same loads with all of its passive pressure; else NaN.
@@ -81,7 +79,7 @@ class Rating(ResultDisplay):
     moving: MovingLoad
     geometric: float
     by_rule: float
-    strength: float | None = None
+    strength: float = np.inf
     without_pressure: float = np.nan
     full_pressure: float = np.nan
     deepest: float = np.nan
@@ -144,7 +142,7 @@ class Rating(ResultDisplay):
         """Describe the result in one line."""
         return (
             f"Rating of '{self.structure.name}' for {self.vehicle.name}: factor {self.factor:.4g} "
-            f"{self._place_text()}, {self.outcome}"
+            f"{self.place}, {self.outcome}"
         )
 
     @property
@@ -156,8 +154,9 @@ class Rating(ResultDisplay):
                 spans.setdefault(joint.part, []).append(joint.intrados[0])
         return {part: (min(xs), max(xs)) for part, xs in spans.items()}
 
-    def _place_text(self) -> str:
-        """Return where the axles stand at the worst place, in words: those over rings that fail."""
+    @property
+    def place(self) -> str:
+        """Where the axles stand at the worst place, in words: those over rings that fail."""
         axles = parse_axles(self.vehicle.axles, self.vehicle.spacings)
         place = self.moving.direction, self.moving.position
         stand = [load.x for load in axles_on_structure(self.structure, axles, *place)]
@@ -201,7 +200,7 @@ class Rating(ResultDisplay):
             f"{self._summary()}",
             f"the factor is on axles × live × impact{also}; codes with partial factors require 1",
             *self._describe_missing(),
-            *self._describe_pressure(),
+            *self.describe_pressure(),
             *self._describe_backing(),
             f"least factor driving {', '.join(least)}",
             f"{self.moving}",
@@ -215,12 +214,12 @@ class Rating(ResultDisplay):
             f"live load by {self.live:g} ({self._source('live')})",
             f"impact by {self.impact:g} ({self._source('impact')})",
             f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
-            describe_crushing(self.strength, self.structure),
+            describe_crushing(self.strength),
             *filter(None, [describe_fill(self.fill)]),
         ]
         return "\n".join(lines)
 
-    def _describe_pressure(self) -> list[str]:
+    def describe_pressure(self) -> list[str]:
         """Return the line on the range of the factor over the pressure of the fill, if any."""
         if np.isnan(self.full_pressure):
             return []
@@ -228,8 +227,8 @@ class Rating(ResultDisplay):
         if np.isnan(self.without_pressure):
             least = "none, as the bridge does not stand,"
         return [
-            f"{PRESSURE_RANGE}{least} without it, {self.factor:.4g} as given, "
-            f"{self.full_pressure:.4g} with all of the passive one"
+            f"over the pressure of the fill, at that place: {least} without it, "
+            f"{self.factor:.4g} as given, {self.full_pressure:.4g} with all of the passive one"
         ]
 
     def _describe_backing(self) -> list[str]:
@@ -351,6 +350,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
             f"{structure.width:.4g} m: give the part over which one vehicle spreads"
         )
     weighted, code = _scale_weights(structure, dead), np.array(driven.axles) * live * impact
+    strength = check_options(structure, friction, strength)
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
 
     def drive(width: float, area_load: float, positions: Sequence[float]) -> MovingLoad:

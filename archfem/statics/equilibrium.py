@@ -502,6 +502,6 @@ def _doubt_support(structure: Structure, numbers: Sequence[int], part: str) -> D
 def _stands_as_rigid_blocks(structure: Structure) -> bool:
     """Return whether limit analysis finds it standing, or does not apply."""
     try:
-        return stands(structure)
+        return stands(structure, strength=np.inf)
     except (InvalidInput, DidNotConverge):  # soft bodies, bonds: no comparison is possible
         return True

@@ -224,14 +224,14 @@ class KinematicAssessment(ResultDisplay):
         return found
 
     @property
-    def _checks(self) -> list[AssessmentCheck]:
+    def checks(self) -> list[AssessmentCheck]:
         """Linear check, and that of the displacement where the mechanism moves."""
         return [self.linear, *([self.displacement] if self.displacement else [])]
 
     @property
     def passes(self) -> bool:
         """Whether the displacement check passes, or without it the linear one."""
-        return self._checks[-1].passes
+        return self.checks[-1].passes
 
     def demand(self, periods: Array) -> tuple[Array, Array]:
         """Return spectral displacements [m] and accelerations [m/s²] of the demand.
@@ -255,7 +255,7 @@ class KinematicAssessment(ResultDisplay):
             ("d_0_star", self.d_0_star, "m"),
             ("T_s", self.T_s, "s"),
         ]
-        for check in self._checks:
+        for check in self.checks:
             rows.append((f"{check.name}: capacity", check.capacity, check.unit))
             rows.append((f"{check.name}: demand", check.demand, check.unit))
             rows.append((f"{check.name}: ratio", check.ratio, "-"))
@@ -288,7 +288,7 @@ class KinematicAssessment(ResultDisplay):
             ]
             changes = [event.text for event in self.path.events if event.text != self.path.end]
             lines += [f"along the path: {join_names(changes, '; ')}"] if changes else []
-            lines += [self.path.end.sentence, *map(str, self._checks)]
+            lines += [self.path.end.sentence, *map(str, self.checks)]
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 
 
@@ -545,7 +545,7 @@ def _find_first_mechanism(
             "and blocks, or use 'coulomb'"
         )
     live = BodyForce(placed.direction)
-    found = collapse_factor(placed.structure, live=live, friction="nonassociated")
+    found = collapse_factor(placed.structure, live=live, friction="nonassociated", strength=np.inf)
     if not found.motion.any():
         return mechanism
     contacts = placed.touching(joints)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from pages import read_page
 
 import archfem as af
 from archfem._files import read_file_list, replace_results
-from archfem.cases import result_text, risk_keys
+from archfem.cases import result_text
 from archfem.cases.defaults import describe_defaults, list_defaults
 from archfem.cases.report import conclusion, report, report_data
 from archfem.cases.report.conclusion import build_conclusion, list_facts
@@ -29,7 +30,10 @@ from archfem.cases.report.sections import (
 from archfem.cases.result_text import ResultTable
 from archfem.cases.run import carry_out, replace_run
 from archfem.limit import rating
+from archfem.statics.mechanism_assessment import AssessmentCheck
+from archfem.studies.fragility import Rate
 from archfem.view.pages.document import FigureBlock
+from archfem.view.style import write_files
 
 CASE = """
 title = "a column <b>& more</b> under two pairs"
@@ -84,7 +88,7 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert "mode 1 at 3.14 Hz" in words
     assert "Ground motions" in words
     assert "Not among the results" not in words
-    assert "Not computed: limit analysis, a rating for a vehicle, a kinematic assess" in words
+    assert "Not computed: limit analysis, pushover, rating, kinematic assessment, sca" in words
     assert (
         "For motions of PGA 0.05 g: the structure forms no mechanism under all 2 motions." in words
     )
@@ -97,45 +101,54 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert f"{float(run.joints['friction'].max()):.3f}" in words
 
 
-LIMIT_TEXT = (
-    "limit analysis: it turns, at 0.25 g to the left\n"
-    "joints crush at 20 MPa, the strength\n"
-    "in doubt: a made one; mend it"
-)
-CHECK_TEXT = (
-    "right: pushed to the right\n"
-    "linear, q = 2, FC = 1.35: capacity 8.212 m/s², demand 2.844 m/s²: passes, "
-    "the spectrum may be 2.89 times as strong\n"
-    "a code: capacity 0.11 m, demand 0.22 m at T = 1.178 s: fails, "
-    "the spectrum may be 0.5 times as strong before the mechanism begins to move\n"
-    "note: an upper bound; compare it with a run"
-)
-RATING_TEXT = "Rating of 'it' for LM1: factor 1.25 with 2 axles at -0.1, 1.1 m, passes without all"
-RISK_TEXT = (
-    "falls at 0.002 a year (0.001 to 0.003 at 90 %), 0.1 in 50 years; median 6 m/s² of pga, so"
-)
+CHECKS = [
+    AssessmentCheck("linear, q = 2, FC = 1.35", 8.212, 2.844, "m/s²", 8.212 / 2.844, np.nan, ""),
+    AssessmentCheck("a code", 0.11, 0.22, "m", 0.5, 1.178, ""),
+]
+
+
+def state_each(hazard):
+    """Statements by command and file, of results that were made up."""
+    assessed = SimpleNamespace(checks=CHECKS, notes=("an upper bound; compare it with a run",))
+    place = "passes without all, with 2 axles at -0.1, 1.1 m"
+    found = SimpleNamespace(hazard=hazard, doubts=(), sentence="falls at 0.002 a year")
+    found.rate = lambda: Rate(0.002, 0.001, 0.003)
+    found.fragility = lambda: SimpleNamespace(median=6.0)
+    doubts = ["in doubt: a made one; mend it"]
+    turns = "it turns, at 4.8 times the load", doubts, "the given load", "4.8"
+    return {
+        ("limit", "limit"): result_text.state_outcome("limit analysis", *turns),
+        ("rate", "rating"): result_text.Statement(["rated"], [("rating", "LM1", place, "1.25")]),
+        ("assess", "assessment"): result_text.state_assessments(
+            {"right": assessed, "left": assessed}, []
+        ),
+        ("risk", "risk"): result_text.state_risk(found),
+    }
+
+
+def write_stated(folder, hazard):
+    """Write the files of these to a result folder."""
+    inputs = read_file_list(folder)["run"].inputs
+    for (command, name), stated in state_each(hazard).items():
+        with replace_results(folder, command, inputs) as draft:
+            write_files({f"{name}.txt": "its text", **stated.as_file(name)}, draft)
 
 
 def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
-    both = "\n\n".join([CHECK_TEXT, CHECK_TEXT.replace("right", "left")])
-    texts = {"limit": LIMIT_TEXT, "assessment": both, "rating": RATING_TEXT, "risk": RISK_TEXT}
-    for name, text in texts.items():
-        with replace_results(kept, name, read_file_list(kept)["run"].inputs) as draft:
-            (draft / f"{name}.txt").write_text(text, encoding="utf-8")
+    write_stated(kept, af.Hazard.from_return_periods({475.0: 3.0, 2475.0: 8.0}))
     found = af.cases.open_results(kept)
     case = found.case.signed(["report.demand=0.25 g, 475 years", "report.author=A. Mason"])
-    hazard = af.Hazard.from_return_periods({475.0: 3.0, 2475.0: 8.0})
-    case = replace(case, risk=risk_keys.RiskSettings(hazard, {}, {}))
+    case = replace(case, limit=replace(case.limit, strength=2e7))
     data = report_data.ReportData(case, found.runs, found.folder)
     *sentences, signatures = build_conclusion(data).pieces
     assumed = dict(build_input_section(data).pieces[1].rows)
     assert "no crushing" not in assumed["joints"]
-    assert assumed["joints"].endswith("crushing in limit analysis alone, at 20 MPa, the strength")
+    assert assumed["joints"].endswith("crushing in limit analysis alone, at 20 MPa")
     (table,) = (each for each in sentences if each.kind == "grid")
     assert table.rows == [
         ("as stated", "0.25 g, 475 years", "-", "-"),
         ("time histories", "PGA 0.05 g", "no mechanism in 2 of 2 runs", "-"),
-        ("limit analysis", "-", "a mechanism at 0.25 g to the left (in doubt)", "-"),
+        ("limit analysis", "the given load", "it turns, at 4.8 times the load (in doubt)", "4.8"),
         ("rating", "LM1", "passes without all, with 2 axles at -0.1, 1.1 m", "1.25"),
         *(
             (f"assessment: {name}, right and left", demand, f"{capacity} (in doubt)", factor)
@@ -146,7 +159,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         ),
         (
             "annual rate",
-            "PGA 3, 8 m/s² once in 475, 2475 years, rate 0.0134 a^-1.68",
+            "PGA 3, 8 m/s² once in 475, 2475 years",
             "median PGA 6 m/s², falls at 0.002 a year",
             "2, 0.75",
         ),
@@ -165,29 +178,53 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert "right and left: a code: capacity 0.11 m" in texts[checks]
     assert texts[checks + 1] == "In doubt: an upper bound."
     assert dict(list_facts(data))["in doubt"] == "limit analysis, kinematic assessment"
-    # of a law, and of a curve of many points, the intensities of return periods of codes
-    law, points = af.Hazard.power(0.02116, 3.0), 1.0 + np.arange(6.0)
-    for site, demand in (
-        (law, "PGA 2.16, 3.74 m/s² once in 475, 2475 years, rate 0.0212 a^-3"),
-        (af.Hazard(points, law.rate_of(points)), "PGA 2.16 m/s² once in 475 years"),
-    ):
-        settings = risk_keys.RiskSettings(site, {}, {})
-        data = report_data.ReportData(replace(case, risk=settings), found.runs, found.folder)
-        (table,) = (each for each in build_conclusion(data).pieces[:-1] if each.kind == "grid")
-        assert (table.rows[-1][1], table.rows[-1][3][:4]) == (demand, "2.78")
     assert signatures.rows == [("author", "A. Mason", "", ""), ("checked by", "", "", "")]
 
 
-@pytest.mark.parametrize(
-    ("line", "row"),
-    [
-        ("it turns, at 4.8 times 98 kN at x = 1 m", ("98 kN at x = 1 m", "a mechanism", "4.8")),
-        ("it turns, at 1 to 2 times the load", ("the load", "a mechanism", "1 to 2")),
-        ("limit analysis: it never turns", ("-", "it never turns", "-")),
-    ],
-)
-def test_a_load_that_grows_is_a_row_of_the_capacities(line, row):
-    assert list(conclusion._load_row("limit analysis", line)) == [("limit analysis", *row)]
+def test_a_rate_is_stated_beside_the_hazard_at_its_return_periods():
+    """Of a law, and of a curve of many points, the intensities of return periods of codes."""
+    law, points = af.Hazard.power(0.02116, 3.0), 1.0 + np.arange(6.0)
+    for site, demand in (
+        (law, "PGA 2.16, 3.74 m/s² once in 475, 2475 years"),
+        (af.Hazard(points, law.rate_of(points)), "PGA 2.16 m/s² once in 475 years"),
+    ):
+        (row,) = state_each(site)["risk", "risk"].rows
+        assert (row[1], row[3][:4]) == (demand, "2.78")
+
+
+def test_a_check_that_passes_at_rest_says_so():
+    resting = replace(CHECKS[1], ratio=1.5)
+    found = SimpleNamespace(checks=[resting], notes=())
+    (row,) = result_text.state_assessments({"right": found}, []).rows
+    outcome = "0.11 m, passes, for the mechanism does not begin to move"
+    assert row == ("assessment: a code, right", "0.22 m", outcome, "1.5")
+
+
+@pytest.mark.parametrize("kind", ["without values", "with others", "of another case"])
+def test_results_of_an_earlier_version_are_named_and_not_stated(kept, undrawn, kind):
+    write_stated(kept, af.Hazard.power(0.02116, 3.0))
+    inputs = read_file_list(kept)["run"].inputs
+    with replace_results(kept, "limit", "other" if "case" in kind else inputs) as draft:
+        files = {"limit.txt": "limit analysis: it turns, at 0.25 g to the left"}
+        stated = state_each(af.Hazard.power(0.02116, 3.0))["limit", "limit"]
+        files |= stated.as_file("limit") if "case" in kind else {}
+        files |= {"limit.json": '{"factor": 0.25}'} if "others" in kind else {}
+        write_files(files, draft)
+    found = af.cases.open_results(kept)
+    data = report_data.ReportData(found.case, found.runs, found.folder)
+    pieces = build_conclusion(data).pieces
+    texts = [each.text for each in pieces if each.kind == "words"]
+    made = "Not stated, for an earlier version of archfem or another case made it"
+    assert f"{made}: limit analysis (run `archfem limit` again)." in texts
+    assert not any("turns" in text or "Limit analysis" in text for text in texts)
+    (table,) = (each for each in pieces[:-1] if each.kind == "grid")
+    assert [row[0] for row in table.rows] == [
+        *("time histories", "rating"),
+        *(f"assessment: {check.name}, right and left" for check in CHECKS),
+        "annual rate",
+    ]
+    (absent,) = (text for text in texts if text.startswith("Not computed: "))
+    assert "limit" not in absent
 
 
 def test_missing_pairs_are_named_and_different_cases_refused(kept, unplotted):
@@ -267,12 +304,14 @@ def test_a_case_without_motion_has_a_report_too(small, unplotted, tmp_path):
         tmp_path / "out",
     )
     with replace_run(case, folder) as draft:
-        (draft / "limit.txt").write_text("it stands")
-        (draft / "assessment.txt").write_text("right: it moves\nnote: it is an upper bound")
+        files = {"limit.txt": "it stands", "assessment.txt": "right: it moves"}
+        files |= result_text.Statement(["it stands"], []).as_file("limit")
+        noted = result_text.Statement([], [], ["note: it is an upper bound; run it"])
+        write_files(files | noted.as_file("assessment"), draft)
     words = " ".join(read_page(af.cases.open_results(folder).report().read_text()).words)
     assert "It stands." in words  # the conclusion
     assert "In doubt: it is an upper bound." in words
-    assert "Not computed: modes, a rating for a vehicle" in words
+    assert "Not computed: pushover, rating, scale of the motion" in words
     assert "blocks rigid joints dry" in " ".join(
         words.split()
     )  # of limit analysis, whatever the case's model is
@@ -599,7 +638,7 @@ def test_a_fill_is_stated_as_elastic_and_not_varied(kept):
     inputs, assumed = build_input_section(data).pieces
     assert "carries tension" in dict(assumed.rows)["fill"]
     words = {(name, mark): value for name, value, mark in inputs.rows}
-    assert words["backfill: E", "default"].startswith("0.00625 GPa (table 2 of")
+    assert words["backfill: E", "default"].startswith("6.25 MPa (table 2 of")
     assert "pga 2.94199 m/s²" in words["motion, synthetic, before matching", "default"]
     stated = conclusion.describe_what_is_not_varied(data)
     assert "one set of properties, stiffness and strength of the fill, one model" in stated

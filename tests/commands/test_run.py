@@ -222,7 +222,7 @@ motion = {{ file = "tap.txt", dt = 0.01, units = "m/s2" }}
     assert re.match(says.replace("tap", "tap.*"), text), text
     assert f"\n\n{head} " in text
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        *("archfem.json", "case.toml", "scale.txt")
+        *("archfem.json", "case.toml", "scale.json", "scale.txt")
     }
     assert 0.9 * 0.25 < float(re.search(r"(?:falls|first mechanism) at (\S+) g", text)[1]) < 0.8
     assert af.commands.main([*given, "--set", "motion.scale=2"]) == code

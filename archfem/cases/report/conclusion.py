@@ -1,32 +1,28 @@
 """Head and conclusion of a report: who signs what, outcome with margin and range, doubts."""
 
-import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from hashlib import sha256
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
+from archfem._files import read_file_list
 from archfem.cases import result_text
 from archfem.cases.case import REPORT_KEYS
-from archfem.cases.report.report_data import NOTE_MARK, ReportData
+from archfem.cases.report.report_data import RESULTS, SHOWN_RESULTS, ReportData
+from archfem.cases.result_text import Row
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import History
-from archfem.dynamics.verdict import DOUBT_MARK, NO_RANGE
+from archfem.dynamics.verdict import NO_RANGE
 from archfem.dynamics.verdict_range import property_text
 from archfem.joints.criteria import assessed_joints
-from archfem.limit.rating import PRESSURE_RANGE
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.units import STANDARD_GRAVITY, format_mm
 from archfem.view.pages.document import Grid, Section, TextBlock
-
-_Row = tuple[str, str, str, str]  # result, demand, capacity or outcome, factor
 
 # Outcomes of runs as verbs
 _VERBS = {
@@ -46,40 +42,12 @@ def describe_origin(data: ReportData) -> str:
     return f"report of archfem {import_module('archfem').__version__} · case {digest}"
 
 
-# Files of further commands, and what they hold
-_FURTHER_RESULTS = {
-    "modes.txt": "modes",
-    "limit.txt": "limit analysis",
-    "rating.txt": "a rating for a vehicle",
-    "assessment.txt": "a kinematic assessment",
-    "accuracy.txt": "a comparison of models and time steps",
-    "verdict_range.txt": "the range of the verdict over uncertain properties",
-    "risk.txt": "the annual rate of collapse",
-}
-
-
-# Result that the conclusion states with the time histories
-_VARIATIONS = "variations"
-
-# Results that the conclusion states, in this order, by the files of their commands
-_STATED_RESULTS = {
-    "": "time histories",
-    "limit.txt": "limit analysis",
-    "pushover.txt": "pushover",
-    "rating.txt": "rating",
-    "assessment.txt": "kinematic assessment",
-    "risk.txt": "annual rate of collapse",
-}
+# Results of runs: histories, and their variations, which the conclusion states together
+_HISTORIES, _VARIATIONS = "time histories", "variations"
 
 _FACTORS = (
     "; factor: the multiple of the demand at which a check is just passed, at which a load makes a "
     "mechanism, or, of an annual rate, at which the structure falls with a probability of one half"
-)
-
-# A check of a kinematic assessment
-_CHECK = re.compile(
-    r"(?P<name>.*): capacity (?P<capacity>\S+ \S+), demand (?P<demand>\S+ [^\s:]+).*: "
-    r"(?P<outcome>passes|fails), the spectrum may be (?P<factor>\S+) times as strong(?P<rest>.*)"
 )
 
 
@@ -141,10 +109,13 @@ def build_conclusion(data: ReportData) -> Section:
     ]
     lead = _build_lead(data, rows, doubtful)
     blocks: list[Any] = [TextBlock(lead)] if lead else []
-    for name, result in _STATED_RESULTS.items():
-        text = " ".join(_conclude_file(data, name) if name else _conclude_histories(data))
+    of_runs = *_conclude_runs(data), *_conclude_joints(data), *_conclude_range(data)
+    texts = {_HISTORIES: " ".join(of_runs)}
+    for name, stated in data.statements.items():
+        texts[RESULTS[name]] = " ".join(map(sentence, stated.sentences))
+    for result, text in texts.items():
         blocks += [TextBlock(text)] if text else []
-        about_these = (result,) if name else (result, _VARIATIONS)
+        about_these = (result, _VARIATIONS) if result == _HISTORIES else (result,)
         own = (doubt for about, doubt in doubts if about in about_these)
         blocks += [TextBlock(f"In doubt: {doubt}.", "doubt") for doubt in own]
     if rows:
@@ -152,20 +123,36 @@ def build_conclusion(data: ReportData) -> Section:
         factors = _FACTORS if any(row[3] != "-" for row in rows) else ""
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
     blocks += [TextBlock(text) for text in filter(None, [describe_what_is_not_varied(data)])]
-    # a history alone has no folder of further results
-    absent = [what for name, what in _FURTHER_RESULTS.items() if name not in data.files]
-    if data.folder is not None and absent:
-        blocks.append(TextBlock(f"Not computed: {', '.join(absent)}."))
+    blocks += [TextBlock(text) for text in _list_absent(data)]
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
 
 
-def _build_lead(data: ReportData, rows: Sequence[_Row], doubtful: Sequence[str]) -> str:
+def _list_absent(data: ReportData) -> Iterator[str]:
+    """Yield the sentences on results of another version or case, and on those not computed."""
+    if data.folder is None:  # a history alone has no folder of further results
+        return
+    present = [name for name in SHOWN_RESULTS if f"{name}.txt" in data.files]
+    present += data.statements
+    absent = {f"{name}.txt": each for name, each in RESULTS.items() if name not in present}
+    earlier = [
+        f"{absent.pop(name)} (run `archfem {command}` again)"
+        for command, group in read_file_list(data.folder).items()
+        for name in group.files
+        if name in absent
+    ]
+    made = "Not stated, for an earlier version of archfem or another case made it"
+    for words, results in ((made, earlier), ("Not computed", [*absent.values()])):
+        if results:
+            yield f"{words}: {', '.join(results)}."
+
+
+def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) -> str:
     """Answer in a few sentences: demand, outcomes, variations, least margin, results in doubt."""
     checks = [(float(row[3]), row[0]) for row in rows if row[0].startswith("assessment: ")]
     if not data.runs and not checks:
         return ""  # a load has one result, which says all
     stated = [data.case.report["demand"]] if data.case.report.get("demand") else []
-    stated += [f"motions of {demand}" for name, demand, *_ in rows if name == "time histories"]
+    stated += [f"motions of {demand}" for name, demand, *_ in rows if name == _HISTORIES]
     lead = [f"the structure {text}" for text in _describe_outcomes(data)]
     if data.verdict_range is not None:
         lead.append(f"it {data.verdict_range.count} variations of its properties")
@@ -187,7 +174,7 @@ def _build_signatures(report: Mapping[str, str]) -> Grid:
     return Grid(("", "name", "place, date", "signature"), rows, "", "form")
 
 
-def _capacity_rows(data: ReportData) -> Iterator[tuple[str, _Row]]:
+def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     """Yield each result with its demand, capacity or outcome, and factor; "-" where is none."""
     if stated := data.case.report.get("demand"):
         yield "", ("as stated", stated, "-", "-")
@@ -196,76 +183,13 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, _Row]]:
         peaks = [f"{_peak_of_ground(run) / STANDARD_GRAVITY:.2f}" for run in data.runs.values()]
         demand = f"PGA {' to '.join(dict.fromkeys([min(peaks), max(peaks)]))} g"
         outcome = result_text.count_outcomes(verdicts) if len(peaks) > 1 else verdicts[0].outcome
-        yield "time histories", ("time histories", demand, outcome, "-")
+        yield _HISTORIES, (_HISTORIES, demand, outcome, "-")
     if (computed := data.verdict_range) is not None:
         motion = computed.dataset.attrs.get("motion")
         name = f"{_VARIATIONS} under '{motion}'" if motion else _VARIATIONS
         yield _VARIATIONS, (name, "the same motion", computed.count, "-")
-    for name, result in _STATED_RESULTS.items():
-        if text := data.read_text(name):
-            build: dict[str, Callable[[str], Iterator[_Row]]]
-            build = {"assessment.txt": _assessment_rows, "risk.txt": partial(_risk_row, data)}
-            for row in build.get(name, partial(_load_row, result))(text):
-                yield result, row
-
-
-def _load_row(result: str, text: str) -> Iterator[_Row]:
-    """Yield the row of a load that grows until it makes a mechanism."""
-    first = text.splitlines()[0]
-    if found := re.search(r" for (.*?): factor (\S+) (.*?), ((?:passes|fails).*)", first):
-        vehicle, factor, place, outcome = found.groups()
-        yield result, vehicle, f"{outcome}, {place}", factor
-    elif found := re.search(r", at (\S+(?: to \S+)?) times (.*)", first):
-        yield result, found[2], "a mechanism", found[1]
-    elif found := re.search(r", at (.*)", first):
-        yield result, "-", f"a mechanism at {found[1]}", "-"
-    else:
-        yield result, "-", first.partition(": ")[2], "-"
-
-
-def _list_checks(text: str) -> dict[str, list[str]]:
-    """Return the checks of a kinematic assessment, each with the directions in which it holds."""
-    checks: dict[str, list[str]] = {}
-    for part in text.split("\n\n"):
-        for line in filter(_CHECK.match, part.splitlines()):
-            checks.setdefault(line, []).append(part.partition(":")[0])
-    return checks
-
-
-def _assessment_rows(text: str) -> Iterator[_Row]:
-    """Yield a row for each check of a kinematic assessment."""
-    for line, directions in _list_checks(text).items():
-        if found := _CHECK.match(line):
-            name = f"assessment: {found['name']}, {' and '.join(directions)}"
-            # a check of displacement passes, too, where the mechanism does not begin to move
-            unmoved = bool(found["rest"]) and found["outcome"] == "passes"
-            rest = ", for the mechanism does not begin to move" if unmoved else ""
-            outcome = f"{found['capacity']}, {found['outcome']}{rest}"
-            yield name, found["demand"], outcome, found["factor"]
-
-
-def _risk_row(data: ReportData, text: str) -> Iterator[_Row]:
-    """Yield the row of the annual rate: hazard by its return periods, and median of the falls."""
-    found, risk = re.search(r"falls at (.*? a year).*; median (\S+) ", text), data.case.risk
-    if not found or risk is None:
-        return
-    hazard = risk.hazard
-    name, unit = hazard.measure.upper().replace("_AVG", ", mean,"), MEASURES[hazard.measure]
-    few = len(hazard.intensity) <= 4
-    years = 1.0 / hazard.rate if few else np.array([DESIGN_PERIOD])
-    sizes = hazard.intensity_of(years)
-    listed = ", ".join(f"{value:.3g}" for value in sizes)
-    demand = f"{name} {listed} {unit} once in {', '.join(f'{each:.4g}' for each in years)} years"
-    if len(sizes) == 2:  # one line in double logarithm
-        slope = float(np.log(years[1] / years[0]) / np.log(sizes[1] / sizes[0]))
-        demand += f", rate {float(sizes[0]) ** slope / years[0]:.3g} a^-{slope:.3g}"
-    factors = ", ".join(f"{float(found[2]) / value:.3g}" for value in sizes)
-    yield "annual rate", demand, f"median {name} {found[2]} {unit}, falls at {found[1]}", factors
-
-
-def _conclude_histories(data: ReportData) -> list[str]:
-    """Return the sentences on the runs, on the law of their joints, and on their range."""
-    return [*_conclude_runs(data), *_conclude_joints(data), *_conclude_range(data)]
+    for name, statement in data.statements.items():
+        yield from ((RESULTS[name], row) for row in statement.rows)
 
 
 def _describe_outcomes(data: ReportData) -> Iterator[str]:
@@ -344,39 +268,17 @@ def _conclude_range(data: ReportData) -> Iterator[str]:
         yield f"Where {varied} {verb} uncertain,{under} the structure {computed.sentence}."
 
 
-def _conclude_file(data: ReportData, name: str) -> list[str]:
-    """Return the decisive sentences of the file of a command."""
-    text = data.read_text(name)
-    if not text:
-        return []
-    if name == "risk.txt":
-        return [sentence(f"the structure {text.splitlines()[0]}")]
-    if name != "assessment.txt":
-        first, *others = text.splitlines()
-        return list(map(sentence, [first, *(x for x in others if x.startswith(PRESSURE_RANGE))]))
-    decisive: dict[str, list[str]] = {}  # the last check of each direction
-    for part in text.split("\n\n"):
-        for line, ways in [*_list_checks(part).items()][-1:]:
-            decisive.setdefault(line, []).extend(ways)
-    return [
-        sentence(f"kinematic assessment, {' and '.join(ways)}: {line}")
-        for line, ways in decisive.items()
-    ]
-
-
 def list_doubts(data: ReportData) -> list[tuple[str, str]]:
     """Return each result in doubt with its doubt, once; of runs with the number that have it."""
     verdicts = [run.verdict for run in data.runs.values()]
     reasons = Counter(doubt.cause for verdict in verdicts for doubt in verdict.doubts)
     count = len(verdicts)
     of_runs = [f"{n} of {count} runs: {text}" if count > 1 else text for text, n in reasons.items()]
-    doubts = [("time histories", text) for text in of_runs]
+    doubts = [(_HISTORIES, text) for text in of_runs]
     if data.verdict_range is not None:
         doubts += [(_VARIATIONS, str(doubt)) for doubt in data.verdict_range.doubts]
-    for name, result in _STATED_RESULTS.items():
-        lines = (data.read_text(name) or "").splitlines()
-        for mark in (DOUBT_MARK, NOTE_MARK):
-            doubts += [(result, line.removeprefix(mark)) for line in lines if line.startswith(mark)]
+    for name, stated in data.statements.items():
+        doubts += [(RESULTS[name], doubt) for doubt in stated.doubts]
     return list(dict.fromkeys(doubts))
 
 
@@ -403,7 +305,8 @@ def describe_what_is_not_varied(data: ReportData) -> str:
     if not single:
         return doubts.strip()
     # the samples of a rate were scaled until they fell
-    scale = "" if "risk.txt" in data.files else ", nor by how much the motion may be scaled"
+    scaled = {"scale", "risk"} & data.statements.keys()
+    scale = "" if scaled else ", nor by how much the motion may be scaled"
     return (
         f"{doubts}Not varied: {', '.join(single)}. What another choice of these would change was "
         f"not computed{scale}."

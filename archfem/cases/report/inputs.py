@@ -5,7 +5,7 @@ from inspect import Parameter, signature
 from typing import Any
 
 from archfem._validation import declared_keys
-from archfem.cases.defaults import DECIDING_VALUES, HINGE_REASON, list_default_keys
+from archfem.cases.defaults import DECIDING_VALUES, HINGE_REASON, list_default_keys, value_text
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.structure_keys import shape_keys
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
@@ -26,6 +26,19 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 
 _RATING_KEYS = {"live", "impact", "dead", "width", "area_load"}
+
+# Properties that limit analysis of rigid blocks does not use, beside a strength that is a default
+_UNUSED = {"young", "poisson", "normal_stiffness", "shear_stiffness", "finish"}
+
+# Properties that may be left out: name in texts, and unit
+_FURTHER_PROPERTIES = {
+    "poisson": ("ν", 1.0, ""),
+    "cohesion": ("cohesion", 1e3, " kPa"),
+    "tension": ("tensile strength", 1e3, " kPa"),
+    "dilatancy": ("dilatancy", 1.0, ""),
+    "fracture_energy": ("fracture energy", 1.0, " N/m"),
+    "shear_fracture_energy": ("fracture energy in shear", 1.0, " N/m"),
+}
 
 _CAPTION = (
     "Inputs. Given: the case states it. Default: archfem's, since the case does not. Inferred: it "
@@ -79,35 +92,25 @@ def describe_value(value: Any, kind: Any = None) -> str:
 def _property_rows(data: ReportData) -> Iterator[Row]:
     """Yield the values of materials and contacts."""
     case = data.case
-    others: dict[str, dict[str, tuple[str, float, str]]] = {
-        "materials": {"poisson": ("ν", 1.0, "")},
-        "contacts": {
-            "cohesion": ("cohesion", 1e3, " kPa"),
-            "tension": ("tensile strength", 1e3, " kPa"),
-            "dilatancy": ("dilatancy", 1.0, ""),
-            "fracture_energy": ("fracture energy", 1.0, " N/m"),
-            "shear_fracture_energy": ("fracture energy in shear", 1.0, " N/m"),
-        },
-    }
     items: list[Material | Contact] = [block.material for block in case.structure.blocks]
     items += [joint.contact for joint in case.structure.joints]
     for item in dict.fromkeys(items):
         section = "materials" if isinstance(item, Material) else "contacts"
         defaults = list_default_keys(case, item)
         given = case.settings.get(section, {}).get(item.name, {})
-        for key, (word, unit, name, reason) in DECIDING_VALUES[section].items():
-            value = getattr(item, key)
-            text = "not known" if value is None else f"{value / unit:.4g}{name}"
-            text = "never slides" if text == "inf" else text
-            mark = _mark(key not in defaults and value is not None)
-            inferred = "finish" in given and key not in given and mark == "given"
-            if mark == "default" and value is not None:
+        unused = _UNUSED | ({"strength"} - given.keys()) if data.is_static else set()
+        for key, (word, *_, reason) in DECIDING_VALUES[section].items():
+            text, mark = value_text(section, key, getattr(item, key)), _mark(key in given)
+            if key in defaults:
                 text += f" ({reason.partition(';')[0]})"
-            yield f"{item.name}: {word}", text, "inferred" if inferred else mark
-        if "finish" in given:
+            elif key not in given and text != "not known":  # by the finish
+                mark = "inferred"
+            if key not in unused:
+                yield f"{item.name}: {word}", text, mark
+        if "finish" in given.keys() - unused:
             yield f"{item.name}: finish", given["finish"], "given"
-        for key, (word, unit, name) in others[section].items():
-            if key in given or getattr(item, key):
+        for key, (word, unit, name) in _FURTHER_PROPERTIES.items():
+            if (key in given or getattr(item, key, None)) and key not in unused:
                 text = f"{getattr(item, key) / unit:g}{name}"
                 yield f"{item.name}: {word}", text, _mark(key in given)
         if isinstance(item, Contact) and item.law is not None:

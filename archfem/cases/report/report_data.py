@@ -1,5 +1,6 @@
 """Data of a report: case, runs, files of the folder, and the model rebuilt for the player."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +12,7 @@ import xarray as xr
 
 from archfem._files import check_listed, describe_deleted, group_of, path_inside, read_file_list
 from archfem.cases.case import Case
+from archfem.cases.result_text import NOTE_MARK, Statement, cut_remedy
 from archfem.cases.run import CASE_FILE, RATING_FILE
 from archfem.cases.toml_file import Table, parse_tables
 from archfem.dynamics.history import History
@@ -26,8 +28,19 @@ from archfem.view.pages.live import LivePage, describe_arch, list_motions
 from archfem.view.pages.player import Player
 from archfem.view.pages.player_data import MAX_PACKED_BYTES, Scene
 
-# Before what a kinematic assessment leaves out
-NOTE_MARK = "note: "
+# Results by the names of their files: those that the report states, and those it shows alone
+RESULTS = {
+    "limit": "limit analysis",
+    "pushover": "pushover",
+    "rating": "rating",
+    "assessment": "kinematic assessment",
+    "scale": "scale of the motion",
+    "risk": "annual rate of collapse",
+    "modes": "modes",
+    "accuracy": "comparison of models and time steps",
+    "verdict_range": "range of the verdict over uncertain properties",
+}
+SHOWN_RESULTS = ("modes", "accuracy", "verdict_range")
 
 # Results of limit analysis, for which blocks are rigid
 STATIC_RESULTS = ("limit", "rating", "assessment")
@@ -69,9 +82,9 @@ class ReportData:
     @property
     def is_static(self) -> bool:
         """Whether there are limit analysis, a rating or an assessment alone, without a model."""
-        modelled = any(f"{name}.txt" in self.files for name in ("pushover", "risk"))
-        static = any(f"{name}.txt" in self.files for name in STATIC_RESULTS)
-        return static and not modelled and not self.runs
+        found = {name for name in RESULTS if f"{name}.txt" in self.files}
+        modelled = found & {"pushover", "scale", "risk"} or self.runs
+        return not modelled and bool(found.intersection(STATIC_RESULTS))
 
     @cached_property
     def verdict_range(self) -> VerdictRange | None:
@@ -91,6 +104,14 @@ class ReportData:
         ]
 
     @cached_property
+    def statements(self) -> dict[str, Statement]:
+        """What the commands state of their results, by the names of their files."""
+        read = {name: json.loads(self.read_text(f"{name}.json") or "{}") for name in RESULTS}
+        # that of an earlier version may have others
+        known = (each for each in read.items() if each[1].keys() == set(Statement._fields))
+        return {name: Statement(**values) for name, values in known}
+
+    @cached_property
     def files(self) -> dict[str, Path]:
         """Files of the folder by name that have the inputs of its case; the others are left out."""
         listed = {} if self.folder is None else read_file_list(self.folder)
@@ -107,17 +128,12 @@ class ReportData:
         return "" if self.folder is None else describe_deleted(self.folder)
 
     def read_text(self, name: str) -> str | None:
-        """Return the text of a file of the folder, or None; its doubts are without remedies.
-
-        Remedies are for who computes. As in `Doubt`, they follow behind the last semicolon.
-        """
+        """Return the text of a file of the folder, or None; its doubts are without remedies."""
         if name not in self.files:
             return None
         check_listed(self.files[name], content := self.files[name].read_bytes())
-        lines = content.decode("utf-8").strip().splitlines()
-        doubts = [line.startswith((DOUBT_MARK, NOTE_MARK)) and "; " in line for line in lines]
-        cut = zip(lines, doubts, strict=True)
-        return "\n".join(line.rpartition("; ")[0] if doubt else line for line, doubt in cut)
+        marks, lines = (DOUBT_MARK, NOTE_MARK), content.decode("utf-8").strip().splitlines()
+        return "\n".join(cut_remedy(x) if x.startswith(marks) else x for x in lines)
 
     def read_figure(self, name: str, caption: str) -> list[FigureBlock]:
         """Return the picture of a file of the folder, or an empty list."""

@@ -35,7 +35,7 @@ from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.mechanism_assessment import LIMIT_STATES, LimitState
 from archfem.statics.stress import utilisation_text
-from archfem.units import kN
+from archfem.units import MPa, kN
 from archfem.view.collapse import draw_fall
 from archfem.view.histories import draw_envelopes
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
@@ -84,6 +84,7 @@ def build_sections(data: ReportData) -> list[Section]:
         *build_dead_load_sections(data),
         build_ground_section(data),
         *build_run_sections(data),
+        Section("Scale of the motion", data.read_result("scale", "")),
         Section("Annual rate of collapse", data.read_result("risk", *_RISK_CAPTIONS)),
         build_check_section(data),
         build_joint_section(data),
@@ -143,12 +144,11 @@ def build_input_section(data: ReportData) -> Section:
 
 def _describe_joints(data: ReportData) -> str:
     """Say what joints resist, and in which results they crush."""
-    law, mark = "dry: no tension but where a bond is given; Coulomb friction", "joints crush at "
-    for name in ("limit", "rating"):
-        for line in (data.read_text(f"{name}.txt") or "").splitlines():
-            if line.startswith(mark):
-                return f"{law}; crushing in limit analysis alone, at {line.removeprefix(mark)}"
-    return f"{law}; no crushing"
+    law = "dry: no tension but where a bond is given; Coulomb friction"
+    strength = data.case.limit.strength
+    if strength is None or not {"limit", "rating"} & data.statements.keys():
+        return f"{law}; no crushing"
+    return f"{law}; crushing in limit analysis alone, at {strength / MPa:.3g} MPa"
 
 
 def _build_geometry(case: Case) -> list[Any]:
@@ -240,8 +240,8 @@ def _build_assessment(data: ReportData) -> list[Any]:
         return []
     caption = "(a) Mechanism at the displacement capacity, and (b) capacity curve with demand."
     names = sorted(name for name in data.files if name.startswith("assessment_"))
-    sizes = [line for line in text.splitlines() if line.startswith("alpha_0 = ")]
-    if len(sizes) == len(names) == 2 and sizes[0] == sizes[1]:
+    stated = data.statements.get("assessment")
+    if stated and len(names) == 2 and all(x.endswith("right and left") for x, *_ in stated.rows):
         names = names[:1]
         caption = f"{caption[:-1]}, to the right; those to the left are its mirror image."
     figures = [figure for name in names for figure in data.read_figure(name, caption)]

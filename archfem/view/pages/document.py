@@ -70,7 +70,9 @@ class FigureBlock:
         with matplotlib.rc_context({"svg.fonttype": "path", "path.simplify_threshold": 0.5}):
             figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
         width = float(figure.get_figwidth())
-        return cls(_uri("image/svg+xml", buffer.getvalue()), caption, width, figure)
+        # upright rectangles are printed at least a pixel wide: letters such as l would be smudged
+        content = buffer.getvalue().replace(b") scale(", b") skewX(0.1) scale(")
+        return cls(_uri("image/svg+xml", content), caption, width, figure)
 
     def raster(self) -> bytes:
         """Return the picture as PNG, 300 dots per inch."""
