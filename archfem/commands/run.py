@@ -24,6 +24,7 @@ from archfem.cases import result_text
 from archfem.cases.analysis_keys import parse_rating, rate_case
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults
+from archfem.cases.result_text import state_rating
 from archfem.cases.run import (
     CASE_FILE,
     RATING_FILE,
@@ -202,9 +203,8 @@ def rate(options: argparse.Namespace) -> None:
     """Rate the bridge of a case for a vehicle, by the joints and the fill of its [limit]."""
     keys = ("vehicle", "live", "impact", "dead", "width", "area_load")
     # as in --set, so that a length may have a unit
-    given = dict(
-        parse_change(f"{key}={x}") for key in keys if (x := getattr(options, key)) is not None
-    )
+    values = {key: getattr(options, key) for key in keys}
+    given = dict(parse_change(f"{k}={x}") for k, x in values.items() if x is not None)
     case = Case.read(options.case, options.changes)
     rating = {**case.settings.get("rating", {}), **given}
     with _record_doubts(case.structure) as doubts:
@@ -212,9 +212,8 @@ def rate(options: argparse.Namespace) -> None:
     text = "\n".join([str(found), *doubts])
     print(f"{case.title}\n{text}")
     # the case of the folder, that of a run, may be rated for another vehicle
-    texts = {RATING_FILE: format_tables({"rating": rating}).rstrip()}
-    texts |= {"rating.txt": text, "rating.csv": found.table()}
-    texts |= result_text.state_rating(found, doubts).as_file("rating")
+    texts = {RATING_FILE: format_tables({"rating": rating}).rstrip(), "rating.txt": text}
+    texts |= {"rating.csv": found.table(), **state_rating(found, doubts).as_file("rating")}
     _write_results("rate", case, options.out, lambda: {**texts, "rating.png": found.plot()})
 
 

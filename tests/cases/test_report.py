@@ -574,6 +574,10 @@ def test_a_result_without_a_time_history_has_a_report(
     assert ("Over the pressure of the fill, at that place: " in concluded) == (command == "rate")
     factor = re.search(r"factor (?:of )?([\d.]+)", said)[1]
     assert f"{factor}" in words
+    # what rigid blocks do not use is no input; a strength that is a default neither
+    inputs = words.split("Inputs and assumptions")[2].partition("Assumptions, units")[0]
+    assert "stone: weight" in inputs
+    assert not re.search(r": (E|strength|k_n|k_s|ν)\b", inputs)
     assert "Response" not in words
     assert "runs of first" not in words
     # a run takes the folder over

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from pages import read_page
 
 import archfem as af
 from archfem.cases.run import carry_out
@@ -229,6 +230,11 @@ motion = {{ file = "tap.txt", dt = 0.01, units = "m/s2" }}
     again = (tmp_path / "out" / "scale.txt").read_text(encoding="utf-8")
     factor = [float(re.search(r"\((\S+) × ", each)[1]) for each in (text, again)]
     assert factor[0] / factor[1] == pytest.approx(2.0, rel=0.1)
+    assert af.commands.main(["report", str(tmp_path / "out")]) == 0
+    words = " ".join(read_page((tmp_path / "out" / "report.html").read_text()).words)
+    said = again.splitlines()[0].partition(": ")[2]
+    assert f"Scale of the motion: {said}." in words  # the conclusion
+    assert head in words.split("Scale of the motion")[-1]  # the section
 
 
 @pytest.mark.slow
@@ -540,6 +546,10 @@ def test_rating_of_a_case(tmp_path, ring, capsys):
     named = replace(ring, name="a ring pushed over")
     found = af.rate(named, "CS454-single", live=0.1)
     assert str(found) in said
+    assert af.commands.main([*command[:-1], f"{100.0 * ring.width} cm"]) == 0
+    assert str(found) in capsys.readouterr().out
+    assert af.commands.main([*command[:-1], "wide"]) == 1
+    assert "rating.width = 'wide'" in capsys.readouterr().err
     assert (out / "rating.txt").read_text().strip() == str(found)
     assert (out / "rating.csv").read_text().strip() == found.table()
     assert f"wrote {out / 'rating.png'}" in said

@@ -1,5 +1,6 @@
 """Rigid-block equilibrium as a linear programme: loads, gaps, balance and crushing cuts."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -104,6 +105,32 @@ def test_strength_lowers_the_factor_steadily():
         af.collapse_factor(ring(), live=SIDEWAYS, strength=0.1 * af.units.MPa).outcome
         == "infeasible"
     )
+
+
+def test_the_strength_of_a_material_is_that_of_its_stones_and_no_default_is():
+    """In the functions of limit analysis alike; infinite is none."""
+    weak = replace(af.STONE, strength=0.5 * af.units.MPa)
+    vehicle, stones, given = "CS454-single", ring(material=weak), {"strength": weak.strength}
+    answers = [
+        [
+            af.collapse_factor(structure, live=SIDEWAYS, **options).factor,
+            af.rate(structure, vehicle, **options).factor,
+        ]
+        for structure, options in (
+            (stones, {}),
+            (ring(), given),
+            (ring(), {}),
+            (stones, {"strength": np.inf}),
+        )
+    ]
+    assert answers[0] == answers[1]
+    assert answers[2] == answers[3]
+    assert np.all(np.array(answers[0]) < 0.9 * np.array(answers[2]))
+    brittle = ring(material=replace(weak, strength=0.1 * af.units.MPa))
+    assert not af.stands(brittle)
+    assert af.stands(brittle, strength=np.inf)
+    with pytest.raises(af.InvalidInput, match="strength -1 Pa is not positive"):
+        af.collapse_factor(stones, live=SIDEWAYS, strength=-1.0)
 
 
 def test_strong_joints_respect_the_stress_block():

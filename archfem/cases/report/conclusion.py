@@ -80,8 +80,7 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
 def _peak_of_ground(run: History) -> float:
     """Return the horizontal peak acceleration of a run [m/s²]."""
     # Files of older versions have the acceleration at their steps alone.
-    steps = float(np.abs(run.dataset["ground"].values[:, 0]).max())
-    return float(run.dataset.attrs.get("pga", steps))
+    return float(run.dataset.attrs.get("pga", np.abs(run.dataset["ground"].values[:, 0]).max()))
 
 
 def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
@@ -110,10 +109,9 @@ def build_conclusion(data: ReportData) -> Section:
     lead = _build_lead(data, rows, doubtful)
     blocks: list[Any] = [TextBlock(lead)] if lead else []
     of_runs = *_conclude_runs(data), *_conclude_joints(data), *_conclude_range(data)
-    texts = {_HISTORIES: " ".join(of_runs)}
-    for name, stated in data.statements.items():
-        texts[RESULTS[name]] = " ".join(map(sentence, stated.sentences))
-    for result, text in texts.items():
+    stated = [(RESULTS[k], map(sentence, each.sentences)) for k, each in data.statements.items()]
+    for result, sentences in ((_HISTORIES, of_runs), *stated):
+        text = " ".join(sentences)
         blocks += [TextBlock(text)] if text else []
         about_these = (result, _VARIATIONS) if result == _HISTORIES else (result,)
         own = (doubt for about, doubt in doubts if about in about_these)
@@ -122,8 +120,8 @@ def build_conclusion(data: ReportData) -> Section:
         head = ("", "demand", "capacity or outcome", "factor")
         factors = _FACTORS if any(row[3] != "-" for row in rows) else ""
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
-    blocks += [TextBlock(text) for text in filter(None, [describe_what_is_not_varied(data)])]
-    blocks += [TextBlock(text) for text in _list_absent(data)]
+    texts = [describe_what_is_not_varied(data), *_list_absent(data)]
+    blocks += map(TextBlock, filter(None, texts))
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
 
 
@@ -219,12 +217,11 @@ def _conclude_runs(data: ReportData) -> Iterator[str]:
     if np.isfinite(sizes).all() and len(sizes):
         largest, residual = map(format_mm, sizes.max(axis=0))
         yield f"The largest displacement of a block is {largest}, and {residual} at the end."
-    known = [each for each in verdicts if "verified" in each.mechanisms]
-    if met := sum(each.mechanisms["verified"] is not None for each in known):
+    if met := [each for each in verdicts if each.mechanisms.get("verified") is not None]:
         yield (
-            f"The stones can move as a mechanism for a while under {met} of {count} motions."
+            f"The stones can move as a mechanism for a while under {len(met)} of {count} motions."
             if count > 1
-            else f"The stones can move as a mechanism for a while: {describe_mechanism(known[0])}."
+            else f"The stones can move as a mechanism for a while: {describe_mechanism(met[0])}."
         )
 
 

@@ -254,8 +254,7 @@ def _criteria_rows(data: ReportData) -> Iterator[Row]:
     given = settings.get("criteria", own) or {}
     reason = "" if "hinge" in given else f" ({HINGE_REASON})"
     yield "a joint hinges where", f"|e| ≥ {criteria.hinge:g}{reason}", _mark("hinge" in given)
-    limit = "its own limit, μ + c A / N"
-    limit = limit if criteria.friction is None else f"{criteria.friction:g}"
+    limit = "its own limit, μ + c A / N" if criteria.friction is None else f"{criteria.friction:g}"
     yield "a joint slides where |V| / N reaches", limit, _mark("friction" in given)
     count = f"{criteria.failures} joints of rings and piers that fail at once"
     yield "mechanism by count", count, _mark("failures" in given)

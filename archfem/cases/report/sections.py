@@ -383,17 +383,13 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
         f"Outcome: {summarise_outcomes(data, [run])}",
         *(f"In doubt: {doubt.cause}" for doubt in verdict.doubts),
     ]
-    lines += (
-        [f"lost: {describe_lost(fall, len(fall.blocks))}"]
-        if fall is not None and fall.blocks
-        else []
-    )
-    blocks: list[Any] = [TextBlock(sentence(line)) for line in lines]
-    blocks.append(TextBlock(sentence(f"Mechanism: {describe_mechanism(verdict)}")))
+    if fall is not None and fall.blocks:
+        lines.append(f"lost: {describe_lost(fall, len(fall.blocks))}")
+    lines.append(f"Mechanism: {describe_mechanism(verdict)}")
     # the conclusion names the law of closing, and whether it was varied
     law = describe_closing(data.case.structure)
-    own = [line for line in verdict.remarks if not law or not line.startswith(law)]
-    blocks += [TextBlock(sentence(line)) for line in own]
+    lines += [line for line in verdict.remarks if not law or not line.startswith(law)]
+    blocks: list[Any] = [TextBlock(sentence(line)) for line in lines]
     if data.case.suite is None or any(verdict.mechanisms.values()):
         caption = "Definitions of a mechanism: failed joints that it needs, and the first one"
         rows = [
@@ -477,13 +473,9 @@ def supported_weight_ratio(structure: Structure, joints: xr.Dataset) -> float:
 def build_method_section(data: ReportData) -> Section:
     """Build the section on norms and methods."""
     norm = [("norm", data.case.report["norm"])] if data.case.report.get("norm") else []
-    sources = (("suite", "target"), ("assessment", "spectrum"))
-    given = [
-        describe_value(table[key])
-        for section, key in sources
-        if key in (table := data.case.settings.get(section, {}))
-    ]
-    spectra = [("design spectrum", each) for each in dict.fromkeys(given)]
+    suite, assessment = (data.case.settings.get(key, {}) for key in ("suite", "assessment"))
+    given = filter(None, [suite.get("target"), assessment.get("spectrum")])
+    spectra = [("design spectrum", text) for text in dict.fromkeys(map(describe_value, given))]
     used = [row[1:] for row in _METHODS if not row[0] or row[0] in data.files]
     used = [row for row in used if data.runs or row[0] != "joints, criteria"]
     return Section("Norms and methods", [Grid((), [*norm, *spectra, *used])])

@@ -1,6 +1,7 @@
 """Documents: words escaped, tables and figures as they should be."""
 
 import re
+from base64 import b64decode
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -26,6 +27,28 @@ def test_words_of_users_are_escaped_and_numbers_typeset():
     assert {"−0.5", "–", "a-b", "a < b"} <= set(read.words)
     assert page.count("data:image/svg+xml;base64,") == 1
     assert "width:2.0in" in page
+
+
+def test_a_short_text_stays_with_its_figure():
+    """And a long one leaves it the next page, for the room before both would be half a page."""
+    figure = FigureBlock.of(Figure(figsize=(2.0, 1.0)), "of it")
+    long = TextBlock("a line\n" * 13, "lines")
+    pieces = [TextBlock("one", "lines"), figure, long, figure, TextBlock("no figure", "lines")]
+    page = Document("", "", [], [Section("", pieces)]).page
+    kept = re.findall(r'<div class="kept">(.*?)</div>', page, re.DOTALL)
+    assert len(kept) == page.count('<div class="kept">') == 1
+    assert "one" in kept[0]
+    assert kept[0].count("<figure") == 1
+
+
+def test_no_letter_is_an_upright_rectangle():
+    """Printers draw those at least a pixel wide: l and I looked smudged."""
+    figure = Figure(figsize=(2.0, 1.0))
+    figure.suptitle("fill")
+    drawn = b64decode(FigureBlock.of(figure, "").source.partition(",")[2]).decode()
+    texts = re.findall(r'transform="(translate[^"]*scale\([^"]*)"', drawn)
+    assert texts
+    assert all("skewX(0.1) scale(" in transform for transform in texts)
 
 
 def test_text_contrasts_with_its_ground_in_both_colour_schemes():
