@@ -376,13 +376,9 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     if not is_plastic:
         geometric, deepest = _geometric_factor(weighted, moving, options)
     factors = live, impact, dead, width, area_load
-    without, full, unbacked = _vary_fill(weighted, moving, options)
-    more: dict[str, Any] = {
-        "strength": strength,
-        "without_pressure": without,
-        "full_pressure": full,
-    }
-    more |= {"deepest": deepest, "without_backing": unbacked, "fill": fill}
+    more: dict[str, Any] = {"strength": strength, "fill": fill, "deepest": deepest}
+    names = ("without_pressure", "full_pressure", "without_backing")
+    more |= dict(zip(names, _vary_fill(weighted, moving, options), strict=True))
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
 
 

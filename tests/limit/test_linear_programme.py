@@ -129,7 +129,7 @@ def test_the_strength_of_a_material_is_that_of_its_stones_and_no_default_is():
     brittle = ring(material=replace(weak, strength=0.1 * af.units.MPa))
     assert not af.stands(brittle)
     assert af.stands(brittle, strength=np.inf)
-    with pytest.raises(af.InvalidInput, match="strength -1 Pa is not positive"):
+    with pytest.raises(af.InvalidInput, match="is not above 0: leave it out for no limit"):
         af.collapse_factor(stones, live=SIDEWAYS, strength=-1.0)
 
 
