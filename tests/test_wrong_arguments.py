@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem._validation import matches_annotation
+from archfem._validation import check_between, matches_annotation
 
 SQUARE = np.array([(-0.5, 0.0), (0.5, 0.0), (0.5, 1.0), (-0.5, 1.0)])
 MASKED = np.ma.masked_array([1.0, 2.0], mask=[False, True])
@@ -301,3 +301,17 @@ def test_a_model_that_has_no_operator_is_a_model(stack):
     assert far.operator is None
     assert matches_annotation(far, af.models.Model)
     assert not matches_annotation(stack, af.models.Model)
+
+
+@pytest.mark.parametrize("ends", ["()", "[)", "(]", "[]"])
+def test_a_parenthesis_excludes_the_bound_of_a_number(ends):
+    assert check_between(0.5, "share", 0.0, 1.0, ends=ends) == 0.5
+    for bound, end in zip((0.0, 1.0), ends, strict=True):
+        if end in "[]":
+            assert check_between(bound, "share", 0.0, 1.0, ends=ends) == bound
+            continue
+        with pytest.raises(af.InvalidInput, match=f"share = {bound} is not between 0 and 1: try"):
+            check_between(bound, "share", 0.0, 1.0, ends=ends, remedy="try 0.5")
+    for outside in (-0.1, 1.1, np.nan):
+        with pytest.raises(af.InvalidInput, match="share = "):
+            check_between(outside, "share", 0.0, 1.0, ends=ends)

@@ -50,7 +50,7 @@ def test_displacements_reach_the_model(path):
     ("change", "says"),
     [
         ("model.fidelity=monolithic", "do not exist with fidelity 'monolithic': use 'full'"),
-        ("model.displacements=far", "displacements 'far' are not known"),
+        ("model.displacements=far", "displacements = 'far' is not known"),
         ("analysis.scheme=newmark", r"does not keep the energy of blocks that turn far.*Conserv"),
         ("model.quadrature=exact", None),
         ("model.quadrature=nodal", None),

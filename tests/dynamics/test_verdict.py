@@ -122,7 +122,7 @@ def test_an_event_over_the_record_ends_a_run_where_the_record_says(model, motion
 
 
 def test_counting_over_the_record_refuses_other_classes():
-    with pytest.raises(af.InvalidInput, match="'instant' or 'record'"):
+    with pytest.raises(af.InvalidInput, match="over = 'motion' is not known"):
         af.dynamics.CountedMechanism(over="motion")
     with pytest.raises(af.InvalidInput, match="leave kinds out"):
         af.dynamics.CountedMechanism(over="record", kinds=("global",))

@@ -440,7 +440,7 @@ def test_paths_that_cannot_be_followed_are_refused():
     sticky = af.Contact(1e9, 0.4e9, 0.6, cohesion=2e4)
     leaning = af.column(breadth=0.6, heights=[2.4], contact=contact(0.6))
     refused = [
-        ({"friction": "nonassociated"}, block, push, "friction 'nonassociated'"),
+        ({"friction": "nonassociated"}, block, push, "friction = 'nonassociated'"),
         ({}, af.column(breadth=0.6, heights=[2.4], contact=bond), push, "tensile strength"),
         ({}, af.column(breadth=0.6, heights=[2.4], contact=sticky), push, "a cohesion of 2e.04 Pa"),
         ({}, arch_bridge(), push, "does not follow the stones"),
