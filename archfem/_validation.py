@@ -140,7 +140,8 @@ def check_between(
     error: type[ArchfemError] = InvalidInput,
 ) -> float:
     """Return a finite number between bounds, of which a parenthesis in `ends` excludes one."""
-    number = check_number(value, name)
+    # NaN fails every comparison, and is refused as a number out of bounds
+    number = value if isinstance(value, float) and value != value else check_number(value, name)
     reaches = number > low if ends[0] == "(" else number >= low
     if reaches and (number < high if ends[1] == ")" else number <= high):
         return number

@@ -44,7 +44,10 @@ WALL = {"length": 2.0, "height": 2.3, "above": 0.8}
             lambda: af.shapes.Backfill(cover=0.4, erosion=-0.1),
             r"'backfill': erosion \[m\] = -0.1 is not",
         ),
-        (lambda: af.shapes.Backfill(cover=float("nan")), "'backfill': cover nan m is not from 0"),
+        (
+            lambda: af.shapes.Backfill(cover=float("nan")),
+            r"'backfill': cover \[m\] = nan is not between",
+        ),
         (lambda: af.shapes.Backfill(cover=0.4, hump=-1.0), r"'backfill': hump \[m\] = -1.0 is not"),
         (
             lambda: af.shapes.Backfill(cover=0.4, spandrels=-1.0),
