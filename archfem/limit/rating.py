@@ -156,7 +156,7 @@ class Rating(ResultDisplay):
 
     @property
     def place(self) -> str:
-        """Where the axles stand at the worst place, in words: those over rings that fail."""
+        """Where the axles over the rings that fail stand at the worst place, in words."""
         axles = parse_axles(self.vehicle.axles, self.vehicle.spacings)
         place = self.moving.direction, self.moving.position
         stand = [load.x for load in axles_on_structure(self.structure, axles, *place)]

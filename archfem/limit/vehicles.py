@@ -446,3 +446,8 @@ def _find_worst(factors: Array, count: Numbers) -> tuple[int, int]:
 
 
 VEHICLES: Mapping[str, Vehicle] = _read_vehicles()
+
+# Vehicles of a code for roads, by its name
+VEHICLES_OF_CODES: Mapping[str, tuple[str, ...]] = {"Eurocode": ("LM1", "LM2")} | {
+    code: tuple(name for name in VEHICLES if name.startswith(code)) for code in ("CS454", "HL93")
+}
