@@ -15,7 +15,7 @@ from archfem.limit.backfill import Fill
 from archfem.limit.collapse import Collapse, collapse_factor
 from archfem.limit.plastic_fill import PlasticFill
 from archfem.limit.rating import Rating, rate
-from archfem.limit.vehicles import Vehicle
+from archfem.limit.vehicles import VEHICLES_OF_CODES, Vehicle
 from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Settlement
 from archfem.masonry.structure import Structure
 from archfem.motion.design_spectra import DesignSpectrum
@@ -231,6 +231,19 @@ def parse_rating(table: Any) -> Table:
     if isinstance(vehicle := options.get("vehicle"), dict):
         options["vehicle"] = read_object(Vehicle, vehicle, "rating.vehicle")
     return options
+
+
+def name_vehicles(names: Sequence[str], rating: Table) -> list[Table]:
+    """Return [rating] with each of some vehicles: by name, all of a code, or the case's own."""
+    own = rating.get("vehicle")
+    named = own["name"] if isinstance(own, dict) and "name" in own else None
+    codes = {code.lower(): vehicles for code, vehicles in VEHICLES_OF_CODES.items()}
+    vehicles = [
+        vehicle
+        for name in names
+        for vehicle in ([own] if name == named else codes.get(name.lower(), [name]))
+    ]
+    return [{**rating, "vehicle": vehicle} for vehicle in vehicles] or [rating]
 
 
 def rate_case(structure: Structure, rating: Table, limit: LimitAnalysis) -> Rating:

@@ -3,6 +3,8 @@
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from csv import writer
+from io import StringIO
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,6 +53,13 @@ class ResultTable(NamedTuple):
     def text(self) -> str:
         """The table with aligned columns, one line a row."""
         return align_columns(*self)
+
+    @property
+    def csv(self) -> str:
+        """The table as comma-separated values."""
+        lines = StringIO()
+        writer(lines, lineterminator="\n").writerows([self.head, *self.rows])
+        return lines.getvalue().rstrip()
 
 
 def tabulate_joints(joints: xr.Dataset, dead: xr.Dataset | None = None) -> ResultTable:
@@ -241,6 +250,17 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     return "\n".join(lines)
 
 
+def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
+    """Tabulate the ratings of a bridge for several vehicles."""
+    head = ["vehicle", "factor", "without pressure", "with all of it", "geometric"]
+    rows = []
+    for found in ratings:
+        numbers = found.factor, found.without_pressure, found.full_pressure, found.geometric
+        cells = ["-" if np.isnan(value) else f"{value:.4g}" for value in numbers]
+        rows.append([found.vehicle.name, *cells, f"{found.outcome}, {found.place}"])
+    return ResultTable([*head, "outcome, and axles at the worst place"], rows)
+
+
 def describe_opposite(collapse: Collapse, opposite: Collapse) -> str:
     """Describe the result of the same load in the other sense, and which of both is less."""
     rank = "less" if opposite.factor < collapse.factor else "not less"
@@ -338,10 +358,14 @@ def state_outcome(
     return Statement([f"{result}: {words}"], [(result, demand, words, factor)], doubts)
 
 
-def state_rating(found: Rating, doubts: Sequence[str]) -> Statement:
-    """State the factor of a vehicle, and what the pressure of the fill adds."""
-    row = "rating", found.vehicle.name, f"{found.outcome}, {found.place}", f"{found.factor:.4g}"
-    return Statement([repr(found), *found.describe_pressure()], [row], doubts)
+def state_ratings(rated: Sequence[tuple[Rating, Sequence[str]]]) -> Statement:
+    """State the factor of each vehicle; of the worst, the first, what the pressure adds."""
+    rows = [
+        ("rating", found.vehicle.name, f"{found.outcome}, {found.place}", f"{found.factor:.4g}")
+        for found, _ in rated
+    ]
+    worst, doubts = rated[0][0], [doubt for _, own in rated for doubt in own]
+    return Statement([repr(worst), *worst.describe_pressure()], rows, doubts)
 
 
 def state_assessments(found: Mapping[str, KinematicAssessment], doubts: list[str]) -> Statement:

@@ -182,9 +182,10 @@ def _add_case_commands(commands: Any) -> None:
     about = "kinematic assessment of the collapse mechanism against a design spectrum"
     add_to = add("assess", about, "folder for text and pictures (none)", required=False)
     add_to("--parts", action="store_true", help="each part by itself")
-    about = "rating of a bridge for a vehicle by limit analysis"
+    about = "rating of a bridge for vehicles by limit analysis"
     add_to = add("rate", about, "")
-    add_to("--vehicle", metavar="NAME", help="such as LM1 or LM71 (that of [rating])")
+    about = "such as LM1, or Eurocode, CS454, HL93 for all of a code (that of [rating]); repeatable"
+    add_to("--vehicle", action="append", default=[], metavar="NAME", help=about, dest="vehicles")
     add_to("--live", type=float, help="partial factor on the vehicle (of its code)")
     add_to("--impact", type=float, help="dynamic factor on the vehicle (of its code)")
     add_to("--dead", type=float, help="partial factor on the weights (1)")

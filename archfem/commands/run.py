@@ -8,9 +8,13 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from archfem._display import ProgressReport
 from archfem._files import (
     DRAFT_PREFIX,
     create_result_folder,
@@ -21,10 +25,10 @@ from archfem._files import (
 from archfem._optional import can_film
 from archfem.cases import result_folder as results
 from archfem.cases import result_text
-from archfem.cases.analysis_keys import parse_rating, rate_case
+from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults
-from archfem.cases.result_text import state_rating
+from archfem.cases.result_text import state_ratings
 from archfem.cases.run import (
     CASE_FILE,
     RATING_FILE,
@@ -108,8 +112,21 @@ def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
         yield draft
 
 
-def _write_results(command: str, case: Case, out: str | None, draw: Callable[[], Files]) -> None:
-    """Write the results of a command to its folder, if one is given."""
+def _write_results(
+    command: str, case: Case, out: str | None, text: str, draw: Callable[[], Files]
+) -> None:
+    """Write the results of a command to its folder, if one is given, and then print its text."""
+    output = io.StringIO()
+    try:
+        # a reader of the text, such as `head`, may leave before its end
+        with redirect_stdout(output):
+            _replace_files(command, case, out, draw)
+    finally:
+        print(f"{text}\n{output.getvalue()}", end="")
+
+
+def _replace_files(command: str, case: Case, out: str | None, draw: Callable[[], Files]) -> None:
+    """Replace the files of a command in its folder, if one is given."""
     if out is None:
         return
     folder = create_result_folder(out)
@@ -168,8 +185,8 @@ def limit(options: argparse.Namespace) -> None:
     lines = [result_text.describe_collapse(case.structure, found, case.limit)]
     lines += [] if opposite is None else [result_text.describe_opposite(found, opposite)]
     text = "\n".join([*lines, *doubts])
-    print(f"{case.title}\n{text}")
-    _write_results("limit", case, options.out, lambda: results.limit_files(found, text, doubts))
+    files = partial(results.limit_files, found, text, doubts)
+    _write_results("limit", case, options.out, f"{case.title}\n{text}", files)
 
 
 def assess(options: argparse.Namespace) -> None:
@@ -188,7 +205,6 @@ def assess(options: argparse.Namespace) -> None:
     texts = [f"{name}: {result}" for name, result in found.items()]
     texts.append(describe_fill(case.assessment.options.get("fill")))
     text = "\n\n".join(filter(None, [*texts, "\n".join(dict.fromkeys(doubts))]))
-    print(f"{case.title}\n{text}")
 
     def draw() -> Files:
         mechanisms = [k for k, result in enumerate(found.values()) if result.path is not None]
@@ -196,25 +212,40 @@ def assess(options: argparse.Namespace) -> None:
         stated = result_text.state_assessments(found, doubts).as_file("assessment")
         return {"assessment.txt": text, **stated, **figures}
 
-    _write_results("assess", case, options.out, draw)
+    _write_results("assess", case, options.out, f"{case.title}\n{text}", draw)
 
 
 def rate(options: argparse.Namespace) -> None:
-    """Rate the bridge of a case for a vehicle, by the joints and the fill of its [limit]."""
-    keys = ("vehicle", "live", "impact", "dead", "width", "area_load")
+    """Rate the bridge of a case for vehicles, by the joints and the fill of its [limit]."""
+    keys = ("live", "impact", "dead", "width", "area_load")
     # as in --set, so that a length may have a unit
     values = {key: getattr(options, key) for key in keys}
     given = dict(parse_change(f"{k}={x}") for k, x in values.items() if x is not None)
     case = Case.read(options.case, options.changes)
     rating = {**case.settings.get("rating", {}), **given}
-    with _record_doubts(case.structure) as doubts:
-        found = rate_case(case.structure, parse_rating(rating), case.limit)
-    text = "\n".join([str(found), *doubts])
-    print(f"{case.title}\n{text}")
+    tables = name_vehicles(options.vehicles, rating)
+    rated = []
+    with ProgressReport("rating", len(tables)) as progress:
+        for table in tables:
+            with _record_doubts(case.structure) as doubts:
+                found = rate_case(case.structure, parse_rating(table), case.limit)
+            rated.append((found, doubts, table))
+            progress.show(f"{found.vehicle.name}: factor {found.factor:.4g}", 1)
+    # the worst first: one without a factor does not stand under its weight
+    rated.sort(key=lambda each: float(np.nan_to_num(each[0].factor, nan=-1.0)))
+    texts = ["\n".join([str(found), *doubts]) for found, doubts, _ in rated]
+    worst, files = rated[0][0], {}
+    if len(rated) > 1:
+        summary = result_text.tabulate_ratings([found for found, *_ in rated])
+        texts.insert(0, summary.text)
+        files["vehicles.csv"] = summary.csv
+    text = "\n\n".join(texts)
     # the case of the folder, that of a run, may be rated for another vehicle
-    texts = {RATING_FILE: format_tables({"rating": rating}).rstrip(), "rating.txt": text}
-    texts |= {"rating.csv": found.table(), **state_rating(found, doubts).as_file("rating")}
-    _write_results("rate", case, options.out, lambda: {**texts, "rating.png": found.plot()})
+    files |= {RATING_FILE: format_tables({"rating": rated[0][2]}).rstrip(), "rating.txt": text}
+    files |= {"rating.csv": worst.table()}
+    files |= state_ratings([(found, doubts) for found, doubts, _ in rated]).as_file("rating")
+    shown = f"{case.title}\n{text}"
+    _write_results("rate", case, options.out, shown, lambda: {**files, "rating.png": worst.plot()})
 
 
 def mesh(options: argparse.Namespace) -> None:
@@ -234,9 +265,8 @@ def accuracy(options: argparse.Namespace) -> None:
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     compared = case_accuracy(case, path_inside(folder, "settings"), workers=options.workers)
     text = result_text.describe_accuracy(compared)
-    print(text)
     files: Files = {"accuracy.txt": text, "accuracy.png": draw_accuracy(compared)}
-    _write_results("accuracy", case, options.out, lambda: files)
+    _write_results("accuracy", case, options.out, text, lambda: files)
 
 
 def risk(options: argparse.Namespace) -> int:
@@ -260,10 +290,9 @@ def risk(options: argparse.Namespace) -> int:
         out=path_inside(folder, "risk_samples.nc"),
         **case.risk.options,
     )
-    print(found)
     files: Files = {"risk.txt": str(found), "risk.nc": found.save, "risk.png": found.plot()}
     files |= result_text.state_risk(found).as_file("risk")
-    _write_results("risk", case, options.out, lambda: files)
+    _write_results("risk", case, options.out, str(found), lambda: files)
     return ExitCode.DOUBTFUL if found.doubts else 0
 
 
@@ -276,10 +305,12 @@ def verdict(options: argparse.Namespace) -> int:
     print(case.title)
     sampling = {"workers": options.workers, "samples": options.samples}
     computed = verdict_range(case.analysis, motion, fidelity="rigid", **sampling)
-    print(computed)
     own: Files = {"verdict_range.nc": computed.save, "verdict_range.txt": str(computed)}
-    draw = computed.plot
-    _write_results("verdict", case, options.out, lambda: own | {"verdict_range.png": draw()})
+
+    def draw() -> Files:
+        return own | {"verdict_range.png": computed.plot()}
+
+    _write_results("verdict", case, options.out, str(computed), draw)
     return ExitCode.DOUBTFUL if computed.doubts else 0
 
 
@@ -302,11 +333,10 @@ def scale(options: argparse.Namespace) -> int:
         found = search(case.analysis, motion)
     doubts += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
     text = "\n".join([f"{motion.name}: {found}", *dict.fromkeys(doubts), "", found.table()])
-    print(f"{case.title}\n{text}")
     demand = f"'{motion.name}', PGA {motion.pga / STANDARD_GRAVITY:.2f} g"
     stated = result_text.state_outcome("scale of the motion", repr(found), doubts, demand)
     files: Files = {"scale.txt": text, **stated.as_file("scale")}
-    _write_results("scale", case, options.out, lambda: files)
+    _write_results("scale", case, options.out, f"{case.title}\n{text}", lambda: files)
     if found.interrupted:
         raise KeyboardInterrupt
     return ExitCode.DOUBTFUL if doubts else 0

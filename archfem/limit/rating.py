@@ -156,7 +156,7 @@ class Rating(ResultDisplay):
 
     @property
     def place(self) -> str:
-        """Where the axles stand at the worst place, in words: those over rings that fail."""
+        """Where the axles over the rings that fail stand at the worst place, in words."""
         axles = parse_axles(self.vehicle.axles, self.vehicle.spacings)
         place = self.moving.direction, self.moving.position
         stand = [load.x for load in axles_on_structure(self.structure, axles, *place)]
@@ -376,9 +376,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     if not is_plastic:
         geometric, deepest = _geometric_factor(weighted, moving, options)
     factors = live, impact, dead, width, area_load
-    more: dict[str, Any] = {"strength": strength, "fill": fill, "deepest": deepest}
-    names = ("without_pressure", "full_pressure", "without_backing")
-    more |= dict(zip(names, _vary_fill(weighted, moving, options), strict=True))
+    more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
+    more |= _vary_fill(weighted, moving, options)
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
 
 
@@ -469,20 +468,22 @@ def _geometric_factor(
 
 def _vary_fill(
     structure: Structure, moving: MovingLoad, options: dict[str, Any]
-) -> tuple[float, float, float]:
-    """Return the factor of the worst loads without pressure, with all of it, without backing."""
+) -> dict[str, float]:
+    """Return the factors of the worst loads without pressure, with all of it, without backing."""
     # At the worst place alone: over all places the least factors differ by up to 0.5 %.
     if not isinstance(fill := options["fill"], Fill):
-        return np.nan, np.nan, np.nan
+        return {}
     row = tuple(load for load in moving.worst.live if isinstance(load, PointLoad))
-
-    def factor_of(other: Fill) -> float:
+    fills = {
+        "without_pressure": replace(fill, mobilisation=0.0, active=0.0),
+        "full_pressure": replace(fill, mobilisation=1.0),
+    }
+    fills |= {} if fill.backing is None else {"without_backing": replace(fill, backing=None)}
+    factors = {}
+    for name, other in fills.items():
         given = options | {"fill": other}
         stones, dead = self_weight_programme(structure, **given)
         stands = is_balanced(dead.minimise_residual(), dead)
         found = collapse_factors(stones, dead, {row: stones.load(row)}, given) if stands else {}
-        return found.get(row, np.nan)
-
-    without = factor_of(replace(fill, mobilisation=0.0, active=0.0))
-    full = factor_of(replace(fill, mobilisation=1.0))
-    return without, full, np.nan if fill.backing is None else factor_of(replace(fill, backing=None))
+        factors[name] = found.get(row, np.nan)
+    return factors

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from archfem._display import ResultDisplay
+from archfem._display import ProgressReport, ResultDisplay
 from archfem._typing import Array, Metres, Newtons, Numbers, Pascals
 from archfem._validation import check_number, check_numbers
 from archfem.errors import InvalidInput, logger
@@ -418,17 +418,20 @@ def _search_nonassociated(
     # Forwards from the associated optimum, two random states and the solution of the place
     # before; then backwards once more from the solution of the place behind.
     states: dict[AxleRow, Optimum | None] = dict.fromkeys(programmes)
-    for backwards in (False, True):
-        neighbour: list[Array] = []
-        for seed, row in enumerate(reversed(programmes) if backwards else programmes):
-            programme, weakest = programmes[row], states[row]
-            starts = list(neighbour)
-            if not backwards:
-                starts += starting_forces(programme, associated[row], 2, seed)
-            state = find_weakest(programme, starts)
-            if weakest is None or (state is not None and state.value > weakest.value):
-                states[row] = weakest = state
-            neighbour = [] if weakest is None else [weakest.forces]
+    with ProgressReport("sliding without dilatancy", 2 * len(programmes)) as progress:
+        for backwards in (False, True):
+            neighbour: list[Array] = []
+            for seed, row in enumerate(reversed(programmes) if backwards else programmes):
+                programme, weakest = programmes[row], states[row]
+                starts = list(neighbour)
+                if not backwards:
+                    starts += starting_forces(programme, associated[row], 2, seed)
+                state = find_weakest(programme, starts)
+                if weakest is None or (state is not None and state.value > weakest.value):
+                    states[row] = weakest = state
+                neighbour = [] if weakest is None else [weakest.forces]
+                way = "back" if backwards else "there"
+                progress.show(f"place {seed + 1} of {len(programmes)}, {way}", 1)
     return states
 
 
@@ -443,3 +446,8 @@ def _find_worst(factors: Array, count: Numbers) -> tuple[int, int]:
 
 
 VEHICLES: Mapping[str, Vehicle] = _read_vehicles()
+
+# Vehicles of a code for roads, by its name
+VEHICLES_OF_CODES: Mapping[str, tuple[str, ...]] = {"Eurocode": ("LM1", "LM2")} | {
+    code: tuple(name for name in VEHICLES if name.startswith(code)) for code in ("CS454", "HL93")
+}

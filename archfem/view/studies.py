@@ -28,7 +28,11 @@ from archfem.view.style import (
     set_figure_title,
     set_title,
     style_axes,
+    text_width,
 )
+
+# Findings of limit analyses and ratings of which codes require at least 1
+REQUIRED_FACTORS = ("factor", "without_pressure", "full_pressure", "geometric")
 
 
 class FragilityCurve(Protocol):
@@ -77,7 +81,8 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
 
     Points that differ in one number alone are joined by a line. Colours are the values of a key in
     words, such as the case. Findings without negative values begin at zero over words, whose
-    distances mean nothing.
+    distances mean nothing. Named cases alone are bars with a dashed line at the first one; of
+    ratings these are the factors, with a line at 1.
 
     Args:
         table: table of a study, as by `Study.run`.
@@ -86,7 +91,7 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
 
     Returns:
         The figure, with a row for each finding and a column for each key; a panel for each finding
-        where a single key varies.
+        where a single key varies, beside the names of the cases if they alone do.
 
     Raises:
         InvalidInput: no finding is a number that differs between points.
@@ -100,6 +105,9 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
     names = [name for name in flat.data_vars if differs[name] and frame[name].dtype.kind == "f"]
     if not names or not keys:
         raise InvalidInput("no finding is a number that differs between points")
+    if len(keys) == 1 and frame[keys[0]].dtype.kind not in "fi":
+        rated = [name for name in names if name in REQUIRED_FACTORS]
+        return _draw_named_cases(flat, frame, keys[0], (rated or names)[:max_panels])
     names = names[: max(max_panels // len(keys), 1)]
     columns = len(keys) if len(keys) > 1 else min(len(names), 3)
     rows = -(-len(names) * len(keys) // columns)
@@ -125,6 +133,33 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
             axes.legend(title=_label_key(flat, coloured), **place, **style)
     for axes in panels[len(names) * len(keys) :]:
         axes.remove()
+    return figure
+
+
+def _draw_named_cases(table: xr.Dataset, frame: Any, key: str, names: Sequence[Any]) -> Figure:
+    """Draw a panel of horizontal bars for each finding, a bar for each case, from the top."""
+    labels, columns = list(dict.fromkeys(frame[key])), min(len(names), 3)
+    rows = -(-len(names) // columns)
+    longest = text_width(max(len(f"{label}") for label in labels))
+    size = 0.4 + longest + 2.0 * columns, 0.3 + rows * (0.7 + 0.18 * len(labels))
+    figure = new_figure(max(size[0], Size.COLUMN), max(size[1], 1.5))
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
+    place = frame[key].map(labels.index)
+    for axes, name in zip(panels, names, strict=False):
+        values, style = frame[name], {"color": Colour.GREY, "lw": 0.9}
+        style_axes(axes, _label_key(table, str(name)))
+        if place.is_unique:
+            axes.barh(place, values.replace(np.inf, np.nan), height=0.7, color=Colour.LINES[0])
+        else:  # samples of a case
+            axes.plot(values, place, "o", ms=3.5, color=Colour.LINES[0])
+        axes.axvline(values.iloc[0], ls="--", label=f"{labels[0]}, the first", **style)
+        if name in REQUIRED_FACTORS:
+            axes.axvline(1.0, **style)
+    panels[0].set_yticks(range(len(labels)), labels)
+    panels[0].set_ylim(len(labels) - 0.5, -0.5)
+    for axes in panels[len(names) :]:
+        axes.remove()
+    add_legend_below(figure, handles=panels[0].get_legend_handles_labels()[0])
     return figure
 
 

@@ -1,8 +1,10 @@
 """Commands on cases: printed results and written files."""
 
+import io
 import json
 import re
 import tomllib
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -563,6 +565,55 @@ def test_rating_of_a_case(tmp_path, ring, capsys):
     assert f"for CS454-single: factor {found.factor:.4g}" in page
     assert "Factor along the bridge" in page
     assert "Thrust line at collapse" in page
+
+
+def test_vehicles_are_rated_together_the_worst_first(tmp_path, unplotted, capsys, monkeypatch):
+    """One of a code, all of another, and the case's own by its name."""
+    path, out = tmp_path / "ring.toml", tmp_path / "out"
+    own = '[rating]\nvehicle = { name = "cart", axles = ["3 kN"] }\n'
+    path.write_text(LIMIT.replace("voussoirs = 17", "voussoirs = 7") + own)
+    monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (0.9, 1.2))
+    given = [part for name in ("cart", "LM1", "hl93") for part in ("--vehicle", name)]
+    assert af.commands.main(["rate", str(path), "--out", str(out), *given]) == 0
+    said = capsys.readouterr().out
+    rows = pd.read_csv(out / "vehicles.csv")
+    assert {*rows["vehicle"]} == {"cart", "LM1", "HL93-tandem", "HL93-truck"}
+    assert (np.diff(rows["factor"]) >= 0.0).all()
+    case = af.Case.read(path)
+    for _, (name, factor, *_) in rows.iterrows():
+        vehicle = case.rating["vehicle"] if name == "cart" else name
+        found = af.rate(case.structure, vehicle)
+        assert factor == float(f"{found.factor:.4g}")
+        assert str(found) in said
+        if name == rows["vehicle"][0]:
+            assert (out / "rating.csv").read_text().strip() == found.table()
+            assert tomllib.loads((out / "rating.toml").read_text())["rating"]["vehicle"] == name
+    text = (out / "rating.txt").read_text().strip()
+    assert text in said
+    assert [line.split()[0] for line in text.splitlines()[1:5]] == [*rows["vehicle"]]
+    assert af.commands.main(["rate", str(path), "--out", str(out)]) == 0
+    assert not (out / "vehicles.csv").exists()
+    assert "cart" in (out / "rating.toml").read_text()
+
+
+@pytest.mark.parametrize("command", ["limit", "rate"])
+def test_results_are_written_before_they_are_printed(tmp_path, unplotted, monkeypatch, command):
+    """`head` may close the pipe after a line."""
+
+    class ClosedPipe(io.StringIO):
+        def write(self, text):
+            raise BrokenPipeError
+
+    path, out = tmp_path / "ring.toml", tmp_path / "out"
+    path.write_text(LIMIT.replace("voussoirs = 17", "voussoirs = 7"))
+    monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (0.9,))
+    monkeypatch.setattr("sys.stdout", ClosedPipe())
+    options = ["--out", str(out)] + (["--vehicle", "LM2"] if command == "rate" else [])
+    with suppress(BrokenPipeError, io.UnsupportedOperation):
+        af.commands.main([command, str(path), *options])
+    name = {"limit": "limit", "rate": "rating"}[command]
+    assert (out / f"{name}.txt").is_file()
+    assert (out / "archfem.json").is_file()
 
 
 def test_limit_analysis_refuses_soil_before_all_else(tmp_path, capsys):

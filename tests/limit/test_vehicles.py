@@ -264,8 +264,9 @@ def test_invalid_input_is_refused(given, says):
         af.moving_load(**options)
 
 
-def test_the_weakest_solution_at_a_place_is_kept(monkeypatch):
+def test_the_weakest_solution_at_a_place_is_kept(monkeypatch, capsys):
     """There and back again: each search begins with the solution found beside it just before."""
+    monkeypatch.setattr("archfem._display.PROGRESS_INTERVAL", 0.0)
     values, calls = iter([0.1, 0.3, None, None, 0.2, 0.4]), []
 
     def weakest_from(programme, starts):
@@ -291,6 +292,9 @@ def test_the_weakest_solution_at_a_place_is_kept(monkeypatch):
         (2, []),
         (1, ["0.3"]),
     ]
+    lines = capsys.readouterr().err.splitlines()
+    ways = [f"place {k} of 3, {way}" for way in ("there", "back") for k in (1, 2, 3)]
+    assert lines == [f"sliding without dilatancy: {way}" for way in ways]
 
 
 def test_a_plastic_fill_bounds_the_vehicle_at_each_place(monkeypatch, caplog):

@@ -1,5 +1,7 @@
 """A study in one picture: medians, ranges, and unreached capacities."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -75,19 +77,43 @@ def test_points_that_differ_in_one_number_are_joined_and_coloured_by_the_case():
         draw_findings(table[["error"]])
 
 
-def test_cases_alone_are_compared_from_zero_with_all_that_differs():
-    """A panel for each finding, in rows of three."""
+def test_cases_alone_are_bars_beside_their_names():
+    """A panel for each finding, in rows of three; a dashed line is at the first case."""
     values = {f"finding {k}": ("case", [1.0 + k, 1.1 + k]) for k in range(4)}
-    values["slip"] = "case", [0.01, 0.02], {"units": "m"}
+    values["slip"] = "case", [0.01, np.inf], {"units": "m"}
     values["drift"] = "case", [-1.0, 1.0]
     values["same"] = "case", [2.0, 2.0]
     table = xr.Dataset(values, {"case": ["thin", "thick"]})
-    panels = draw_findings(table).axes
-    labels = [axes.get_ylabel() for axes in panels]
-    assert labels == [*(f"finding {k}" for k in range(4)), "slip\n[m]", "drift"]
-    assert [axes.get_ylim()[0] for axes in panels[:5]] == [0.0] * 5
-    assert panels[4].get_ylim()[1] == pytest.approx(0.022)
-    assert panels[5].get_ylim()[0] < -1.0
+    panels = draw_findings(table.drop_vars("slip")).axes
+    assert [axes.get_xlabel() for axes in panels] == [*(f"finding {k}" for k in range(4)), "drift"]
+    for axes, name in zip(panels, [*(f"finding {k}" for k in range(4)), "drift"], strict=True):
+        assert [bar.get_width() for bar in axes.patches] == table[name].values.tolist()
+        assert [line.get_xdata()[0] for line in axes.lines] == [table[name].values[0]]
+    assert [text.get_text() for text in panels[0].get_yticklabels()] == ["thin", "thick"]
+    assert panels[0].get_ylim()[0] > panels[0].get_ylim()[1]  # the first one is on top
+    assert panels[0].get_xlim()[0] == 0.0
     assert panels[0].get_position().y0 > panels[3].get_position().y0
-    assert [axes.get_xlabel() for axes in panels] == [*[""] * 3, *["case"] * 3]
     assert len(draw_findings(table, max_panels=2).axes) == 2
+    table["slip"] = "case", [0.01, 0.02], {"units": "m"}
+    assert "slip [m]" in [axes.get_xlabel() for axes in draw_findings(table).axes]
+
+
+def test_names_of_many_ratings_do_not_overlap():
+    """Only the factors have panels, with a line at 1."""
+    names = [f"mobilisation {k}, dispersal uniform, 1 in 2" for k in range(14)]
+    factors = 2.0 + 0.1 * np.arange(14)
+    table = xr.Dataset(
+        {
+            "position": ("case", factors),
+            "factor": ("case", factors),
+            "geometric": ("case", factors),
+        },
+        {"case": names},
+    )
+    figure = draw_findings(table)
+    assert [axes.get_xlabel() for axes in figure.axes] == ["factor", "geometric"]
+    assert [line.get_xdata()[0] for line in figure.axes[0].lines] == [2.0, 1.0]
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in figure.axes[0].get_yticklabels()]
+    assert not any(first.overlaps(second) for first, second in pairwise(boxes))
+    assert min(box.x0 for box in boxes) >= 0.0
