@@ -214,14 +214,14 @@ class NonassociatedBounds:
         text = "were not found"
         if np.isfinite(weakest):
             text = f"found from {weakest:.4g}, the least, to {strongest:.4g}"
-        limits = f"all lie from {lower:.4g} to {upper:.4g}"
+        limits = f"proved: none is below {lower:.4g}, nor above {upper:.4g}"
         if np.isinf(upper):  # a load that no associated factor limits has a lower bound alone
-            limits = f"none is below {lower:.4g}"
+            limits = f"proved: none is below {lower:.4g}"
         elif abs(lower) <= GAP_TOLERANCE * abs(upper):
-            limits = f"none is above {upper:.4g}: no lower bound is known"
+            limits = f"proved: none is above {upper:.4g}; no lower bound is known"
         return (
-            f"solutions without dilatancy {text} (by {successful} of {tried} starting states), "
-            f"and {limits}"
+            f"solutions without dilatancy {text} (by {successful} of {tried} starting states); "
+            f"{limits}"
         )
 
     @property
