@@ -9,6 +9,7 @@ import xarray as xr
 
 from archfem._files import align_columns
 from archfem.cases.analysis_keys import LimitAnalysis
+from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults, explain_defaults
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
@@ -203,6 +204,8 @@ def describe_supports(structure: Structure, max_names: int = 4) -> str:
     for word, fixed in (("move", False), ("fixed", True)):
         own = [block for block in structure.blocks if block.fixed is fixed]
         names = [f"'{block.name}'" for block in own]
+        if fixed:
+            names = [f"'{b.name}' ({format_mm(np.ptp(b.points[:, 0]))} broad)" for b in own]
         if len(own) > max_names:
             parts = Counter(block.part or "unnamed" for block in own)
             names = [f"{count} of '{part}'" for part, count in parts.items()]
@@ -243,6 +246,13 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     crushing = describe_crushing(limit.strength, structure)
     lines += filter(None, [crushing, describe_fill(limit.fill)])
     return "\n".join(lines)
+
+
+def describe_limit(case: Case, collapse: Collapse) -> str:
+    """Describe the result of limit analysis, and that of a horizontal load in the other sense."""
+    opposite = case.limit.solve_opposite(case.structure)
+    text = describe_collapse(case.structure, collapse, case.limit)
+    return text if opposite is None else f"{text}\n{describe_opposite(collapse, opposite)}"
 
 
 def describe_opposite(collapse: Collapse, opposite: Collapse) -> str:
