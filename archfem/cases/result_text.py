@@ -12,6 +12,7 @@ import xarray as xr
 
 from archfem._files import align_columns
 from archfem.cases.analysis_keys import LimitAnalysis
+from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults, explain_defaults
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
@@ -219,6 +220,8 @@ def describe_supports(structure: Structure, max_names: int = 4) -> str:
     for word, fixed in (("move", False), ("fixed", True)):
         own = [block for block in structure.blocks if block.fixed is fixed]
         names = [f"'{block.name}'" for block in own]
+        if fixed:
+            names = [f"'{b.name}' ({format_mm(np.ptp(b.points[:, 0]))} broad)" for b in own]
         if len(own) > max_names:
             parts = Counter(block.part or "unnamed" for block in own)
             names = [f"{count} of '{part}'" for part, count in parts.items()]
@@ -259,6 +262,13 @@ def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
         cells = ["-" if np.isnan(value) else f"{value:.4g}" for value in numbers]
         rows.append([found.vehicle.name, *cells, f"{found.outcome}, {found.place}"])
     return ResultTable([*head, "outcome, and axles at the worst place"], rows)
+
+
+def describe_limit(case: Case, collapse: Collapse) -> str:
+    """Describe the result of limit analysis, and that of a horizontal load in the other sense."""
+    opposite = case.limit.solve_opposite(case.structure)
+    text = describe_collapse(case.structure, collapse, case.limit)
+    return text if opposite is None else f"{text}\n{describe_opposite(collapse, opposite)}"
 
 
 def describe_opposite(collapse: Collapse, opposite: Collapse) -> str:

@@ -38,6 +38,7 @@ from archfem.cases.run import (
     carry_out,
     replace_run,
 )
+from archfem.cases.structure_keys import read_survey
 from archfem.cases.toml_file import format_tables, parse_change
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions
@@ -54,7 +55,7 @@ from archfem.limit.collapse import Collapse, describe_fill
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-from archfem.statics.equilibrium import support_doubts
+from archfem.statics.equilibrium import structure_doubts
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
 from archfem.units import STANDARD_GRAVITY, MPa
@@ -151,7 +152,7 @@ def _name_published_files(text: str, folder: Path, command: str) -> str:
 @contextmanager
 def _record_doubts(structure: Structure) -> Iterator[list[str]]:
     """Yield doubts about the supports of a structure, and then the warnings of a block."""
-    doubts = [f"{DOUBT_MARK}{doubt}" for doubt in support_doubts(structure)]
+    doubts = [f"{DOUBT_MARK}{doubt}" for doubt in structure_doubts(structure)]
     handler = logging.Handler(logging.WARNING)
     handler.emit = lambda record: doubts.append(f"{DOUBT_MARK}{record.getMessage()}")  # type: ignore[method-assign]
     logger.addHandler(handler)
@@ -181,10 +182,8 @@ def limit(options: argparse.Namespace) -> None:
     case = Case.read(options.case, options.changes)
     with _record_doubts(case.structure) as doubts:
         found = case.limit.solve(case.structure)
-        opposite = case.limit.solve_opposite(case.structure)
-    lines = [result_text.describe_collapse(case.structure, found, case.limit)]
-    lines += [] if opposite is None else [result_text.describe_opposite(found, opposite)]
-    text = "\n".join([*lines, *doubts])
+        text = result_text.describe_limit(case, found)
+    text = "\n".join([text, *doubts])
     files = partial(results.limit_files, found, text, doubts)
     _write_results("limit", case, options.out, f"{case.title}\n{text}", files)
 
@@ -467,10 +466,12 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     """Print results, write their files, and return the verdict and whether any is in doubt."""
     # `carry_out` yields limit analysis, dead load, pushover, suite and runs in this order.
     runs: dict[str, History] = {}
+    if (survey := read_survey(case.settings, case.folder)) is not None:
+        print(survey)
     with _record_doubts(case.structure) as doubts:
         for result in found:
             if isinstance(result, Collapse):
-                text = result_text.describe_collapse(case.structure, result, case.limit)
+                text = result_text.describe_limit(case, result)
                 text = "\n".join([text, *doubts])  # of limit analysis, which comes first
                 print(text)
                 write(results.limit_files(result, text, doubts), folder)

@@ -39,8 +39,7 @@ def check(options: argparse.Namespace) -> int:
     print(result_text.describe_supports(case.structure))
     print(result_text.describe_depths(case.structure))
     if case.limit.live:
-        found = case.limit.solve(case.structure)
-        print(result_text.describe_collapse(case.structure, found, case.limit))
+        print(result_text.describe_limit(case, case.limit.solve(case.structure)))
     # Unreadable records are errors before the dead load is computed.
     case.check_ground()
     at_rest = DeadLoadResult.of(case)

@@ -1,12 +1,15 @@
 """Scale of a ground motion at the first mechanism, or at collapse of the structure.
 
 Incremental dynamic analysis: runs at increasing and decreasing scales until each limit state is
-bracketed, then at the geometric mean of the widest bracket.
+bracketed, then at the geometric mean of the widest bracket. A structure may stand at a larger scale
+than one at which it falls. Hence runs also fill the gaps between scales below the smallest fall;
+where one falls, the search goes on below it.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from math import inf, sqrt
 from typing import Any
 
@@ -38,6 +41,10 @@ from archfem.units import STANDARD_GRAVITY
 
 # Limit state of large displacements, in place of a definition of mechanisms
 COLLAPSE_DEFINITION = "collapse"
+
+# Gaps between scales are filled down to a ratio, from a share of the smallest fall on [-]
+FILLED_SHARE, FILLED_RATIO = 0.5, 1.1
+NEAR_SHARE, NEAR_RATIO = 0.7, 1.05  # where windows of falls are most frequent
 
 
 @dataclass(frozen=True)
@@ -185,7 +192,7 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
     Incremental dynamic analysis: scales decrease from 1 by a factor √2 until nothing is met and
     increase until everything is, then brackets are bisected. Each run covers all definitions and
     ends once all are met. A run without equilibrium counts as failed. Ctrl-C ends the search and
-    returns the runs made so far.
+    returns the runs made so far. Scales between those that were run are not tested.
 
     Args:
         model: model of any fidelity, or an `Analysis`, whose settings are then the defaults.
@@ -251,7 +258,7 @@ def _doubts_of_bracket(scales: MechanismScales, definition: str) -> tuple[str, .
     """Return reasons why a bracket may be wrong: runs broken off, not monotonic, or in doubt."""
     bracket, doubts = scales[definition], list[str]()
     for note, values in {
-        "it survives also": bracket.above,
+        "it is not monotonic: it survives also": bracket.above,
         "runs without an answer were": bracket.unanswered,
     }.items():
         if values:
@@ -289,12 +296,13 @@ def search_scales(
     definitions: tuple[str, ...],
     precision: float,
     between: tuple[float, float],
+    begin: float = 1.0,
 ) -> MechanismScales:
-    """Make runs until all brackets are within the precision."""
+    """Make runs until all brackets are within the precision, and below a fall no gap is wide."""
     scales = MechanismScales(definitions)
     try:
         with tqdm(unit="run", disable=None, leave=False, desc="scales") as bar:
-            while (scale := _next_scale(scales, precision, between)) is not None:
+            while (scale := _next_scale(scales, precision, between, begin)) is not None:
                 bar.set_postfix_str(f"× {scale:.3g}")
                 scales = scales.with_run(run_scaled(scale))
                 bar.update()
@@ -305,14 +313,33 @@ def search_scales(
     return scales
 
 
+def _next_below_fall(scales: MechanismScales, precision: float, smallest: float) -> float | None:
+    """Return a scale in the widest gap below the smallest fall or the last run, or None."""
+    runs = scales.runs
+    top = min(scales[COLLAPSE_DEFINITION].upper, runs[-1].scale)
+    if runs[0].scale > max(FILLED_SHARE * top, smallest):
+        return max(runs[0].scale / sqrt(2.0), smallest)
+
+    def excess(gap: tuple[float, float]) -> float:
+        ratio = NEAR_RATIO if gap[1] > NEAR_SHARE * top else FILLED_RATIO
+        return gap[1] / gap[0] / max(ratio, 1.0 + precision)
+
+    gaps = pairwise(run.scale for run in runs if run.scale <= top)
+    wide = [gap for gap in gaps if gap[1] > FILLED_SHARE * top and excess(gap) > 1.0]
+    if not wide:
+        return None
+    lower, upper = max(wide, key=excess)
+    return sqrt(lower * upper)
+
+
 def _next_scale(
-    scales: MechanismScales, precision: float, between: tuple[float, float]
+    scales: MechanismScales, precision: float, between: tuple[float, float], begin: float
 ) -> float | None:
     """Return the scale of the next run, or None."""
     runs, (smallest, largest) = scales.runs, between
     ratio, max_runs = sqrt(2.0), 40  # ratio of scales before bisection
     if not runs:
-        return min(max(1.0, smallest), largest)
+        return min(max(begin, smallest), largest)
     # four definitions to five per cent take about fifteen runs
     if len(runs) >= max_runs or scales.interrupted:
         return None
@@ -322,8 +349,9 @@ def _next_scale(
     if runs[-1].scale < largest and any(bracket.run is None for bracket in brackets):
         return min(runs[-1].scale * ratio, largest)
     wide = [bracket for bracket in brackets if 1.0 + precision < bracket.ratio < inf]
-    if not wide:
-        return None
+    fills = COLLAPSE_DEFINITION in scales.definitions
+    if fills and (scale := _next_below_fall(scales, precision, smallest)) is not None:
+        return scale
     for bracket in sorted(wide, key=lambda bracket: -bracket.ratio):
         # a scale without an answer divides no bracket: its neighbours are tried instead
         for share in (1.0 / 2.0, 1.0 / 3.0, 2.0 / 3.0):
@@ -340,7 +368,8 @@ class CollapseScale:
 
     A structure has fallen once its `CollapseState` is "partly fallen" or "fallen". A run that is
     broken off counts neither as a fall nor as standing, and no bracket rests on it. The response
-    need not be monotonic: it may survive a motion stronger than one that brought it down.
+    need not be monotonic: it may survive a motion stronger than one that brought it down, and fall
+    at a scale between two at which it stood.
 
     Attributes:
         searches: runs made, by time step [s].
@@ -357,12 +386,27 @@ class CollapseScale:
         falls = [fall for dt in self.searches for at, fall in self.falls(dt) if at == self.lower]
         parted = any(fall is not None and fall.kind == "dislocated" for fall in falls)
         state = "dislocated, not fallen," if parted else "stands"
+        least = min(self.bracket(dt).upper for dt in self.searches)
         met = "falls at no scale that was tried"
-        if self.upper < inf:
-            met = f"falls at {_say_scale(self.upper, self.pga)}"
-        elif any(self.bracket(dt).run for dt in self.searches):
-            met = "falls with some of the time steps only"
-        return _say_bracket(state, self.lower, self.pga, met)
+        if least < inf:
+            met = f"falls at {_say_scale(least, self.pga)}"
+        if least < self.upper:
+            every = f"from {self.upper:#.3g} × on" if self.upper < inf else "at no scale"
+            met = f"{met}, with all time steps {every}"
+        return _say_bracket(state, self.lower, self.pga, met) + self._say_tested()
+
+    def _say_tested(self) -> str:
+        """Return in words how closely scales were run up to `lower`; "" where none stands."""
+        made = {scale for dt in self.searches for scale, fall in self.falls(dt) if fall}
+        stood = sorted(scale for scale in made if scale <= self.lower)
+        gaps = [gap for gap in pairwise(stood) if gap[1] > FILLED_SHARE * self.lower]
+        if not gaps:
+            return ""
+        ratio = max(high / low for low, high in gaps)
+        return (
+            f"; stands at every smaller scale that was run, from {gaps[0][0]:#.3g} × on up to a "
+            f"factor of {ratio:.2f} apart; those between were not run"
+        )
 
     @property
     def interrupted(self) -> bool:
@@ -471,10 +515,14 @@ def collapse_scale(
     precision: float = 0.05,
     between: tuple[float, float] = (0.1, 10.0),
 ) -> CollapseScale:
-    """Find the smallest scale of a motion at which a structure falls.
+    """Search the smallest scale of a motion at which a structure falls, among those it runs.
 
     Scales are searched as by `mechanism_scales`, once for each time step: a fall under a record is
-    sensitive to all parameters, and a result on which two steps disagree is not reliable.
+    sensitive to all parameters, and a result on which two steps disagree is not reliable. Whether a
+    structure falls need not be monotonic in the scale. Hence gaps between scales are filled to a
+    ratio of 1.1 from half of the smallest fall on and 1.05 from 0.7 of it, or `precision` where
+    that is larger, and the search goes on below a fall found there. A window of falls narrower
+    than a gap is found by chance only: for a check at one scale, run that scale.
 
     Args:
         model: model of large displacements, `build(…, displacements="large")`, or such an
@@ -509,11 +557,14 @@ def collapse_scale(
         doubts = tuple(map(str, run.doubts))
         return ScaledRun(scale, {}, run.ending, run.outcome, run.fall, doubts)
 
-    limits = admissible_range(between, motion)
+    limits, first = admissible_range(between, motion), 1.0
     searches = {}
     for step in steps:
         run_at = partial(run_scaled, step)
-        searches[step] = search_scales(run_at, (COLLAPSE_DEFINITION,), precision, limits)
+        searches[step] = search_scales(run_at, (COLLAPSE_DEFINITION,), precision, limits, first)
         if searches[step].interrupted:
             break
+        # the next search begins near this fall, and its scales lie between those of this one
+        least = searches[step][COLLAPSE_DEFINITION].upper
+        first = least / NEAR_RATIO**0.5 if least < inf else first
     return CollapseScale(searches, motion.pga, doubt_soft_blocks(begin.model.structure))

@@ -6,6 +6,7 @@ blocks until they rest (`dynamics.fall`).
 """
 
 from collections.abc import Iterable, Iterator
+from math import floor, log10
 from time import monotonic
 from typing import Any
 
@@ -198,11 +199,15 @@ def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) 
     limit = max(limit, 0.3 * largest)
     if error <= limit:
         return None
+    # the error varies with the square of the step, and faster where steps miss peaks
+    shorter = dt * (limit / error) ** 0.5
+    unit = 10.0 ** floor(log10(shorter))
+    shorter = floor(shorter / unit) * unit
     return Doubt(
         f"steps of {1e3 * dt:g} ms are long for sliding: of '{dataset['name'].values[worst]}' the "
         f"slip may be wrong by {format_mm(error)}, where the largest slip is {format_mm(largest)}",
-        # the error varies with the square of the step, and faster where steps miss peaks
-        f"leave dt out, or take {1e3 * dt * (limit / error) ** 0.5:.2g} ms or less",
+        f"take {1e3 * shorter:g} ms or less, `--set analysis.dt={shorter:g}`; a single run may "
+        "leave dt out",
     )
 
 

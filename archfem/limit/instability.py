@@ -65,10 +65,9 @@ def explain_instability(structure: Structure) -> str | None:
     missing = _name_interruption(rigid, np.array(rigid.free)[speeds > 1e-6 * speeds.max()])
     if _stands(dead, friction=unlimited, depth=unlimited):
         moves = [sliding and f"slide ({sliding})", turning and f"hinge ({turning})"]
-        return (
-            f"joints {' and '.join(filter(None, moves))}: "
-            f"{missing or 'a stone or a support is missing'}, or it needs both more friction and "
-            "deeper joints"
+        return f"joints {' and '.join(filter(None, moves))}: " + (
+            missing
+            or "a stone or a support is missing, or it needs both more friction and deeper joints"
         )
     block = rigid.blocks[rigid.free[int(speeds.argmax())]].name
     return missing or (
@@ -95,9 +94,13 @@ def _name_interruption(structure: Structure, moving: Sequence[int]) -> str:
         other = min(gaps, key=gaps.__getitem__, default=end)
         # a missing stone is hardly larger than the one beside it
         if other != end and gaps[other] <= 1.5 * np.hypot(*np.ptp(blocks[end].points, axis=0)):
+            stone = np.ptp(blocks[end].points, axis=0).min()
+            remedy = "add the stone between them, which may be on an ignored layer"
+            if gaps[other] < 0.25 * stone:
+                remedy = "close the joint between them, by faces that touch"
             return (
                 f"it is interrupted, {gaps[other]:.3g} m from {name} to '{blocks[other].name}': "
-                "add the stone between them, which may be on an ignored layer"
+                f"{remedy}"
             )
     if not ends:
         return ""

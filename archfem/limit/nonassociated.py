@@ -214,11 +214,11 @@ class NonassociatedBounds:
         text = "were not found"
         if np.isfinite(weakest):
             text = f"found from {weakest:.4g}, the least, to {strongest:.4g}"
-        limits = f"proven is that none is below {lower:.4g} or above {upper:.4g}"
+        limits = f"proved: none is below {lower:.4g}, nor above {upper:.4g}"
         if np.isinf(upper):  # a load that no associated factor limits has a lower bound alone
-            limits = f"none is below {lower:.4g}"
+            limits = f"proved: none is below {lower:.4g}"
         elif abs(lower) <= GAP_TOLERANCE * abs(upper):
-            limits = f"none is above {upper:.4g}: no lower bound is known"
+            limits = f"proved: none is above {upper:.4g}; no lower bound is known"
         if np.isclose(weakest, upper, rtol=1e-6):
             limits += "; the least found is the factor of 'coulomb' too"
         return (

@@ -31,6 +31,7 @@ from archfem.joints.resultants import joint_dataset, select_joint
 from archfem.limit.collapse import stands
 from archfem.limit.instability import explain_instability
 from archfem.limit.linear_programme import NoEquilibrium
+from archfem.masonry.block import as_point, say_place
 from archfem.masonry.construction import Stage, resolve_stages
 from archfem.masonry.loads import BodyForce
 from archfem.masonry.structure import Structure, join_joint_names
@@ -47,6 +48,10 @@ from archfem.statics.relaxation import (
     solve_or_relax,
 )
 from archfem.units import MPa, mm
+
+# Median depth of a ring's joints above which a wrong unit is likely [m]: of arches that span more
+# than 60 m the deepest are about that
+MAX_USUAL_DEPTH = 2.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -433,7 +438,7 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
     structure, joints = dead.model.structure, assessed_joints(dead.joints)
     ratio, names = joints["friction"], joints["name"].values
     limit = 1.0 if friction is None else friction  # rough faces of stone slide at 0.6 to 0.75
-    doubts = support_doubts(structure)
+    doubts = structure_doubts(structure)
     if (steep := (ratio > limit).values).any():
         reason = (
             f"under dead load |V| / N is {float(ratio.max()):.3g} in "
@@ -461,7 +466,50 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
     return tuple(doubts)
 
 
-def support_doubts(structure: Structure) -> list[Doubt]:
+def structure_doubts(structure: Structure) -> list[Doubt]:
+    """Return doubts about fixed blocks, and about the size of stones."""
+    springers = _doubt_springers(structure)
+    return [*_doubt_inner_supports(structure), *springers, *_doubt_depth(structure)]
+
+
+def _doubt_depth(structure: Structure) -> list[Doubt]:
+    """Doubt a ring whose joints are far deeper than those of built ones."""
+    rings = np.array([joint.role == "ring" for joint in structure.joints], dtype=bool)
+    depths = structure.depths[rings & structure.judged]
+    if not len(depths) or (depth := float(np.median(depths))) <= MAX_USUAL_DEPTH:
+        return []
+    return [
+        Doubt(
+            f"joints of the ring are typically {depth:.3g} m deep, as of hardly any arch",
+            "check the unit of the lengths, in a drawing that which it states",
+        )
+    ]
+
+
+def _doubt_springers(structure: Structure) -> list[Doubt]:
+    """Doubt fixed blocks of the size of a voussoir between an abutment and a ring."""
+    blocks, doubts = structure.blocks, []
+    fixed = np.array([block.fixed for block in blocks])
+    backed = set(structure.pairs[fixed[structure.pairs].all(axis=1)].ravel().tolist())
+    for joint, pair in zip(structure.joints, structure.pairs.tolist(), strict=True):
+        support, free = pair if fixed[pair[0]] else pair[::-1]
+        if fixed[free] or support not in backed or joint.role != "ring":
+            continue
+        block, stone = blocks[support], blocks[free]
+        # one that has the part of the ring is fixed on purpose, not by its layer
+        if block.part != joint.part and block.area <= 1.5 * stone.area:
+            doubts.append(
+                Doubt(
+                    f"'{block.name}' at {say_place(as_point(block.centroid))} cannot move, and is "
+                    f"hardly larger than '{stone.name}' beside it: the ring has a stone less",
+                    "if it is a stone of the ring, give it the ring's part, in a drawing by its "
+                    "layer; if it is none, draw it as one with the abutment behind it",
+                )
+            )
+    return doubts
+
+
+def _doubt_inner_supports(structure: Structure) -> list[Doubt]:
     """Return a doubt for fixed blocks that stand within a ring or pier instead of at its ends."""
     blocks, body = structure.blocks, np.arange(len(structure.blocks))
     for one, other in structure.pairs:  # fixed blocks side by side are one body

@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from math import inf
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -222,6 +224,68 @@ def test_a_search_makes_forty_runs_at_most():
     assert found["verified"].lower < 0.7 <= found["verified"].upper
 
 
+def shaken_down(*windows, made=None):
+    """A function from a scale to a run that falls within any of some windows."""
+
+    def run(scale):
+        made.append(scale)
+        kind = "fallen" if any(low < scale < high for low, high in windows) else "stands"
+        state = af.dynamics.CollapseState(kind, None, (), 0.1, 0.1, True)
+        return ScaledRun(scale, {}, Ending.FINISHED, "", state)
+
+    return run
+
+
+@pytest.mark.parametrize("place", np.geomspace(2.0, 3.5, 9))
+def test_a_window_of_falls_a_tenth_wide_below_the_first_fall_is_found(place):
+    """The ladder steps over it, from half of its fall on; falls found so end the next search."""
+    made, window = [], (place, 1.1 * place)
+    found = search_scales(shaken_down(window, (3.9, inf), made=made), ("collapse",), 0.05, (0.1, 9))
+    bracket = found["collapse"]
+    assert place < bracket.upper < 1.1 * place
+    assert bracket.lower < place
+    assert bracket.ratio <= 1.05 * ROUND_OFF
+    below = [each for each in sorted(made) if 0.5 * bracket.upper < each <= bracket.upper]
+    assert max(high / low for low, high in pairwise(below)) <= 1.1
+    near = [each for each in below if each > 0.7 * bracket.upper]
+    assert max(high / low for low, high in pairwise(near)) <= 1.05
+    assert len(made) <= 32
+
+
+def test_gaps_below_the_largest_scale_are_filled_where_nothing_falls_there():
+    """As below a fall; with a coarse precision, and for mechanisms, only brackets count."""
+    made = []
+    search_scales(shaken_down((2.3, 2.55), made=made), ("collapse",), 0.05, (0.1, 4.0))
+    assert any(2.3 < scale < 2.55 for scale in made)
+    made.clear()
+    search_scales(shaken_down(made=made), ("collapse",), 0.5, (0.1, 4.0))
+    assert made == pytest.approx([2.0**k for k in np.arange(0.0, 2.1, 0.5)])
+    found = searched({name: beyond(2.5) for name in DEFINITIONS}, precision=0.5)
+    assert len(found.runs) == 4
+
+
+def test_the_second_step_begins_near_the_fall_of_the_first(monkeypatch):
+    """Its scales lie between those of the first."""
+    made = {0.01: [], 0.005: []}
+
+    def shake(model, motion, *, dt, **_):
+        run = shaken_down((2.9, inf), made=made[dt])(motion.pga)
+        return SimpleNamespace(ending=run.ending, outcome="", fall=run.fall, doubts=())
+
+    monkeypatch.setattr("archfem.dynamics.motion_scaling.time_history", shake)
+    block = af.column(breadth=1.0, heights=[1.0])
+    model = af.build(block, fidelity="rigid", displacements="large")
+    found = af.collapse_scale(model, af.Motion(np.array([0.0, 1.0, 0.0]), dt=0.01), dt=0.01)
+    assert found.lower < 2.9 < found.upper
+    assert made[0.005][0] == pytest.approx(found.bracket(0.01).upper / 1.05**0.5)
+    assert len(made[0.005]) < len(made[0.01])
+    assert max(min(scales) for scales in made.values()) <= 0.5 * found.upper
+    away = [min(abs(one / other - 1.0) for other in made[0.01]) for one in made[0.005]]
+    assert min(away) > 0.015
+    assert "; stands at every smaller scale that was run, from " in str(found)
+    assert str(found).endswith("; those between were not run")
+
+
 def fallen(*scales):
     """Runs at some scales, those of a negative one fallen."""
     made = (
@@ -237,14 +301,20 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     assert (found.lower, found.upper) == (1.0, 2.5)
     assert found.above == (2.7, 3.0)
     assert found.bracket(0.005).upper == 2.5
-    assert str(found) == "stands at 1.00 × the motion, falls at 2.50 × the motion"
+    assert str(found) == (
+        "stands at 1.00 × the motion, falls at 2.00 × the motion, with all time steps from 2.50 × "
+        "on; stands at every smaller scale that was run, from 0.500 × on up to a factor of 2.00 "
+        "apart; those between were not run"
+    )
     assert [doubt.partition(" at ")[0] for doubt in found.doubts] == [
-        "by a time step of 10 ms, it survives also",
-        "by a time step of 5 ms, it survives also",
+        "by a time step of 10 ms, it is not monotonic: it survives also",
+        "by a time step of 5 ms, it is not monotonic: it survives also",
     ]
     never = CollapseScale({0.01: fallen(1.0, -2.0), 0.005: fallen(1.0, 2.0)})
     assert (never.lower, never.upper, never.above) == (1.0, inf, ())
-    assert str(never) == "stands at 1.00 × the motion, falls with some of the time steps only"
+    assert str(never) == (
+        "stands at 1.00 × the motion, falls at 2.00 × the motion, with all time steps at no scale"
+    )
     assert never.doubts == (
         "its time steps disagree: it falls from 1.00 to 2.00 by 10 ms, 2.00 to inf by 5 ms",
     )
@@ -304,11 +374,12 @@ def test_no_bracket_rests_on_a_run_without_an_answer():
     found = search_scales(shaken, ("collapse",), 0.05, (0.1, 4.0))
     bracket = found["collapse"]
     assert bracket.lower < 1.9 < bracket.upper <= 1.05 * ROUND_OFF * bracket.lower
-    assert bracket.unanswered == (pytest.approx(np.sqrt(2.0)),)
+    assert pytest.approx(np.sqrt(2.0)) in bracket.unanswered
+    assert all(1.35 < scale < 1.5 for scale in bracket.unanswered)
     scales = CollapseScale({0.005: found})
     assert scales.unanswered == bracket.unanswered
     assert "no answer" in scales.table()
-    (run,) = [run for run in found.runs if run.fall is None]
+    run = next(run for run in found.runs if run.fall is None)
     assert not run.survives("collapse")
     assert not run.fails("collapse")
 
@@ -322,7 +393,7 @@ def test_collapse_is_not_sought_beyond_five_g(between, limits, monkeypatch):
     ranges = []
     monkeypatch.setattr(
         "archfem.dynamics.motion_scaling.search_scales",
-        lambda _, what, precision, found: ranges.append(found) or MechanismScales(what),
+        lambda _, what, precision, found, first: ranges.append(found) or MechanismScales(what),
     )
     block = af.column(breadth=1.0, heights=[1.0])
     model = af.build(block, fidelity="rigid", displacements="large")

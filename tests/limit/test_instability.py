@@ -111,11 +111,25 @@ def ring_without(*missing, embrace=150.0):
 def test_an_arch_without_its_keystone_is_said_to_be_interrupted():
     text = explain_instability(ring_without("voussoir 5", embrace=60.0))
     assert "joints slide (arch, joints 0 and 7) and hinge (" in text
-    assert text.endswith(", or it needs both more friction and deeper joints")
+    assert text.endswith("add the stone between them, which may be on an ignored layer")
     for ring in (text, explain_instability(ring_without("voussoir 5"))):
         assert "interrupted, 0." in ring
         assert "m from 'voussoir 4' at " in ring
         assert " to 'voussoir 6': add the stone between them" in ring
+
+
+def test_a_gap_far_below_a_stone_is_a_joint_to_close():
+    """The right half, the support too, 30 mm to the right of the left one."""
+    whole = af.circular_arch(radius=3.0, thickness=0.4, embrace=150.0, voussoirs=9)
+    blocks = [
+        replace(b, outline=tuple((x + 0.03, y) for x, y in b.outline), centre=None)
+        if b.centroid[0] > 0.1
+        else b
+        for b in whole.blocks
+    ]
+    apart = af.masonry.assembled(blocks, af.Contact(1e10, 4e9, 0.6))
+    text = explain_instability(apart)
+    assert text.endswith("close the joint between them, by faces that touch")
 
 
 def test_a_ring_on_one_support_is_named_with_its_end():

@@ -184,7 +184,7 @@ def test_sliding_without_dilatancy_changes_nothing_where_nothing_slides():
     )
     assert without.factor == pytest.approx(plain.factor, rel=EXACT)
     low, high = without.solutions.bracket
-    words = f"proven is that none is below {low:.4g} or above {high:.4g}; the least found is "
+    words = f"proved: none is below {low:.4g}, nor above {high:.4g}; the least found is "
     assert str(without.solutions).endswith(f"{words}the factor of 'coulomb' too")
 
 

@@ -468,7 +468,8 @@ fidelity = "rigid"
     assert af.commands.main(["check", str(tmp_path / "a.toml")]) == 0
     said = capsys.readouterr().out
     assert (
-        "drawing: read in mm, corners moved by up to 1.5 mm; ignored outlines: 1 on 'NOTE'" in said
+        "drawing: 1 × 2 m, read in mm, corners moved by up to 1.5 mm; ignored outlines: 1 on "
+        "'NOTE'\n" in said
     )
     assert re.search(
         r"depth of joints: 1000 mm at least, at WALL, \w+ ?\d?; median 1000 mm", said

@@ -76,15 +76,15 @@ LOWER = {"rock": square(0, -1)}
         ),
         (
             LOWER | {"a": square(0, 0.004)},
-            r"faces of 'rock' and 'a' are 4 mm apart at .* m: .* raise snap from 0.001 to 0.004 m",
+            r"faces of 'rock' and 'a' are 4 mm apart at .* m, .* raise snap from 0.001 to 0.004 m",
         ),
         (
             LOWER | {"a": [[-0.1, 0.003], [2, 0], [2, 1], [0, 1]]},
-            r"are 2.86 mm apart at \(0, 0\) m: draw .* open joint of more than 0.005 m, or raise",
+            r"are 2.86 mm apart at \(0, 0\) m, within 0.005 m = 5 times snap, .* touch, or raise",
         ),
         (
             LOWER | {"a": [[-0.1, 0.0033], [1, 0], [1, 1], [-0.1, 1]]},
-            r"are 3 mm apart at \(0, 0\) m: draw faces that touch, or an open joint",
+            r"are 3 mm apart at \(0, 0\) m, .*; or is the unit wrong\? Read in m the .* 1.1 × 2 m$",
         ),
         (
             LOWER | {"a": square(0, 0), "b": square(0, 0)},

@@ -10,7 +10,7 @@ import pytest
 
 import archfem as af
 from archfem.statics import Equilibrium, dead_load, equilibrium, self_weight
-from archfem.statics.equilibrium import _increment_load, dead_load_doubts, support_doubts
+from archfem.statics.equilibrium import _increment_load, dead_load_doubts, structure_doubts
 from archfem.statics.newton import Solution
 
 ROOT = Path(__file__).parents[2]
@@ -204,15 +204,37 @@ def test_a_fixed_voussoir_is_a_doubt_with_its_place(numbers):
 
 
 def test_a_voussoir_that_extends_its_abutment_is_none():
-    assert support_doubts(with_fixed(resting().model.structure, 1, 2, 9)) == []
+    assert structure_doubts(with_fixed(resting().model.structure, 1, 2, 9)) == []
+
+
+@pytest.mark.parametrize("part", ["abutment", "arch"])
+def test_a_voussoir_on_the_layer_of_the_abutments_is_a_doubt(part):
+    """One that is fixed as a stone of the ring is meant so, and an abutment alone is none."""
+    ring = with_fixed(resting().model.structure, 1)
+    blocks = list(ring.blocks)
+    blocks[1] = replace(blocks[1], part=part, role="ring" if part == "arch" else "other")
+    doubts = structure_doubts(af.masonry.assembled(blocks, af.masonry.STONE_TO_STONE))
+    assert len(doubts) == (part == "abutment")
+    for doubt in doubts:
+        assert doubt.cause.startswith(f"'{blocks[1].name}' at (")
+        assert f"hardly larger than '{blocks[2].name}' beside it" in doubt.cause
+
+
+@pytest.mark.parametrize(("factor", "doubts"), [(1.0, 0), (10.0, 1), (25.4, 1)])
+def test_a_ring_in_a_wrong_unit_is_a_doubt(factor, doubts):
+    """Drawn in mm, and read in mm, cm or inches."""
+    ring = af.circular_arch(radius=3.0 * factor, thickness=0.3 * factor, embrace=150, voussoirs=9)
+    found = structure_doubts(ring)
+    assert len(found) == doubts
+    assert all(f"typically {0.3 * factor:.3g} m deep" in doubt.cause for doubt in found)
 
 
 def test_a_fixed_stone_of_a_pier_or_a_flat_arch_is_a_doubt():
     pier = af.column(breadth=0.6, heights=[0.5] * 4)
     flat = af.shapes.flat_arch(span=2.0, thickness=0.4, voussoirs=5, skewback="10 degree")
     for structure, number in ((pier, 2), (flat, 3)):
-        assert support_doubts(structure) == []
-        (doubt,) = support_doubts(with_fixed(structure, number))
+        assert structure_doubts(structure) == []
+        (doubt,) = structure_doubts(with_fixed(structure, number))
         assert doubt.cause.startswith(f"'{structure.blocks[number].name}' at (")
 
 
@@ -232,7 +254,7 @@ def test_a_fixed_pier_between_arches_of_one_part_is_none():
         ),
         af.Block(tuple(pier), af.STONE, "pier", fixed=True, part="rock", role="other"),
     ]
-    assert support_doubts(af.masonry.assembled(stones, af.masonry.STONE_TO_STONE)) == []
+    assert structure_doubts(af.masonry.assembled(stones, af.masonry.STONE_TO_STONE)) == []
 
 
 CASES = [*ROOT.glob("meshes/*.toml"), *ROOT.glob("archfem/cases/new/*.toml")]
@@ -244,7 +266,7 @@ CASES = [*ROOT.glob("meshes/*.toml"), *ROOT.glob("archfem/cases/new/*.toml")]
     ids=lambda path: path.stem,
 )
 def test_supports_of_shipped_cases_are_none(path):
-    assert support_doubts(af.Case.read(path).structure) == []
+    assert structure_doubts(af.Case.read(path).structure) == []
 
 
 def smooth(friction):
@@ -293,7 +315,8 @@ def test_commands_name_fixed_blocks_and_doubt_those_within_a_ring(tmp_path, caps
     af.Analysis(ring, fidelity="rigid").write(path)
     assert af.commands.main(["check", str(path)]) == 3
     said = capsys.readouterr().out
-    fixed = "'left abutment', 'voussoir 5', 'right abutment'"
+    sizes = {number: 1e3 * np.ptp(ring.blocks[number].points[:, 0]) for number in (0, 5, 10)}
+    fixed = ", ".join(f"'{ring.blocks[k].name}' ({mm:.3g} mm broad)" for k, mm in sizes.items())
     assert f"blocks that move: 8 of 'arch'; fixed: {fixed}\n" in said
     assert "in doubt: 'voussoir 5' at (0.00, " in said
     for command in (["rate", "--vehicle", "CS454-single"], ["limit", "--set", "limit.vertical=-1"]):

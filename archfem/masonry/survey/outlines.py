@@ -54,6 +54,10 @@ Closed = tuple[list[Array], float, list[Touch]]
 Materials = Mapping[str, Material]
 
 
+class NarrowGap(InvalidStructure):
+    """A gap between two faces that is too narrow to be meant as one."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Layer:
     """Properties of the blocks on one layer of a drawing (in GeoJSON, of one part).
@@ -79,12 +83,14 @@ class Survey:
 
     Attributes:
         blocks: blocks in the order of the file.
+        size: breadth and height of the drawing [m].
         moved: largest displacement of a vertex by snapping [m].
         frame: unit of the coordinates.
         ignored: number of outlines on each ignored layer.
     """
 
     blocks: tuple[Block, ...]
+    size: tuple[float, float]
     moved: float
     frame: Frame
     ignored: Mapping[str, int]
@@ -93,8 +99,8 @@ class Survey:
         counts = [f"{count} on '{layer}'" for layer, count in self.ignored.items() if count]
         moved = self.frame.length(round(self.moved, 9))  # less than a nanometre is round-off
         return (
-            f"drawing: read in {self.frame.unit}, corners moved by up to {moved}; "
-            f"ignored outlines: {', '.join(counts) or 'none'}"
+            f"drawing: {_say_size(self.size)}, read in {self.frame.unit}, corners moved by up to "
+            f"{moved}; ignored outlines: {', '.join(counts) or 'none'}"
         )
 
 
@@ -147,7 +153,18 @@ def read_outlines(
         made = tuple(replace(b, corners=_find_corners(b, directions.get(b.part))) for b in made)
     except (InvalidInput, InvalidStructure) as error:
         raise type(error)(f"{path}: {error}") from error
-    return Survey(made, moved, outlines[0].frame, ignored)
+    return Survey(made, _measure(outlines), moved, outlines[0].frame, ignored)
+
+
+def _measure(outlines: Sequence[Outline]) -> tuple[float, float]:
+    """Return breadth and height of a drawing [m]."""
+    breadth, height = np.ptp(np.concatenate([each.points for each in outlines]), axis=0)
+    return float(breadth), float(height)
+
+
+def _say_size(size: tuple[float, float]) -> str:
+    """Return breadth and height in words."""
+    return f"{size[0]:.3g} × {size[1]:.3g} m"
 
 
 @validate_arguments
@@ -305,20 +322,24 @@ def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
     try:
         return _close_gaps(outlines, snap)
     except InvalidStructure as error:
-        advice = str(error)
+        advice, is_gap = str(error), isinstance(error, NarrowGap)
     # a tolerance above a tenth of the smallest stone would distort it
     largest = 0.1 * min(abs(measure_polygon(outline.points)[0]) for outline in outlines) ** 0.5
     values = [
         digit * 10.0**k for k in range(-6, 1) for digit in (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
     ]
     higher = [value for value in values if snap < value <= largest]
-    lower = [value for value in values[::-1] if 0.05 * snap <= value < snap]
+    # a lower tolerance would leave a gap open
+    lower = [value for value in values[::-1] if 0.05 * snap <= value < snap and not is_gap]
     frame = outlines[0].frame
     for verb, values in (("raise", higher), ("lower", lower)):
         if value := next((each for each in values if _closes_all(outlines, each)), None):
             advice += f", or {verb} snap from {snap / frame.factor:.3g} to {frame.length(value)}"
             if value > 2.0 * snap:
                 advice += ", which also closes real openings up to that"
+            if verb == "raise":
+                size = _say_size(_measure(outlines))
+                advice += f"; or is the unit wrong? Read in {frame.unit} the drawing is {size}"
             break
     raise InvalidStructure(advice)
 
@@ -364,7 +385,7 @@ def _close_gaps(outlines: list[Outline], snap: float) -> Closed:
         )
     found = [placed[boundary] for boundary in boundaries]
     check_overlaps(found, names, place=place)
-    _check_gaps(placed, boundaries, outlines, snap)
+    _check_gaps(placed, boundaries, outlines, AMBIGUOUS_GAP_RATIO * snap)
     blocks = [Block(tuple(map(as_point, points)), STONE, "") for points in found]
     touches = touching(blocks)
     for a, b, (start, end) in touches:
@@ -480,9 +501,9 @@ def _place_tied(places: Array, ties: dict[int, Edge]) -> Array:
 
 
 def _check_gaps(
-    places: Array, boundaries: Boundaries, outlines: list[Outline], snap: float
+    places: Array, boundaries: Boundaries, outlines: list[Outline], widest: float
 ) -> None:
-    """Refuse blocks with a narrow gap between their faces."""
+    """Refuse blocks with a gap between their faces that is no wider than a length."""
     import shapely
 
     near = CONTACT_TOLERANCE * float(np.linalg.norm(np.ptp(places, axis=0)))
@@ -494,7 +515,7 @@ def _check_gaps(
     found: dict[frozenset[int], tuple[float, int]] = {}  # the widest gap of each pair
     for number, a, b in _edges(boundaries):
         along, off, length = _project(places, a, b)
-        beside = (off < -near) & (off >= -AMBIGUOUS_GAP_RATIO * snap)
+        beside = (off < -near) & (off >= -widest)
         beside &= (along > -near) & (along < length + near)
         for place in set(np.flatnonzero(beside).tolist()) - set(boundaries[number]):
             foot = places[a] + along[place] / length * (places[b] - places[a])
@@ -508,8 +529,9 @@ def _check_gaps(
     (width, place), (one, other) = max((gap, sorted(pair)) for pair, gap in found.items())
     frame = outlines[one].frame
     more = f", the widest of {len(found)} gaps" if len(found) > 1 else ""
-    raise InvalidStructure(
+    raise NarrowGap(
         f"the faces of '{outlines[one].name}' and '{outlines[other].name}' are "
-        f"{1e3 * width:.3g} mm apart at {frame.place(places[place])}{more}: draw faces that "
-        f"touch, or an open joint of more than {frame.length(AMBIGUOUS_GAP_RATIO * snap)}"
+        f"{1e3 * width:.3g} mm apart at {frame.place(places[place])}{more}, within "
+        f"{frame.length(widest)} = {AMBIGUOUS_GAP_RATIO:g} times snap, which is taken for an error "
+        "of the survey: draw faces that touch"
     )
