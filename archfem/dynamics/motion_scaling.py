@@ -3,7 +3,7 @@
 Incremental dynamic analysis: runs at increasing and decreasing scales until each limit state is
 bracketed, then at the geometric mean of the widest bracket. A structure may stand at a larger scale
 than one at which it falls. Hence runs also fill the gaps between scales below the smallest fall;
-where one falls, the search goes on below it.
+where one falls, the search continues below it.
 """
 
 from collections.abc import Callable, Sequence
@@ -521,7 +521,7 @@ def collapse_scale(
     sensitive to all parameters, and a result on which two steps disagree is not reliable. Whether a
     structure falls need not be monotonic in the scale. Hence gaps between scales are filled to a
     ratio of 1.1 from half of the smallest fall on and 1.05 from 0.7 of it, or `precision` where
-    that is larger, and the search goes on below a fall found there. A window of falls narrower
+    that is larger, and the search continues below a fall found there. A window of falls narrower
     than a gap is found by chance only: for a check at one scale, run that scale.
 
     Args:

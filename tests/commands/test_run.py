@@ -405,13 +405,13 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     assert af.commands.main(["run", str(path), "--out", str(out)]) == 0
     said = capsys.readouterr().out
     found = af.collapse_factor(ring, live=af.BodyForce(1.0, 0.0))
-    assert f"at {found.factor:.4g} g to the right" in said
+    assert f"at {found.factor:.4g} g of force to the right" in said
     assert all(f"joint {number} at the {side}" in said for number, side in found.hinges)
     assert (out / "limit.txt").read_text() in said
     assert (out / "collapse.png").is_file()
     assert (out / "dead.png").is_file()
     assert af.commands.main(["check", str(path)]) == 0
-    assert f"at {found.factor:.4g} g to the right" in capsys.readouterr().out
+    assert f"at {found.factor:.4g} g of force to the right" in capsys.readouterr().out
     # the case alone, in the same folder: its files replace those of the run
     assert af.commands.main(["limit", str(path), "--out", str(out)]) == 0
     assert (out / "limit.txt").read_text() in capsys.readouterr().out
@@ -419,7 +419,7 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     assert joints["N"].to_numpy() == pytest.approx(found.joints["N"].values, rel=1e-9)
     assert af.commands.main(["limit", str(path), "--set", "limit.horizontal=0.5"]) == 0
     said = capsys.readouterr().out
-    assert f"at {found.factor:.4g} g to the right" in said
+    assert f"at {found.factor:.4g} g of force to the right" in said
     assert (
         f"in the other sense: {found.outcome.sentence}, at {found.factor:.4g} g to the left" in said
     )

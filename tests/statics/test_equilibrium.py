@@ -209,7 +209,7 @@ def test_a_voussoir_that_extends_its_abutment_is_none():
 
 @pytest.mark.parametrize("part", ["abutment", "arch"])
 def test_a_voussoir_on_the_layer_of_the_abutments_is_a_doubt(part):
-    """One that is fixed as a stone of the ring is meant so, and an abutment alone is none."""
+    """One that is fixed as a stone of the ring is so on purpose, and an abutment alone is none."""
     ring = with_fixed(resting().model.structure, 1)
     blocks = list(ring.blocks)
     blocks[1] = replace(blocks[1], part=part, role="ring" if part == "arch" else "other")

@@ -55,7 +55,7 @@ Materials = Mapping[str, Material]
 
 
 class NarrowGap(InvalidStructure):
-    """A gap between two faces that is too narrow to be meant as one."""
+    """A gap between two faces that is too narrow to be one on purpose."""
 
 
 @dataclass(frozen=True, kw_only=True)
