@@ -47,6 +47,22 @@ def retaining_wall(breadth=1.0, height=2.0, friction=0.6, material=SOIL, width=1
     )
 
 
+def two_walls():
+    """A wall of 1 m and one of 2 m, both 2 m high, on rock, with a fill between them."""
+    blocks = [
+        rectangle(-2.0, -1.0, 6.0, 0.0, "rock", fixed=True),
+        rectangle(-1.0, 0.0, 0.0, 2.0, "slender"),
+        rectangle(0.0, 0.0, 2.0, 2.0, "soil", SOIL),
+        rectangle(2.0, 0.0, 4.0, 2.0, "thick"),
+    ]
+    return af.masonry.assembled(
+        blocks,
+        lambda a, b: (
+            af.masonry.SOIL_TO_STONE if "soil" in (a.name, b.name) else af.masonry.STONE_TO_STONE
+        ),
+    )
+
+
 def row_of_stones(cover=1.0, stones=12, paving=0.0):
     """Stones of 0.5 m side by side on rock, under a level fill and, on request, a pavement."""
     side = 0.5

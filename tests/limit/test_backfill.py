@@ -10,9 +10,9 @@ from backfilled import (
     column_above,
     faces_of,
     fill_of,
-    rectangle,
     retaining_wall,
     row_of_stones,
+    two_walls,
 )
 from scipy.integrate import quad
 from scipy.optimize import linprog
@@ -388,16 +388,7 @@ def test_backing_behind_a_wall_by_hand(level):
 
 def test_backing_between_two_walls_is_a_strut():
     """Both turn about their toes at once: the sum of the weights' moments over that of the push."""
-    rough, stone = af.masonry.STONE_TO_STONE, af.STONE.unit_weight
-    blocks = [
-        rectangle(-2.0, -1.0, 6.0, 0.0, "rock", fixed=True),
-        rectangle(-1.0, 0.0, 0.0, 2.0, "slender"),
-        rectangle(0.0, 0.0, 2.0, 2.0, "soil", af.masonry.BACKFILL),
-        rectangle(2.0, 0.0, 4.0, 2.0, "thick"),
-    ]
-    structure = af.masonry.assembled(
-        blocks, lambda a, b: af.masonry.SOIL_TO_STONE if "soil" in (a.name, b.name) else rough
-    )
+    structure = two_walls()
     fill = Fill(friction_angle=35.0, mobilisation=0.0, active=0.0, backing=1.5)
     found = af.collapse_factor(structure, live=af.BodyForce(1.0, 0.0), friction=None, fill=fill)
     assert found.factor == pytest.approx((2.0 * 0.5 + 4.0 * 1.0) / (2.0 + 4.0), rel=1e-9)
@@ -405,7 +396,7 @@ def test_backing_between_two_walls_is_a_strut():
     height = np.ptp(pressed.y.values, axis=1)
     thrust = (pressed.toward * pressed.pressure * height).groupby("block").sum()
     assert thrust[0] == pytest.approx(-thrust[1])
-    assert abs(float(thrust[0])) > 0.01 * stone
+    assert abs(float(thrust[0])) > 0.01 * af.STONE.unit_weight
 
 
 @pytest.mark.slow

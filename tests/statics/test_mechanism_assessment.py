@@ -5,7 +5,7 @@ from math import atan2, pi, sqrt
 
 import numpy as np
 import pytest
-from backfilled import SOIL, arch_bridge, rectangle, retaining_wall
+from backfilled import SOIL, arch_bridge, rectangle, retaining_wall, two_walls
 
 import archfem as af
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
@@ -344,6 +344,16 @@ def test_a_wall_turns_from_the_fill_behind_it_or_into_it(direction, part, verifi
         "closed form",
         found.alpha_0,
     )
+
+
+def test_backing_holds_a_wall_against_the_ground_and_not_against_another_wall():
+    """At rest its strength acts up to its level, about the toe: λ W H/2 = W b/2 + S h²/2."""
+    level, weight = 0.1, 2.0 * STONE
+    fill = af.limit.Fill(friction_angle=30.0, mobilisation=0.0, active=0.0, backing=level)
+    for structure, moment in ((retaining_wall(), 0.5e6 * level**2), (two_walls(), 0.0)):
+        found = af.kinematic_assessment(structure, SPECTRUM, friction=None, fill=fill)
+        expected = 0.5 + moment / weight
+        assert found.path.mechanisms[0].factor == pytest.approx(expected, rel=1e-6)
 
 
 def test_pressures_of_a_fill_are_those_of_limit_analysis():
