@@ -25,7 +25,7 @@ from archfem.joints.criteria import (
     longest_duration,
     with_failure_flags,
 )
-from archfem.limit.collapse import Collapse, describe_crushing, describe_fill
+from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
 from archfem.masonry.structure import Structure, join_joint_names, join_names
@@ -266,8 +266,10 @@ def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
 
 def describe_limit(case: Case, collapse: Collapse) -> str:
     """Describe the result of limit analysis, and that of a horizontal load in the other sense."""
-    opposite = case.limit.solve_opposite(case.structure)
     text = describe_collapse(case.structure, collapse, case.limit)
+    if collapse.outcome is Outcome.INFEASIBLE:  # the load, in either sense, plays no part
+        return text
+    opposite = case.limit.solve_opposite(case.structure)
     return text if opposite is None else f"{text}\n{describe_opposite(collapse, opposite)}"
 
 

@@ -481,7 +481,7 @@ def _doubt_depth(structure: Structure) -> list[Doubt]:
     return [
         Doubt(
             f"joints of the ring are typically {depth:.3g} m deep, as of hardly any arch",
-            "check the unit of the lengths, in a drawing that which it states",
+            "check the unit of the lengths; `unit` in [structure] replaces that of a drawing",
         )
     ]
 

@@ -410,8 +410,11 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     assert (out / "limit.txt").read_text() in said
     assert (out / "collapse.png").is_file()
     assert (out / "dead.png").is_file()
+    assert "in the other sense: " in said
     assert af.commands.main(["check", str(path)]) == 0
-    assert f"at {found.factor:.4g} g of force to the right" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f"at {found.factor:.4g} g of force to the right" in said
+    assert "in the other sense: " in said
     # the case alone, in the same folder: its files replace those of the run
     assert af.commands.main(["limit", str(path), "--out", str(out)]) == 0
     assert (out / "limit.txt").read_text() in capsys.readouterr().out

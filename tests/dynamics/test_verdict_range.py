@@ -170,6 +170,16 @@ def test_the_sentence_names_the_properties_that_separate_falls(columns, falls, w
     assert made_up(falls, **columns).sentence.split(": ")[1].split(";")[0] == where
 
 
+def test_a_rule_of_all_falls_separates_better_than_one_run():
+    """Five of 250 fall, all of 91 with exact joints; one of them has the softest joints of all."""
+    rule = np.array(["exact"] * 91 + ["rigid"] * 159)
+    soft = np.random.default_rng(1).permutation(np.linspace(1.0, 3.0, 250))
+    soft[40] = 0.4
+    falls = np.isin(np.arange(250), (5, 23, 40, 61, 88))
+    sentence = made_up(falls, k_s=soft, joint_rule=rule).sentence
+    assert "all with joint rule 'exact'" in sentence
+
+
 def test_without_a_difference_no_condition_is_named():
     for falls, first in ((False, "falls in 0 of 3; "), (True, "falls in 3 of 3; ")):
         assert made_up([falls] * 3, sign=list("aba")).sentence.startswith(first)

@@ -465,12 +465,15 @@ NOTE = {{ ignore = true }}
 fidelity = "rigid"
 """
     )
+    line = (
+        "drawing: 1 × 2 m, read in mm, corners moved by up to 1.5 mm; ignored outlines: 1 on "
+        "'NOTE'\n"
+    )
+    assert af.commands.main(["run", str(tmp_path / "a.toml"), "--out", str(tmp_path / "out")]) == 0
+    assert line in capsys.readouterr().out
     assert af.commands.main(["check", str(tmp_path / "a.toml")]) == 0
     said = capsys.readouterr().out
-    assert (
-        "drawing: 1 × 2 m, read in mm, corners moved by up to 1.5 mm; ignored outlines: 1 on "
-        "'NOTE'\n" in said
-    )
+    assert line in said
     assert re.search(
         r"depth of joints: 1000 mm at least, at WALL, \w+ ?\d?; median 1000 mm", said
     ), said

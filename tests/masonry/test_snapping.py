@@ -84,7 +84,7 @@ LOWER = {"rock": square(0, -1)}
         ),
         (
             LOWER | {"a": [[-0.1, 0.0033], [1, 0], [1, 1], [-0.1, 1]]},
-            r"are 3 mm apart at \(0, 0\) m, .*; or is the unit wrong\? Read in m the .* 1.1 × 2 m$",
+            r"are 3 mm apart at \(0, 0\) m, .*; or is the unit wrong\? By unit = 'm' .* 1.1 × 2 m$",
         ),
         (
             LOWER | {"a": square(0, 0), "b": square(0, 0)},
@@ -107,6 +107,17 @@ def test_outlines_that_are_no_structure(tmp_path, outlines, says):
     path = geojson(tmp_path / "bad.geojson", outlines)
     with pytest.raises(af.errors.InvalidStructure, match=says):
         af.masonry.surveyed(path)
+
+
+def test_no_lower_snap_is_advised_that_leaves_a_gap_open(tmp_path):
+    """The gap of 4.5 mm would be no error at 0.8 mm, and split the structure."""
+    stones = LOWER | {"a": square(0, 0.0045), "b": square(0, 1.0045)}
+    stones |= {"pier": [[1.0, -1.0], [2.0, -1.0], [2.0, 2.0045], [1.0, 2.0045]]}
+    path = geojson(tmp_path / "gap.geojson", stones)
+    with pytest.raises(af.InvalidStructure, match=r"4\.5 mm apart") as caught:
+        af.masonry.surveyed(path)
+    assert "lower snap" not in str(caught.value)
+    af.masonry.surveyed(path, snap=8e-4)  # would be accepted nevertheless
 
 
 def draw_ring(path, gap, off):

@@ -339,7 +339,7 @@ def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
                 advice += ", which also closes real openings up to that"
             if verb == "raise":
                 size = _say_size(_measure(outlines))
-                advice += f"; or is the unit wrong? Read in {frame.unit} the drawing is {size}"
+                advice += f"; or is the unit wrong? By unit = '{frame.unit}' the drawing is {size}"
             break
     raise InvalidStructure(advice)
 
