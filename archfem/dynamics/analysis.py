@@ -225,7 +225,7 @@ class Analysis:
         return call_late_bound("Analysis.run", self, motion)
 
     def scale(self, motion: Motion, **options: Any) -> Any:
-        """Find the smallest scale of a motion at which the structure falls.
+        """Search the smallest scale of a motion at which the structure falls, among those it runs.
 
         Args:
             motion: motion to scale.

@@ -147,7 +147,8 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
     """Compute the annual rate at which a structure falls, from sampled properties and records.
 
     Properties are a Latin hypercube over their ranges, alternatives are drawn by their weights, and
-    records are dealt in turn. Each sample is scaled until its fall is bracketed.
+    records are dealt in turn. Each sample is scaled until its fall is bracketed; where it falls at
+    one scale and stands at a larger one, the bracket is that of one of several crossings.
 
     Args:
         analysis: settings of all runs, which have large displacements; or a structure, of rigid

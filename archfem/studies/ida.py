@@ -315,8 +315,9 @@ def ida(
     """Scale each motion up until each limit state is reached, and narrow the bracket of the scale.
 
     The search begins at scale 1 and multiplies or divides by √2 until a limit state is bracketed.
-    Then the brackets are halved, and runs fill the widest gaps of the curves. Every run takes the
-    whole motion. A run without equilibrium counts as failed.
+    Then the brackets are halved, gaps below a collapse filled as by `collapse_scale`, and the
+    widest gaps of the curves. Every run takes the whole motion. A run without equilibrium counts as
+    failed.
 
     Args:
         subject: analysis, or case of the structure; with `displacements="large"` collapse is a
