@@ -35,6 +35,10 @@ SELF_WEIGHT = BodyForce(0.0, -1.0)
 # one makes factors continuous in the level of the backing.
 BACKING_STRENGTH = 1e6
 
+# Share of a factor by which the height of a fill's horizontal force may lower it unsaid [-]: less
+# than the eighth by which the best fill errs in load tests of bridges
+LEVER_TOLERANCE = 0.1
+
 
 @dataclass(frozen=True, kw_only=True)
 class Fill:
@@ -51,11 +55,10 @@ class Fill:
       so that stones which move into the fill are held back and those which move away are pushed;
     - a load on its surface spreads down in a straight fan to the stones that it meets first.
 
-    The vertical stress is that of the weights alone: live loads do not raise the pressures. A body
-    force pulls at each column's foot, and does not change the pressures as an earthquake would
-    (Mononobe and Okabe). Shear between fill and stones is neglected, and the fill is long enough to
-    bear its reactions: its own balance and failure are not checked, and the pressure on one arch
-    does not act on the next.
+    The vertical stress is that of the weights alone: live loads do not raise the pressures, and
+    neither does a body force, as an earthquake would (Mononobe and Okabe). Shear between fill and
+    stones is neglected, and the fill is long enough to bear its reactions: its own balance and
+    failure are not checked, and the pressure on one arch does not act on the next.
 
     Attributes:
         friction_angle: friction angle φ of the fill [degrees].
@@ -69,6 +72,9 @@ class Fill:
             half-plane under a line load, or "uniform", evenly on each level.
         spread: half the angle of the fan, from the vertical [degrees]. The part that Boussinesq's
             stresses would carry outside of it is distributed inside.
+        lever: where the horizontal force of each column acts, from 0 for its foot to 1 for its
+            centroid. At 0 shear between the columns carries its moment to ends that hold the fill,
+            at 1 the stone below carries all of it. Neither is measured: state both [-].
         backing: level, a y coordinate, up to which there is masonry behind the haunches, not fill
             [m]; None for none. It holds the stones' faces horizontally, without tension, by up to
             `BACKING_STRENGTH`: faces beside the ground against the ground, those above a pier
@@ -89,15 +95,16 @@ class Fill:
     active: float = 1.0
     dispersal: str = "boussinesq"
     spread: Degrees = 30.0
+    lever: float = 0.0
     backing: Metres | None = None
 
     def __post_init__(self) -> None:
         """Refuse values outside their range, most of them wrong units."""
-        read_strength(self, "mobilisation", "active")
+        read_strength(self, "mobilisation", "active", "lever")
         remedy = "with more it is masonry, to be modelled by blocks"
         check_between(self.cohesion, "fill, cohesion [Pa]", 0.0, 1e6, ends="[]", remedy=remedy)
-        for key in ("mobilisation", "active"):
-            check_number(getattr(self, key), f"fill, {key}, a part of the pressure", maximum=1.0)
+        for key in ("mobilisation", "active", "lever"):
+            check_number(getattr(self, key), f"fill, {key}, a part", maximum=1.0)
         check_choice(self.dispersal, "fill, dispersal", ("boussinesq", "uniform"))
         remedy = "give degrees from the vertical; 1 in 2 is 26.6"
         check_between(self.spread, "fill, spread [degrees]", 0.1, 80.0, ends="[]", remedy=remedy)
@@ -248,9 +255,12 @@ class FillProfile:
         weights = np.array([block.material.unit_weight for block in self.structure.blocks])
         return np.asarray(weights[self.slices.block])
 
-    @cached_property
-    def columns(self) -> tuple[Numbers, Array, Array]:
-        """Return stone, foot and weight of every column of fill (n,), (n, 2) [m], (n,) [N]."""
+    def columns(self, lever: float = 0.0) -> tuple[Numbers, Array, Array]:
+        """Return stone, place and weight of every column of fill (n,), (n, 2) [m], (n,) [N].
+
+        Args:
+            lever: where the place is, from 0 for the foot of a column to 1 for its centroid [-].
+        """
         cut, rests = self.slices, ~self.stones[self.slices.block]
         # the stone below each slice of fill, through any fill between them
         below = np.where(rests, -1, np.arange(len(rests)))
@@ -260,8 +270,10 @@ class FillProfile:
         carried = np.flatnonzero(rests & (below >= 0))
         weight = (self._unit_weights * cut.area)[carried] * self.structure.width
         carrier, x = below[carried], cut.middle[carried]
-        foot = np.stack([x, _interpolate_edge(cut.side[carrier], cut.top[carrier], x)], axis=1)
-        return cut.block[carrier], foot, weight
+        foot = _interpolate_edge(cut.side[carrier], cut.top[carrier], x)
+        ends = (_interpolate_edge(cut.side[carried], y[carried], x) for y in (cut.bottom, cut.top))
+        height = foot + lever * (0.5 * sum(ends) - foot)
+        return cut.block[carrier], np.stack([x, height], axis=1), weight
 
     def overburden(self, point: Array, side: float) -> float:
         """Return the vertical stress of all fill above a point, just beside it [Pa]."""
@@ -432,15 +444,22 @@ class BlocksWithFill:
         heights = np.unique([*heights[heights < level], level])
         return heights[np.append(np.diff(heights) > self._profile.near, True)]
 
-    def load(self, actions: Sequence[BodyForce | PointLoad]) -> Array:
-        """Return the generalised forces of actions on the free stones (3 n_free,) [N, N, N m]."""
+    def load(self, actions: Sequence[BodyForce | PointLoad], lever: float | None = None) -> Array:
+        """Return the generalised forces of actions on the free stones (3 n_free,) [N, N, N m].
+
+        Args:
+            actions: that act on the whole structure.
+            lever: as of a `Fill`; by default its own.
+        """
         total = np.zeros(3 * len(self.rigid_regions.structure.free))
         for action in actions:
-            # a body force acts on the fill too, and so on the stone at the foot of each column
+            # a body force acts on the fill too, and so on the stone below each column
             if self.fill is not None and isinstance(action, BodyForce):
-                block, foot, weight = self._profile.columns
+                block, place, weight = self._profile.columns(
+                    self.fill.lever if lever is None else lever
+                )
                 pull = weight[:, None] * np.array([action.horizontal, action.vertical])
-                total += self._sum_forces(self.rigid_regions.place[block], foot, pull)
+                total += self._sum_forces(self.rigid_regions.place[block], place, pull)
             if self.fill is not None and isinstance(action, PointLoad):
                 number, point = action.place(self.whole)
                 if self.rigid_regions.place[number] < 0:
@@ -529,6 +548,16 @@ class BlocksWithFill:
     def _sum_forces(self, block: Numbers, points: Array, forces: Array) -> Array:
         """Return the sum of the generalised forces of forces at points (3 n_free,)."""
         return np.asarray(self._apply_forces(block, points, forces).sum(axis=0)).ravel()
+
+
+def warn_of_lever(factor: float, raised: float, name: str = "the factor") -> None:
+    """Warn where a factor rests on horizontal forces of the fill that act below its centroid."""
+    if raised < (1.0 - LEVER_TOLERANCE) * factor:
+        logger.warning(
+            "%s of %.4g rests on horizontal forces of the fill below the centroids of its columns: "
+            "at these it is at most %.4g; state the range, by lever = 1 in fill",
+            *(name, factor, raised),
+        )
 
 
 def sum_body_forces(actions: Sequence[Action]) -> tuple[float, float]:

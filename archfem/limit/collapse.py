@@ -28,6 +28,8 @@ from archfem.limit.backfill import (
     is_balanced,
     refuse_bonds,
     self_weight_programme,
+    sum_body_forces,
+    warn_of_lever,
 )
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
@@ -257,6 +259,9 @@ def collapse_factor(
         result = _solve_collapse(stones, programme, loads, friction)
         if result.outcome is Outcome.COLLAPSES and not isinstance(loads, Settlement):
             stones.warn_of_sliding_fill(loads, stays, result.factor)
+            if fill is not None and fill.lever < 1.0 and sum_body_forces(loads)[0]:
+                high = programme.with_load_factor(stones.load(loads, lever=1.0)).solve()
+                warn_of_lever(result.factor, np.inf if high is None else -high.value)
     if np.isinf(result.factor):
         warn_locking(structure, friction)
     if friction is None:

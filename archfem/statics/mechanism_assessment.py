@@ -30,7 +30,13 @@ from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import check_between, check_choice, check_fields, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput, logger
-from archfem.limit.backfill import BlocksWithFill, Fill, FillProfile, attach_fill
+from archfem.limit.backfill import (
+    BlocksWithFill,
+    Fill,
+    FillProfile,
+    attach_fill,
+    warn_of_lever,
+)
 from archfem.limit.collapse import collapse_factor
 from archfem.limit.displaced_blocks import (
     FillPressure,
@@ -377,7 +383,8 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     structure = structure_of(structure)
     _check_structure(structure, friction, loads)
     filled = None if fill is None else attach_fill(structure, fill)
-    stones, weights = _take_fill_as_loads(structure if filled is None else filled.whole)
+    whole, lever = (structure, 0.0) if filled is None else (filled.whole, fill.lever)
+    stones, weights = _take_fill_as_loads(whole, lever)
     joints = _select_joints(stones, part, blocks)
     pressure = None if filled is None else _press_stones(filled)
     placed = PlacedBlocks.at_rest(stones, (*weights, *loads), float(direction), pressure)
@@ -396,6 +403,10 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         holds = follower.last_equilibrium(path)
         if filled is not None:
             filled.warn_of_sliding_fill([BodyForce(float(direction))], (), mechanism.factor)
+        if weights and lever < 1.0:
+            high = replace(placed, loads=(*_take_fill_as_loads(whole, 1.0)[1], *loads))
+            raised = _find_first_mechanism(high, joints, coefficient, friction)
+            warn_of_lever(mechanism.factor, raised.factor if raised else np.inf, "alpha_0")
     given = spectrum, rules, confidence_factor
     return _Oscillator(placed, path, holds, bool(weights), *given).assess(q)
 
@@ -465,18 +476,20 @@ def _check_structure(
         )
 
 
-def _take_fill_as_loads(structure: Structure) -> tuple[Structure, tuple[AttachedLoad, ...]]:
+def _take_fill_as_loads(
+    structure: Structure, lever: float
+) -> tuple[Structure, tuple[AttachedLoad, ...]]:
     """Return the stones without yielding bodies, and the weight of these on each stone."""
     if not find_yielding_blocks(structure):
         return structure, ()
     regions = find_rigid_regions(structure)
     stones = np.isin(np.arange(len(structure.blocks)), regions.blocks)
-    stone, foot, weight = FillProfile(structure, stones).columns
+    stone, place, weight = FillProfile(structure, stones).columns(lever)
     loads = []
     for number in np.unique(stone):
         own = stone == number
         if not structure.blocks[number].fixed and weight[own].sum() > 0.0:
-            x, y = np.average(foot[own], axis=0, weights=weight[own])
+            x, y = np.average(place[own], axis=0, weights=weight[own])
             name = structure.blocks[number].name
             loads.append(AttachedLoad(name, (float(x), float(y)), float(weight[own].sum())))
     return regions.structure, tuple(loads)
