@@ -24,7 +24,7 @@ LATE_BOUND_METHODS: Mapping[str, str] = {
     "Analysis.ida": "studies.ida:ida",
     "Analysis.mesh_sensitivity": "studies.convergence:mesh_sensitivity",
     "Analysis.page": "view.pages.live:page",
-    "Analysis.run": "dynamics.time_history:time_history",
+    "Analysis.run": "dynamics.time_history:run_analysis",
     "Analysis.scale": "dynamics.motion_scaling:collapse_scale",
     "Analysis.verdict_range": "studies.variations:verdict_range",
     "Analysis.write": "cases.case:write_analysis",

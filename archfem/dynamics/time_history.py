@@ -43,7 +43,7 @@ from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.joints.criteria import Criteria
 from archfem.models.model import Doubt, Model, check_model
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.statics.equilibrium import Equilibrium, dead_load, fill_doubts
 from archfem.statics.newton import Newton
 from archfem.units import format_mm
 
@@ -153,6 +153,12 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         return history
     whole = recorder.record.whole_fall
     return follow_fall(history, model, (start, recorder.state), motion, viscous, whole)
+
+
+def run_analysis(analysis: Analysis, motion: Motion) -> History:
+    """Compute the time history of an analysis, with the doubts of its fill."""
+    history = time_history(analysis, motion)
+    return history.with_doubts((*history.doubts, *fill_doubts(analysis.structure)))
 
 
 def _resolve_start(

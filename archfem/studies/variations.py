@@ -28,8 +28,9 @@ from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.joint_closing import FINISHES, with_finish
 from archfem.masonry.structure import Structure
-from archfem.models.model import write_doubts
+from archfem.models.model import Doubt, write_doubts
 from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import fill_doubts
 from archfem.studies.evaluators import PreparedRuns
 from archfem.studies.parameter_space import WholePoint
 from archfem.studies.result_store import evaluate_with_progress
@@ -144,12 +145,26 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     several = any(isinstance(each, Motion) for each in named)
     dataset.attrs["motion"] = "" if several else motion.name
     structures = [analysis.structure, *(each for each in named if isinstance(each, Structure))]
-    doubts = (*rest.model.doubts, *doubt_soft_blocks(*structures))
+    doubts = [*rest.model.doubts, *fill_doubts(analysis.structure)]
+    if isinstance(structure, Analysis) and analysis.fidelity != structure.fidelity:
+        doubts = [_blame_variations(each, analysis.fidelity) for each in doubts]
+    doubts += doubt_soft_blocks(*structures)
     dataset.attrs["doubts"] = write_doubts(doubts)
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
     dataset.attrs["k_s"] = float(np.mean([contact.shear_stiffness for contact in contacts]))
     return VerdictRange(dataset)
+
+
+def _blame_variations(doubt: Doubt, fidelity: object) -> Doubt:
+    """Return the doubt of a fidelity that the case has not, but its variations take."""
+    if not doubt.remedy.startswith(f"'{fidelity}' is wrong"):
+        return doubt
+    remedy = (
+        f"the variations take them as '{fidelity}', and the case's own fidelity was not varied: "
+        "judge by its runs, or vary it by af.verdict_range(case.analysis, motion)"
+    )
+    return replace(doubt, remedy=remedy)
 
 
 def as_falling(

@@ -10,7 +10,12 @@ import pytest
 
 import archfem as af
 from archfem.statics import Equilibrium, dead_load, equilibrium, self_weight
-from archfem.statics.equilibrium import _increment_load, dead_load_doubts, structure_doubts
+from archfem.statics.equilibrium import (
+    _increment_load,
+    dead_load_doubts,
+    fill_doubts,
+    structure_doubts,
+)
 from archfem.statics.newton import Solution
 
 ROOT = Path(__file__).parents[2]
@@ -320,8 +325,53 @@ def test_commands_name_fixed_blocks_and_doubt_those_within_a_ring(tmp_path, caps
     assert f"blocks that move: 8 of 'arch'; fixed: {fixed}\n" in said
     assert "in doubt: 'voussoir 5' at (0.00, " in said
     for command in (["rate", "--vehicle", "CS454-single"], ["limit", "--set", "limit.vertical=-1"]):
-        assert af.commands.main([command[0], str(path), *command[1:]]) == 0
+        assert af.commands.main([command[0], str(path), *command[1:]]) == 3
         assert "in doubt: 'voussoir 5' at (0.00, " in capsys.readouterr().out
+
+
+def arch_bridge(**walls):
+    """A bridge of one span under fill; with the given sidewalls, or none."""
+    arch = af.shapes.Arch(span=8.4, rise=2.1, thickness=0.55, voussoirs=16)
+    names = ("left wall", "right wall") if walls else ()
+    sides = [af.shapes.Sidewall(name=name, **walls) for name in names]
+    fill = af.shapes.Backfill(cover=0.45)
+    return af.bridge(arches=[arch], sidewalls=sides, backfill=fill, width=5.0)
+
+
+NOTHING = {"joint_rule": "exact", "sign": "as given", "dt": "as given"}
+WALLS = {"length": 2.0, "height": 2.0, "above": 2.0, "course": 0.5, "state": "fixed"}
+
+
+def test_fill_that_only_tension_holds_is_a_doubt_with_its_free_ends():
+    (doubt,) = fill_doubts(arch_bridge())
+    assert "as soil of 30° and 5 kPa it does not stand under its own weight" in doubt.cause
+    # radius 5.25 m, springing at cos α = 0.6: from the extrados there to the deck
+    assert f"free faces of {5.8 + 0.45 - 5.8 * 0.6:.3g}, 2.77 m" in doubt.cause
+    assert "sidewalls" in doubt.remedy
+    assert fill_doubts(arch_bridge(**WALLS)) == []
+    assert fill_doubts(resting().model.structure) == []
+
+
+def test_fill_in_pieces_answers_itself():
+    pieces = af.masonry.jointed_fill(arch_bridge(), 1.2, friction_angle=30.0)
+    assert not af.stands(pieces)
+    assert fill_doubts(pieces) == []
+
+
+def test_every_answer_of_a_bridge_has_the_doubt_of_its_fill(tmp_path, capsys):
+    """Check, limit analysis, a run, and the range of its verdict; and no answer with sidewalls."""
+    path = tmp_path / "bridge.toml"
+    motion = af.Motion.synthetic(duration=0.5, pga=0.5, seed=1)
+    for structure, doubted in ((arch_bridge(), True), (arch_bridge(**WALLS), False)):
+        analysis = af.Analysis(structure, fidelity="rigid", displacements="large")
+        analysis.write(path)
+        fill = ["--set", "limit.fill.friction_angle=30 degree", "--set", "limit.vertical=-1"]
+        for command in (["check"], ["limit", *fill]):
+            af.commands.main([command[0], str(path), *command[1:]])
+            assert ("fill in one piece holds itself" in capsys.readouterr().out) == doubted
+        found = analysis.run(motion), analysis.verdict_range(motion, samples=1, vary=NOTHING)
+        for each in found:
+            assert any("holds itself" in doubt.cause for doubt in each.doubts) == doubted
 
 
 def thin_ring(stiffness, unit_weight=20e3):
