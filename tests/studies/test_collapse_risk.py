@@ -329,6 +329,33 @@ def test_samples_are_added_to_those_of_a_file(tmp_path, quick_runs):
         af.collapse_risk(analysis, motions, SITE, samples=40, seed=1, **options)
 
 
+def test_another_hazard_keeps_the_samples_of_a_file(tmp_path, quick_runs, monkeypatch):
+    analysis, motions = tilted_block()
+    options = {"out": tmp_path / "risk.nc", "precision": 0.02, "samples": 10}
+    first = af.collapse_risk(analysis, motions, SITE, **options)
+    rare = af.Hazard(SITE.intensity, 0.1 * SITE.rate)
+    no_run = {"name": "bracket_capacity", "value": None}
+    monkeypatch.setattr(af.studies.collapse_risk, **no_run)
+    again = af.collapse_risk(analysis, motions, rare, **options)
+    assert again.rate().rate == pytest.approx(0.1 * first.rate().rate, rel=1e-9)
+    assert CollapseRisk.read(options["out"]).hazard.rate == pytest.approx(rare.rate)
+
+
+@pytest.mark.parametrize(("ratio", "doubted"), [(0.87, True), (0.92, False), (1.09, False)])
+@pytest.mark.parametrize("measure", ["pga", "sa"])
+def test_a_hazard_of_other_ground_than_the_target_is_in_doubt(ratio, doubted, measure, quick_runs):
+    """Soil C of EN 1998-1 has S = 1.15, and 1.15 · 2.5 on its plateau: rock is 13 % below."""
+    design = 9.80665 * 0.22 * 1.15 * (2.5 if measure == "sa" else 1.0)
+    period = {"period": 0.4} if measure == "sa" else {}
+    points = {475.0: ratio * design, 2475.0: 1.7 * ratio * design}
+    site = af.Hazard.from_return_periods(points, measure=measure, **period)
+    target = af.motion.Eurocode8(0.22, "C")
+    found = af.collapse_risk(*tilted_block(), site, samples=8, target=target)
+    words = f"the target of the motions {design:.3g} m/s²"
+    assert (words in str(found)) == doubted
+    assert words not in str(af.collapse_risk(*tilted_block(), site, samples=8))
+
+
 def thin_arch(finish):
     """A semicircle of seven stones, t/R = 0.125, with joints of a finish."""
     size = {"radius": 4.0, "thickness": 0.5, "embrace": 180.0, "voussoirs": 7, "chords": 1}
