@@ -175,7 +175,10 @@ def _divide_fill(structure: Structure, table: Table) -> Structure:
             raise InvalidInput(f"structure.fill has {sorted(fill)}: they need law = 'jointed'")
         return structure
     if missing := sorted({"piece_size", "friction_angle"} - set(fill)):
-        raise InvalidInput(f"structure.fill lacks {missing}: a jointed fill needs both")
+        raise InvalidInput(
+            f"structure.fill lacks {missing}: a jointed fill needs both, such as "
+            'piece_size = "0.8 m", friction_angle = "30 degree"'
+        )
     return jointed_fill(structure, **fill)
 
 

@@ -209,6 +209,8 @@ def refuse_unknown(table: Table, keys: Iterable[str], section: str = "") -> None
     for key in table:
         if key not in keys:
             hint = suggest_name(key, keys) or f"the keys are {sorted(keys)}"
+            if section == "structure" and key in ("materials", "contacts"):
+                hint = f"[{key}] stands beside [structure], at the top of the file"
             raise InvalidInput(f"unknown key '{section + '.' if section else ''}{key}': {hint}")
 
 

@@ -151,7 +151,7 @@ def _name_published_files(text: str, folder: Path, command: str) -> str:
 
 @contextmanager
 def _record_doubts(structure: Structure) -> Iterator[list[str]]:
-    """Yield doubts about the supports of a structure, and then the warnings of a block."""
+    """Yield doubts about a structure, and then the warnings of a block, as lines."""
     doubts = [f"{DOUBT_MARK}{doubt}" for doubt in structure_doubts(structure)]
     handler = logging.Handler(logging.WARNING)
     handler.emit = lambda record: doubts.append(f"{DOUBT_MARK}{record.getMessage()}")  # type: ignore[method-assign]
@@ -162,7 +162,12 @@ def _record_doubts(structure: Structure) -> Iterator[list[str]]:
         logger.removeHandler(handler)
 
 
-def modes(options: argparse.Namespace) -> None:
+def _doubt_code(lines: Iterable[str]) -> int:
+    """Return the exit code of printed doubts and notes."""
+    return ExitCode.DOUBTFUL if any(line.startswith(DOUBT_MARK) for line in lines) else 0
+
+
+def modes(options: argparse.Namespace) -> int:
     """Compute the modes of a case about its dead load: table, picture, film of the first two."""
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     print(case.title)
@@ -175,20 +180,23 @@ def modes(options: argparse.Namespace) -> None:
             from archfem.view.films.film import film_modes
 
             write({"modes.gif": lambda path: film_modes(computed, path, first)}, draft)
+    return ExitCode.DOUBTFUL if at_rest.doubts else 0
 
 
-def limit(options: argparse.Namespace) -> None:
+def limit(options: argparse.Namespace) -> int:
     """Find the collapse factor of the loads in [limit], and the mechanism."""
     case = Case.read(options.case, options.changes)
     with _record_doubts(case.structure) as doubts:
         found = case.limit.solve(case.structure)
         text = result_text.describe_limit(case, found)
+    doubts = [*dict.fromkeys(doubts)]  # the other sense may have the same
     text = "\n".join([text, *doubts])
     files = partial(results.limit_files, found, text, doubts)
     _write_results("limit", case, options.out, f"{case.title}\n{text}", files)
+    return _doubt_code(doubts)
 
 
-def assess(options: argparse.Namespace) -> None:
+def assess(options: argparse.Namespace) -> int:
     """Assess the collapse mechanisms of a case against a design spectrum, in both directions."""
     case = Case.read(options.case, options.changes)
     motion = case.ground_motion() if case.motion is not None else None
@@ -212,9 +220,10 @@ def assess(options: argparse.Namespace) -> None:
         return {"assessment.txt": text, **stated, **figures}
 
     _write_results("assess", case, options.out, f"{case.title}\n{text}", draw)
+    return _doubt_code(doubts)
 
 
-def rate(options: argparse.Namespace) -> None:
+def rate(options: argparse.Namespace) -> int:
     """Rate the bridge of a case for vehicles, by the joints and the fill of its [limit]."""
     keys = ("live", "impact", "dead", "width", "area_load")
     # as in --set, so that a length may have a unit
@@ -245,6 +254,7 @@ def rate(options: argparse.Namespace) -> None:
     files |= state_ratings([(found, doubts) for found, doubts, _ in rated]).as_file("rating")
     shown = f"{case.title}\n{text}"
     _write_results("rate", case, options.out, shown, lambda: {**files, "rating.png": worst.plot()})
+    return _doubt_code([doubt for _, doubts, _ in rated for doubt in doubts])
 
 
 def mesh(options: argparse.Namespace) -> None:
@@ -287,6 +297,7 @@ def risk(options: argparse.Namespace) -> int:
         alternatives=alternatives or None,
         workers=options.workers,
         out=path_inside(folder, "risk_samples.nc"),
+        target=case.target,
         **case.risk.options,
     )
     files: Files = {"risk.txt": str(found), "risk.nc": found.save, "risk.png": found.plot()}
@@ -338,7 +349,7 @@ def scale(options: argparse.Namespace) -> int:
     _write_results("scale", case, options.out, f"{case.title}\n{text}", lambda: files)
     if found.interrupted:
         raise KeyboardInterrupt
-    return ExitCode.DOUBTFUL if doubts else 0
+    return _doubt_code(doubts)
 
 
 def report(options: argparse.Namespace) -> None:
@@ -466,15 +477,17 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     """Print results, write their files, and return the verdict and whether any is in doubt."""
     # `carry_out` yields limit analysis, dead load, pushover, suite and runs in this order.
     runs: dict[str, History] = {}
+    of_limit: list[str] = []
     if (survey := read_survey(case.settings, case.folder)) is not None:
         print(survey)
     with _record_doubts(case.structure) as doubts:
         for result in found:
             if isinstance(result, Collapse):
                 text = result_text.describe_limit(case, result)
-                text = "\n".join([text, *doubts])  # of limit analysis, which comes first
+                of_limit = [*dict.fromkeys(doubts)]  # of limit analysis, which comes first
+                text = "\n".join([text, *of_limit])
                 print(text)
-                write(results.limit_files(result, text, doubts), folder)
+                write(results.limit_files(result, text, of_limit), folder)
             elif isinstance(result, DeadLoadResult):
                 at_rest = result
                 print(result_text.describe_dead_load(at_rest))
@@ -496,7 +509,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     if case.suite is not None:
         _print_pairs(suite, runs, at_rest, folder)
     verdict = result_text.describe_verdicts(runs.values()) if runs else ""
-    return verdict, bool(at_rest.doubts) or any(run.doubts for run in runs.values())
+    return verdict, any([of_limit, at_rest.doubts, *(run.doubts for run in runs.values())])
 
 
 def _print_first_modes(at_rest: DeadLoadResult, folder: Path, max_modes: int = 4) -> None:

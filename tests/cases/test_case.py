@@ -41,6 +41,7 @@ def test_changes_from_the_command_line():
     [
         ("structure.radus=3", "unknown key 'structure.radus': did you mean 'radius'"),
         ("structre.radius=3", "unknown key 'structre': did you mean 'structure'"),
+        ("structure.materials.stone.young=1e9", r"\[materials\] stands beside \[structure\]"),
         ("structure.radius='3 s'", r"structure.radius = '3 s' is not in a unit like m"),
         ("structure.voussoirs=1.5", "structure.voussoirs = 1.5 is not a whole number"),
         ("structure.shape=cone", "structure.shape = 'cone' is not known"),
