@@ -514,7 +514,8 @@ class BlocksWithFill:
         single = self._apply_forces(contacts.block, points, forces).T
         # backing presses as much on one side as on the other: one unknown for both
         count = np.arange(len(contacts.partner))
-        pairs = sparse.csr_matrix((np.ones(len(count)), (count, contacts.partner)))
+        entries = np.ones(len(count)), (count, contacts.partner)
+        pairs = sparse.csr_matrix(entries, (len(count), len(count)))
         return sparse.csr_matrix(single @ pairs)
 
     def pressure_dataset(self, share: Array) -> xr.Dataset | None:
