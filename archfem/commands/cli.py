@@ -30,9 +30,9 @@ class ExitCode(IntEnum):
 
 EXIT_CODES = (
     "exit codes: 0, an answer; 1, an error in words, no answer; 2, the arguments are not "
-    f"understood; {ExitCode.DOUBTFUL}, an answer that is in doubt: summary.txt begins with why "
-    "(energy that drifts, displacements that are not small, a fidelity that is wrong or errs "
-    f"by more than is permitted); {ExitCode.INTERRUPTED}, ended by Ctrl-C, and 143, "
+    f"understood; {ExitCode.DOUBTFUL}, an answer in doubt: each line 'in doubt: …' "
+    "says why (energy that drifts, a fidelity that is wrong, fill that only tension holds, sliding "
+    f"that dilates); {ExitCode.INTERRUPTED}, ended by Ctrl-C, and 143, "
     "by SIGTERM: what was computed is kept."
 )
 

@@ -383,7 +383,8 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     structure = structure_of(structure)
     _check_structure(structure, friction, loads)
     filled = None if fill is None else attach_fill(structure, fill)
-    whole, lever = (structure, 0.0) if filled is None else (filled.whole, fill.lever)
+    whole = structure if filled is None else filled.whole
+    lever = fill.lever if isinstance(fill, Fill) else 0.0
     stones, weights = _take_fill_as_loads(whole, lever)
     joints = _select_joints(stones, part, blocks)
     pressure = None if filled is None else _press_stones(filled)

@@ -324,7 +324,12 @@ def test_commands_name_fixed_blocks_and_doubt_those_within_a_ring(tmp_path, caps
     fixed = ", ".join(f"'{ring.blocks[k].name}' ({mm:.3g} mm broad)" for k, mm in sizes.items())
     assert f"blocks that move: 8 of 'arch'; fixed: {fixed}\n" in said
     assert "in doubt: 'voussoir 5' at (0.00, " in said
-    for command in (["rate", "--vehicle", "CS454-single"], ["limit", "--set", "limit.vertical=-1"]):
+    commands = (
+        ["rate", "--vehicle", "CS454-single"],
+        ["limit", "--set", "limit.vertical=-1"],
+        ["modes", "--count", "1", "--out", str(tmp_path / "modes")],
+    )
+    for command in commands:
         assert af.commands.main([command[0], str(path), *command[1:]]) == 3
         assert "in doubt: 'voussoir 5' at (0.00, " in capsys.readouterr().out
 
