@@ -221,14 +221,15 @@ class Rating(ResultDisplay):
 
     def describe_pressure(self) -> list[str]:
         """Return the line on the range of the factor over the pressure of the fill, if any."""
-        if np.isnan(self.full_pressure):
+        if np.isnan(self.full_pressure) or not isinstance(self.fill, Fill):
             return []
         least = f"{self.without_pressure:.4g}"
         if np.isnan(self.without_pressure):
             least = "none, as the bridge does not stand,"
         return [
             f"over the pressure of the fill, at that place: {least} without it, "
-            f"{self.factor:.4g} as given, {self.full_pressure:.4g} with all of the passive one"
+            f"{self.factor:.4g} with up to {self.fill.mobilisation:.2g} of the passive one, "
+            f"{self.full_pressure:.4g} with all of it"
         ]
 
     def _describe_backing(self) -> list[str]:

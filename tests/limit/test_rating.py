@@ -279,7 +279,7 @@ def test_the_range_over_the_pressure_of_the_fill_is_that_of_collapse_factors(lor
     assert lorry_rating.without_pressure == pytest.approx(none, rel=EXACT)
     assert lorry_rating.full_pressure == pytest.approx(whole, rel=EXACT)
     assert none < 0.9 * lorry_rating.factor < 0.8 * whole
-    line = f"place: {none:.4g} without it, {lorry_rating.factor:.4g} as given, {whole:.4g} with all"
+    line = f"place: {none:.4g} without it, {lorry_rating.factor:.4g} with up to 0.33 of the passive"
     assert f"\nover the pressure of the fill, at that {line}" in str(lorry_rating)
 
 
