@@ -76,7 +76,7 @@ def test_a_run_to_the_plain_call_keeps_its_energy(ring):
     [
         ({"dt": 0.005, "tolerance": 0.01}, "give one of both"),
         ({"tolerance": 0.0}, "between 0 and 1"),
-        ({"tolerance": float("nan")}, "not a finite number"),
+        ({"tolerance": float("nan")}, "nan is not between 0 and 1"),
     ],
 )
 def test_invalid_input_is_refused(ring, options, words):
