@@ -299,10 +299,23 @@ def describe_accuracy(accuracy: Accuracy) -> str:
     )
 
 
-def describe_run(structure: Structure, run: History, dead: xr.Dataset) -> str:
-    """Describe a run: verdict, quality of the numbers, joints, and use of strength."""
+def describe_run(
+    structure: Structure, run: History, dead: xr.Dataset, max_joints: int | None = None
+) -> str:
+    """Describe a run: verdict, quality of the numbers, joints, and use of strength.
+
+    With `max_joints` the table has as many joints, those of the largest |e|.
+    """
     strength = utilisation_text(structure, run.joints)
-    table = tabulate_joints(run.joints, dead).text
+    whole = tabulate_joints(run.joints, dead)
+    table = whole.text
+    if max_joints is not None and len(whole.rows) > max_joints:
+        extremes = envelope(assessed_joints(run.joints))
+        size = np.maximum(-extremes["lowest"], extremes["highest"]).fillna(0.5).values
+        worst = np.sort(np.argsort(-size, kind="stable")[:max_joints])
+        table = ResultTable(whole.head, [whole.rows[k] for k in worst]).text
+        table += f"\n{max_joints} of {len(whole.rows)} joints, those of the largest |e|: "
+        table += "summary.txt has all"
     return "\n\n".join([str(run.verdict), describe_run_quality(run), table, strength])
 
 

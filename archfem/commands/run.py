@@ -67,6 +67,10 @@ logger = logging.getLogger("archfem")
 # Modules that import pyvista or studies, which are slow, are imported where they are needed.
 
 
+# Joints of the table that `archfem run` prints; summary.txt has all
+MAX_PRINTED_JOINTS = 20
+
+
 class FailedPairs(DidNotConverge):
     """Some pairs of a suite failed; the results of the suite are complete nevertheless."""
 
@@ -553,9 +557,13 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
             f"{float(history.time[-1]):.2f} s in {run.seconds:.1f} s; {history.outcome}"
         )
         print(f"wrote {run.path}")
-    text = result_text.describe_run(run.case.structure, history, at_rest.dead.joints)
-    text += f"\n\n{defaults}" if (defaults := describe_defaults(run.case)) else ""
-    print(text)
+    defaults = describe_defaults(run.case)
+    given = run.case.structure, history, at_rest.dead.joints
+    said, text = (
+        "\n\n".join(filter(None, [result_text.describe_run(*given, count), defaults]))
+        for count in (MAX_PRINTED_JOINTS, None)
+    )
+    print(said)
     write(results.run_files(run, at_rest, text), run.path.parent)
     if history.ending is Ending.INTERRUPTED and run.case.suite is None:
         raise KeyboardInterrupt

@@ -238,6 +238,11 @@ class NonassociatedBounds:
         )
 
     @property
+    def may_be_less(self) -> bool:
+        """Whether a solution below the least that was found is not excluded."""
+        return self.bracket[0] < (1.0 - CRUSHING_GAP_TOLERANCE) * self.between[0]
+
+    @property
     def jumps(self) -> bool:
         """Whether the factor rises far faster with the last of the friction than before."""
         # as where the path to a toe wedge is lost, and sliding of the whole wall is found
