@@ -43,7 +43,6 @@ from archfem.view.style import (
     style_axes,
 )
 
-
 # Letters of a joint's name for which there is room at an axis
 MAX_NAME_LETTERS = 16
 

@@ -356,7 +356,8 @@ def draw_names(structure: Structure) -> Figure:
     title = f"{structure.name}: names of joints, such as '{example}'"
     if walls:
         number = structure.joints[len(structure.joints) // 2].blocks[1]
-        title = f"{structure.name}: numbers of stones; {number} is '{structure.blocks[number].name}'"
+        stone = structure.blocks[number].name
+        title = f"{structure.name}: numbers of stones; {number} is '{stone}'"
     set_title(axes, title)
     add_note(cast(Figure, axes.figure), {"": structure.assessment})
     return cast(Figure, axes.figure)

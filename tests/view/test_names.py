@@ -1,5 +1,6 @@
 """A picture in which each joint has its name."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -7,7 +8,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import archfem as af
-from archfem.cases.result_text import describe_run
+from archfem.cases.analysis_keys import LimitAnalysis
+from archfem.cases.result_text import describe_collapse, describe_run
 from archfem.view import draw_envelope, draw_names
 from archfem.view.structure import short_name
 
@@ -105,3 +107,13 @@ def test_a_wall_has_its_assessed_joints_alone_in_pictures_and_the_worst_in_a_tab
     assert f"20 of {judged} joints, those of the largest |e|: summary.txt has all" in brief
     size = abs(run.joints["eccentricity"]).max("time").where(wall.judged, 0.0)
     assert f"\n{run.joints['name'].values[int(size.argmax())]} " in brief
+
+
+def test_a_wall_that_slides_has_one_of_many_mechanisms():
+    said = "all bed joints reach μ together: the mechanism is one of many"
+    for friction, slides in ((0.3, True), (4.0, False)):
+        wall = bonded()
+        joints = [replace(j, contact=replace(j.contact, friction=friction)) for j in wall.joints]
+        wall = replace(wall, joints=tuple(joints))
+        limit = LimitAnalysis((af.BodyForce(1.0),), "coulomb")
+        assert (said in describe_collapse(wall, limit.solve(wall), limit)) == slides
