@@ -106,11 +106,12 @@ def write_progress_line(name: str, text: str) -> None:
 
 
 class ProgressReport:
-    """Progress of a long search: a bar on a terminal, elsewhere a line every five seconds."""
+    """Progress of a search of five seconds and more: a bar on a terminal, elsewhere lines."""
 
     def __init__(self, name: str, total: int) -> None:
         layout = "{desc}: |{bar}| {n_fmt} of {total_fmt}{postfix}"
-        self._bar = tqdm(total=total, bar_format=layout, desc=name, disable=None, leave=False)
+        look: dict[str, Any] = {"bar_format": layout, "desc": name, "leave": False}
+        self._bar = tqdm(total=total, disable=None, delay=PROGRESS_INTERVAL, **look)
         self._name, self._shown = name, monotonic()
 
     def __enter__(self) -> Self:

@@ -11,7 +11,7 @@ from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.toml_file import Table, check_table, read_object
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
-from archfem.limit.backfill import Fill
+from archfem.limit.backfill import Fill, self_weight_programme
 from archfem.limit.collapse import Collapse, collapse_factor
 from archfem.limit.plastic_fill import PlasticFill
 from archfem.limit.rating import Rating, rate
@@ -59,6 +59,19 @@ class LimitAnalysis:
     def resistance(self) -> dict[str, Any]:
         """Arguments of `collapse_factor` other than the load, which `rate` has too."""
         return {"friction": self.friction, "strength": self.strength, "fill": self.fill}
+
+    def check(self, structure: Structure) -> None:
+        """Refuse what `solve` refuses of loads and soft blocks, before other results are computed.
+
+        Args:
+            structure: structure of the case.
+
+        Raises:
+            InvalidInput: a load misses the structure, or blocks are too soft to be rigid.
+        """
+        if self.live and not isinstance(self.fill, PlasticFill):
+            given = self.friction, self.strength, self.fill, self.dead
+            self_weight_programme(structure, *given)[0].load(self.live)
 
     def solve(self, structure: Structure) -> Collapse:
         """Compute the load factor at which a structure of rigid blocks becomes a mechanism.

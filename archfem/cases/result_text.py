@@ -28,6 +28,7 @@ from archfem.joints.criteria import (
 from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
+from archfem.masonry.loads import BodyForce
 from archfem.masonry.structure import Structure, join_joint_names, join_names
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import Match
@@ -247,6 +248,8 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     lines = [f"limit analysis: {collapse.sentence}"]
     lines += [f"hinges, by the face in contact: {join_names(hinges, '; ')}"] if hinges else []
     lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
+    if _slides_alone(structure, collapse):
+        lines.append("all bed joints reach μ together: the mechanism is one of many")
     lines += [str(collapse.solutions)] if collapse.solutions else []
     crushing = describe_crushing(limit.strength)
     lines += filter(None, [crushing, describe_fill(limit.fill)])
@@ -271,6 +274,15 @@ def describe_limit(case: Case, collapse: Collapse) -> str:
         return text
     opposite = case.limit.solve_opposite(case.structure)
     return text if opposite is None else f"{text}\n{describe_opposite(collapse, opposite)}"
+
+
+def _slides_alone(structure: Structure, collapse: Collapse) -> bool:
+    """Return whether a wall slides at the friction of all its joints, pushed by its weight."""
+    loads = [load for load in collapse.live if isinstance(load, BodyForce) and not load.vertical]
+    if collapse.hinges or not collapse.sliding or len(loads) != len(collapse.live):
+        return False
+    push = abs(collapse.factor * sum(load.horizontal for load in loads))
+    return bool(structure.heads.any() and np.allclose(structure.friction, push, rtol=1e-3))
 
 
 def describe_opposite(collapse: Collapse, opposite: Collapse) -> str:
@@ -299,10 +311,24 @@ def describe_accuracy(accuracy: Accuracy) -> str:
     )
 
 
-def describe_run(structure: Structure, run: History, dead: xr.Dataset) -> str:
-    """Describe a run: verdict, quality of the numbers, joints, and use of strength."""
+def describe_run(
+    structure: Structure, run: History, dead: xr.Dataset, max_joints: int | None = None
+) -> str:
+    """Describe a run: verdict, quality of the numbers, joints, and use of strength.
+
+    With `max_joints` the table has as many joints, those of the largest |e|.
+    """
     strength = utilisation_text(structure, run.joints)
-    table = tabulate_joints(run.joints, dead).text
+    whole = tabulate_joints(run.joints, dead)
+    table = whole.text
+    if max_joints is not None and len(whole.rows) > max_joints:
+        extremes = envelope(assessed_joints(run.joints))
+        size = np.maximum(-extremes["lowest"].values, extremes["highest"].values)
+        size = np.nan_to_num(size, nan=0.5)  # open throughout
+        worst = np.sort(np.argsort(-size, kind="stable")[:max_joints])
+        table = ResultTable(whole.head, [whole.rows[k] for k in worst]).text
+        table += f"\n{max_joints} of {len(whole.rows)} joints, those of the largest |e|: "
+        table += "summary.txt has all"
     return "\n\n".join([str(run.verdict), describe_run_quality(run), table, strength])
 
 

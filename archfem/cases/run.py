@@ -1,4 +1,4 @@
-"""Carry out a case: limit analysis, dead load and time histories.
+"""Carry out a case: dead load, time histories and limit analysis.
 
 `run_case` yields each result as soon as it is computed. Histories are saved in a folder; those of
 an earlier call are reused if case, input files, program and ground motion are the same.
@@ -239,8 +239,8 @@ def run_case(
         run_motion: function that integrates one motion; by default `run_time_history`.
 
     Yields:
-        A `Collapse` if the case has [limit] with a load; the `DeadLoadResult`; a `Pushover` if the
-        case has one; the `Suite` if there is one; and a `Run` for each motion.
+        The `DeadLoadResult`; a `Pushover` if the case has one; the `Suite` if there is one; a `Run`
+        for each motion; and a `Collapse` if the case has [limit] with a load.
 
     Raises:
         InvalidInput: a motion cannot be read, limit analysis is not possible, or another command
@@ -279,8 +279,7 @@ def carry_out(
     # Unreadable records are errors before the dead load is computed.
     selected = case if pairs is None else case.alone(*pairs)
     selected.check_ground()
-    if case.limit.live:
-        yield case.limit.solve(case.structure)
+    case.limit.check(case.structure)
     at_rest = DeadLoadResult.of(case)
     yield at_rest
     if case.pushover is not None:
@@ -292,10 +291,16 @@ def carry_out(
             run = _run_pair(at_rest, motion, folder, run_motion)
             yield run
             if run.history.ending is Ending.INTERRUPTED:  # by Ctrl-C, or SIGTERM
-                break
+                return
     elif case.motion is not None:
         path = None if folder is None else folder / HISTORY_FILE
-        yield _run_motion(case, case.ground_motion(), at_rest, path, run_motion)
+        run = _run_motion(case, case.ground_motion(), at_rest, path, run_motion)
+        yield run
+        if run.history.ending is Ending.INTERRUPTED:
+            return
+    # of a large wall it takes longest, and its interruption loses nothing else
+    if case.limit.live:
+        yield case.limit.solve(case.structure)
 
 
 @validate_arguments

@@ -67,12 +67,16 @@ logger = logging.getLogger("archfem")
 # Modules that import pyvista or studies, which are slow, are imported where they are needed.
 
 
+# Joints of the table that `archfem run` prints; summary.txt has all
+MAX_PRINTED_JOINTS = 20
+
+
 class FailedPairs(DidNotConverge):
     """Some pairs of a suite failed; the results of the suite are complete nevertheless."""
 
 
 def run(options: argparse.Namespace) -> int:
-    """Carry out a case: limit analysis, dead load and time histories, tables and pictures."""
+    """Carry out a case: dead load, time histories and limit analysis, tables and pictures."""
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     failure = None
     # All else is printed after the verdict, which is known last.
@@ -475,16 +479,17 @@ def compile_steps(options: argparse.Namespace) -> None:
 
 def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[str, bool]:
     """Print results, write their files, and return the verdict and whether any is in doubt."""
-    # `carry_out` yields limit analysis, dead load, pushover, suite and runs in this order.
+    # `carry_out` yields dead load, pushover, suite, runs and limit analysis in this order.
     runs: dict[str, History] = {}
     of_limit: list[str] = []
     if (survey := read_survey(case.settings, case.folder)) is not None:
         print(survey)
     with _record_doubts(case.structure) as doubts:
+        supports = len(doubts)
         for result in found:
             if isinstance(result, Collapse):
                 text = result_text.describe_limit(case, result)
-                of_limit = [*dict.fromkeys(doubts)]  # of limit analysis, which comes first
+                of_limit = [*dict.fromkeys(doubts)]
                 text = "\n".join([text, *of_limit])
                 print(text)
                 write(results.limit_files(result, text, of_limit), folder)
@@ -506,6 +511,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
                 print(f"{result.motion.name}: {result.history.outcome}", file=sys.stderr)
                 _print_run(result, at_rest)
                 runs[result.motion.name] = result.history
+            del doubts[supports:]  # they are not of the next result
     if case.suite is not None:
         _print_pairs(suite, runs, at_rest, folder)
     verdict = result_text.describe_verdicts(runs.values()) if runs else ""
@@ -551,9 +557,13 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
             f"{float(history.time[-1]):.2f} s in {run.seconds:.1f} s; {history.outcome}"
         )
         print(f"wrote {run.path}")
-    text = result_text.describe_run(run.case.structure, history, at_rest.dead.joints)
-    text += f"\n\n{defaults}" if (defaults := describe_defaults(run.case)) else ""
-    print(text)
+    defaults = describe_defaults(run.case)
+    given = run.case.structure, history, at_rest.dead.joints
+    said, text = (
+        "\n\n".join(filter(None, [result_text.describe_run(*given, count), defaults]))
+        for count in (MAX_PRINTED_JOINTS, None)
+    )
+    print(said)
     write(results.run_files(run, at_rest, text), run.path.parent)
     if history.ending is Ending.INTERRUPTED and run.case.suite is None:
         raise KeyboardInterrupt

@@ -23,6 +23,7 @@ from archfem.limit.mechanism_count import (
     demirel_aldemir_mechanism,
     duration_text,
     has_counted_mechanism,
+    leave_out_walls,
 )
 from archfem.limit.mechanism_kinematics import first_verified_mechanism
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
@@ -135,15 +136,17 @@ def detect_mechanisms(
 ) -> dict[str, Mechanism | None]:
     """Find the first mechanism by each definition that applies.
 
-    "Verified" needs the structure, and "ring and pier at once" needs both.
+    "Verified" needs the structure, and "ring and pier at once" needs both. No joints of walls in
+    bond are counted.
     """
-    first: dict[str, Mechanism | None] = dict(counted_mechanisms(joints))
+    counted = leave_out_walls(joints)
+    first: dict[str, Mechanism | None] = dict(counted_mechanisms(counted))
     if not {"ring", "pier"} <= set(joints["role"].values.astype(str)):
         del first["ring and pier at once"]
     if structure is not None:
         verified = first_verified_mechanism(structure, joints)
         first["verified"] = None if verified is None else verified.moved
-    first[PUBLISHED_DEFINITION] = demirel_aldemir_mechanism(joints)
+    first[PUBLISHED_DEFINITION] = demirel_aldemir_mechanism(counted)
     return first
 
 

@@ -146,6 +146,8 @@ class Collapse(ResultDisplay):
                 place = f"which is at least {low}"
             elif low == high or abs(self.factor) <= 1e-9 * abs(self.upper):
                 place = f"which is at most {high}"
+        elif self.outcome is Outcome.COLLAPSES and self.solutions and self.solutions.may_be_less:
+            place, words = f"at ≤ {low}", f"{words} (least found)"
         return f"{self.outcome.sentence}, {place}{words}"
 
     def _summary(self) -> str:

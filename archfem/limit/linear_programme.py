@@ -225,6 +225,13 @@ def no_limits(joint_count: int) -> Limits:
     return Limits(sparse.csr_matrix((0, 3 * joint_count)), np.zeros(0))
 
 
+def uneven_compression(joint_count: int) -> Array:
+    """Return a cost of compressions whose least state is unique, so that crushing cuts converge."""
+    # weights from 1 to 2 without regularity
+    weights = 1.0 + np.arange(2 * joint_count) * 0.5 * (5.0**0.5 - 1.0) % 1.0
+    return np.concatenate([weights, np.zeros(joint_count)])
+
+
 def crushing_cuts(joints: Numbers, at: Array, crushing: Array) -> Limits:
     """Return tangents at N_0 = `at` of the crushing limit |M| <= N h/2 - N²/(2 σ w)."""
     # A rectangular stress block of the full strength σ demands F >= N²/(2 N_c) at each end, with
@@ -298,14 +305,17 @@ class Programme:
         force_cost = 0.0 if self.force_cost is None else self.force_cost @ state.forces
         return float(force_cost + self.unknown_cost @ state.unknowns)
 
-    def solve(self, max_rounds: int = 60, crushing_tolerance: float = 1e-7) -> Optimum | None:
-        """Solve, adding crushing cuts until none is violated; None where it is unbounded."""
+    def solve(
+        self, *, forces: bool = True, max_rounds: int = 60, crushing_tolerance: float = 1e-7
+    ) -> Optimum | None:
+        """Solve, adding crushing cuts until none is violated; None where it is unbounded.
+
+        Without forces, until the objective and its mechanism, from below, no longer change.
+        """
         limits = self.limits or no_limits(len(self.friction))
-        if self.crushing is not None:
+        if self.crushing is not None:  # this tangent bounds every thrust by the crushing force
             crushes = np.flatnonzero(np.isfinite(self.crushing))
-            for share in (0.25, 0.5, 1.0):
-                thrust = share * self.crushing[crushes]
-                limits = limits.joined(crushing_cuts(crushes, thrust, self.crushing))
+            limits = limits.joined(crushing_cuts(crushes, self.crushing[crushes], self.crushing))
         columns = sparse.csr_matrix((len(self.load), 0)) if self.columns is None else self.columns
         reduced = self.blocks.reduce(columns, self.friction, self.cohesion > 0.0)
         # As tangents of a parabola the cuts converge quadratically, in about six rounds, where one
@@ -330,6 +340,8 @@ class Programme:
                 return optimum if found is None else self._join_states(found, optimum)
             limits = limits.joined(crushing_cuts(violated, thrust[violated], self.crushing))
             if found is None and abs(optimum.value - before) <= 1e-9 * abs(optimum.value):
+                if not forces:
+                    return optimum
                 held = self._hold_factor(optimum)
                 found, programme = (None, self) if held is None else (optimum, held)
             before = optimum.value
@@ -346,13 +358,10 @@ class Programme:
         if self.columns is not None and self.unknown_cost[0]:
             load = load - self.columns[:, [0]].toarray()[:, 0] * HELD_SHARE * optimum.unknowns[0]
             upper_bounds[0] = 0.0
-        # weights without regularity make this state unique, so that cuts converge
-        weights = 1.0 + np.arange(2 * len(self.friction)) * 0.5 * (5.0**0.5 - 1.0) % 1.0
-        least = np.concatenate([weights, np.zeros(len(self.friction))])
         return replace(
             self,
             load=load,
-            force_cost=least,
+            force_cost=uneven_compression(len(self.friction)),
             unknown_cost=np.zeros_like(self.unknown_cost),
             upper_bounds=upper_bounds,
         )

@@ -321,6 +321,16 @@ class Failures(NamedTuple):
         return cls(Criteria.of(joints), roles, flags, counts)
 
 
+def leave_out_walls(joints: xr.Dataset) -> xr.Dataset:
+    """Return the joints without those of walls in bond, where a count says nothing."""
+    # their bed joints touch and part in turn: any four of hundreds are no mechanism
+    if HEAD_COORDINATE not in joints.coords:
+        return joints
+    parts = joints["part"].values.astype(str)
+    walls = parts[joints[HEAD_COORDINATE].values]
+    return joints.isel(joint=~np.isin(parts, walls)) if len(walls) else joints
+
+
 def has_counted_mechanism(joints: xr.Dataset) -> xr.DataArray:
     """Return whether enough joints for a mechanism by count have failed at each instant."""
     return find_failed_joints(assessed_joints(joints)).sum("joint") >= Criteria.of(joints).failures

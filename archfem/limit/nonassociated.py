@@ -28,9 +28,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
+from archfem._display import ProgressReport
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
-from archfem.limit.linear_programme import Limits, Optimum, Programme, no_limits
+from archfem.limit.linear_programme import Limits, Optimum, Programme, no_limits, uneven_compression
 
 # States from which the search starts besides the associated one; fewer for many joints
 MAX_START_COUNT = 40
@@ -48,8 +49,15 @@ MAX_SUDDEN_RISE = 0.05
 # Relative gap that counts as zero [-]: programmes are solved to 1e-9
 GAP_TOLERANCE = 1e-7
 
+# The same with crushing, whose cuts leave objectives uncertain by 2e-5 or so [-]
+CRUSHING_GAP_TOLERANCE = 1e-4
+
 # Shear resistance added so that round-off cannot make a programme infeasible [mean block weights]
 RESISTANCE_MARGIN = 1e-8
+
+# Cost of compressions with crushing, relative to the largest of friction [-]: it decides between
+# states of the same gap alone
+LEAST_COMPRESSION = 1e-6
 
 # Relative decrease of the objective from one solution to the next weaker one [-]
 OBJECTIVE_DECREASE = 1e-3
@@ -106,7 +114,7 @@ def _alternate(
     """Find the mechanism dual to forces, then the forces of least gap for its slips."""
     resistance = shear_resistance(programme, normal_forces(forces)) + RESISTANCE_MARGIN
     try:
-        mechanism = with_shear_limits(programme, resistance).solve()
+        mechanism = with_shear_limits(programme, resistance).solve(forces=False)
         if mechanism is None:
             return None
         slips = np.abs(mechanism_gaps(programme, mechanism.multipliers).reshape(3, -1)[2])
@@ -120,7 +128,8 @@ def _alternate(
     value = programme.objective(state)
     change = shear_resistance(programme, normal_forces(state.forces)) - resistance
     gap = value + float(change @ slips) - mechanism.value
-    tolerance = GAP_TOLERANCE * max(abs(value), abs(mechanism.value))
+    share = GAP_TOLERANCE if programme.crushing is None else CRUSHING_GAP_TOLERANCE
+    tolerance = share * max(abs(value), abs(mechanism.value))
     tolerance = tolerance + RESISTANCE_MARGIN * float(slips.sum())
     pair = Optimum(value, state.forces, mechanism.multipliers, state.unknowns)
     return AlternatingIterate(pair, gap, gap <= tolerance)
@@ -131,6 +140,8 @@ def _minimise_gap(programme: Programme, slips: Array, preference: float = 1e-4) 
     # The small `preference` for a weak objective decides between states of the same gap.
     dissipation = friction_coefficients(programme) * slips
     cost = np.concatenate([dissipation, dissipation, np.zeros(len(dissipation))])
+    if programme.crushing is not None:  # one state alone, for which the crushing cuts converge
+        cost += LEAST_COMPRESSION * cost.max() * uneven_compression(len(dissipation))
     if programme.force_cost is not None:
         cost += (1.0 - preference) * programme.force_cost
     unknown_cost = (1.0 - preference) * programme.unknown_cost
@@ -227,6 +238,11 @@ class NonassociatedBounds:
         )
 
     @property
+    def may_be_less(self) -> bool:
+        """Whether a solution below the least that was found is not excluded."""
+        return self.bracket[0] < (1.0 - CRUSHING_GAP_TOLERANCE) * self.between[0]
+
+    @property
     def jumps(self) -> bool:
         """Whether the factor rises far faster with the last of the friction than before."""
         # as where the path to a toe wedge is lost, and sliding of the whole wall is found
@@ -245,15 +261,16 @@ def search_nonassociated(
     # the number of starts falls with the joints squared
     joints = len(programme.blocks.structure.depths)
     number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
-    followed, path = _follow_friction(programme)
-    starts = followed + _free_head_joints(programme)
-    starts += starting_forces(programme, start, number, 0)
-    solutions = _find_solutions(programme, starts)
-    for seed in (1, 2, 3):  # in walls one start of four leads to a solution
-        if not solutions and joints > MAX_FULL_SEARCH_JOINTS:
-            more = _random_vertices(programme, start, number, np.random.default_rng(seed))
-            starts += more
-            solutions = _find_solutions(programme, more)
+    with ProgressReport("limit analysis", len(FRICTION_SHARES) + number) as progress:
+        followed, path = _follow_friction(programme, progress)
+        starts = followed + _free_head_joints(programme)
+        starts += starting_forces(programme, start, number, 0)
+        solutions = _find_solutions(programme, starts, progress)
+        for seed in (1, 2, 3):  # in walls one start of four leads to a solution
+            if not solutions and joints > MAX_FULL_SEARCH_JOINTS:
+                more = _random_vertices(programme, start, number, np.random.default_rng(seed))
+                starts += more
+                solutions = _find_solutions(programme, more, progress)
     normal = np.array([normal_forces(forces) for forces in starts])
     smallest = normal.reshape(-1, joints).min(axis=0, initial=np.inf)
     associated = -np.inf if start is None else start.value
@@ -277,11 +294,14 @@ def search_nonassociated(
     return weakest.state, _with_residuals(programme, weakest, bounds)
 
 
-def _follow_friction(programme: Programme) -> tuple[list[Array], list[tuple[float, float]]]:
+def _follow_friction(
+    programme: Programme, progress: ProgressReport
+) -> tuple[list[Array], list[tuple[float, float]]]:
     """Return forces of solutions with nearly all friction, and shares and objectives on the way."""
     followed: list[Array] = []
     path = []
     for share in FRICTION_SHARES:
+        progress.show(f"{share:.3g} of the friction", done=1)
         reduced, starts = replace(programme, friction=share * programme.friction), followed
         with suppress(DidNotConverge):  # it might not stand with so little friction
             if (associated := reduced.solve()) is not None:
@@ -305,10 +325,17 @@ def _free_head_joints(programme: Programme) -> list[Array]:
     return []
 
 
-def _find_solutions(programme: Programme, starts: Sequence[Array]) -> list[AlternatingIterate]:
+def _find_solutions(
+    programme: Programme, starts: Sequence[Array], progress: ProgressReport | None = None
+) -> list[AlternatingIterate]:
     """Return the solutions to which given forces lead."""
-    iterates = [find_solution(programme, forces) for forces in starts]
-    return [iterate for iterate in iterates if iterate is not None]
+    solutions = []
+    for number, forces in enumerate(starts, start=1):
+        if progress is not None:
+            progress.show(f"start {number} of {len(starts)}", done=1)
+        if (iterate := find_solution(programme, forces)) is not None:
+            solutions.append(iterate)
+    return solutions
 
 
 def find_weakest(programme: Programme, starts: Sequence[Array]) -> Optimum | None:

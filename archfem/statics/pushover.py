@@ -32,6 +32,9 @@ STEP_GROWTH = 1.1
 # as about a hinge that moves from joint to joint.
 STAGNATION_STEPS = 40
 
+# Begin of the outcome of such a path
+CRAWLS = "it crawls"
+
 # Smallest relative load increment of relaxation, to which failed trials are halved: the accuracy of
 # the limit [-]
 MIN_RELAXATION_LOAD_STEP = 0.002
@@ -78,7 +81,7 @@ class Pushover(ResultDisplay):
         hinge_steps: step at which each of them first hinges.
         outcome: rule that ended the pushover, as text.
         limit: limit of the factor, by extrapolation of the curve [-]; undefined (NaN) where it is
-            still too steep.
+            still too steep, or crawls as joints slide.
         uncertainty: distance of `limit` from the last factor [-].
     """
 
@@ -277,7 +280,7 @@ def stop_reason(path: Path, stop: Stop, criteria: Criteria, step: Array) -> str 
     is_last = len(path.states) > stop.steps
     if _is_stagnating(path, 0.1 if is_last else 0.01) and sliding_joints(path, criteria):
         return (
-            f"it crawls: in {STAGNATION_STEPS} steps the {path.moving} moved by less than a tenth "
+            f"{CRAWLS}: in {STAGNATION_STEPS} steps the {path.moving} moved by less than a tenth "
             f"of {displacement:.3g} m, and the factor went no further than {path.factors[-1]:.5g}"
         )
     return f"{stop.steps} steps were taken" if is_last else None
@@ -373,7 +376,9 @@ def _label_result(path: Path, criteria: Criteria, outcome: str) -> Pushover:
         },
         {"step": np.arange(count)},
     )
-    limit, uncertainty = _extrapolate_limit(path.displacements, factors)
+    limit, uncertainty = np.nan, np.nan
+    if not outcome.startswith(CRAWLS):  # sliding has its limit at once, and no asymptote of hinges
+        limit, uncertainty = _extrapolate_limit(path.displacements, factors)
     return Pushover(curve, joints, *hinge_order(joints), outcome, limit, uncertainty)
 
 

@@ -43,6 +43,9 @@ from archfem.view.style import (
     style_axes,
 )
 
+# Letters of a joint's name for which there is room at an axis
+MAX_NAME_LETTERS = 16
+
 
 @validate_arguments
 def draw_envelope(
@@ -192,7 +195,7 @@ class PartPanel:
 
     def select(self, joints: xr.Dataset) -> tuple[Array, xr.Dataset]:
         """Return the joints of the part, and their places along the axis (n,)."""
-        own = _joints_of_part(joints, self.part)
+        own = _joints_of_part(assessed_joints(joints), self.part)
         places = own["height"].values if self.by_height else np.arange(own.sizes["joint"])
         return places.astype(float), own
 
@@ -250,7 +253,10 @@ def _make_panels(
 
 
 def _label_joints(axes: Axes, names: Sequence[str]) -> None:
-    """Write the names of joints at 0, 1, …, as far as there is room."""
+    """Write the names of joints at 0, 1, …, as far as there is room, or 0, 1, … for long ones."""
+    if max(map(len, names), default=0) > MAX_NAME_LETTERS:
+        axes.set_xlabel("joint, counted among those assessed [-]")
+        names = [str(k) for k in range(len(names))]
     labels = {float(k): name for k, name in enumerate(names)}
     axes.xaxis.set_major_locator(MaxNLocator(max(2, min(6, len(names) // 3)), integer=True))
     axes.xaxis.set_major_formatter(lambda place, _: labels.get(round(place, 6), ""))

@@ -16,6 +16,7 @@ from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, describe_assessed_joints, envelope, with_failure_flags
 from archfem.joints.resultants import check_instant
+from archfem.limit.mechanism_count import counted_mechanism, leave_out_walls
 from archfem.limit.mechanism_kinematics import verified_mechanism
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement
 from archfem.masonry.structure import Joint, Structure
@@ -104,10 +105,11 @@ def _draw_state(axes: Axes, structure: Structure, joints: xr.Dataset | None, nam
 def _describe_failed_joints(structure: Structure, joints: xr.Dataset) -> str:
     """Return whether enough failed joints permit a motion; empty where fewer have failed."""
     found = verified_mechanism(structure, joints)
-    if found.counted is None:
+    counted = found.counted and counted_mechanism(leave_out_walls(joints))
+    if counted is None:
         return ""
     motion = "no motion" if found.kind == "none" else f"{found.kind} mechanism"
-    return f": {len(found.counted.joints)} failed joints; {motion} verified"
+    return f": {len(counted.joints)} failed joints; {motion} verified"
 
 
 @validate_arguments
@@ -323,7 +325,8 @@ def draw_names(structure: Structure) -> Figure:
 
     Joints of rings and piers are named, or all joints of a structure that has neither; where they
     are too near to one another on a page, every second or third. The name of a ring stands above
-    it, that of another part below: "5" in "main arch" is "main arch, joint 5".
+    it, that of another part below: "5" in "main arch" is "main arch, joint 5". Of a wall in bond
+    the stones are numbered instead, as in `structure.blocks`.
 
     Args:
         structure: the structure.
@@ -342,12 +345,36 @@ def draw_names(structure: Structure) -> Figure:
     axes.autoscale_view()
     for joint in shown:
         axes.plot(*joint.ends.T, color=Colour.SLIDING, lw=1.0, zorder=4)
+    heads = zip(structure.joints, structure.heads, strict=True)
+    walls = {joint.part for joint, head in heads if head}
     for part in dict.fromkeys(joint.part for joint in shown):
-        _name_part(axes, [joint for joint in shown if joint.part == part], inch)
+        if part in walls:
+            _number_stones(axes, structure, part, inch)
+        else:
+            _name_part(axes, [joint for joint in shown if joint.part == part], inch)
     example = shown[len(shown) // 2].name
-    set_title(axes, f"{structure.name}: names of joints, such as '{example}'")
+    title = f"{structure.name}: names of joints, such as '{example}'"
+    if walls:
+        number = structure.joints[len(structure.joints) // 2].blocks[1]
+        stone = structure.blocks[number].name
+        title = f"{structure.name}: numbers of stones; {number} is '{stone}'"
+    set_title(axes, title)
     add_note(cast(Figure, axes.figure), {"": structure.assessment})
     return cast(Figure, axes.figure)
+
+
+def _number_stones(axes: Axes, structure: Structure, part: str, inch: float) -> None:
+    """Write the numbers of a wall's stones, as many as fit in legible type."""
+    numbers = [k for k in structure.free if structure.blocks[k].part == part]
+    boxes = np.array([np.ptp(structure.blocks[k].outline, axis=0) for k in numbers])
+    # a line of type takes 0.65 of the height, and a figure 0.7 of its size with the space beside
+    sizes = np.minimum(0.65 * boxes[:, 1], boxes[:, 0] / (0.7 * len(str(numbers[-1]))))
+    fitting = 72.0 * float(sizes.min()) / inch
+    every = max(1, int(np.ceil(Size.NOTE / fitting)))
+    style: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 8, "color": Colour.TEXT}
+    style["fontsize"] = min(every * fitting, Size.LABEL)
+    for number in numbers[::every]:
+        annotate(axes, str(number), structure.centroids[number], (0.0, 0.0), **style)
 
 
 def _name_part(axes: Axes, joints: Sequence[Joint], inch: float) -> None:

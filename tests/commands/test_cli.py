@@ -251,6 +251,23 @@ def test_a_signal_ends_a_motion_and_keeps_its_steps(
     assert "interrupted" in capsys.readouterr().err
 
 
+def test_sigterm_in_limit_analysis_keeps_dead_load_and_motion(
+    column, tmp_path, unplotted, monkeypatch, caplog
+):
+    def stop(*given, **options):
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setattr("archfem.cases.analysis_keys.collapse_factor", stop)
+    out = tmp_path / "out"
+    command = ["run", str(column), "--set", "limit.horizontal=1", "--out", str(out)]
+    assert af.commands.main(command) == 143
+    assert "reached the end of the motion" in (out / "summary.txt").read_text()
+    assert (out / "dead.png").is_file()
+    (run,) = af.cases.open_results(out).runs.values()
+    assert run.ending is af.dynamics.Ending.FINISHED
+    assert f"what was computed is kept in {out}" in caplog.text
+
+
 def test_a_full_disk_is_an_error_in_words(column, tmp_path, unplotted, capsys):
     """A file may not be longer than 20 kB, which acts as a full disk does."""
     out = tmp_path / "out"

@@ -239,6 +239,7 @@ def test_a_rough_wall_fails_by_a_wedge_above_a_stepped_crack(friction):
     assert found.solutions.bracket[1] > 1.05 * wedge
     assert not found.solutions.jumps
     assert "no lower bound is known" in str(found.solutions)
+    assert f"at ≤ {found.factor:.4g} g of force to the right (least found)" in found.sentence
 
 
 def test_a_wedge_that_is_lost_is_doubted(monkeypatch, caplog):
@@ -247,15 +248,34 @@ def test_a_wedge_that_is_lost_is_doubted(monkeypatch, caplog):
     monkeypatch.setattr(nonassociated, "_free_head_joints", lambda programme: [])
     monkeypatch.setattr(nonassociated, "descend", lambda *given, **options: iter([]))
     follow = nonassociated._follow_friction
-    monkeypatch.setattr(
-        nonassociated, "_follow_friction", lambda programme: ([], follow(programme)[1])
-    )
+    monkeypatch.setattr(nonassociated, "_follow_friction", lambda *given: ([], follow(*given)[1]))
     found = af.collapse_factor(wall(ROUGH_WALL, 1.0), live=SIDEWAYS, friction="nonassociated")
     assert found.factor == pytest.approx(1.0)
     assert found.solutions.jumps
     assert "a weaker solution without dilatancy is likely: the least found is 1, but 0." in (
         caplog.text
     )
+
+
+def test_strength_that_hardly_matters_takes_few_programmes_more(monkeypatch, capfd):
+    """Of many states with the same gap one is sought, so that the crushing cuts converge."""
+    solved, solve = [], linear_programme.solve_linear
+    monkeypatch.setattr(
+        linear_programme, "solve_linear", lambda *given: [solved.append(1), solve(*given)][1]
+    )
+    monkeypatch.setattr("archfem._display.PROGRESS_INTERVAL", 0.0)
+    found, counts = {}, {}
+    for strength in (None, 56e6):
+        options = {"friction": "nonassociated", "strength": strength}
+        solved.clear()
+        found[strength] = af.collapse_factor(wall([FOUR, FOUR_CUT] * 8), live=SIDEWAYS, **options)
+        counts[strength] = len(solved)
+    assert found[56e6].factor == pytest.approx(found[None].factor, rel=2e-3)
+    assert found[56e6].solutions.starts[1] > 25  # of 32 starts; the gap has the error of the cuts
+    assert counts[56e6] < 4 * counts[None]
+    said = capfd.readouterr().err
+    assert "limit analysis: 0.7 of the friction" in said
+    assert "limit analysis: start 2 of " in said
 
 
 def test_a_factor_jumps_where_it_rises_far_faster_than_before():
@@ -524,7 +544,7 @@ def test_bounds_are_those_of_the_weakest_and_the_strongest_solution(monkeypatch)
         nonassociated.AlternatingIterate(replace(optimum, value=value), 0.0, True)
         for value in (-0.4, -0.3, -0.5)
     ]
-    monkeypatch.setattr(nonassociated, "_find_solutions", lambda programme, starts: list(found))
+    monkeypatch.setattr(nonassociated, "_find_solutions", lambda *given: list(found))
     monkeypatch.setattr(nonassociated, "descend", lambda *given, **options: iter([]))
     state, bounds = nonassociated.search_nonassociated(programme, optimum, -1.0)
     assert state.value == -0.3

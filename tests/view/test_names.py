@@ -1,11 +1,16 @@
 """A picture in which each joint has its name."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import archfem as af
-from archfem.view import draw_names
+from archfem.cases.analysis_keys import LimitAnalysis
+from archfem.cases.result_text import describe_collapse, describe_run
+from archfem.view import draw_envelope, draw_names
 from archfem.view.structure import short_name
 
 
@@ -52,3 +57,63 @@ def test_names_of_a_ring_are_legible(voussoirs):
     lines = np.linalg.norm(np.diff(places, axis=0), axis=1)
     assert lines.min() > 1.2 * max(note.get_fontsize() for note in notes)
     assert all(-91.0 <= (note.get_rotation() + 180.0) % 360.0 - 180.0 <= 91.0 for note in notes)
+
+
+def bonded(courses=6):
+    """A wall in running bond, whose joints are named after both stones."""
+    blocks = [
+        af.Block(
+            ((-1.0, -0.5), (4.0, -0.5), (4.0, 0.0), (-1.0, 0.0)),
+            af.STONE,
+            "ground",
+            fixed=True,
+            part="ground",
+            role="other",
+        )
+    ]
+    for k in range(courses):
+        ends = [0.0, *np.arange(0.5 - 0.25 * (k % 2), 3.0, 0.5), 3.0]
+        for a, b in pairwise(ends):
+            corners = ((a, 0.25 * k), (b, 0.25 * k), (b, 0.25 * (k + 1)), (a, 0.25 * (k + 1)))
+            name = f"course {k + 1}, stone {len(blocks)}"
+            blocks.append(af.Block(corners, af.STONE, name, part="wall", role="pier"))
+    return af.masonry.assembled(blocks, af.Contact(1.48e9, 0.3e9, friction=0.6))
+
+
+def test_stones_of_a_wall_in_bond_are_numbered():
+    wall = bonded()
+    figure = draw_names(wall)
+    notes = written(figure)
+    assert [word for word, _ in notes] == [str(k) for k in wall.free]
+    boxes = [note.get_window_extent() for _, note in notes]
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+    title = figure.axes[0].get_title()
+    assert "numbers of stones" in title.replace("\n", " ")
+
+
+def test_a_wall_has_its_assessed_joints_alone_in_pictures_and_the_worst_in_a_table():
+    wall = bonded()
+    shake = af.Motion(2.0 * np.sin(40.0 * np.arange(0.0, 0.1, 0.005)), 0.005)
+    run = af.time_history(af.build(wall, fidelity="rigid"), shake, dt=0.005)
+    axes = draw_envelope({"quake": run}).axes[0]
+    line = next(line for line in axes.lines if line.get_label() == "quake")
+    judged = int(wall.judged.sum())
+    assert len(line.get_xdata()) == judged < len(wall.joints)
+    axes.figure.canvas.draw()
+    assert max(len(text.get_text()) for text in axes.get_xticklabels()) <= 3
+    dead = run.joints.isel(time=0)
+    whole, brief = (describe_run(wall, run, dead, *count) for count in ((), (20,)))
+    assert whole.count(" to course ") - brief.count(" to course ") >= judged - 20 - 10
+    assert f"20 of {judged} joints, those of the largest |e|: summary.txt has all" in brief
+    size = abs(run.joints["eccentricity"]).max("time").where(wall.judged, 0.0)
+    assert f"\n{run.joints['name'].values[int(size.argmax())]} " in brief
+
+
+def test_a_wall_that_slides_has_one_of_many_mechanisms():
+    said = "all bed joints reach μ together: the mechanism is one of many"
+    for friction, slides in ((0.3, True), (4.0, False)):
+        wall = bonded()
+        joints = [replace(j, contact=replace(j.contact, friction=friction)) for j in wall.joints]
+        wall = replace(wall, joints=tuple(joints))
+        limit = LimitAnalysis((af.BodyForce(1.0),), "coulomb")
+        assert (said in describe_collapse(wall, limit.solve(wall), limit)) == slides
