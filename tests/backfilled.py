@@ -28,6 +28,25 @@ def arch_bridge(cover=0.3, material=SOIL, width=1.0, **ring):
     )
 
 
+def slender_bridge(**rings):
+    """Rings of some span and rise on piers of 0.9 m by 6 m, under a level fill."""
+    return af.bridge(
+        arches=[
+            af.shapes.Arch(span=span, rise=rise, thickness=0.6, voussoirs=9, name=name)
+            for name, (span, rise) in rings.items()
+        ],
+        piers=[
+            af.shapes.Pier(gap=0.9, height=6.0, course=2.0, name=f"pier {name}")
+            for name in [*rings][1:]
+        ],
+        sidewalls=[
+            af.shapes.Sidewall(length=3.0, height=2.0, state="fixed", name=f"{side} wall")
+            for side in ("left", "right")
+        ],
+        backfill=af.shapes.Backfill(cover=0.5),
+    )
+
+
 def rectangle(left, bottom, right, top, name, material=af.STONE, **given):
     outline = ((left, bottom), (right, bottom), (right, top), (left, top))
     return af.Block(outline, material, name, **{"part": name, "role": "other"} | given)

@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from math import radians, sqrt, tan
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from archfem._typing import Array, Degrees, Flags, Metres, Numbers, Pascals
 from archfem._validation import check_between, check_choice, check_number, check_type
@@ -30,10 +31,6 @@ from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 from archfem.units import in_degrees
 
 SELF_WEIGHT = BodyForce(0.0, -1.0)
-
-# Horizontal strength of backing [Pa]: rubble in lime mortar has 1 to 2 MPa (from memory). A finite
-# one makes factors continuous in the level of the backing.
-BACKING_STRENGTH = 1e6
 
 # Share of a factor by which the height of a fill's horizontal force may lower it unsaid [-]: less
 # than the eighth by which the best fill errs in load tests of bridges
@@ -57,8 +54,9 @@ class Fill:
 
     The vertical stress is that of the weights alone: live loads do not raise the pressures, and
     neither does a body force, as an earthquake would (Mononobe and Okabe). Shear between fill and
-    stones is neglected, and the fill is long enough to bear its reactions: its own balance and
-    failure are not checked, and the pressure on one arch does not act on the next.
+    stones is neglected. Between two faces, as above a pier, fill and backing press on both equally.
+    Beside the ground the fill is long enough to bear its reactions: its own balance and failure are
+    not checked.
 
     Attributes:
         friction_angle: friction angle φ of the fill [degrees].
@@ -76,9 +74,10 @@ class Fill:
             centroid. At 0 shear between the columns carries its moment to ends that hold the fill,
             at 1 the stone below carries all of it. Neither is measured: state both [-].
         backing: level, a y coordinate, up to which there is masonry behind the haunches, not fill
-            [m]; None for none. It holds the stones' faces horizontally, without tension, by up to
-            `BACKING_STRENGTH`: faces beside the ground against the ground, those above a pier
-            against each other. It never pushes.
+            [m]; None for none. It holds the stones' faces horizontally, without tension: against
+            the ground or, above a pier, against each other. It never pushes.
+        backing_strength: greatest pressure of the backing [Pa]. Rubble in lime mortar has 1 to 2
+            MPa (from memory). A finite one makes factors continuous in the level of the backing.
 
     References:
         Gilbert, RING Theory and Modelling Guide, University of Sheffield (2005). Rankine, Phil.
@@ -97,12 +96,15 @@ class Fill:
     spread: Degrees = 30.0
     lever: float = 0.0
     backing: Metres | None = None
+    backing_strength: Pascals = 1e6
 
     def __post_init__(self) -> None:
         """Refuse values outside their range, most of them wrong units."""
         read_strength(self, "mobilisation", "active", "lever")
         remedy = "with more it is masonry, to be modelled by blocks"
         check_between(self.cohesion, "fill, cohesion [Pa]", 0.0, 1e6, ends="[]", remedy=remedy)
+        given, name = self.backing_strength, "fill, backing_strength [Pa]"
+        check_between(given, name, 1e4, 1e8, ends="[]", remedy="rubble in lime mortar has 1e6")
         for key in ("mobilisation", "active", "lever"):
             check_number(getattr(self, key), f"fill, {key}, a part", maximum=1.0)
         check_choice(self.dispersal, "fill, dispersal", ("boussinesq", "uniform"))
@@ -356,7 +358,14 @@ class FillContacts:
     least: Array  # active pressure at both ends (n, 2) [Pa]
     most: Array  # mobilised passive pressure at both ends (n, 2) [Pa]
     backed: Flags  # whether the piece is beside backing, not fill (n,)
-    partner: Numbers  # piece on which the same backing presses, or the piece itself (n,)
+    partner: Numbers  # piece to its left on which the same fill presses, or the piece itself (n,)
+
+    @property
+    def shared(self) -> sparse.csr_matrix:
+        """Whether a piece has the pressure of an unknown, that of its partner (n, n)."""
+        count = len(self.partner)
+        entries = np.ones(count), (np.arange(count), self.partner)
+        return sparse.csr_matrix(entries, (count, count))
 
     def thrust(self, pressure: Array, width: float) -> tuple[Array, Array]:
         """Return points and resultants (n, 2) of pressures that are linear along each piece."""
@@ -364,6 +373,45 @@ class FillContacts:
         size = self.toward * pressure.mean(axis=1) * np.abs(along[:, 1]) * width
         points = self.ends[:, 0] + _centroid_share(pressure)[:, None] * along
         return points, np.stack([size, np.zeros(len(size))], axis=1)
+
+
+class Face(NamedTuple):
+    """Face of a stone below the fill, or a piece of one."""
+
+    region: int  # number of the stone in the rigid regions
+    ends: Array  # (2, 2) [m]
+    side: float  # sense of the outward normal along x, 1 or -1
+
+
+def _find_facing(faces: Sequence[Face], fixed: Sequence[Face], heights: Array) -> Numbers:
+    """Return pairs of faces, left and right, with only fill between them at one of some heights.
+
+    Args:
+        faces: of free stones.
+        fixed: faces of fixed stones, which are in no pair and may be between two others.
+        heights: at which to look, any number [m].
+    """
+    ends = np.array([face.ends for face in (*faces, *fixed)]).reshape(-1, 2, 2)
+    side = np.array([face.side for face in faces] + [0.0] * len(fixed))
+    (x, y), (across, rise) = ends[:, 0].T, (ends[:, 1] - ends[:, 0]).T
+    pairs = [np.zeros((0, 2), dtype=np.intp)]
+    for height in heights:
+        share = (height - y) / rise
+        at = np.flatnonzero((share > 0.0) & (share < 1.0))
+        at = at[np.argsort((x + share * across)[at])]
+        neighbours = np.stack([at[:-1], at[1:]], axis=1)
+        pairs.append(neighbours[(side[neighbours] == [1.0, -1.0]).all(axis=1)])
+    return np.unique(np.concatenate(pairs), axis=0)
+
+
+def _equalise(ends: Array, least: Array, most: Array, left: Numbers, right: Numbers) -> None:
+    """Give pieces that face each other the same range of pressure, in place."""
+    order = np.argsort(ends[:, :, 1], axis=1)  # from below
+    low, high = (np.take_along_axis(each, order, axis=1) for each in (least, most))
+    # it is as large as the fill pushes anywhere between them, or as the weakest place can bear
+    low[left] = low[right] = np.maximum(low[left], low[right])
+    high[left] = high[right] = np.maximum(low[left], np.minimum(high[left], high[right]))
+    least[:], most[:] = (np.take_along_axis(each, order, axis=1) for each in (low, high))
 
 
 @dataclass(frozen=True, eq=False)
@@ -379,61 +427,53 @@ class BlocksWithFill:
         """Stones and fill in strips."""
         return FillProfile(self.whole, self.rigid_regions.place >= 0)
 
-    def _faces(self) -> list[tuple[int, Array, float]]:
-        """Return region, ends and outward sense along x of each face of a stone below the fill."""
+    def _faces(self) -> tuple[list[Face], list[Face]]:
+        """Return the faces of free stones and those of fixed stones below the fill."""
         soil, normals = set(find_yielding_blocks(self.whole)), self.whole.normals
-        faces, level = [], 1e-9  # rise over length of a face without side pressure
+        free: list[Face] = []
+        fixed: list[Face] = []
+        level = 1e-9  # rise over length of a face without side pressure
         for number, joint in enumerate(self.whole.joints):
             stone = next((b for b in joint.blocks if b not in soil), joint.lower)
             other = joint.blocks[0] + joint.blocks[1] - stone
             out = normals[number] * (1.0 if stone == joint.lower else -1.0)
-            bare = self.rigid_regions.place[stone] < 0 or self.whole.blocks[stone].fixed
+            bare = self.rigid_regions.place[stone] < 0
             if bare or other not in soil or abs(out[0]) <= level or out[1] < -level:
                 continue
-            faces.append((self.rigid_regions.place[stone], joint.ends, float(np.sign(out[0]))))
-        return faces
+            face = Face(self.rigid_regions.place[stone], joint.ends, float(np.sign(out[0])))
+            (fixed if self.whole.blocks[stone].fixed else free).append(face)
+        return free, fixed
 
     @cached_property
     def contacts(self) -> FillContacts:
         """Pieces of the stones' faces on which the fill presses, or that the backing holds."""
         assert self.fill is not None
-        block, ends, toward, stress = [], [], [], []
-        faces, shares = self._faces(), np.linspace(0.0, 1.0, 9)  # eight pieces a face
-        slabs = self._cut_backing([ends[:, 1] for _, ends, _ in faces], shares)
-        for region, (start, end), side in faces:
-            # beside backing, cuts are at the heights of those of the face across it
-            at = (slabs - start[1]) / (end[1] - start[1])
-            near = self._profile.near / abs(end[1] - start[1])
-            above = start[1] + shares * (end[1] - start[1]) > slabs.max(initial=-np.inf)
-            cuts = [shares[[0, -1]], shares[above], at[(at > near) & (at < 1.0 - near)]]
-            along = np.unique(np.concatenate(cuts))[:, None]
-            points = start + along * (end - start)
-            over = np.array([self._profile.overburden(point, side) for point in points])
-            block += [region] * (len(points) - 1)
-            toward += [-side] * (len(points) - 1)
-            ends += list(pairwise(points))
+        faces, fixed = self._faces()
+        level = self._backing_level(faces)
+        pieces, stress = [], []
+        for face, along in zip(faces, self._cut_faces(faces, level), strict=True):
+            points = face.ends[0] + along[:, None] * (face.ends[1] - face.ends[0])
+            over = np.array([self._profile.overburden(point, face.side) for point in points])
+            pieces += [face._replace(ends=np.array(ends)) for ends in pairwise(points)]
             stress += list(pairwise(over))
         least, most = self.fill.pressures(np.array(stress, dtype=float).reshape(-1, 2))
-        pieces, senses = np.array(ends, dtype=float).reshape(-1, 2, 2), np.array(toward)
-        middle = pieces.mean(axis=1)
-        slab = np.searchsorted(slabs, middle[:, 1])
-        backed = slab < len(slabs)
-        least[backed], most[backed] = 0.0, BACKING_STRENGTH
-        # of neighbours in a slab, a face to the right and one to the left have backing between them
-        order, partner = np.lexsort((middle[:, 0], slab)), np.arange(len(slab))
-        left, right = order[:-1], order[1:]
-        across = backed[left] & (slab[left] == slab[right]) & (senses[left] < senses[right])
-        partner[right[across]] = left[across]
-        numbers = np.array(block, dtype=np.intp)
-        return FillContacts(numbers, pieces, senses, least, most, backed, partner)
+        ends = np.array([piece.ends for piece in pieces]).reshape(-1, 2, 2)
+        middle, partner = ends[:, :, 1].mean(axis=1), np.arange(len(pieces))
+        least[middle < level], most[middle < level] = 0.0, self.fill.backing_strength
+        left, right = _find_facing(pieces, fixed, middle).T
+        partner[right] = left
+        _equalise(ends, least, most, left, right)
+        numbers = np.array([piece.region for piece in pieces], dtype=np.intp)
+        toward = np.array([-piece.side for piece in pieces])
+        return FillContacts(numbers, ends, toward, least, most, middle < level, partner)
 
-    def _cut_backing(self, faces: Sequence[Array], shares: Array) -> Array:
-        """Return the heights at which the backing is cut into level slabs, the last its top [m]."""
+    def _backing_level(self, faces: Sequence[Face]) -> float:
+        """Return the level below which there is backing, -inf for none [m]."""
         assert self.fill is not None
         if (level := self.fill.backing) is None:
-            return np.zeros(0)
+            return -np.inf
         check_number(level, "fill, backing")
-        heights = np.concatenate([start + shares * (end - start) for start, end in faces])
+        heights = np.array([face.ends[:, 1] for face in faces])
         lowest, highest = heights.min(), heights.max()
         if not lowest < level < highest:
             raise InvalidInput(
@@ -441,8 +481,29 @@ class BlocksWithFill:
                 f"stones, whose faces below the fill are {lowest:.4g} to {highest:.4g} m high: "
                 "give a level between"
             )
-        heights = np.unique([*heights[heights < level], level])
-        return heights[np.append(np.diff(heights) > self._profile.near, True)]
+        return float(level)
+
+    def _cut_faces(self, faces: Sequence[Face], level: float) -> list[Array]:
+        """Return where each face is cut along it: in eight, and where those that it faces are cut.
+
+        Faces on both sides of a pier are cut at the same heights, even if they do not all face
+        each other: one may face a low ring and, above it, one beyond.
+        """
+        ends = np.array([face.ends for face in faces]).reshape(-1, 2, 2)
+        start, rise = ends[:, 0, 1], ends[:, 1, 1] - ends[:, 0, 1]
+        shares = np.linspace(0.0, 1.0, 9)
+        heights = start[:, None] + shares * rise[:, None]
+        every = np.unique(heights)
+        between = 0.5 * (every[1:] + every[:-1])[np.diff(every) > self._profile.near]
+        left, right = _find_facing(faces, [], between).T
+        facing = sparse.coo_matrix((left >= 0, (left, right)), (len(faces), len(faces)))
+        _, group = connected_components(facing, directed=False)
+        cuts = []
+        for k, near in enumerate(self._profile.near / np.abs(rise)):
+            at = (np.append(heights[group == group[k]], level) - start[k]) / rise[k]
+            at = np.unique([*shares, *at[(at > near) & (at < 1.0 - near)]])
+            cuts.append(at[np.append(True, np.diff(at) > near)])
+        return cuts
 
     def load(self, actions: Sequence[BodyForce | PointLoad], lever: float | None = None) -> Array:
         """Return the generalised forces of actions on the free stones (3 n_free,) [N, N, N m].
@@ -512,11 +573,7 @@ class BlocksWithFill:
         contacts = self.contacts
         points, forces = contacts.thrust(contacts.most - contacts.least, self.whole.width)
         single = self._apply_forces(contacts.block, points, forces).T
-        # backing presses as much on one side as on the other: one unknown for both
-        count = np.arange(len(contacts.partner))
-        entries = np.ones(len(count)), (count, contacts.partner)
-        pairs = sparse.csr_matrix(entries, (len(count), len(count)))
-        return sparse.csr_matrix(single @ pairs)
+        return sparse.csr_matrix(single @ contacts.shared)
 
     def pressure_dataset(self, share: Array) -> xr.Dataset | None:
         """Return the pressures of the fill over contact, or None where there is none."""

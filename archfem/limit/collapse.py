@@ -22,7 +22,6 @@ from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, logger
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import (
-    BACKING_STRENGTH,
     BlocksWithFill,
     Fill,
     is_balanced,
@@ -532,7 +531,11 @@ def describe_fill(fill: Fill | PlasticFill | None) -> str:
             f"{fill.active:.2g} of the active and at most {fill.mobilisation:.2g} of the passive"
         )
         text = f"fill: weight, and {share} pressure, {strength}"
-        holds = f"it holds faces horizontally, by up to {BACKING_STRENGTH / MPa:g} MPa"
+        is_given = fill.backing_strength != Fill.backing_strength
+        source = "given" if is_given else "default, from memory"
+        holds = (
+            f"it holds faces horizontally, by up to {fill.backing_strength / MPa:g} MPa ({source})"
+        )
     return (
         text if fill.backing is None else f"{text}; backing up to y = {fill.backing:g} m: {holds}"
     )

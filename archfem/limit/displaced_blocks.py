@@ -61,6 +61,7 @@ class FillPressure(NamedTuple):
     block: Numbers  # (n,)
     points: Array  # at rest, of the least pressure and of what a passive one adds (2, n, 2) [m]
     forces: Array  # least force, and the largest that a passive pressure adds (2, n, 2) [N]
+    shared: csr_matrix  # whether a piece has the passive pressure of an unknown (n, n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,7 +322,7 @@ class Bodies:
                 fill.forces, turned + blocks.centroids[fill.block], strict=True
             )
         )
-        return least, further
+        return least, fill.shared.T @ further
 
     def dead_forces(self, velocity: Array | None = None) -> Array:
         """Return the generalised forces that do not grow (3 n_bodies,).

@@ -499,13 +499,9 @@ def _take_fill_as_loads(
 def _press_stones(filled: BlocksWithFill) -> FillPressure:
     """Return the forces of a fill on the stones, from its active pressure to its passive one."""
     contacts, width = filled.contacts, filled.whole.width
-    # what backing between two rings presses depends on both: left out, which is safe
-    paired = contacts.partner != np.arange(len(contacts.partner))
-    paired[contacts.partner[paired]] = True
-    most = np.where(paired[:, None], contacts.least, contacts.most)
-    ranges = contacts.least, most - contacts.least
+    ranges = contacts.least, contacts.most - contacts.least
     points, forces = zip(*(contacts.thrust(each, width) for each in ranges), strict=True)
-    return FillPressure(contacts.block, np.array(points), np.array(forces))
+    return FillPressure(contacts.block, np.array(points), np.array(forces), contacts.shared)
 
 
 def _select_joints(

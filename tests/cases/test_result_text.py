@@ -79,7 +79,9 @@ def test_limit_analysis_in_words(ring):
     backed = describe_fill(replace(plastic, backing=0.5))
     assert backed.endswith("; backing up to y = 0.5 m: stones below are fixed")
     backed = describe_fill(replace(limit.fill, backing=0.5))
-    assert backed.endswith("up to y = 0.5 m: it holds faces horizontally, by up to 1 MPa")
+    assert backed.endswith("it holds faces horizontally, by up to 1 MPa (default, from memory)")
+    fill = parse_limit({"fill": {"friction_angle": 35, "backing_strength": "2 MPa"}}).fill
+    assert describe_fill(replace(fill, backing=0.5)).endswith("by up to 2 MPa (given)")
     mirrored = af.collapse_factor(ring, live=af.BodyForce(-2.0))
     assert mirrored.sentence == pushed.sentence.replace("right", "left")
     wheel = af.PointLoad(0.5, (0.0, -3e3))

@@ -6,16 +6,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from backfilled import (
+    SOIL,
     arch_bridge,
     column_above,
     faces_of,
     fill_of,
+    rectangle,
     retaining_wall,
     row_of_stones,
+    slender_bridge,
     two_walls,
 )
 from scipy.integrate import quad
 from scipy.optimize import linprog
+from shapely import LineString, Point, Polygon
 
 import archfem as af
 from archfem.limit import Fill
@@ -307,21 +311,50 @@ def test_the_residual_may_be_the_rounding_of_all_blocks_that_move(free, share, s
     assert is_balanced(fall, dead) is stands
 
 
-def push_with_backing(structure, level):
-    """Horizontal pull that brings a backed ring down: a linear programme by other means [g].
+def presses_by_level(structure, fill, moving, levels=800):
+    """Least and greatest size, and stones, points and forces on them of each level of a fill.
 
-    Backing presses on each of many thin slices of a face by up to its strength. Nothing slides.
+    The polygon of the fill is cut into thin levels. Each presses on the stones at its two ends, on
+    both equally where both may move.
     """
-    ring = [n for n in structure.free if structure.blocks[n].role == "ring"]
-    joints = [j for j in structure.joints if set(j.blocks) & set(ring) and j.role == "ring"]
-    columns, bounds, dead = [], [], np.zeros(3 * len(ring))
-    pull = np.zeros(3 * len(ring))
+    faces = {number: [LineString(f) for f in faces_of(structure, number)] for number in moving}
+    soil = fill_of(structure)
+    polygon = Polygon(soil.points)
+    left, low, right, road = polygon.bounds
+    height = (road - low) / levels
+    for y in low + height * (0.5 + np.arange(levels)):
+        sizes = fill.pressures(np.array((road - y) * soil.material.unit_weight))
+        if fill.backing is not None and y < fill.backing:
+            sizes = 0.0, fill.backing_strength
+        sizes = height * structure.width * np.array(sizes)
+        pieces = polygon.intersection(LineString([(left - 1.0, y), (right + 1.0, y)]))
+        for piece in getattr(pieces, "geoms", [pieces]):
+            pressed = [
+                (number, end, (push, 0.0))
+                for end, push in zip(sorted(piece.coords), (-1.0, 1.0), strict=True)
+                for number in moving
+                if any(face.distance(Point(end)) < 1e-9 for face in faces[number])
+            ]
+            for group in [pressed] if len(pressed) == 2 else [[each] for each in pressed]:
+                yield sizes, group
 
-    def add(target, number, point, force, sense=1.0):
-        if number in ring:
-            row = 3 * ring.index(number)
-            moment = point[0] * force[1] - point[1] * force[0]
-            target[row : row + 3] += sense * np.array([force[0], force[1], moment])
+
+def push_by_levels(structure, fill, sense=1.0):
+    """Horizontal pull that brings down rings and piers: a linear programme by other means [g].
+
+    Nothing slides.
+    """
+    moving = [n for n in structure.free if structure.blocks[n].part != "backfill"]
+    joints = [j for j in structure.joints if set(j.blocks) & set(moving) and j.role != "other"]
+    columns, bounds, weights = [], [], []
+
+    def act(*forces):
+        column = np.zeros(3 * len(moving))
+        for number, (x, y), force in forces:
+            if number in moving:
+                row = 3 * moving.index(number)
+                column[row : row + 3] += [*force, x * force[1] - y * force[0]]
+        return column
 
     for joint in joints:
         along = joint.ends[1] - joint.ends[0]
@@ -333,27 +366,20 @@ def push_with_backing(structure, level):
             *((end, across, 0.0) for end in joint.ends),
             (joint.ends[0], along, None),
         ):
-            columns.append(np.zeros(3 * len(ring)))
-            add(columns[-1], joint.blocks[1], point, force)
-            add(columns[-1], joint.blocks[0], point, force, -1.0)
+            columns.append(act((joint.blocks[1], point, force), (joint.blocks[0], point, -force)))
             bounds.append((low, None))
-    for number in ring:
+    for number in moving:
         block = structure.blocks[number]
         weight = block.area * block.material.unit_weight * structure.width
-        above, x = column_above(structure, number)
-        face = faces_of(structure, number)[0]
-        foot = x, np.interp(x, *face.T)
-        for target, direction in ((dead, (0.0, -1.0)), (pull, (1.0, 0.0))):
-            for point, size in ((structure.centroids[number], weight), (foot, above)):
-                add(target, number, point, size * np.array(direction))
-        out = np.sign(face.mean(axis=0)[0] - 4.5)
-        share = np.linspace(0.0, 1.0, 201)
-        points = face[0] + (0.5 * (share[1:] + share[:-1]))[:, None] * (face[1] - face[0])
-        height = abs(face[1, 1] - face[0, 1]) / 200.0
-        for point in points[points[:, 1] < level]:
-            columns.append(np.zeros(3 * len(ring)))
-            add(columns[-1], number, point, (-out, 0.0))
-            bounds.append((0.0, 1e6 * height * structure.width))
+        weights.append((number, structure.centroids[number], weight))
+        for face in faces_of(structure, number):
+            above, x = column_above(structure, number)
+            weights.append((number, (x, np.interp(x, *face.T)), above))
+    dead = act(*((number, point, (0.0, -weight)) for number, point, weight in weights))
+    pull = act(*((number, point, (sense * weight, 0.0)) for number, point, weight in weights))
+    for sizes, pressed in presses_by_level(structure, fill, moving):
+        columns.append(act(*pressed))
+        bounds.append(sizes)
     matrix = np.column_stack([*columns, pull])
     cost = np.append(np.zeros(len(columns)), -1.0)
     return -linprog(cost, A_eq=matrix, b_eq=-dead, bounds=[*bounds, (0.0, None)]).fun
@@ -373,31 +399,97 @@ def test_backing_holds_faces_up_to_its_level_as_in_an_independent_programme():
     assert np.diff(found).min() > 0.0
     assert (np.diff(found) / found[:-1]).max() < 0.05
     for level, factor in list(zip(levels, found, strict=True))[::8]:
-        assert push_with_backing(structure, level) == pytest.approx(factor, rel=5e-3)
+        backed = replace(fill, backing=level)
+        assert push_by_levels(structure, backed) == pytest.approx(factor, rel=5e-3)
 
 
-@pytest.mark.parametrize("level", [0.05, 0.1, 0.2])
-def test_backing_behind_a_wall_by_hand(level):
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+@pytest.mark.parametrize("backing", [None, 0.7])
+@pytest.mark.parametrize(
+    "rings",
+    [
+        {"left": (8.4, 2.1), "right": (8.4, 2.2)},
+        {"left": (8.4, 2.1), "right": (6.0, 1.2)},
+        {"left": (8.4, 2.1), "low": (5.0, 1.0), "right": (8.4, 2.3)},
+    ],
+    ids=len,
+)
+def test_fill_between_rings_as_in_an_independent_programme(rings, sense, backing):
+    """Also where one ring is higher, and two are above the crown of the one between."""
+    structure = slender_bridge(**rings)
+    fill = Fill(friction_angle=35.0, backing=backing)
+    found = af.collapse_factor(structure, live=af.BodyForce(sense), friction=None, fill=fill)
+    assert found.factor == pytest.approx(push_by_levels(structure, fill, sense), rel=5e-3)
+
+
+@pytest.mark.parametrize(("level", "strength"), [(0.05, 1e6), (0.1, 2e6), (0.2, 1e6)])
+def test_backing_behind_a_wall_by_hand(level, strength):
     """A wall turns about its toe when the backing crushes: λ W H/2 = W b/2 + S h²/2."""
-    wall, fill = retaining_wall(), Fill(friction_angle=35.0, mobilisation=0.0, active=0.0)
-    weight, moment = 2.0 * af.STONE.unit_weight, 0.5e6 * level**2
+    fill = Fill(
+        friction_angle=35.0,
+        mobilisation=0.0,
+        active=0.0,
+        backing=level,
+        backing_strength=strength,
+    )
+    weight, moment = 2.0 * af.STONE.unit_weight, 0.5 * strength * level**2
     found = af.collapse_factor(
-        wall, live=af.BodyForce(1.0, 0.0), friction=None, fill=replace(fill, backing=level)
+        retaining_wall(), live=af.BodyForce(1.0, 0.0), friction=None, fill=fill
     )
     assert found.factor == pytest.approx((weight * 0.5 + moment) / weight, rel=1e-9)
 
 
-def test_backing_between_two_walls_is_a_strut():
+NO_PRESSURE = Fill(friction_angle=30.0, mobilisation=0.0, active=0.0)
+
+
+@pytest.mark.parametrize("fill", [replace(NO_PRESSURE, backing=1.5), Fill(friction_angle=30.0)])
+def test_backing_or_fill_between_two_walls_is_a_strut(fill):
     """Both turn about their toes at once: the sum of the weights' moments over that of the push."""
-    structure = two_walls()
-    fill = Fill(friction_angle=35.0, mobilisation=0.0, active=0.0, backing=1.5)
-    found = af.collapse_factor(structure, live=af.BodyForce(1.0, 0.0), friction=None, fill=fill)
+    found = af.collapse_factor(two_walls(), live=af.BodyForce(1.0), friction=None, fill=fill)
     assert found.factor == pytest.approx((2.0 * 0.5 + 4.0 * 1.0) / (2.0 + 4.0), rel=1e-9)
-    pressed = found.soil.where(found.soil.backed, drop=True)
-    height = np.ptp(pressed.y.values, axis=1)
-    thrust = (pressed.toward * pressed.pressure * height).groupby("block").sum()
+    height = np.ptp(found.soil.y.values, axis=1)
+    thrust = (found.soil.toward * found.soil.pressure * height).groupby("block").sum()
     assert thrust[0] == pytest.approx(-thrust[1])
     assert abs(float(thrust[0])) > 0.01 * af.STONE.unit_weight
+
+
+def test_a_fixed_stone_between_two_walls_separates_them():
+    """Active thrust helps to turn the thick one, and the slender one has the passive one."""
+    bare = two_walls()
+    soil, wall = bare.blocks[2], rectangle(0.9, 0.0, 1.1, 2.0, "middle", fixed=True)
+    parts = [rectangle(x, 0.0, x + 0.9, 2.0, f"soil {x}", soil.material) for x in (0.0, 1.1)]
+    structure = af.masonry.assembled(
+        [*bare.blocks[:2], parts[0], wall, parts[1], bare.blocks[3]], af.masonry.SOIL_TO_STONE
+    )
+    fill = Fill(friction_angle=30.0)
+    found = af.collapse_factor(structure, live=af.BodyForce(1.0), friction=None, fill=fill)
+    thrust = 0.5 * soil.material.unit_weight * 2.0**2 / 3.0
+    expected = 1.0 - thrust * 2.0 / 3.0 / (4.0 * af.STONE.unit_weight)
+    assert found.factor == pytest.approx(expected, rel=1e-9)
+
+
+def test_under_a_sloping_road_both_walls_have_the_same_pressure():
+    """At least what the deeper side pushes, at most what the shallower one bears."""
+    blocks = [
+        rectangle(-2.0, -1.0, 6.0, 0.0, "rock", fixed=True),
+        rectangle(-1.0, 0.0, 0.0, 2.0, "low"),
+        af.Block(((0.0, 0.0), (2.0, 0.0), (2.0, 3.0), (0.0, 2.0)), SOIL, "soil", role="other"),
+        rectangle(2.0, 0.0, 4.0, 3.0, "high"),
+    ]
+    structure = af.masonry.assembled(blocks, af.masonry.SOIL_TO_STONE)
+    fill = Fill(friction_angle=30.0, mobilisation=0.5)
+    found = af.collapse_factor(structure, live=af.BodyForce(1.0), friction=None, fill=fill).soil
+    low, high = (found.sel(contact=found.block == number) for number in (1, 3))
+    y = low.y.mean("end").values
+    assert low.sizes["contact"] > 8
+    stress = SOIL.unit_weight * np.array([3.0 - y, 2.0 - y])
+    least, most = stress[0] / 3.0, np.maximum(stress[0] / 3.0, 1.5 * stress[1])
+    for key, expected in (("least", least), ("most", most)):
+        np.testing.assert_allclose(low[key], expected, rtol=0.04)  # at the middle of a piece
+    shared = high.isel(contact=np.argsort(high.y.mean("end").values)[: len(y)])
+    order = np.argsort(y)
+    for key in ("least", "most", "pressure"):
+        np.testing.assert_allclose(low[key][order], shared[key], rtol=1e-9)
 
 
 @pytest.mark.slow

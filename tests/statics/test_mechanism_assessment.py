@@ -5,7 +5,7 @@ from math import atan2, pi, sqrt
 
 import numpy as np
 import pytest
-from backfilled import SOIL, arch_bridge, rectangle, retaining_wall, two_walls
+from backfilled import SOIL, arch_bridge, rectangle, retaining_wall, slender_bridge, two_walls
 
 import archfem as af
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
@@ -346,22 +346,28 @@ def test_a_wall_turns_from_the_fill_behind_it_or_into_it(direction, part, verifi
     )
 
 
-def test_backing_holds_a_wall_against_the_ground_and_not_against_another_wall():
-    """At rest its strength acts up to its level, about the toe: λ W H/2 = W b/2 + S h²/2."""
+def test_backing_holds_a_wall_against_the_ground_and_against_another_wall():
+    """At rest its strength acts about the toe: λ W H/2 = W b/2 + S h²/2; two walls turn at once."""
     level, weight = 0.1, 2.0 * STONE
     fill = af.limit.Fill(friction_angle=30.0, mobilisation=0.0, active=0.0, backing=level)
-    for structure, moment in ((retaining_wall(), 0.5e6 * level**2), (two_walls(), 0.0)):
-        found = af.kinematic_assessment(structure, SPECTRUM, friction=None, fill=fill)
-        expected = 0.5 + moment / weight
+    strut = replace(fill, backing_strength=1e8)
+    for structure, given, expected in (
+        (retaining_wall(), fill, 0.5 + 0.5e6 * level**2 / weight),
+        (two_walls(), strut, (2.0 * 0.5 + 4.0 * 1.0) / 6.0),
+        (two_walls(), af.limit.Fill(friction_angle=30.0), (2.0 * 0.5 + 4.0 * 1.0) / 6.0),
+    ):
+        found = af.kinematic_assessment(structure, SPECTRUM, friction=None, fill=given)
         assert found.path.mechanisms[0].factor == pytest.approx(expected, rel=1e-6)
 
 
 def test_pressures_of_a_fill_are_those_of_limit_analysis():
     """The first factor of a bridge on a fill is the collapse factor, also with a cohesive one."""
-    bridge, fill = arch_bridge(voussoirs=8), af.limit.Fill(friction_angle=35.0, cohesion=2e3)
-    found = af.kinematic_assessment(bridge, SPECTRUM, fill=fill)
-    expected = af.collapse_factor(bridge, live=af.BodyForce(1.0), fill=fill).factor
-    assert found.path.mechanisms[0].factor == pytest.approx(expected, rel=1e-6)
+    fill = af.limit.Fill(friction_angle=35.0, cohesion=2e3)
+    spans = {"left": (8.4, 2.1), "right": (6.0, 1.2)}
+    for bridge in (slender_bridge(**spans), arch_bridge(voussoirs=8)):
+        found = af.kinematic_assessment(bridge, SPECTRUM, fill=fill)
+        expected = af.collapse_factor(bridge, live=af.BodyForce(1.0), fill=fill).factor
+        assert found.path.mechanisms[0].factor == pytest.approx(expected, rel=1e-6)
     bare = af.limit.Fill(friction_angle=35.0, mobilisation=0.0, active=0.0)
     assert expected > 1.05 * af.collapse_factor(bridge, live=af.BodyForce(1.0), fill=bare).factor
     plastic = af.limit.PlasticFill(friction_angle=35.0)
