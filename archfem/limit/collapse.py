@@ -130,7 +130,7 @@ class Collapse(ResultDisplay):
         words = " times the load"
         if isinstance(load, BodyForce) and load.horizontal and not load.vertical:
             unit = abs(load.horizontal)
-            words = f" g of force to the {'right' if load.horizontal > 0.0 else 'left'}"
+            words = f" g, pushed to the {'right' if load.horizontal > 0.0 else 'left'}"
         elif points and len(points) == len(self.live):
             sizes = join_names([f"{np.hypot(*point.force) / kN:.4g}" for point in points])
             places = join_names([f"{point.x:.4g}" for point in points])

@@ -67,7 +67,7 @@ def test_limit_analysis_in_words(ring):
     pushed = af.collapse_factor(ring, live=af.BodyForce(1.0))
     limit = parse_limit({"strength": 2e6, "fill": {"friction_angle": 35}})
     outcome, hinges, crushing, fill = describe_collapse(ring, pushed, limit).splitlines()
-    assert outcome.endswith(f"into a mechanism, at {pushed.factor:.4g} g of force to the right")
+    assert outcome.endswith(f"into a mechanism, at {pushed.factor:.4g} g, pushed to the right")
     assert hinges.startswith("hinges, by the face in contact: joint 0 at the intrados; joint 6 at")
     assert crushing == "joints crush at 2 MPa, the strength of the stones"
     assert "at most 0.33 of the passive pressure, friction angle 35°, cohesion 0 kPa" in fill

@@ -405,7 +405,7 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     assert af.commands.main(["run", str(path), "--out", str(out)]) == 0
     said = capsys.readouterr().out
     found = af.collapse_factor(ring, live=af.BodyForce(1.0, 0.0))
-    assert f"at {found.factor:.4g} g of force to the right" in said
+    assert f"at {found.factor:.4g} g, pushed to the right" in said
     assert all(f"joint {number} at the {side}" in said for number, side in found.hinges)
     assert (out / "limit.txt").read_text() in said
     assert (out / "collapse.png").is_file()
@@ -413,7 +413,7 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     assert "in the other sense: " in said
     assert af.commands.main(["check", str(path)]) == 0
     said = capsys.readouterr().out
-    assert f"at {found.factor:.4g} g of force to the right" in said
+    assert f"at {found.factor:.4g} g, pushed to the right" in said
     assert "in the other sense: " in said
     # the case alone, in the same folder: its files replace those of the run
     assert af.commands.main(["limit", str(path), "--out", str(out)]) == 0
@@ -422,8 +422,8 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     assert joints["N"].to_numpy() == pytest.approx(found.joints["N"].values, rel=1e-9)
     assert af.commands.main(["limit", str(path), "--set", "limit.horizontal=0.5"]) == 0
     said = capsys.readouterr().out
-    assert f"at {found.factor:.4g} g of force to the right" in said
-    other = f"{found.outcome.sentence}, at {found.factor:.4g} g of force to the left"
+    assert f"at {found.factor:.4g} g, pushed to the right" in said
+    other = f"{found.outcome.sentence}, at {found.factor:.4g} g, pushed to the left"
     assert f"in the other sense: {other}" in said
     assert "(the same)" in said
     assert af.commands.main(["limit", str(path), "--set", "limit.vertical=-1"]) == 0

@@ -239,7 +239,7 @@ def test_a_rough_wall_fails_by_a_wedge_above_a_stepped_crack(friction):
     assert found.solutions.bracket[1] > 1.05 * wedge
     assert not found.solutions.jumps
     assert "no lower bound is known" in str(found.solutions)
-    assert f"at ≤ {found.factor:.4g} g of force to the right (least found)" in found.sentence
+    assert f"at ≤ {found.factor:.4g} g, pushed to the right (least found)" in found.sentence
 
 
 def test_a_wedge_that_is_lost_is_doubted(monkeypatch, caplog):
