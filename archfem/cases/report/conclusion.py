@@ -127,8 +127,7 @@ def build_conclusion(data: ReportData) -> Section:
         head = ("", "demand", "capacity or outcome", "factor")
         factors = _FACTORS if any(row[3] != "-" for row in rows) else ""
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
-    texts = [describe_what_is_not_varied(data), *_list_absent(data)]
-    blocks += map(TextBlock, filter(None, texts))
+    blocks += map(TextBlock, _list_absent(data))
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
 
 
@@ -173,8 +172,9 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
         found = data.verdict_range.sentence.partition("; of ")[0]
         changes.append(f"variations of its properties ({found})")
     changes += [f"the doubts given below, on {join_names(doubtful)}"] if doubtful else []
-    single = list_single(data)
+    single = list_unvaried(data)
     changes += [f"what was not varied: {', '.join(single)}"] if single else []
+    lead += ["the checks of the numbers raise no doubt"] if data.runs and not doubtful else []
     lead += [f"what may change this: {'; '.join(changes)}"] if changes else []
     return " ".join(map(sentence, lead))
 
@@ -330,8 +330,8 @@ def list_elastic_fill(data: ReportData) -> list[str]:
     return list(dict.fromkeys(block.material.name for block in bodies))
 
 
-def list_single(data: ReportData) -> list[str]:
-    """Return what was not varied; nothing without a run."""
+def list_unvaried(data: ReportData) -> list[str]:
+    """Return what was not varied, without which "no doubt" says little; nothing without a run."""
     if not data.runs:
         return []
     single = ["one motion"] if len(data.runs) == 1 else []
@@ -340,24 +340,8 @@ def list_single(data: ReportData) -> list[str]:
     predicted = all("predicted_error" in run.dataset.attrs for run in data.runs.values())
     if not predicted and "accuracy.txt" not in data.files:
         single.append("one model" if "dt" in list_varied(data) else "one model and time step")
-    return single
-
-
-def describe_what_is_not_varied(data: ReportData) -> str:
-    """Say what was not varied, without which "no doubts" says little; "" without a run."""
-    if not data.runs:
-        return ""
-    single = list_single(data)
-    doubts = "" if list_doubts(data) else "The checks of the numbers raise no doubt. "
-    if not single:
-        return doubts.strip()
     # the samples of a rate were scaled until they fell
-    scaled = {"scale", "risk"} & data.statements.keys()
-    scale = "" if scaled else ", nor by how much the motion may be scaled"
-    return (
-        f"{doubts}Not varied: {', '.join(single)}. What another choice of these would change was "
-        f"not computed{scale}."
-    )
+    return single if {"scale", "risk"} & data.statements.keys() else [*single, "size of motions"]
 
 
 def sentence(text: str) -> str:
