@@ -188,7 +188,8 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert facts["in doubt"] == "limit analysis, kinematic assessment"
     assert facts["verdict"] == "no mechanism in 2 of 2 runs"
     alone = report_data.ReportData(case, {}, found.folder)
-    outcomes = "it turns, factor 4.8; passes without all, factor 1.25; 8.212 m/s², factor 2.89; "
+    outcomes = "the given load: it turns, at 4.8 times the load, factor 4.8; LM1: passes without "
+    outcomes += "all, factor 1.25; 2.844 m/s² of the motion: 8.212 m/s², passes, factor 2.89; "
     assert dict(list_facts(alone))["verdict"].startswith(outcomes)
     assert signatures.rows == [("author", "A. Mason", "", ""), ("checked by", "", "", "")]
 

@@ -69,7 +69,11 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     doubts = [("in doubt", ", ".join(doubtful))] if doubtful else []
     if not runs:
         rows = (row for _, row in _capacity_rows(data) if row[3] != "-")
-        factors = [f"{outcome.partition(',')[0]}, factor {each}" for *_, outcome, each in rows]
+        # the place of a vehicle is in the conclusion
+        factors = [
+            f"{demand}: {outcome.partition(', with')[0]}, factor {factor}"
+            for _, demand, outcome, factor in rows
+        ]
         return [*signed, *([("verdict", "; ".join(factors))] if factors else []), *doubts, *blocks]
     pga = max(map(_peak_of_ground, runs))
     joints = [assessed_joints(run.joints) for run in runs]

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from csv import reader
 from dataclasses import replace
 from hashlib import sha256
-from itertools import count
 from typing import Any
 
 import numpy as np
@@ -216,10 +215,11 @@ def build_dead_load_sections(data: ReportData) -> list[Section]:
 def _build_rating(data: ReportData) -> list[Any]:
     """Build text and picture of a rating, below the table of several vehicles."""
     caption = "(a) Factor along the bridge, and (b) mechanism at the worst place."
-    text, *figures = data.read_result("rating", caption) or [None]
-    if (table := data.read_text("vehicles.csv")) is None or text is None:
-        return [text, *figures] if text else []
+    blocks = data.read_result("rating", caption)
+    if (table := data.read_text("vehicles.csv")) is None:
+        return blocks
     # the text begins with the same table, and the picture is of the worst vehicle
+    text, *figures = blocks
     _, worst, *others = text.text.split("\n\n")
     head, *rows = reader(table.splitlines())
     grid = Grid(head, rows, "Factors of several vehicles, the worst first", "words")
@@ -382,10 +382,11 @@ def _build_envelopes(data: ReportData) -> list[FigureBlock]:
     """Draw the envelopes of all runs."""
     caption = "Least and largest eccentricity of each joint; dotted under dead load"
     figures = draw_envelopes(data.runs, data.dead)
-    if len(figures) == 1:
-        return [FigureBlock.of(figures[0], caption)]
-    parts = (f"{caption}; part {k + 1} of {len(figures)} of the motions" for k in count())
-    return [FigureBlock.of(*each) for each in zip(figures, parts, strict=False)]
+    part = f"; part {{}} of {len(figures)} of the motions" if len(figures) > 1 else ""
+    return [
+        FigureBlock.of(figure, f"{caption}{part.format(number)}")
+        for number, figure in enumerate(figures, start=1)
+    ]
 
 
 def _tabulate_joints(data: ReportData, run: History, label: str = "") -> Grid:
