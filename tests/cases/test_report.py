@@ -188,6 +188,8 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert facts["in doubt"] == "limit analysis, kinematic assessment"
     assert facts["verdict"] == "no mechanism in 2 of 2 runs"
     alone = report_data.ReportData(case, {}, found.folder)
+    lead = build_conclusion(alone).pieces[0].text
+    assert lead.startswith("For 0.25 g, 475 years: its least margin is 0.5: it passes a code")
     outcomes = "the given load: it turns, at 4.8 times the load, factor 4.8; LM1: passes without "
     outcomes += "all, factor 1.25; 2.844 m/s² of the motion: 8.212 m/s², passes, factor 2.89; "
     assert dict(list_facts(alone))["verdict"].startswith(outcomes)

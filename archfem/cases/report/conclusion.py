@@ -163,14 +163,14 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
         return f"The demand, as stated: {sentence(demand)}" if demand else ""
     stated = [demand] if demand else []
     stated += [f"motions of {demand}" for name, demand, *_ in rows if name == _HISTORIES]
-    lead = ["; it ".join(_describe_outcomes(data))] if data.runs else []
-    lead = [f"for {' and '.join(stated)}: the structure {text}" for text in lead]
+    lead = [f"the structure {'; it '.join(_describe_outcomes(data))}"] if data.runs else []
     if checks:
         factor, (check, *_) = min(checks)
         lead.append(
             f"its least margin is {factor:g}: it passes {check.partition(': ')[2]}, up to "
             f"{factor:g} times {name_spectrum(data)}{'' if factor >= 1.0 else ', and so fails'}"
         )
+    lead[0] = f"for {' and '.join(stated)}: {lead[0]}" if stated else lead[0]
     changes = []
     if data.verdict_range is not None:
         found = data.verdict_range.sentence.partition("; of ")[0]
