@@ -5,6 +5,7 @@ from itertools import groupby
 from math import inf
 from typing import NamedTuple
 
+from archfem._validation import declared_keys
 from archfem.cases.case import Case
 from archfem.cases.toml_file import Table, format_key
 from archfem.masonry.joint_closing import FINISHED_KEYS, finish_range
@@ -40,6 +41,10 @@ def value_text(section: str, key: str, value: float | None) -> str:
     return f"{value / unit:.4g}{name}"
 
 
+# Values of a fill on which factors depend most
+_DECIDING_OF_FILL = ("cohesion", "mobilisation", "active")
+
+
 class Default(NamedTuple):
     """A value that a case does not give."""
 
@@ -57,6 +62,20 @@ def list_default_keys(case: Case, item: Material | Contact) -> list[str]:
     if "finish" in given:
         given = dict.fromkeys((*given, *FINISHED_KEYS))
     return [key for key in keys if key not in given and getattr(item, key) is not None]
+
+
+def list_fill_values(case: Case) -> Iterator[tuple[str, str, bool]]:
+    """Yield path, value, and whether the case gives it, of each value of a fill's strength."""
+    fills = {"limit": case.limit.fill, "assessment": case.assessment.options.get("fill")}
+    for section, fill in fills.items():
+        # an assessment may have the fill of the limit analysis
+        if (given := case.settings.get(section, {}).get("fill")) is None:
+            continue
+        for key, unit in {"law": "", **declared_keys(type(fill))}.items():
+            value = getattr(fill, key, given.get("law", "pressure"))  # the law is a class
+            number = isinstance(value, float)
+            text = f"{value:.3g} {unit}".removesuffix(" 1") if number else str(value).lower()
+            yield f"{section}.fill.{key}", text, key in given
 
 
 def list_defaults(case: Case) -> list[Default]:
@@ -95,6 +114,11 @@ def _list_settings(case: Case) -> Iterator[Default]:
     if "failures" not in given:
         words, reason = f"mechanism of {criteria.failures} joints", "Heyman (1966): four hinges"
         yield Default("", words, "criteria.failures", reason)
+    for path, text, is_given in list_fill_values(case):
+        subject, _, key = path.rpartition(".")
+        if key in _DECIDING_OF_FILL and not is_given:
+            words = f"{key.replace('_', ' ')} {text}"
+            yield Default(subject, words, path, "limit analyses and ratings depend on it")
     reasons = {
         "fidelity": 'elastic blocks, all nodes; "rigid" is quicker, and blocks have no mesh',
         "displacements": 'equilibrium where the blocks stood; "large" follows slips and falls',

@@ -267,15 +267,6 @@ def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
     return ResultTable([*head, "outcome, and axles at the worst place"], rows)
 
 
-def describe_limit(case: Case, collapse: Collapse) -> str:
-    """Describe the result of limit analysis, and that of a horizontal load in the other sense."""
-    text = describe_collapse(case.structure, collapse, case.limit)
-    if collapse.outcome is Outcome.INFEASIBLE:  # the load, in either sense, plays no part
-        return text
-    opposite = case.limit.solve_opposite(case.structure)
-    return text if opposite is None else f"{text}\n{describe_opposite(collapse, opposite)}"
-
-
 def _slides_alone(structure: Structure, collapse: Collapse) -> bool:
     """Return whether a wall slides at the friction of all its joints, pushed by its weight."""
     loads = [load for load in collapse.live if isinstance(load, BodyForce) and not load.vertical]
@@ -285,12 +276,20 @@ def _slides_alone(structure: Structure, collapse: Collapse) -> bool:
     return bool(structure.heads.any() and np.allclose(structure.friction, push, rtol=1e-3))
 
 
-def describe_opposite(collapse: Collapse, opposite: Collapse) -> str:
-    """Describe the result of the same load in the other sense, and which of both is less."""
-    rank = "less" if opposite.factor < collapse.factor else "not less"
-    if np.isclose(opposite.factor, collapse.factor, rtol=1e-4):
+def describe_limit(case: Case, found: Collapse) -> tuple[Collapse, str]:
+    """Return the lesser result of a horizontal load in both senses, and the text on both."""
+    opposite = None
+    if found.outcome is not Outcome.INFEASIBLE:  # where the load, in either sense, plays no part
+        opposite = case.limit.solve_opposite(case.structure)
+    if opposite is None:
+        return found, describe_collapse(case.structure, found, case.limit)
+    rank = "not less"
+    if np.isclose(opposite.factor, found.factor, rtol=1e-4):
         rank = "the same"
-    return f"in the other sense: {opposite.sentence} ({rank})"
+    elif opposite.factor < found.factor:
+        found, opposite = opposite, found
+    text = describe_collapse(case.structure, found, case.limit)
+    return found, f"{text}\nin the other sense: {opposite.sentence} ({rank})"
 
 
 def describe_pushover(push: Pushover) -> str:
@@ -428,12 +427,15 @@ def state_assessments(found: Mapping[str, KinematicAssessment], doubts: list[str
 
 def state_risk(found: Any) -> Statement:  # of `archfem.studies`, a room to the right
     """State the annual rate, the hazard by its return periods, and the median of the falls."""
-    hazard, median = found.hazard, found.fragility().median
+    hazard, median, rate = found.hazard, found.fragility().median, found.rate()
     name, unit = hazard.measure.upper().replace("_AVG", ", mean,"), MEASURES[hazard.measure]
     years = 1.0 / hazard.rate if len(hazard.rate) <= 4 else np.array([DESIGN_PERIOD])
     sizes = hazard.intensity_of(years)
     listed = ", ".join(f"{value:.3g}" for value in sizes)
     demand = f"{name} {listed} {unit} once in {', '.join(f'{each:.4g}' for each in years)} years"
-    outcome = f"median {name} {median:.3g} {unit}, falls at {found.rate().rate:.2g} a year"
-    row = "annual rate", demand, outcome, ", ".join(f"{median / value:.3g}" for value in sizes)
-    return Statement([f"the structure {found.sentence}"], [row], list(map(str, found.doubts)))
+    outcome = f"median {name} {median:.3g} {unit}, falls at {rate.rate:.2g} a year"
+    factors = zip(sizes, years, strict=True)
+    factor = ", ".join(f"{median / size:.3g} on {each:.4g} years" for size, each in factors)
+    text = f"the structure falls at {rate}; in half of the cases from {median:.3g} {unit} of {name}"
+    row = "annual rate", demand, outcome, factor
+    return Statement([text], [row], list(map(str, found.doubts)))

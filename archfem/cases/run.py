@@ -24,6 +24,7 @@ from archfem._display import call_late_bound
 from archfem._netcdf import read_dataset
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
+from archfem.cases.structure_keys import read_survey
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.history import Ending, History, partial_history
@@ -40,6 +41,7 @@ from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium, dead_load_doubts
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use
+from archfem.units import format_mm
 
 if TYPE_CHECKING:
     from archfem.view.pages.player import Player
@@ -47,6 +49,7 @@ if TYPE_CHECKING:
 
 # Names of files in a result folder.
 CASE_FILE = "case.toml"
+DRAWING_FILE = "drawing.txt"  # file of the blocks, its unit, and how far corners were moved
 RATING_FILE = "rating.toml"  # [rating] as `archfem rate` took it
 HISTORY_FILE = "history.nc"
 
@@ -520,9 +523,21 @@ def _start_draft(case: Case, folder: Path, inputs: str) -> Path:
             known = listed is not None and listed.inputs == inputs and name in listed.files
             if known or _is_of(path, case.alone(pair)):
                 link_file(path, draft / name)
-    with _files.atomic_write(draft / CASE_FILE) as part:
-        part.write_text(case.text(), encoding="utf-8")
+    for name, text in case_files(case).items():
+        with _files.atomic_write(draft / name) as part:
+            part.write_text(f"{text}\n", encoding="utf-8")
     return draft
+
+
+def case_files(case: Case) -> dict[str, str]:
+    """Return the case, and what was read from its drawing, whose blocks the case has."""
+    files = {CASE_FILE: case.text().rstrip("\n")}
+    if (survey := read_survey(case.settings, case.folder)) is not None:
+        table = case.settings["structure"]
+        snap = table.get("snap", 1e-3)
+        within = snap if isinstance(snap, str) else format_mm(snap)
+        files[DRAWING_FILE] = f"{table['file']}, snap {within}; {survey}"
+    return files
 
 
 def _is_of(path: Path, case: Case) -> bool:

@@ -30,12 +30,12 @@ from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults
 from archfem.cases.result_text import state_ratings
 from archfem.cases.run import (
-    CASE_FILE,
     RATING_FILE,
     DeadLoadResult,
     Result,
     Run,
     carry_out,
+    case_files,
     replace_run,
 )
 from archfem.cases.structure_keys import read_survey
@@ -139,7 +139,7 @@ def _replace_files(command: str, case: Case, out: str | None, draw: Callable[[],
     with _replace_results(command, case, folder) as draft:
         files = draw()
         if not has_run:  # which has the case of the folder
-            files = {CASE_FILE: case.text().rstrip("\n"), **files}
+            files = {**case_files(case), **files}
         write(files, draft)
 
 
@@ -191,8 +191,7 @@ def limit(options: argparse.Namespace) -> int:
     """Find the collapse factor of the loads in [limit], and the mechanism."""
     case = Case.read(options.case, options.changes)
     with _record_doubts(case.structure) as doubts:
-        found = case.limit.solve(case.structure)
-        text = result_text.describe_limit(case, found)
+        found, text = result_text.describe_limit(case, case.limit.solve(case.structure))
     doubts = [*dict.fromkeys(doubts)]  # the other sense may have the same
     text = "\n".join([text, *doubts])
     files = partial(results.limit_files, found, text, doubts)
@@ -488,11 +487,11 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
         supports = len(doubts)
         for result in found:
             if isinstance(result, Collapse):
-                text = result_text.describe_limit(case, result)
+                least, text = result_text.describe_limit(case, result)
                 of_limit = [*dict.fromkeys(doubts)]
                 text = "\n".join([text, *of_limit])
                 print(text)
-                write(results.limit_files(result, text, of_limit), folder)
+                write(results.limit_files(least, text, of_limit), folder)
             elif isinstance(result, DeadLoadResult):
                 at_rest = result
                 print(result_text.describe_dead_load(at_rest))

@@ -39,7 +39,7 @@ def check(options: argparse.Namespace) -> int:
     print(result_text.describe_supports(case.structure))
     print(result_text.describe_depths(case.structure))
     if case.limit.live:
-        print(result_text.describe_limit(case, case.limit.solve(case.structure)))
+        print(result_text.describe_limit(case, case.limit.solve(case.structure))[1])
     # Unreadable records are errors before the dead load is computed.
     case.check_ground()
     at_rest = DeadLoadResult.of(case)

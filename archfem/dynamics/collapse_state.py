@@ -182,8 +182,8 @@ def describe_dislocation(structure: Structure) -> str:
     """Return beyond which residual displacement a structure is dislocated, and by which part."""
     depth, part = shallowest_part(structure)
     return (
-        f"dislocated beyond {format_mm(DISLOCATION * depth)} of residual displacement, a tenth of "
-        f"the median depth of the joints of {part or 'the ring'}"
+        f"would count as dislocated beyond {format_mm(DISLOCATION * depth)} of residual "
+        f"displacement, a tenth of the median depth of the joints of {part or 'the ring'}"
     )
 
 

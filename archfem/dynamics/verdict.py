@@ -230,14 +230,16 @@ def extremes_remark(dataset: xr.Dataset) -> list[str]:
     if "rotation" not in dataset:
         return []
     # rotations of joints while they hinge, slips of all joints, both of rings and piers
-    joints = assessed_joints(dataset[["rotation", "slip", "hinge"]]).transpose("time", "joint")
+    names = ["rotation", "slip", "hinge", "slide"]
+    joints = assessed_joints(dataset[names]).transpose("time", "joint")
     rotations, slips = (np.abs(joints[name].values) for name in ("rotation", "slip"))
     rotations = np.where(joints["hinge"].values != 0, rotations, 0.0)
     if rotations.max() > 0.0:
         rotation = f"largest hinge rotation {_peak_text(joints, rotations, 1e-3, 'mrad')}"
     else:
         rotation = f"no{_assessed_word(dataset)} joint hinges"
-    return [f"{rotation}, largest slip {_peak_text(joints, slips, mm, 'mm')}"]
+    slip = "slip" if joints["slide"].any() else "elastic slip"
+    return [f"{rotation}, largest {slip} {_peak_text(joints, slips, mm, 'mm')}"]
 
 
 def _peak_text(joints: xr.Dataset, values: Array, unit: float, name: str) -> str:

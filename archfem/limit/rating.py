@@ -226,10 +226,12 @@ class Rating(ResultDisplay):
         least = f"{self.without_pressure:.4g}"
         if np.isnan(self.without_pressure):
             least = "none, as the bridge does not stand,"
+        part = f"up to {self.fill.mobilisation:.2g} of the passive one"
+        if self.fill.mobilisation == Fill.mobilisation:
+            part = "up to a third of the passive one (default)"
         return [
-            f"over the pressure of the fill, at that place: {least} without it, "
-            f"{self.factor:.4g} with up to {self.fill.mobilisation:.2g} of the passive one, "
-            f"{self.full_pressure:.4g} with all of it"
+            f"over the pressure of the fill, at that place: {least} without it, {self.factor:.4g} "
+            f"with {part}, {self.full_pressure:.4g} with all of it"
         ]
 
     def _describe_backing(self) -> list[str]:

@@ -94,6 +94,22 @@ def _european_branches(
 class CodeSpectrum:
     """Elastic spectra of a code, which all have the same branches."""
 
+    _corner_names: ClassVar[Sequence[str]] = ("T_B", "T_C", "T_D")
+
+    def describe(self) -> str:
+        """Return peak, plateau and corner periods of both spectra, in one line."""
+        texts = []
+        for name, own in zip(("horizontal", "vertical"), self._branches(), strict=True):
+            if own is not None:
+                peak, ground = own.level * own.lowest, getattr(self, "ag", None)
+                corners = zip(self._corner_names, own.corners, strict=True)
+                texts.append(
+                    f"{name}: PGA {peak:.3g} g{f' = {peak / ground:.3g} ag' if ground else ''}, "
+                    f"plateau {own.level:.3g} g, "
+                    f"{', '.join(f'{corner} {period:.3g} s' for corner, period in corners)}"
+                )
+        return "; ".join(texts)
+
     def _branches(self) -> tuple[SpectrumBranches, SpectrumBranches | None]:
         """Return the horizontal spectrum, and the vertical one unless points have to give it."""
         raise NotImplementedError
@@ -151,6 +167,8 @@ class Tbec2018(CodeSpectrum):
         >>> code.horizontal([0.0, 0.5, 1.0]).round(3).tolist()
         [0.476, 1.19, 0.625]
     """
+
+    _corner_names: ClassVar[Sequence[str]] = ("T_A", "T_B", "T_L")
 
     # Site factors of TBEC-2018, table 2.1: linear between the columns, constant outside
     _short_period_factors: ClassVar = {
@@ -430,6 +448,8 @@ class Asce2022(CodeSpectrum):
     References:
         ASCE/SEI 7-22 (2022), sections 11.4.4 and 11.4.5.2.
     """
+
+    _corner_names: ClassVar[Sequence[str]] = ("T_0", "T_S", "T_L")
 
     sds: float
     sd1: float

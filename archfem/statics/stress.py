@@ -233,7 +233,8 @@ def utilisation_text(structure: Structure, joints: xr.Dataset) -> str:
         return "no use of strength is known: all joints hinge or are open, or no strength is given"
     return (
         f"largest compression at the edge of a joint that does not hinge: {stress:.3f} MPa, "
-        f"{largest:.2%} of strength, in {found['name'].values} at {float(found['time']):.3f} s"
+        f"{largest:.2%} of strength {stress / largest:.3g} MPa, in {found['name'].values} at "
+        f"{float(found['time']):.3f} s"
     )
 
 

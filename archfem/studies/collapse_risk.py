@@ -614,6 +614,8 @@ class CollapseRisk(ResultDisplay):
     def disaggregation(self, bins: int = 12) -> tuple[Array, Array]:
         """Return the edges of bins of intensity (bins + 1,), and the share of the rate in each.
 
+        What is left of the rate lies above the last edge, where all structures fall.
+
         Args:
             bins: number of bins.
         """
@@ -626,14 +628,14 @@ class CollapseRisk(ResultDisplay):
             mean, deviation = self._fits(every, group)
             falls += group.mean() * ndtr((middle - mean) / deviation)
         shares = falls * -np.diff(self.hazard.rate_of(edges))
-        return edges, shares / shares.sum()
+        return edges, shares / (shares.sum() + self.hazard.rate_of(edges[-1]))
 
     @property
     def doubts(self) -> tuple[Doubt, ...]:
         """Reasons why the rate may be wrong, each with its remedy."""
         last, unit = self.hazard.intensity[-1], MEASURES[self.hazard.measure]
         edges, shares = self.disaggregation(240)
-        beyond = float(shares[edges[:-1] > last].sum())
+        beyond = 1.0 - float(shares[edges[:-1] <= last].sum())
         doubts = [*read_doubts(self.dataset.attrs.get("doubts", "[]"))]
         if beyond > LARGEST_EXTRAPOLATED_SHARE:
             cause = (
@@ -663,7 +665,8 @@ class CollapseRisk(ResultDisplay):
             f"{self.best_measure} has the least dispersion; "
             f"{len(self.answered)} samples under {records} records"
         )
-        return text + (f"; {failed} samples have no answer" if failed else "")
+        have = "sample has" if failed == 1 else "samples have"
+        return text + (f"; {failed} {have} no answer" if failed else "")
 
     def table(self) -> str:
         """Return a line for each alternative: samples, rate, interval, probability in 50 years."""

@@ -222,6 +222,7 @@ def _draw_factors(
         upper.plot([found.position], [worst.factor], "o", label="worst place", **style)
         upper.set_ylim(0.0, top)
     style_axes(upper, "middle of the vehicle, x [m]", "factor [-]")
+    upper.tick_params(labelbottom=True)
     set_title(upper, title)
     upper.legend(frameon=False, fontsize=Size.LABEL)
     draw_structure(structure, axes=lower)
@@ -284,7 +285,7 @@ def _draw_displaced_mechanism(axes: Axes, found: KinematicAssessment) -> None:
     rest = np.zeros((len(structure.blocks), 3))
     _mark_hinges(axes, structure, found, rest, {"label": "hinge at rest", "ms": 6.5})
     _mark_sliding(axes, structure, found.sliding)
-    set_title(axes, f"{structure.name}: alpha_0 = {found.alpha_0:.3f}, e* = {found.e_star:.2f}")
+    set_title(axes, f"alpha_0 = {found.alpha_0:.3f}, e* = {found.e_star:.2f}")
 
 
 def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:

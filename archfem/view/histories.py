@@ -120,7 +120,9 @@ def _draw_state(
 
 def draw_envelopes(runs: Mapping[str, History], dead: xr.Dataset | None) -> list[Figure]:
     """Draw the envelopes of any number of runs, in as many figures as line styles require."""
-    pairs, count = list(runs.items()), len(Colour.LINES)
+    # of about equal numbers: the last run is not alone in a figure
+    number = -(-len(runs) // len(Colour.LINES)) or 1
+    pairs, count = list(runs.items()), -(-len(runs) // number)
     groups = [dict(pairs[first : first + count]) for first in range(0, len(pairs), count)]
     return [draw_envelope(group, dead=dead) for group in groups]
 

@@ -486,7 +486,7 @@ def draw_collapse_risk(risk: RiskCurves) -> Figure:
     third.bar(edges[:-1], shares, np.diff(edges), align="edge", color=Colour.LINES[2], lw=0.0)
     for axes, title in zip((first, second, third), ("fragility", "hazard", "rate"), strict=True):
         set_title(axes, title)
-    set_figure_title(figure, risk.sentence)
+    set_figure_title(figure, risk.sentence.partition(";")[0])
     return figure
 
 

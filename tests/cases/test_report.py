@@ -23,6 +23,7 @@ from archfem.cases.report import conclusion, report, report_data
 from archfem.cases.report.conclusion import build_conclusion, list_facts
 from archfem.cases.report.inputs import tabulate_inputs
 from archfem.cases.report.sections import (
+    _build_rating,
     build_input_section,
     build_joint_section,
     supported_weight_ratio,
@@ -92,7 +93,8 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert (
         "For motions of PGA 0.05 g: the structure forms no mechanism under all 2 motions." in words
     )
-    assert "Not varied: one set of properties, one model and time step." in words
+    assert "The checks of the numbers raise no doubt. What may change this: what was not" in words
+    assert "not varied: one set of properties, one model and time step, size of motions." in words
     assert "another case" not in words
     case = af.Case.read(kept / "case.toml")
     assert sha256(case.text().encode()).hexdigest() in words
@@ -146,12 +148,16 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert assumed["joints"].endswith("crushing in limit analysis alone, at 20 MPa")
     (table,) = (each for each in sentences if each.kind == "grid")
     assert table.rows == [
-        ("as stated", "0.25 g, 475 years", "-", "-"),
         ("time histories", "PGA 0.05 g", "no mechanism in 2 of 2 runs", "-"),
         ("limit analysis", "the given load", "it turns, at 4.8 times the load (in doubt)", "4.8"),
         ("rating", "LM1", "passes without all, with 2 axles at -0.1, 1.1 m", "1.25"),
         *(
-            (f"assessment: {name}, right and left", demand, f"{capacity} (in doubt)", factor)
+            (
+                f"assessment: {name}, right and left",
+                f"{demand} of the motion",
+                f"{capacity} (in doubt)",
+                factor,
+            )
             for name, demand, capacity, factor in (
                 ("linear, q = 2, FC = 1.35", "2.844 m/s²", "8.212 m/s², passes", "2.89"),
                 ("a code", "0.22 m", "0.11 m, fails", "0.5"),
@@ -161,15 +167,16 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
             "annual rate",
             "PGA 3, 8 m/s² once in 475, 2475 years",
             "median PGA 6 m/s², falls at 0.002 a year",
-            "2, 0.75",
+            "2 on 475 years, 0.75 on 2475 years",
         ),
     ]
     texts = [each.text for each in sentences if each.kind == "words"]
     assert texts[0] == (
         "For 0.25 g, 475 years and motions of PGA 0.05 g: the structure forms no mechanism under "
-        "all 2 motions. It fails with a least margin of 0.5 on the spectrum, by assessment: a "
-        "code, right and left. In doubt, for reasons given below: limit analysis, kinematic "
-        "assessment."
+        "all 2 motions. Its least margin is 0.5: it passes a code, right and left, up to 0.5 "
+        "times the motion, and so fails. What may change this: the doubts "
+        "given below, on limit analysis, kinematic assessment; what was not varied: one set of "
+        "properties, one model and time step."
     )
     # each doubt follows the sentence of its result
     (limit,) = (k for k, text in enumerate(texts) if text.startswith("Limit analysis"))
@@ -177,8 +184,38 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     (checks,) = (k for k, text in enumerate(texts) if text.startswith("Kinematic assessment"))
     assert "right and left: a code: capacity 0.11 m" in texts[checks]
     assert texts[checks + 1] == "In doubt: an upper bound."
-    assert dict(list_facts(data))["in doubt"] == "limit analysis, kinematic assessment"
+    facts = dict(list_facts(data))
+    assert facts["in doubt"] == "limit analysis, kinematic assessment"
+    assert facts["verdict"] == "no mechanism in 2 of 2 runs"
+    alone = report_data.ReportData(case, {}, found.folder)
+    lead = build_conclusion(alone).pieces[0].text
+    assert lead.startswith("For 0.25 g, 475 years: its least margin is 0.5: it passes a code")
+    outcomes = "the given load: it turns, at 4.8 times the load, factor 4.8; LM1: passes without "
+    outcomes += "all, factor 1.25; 2.844 m/s² of the motion: 8.212 m/s², passes, factor 2.89; "
+    assert dict(list_facts(alone))["verdict"].startswith(outcomes)
     assert signatures.rows == [("author", "A. Mason", "", ""), ("checked by", "", "", "")]
+
+
+@pytest.mark.parametrize(("ag", "doubted"), [(0.03, True), (0.045, False)])
+def test_a_margin_names_its_spectrum_which_may_be_another_demand(kept, undrawn, ag, doubted):
+    """Motions of PGA 0.05 g beside spectra of 1.15 a_g."""
+    write_stated(kept, af.Hazard.power(0.02116, 3.0))
+    found = af.cases.open_results(kept)
+    tables = {**found.case.settings}
+    tables["assessment"] = {"spectrum": {"code": "EC8", "ag": ag, "ground": "C"}}
+    data = report_data.ReportData(af.Case.of(tables), found.runs, found.folder)
+    pieces = build_conclusion(data).pieces
+    (table,) = (each for each in pieces[:-1] if each.kind == "grid")
+    spectrum = f"the EC8 spectrum of PGA {1.15 * ag:.3g} g"
+    demands = [row[1] for row in table.rows if row[0].startswith("assessment")]
+    assert demands == [f"{own} of {spectrum}" for own in ("2.844 m/s²", "0.22 m")]
+    assert f"it passes a code, right and left, up to 0.5 times {spectrum}," in pieces[0].text
+    assert "In doubt: the check is one of NTC, which was not made for a spectrum of EC8." in [
+        getattr(each, "text", "") for each in pieces
+    ]
+    words = f"In doubt: the spectrum has a PGA of {1.15 * ag:.3g} g, and the motions have 0.05"
+    texts = [each.text for each in pieces if each.kind == "words"]
+    assert any(text.startswith(words) for text in texts) == doubted
 
 
 def test_a_rate_is_stated_beside_the_hazard_at_its_return_periods():
@@ -271,7 +308,7 @@ def test_a_run_in_memory_has_a_report_and_a_player(small, unplotted, undoubted, 
     case = af.Case.read(small, ["analysis.damping={ratio=0.05, frequency=5.0}"])
     *_, run = af.cases.run_case(case, pairs=["first"])
     words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
-    assert "5 % of critical, joints closed" in words
+    assert "damping 5 % of critical given damping, joints closed default" in " ".join(words.split())
     assert "5 Hz, proportional to stiffness" in words
     assert "contains no displacements" in run.player().scene.data["note"]
     assert "Ground motions" not in words
@@ -383,6 +420,7 @@ def test_results_need_no_drawing_beside_them(name, unplotted, undoubted, tmp_pat
     with replace_run(case, tmp_path / "out") as draft:
         list(carry_out(case, draft))
     defaults = describe_defaults(case)
+    moved = "pier.geojson, snap 1 mm; drawing: 0.8 × 1.74 m, read in m, corners moved by up to 0 m"
     shutil.rmtree(drawing.parent)
     shutil.move(tmp_path / "out", place)
     found = af.cases.open_results(place)
@@ -390,7 +428,7 @@ def test_results_need_no_drawing_beside_them(name, unplotted, undoubted, tmp_pat
     if name == "rubble":  # the words name a material by its table
         assert describe_defaults(found.case) == defaults
     assert af.commands.main(["report", str(place)]) == 0
-    read_page((place / "report.html").read_text(encoding="utf-8"))
+    assert f"The outlines were read from {moved}" in words_of(place / "report.html")
     if name == "rubble":
         given = ["--out", str(place / "film.gif"), "--size", "480x320", "--fps", "5"]
         assert af.commands.main(["animate", str(place), *given]) == 0
@@ -442,6 +480,10 @@ def test_a_report_for_word_has_the_sections_of_the_page(
     headings = [each.text for each in found.paragraphs if each.style.name.startswith("Heading")]
     words = words_of(af.cases.open_results(carried_out).report(tmp_path / "report.html"))
     assert len(headings) > 5
+    # the players are pictures
+    captions = [each.text for each in found.paragraphs if each.style.name == "Caption"]
+    assert len(found.inline_shapes) == sum(text.startswith("Figure") for text in captions)
+    assert sum(text.endswith("The HTML report plays it.") for text in captions) == 2
     assert all(heading in words for heading in headings)
     assert af.commands.main(["report", str(carried_out), "--out", str(path), "--pdf"]) == 1
     assert "--pdf prints the page" in capsys.readouterr().err
@@ -469,7 +511,10 @@ def test_every_input_has_its_mark():
         "fidelity": ("rigid", "given"),
         "displacements": ("small", "default"),
         "time step": ("by an error of 0.005 in |e|", "inferred"),
-        "damped at": ("the effective modes about dead load, stiffness", "inferred"),
+        "damping": ("5 % of critical", "default"),
+        "damping, joints": ("closed", "default"),
+        "damping, kind": ("stiffness", "default"),
+        "damped at": ("the effective modes about dead load", "given"),
         "a joint hinges where": ("|e| ≥ 0.45", "given"),
         "mechanism by count": ("4 joints of rings and piers that fail at once", "default"),
     }
@@ -573,8 +618,14 @@ def test_a_result_without_a_time_history_has_a_report(
     assert found in concluded
     assert "In doubt: joints slide (arch, joint" in concluded
     assert ("Over the pressure of the fill, at that place: " in concluded) == (command == "rate")
+    doubted = "In doubt: values marked as from memory were not compared with the text" in concluded
+    assert doubted == (command == "rate")
     factor = re.search(r"factor (?:of )?([\d.]+)", said)[1]
     assert f"{factor}" in words
+    listed = " ".join(words.split())
+    assert "limit: fill, friction angle 35 degree given" in listed
+    for value in ("law pressure", "cohesion 0 Pa", "mobilisation 0.333", "active 1"):
+        assert f"limit: fill, {value} default" in listed
     # what rigid blocks do not use is no input; a strength that is a default neither
     inputs = words.split("Inputs and assumptions")[2].partition("Assumptions, units")[0]
     assert "stone: weight" in inputs
@@ -619,6 +670,9 @@ def test_an_assessment_takes_the_fill_of_the_limit_analysis(undrawn, tmp_path, c
     assert af.commands.main(["report", str(folder)]) == 0
     inputs = " ".join(words_of(folder / "report.html").split())
     assert "assessment: fill that of the limit analysis inferred" in inputs
+    assert "limit: fill, mobilisation 0.333 default" in inputs
+    code = "by the code horizontal: PGA 0.29 g = 1.16 ag, plateau 0.696 g, T_B 0.147 s, T_C 0.442 s"
+    assert f"assessment: spectrum, {code}, T_D 2.6 s; vertical: PGA 0.169 g" in inputs
     path.write_text(BRIDGE.replace('fill = { friction_angle = "35 degree" }', ""))
     capsys.readouterr()
     assert af.commands.main(["assess", str(path)]) == 3
@@ -628,7 +682,9 @@ def test_an_assessment_takes_the_fill_of_the_limit_analysis(undrawn, tmp_path, c
     pages = words_of(folder / "report.html")
     assert pages.count("its mirror image") == 1
     assert len([name for name in read_file_list(folder)["assess"].files if "png" in name]) == 2
-    assert "NTC-2018 SLV capacity 0.4 d_0*" in " ".join(pages.split())
+    stated = " ".join(pages.split())
+    assert "NTC-2018 SLV capacity 0.4 d_0*; demand the displacement spectrum, 8 % damped" in stated
+    assert "T 1.68 π √(d / a*(d)) at d = 0.4 d_0*, with a* divided by FC" in stated
     factors = [float(re.search(r"alpha_0 = ([\d.]+)", text)[1]) for text in (pressed, alone)]
     assert factors[0] > 1.05 * factors[1]
 
@@ -645,10 +701,32 @@ def test_a_fill_is_stated_as_elastic_and_not_varied(kept):
     words = {(name, mark): value for name, value, mark in inputs.rows}
     assert words["backfill: E", "default"].startswith("6.25 MPa (table 2 of")
     assert "pga 2.94199 m/s²" in words["motion, synthetic, before matching", "default"]
-    stated = conclusion.describe_what_is_not_varied(data)
+    stated = ", ".join(conclusion.list_unvaried(data))
     assert "one set of properties, stiffness and strength of the fill, one model" in stated
     vars(data)["fidelity"] = "rigid"
-    assert "fill" not in conclusion.describe_what_is_not_varied(data)
+    assert "fill" not in ", ".join(conclusion.list_unvaried(data))
+
+
+def test_of_several_vehicles_a_table_has_the_factors(small, undrawn):
+    case, folder = af.Case.of(tomllib.loads(BRIDGE)), small.parent / "out"
+    with replace_run(case, folder) as draft:
+        rows = ["vehicle,factor", "LM71,1.5", "LM1,1.9"]
+        texts = "vehicle  factor", "Rating of 'it'", "Rating of other"
+        files = {"rating.txt": "\n\n".join(texts), "vehicles.csv": "\n".join(rows)}
+        write_files(files, draft)
+    grid, *found = _build_rating(report_data.ReportData(case, {}, folder))
+    assert (grid.head, grid.rows) == (["vehicle", "factor"], [["LM71", "1.5"], ["LM1", "1.9"]])
+    assert [each.text for each in found] == [*texts[1:]]  # without the same table
+
+
+def test_factors_of_a_vehicle_are_not_those_of_the_code(kept, undrawn):
+    axle = {"name": "axle", "axles": [1e5], "live": 1.35, "impact": 1.4}
+    case = af.Case.of(tomllib.loads(BRIDGE) | {"rating": {"vehicle": axle}})
+    with replace_results(kept, "rate", read_file_list(kept)["run"].inputs) as draft:
+        write_files({"rating.txt": "it"}, draft)
+    rows = {row[0]: row[1:] for row in tabulate_inputs(report_data.ReportData(case, {}, kept)).rows}
+    assert "live 1.35; impact 1.4" in rows["rating: vehicle"][0]
+    assert rows["rating: area load, dead, width"] == ("of the code, see below", "default")
 
 
 def test_long_tables_of_joints_stand_in_two_halves(kept, monkeypatch):
@@ -686,7 +764,7 @@ def test_the_conclusion_states_outcomes_falls_and_the_range(kept, unplotted):
         verdicts["second"], outcome="fallen", doubts=(af.models.model.Doubt("it leaks", "mend it"),)
     )
     text = " ".join(piece.text for piece in build_conclusion(data).pieces if piece.kind == "words")
-    assert "the structure forms no mechanism under 1 of 2 motions: first." in text
-    assert "The structure falls under 1 of 2 motions: second." in text
+    assert "the structure forms no mechanism under 1 of 2 motions: first; it falls" in text
+    assert "it falls under 1 of 2 motions: second." in text
     assert "In doubt: 1 of 2 runs: it leaks." in text  # the remedy is not for the client
     assert "raise no doubt" not in text

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,7 +10,7 @@ import archfem as af
 from archfem.cases.analysis_keys import parse_limit
 from archfem.cases.result_text import (
     describe_collapse,
-    describe_opposite,
+    describe_limit,
     describe_run,
     describe_run_quality,
     describe_verdicts,
@@ -91,10 +92,16 @@ def test_limit_analysis_in_words(ring):
     assert axles.sentence.endswith(f"at {axles.factor:.4g} times 3, 2 kN at x = 0.5, 1 m")
     both = af.collapse_factor(ring, live=[wheel, af.BodyForce(1.0)])
     assert both.sentence.endswith(f"at {both.factor:.4g} times the load")
-    for factor, rank in ((0.9, "less"), (1.1, "not less"), (1.00001, "the same")):
+    # the lesser of both senses is concluded with
+    for factor, rank in ((0.9, "not less"), (1.1, "not less"), (0.99999, "the same")):
         other = replace(mirrored, factor=factor * pushed.factor, upper=factor * pushed.factor)
-        words = describe_opposite(pushed, other)
-        assert words == f"in the other sense: {other.sentence} ({rank})"
+        solved = SimpleNamespace(**vars(limit), solve_opposite=lambda _, other=other: other)
+        case = SimpleNamespace(structure=ring, limit=solved)
+        least, words = describe_limit(case, pushed)
+        first, second = (other, pushed) if factor == 0.9 else (pushed, other)
+        assert least is first
+        assert words.startswith(f"limit analysis: {first.sentence}\n")
+        assert words.endswith(f"\nin the other sense: {second.sentence} ({rank})")
     slab = af.column(breadth=4.0, heights=[1.0])  # slides before it turns
     slid, lifted = (af.collapse_factor(slab, live=af.BodyForce(*g)) for g in ((1.0,), (0.0, -1.0)))
     words = describe_collapse(slab, slid, parse_limit({})).splitlines()

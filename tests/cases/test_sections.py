@@ -94,7 +94,7 @@ def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
     data = report_data.ReportData(SimpleNamespace(structure=piers, report={}), runs)
     facts = dict(conclusion.list_facts(data))
     assert facts["structure"] == f"{len(piers.free)} blocks, {len(piers.joints)} joints"
-    assert facts["PGA"] == "0.60 m/s²"
+    assert facts["PGA"] == "0.0612 g"
     largest = [float(abs(run.joints["eccentricity"]).max()) for run in runs.values()]
     assert largest[0] != pytest.approx(largest[1], rel=1e-2)
     assert facts["largest |e|"] == f"{max(largest):.3f}"
@@ -109,21 +109,21 @@ def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
     assert "verdict" not in dict(conclusion.list_facts(none))
 
 
-def test_the_conclusion_names_the_law_of_the_joints(piers):
-    data = report_data.ReportData(SimpleNamespace(structure=piers), {"first": None})
-    (words,) = conclusion._conclude_joints(data)
-    assert words == "Joints close linearly with 1.48 MPa/mm, which was not varied."
+def test_the_assumptions_name_the_law_of_the_joints(piers):
+    limit = SimpleNamespace(strength=None)
+    data = report_data.ReportData(SimpleNamespace(structure=piers, limit=limit), {"first": None})
+    words = sections._describe_joints(data)
+    assert "; joints close linearly with 1.48 MPa/mm, which was not varied; no cru" in words
     for properties, varied in ((("damping_ratio",), "not varied"), (("finish",), "varied")):
         vars(data)["verdict_range"] = SimpleNamespace(properties=properties)
-        (words,) = conclusion._conclude_joints(data)
-        assert words.endswith(f"which was {varied}.")
+        assert f", which was {varied}; " in sections._describe_joints(data)
 
 
 def test_the_pga_of_older_files_is_that_at_their_steps(piers, runs):
     old = af.History(runs["first"].dataset.drop_attrs(), piers)
     old.dataset.attrs |= {k: v for k, v in runs["first"].dataset.attrs.items() if k != "pga"}
     data = report_data.ReportData(SimpleNamespace(structure=piers, report={}), {"only": old})
-    assert dict(conclusion.list_facts(data))["PGA"] == "0.60 m/s²"
+    assert dict(conclusion.list_facts(data))["PGA"] == "0.0612 g"
 
 
 def test_the_pga_of_a_report_is_that_of_the_motion_and_not_of_the_steps(piers):
@@ -131,10 +131,10 @@ def test_the_pga_of_a_report_is_that_of_the_motion_and_not_of_the_steps(piers):
     run = af.time_history(af.build(piers, fidelity="rigid"), motion, dt=0.003)
     assert np.abs(run.dataset["ground"]).max() < 1.9
     data = report_data.ReportData(SimpleNamespace(structure=piers, report={}), {"only": run})
-    assert dict(conclusion.list_facts(data))["PGA"] == "2.00 m/s²"
+    assert dict(conclusion.list_facts(data))["PGA"] == "0.204 g"
     del run.dataset.attrs["pga"]  # as in files of older versions
     largest = float(np.abs(run.dataset["ground"][:, 0]).max())
-    assert dict(conclusion.list_facts(data))["PGA"] == f"{largest:.2f} m/s²"
+    assert dict(conclusion.list_facts(data))["PGA"] == f"{largest / 9.80665:.3g} g"
 
 
 def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatch):
@@ -156,6 +156,19 @@ def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatc
     *_, first, second = sections.build_run_sections(pairs)
     assert (first.pieces[0], second.pieces[0]) == ("one of 2 players",) * 2
     assert (first.level, second.level) == (3, 3)
+
+
+def test_tables_and_figures_of_all_pairs_say_what_they_show(runs, piers, monkeypatch):
+    """Definitions that no run meets are one line, and each of two figures has its part named."""
+    monkeypatch.setattr(sections.FigureBlock, "of", lambda figure, caption: caption)
+    monkeypatch.setattr(sections, "draw_envelopes", lambda *_: ["one", "other"])
+    data = report_data.ReportData(SimpleNamespace(structure=piers), runs)
+    _, ends, *captions = sections._build_suite_response(data)
+    assert ends.text == ("No run forms a mechanism by any definition; end: reached 0.10 s in all.")
+    assert [text.rpartition("; ")[2] for text in captions] == [
+        "part 1 of 2 of the motions",
+        "part 2 of 2 of the motions",
+    ]
 
 
 def test_a_run_that_was_broken_off_is_reported_as_such(runs, piers, monkeypatch):

@@ -279,8 +279,12 @@ def test_the_range_over_the_pressure_of_the_fill_is_that_of_collapse_factors(lor
     assert lorry_rating.without_pressure == pytest.approx(none, rel=EXACT)
     assert lorry_rating.full_pressure == pytest.approx(whole, rel=EXACT)
     assert none < 0.9 * lorry_rating.factor < 0.8 * whole
-    line = f"place: {none:.4g} without it, {lorry_rating.factor:.4g} with up to 0.33 of the passive"
-    assert f"\nover the pressure of the fill, at that {line}" in str(lorry_rating)
+    begin = f"over the pressure of the fill, at that place: {none:.4g} without it"
+    share = "up to a third of the passive one (default)"
+    end = f", {whole:.4g} with all of it"
+    assert f"\n{begin}, {lorry_rating.factor:.4g} with {share}{end}\n" in str(lorry_rating)
+    half = replace(lorry_rating, fill=replace(lorry_rating.fill, mobilisation=0.5))
+    assert half.describe_pressure()[0].endswith(f"with up to 0.5 of the passive one{end}")
 
 
 def test_a_bridge_that_the_fill_holds_has_no_factor_without_it(monkeypatch):

@@ -162,3 +162,13 @@ def test_table_is_straight_between_its_points():
 def test_spectra_that_codes_do_not_define_are_refused(build, message):
     with pytest.raises(af.errors.InvalidInput, match=message):
         build()
+
+
+def test_the_values_of_a_code_are_stated():
+    """Soil factor 1.15 and corner periods of ground C, type 1; vertical 0.9 (EN 1998-1, 3.2.2)."""
+    assert af.motion.Eurocode8(ag=0.22, ground="C").describe() == (
+        "horizontal: PGA 0.253 g = 1.15 ag, plateau 0.633 g, T_B 0.2 s, T_C 0.6 s, T_D 2 s; "
+        "vertical: PGA 0.198 g = 0.9 ag, plateau 0.594 g, T_B 0.05 s, T_C 0.15 s, T_D 1 s"
+    )
+    american = af.motion.Asce2022(sds=1.0, sd1=0.5, tl=8.0).describe()
+    assert american == "horizontal: PGA 0.4 g, plateau 1 g, T_0 0.1 s, T_S 0.5 s, T_L 8 s"

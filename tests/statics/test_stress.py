@@ -166,7 +166,7 @@ def test_the_most_loaded_joint_of_a_run_is_named_but_not_a_hinge(stack):
     joints = af.joints.joint_dataset(stack, rows, np.array([0.0, 0.5, 1.0]))
     assert utilisation_text(stack, joints) == (
         "largest compression at the edge of a joint that does not hinge: 0.560 MPa, "
-        "1.00% of strength, in joint 1 at 0.500 s"
+        "1.00% of strength 56 MPa, in joint 1 at 0.500 s"
     )
     still = af.joints.joint_dataset(stack, 0.0 * rows, np.array([0.0, 0.5, 1.0]))
     assert utilisation_text(stack, still).startswith("no use of strength is known")
@@ -179,7 +179,7 @@ def test_the_most_loaded_joint_of_a_long_run_is_found(stack, step, again):
     rows[..., 0] = 1e5
     rows[again, 0, 0], rows[step, 1, 0] = 4e5, 5.6e5
     text = utilisation_text(stack, af.joints.joint_dataset(stack, rows, 0.01 * np.arange(8301)))
-    assert text.endswith(f"0.560 MPa, 1.00% of strength, in joint 1 at {0.01 * step:.3f} s")
+    assert text.endswith(f"0.560 MPa, 1.00% of strength 56 MPa, in joint 1 at {0.01 * step:.3f} s")
 
 
 def pushed_sideways(structure, cells, eccentricity):

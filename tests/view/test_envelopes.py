@@ -10,6 +10,7 @@ from pictures import APART, WEIGHT, history
 
 import archfem as af
 from archfem.view import draw_eccentricity, draw_envelope
+from archfem.view.histories import draw_envelopes
 
 MESHES = Path(__file__).parents[2] / "meshes"
 
@@ -145,3 +146,11 @@ def test_ticks_are_names_of_joints():
         for number, name in enumerate(names[panel.get_title()]):
             assert f"joint {formatter(number, 0)}" == name
         assert formatter(99, 0) == ""
+
+
+def test_many_runs_are_shared_evenly_among_figures(run):
+    """Not six in one, and the seventh alone."""
+    figures = draw_envelopes({f"run {k}": run for k in range(7)}, None)
+    shown = [[line.get_label() for line in each.axes[0].lines] for each in figures]
+    names = [sum(label.startswith("run") for label in labels) for labels in shown]
+    assert names == [4, 3]

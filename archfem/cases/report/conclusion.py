@@ -17,10 +17,9 @@ from archfem.cases.result_text import Row
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict import NO_RANGE
-from archfem.dynamics.verdict_range import property_text
 from archfem.joints.criteria import assessed_joints
-from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
+from archfem.masonry.structure import join_names
 from archfem.units import STANDARD_GRAVITY, format_mm
 from archfem.view.pages.document import Grid, Section, TextBlock
 
@@ -42,6 +41,10 @@ def describe_origin(data: ReportData) -> str:
     return f"report of archfem {import_module('archfem').__version__} · case {digest}"
 
 
+# Ratio of the peaks of motions and spectrum beyond which they are different demands: those of
+# matched motions exceed the target by a tenth
+MAX_RATIO_OF_PEAKS = 1.25
+
 # Results of runs: histories, and their variations, which the conclusion states together
 _HISTORIES, _VARIATIONS = "time histories", "variations"
 
@@ -62,25 +65,31 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     runs, structure = list(data.runs.values()), data.case.structure
     blocks = [("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")]
     blocks += [("joints", structure.assessment)] if structure.assessment else []
+    doubtful = list(dict.fromkeys(result for result, _ in list_doubts(data)))
+    doubts = [("in doubt", ", ".join(doubtful))] if doubtful else []
     if not runs:
-        return [*signed, *blocks]
+        rows = (row for _, row in _capacity_rows(data) if row[3] != "-")
+        # the place of a vehicle is in the conclusion
+        factors = [
+            f"{demand}: {outcome.partition(', with')[0]}, factor {factor}"
+            for _, demand, outcome, factor in rows
+        ]
+        return [*signed, *([("verdict", "; ".join(factors))] if factors else []), *doubts, *blocks]
     pga = max(map(_peak_of_ground, runs))
     joints = [assessed_joints(run.joints) for run in runs]
     eccentricity = max(float(abs(each["eccentricity"]).max()) for each in joints)
     opened = " (joints came apart)" if any(bool(each["open"].any()) for each in joints) else ""
     friction = max(float(each["friction"].max()) for each in joints)
-    sizes = [("PGA", f"{pga:.2f} m/s²"), ("largest |e|", f"{eccentricity:.3f}{opened}")]
+    sizes = [("PGA", f"{pga:.3g} g"), ("largest |e|", f"{eccentricity:.3f}{opened}")]
     sizes.append(("largest V / N", result_text.format_ratio(friction)))
-    verdict = [("verdict", summarise_outcomes(data, runs))]
-    doubtful = list(dict.fromkeys(result for result, _ in list_doubts(data)))
-    verdict += [("in doubt", ", ".join(doubtful))] if doubtful else []
-    return [*signed, *verdict, *blocks, *sizes]
+    return [*signed, ("verdict", summarise_outcomes(data, runs)), *doubts, *blocks, *sizes]
 
 
 def _peak_of_ground(run: History) -> float:
-    """Return the horizontal peak acceleration of a run [m/s²]."""
+    """Return the horizontal peak acceleration of a run [g]."""
     # Files of older versions have the acceleration at their steps alone.
-    return float(run.dataset.attrs.get("pga", np.abs(run.dataset["ground"].values[:, 0]).max()))
+    recorded = np.abs(run.dataset["ground"].values[:, 0]).max()
+    return float(run.dataset.attrs.get("pga", recorded)) / STANDARD_GRAVITY
 
 
 def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
@@ -108,20 +117,21 @@ def build_conclusion(data: ReportData) -> Section:
     ]
     lead = _build_lead(data, rows, doubtful)
     blocks: list[Any] = [TextBlock(lead)] if lead else []
-    of_runs = *_conclude_runs(data), *_conclude_joints(data), *_conclude_range(data)
+    of_runs = _conclude_runs(data)
     stated = [(RESULTS[k], map(sentence, each.sentences)) for k, each in data.statements.items()]
+    shown = set[str]()
     for result, sentences in ((_HISTORIES, of_runs), *stated):
         text = " ".join(sentences)
         blocks += [TextBlock(text)] if text else []
         about_these = (result, _VARIATIONS) if result == _HISTORIES else (result,)
-        own = (doubt for about, doubt in doubts if about in about_these)
+        own = [doubt for about, doubt in doubts if about in about_these and doubt not in shown]
+        shown |= {*own}  # a doubt of several results is stated once
         blocks += [TextBlock(f"In doubt: {doubt}.", "doubt") for doubt in own]
     if rows:
         head = ("", "demand", "capacity or outcome", "factor")
         factors = _FACTORS if any(row[3] != "-" for row in rows) else ""
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
-    texts = [describe_what_is_not_varied(data), *_list_absent(data)]
-    blocks += map(TextBlock, filter(None, texts))
+    blocks += map(TextBlock, _list_absent(data))
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
 
 
@@ -145,22 +155,52 @@ def _list_absent(data: ReportData) -> Iterator[str]:
 
 
 def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) -> str:
-    """Answer in a few sentences: demand, outcomes, variations, least margin, results in doubt."""
-    checks = [(float(row[3]), row[0]) for row in rows if row[0].startswith("assessment: ")]
+    """Answer in three sentences: outcomes with their demand, least margin, what may change them."""
+    checks = [(float(row[3]), row) for row in rows if row[0].startswith("assessment: ")]
+    demand = data.case.report.get("demand", "")
     if not data.runs and not checks:
-        return ""  # a load has one result, which says all
-    stated = [data.case.report["demand"]] if data.case.report.get("demand") else []
+        # a load has one result, which says all
+        return f"The demand, as stated: {sentence(demand)}" if demand else ""
+    stated = [demand] if demand else []
     stated += [f"motions of {demand}" for name, demand, *_ in rows if name == _HISTORIES]
-    lead = [f"the structure {text}" for text in _describe_outcomes(data)]
-    if data.verdict_range is not None:
-        lead.append(f"it {data.verdict_range.count} variations of its properties")
+    lead = [f"the structure {'; it '.join(_describe_outcomes(data))}"] if data.runs else []
     if checks:
-        factor, check = min(checks)
-        outcome = "passes" if factor >= 1.0 else "fails"
-        lead.append(f"it {outcome} with a least margin of {factor:g} on the spectrum, by {check}")
-    lead += [f"in doubt, for reasons given below: {', '.join(doubtful)}"] if doubtful else []
+        factor, (check, *_) = min(checks)
+        lead.append(
+            f"its least margin is {factor:g}: it passes {check.partition(': ')[2]}, up to "
+            f"{factor:g} times {name_spectrum(data)}{'' if factor >= 1.0 else ', and so fails'}"
+        )
     lead[0] = f"for {' and '.join(stated)}: {lead[0]}" if stated else lead[0]
+    changes = []
+    if data.verdict_range is not None:
+        found = data.verdict_range.sentence.partition("; of ")[0]
+        changes.append(f"variations of its properties ({found})")
+    changes += [f"the doubts given below, on {join_names(doubtful)}"] if doubtful else []
+    single = list_unvaried(data)
+    changes += [f"what was not varied: {', '.join(single)}"] if single else []
+    lead += ["the checks of the numbers raise no doubt"] if data.runs and not doubtful else []
+    lead += [f"what may change this: {'; '.join(changes)}"] if changes else []
     return " ".join(map(sentence, lead))
+
+
+def name_spectrum(data: ReportData) -> str:
+    """Name the demand of kinematic assessments, with its peak acceleration."""
+    code = read_spectrum(data).get("code")
+    if code is None:
+        return "the motion"
+    return f"the {code} spectrum of PGA {_peak_of_spectrum(data):.3g} g"
+
+
+def read_spectrum(data: ReportData) -> Mapping[str, Any]:
+    """Return the table of the assessment's spectrum, empty for that of a motion."""
+    own = [data.case.settings.get(key) or {} for key in ("assessment", "suite")]
+    return own[0].get("spectrum") or own[1].get("target") or {}
+
+
+def _peak_of_spectrum(data: ReportData) -> float:
+    """Return the spectral acceleration of the assessment's demand at period zero [g]."""
+    spectrum = data.case.assessment.spectrum or data.case.target
+    return float(spectrum.horizontal(0.0)) if spectrum is not None else np.nan
 
 
 def _build_signatures(report: Mapping[str, str]) -> Grid:
@@ -174,11 +214,9 @@ def _build_signatures(report: Mapping[str, str]) -> Grid:
 
 def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     """Yield each result with its demand, capacity or outcome, and factor; "-" where is none."""
-    if stated := data.case.report.get("demand"):
-        yield "", ("as stated", stated, "-", "-")
     if data.runs:
         verdicts = [run.verdict for run in data.runs.values()]
-        peaks = [f"{_peak_of_ground(run) / STANDARD_GRAVITY:.2f}" for run in data.runs.values()]
+        peaks = [f"{_peak_of_ground(run):.2f}" for run in data.runs.values()]
         demand = f"PGA {' to '.join(dict.fromkeys([min(peaks), max(peaks)]))} g"
         outcome = result_text.count_outcomes(verdicts) if len(peaks) > 1 else verdicts[0].outcome
         yield _HISTORIES, (_HISTORIES, demand, outcome, "-")
@@ -186,8 +224,10 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         motion = computed.dataset.attrs.get("motion")
         name = f"{_VARIATIONS} under '{motion}'" if motion else _VARIATIONS
         yield _VARIATIONS, (name, "the same motion", computed.count, "-")
-    for name, statement in data.statements.items():
-        yield from ((RESULTS[name], row) for row in statement.rows)
+    for result, statement in data.statements.items():
+        of = f" of {name_spectrum(data)}" if result == "assessment" else ""
+        for name, demand, *others in statement.rows:
+            yield RESULTS[result], (name, f"{demand}{of}", *others)
 
 
 def _describe_outcomes(data: ReportData) -> Iterator[str]:
@@ -240,29 +280,9 @@ def describe_lost(fall: CollapseState, max_names: int = 3) -> str:
     return f"{len(fall.blocks)} blocks, the first at {fall.time:.2f} s: {names}"
 
 
-def _conclude_joints(data: ReportData) -> Iterator[str]:
-    """Yield the sentence on the law by which joints close, if runs depend on it."""
-    law = describe_closing(data.case.structure)
-    if data.runs and law:
-        varied = {"joint_rule", "k_n", "finish"}.intersection(list_varied(data))
-        yield sentence(f"{law}, which was {'varied' if varied else 'not varied'}")
-
-
 def list_varied(data: ReportData) -> tuple[str, ...]:
     """Return the properties that the range of the verdict varies; none without a range."""
     return () if data.verdict_range is None else data.verdict_range.properties
-
-
-def _conclude_range(data: ReportData) -> Iterator[str]:
-    """Yield the sentences on the range of the verdict and on the risk, if the folder has them."""
-    if (computed := data.verdict_range) is not None:
-        words = ", ".join(map(property_text, computed.properties))
-        varied = " and ".join(words.rsplit(", ", 1))
-        verb = "is" if len(computed.properties) == 1 else "are"
-        # files of older versions do not name the motion
-        motion = computed.dataset.attrs.get("motion") if len(data.runs) > 1 else None
-        under = f" under '{motion}'" if motion else ""
-        yield f"Where {varied} {verb} uncertain,{under} the structure {computed.sentence}."
 
 
 def list_doubts(data: ReportData) -> list[tuple[str, str]]:
@@ -273,10 +293,36 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
     of_runs = [f"{n} of {count} runs: {text}" if count > 1 else text for text, n in reasons.items()]
     doubts = [(_HISTORIES, text) for text in of_runs]
     if data.verdict_range is not None:
-        doubts += [(_VARIATIONS, str(doubt)) for doubt in data.verdict_range.doubts]
+        doubts += [(_VARIATIONS, doubt.cause) for doubt in data.verdict_range.doubts]
+        if fill := list_elastic_fill(data):
+            text = (
+                f"variations take {', '.join(fill)} as rigid: as an elastic body it was not varied"
+            )
+            doubts.append((_VARIATIONS, text))
     for name, stated in data.statements.items():
         doubts += [(RESULTS[name], doubt) for doubt in stated.doubts]
+    if "assessment" in data.statements:
+        doubts += [(RESULTS["assessment"], text) for text in _doubt_spectrum(data)]
+    if "from memory" in (data.read_text("rating.txt") or ""):
+        text = "values marked as from memory were not compared with the text of their code"
+        doubts.append((RESULTS["rating"], text))
     return list(dict.fromkeys(doubts))
+
+
+def _doubt_spectrum(data: ReportData) -> Iterator[str]:
+    """Yield why a margin on the spectrum may mislead: a check of another code, other motions."""
+    state = data.case.assessment.options.get("limit_state", "NTC-2018 SLV")
+    name, code = getattr(state, "name", state), read_spectrum(data).get("code", "NTC")
+    if name.startswith("NTC") and not str(code).startswith("NTC"):
+        yield f"the check is one of NTC, which was not made for a spectrum of {code}"
+    peaks = [_peak_of_ground(run) for run in data.runs.values()]
+    if peaks:
+        mean, other = np.mean(peaks), _peak_of_spectrum(data)
+        if abs(np.log(mean / other)) > np.log(MAX_RATIO_OF_PEAKS):
+            yield (
+                f"the spectrum has a PGA of {other:.3g} g, and the motions have {mean:.3g} g: the "
+                "margin is not one on the demand of the time histories"
+            )
 
 
 def list_elastic_fill(data: ReportData) -> list[str]:
@@ -288,26 +334,18 @@ def list_elastic_fill(data: ReportData) -> list[str]:
     return list(dict.fromkeys(block.material.name for block in bodies))
 
 
-def describe_what_is_not_varied(data: ReportData) -> str:
-    """Say what was not varied, without which "no doubts" says little; "" without a run."""
+def list_unvaried(data: ReportData) -> list[str]:
+    """Return what was not varied, without which "no doubt" says little; nothing without a run."""
     if not data.runs:
-        return ""
+        return []
     single = ["one motion"] if len(data.runs) == 1 else []
     single += [] if data.verdict_range else ["one set of properties"]
     single += ["stiffness and strength of the fill"] if list_elastic_fill(data) else []
     predicted = all("predicted_error" in run.dataset.attrs for run in data.runs.values())
     if not predicted and "accuracy.txt" not in data.files:
         single.append("one model" if "dt" in list_varied(data) else "one model and time step")
-    doubts = "" if list_doubts(data) else "The checks of the numbers raise no doubt. "
-    if not single:
-        return doubts.strip()
     # the samples of a rate were scaled until they fell
-    scaled = {"scale", "risk"} & data.statements.keys()
-    scale = "" if scaled else ", nor by how much the motion may be scaled"
-    return (
-        f"{doubts}Not varied: {', '.join(single)}. What another choice of these would change was "
-        f"not computed{scale}."
-    )
+    return single if {"scale", "risk"} & data.statements.keys() else [*single, "size of motions"]
 
 
 def sentence(text: str) -> str:

@@ -5,12 +5,20 @@ from inspect import Parameter, signature
 from typing import Any
 
 from archfem._validation import declared_keys
-from archfem.cases.defaults import DECIDING_VALUES, HINGE_REASON, list_default_keys, value_text
+from archfem.cases.defaults import (
+    DECIDING_VALUES,
+    HINGE_REASON,
+    list_default_keys,
+    list_fill_values,
+    value_text,
+)
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.structure_keys import shape_keys
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.limit.collapse import collapse_factor
 from archfem.masonry.materials import Contact, Material
+from archfem.motion.design_spectra import CodeSpectrum
+from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.statics.mechanism_assessment import kinematic_assessment
 from archfem.statics.pushover import pushover
@@ -126,14 +134,29 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
         if not any(f"{name}.txt" in data.files for name in users):
             continue
         for key, value in table.items():
-            yield f"{section}: {key.replace('_', ' ')}", describe_value(value), "given"
+            if key != "fill":
+                yield f"{section}: {key.replace('_', ' ')}", describe_value(value), "given"
         if section in _FUNCTIONS:
             yield from _default_rows(section, table)
-        if section == "assessment" and "fill" in data.case.assessment.options.keys() - table:
-            yield "assessment: fill", "that of the limit analysis", "inferred"
-        if section == "rating" and (own := _RATING_KEYS - table.keys()):
-            words = ", ".join(sorted(own)).replace("_", " ")
-            yield f"rating: {words}", "of the code, see below", "default"
+        yield from _further_rows(data, section, table)
+    if any(f"{name}.txt" in data.files for name in STATIC_RESULTS):
+        for path, text, given in list_fill_values(data.case):
+            section, _, key = path.split(".")
+            yield f"{section}: fill, {key.replace('_', ' ')}", text, _mark(given)
+
+
+def _further_rows(data: ReportData, section: str, table: Mapping[str, Any]) -> Iterator[Row]:
+    """Yield what a spectrum, the fill of an assessment and the vehicle of a rating imply."""
+    if section == "assessment" and "spectrum" in table:
+        yield from _spectrum_rows("assessment: spectrum", data.case.assessment.spectrum)
+    if section == "assessment" and "fill" in data.case.assessment.options.keys() - table:
+        yield "assessment: fill", "that of the limit analysis", "inferred"
+    # a vehicle of one's own may have factors
+    vehicle = table.get("vehicle")
+    of_vehicle = set(vehicle) if isinstance(vehicle, Mapping) else set()
+    if section == "rating" and (own := _RATING_KEYS - table.keys() - of_vehicle):
+        words = ", ".join(sorted(own)).replace("_", " ")
+        yield f"rating: {words}", "of the code, see below", "default"
 
 
 def _default_rows(section: str, table: Mapping[str, Any]) -> Iterator[Row]:
@@ -159,7 +182,9 @@ def _motion_rows(data: ReportData) -> Iterator[Row]:
             yield f"{part}{before}", values, mark
         target = suite.get("target")
         yield "target spectrum", describe_value(target) if target else "none", _mark(bool(target))
-        matched = "matched to the target" if suite.get("matched") else "as they are"
+        yield from _spectrum_rows("target spectrum", data.case.target)
+        band = "from {:g} to {:g} s".format(*DEFAULT_BAND)
+        matched = f"matched to the target {band}" if suite.get("matched") else "as they are"
         yield "motions are", matched, _mark("matched" in suite)
         for key, name in (("scale", "scale of the motions"), ("reduction", "reduction factor R")):
             yield name, str(suite.get(key, 1.0)), _mark(key in suite)
@@ -167,6 +192,12 @@ def _motion_rows(data: ReportData) -> Iterator[Row]:
         own = {key: value for key, value in motion.items() if key != "scale"}
         yield from _source_rows([own])
         yield "scale of the motion", str(motion.get("scale", 1.0)), _mark("scale" in motion)
+
+
+def _spectrum_rows(name: str, spectrum: Any) -> Iterator[Row]:
+    """Yield what follows from the code of a spectrum."""
+    if isinstance(spectrum, CodeSpectrum):
+        yield f"{name}, by the code", spectrum.describe(), "inferred"
 
 
 def _source_rows(motions: Sequence[Mapping[str, Any]]) -> Iterator[Row]:
@@ -219,6 +250,7 @@ def _model_rows(data: ReportData) -> Iterator[Row]:
         if analysis.discretisation.fidelity != "rigid":
             through, along = analysis.discretisation.cells
             yield "cells a block", f"{through} through, {along} along", _mark("cells" in model)
+            yield "cells", f"{analysis.discretisation.cell}s", _mark("cell" in model)
     if not data.case.has_motion:
         return
     scheme = type(analysis.scheme).__name__.lower()
@@ -227,18 +259,21 @@ def _model_rows(data: ReportData) -> Iterator[Row]:
         yield "time step", f"by an error of {analysis.tolerance:g} in |e|", "inferred"
     else:
         yield "time step", f"{1e3 * analysis.dt:g} ms", "given"
-    yield from _damping_rows(data, "damping" in own)
+    yield from _damping_rows(data, own.get("damping"))
 
 
-def _damping_rows(data: ReportData, given: bool) -> Iterator[Row]:
-    """Yield damping ratio and frequencies; those of modes are inferred."""
+def _damping_rows(data: ReportData, given: str | Mapping[str, Any] | None) -> Iterator[Row]:
+    """Yield ratio, joints, kind and frequencies of damping, which a word or a table gives."""
     damping = interpret_damping(data.case.analysis.damping)
     if damping is None:
-        yield "damping", "none but that of friction", _mark(given)
+        yield "damping", "none but that of friction", _mark(given is not None)
         return
-    yield "damping", f"{100.0 * damping.ratio:g} % of critical, joints {damping.joints}", "given"
+    own = given if isinstance(given, Mapping) else {}
+    yield "damping", f"{100.0 * damping.ratio:g} % of critical", _mark("ratio" in own)
+    yield "damping, joints", damping.joints, _mark("joints" in own)
     if isinstance(damping, EffectiveDamping):
-        yield "damped at", f"the effective modes about dead load, {damping.kind}", "inferred"
+        yield "damping, kind", damping.kind, _mark("kind" in own)
+        yield "damped at", "the effective modes about dead load", "given"
     elif isinstance(damping, Rayleigh):
         low, high = damping.frequencies
         yield "damped at", f"{low:.3g} and {high:.3g} Hz (Rayleigh)", "given"

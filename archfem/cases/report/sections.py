@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from csv import reader
 from dataclasses import replace
 from hashlib import sha256
 from typing import Any
@@ -16,6 +17,7 @@ from archfem.cases.report.conclusion import (
     describe_lost,
     describe_mechanism,
     list_elastic_fill,
+    list_varied,
     sentence,
     summarise_outcomes,
 )
@@ -25,12 +27,14 @@ from archfem.cases.report.report_data import (
     build_live_page,
     build_player,
 )
+from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.history import SIGN_CONVENTION, History
 from archfem.dynamics.recorder import library_versions
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure
+from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.mechanism_assessment import LIMIT_STATES, LimitState
@@ -55,9 +59,10 @@ _DEFINITIONS = {
 # Of figure and table, with the file of the figure
 _RISK_CAPTIONS = (
     "(a) Probability of a fall by intensity with its band, (b) hazard of the site, and (c) share "
-    "of the rate by intensity.",
+    "of the rate by intensity; the rest lies above.",
     "risk.png",
-    "Annual rate of collapse, and that of each alternative, with intervals",
+    "Annual rate of collapse, and that of each alternative, with intervals of the samples alone: "
+    "hazard and model are outside of them",
 )
 
 _PLAYER_CAPTION = "The structure at an instant, the ground acceleration, and one joint."
@@ -80,7 +85,7 @@ def build_sections(data: ReportData) -> list[Section]:
     sections = [
         build_conclusion(data),
         build_input_section(data),
-        Section("Structure", _build_geometry(data.case)),
+        Section("Structure", [*_build_geometry(data.case), *_describe_drawing(data)]),
         *build_dead_load_sections(data),
         build_ground_section(data),
         *build_run_sections(data),
@@ -145,6 +150,9 @@ def build_input_section(data: ReportData) -> Section:
 def _describe_joints(data: ReportData) -> str:
     """Say what joints resist, and in which results they crush."""
     law = "dry: no tension but where a bond is given; Coulomb friction"
+    if data.runs and (closing := describe_closing(data.case.structure)):
+        varied = {"joint_rule", "k_n", "finish"}.intersection(list_varied(data))
+        law += f"; {closing}, which was {'varied' if varied else 'not varied'}"
     strength = data.case.limit.strength
     if strength is None or not {"limit", "rating"} & data.statements.keys():
         return f"{law}; no crushing"
@@ -164,6 +172,12 @@ def _build_geometry(case: Case) -> list[Any]:
     )
     figure = FigureBlock.of(draw_names(structure), caption)
     return [TextBlock(extent), _tabulate_parts(structure), figure]
+
+
+def _describe_drawing(data: ReportData) -> list[TextBlock]:
+    """Name the drawing of the blocks, its unit and tolerance, and how far corners were moved."""
+    text = data.read_text(DRAWING_FILE)
+    return [] if text is None else [TextBlock(f"The outlines were read from {text}.")]
 
 
 def _tabulate_parts(structure: Structure) -> Grid:
@@ -187,16 +201,29 @@ def build_dead_load_sections(data: ReportData) -> list[Section]:
     """Build the sections on dead load, modes, limit analysis, pushover, rating, assessment."""
     collapse = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
     curve = "Load factor over displacement, with the joints in the order of their first hinge."
-    rating = "(a) Factor along the bridge, and (b) mechanism at the worst place."
     shapes, modes = "Shapes of the modes about dead load.", "Modes: effective masses along x and y"
     return [
         Section("Dead load", _build_dead_load(data)),
         Section("Modes", data.read_result("modes", shapes, table=modes)),
         Section("Limit analysis", data.read_result("limit", collapse, "collapse.png")),
         Section("Pushover", data.read_result("pushover", curve)),
-        Section("Rating for a vehicle", data.read_result("rating", rating)),
+        Section("Rating for a vehicle", _build_rating(data)),
         Section("Kinematic assessment", _build_assessment(data)),
     ]
+
+
+def _build_rating(data: ReportData) -> list[Any]:
+    """Build text and picture of a rating, below the table of several vehicles."""
+    caption = "(a) Factor along the bridge, and (b) mechanism at the worst place."
+    blocks = data.read_result("rating", caption)
+    if (table := data.read_text("vehicles.csv")) is None:
+        return blocks
+    # the text begins with the same table, and the picture is of the worst vehicle
+    text, *figures = blocks
+    _, worst, *others = text.text.split("\n\n")
+    head, *rows = reader(table.splitlines())
+    grid = Grid(head, rows, "Factors of several vehicles, the worst first", "words")
+    return [grid, TextBlock(worst, "lines"), *figures, *(TextBlock(x, "lines") for x in others)]
 
 
 def _build_dead_load(data: ReportData) -> list[Any]:
@@ -252,21 +279,23 @@ def _define_assessment(data: ReportData) -> Grid:
     """Tabulate the quantities of a kinematic assessment, their rules, and codes that are mixed."""
     state = data.case.assessment.options.get("limit_state", "NTC-2018 SLV")
     rules = state if isinstance(state, LimitState) else LIMIT_STATES[state]
-    demand = f"the spectrum, {100.0 * rules.damping:g} % damped, at that period"
+    demand = f"the displacement spectrum, {100.0 * rules.damping:g} % damped, up to T"
+    period = (
+        f"{rules.period_factor:g} π √(d / a*(d)) at d = {rules.secant_share * rules.share:g} d_0*, "
+        "with a* divided by FC; 2 π in place of it is the secant period"
+    )
     rows = [
         ("alpha_0", "multiple of the weights, as horizontal forces, that begins the mechanism"),
         ("e*, M*", "share and mass that take part: M* = (Σ P δ)² / (g Σ P δ²), e* = g M* / Σ P"),
         ("a_0*, d_0*", "acceleration that begins it, and displacement at which it resists nothing"),
-        ("T_s", "secant period at 0.16 d_0*"),
+        (
+            "linear",
+            "q a_0* / FC against the spectrum at T = 0, which small arches pass that fall in runs",
+        ),
+        ("T_s", "secant period at 0.16 d_0*, that of NTC-2008"),
+        ("T", period),
         (rules.name, f"capacity {rules.share:g} d_0*; demand {demand}; {rules.source}"),
     ]
-    own = [data.case.settings.get(key, {}) for key in ("assessment", "suite")]
-    spectrum = own[0].get("spectrum") or own[1].get("target") or {}
-    code = str(spectrum.get("code", "NTC"))
-    if rules.name.startswith("NTC") and not code.startswith("NTC"):
-        rows.append(
-            ("codes", f"a check of NTC with a spectrum of {code}, which it was not made for")
-        )
     return Grid((), rows, "Quantities of the assessment; Circolare 7/2019, C8.7.1.2.1")
 
 
@@ -293,6 +322,8 @@ def _build_spectra(case: Case, motions: list[Motion]) -> list[Any]:
     pairs = tuple(motion.scaled(reduction / scale) for motion in motions)
     suite = Suite(case.suite.get("name", "suite"), pairs, scale=scale, reduction=reduction)
     caption = "Response spectra, 5 % damped, as applied"
+    if case.suite.get("matched", False):
+        caption += "; matched from {:g} to {:g} s".format(*DEFAULT_BAND)
     if reduction != 1.0:
         caption = (
             "Response spectra, 5 % damped, before they are divided by the reduction factor "
@@ -349,8 +380,13 @@ def build_joint_section(data: ReportData) -> Section:
 
 def _build_envelopes(data: ReportData) -> list[FigureBlock]:
     """Draw the envelopes of all runs."""
-    caption = "Least and largest eccentricity of each joint; dotted under dead load."
-    return [FigureBlock.of(figure, caption) for figure in draw_envelopes(data.runs, data.dead)]
+    caption = "Least and largest eccentricity of each joint; dotted under dead load"
+    figures = draw_envelopes(data.runs, data.dead)
+    part = f"; part {{}} of {len(figures)} of the motions" if len(figures) > 1 else ""
+    return [
+        FigureBlock.of(figure, f"{caption}{part.format(number)}")
+        for number, figure in enumerate(figures, start=1)
+    ]
 
 
 def _tabulate_joints(data: ReportData, run: History, label: str = "") -> Grid:
@@ -386,10 +422,13 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
     if fall is not None and fall.blocks:
         lines.append(f"lost: {describe_lost(fall, len(fall.blocks))}")
     lines.append(f"Mechanism: {describe_mechanism(verdict)}")
-    # the conclusion names the law of closing, and whether it was varied
+    # the assumptions name the law of closing, and whether it was varied
     law = describe_closing(data.case.structure)
     lines += [line for line in verdict.remarks if not law or not line.startswith(law)]
-    blocks: list[Any] = [TextBlock(sentence(line)) for line in lines]
+    stated = (
+        [*map(sentence, lines)] if data.case.suite is None else [" ".join(map(sentence, lines))]
+    )
+    blocks: list[Any] = [*map(TextBlock, stated)]
     if data.case.suite is None or any(verdict.mechanisms.values()):
         caption = "Definitions of a mechanism: failed joints that it needs, and the first one"
         rows = [
@@ -408,13 +447,20 @@ def _build_suite_response(data: ReportData) -> list[Any]:
     (head, rows), columns = result_text.tabulate_runs(data.runs), len(result_text.RUN_COLUMNS)
     # The mechanisms have too many columns for a page: a line for each definition instead.
     mechanisms = []
-    for title, *cells in zip(head[columns:], *(row[columns:] for row in rows), strict=True):
-        named = [f"{row[0]}: {cell}" for row, cell in zip(rows, cells, strict=True) if cell != "-"]
-        mechanisms += [(title, _DEFINITIONS.get(title, ""), "; ".join(named))] if named else []
+    for title, *cells in zip(head[columns:], *(row[columns:] for row in rows[:-1]), strict=True):
+        named = [f"{row[0]}: {cell}" for row, cell in zip(rows, cells, strict=False)]
+        if not {*cells} <= {"none", "-"}:
+            text = "; ".join(named) if len({*cells}) > 1 else f"{cells[0]} in all"
+            mechanisms.append((title, _DEFINITIONS.get(title, ""), text))
     caption = "Outcome, PGA, and the critical joint of each run"
+    by_definition = "Mechanisms by definition, the failed joints that it needs, and end"
+    table: Any = Grid([], mechanisms, by_definition)
+    if len(mechanisms) == 1:  # the end alone
+        text = f"No run forms a mechanism by any definition; end: {mechanisms[0][-1]}"
+        table = TextBlock(sentence(text))
     return [
         Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption),
-        Grid([], mechanisms, "Mechanisms by definition, the failed joints that it needs, and end"),
+        table,
         *_build_envelopes(data),
     ]
 
@@ -428,14 +474,21 @@ def build_check_section(data: ReportData) -> Section:
         rows = [_check_row(data.case, name, run) for name, run in data.runs.items()]
         caption = (
             "Checks of each run: energy drift relative to the largest energy exchanged, reaction "
-            "of the supports under dead load, and most Newton iterations between two records"
+            "of the supports under dead load, by joints in their directions as built, and most "
+            "Newton iterations between two records"
         )
         blocks.append(Grid(head, rows, caption))
     caption = "Speed against error over fidelities, meshes and steps."
     table = "Models in the order of their errors, with times"
     blocks += data.read_result("accuracy", caption, table=table)
-    caption = "Residual displacement over each property; falls are above the line."
-    table = "Falls by the value of each property, and the share of the damage that it explains"
+    caption = (
+        "Residual displacement over the properties that explain most of it, at most six; falls are "
+        "above the line, and displacements below the axis at its lower end."
+    )
+    table = (
+        "Falls by the value of each property: of k_n, k_s and damping ratio factors on the values "
+        "of the case, of friction what is added"
+    )
     blocks += data.read_result("verdict_range", caption, table=table)
     return Section("Checks of the numbers, and range of the verdict", blocks)
 

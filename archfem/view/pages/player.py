@@ -6,8 +6,10 @@ from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.models.model import Model
-from archfem.view.pages.document import StandalonePage, render
+from archfem.view.pages.document import FigureBlock, StandalonePage, render
 from archfem.view.pages.player_data import Scene
+from archfem.view.positions import decisive_instant
+from archfem.view.structure import draw_structure
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +35,13 @@ class Player(StandalonePage):
     def page(self) -> str:
         """The complete page (HTML), without references to other files."""
         return render("player_page.html", title=self.scene.data["title"], player=self)
+
+    @property
+    def still(self) -> FigureBlock:
+        """Picture of the decisive instant, for documents in which nothing plays."""
+        run = self.scene.run
+        joints = run.joints.sel(time=decisive_instant(run), method="nearest")
+        return FigureBlock.of(draw_structure(self.scene.structure, joints), self.caption)
 
     @property
     def frame_height(self) -> float:

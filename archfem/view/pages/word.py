@@ -13,7 +13,7 @@ TEXT_WIDTH = 6.69
 
 
 def write_word(path: str | Path, document: Document) -> Path:
-    """Write a document for Word atomically; its players are on the page alone."""
+    """Write a document for Word atomically; players are pictures."""
     with require_package("python-docx"):
         from docx import Document as WordDocument
         from docx.shared import Inches, Mm, Pt
@@ -36,11 +36,12 @@ def write_word(path: str | Path, document: Document) -> Path:
                 _add_text(word, piece)
             elif isinstance(piece, Grid):
                 _add_table(word, piece)
-            elif isinstance(piece, FigureBlock):
-                word.add_picture(BytesIO(piece.raster()), Inches(min(piece.inches, TEXT_WIDTH)))
-                word.add_paragraph(piece.caption, "Caption")
             else:
-                word.add_paragraph(f"{piece.caption} It is in the HTML report.", "Caption")
+                picture = piece if isinstance(piece, FigureBlock) else piece.still
+                width = Inches(min(picture.inches, TEXT_WIDTH))
+                word.add_picture(BytesIO(picture.raster()), width)
+                more = "" if picture is piece else " The HTML report plays it."
+                word.add_paragraph(f"{piece.caption}{more}", "Caption")
     word.add_paragraph(document.foot)
     with atomic_write(target) as draft:
         word.save(str(draft))
