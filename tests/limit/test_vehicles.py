@@ -75,7 +75,9 @@ def test_each_place_is_a_row_of_point_loads(fill, direction):
 def test_sliding_flat_is_searched_from_place_to_place(monkeypatch):
     """Results are as weak as by the whole search at each place, in a fifth of its programmes."""
     solved, solve = [], Programme.solve
-    monkeypatch.setattr(Programme, "solve", lambda self: solved.append(self) or solve(self))
+    monkeypatch.setattr(
+        Programme, "solve", lambda self, **how: solved.append(self) or solve(self, **how)
+    )
     slick = af.Contact(1.48e9, 0.3e9, 0.3)
     structure, places = ring(voussoirs=9, contact=slick), np.linspace(-2.0, 2.0, 9)
     found = over(structure, 60e3, positions=places, friction="nonassociated")
