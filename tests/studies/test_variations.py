@@ -424,7 +424,7 @@ def test_a_report_shows_the_range(tmp_path, undrawn, calls):
     assert af.commands.main(["verdict", str(path), "--out", str(out), "--samples", "2"]) == 0
     words = " ".join(read_page(report(out)).words)
     assert af.dynamics.VerdictRange.read(out / "verdict_range.nc").sentence in words
-    assert "Residual displacement over each property; falls are above the line." in words
+    assert "Residual displacement over the properties that explain most of it" in words
 
 
 def report(folder):
