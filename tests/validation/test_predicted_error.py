@@ -155,15 +155,9 @@ def test_damping_found_of_the_first_model_is_that_of_the_choice(ring):
     assert found[0].candidates == found[1].candidates
 
 
-@pytest.mark.parametrize(
-    ("tolerance", "says"),
-    [
-        *((value, "is not between 0 and 1") for value in (-0.1, 0.0, 1.0)),
-        (float("nan"), "is not a finite number"),
-    ],
-)
-def test_an_invalid_tolerance_is_refused(tolerance, says):
-    with pytest.raises(af.InvalidInput, match=f"tolerance .* {says}"):
+@pytest.mark.parametrize("tolerance", [-0.1, 0.0, 1.0, float("nan")])
+def test_an_invalid_tolerance_is_refused(tolerance):
+    with pytest.raises(af.InvalidInput, match=r"tolerance .* is not between 0 and 1"):
         af.build(SCENES["ring"][0], fidelity="auto", tolerance=tolerance)
 
 

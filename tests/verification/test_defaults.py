@@ -78,6 +78,8 @@ BLOCKS = {
         "mobilisation": 1.0 / 3.0,
         "active": 1.0,
         "spread": 30.0,
+        "lever": 0.0,
+        "backing_strength": 1e6,
     },
     "limit.support_movement.largest_movement": {"tolerance": 1e-4},
     "limit.thickness.minimum_thickness": {"tolerance": 1e-6},
