@@ -66,6 +66,7 @@ class Rating(ResultDisplay):
             slide; else NaN. It differs from stone to stone.
         without_backing: factor of the same loads without the backing of a `Fill`; NaN without one,
             and where the bridge then does not stand.
+        without_either: factor of the same loads without backing and without pressure; NaN likewise.
         fill: strength of the fill, or None.
     """
 
@@ -84,6 +85,7 @@ class Rating(ResultDisplay):
     full_pressure: float = np.nan
     deepest: float = np.nan
     without_backing: float = np.nan
+    without_either: float = np.nan
     fill: Fill | PlasticFill | None = None
 
     @property
@@ -100,21 +102,24 @@ class Rating(ResultDisplay):
     def outcome(self) -> str:
         """Whether it passes, on which condition, and the factor by rule where less was given."""
         words = "passes" if self.passes else "fails"
-        needed = self._needs() if self.passes else []
-        words += f" only with the {' and the '.join(needed)}" if needed else ""
+        needed = self._needs() if self.passes else ""
+        words += f" only with the {needed}" if needed else ""
         if missing := self._missing_factors():
             words += f" if the code's {missing} is at most {self.factor:.4g}" if self.passes else ""
         words += f" without {self.vehicle.left_out}" if self.vehicle.left_out else ""
         return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
 
-    def _needs(self) -> list[str]:
-        """Return the parts of the fill without any of which the bridge fails at this place."""
-        fill, parts = self.fill, list[str]()
-        if isinstance(fill, Fill):
-            parts += [] if self.without_pressure >= 1.0 else ["pressure of the fill"]
-            backed = fill.backing is not None and not self.without_backing >= 1.0
-            parts += ["backing"] if backed else []
-        return parts
+    def _needs(self) -> str:
+        """Return the parts of the fill without which the bridge fails at this place, in words."""
+        if not isinstance(self.fill, Fill):
+            return ""
+        without = {"pressure of the fill": self.without_pressure}
+        if self.fill.backing is not None:
+            without["backing"] = self.without_backing
+        needed = [part for part, factor in without.items() if not factor >= 1.0]
+        if not needed and len(without) == 2 and not self.without_either >= 1.0:
+            return " or the ".join(without)
+        return " and the ".join(needed)
 
     def _missing_factors(self) -> str:
         """Return the factors of a code that neither the vehicle nor its user gave, in words."""
@@ -207,7 +212,7 @@ class Rating(ResultDisplay):
             *self._describe_hinges(),
             *self._describe_spans(),
             f"geometric factor of safety at that place: {self._geometric_text()}",
-            "it is of the same vehicle; Heyman requires it, often 2 (from memory), and no code",
+            "it is Heyman's criterion, often 2 or more (from memory), which no code has",
             f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN"
             f"{beside}; {source}",
             f"over {self.width:.3g} m of width ({rule if by_rule else 'given'})",
@@ -238,10 +243,14 @@ class Rating(ResultDisplay):
         """Return the line on what the backing adds, if there is some."""
         if not isinstance(self.fill, Fill) or self.fill.backing is None:
             return []
-        least = f"{self.without_backing:.4g}"
-        if np.isnan(self.without_backing):
-            least = "the bridge does not stand"
-        return [f"without the backing but with the pressure, at that place: {least}"]
+        with_pressure, neither = (
+            "the bridge does not stand" if np.isnan(factor) else f"{factor:.4g}"
+            for factor in (self.without_backing, self.without_either)
+        )
+        return [
+            f"without the backing but with the pressure, at that place: {with_pressure}; "
+            f"without either: {neither}"
+        ]
 
     def _describe_missing(self) -> list[str]:
         """Return the line on what codes ask of a vehicle without any factors, if it is one."""
@@ -472,7 +481,7 @@ def _geometric_factor(
 def _vary_fill(
     structure: Structure, moving: MovingLoad, options: dict[str, Any]
 ) -> dict[str, float]:
-    """Return the factors of the worst loads without pressure, with all of it, without backing."""
+    """Return the factors of the worst loads under other pressures, with and without backing."""
     # At the worst place alone: over all places the least factors differ by up to 0.5 %.
     if not isinstance(fill := options["fill"], Fill):
         return {}
@@ -481,7 +490,9 @@ def _vary_fill(
         "without_pressure": replace(fill, mobilisation=0.0, active=0.0),
         "full_pressure": replace(fill, mobilisation=1.0),
     }
-    fills |= {} if fill.backing is None else {"without_backing": replace(fill, backing=None)}
+    if fill.backing is not None:
+        fills["without_backing"] = replace(fill, backing=None)
+        fills["without_either"] = replace(fills["without_pressure"], backing=None)
     factors = {}
     for name, other in fills.items():
         given = options | {"fill": other}

@@ -254,7 +254,7 @@ def test_words_and_table(lorry_rating):
         for start in ("Rating of", "geometric factor")
     )
     assert words.splitlines()[factor + 1].endswith("codes with partial factors require 1")
-    assert "Heyman requires it" in words.splitlines()[geometric + 1]
+    assert "Heyman's criterion" in words.splitlines()[geometric + 1]
     hinges = [joint for joint, _ in lorry_rating.moving.worst.hinges]
     (line,) = (line for line in words.splitlines() if line.startswith("hinges at x = "))
     for x, joint in zip(line.removeprefix("hinges at x = ").split(","), hinges, strict=True):
@@ -330,8 +330,11 @@ def test_a_verdict_says_which_parts_of_the_fill_it_rests_on(lorry_rating):
     words = "passes only with the pressure of the fill and the backing"
     assert backed.outcome.startswith(words)
     without = "\nwithout the backing but with the pressure, at that place: "
-    assert f"{without}the bridge does not stand\n" in str(backed)
-    assert f"{without}1.01\n" in str(replace(backed, without_backing=1.01))
+    assert f"{without}the bridge does not stand; without either: " in str(backed)
+    either = replace(lorry_rating, fill=backed.fill, without_backing=1.01, without_either=0.8)
+    assert either.outcome.startswith("passes only with the pressure of the fill or the backing if")
+    assert f"{without}1.01; without either: 0.8\n" in str(either)
+    assert replace(either, without_either=1.0).outcome.startswith("passes if")
 
 
 def test_a_rating_with_backing_has_the_factor_without_it(monkeypatch):
@@ -340,6 +343,7 @@ def test_a_rating_with_backing_has_the_factor_without_it(monkeypatch):
     found = af.rate(arch_bridge(voussoirs=9), axle, fill=backed)
     plain = af.rate(arch_bridge(voussoirs=9), axle, fill=GRAVEL)
     assert found.without_backing == pytest.approx(plain.factor, rel=EXACT)
+    assert found.without_either == pytest.approx(plain.without_pressure, rel=EXACT)
     assert found.factor > 1.02 * plain.factor
     assert np.isnan(plain.without_backing)
 
