@@ -223,7 +223,7 @@ scale = af.collapse_scale(
     model, motion, dt=steps, precision=0.5 if quick else 0.05, between=(0.5, 2.0), **shake
 )
 print(scale.table())
-f"it stands up to × {scale.lower:.2f} by every step, and falls from × {scale.upper:.2f}"
+f"it stands up to × {scale.lower:.2f} by every step; the last one falls at × {scale.upper:.2f}"
 
 # %% [markdown]
 # ## How long, how strong?

@@ -296,10 +296,14 @@ def search_scales(
     definitions: tuple[str, ...],
     precision: float,
     between: tuple[float, float],
-    begin: float = 1.0,
+    begin: Sequence[float] = (1.0,),
+    found: MechanismScales | None = None,
 ) -> MechanismScales:
-    """Make runs until all brackets are within the precision, and below a fall no gap is wide."""
-    scales = MechanismScales(definitions)
+    """Make runs until all brackets are within the precision, and below a fall no gap is wide.
+
+    The first ones are at `begin`; those that were `found` before are kept.
+    """
+    scales = found or MechanismScales(definitions)
     try:
         with tqdm(unit="run", disable=None, leave=False, desc="scales") as bar:
             while (scale := _next_scale(scales, precision, between, begin)) is not None:
@@ -333,13 +337,15 @@ def _next_below_fall(scales: MechanismScales, precision: float, smallest: float)
 
 
 def _next_scale(
-    scales: MechanismScales, precision: float, between: tuple[float, float], begin: float
+    scales: MechanismScales, precision: float, between: tuple[float, float], begin: Sequence[float]
 ) -> float | None:
     """Return the scale of the next run, or None."""
     runs, (smallest, largest) = scales.runs, between
     ratio, max_runs = sqrt(2.0), 40  # ratio of scales before bisection
-    if not runs:
-        return min(max(begin, smallest), largest)
+    first = [min(max(scale, smallest), largest) for scale in begin]
+    missing = [scale for scale in first if all(scale != run.scale for run in runs)]
+    if missing and not scales.interrupted:
+        return missing[0]
     # four definitions to five per cent take about fifteen runs
     if len(runs) >= max_runs or scales.interrupted:
         return None
@@ -391,21 +397,23 @@ class CollapseScale:
         if least < inf:
             met = f"falls at {_say_scale(least, self.pga)}"
         if least < self.upper:
-            every = f"from {self.upper:#.3g} × on" if self.upper < inf else "at no scale"
-            met = f"{met}, with all time steps {every}"
+            at = f"first falls at {self.upper:#.3g} ×" if self.upper < inf else "falls at no scale"
+            met = f"{met}, {'the other' if len(self.searches) == 2 else 'the last'} time step {at}"
         return _say_bracket(state, self.lower, self.pga, met) + self._say_tested()
 
     def _say_tested(self) -> str:
         """Return in words how closely scales were run up to `lower`; "" where none stands."""
-        made = {scale for dt in self.searches for scale, fall in self.falls(dt) if fall}
-        stood = sorted(scale for scale in made if scale <= self.lower)
+        made = [(at, fall.kind) for dt in self.searches for at, fall in self.falls(dt) if fall]
+        stood = sorted({scale for scale, _ in made if scale <= self.lower})
         gaps = [gap for gap in pairwise(stood) if gap[1] > FILLED_SHARE * self.lower]
         if not gaps:
             return ""
         ratio = max(high / low for low, high in gaps)
+        first = min((at for at, kind in made if kind == "dislocated"), default=inf)
+        parted = f", or is dislocated (first at {first:#.3g} ×)," if first < self.lower else ""
         return (
-            f"; stands at every smaller scale that was run, from {gaps[0][0]:#.3g} × on up to a "
-            f"factor of {ratio:.2f} apart; those between were not run"
+            f"; stands{parted} at every smaller scale that was run, from {gaps[0][0]:#.3g} × on up "
+            f"to a factor of {ratio:.2f} apart; those between were not run"
         )
 
     @property
@@ -418,11 +426,12 @@ class CollapseScale:
         """Reasons why the scales may be wrong."""
         doubts = [str(doubt) for doubt in self.of_model]
         brackets = {dt: self.bracket(dt) for dt in self.searches}
-        if max(b.lower for b in brackets.values()) >= min(b.upper for b in brackets.values()):
+        if _disagreeing(self.searches):
             found = (
-                f"{b.lower:#.3g} to {b.upper:#.3g} by {1e3 * dt:g} ms" for dt, b in brackets.items()
+                f"between {b.lower:#.3g} and {b.upper:#.3g} × by {1e3 * dt:g} ms"
+                for dt, b in brackets.items()
             )
-            doubts.append(f"its time steps disagree: it falls from {', '.join(found)}")
+            doubts.append(f"its time steps disagree: it first falls {', '.join(found)}")
         for dt, search in self.searches.items():
             own = _doubts_of_bracket(search, COLLAPSE_DEFINITION)
             doubts += [f"by a time step of {1e3 * dt:g} ms, {doubt}" for doubt in own]
@@ -503,6 +512,14 @@ class CollapseScale:
         return align_columns(["step", "scale", "the structure", "at", "residual"], rows)
 
 
+def _disagreeing(searches: dict[float, MechanismScales]) -> tuple[float, Bracket] | None:
+    """Return a time step that stands where another one falls, and the bracket of that, or None."""
+    brackets = {dt: search[COLLAPSE_DEFINITION] for dt, search in searches.items()}
+    step = max(brackets, key=lambda dt: brackets[dt].lower)
+    weakest = min(brackets.values(), key=lambda bracket: bracket.upper)
+    return (step, weakest) if brackets[step].lower >= weakest.upper else None
+
+
 @takes_analysis
 @validate_arguments
 def collapse_scale(
@@ -518,11 +535,12 @@ def collapse_scale(
     """Search the smallest scale of a motion at which a structure falls, among those it runs.
 
     Scales are searched as by `mechanism_scales`, once for each time step: a fall under a record is
-    sensitive to all parameters, and a result on which two steps disagree is not reliable. Whether a
-    structure falls need not be monotonic in the scale. Hence gaps between scales are filled to a
-    ratio of 1.1 from half of the smallest fall on and 1.05 from 0.7 of it, or `precision` where
-    that is larger, and the search continues below a fall found there. A window of falls narrower
-    than a gap is found by chance only: for a check at one scale, run that scale.
+    sensitive to all parameters, and a result on which two steps disagree is not reliable. One that
+    stands where another one falls is run at the scales around that fall, too. Whether a structure
+    falls need not be monotonic in the scale. Hence gaps between scales are filled to a ratio of 1.1
+    from half of the smallest fall on and 1.05 from 0.7 of it, or `precision` where that is larger,
+    and the search continues below a fall found there. A window of falls narrower than a gap is
+    found by chance only: for a check at one scale, run that scale.
 
     Args:
         model: model of large displacements, `build(…, displacements="large")`, or such an
@@ -558,13 +576,24 @@ def collapse_scale(
         return ScaledRun(scale, {}, run.ending, run.outcome, run.fall, doubts)
 
     limits, first = admissible_range(between, motion), 1.0
-    searches = {}
+    searches: dict[float, MechanismScales] = {}
+
+    def search(step: float, *at: float) -> None:
+        run_at, limit, made = partial(run_scaled, step), (COLLAPSE_DEFINITION,), searches.get(step)
+        searches[step] = search_scales(run_at, limit, precision, limits, at, made)
+
     for step in steps:
-        run_at = partial(run_scaled, step)
-        searches[step] = search_scales(run_at, (COLLAPSE_DEFINITION,), precision, limits, first)
+        search(step, first)
         if searches[step].interrupted:
             break
         # the next search begins near this fall, and its scales lie between those of this one
         least = searches[step][COLLAPSE_DEFINITION].upper
         first = least / NEAR_RATIO**0.5 if least < inf else first
+    # a step may jump over the fall of another one: it is run there too before they disagree
+    while not searches[step].interrupted and (pair := _disagreeing(searches)):
+        step, weakest = pair
+        made = searches[step].runs
+        search(step, weakest.lower, weakest.upper)
+        if searches[step].runs == made:
+            break
     return CollapseScale(searches, motion.pga, doubt_soft_blocks(begin.model.structure))

@@ -185,6 +185,8 @@ def test_ctrl_c_keeps_the_bracket_so_far(caplog):
         2.0**0.5
     )  # the broken-off run counts for nothing
     assert found["verified"].run is None
+    stopped = pretended(dict.fromkeys(DEFINITIONS, beyond(2.5)), lambda _: Ending.INTERRUPTED)
+    assert len(search_scales(stopped, DEFINITIONS, 0.05, (0.05, 5.0), (2.0, 1.0)).runs) == 1
 
 
 def test_ctrl_c_between_runs_keeps_the_bracket_so_far():
@@ -264,18 +266,37 @@ def test_gaps_below_the_largest_scale_are_filled_where_nothing_falls_there():
     assert len(found.runs) == 4
 
 
-def test_the_second_step_begins_near_the_fall_of_the_first(monkeypatch):
-    """Its scales lie between those of the first."""
-    made = {0.01: [], 0.005: []}
+def searched_by_steps(monkeypatch, windows, made):
+    """Search the fall of a block that falls within given windows of scales by each time step."""
 
     def shake(model, motion, *, dt, **_):
-        run = shaken_down((2.9, inf), made=made[dt])(motion.pga)
+        run = shaken_down(*windows[dt], made=made.setdefault(dt, []))(motion.pga)
         return SimpleNamespace(ending=run.ending, outcome="", fall=run.fall, doubts=())
 
     monkeypatch.setattr("archfem.dynamics.motion_scaling.time_history", shake)
     block = af.column(breadth=1.0, heights=[1.0])
     model = af.build(block, fidelity="rigid", displacements="large")
-    found = af.collapse_scale(model, af.Motion(np.array([0.0, 1.0, 0.0]), dt=0.01), dt=0.01)
+    return af.collapse_scale(model, af.Motion(np.array([0.0, 1.0, 0.0]), dt=0.01), dt=(*windows,))
+
+
+@pytest.mark.parametrize("agree", [True, False])
+@pytest.mark.parametrize(("window", "finds"), [((0.9, 0.93), 0.01), ((0.925, 0.945), 0.005)])
+def test_steps_disagree_at_equal_scales_only(monkeypatch, window, finds, agree):
+    """One step finds a window of falls over which the other one jumps."""
+    made, beyond = {}, (0.97, inf)
+    falls = {dt: (window, beyond) if agree or dt == finds else (beyond,) for dt in (0.01, 0.005)}
+    found = searched_by_steps(monkeypatch, falls, made)
+    bracket = found.bracket(finds)
+    assert window[0] < bracket.upper < window[1]
+    assert all({bracket.lower, bracket.upper} <= set(scales) for scales in made.values())
+    assert any("time steps disagree" in doubt for doubt in found.doubts) != agree
+    assert all(len(set(scales)) == len(scales) for scales in made.values())
+
+
+def test_the_second_step_begins_near_the_fall_of_the_first(monkeypatch):
+    """Its scales lie between those of the first."""
+    made = {}
+    found = searched_by_steps(monkeypatch, dict.fromkeys((0.01, 0.005), ((2.9, inf),)), made)
     assert found.lower < 2.9 < found.upper
     assert made[0.005][0] == pytest.approx(found.bracket(0.01).upper / 1.05**0.5)
     assert len(made[0.005]) < len(made[0.01])
@@ -302,9 +323,9 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     assert found.above == (2.7, 3.0)
     assert found.bracket(0.005).upper == 2.5
     assert str(found) == (
-        "stands at 1.00 × the motion, falls at 2.00 × the motion, with all time steps from 2.50 × "
-        "on; stands at every smaller scale that was run, from 0.500 × on up to a factor of 2.00 "
-        "apart; those between were not run"
+        "stands at 1.00 × the motion, falls at 2.00 × the motion, the other time step first falls "
+        "at 2.50 ×; stands at every smaller scale that was run, from 0.500 × on up to a factor of "
+        "2.00 apart; those between were not run"
     )
     assert [doubt.partition(" at ")[0] for doubt in found.doubts] == [
         "by a time step of 10 ms, it is not monotonic: it survives also",
@@ -313,11 +334,27 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     never = CollapseScale({0.01: fallen(1.0, -2.0), 0.005: fallen(1.0, 2.0)})
     assert (never.lower, never.upper, never.above) == (1.0, inf, ())
     assert str(never) == (
-        "stands at 1.00 × the motion, falls at 2.00 × the motion, with all time steps at no scale"
+        "stands at 1.00 × the motion, falls at 2.00 × the motion, the other time step falls at no "
+        "scale"
     )
     assert never.doubts == (
-        "its time steps disagree: it falls from 1.00 to 2.00 by 10 ms, 2.00 to inf by 5 ms",
+        "its time steps disagree: it first falls between 1.00 and 2.00 × by 10 ms, between 2.00 "
+        "and inf × by 5 ms",
     )
+    three = CollapseScale({dt: fallen(1.0, -upper) for dt, upper in enumerate((2.0, 2.2, 2.1))})
+    assert "2.00 × the motion, the last time step first falls at 2.20 ×" in str(three)
+
+
+def test_smaller_scales_at_which_it_is_dislocated_are_said():
+    found = fallen(1.0, 1.1, 1.2, 1.3, -1.4)
+    runs = [
+        replace(run, fall=replace(run.fall, kind="dislocated")) if 1.1 <= run.scale < 1.3 else run
+        for run in found.runs
+    ]
+    said = str(CollapseScale({0.005: replace(found, runs=tuple(runs))}))
+    assert "; stands, or is dislocated (first at 1.10 ×), at every smaller scale that was" in said
+    bound = CollapseScale({0.005: replace(found, runs=(*runs[:1], runs[1], found.runs[-1]))})
+    assert "; stands at every smaller scale that was run" in str(bound)
 
 
 @pytest.mark.parametrize(
@@ -393,7 +430,7 @@ def test_collapse_is_not_sought_beyond_five_g(between, limits, monkeypatch):
     ranges = []
     monkeypatch.setattr(
         "archfem.dynamics.motion_scaling.search_scales",
-        lambda _, what, precision, found, first: ranges.append(found) or MechanismScales(what),
+        lambda _, what, precision, found, *begin: ranges.append(found) or MechanismScales(what),
     )
     block = af.column(breadth=1.0, heights=[1.0])
     model = af.build(block, fidelity="rigid", displacements="large")
