@@ -197,7 +197,9 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
         f"{model.size} coordinates ({result.seconds:.2f} s with the dead load)"
     ]
     lines += [] if model.prediction is None else [f"model: {model.prediction.text}"]
-    lines.append(f"dead load: {_describe_largest(joints)}")
+    # without equilibrium there is no result; doubts may be about it, and are printed below
+    doubted = ", in doubt as below" if result.doubts else ""
+    lines.append(f"dead load: stands under its own weight{doubted}: {_describe_largest(joints)}")
     if structure.heads.any():
         heads = result.dead.joints.isel(joint=structure.heads)
         lines[-1] += f"; of head joints, which do not count, {_describe_largest(heads)}"

@@ -71,6 +71,15 @@ def test_results_name_them():
     assert describe_defaults(case) in describe_dead_load(af.cases.DeadLoadResult.of(case))
 
 
+def test_the_dead_load_says_whether_it_stands_and_what_is_in_doubt():
+    """Joints of very little friction are doubted."""
+    for friction, doubted in ((0.6, ""), (0.05, ", in doubt as below")):
+        contact = {"normal_stiffness": 1.48e9, "friction": friction}
+        given = {"model": {"fidelity": "rigid"}, "contacts": {"stone to stone": contact}}
+        text = describe_dead_load(af.cases.DeadLoadResult.of(af.Case.of(BARE | given)))
+        assert f"dead load: stands under its own weight{doubted}: |e| ≤ " in text
+
+
 def test_head_joints_are_apart_in_the_line_of_the_dead_load(tmp_path):
     """Two stones side by side under a third: their joint carries nothing."""
     corners = {"a": (0, 0, 1, 1), "b": (1, 0, 2, 1), "c": (0, 1, 2, 2), "ground": (0, -1, 2, 0)}
@@ -83,7 +92,8 @@ def test_head_joints_are_apart_in_the_line_of_the_dead_load(tmp_path):
     wall = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.6))
     case = af.Case.read(af.Analysis(wall, fidelity="rigid").write(tmp_path / "wall.toml"))
     text = describe_dead_load(af.cases.DeadLoadResult.of(case))
-    (line,) = [each for each in text.splitlines() if each.startswith("dead load: |e|")]
+    (line,) = [each for each in text.splitlines() if each.startswith("dead load: ")]
+    assert line.startswith("dead load: stands under its own weight: |e| ≤ ")
     beds, heads = line.split("; of head joints, which do not count, ")
     assert beds.endswith(f"N ≥ {1e-3 * af.STONE.unit_weight:.2f} kN")  # c rests on a and b
     assert heads.endswith("N ≥ 0.00 kN")

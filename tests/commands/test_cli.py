@@ -92,7 +92,9 @@ def test_a_title_is_printed_as_far_as_the_terminal_has_letters(encoding, tmp_pat
 
 def test_check_command(capsys):
     assert af.commands.main(["check", str(RING), "--set", "model.fidelity=rigid"]) == 0
-    assert "ready" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "dead load: stands under its own weight: |e| ≤ " in said
+    assert "ready" in said
     assert af.commands.main(["check", str(RING), "--set", "structure.radus=3"]) == 1
     assert "did you mean 'radius'" in capsys.readouterr().err
 

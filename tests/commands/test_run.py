@@ -46,6 +46,7 @@ def test_run_command(tmp_path, undrawn, capsys):
     assert af.Case.of(tomllib.loads(run.dataset.attrs["case"])).analysis.fidelity == "rigid"
     said = capsys.readouterr().out
     assert "joint 7" in said
+    assert "dead load: stands under its own weight: |e| ≤ " in said
     assert (tmp_path / "out" / "modes.txt").read_text(encoding="utf-8") in said
     assert "damping: 5 % at 8.00 and 16.00 Hz" in said
 

@@ -60,6 +60,39 @@ def test_distances_of_a_symmetric_arc_are_square_to_every_change_of_the_circle()
         assert np.abs(found.distances @ changes).max() <= 1e-8 * 36 * 4e-3
 
 
+CURVES = {
+    # shape, span and rise [m], and largest distance from the circle [% of the span] that is doubted
+    "circle": (af.circular_arch, 4.0, 2.0, None),
+    "nearly a circle": (af.shapes.elliptical_arch, 4.0, 1.95, None),
+    "ellipse": (af.shapes.elliptical_arch, 4.0, 1.3, 2.2),
+    "pointed": (af.shapes.pointed_arch, 5.0, 3.57, 5.1),
+}
+
+
+@pytest.mark.parametrize("curve", CURVES)
+def test_a_circle_of_another_curve_is_doubted(curve, caplog):
+    """A ring along it needs 0.069 m at rest where the half ellipse needs 0.26 m."""
+    build, span, rise, share = CURVES[curve]
+    ring = build(span=span, rise=rise, thickness=0.4, voussoirs=19)
+    found = fitted_circle([joint.intrados for joint in ring.joints])
+    if share is None:
+        assert not caplog.records
+    else:
+        misfit = 1e3 * np.abs(found.distances).max()
+        assert f"up to {misfit:.3g} mm from the circle" in caplog.text
+        assert f", {share} % of their extent: " in caplog.text
+        assert "pointed_arch, elliptical_arch" in caplog.text
+
+
+def test_points_are_as_far_from_their_circle_as_a_survey_errs(caplog):
+    """Errors of 3 mm are none of the curve, and 20 mm on 5 m are."""
+    for error, doubts in ((0.003, 0), (0.02, 1)):
+        caplog.clear()
+        _, points = intrados(*ARCHES[1])
+        fitted_circle(points + np.random.default_rng(4).normal(0.0, error, points.shape))
+        assert len(caplog.records) == doubts
+
+
 @pytest.mark.parametrize(
     ("points", "says"),
     [

@@ -86,6 +86,13 @@ LOWER = {"rock": square(0, -1)}
             LOWER | {"a": [[-0.1, 0.0033], [1, 0], [1, 1], [-0.1, 1]]},
             r"are 3 mm apart at \(0, 0\) m, .*; or is the unit wrong\? By unit = 'm' .* 1.1 × 2 m$",
         ),
+        (  # as of millimetres for centimetres: no snap up to a tenth of the stone closes it
+            {
+                "rock": [[0, -0.03], [0.03, -0.03], [0.03, 0], [0, 0]],
+                "a": [[0, 0.004], [0.03, 0.004], [0.03, 0.03], [0, 0.03]],
+            },
+            r"are 4 mm apart .* touch; or is the unit wrong\? By unit = 'm' .* 0.03 × 0.06 m$",
+        ),
         (
             LOWER | {"a": square(0, 0), "b": square(0, 0)},
             r"'a' and 'b' at \(0.5, 0.5\) m are the same: leave one out$",

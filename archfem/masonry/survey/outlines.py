@@ -331,16 +331,17 @@ def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
     higher = [value for value in values if snap < value <= largest]
     # a lower tolerance would leave a gap open
     lower = [value for value in values[::-1] if 0.05 * snap <= value < snap and not is_gap]
-    frame = outlines[0].frame
+    frame, asks_unit = outlines[0].frame, is_gap
     for verb, values in (("raise", higher), ("lower", lower)):
         if value := next((each for each in values if _closes_all(outlines, each)), None):
             advice += f", or {verb} snap from {snap / frame.factor:.3g} to {frame.length(value)}"
             if value > 2.0 * snap:
                 advice += ", which also closes real openings up to that"
-            if verb == "raise":
-                size = _say_size(_measure(outlines))
-                advice += f"; or is the unit wrong? By unit = '{frame.unit}' the drawing is {size}"
+            asks_unit |= verb == "raise"
             break
+    if asks_unit:
+        size = _say_size(_measure(outlines))
+        advice += f"; or is the unit wrong? By unit = '{frame.unit}' the drawing is {size}"
     raise InvalidStructure(advice)
 
 
