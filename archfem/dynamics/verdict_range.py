@@ -122,13 +122,18 @@ class VerdictRange(ResultDisplay):
         return f"falls in {int(self.falls[self.answered].sum())} of {int(self.answered.sum())}"
 
     @property
+    def unanswered(self) -> str:
+        """How many runs have no answer, for the end of a sentence; empty if all have one."""
+        missing = int((~self.answered).sum())
+        return f"; {missing} of {len(self.answered)} have no answer" if missing else ""
+
+    @property
     def sentence(self) -> str:
         """How often the structure falls, and where."""
-        falls, answered = self.falls[self.answered], int(self.answered.sum())
-        missing = len(self.answered) - answered
+        falls = self.falls[self.answered]
         if not (self.answered & self.dataset["sampled"].values).any():
             errors = [error for error in self.dataset["error"].values if error]
-            return f"{missing} of {len(self.answered)} runs have no answer: {errors[0]}"
+            return f"{len(errors)} of {len(self.answered)} runs have no answer: {errors[0]}"
         text = self.count
         if 0 < falls.sum() < len(falls):
             text += f": {self._describe_falls()}"
@@ -139,7 +144,7 @@ class VerdictRange(ResultDisplay):
             f"({low:.0%} to {high:.0%} at 95%)"
         )
         text += f", under '{motion}' alone" if (motion := self.dataset.attrs.get("motion")) else ""
-        return text + (f"; {missing} have no answer" if missing else "")
+        return text + self.unanswered
 
     def _describe_falls(self) -> str:
         """Return the one or two conditions that separate runs that fall from others best."""

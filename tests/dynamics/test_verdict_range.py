@@ -87,7 +87,8 @@ def test_a_run_without_an_answer_neither_stands_nor_falls():
     assert found.answered.tolist() == [True] * 4 + [False]
     assert found.share == 0.5
     assert found.sentence.startswith("falls in 2 of 4")
-    assert found.sentence.endswith("; 1 have no answer")
+    assert found.sentence.endswith(" have no answer")
+    assert found.unanswered.startswith("; 1 of ")
     without = made_up([True, False, False, True], sign=names[:4])
     assert found.interval() == without.interval()
     assert found.importance() == without.importance()

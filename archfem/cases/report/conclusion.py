@@ -104,7 +104,7 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
     if found is None or (len(data.runs) > 1 and found.dataset.attrs.get("motion") != own):
         return verdict.headline
     # a run cannot know that a range was computed after it
-    return verdict.headline.replace(NO_RANGE, f"{found.count} variations")
+    return verdict.headline.replace(NO_RANGE, f"{found.count} variations{found.unanswered}")
 
 
 def build_conclusion(data: ReportData) -> Section:
@@ -223,7 +223,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     if (computed := data.verdict_range) is not None:
         motion = computed.dataset.attrs.get("motion")
         name = f"{_VARIATIONS} under '{motion}'" if motion else _VARIATIONS
-        yield _VARIATIONS, (name, "the same motion", computed.count, "-")
+        yield _VARIATIONS, (name, "the same motion", computed.count + computed.unanswered, "-")
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for name, demand, *others in statement.rows:

@@ -304,7 +304,11 @@ def build_ground_section(data: ReportData) -> Section:
     motions = list(data.motions.values())
     if not motions:
         return Section("Ground motion", [])
-    caption = "Measures of the motions as applied, read at the steps that the runs recorded."
+    longest = max(float(np.diff(run.time).max(initial=0.0)) for run in data.runs.values())
+    caption = (
+        f"Measures of the motions in the steps of the runs, up to {1e3 * longest:.3g} ms: peaks "
+        "between steps are left out, and displacements drift; archfem motion measures the motion."
+    )
     blocks: list[Any] = [Grid(*result_text.tabulate_motions(motions), caption)]
     if data.case.suite is None:
         applied = "Ground motion as applied: acceleration, velocity and displacement."
