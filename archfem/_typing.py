@@ -39,3 +39,6 @@ class NumberOrWord:
 
 # Coefficient of friction; a joint of "none" never slides
 Friction = Annotated[float | None, NumberOrWord("1", "none")]
+
+# Strength of the stones at joints, which do not crush with "none"
+CrushingStrength = Annotated[float | None, NumberOrWord("Pa", "none")]

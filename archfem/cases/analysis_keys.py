@@ -44,7 +44,7 @@ class LimitAnalysis:
             and strengths are those of a rating.
         friction: friction law, "coulomb", "nonassociated", or None without sliding.
         strength: compressive strength of the stones at the joints [Pa], that of [limit] or else
-            the least that [materials] give; or None.
+            the least that [materials] give; None, or infinite for "none", without crushing.
         fill: strength of the fill, or None.
         dead: loads beside self-weight that do not grow.
     """
@@ -93,13 +93,13 @@ class LimitAnalysis:
             )
         return collapse_factor(structure, live=self.live, dead=self.dead, **self.resistance)
 
-    def solve_opposite(self, structure: Structure) -> Collapse | None:
-        """Solve with the load in the other sense; None unless all of it is horizontal."""
+    @property
+    def opposite(self) -> "LimitAnalysis | None":
+        """The analysis with the load in the other sense; None unless all of it is horizontal."""
         loads = [load for load in self.live if isinstance(load, BodyForce) and not load.vertical]
         if len(loads) < len(self.live):
             return None
-        opposite = [BodyForce(-load.horizontal) for load in loads]
-        return replace(self, live=opposite).solve(structure)
+        return replace(self, live=[BodyForce(-load.horizontal) for load in loads])
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,10 @@ def parse_limit(table: Any, strength: float | None = None) -> LimitAnalysis:
     live, dead = _read_loads(values, "limit")
     friction = _check_friction(values.get("friction", "coulomb"), "limit.friction")
     fill = _fill(values["fill"], "limit.fill") if "fill" in values else None
-    return LimitAnalysis(live, friction, values.get("strength", strength), fill, dead)
+    given = values.get("strength", strength)
+    if "strength" in values and given is None:  # "none"
+        given = np.inf
+    return LimitAnalysis(live, friction, given, fill, dead)
 
 
 def parse_pushover(table: Any) -> PushoverSettings:

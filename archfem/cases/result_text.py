@@ -255,6 +255,10 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     lines += [str(collapse.solutions)] if collapse.solutions else []
     crushing = describe_crushing(limit.strength)
     lines += filter(None, [crushing, describe_fill(limit.fill)])
+    if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES:
+        lines.append(
+            "blocks are rigid, and elastic joints may bear less: hold a motion a tenth below"
+        )
     return "\n".join(lines)
 
 
@@ -278,20 +282,24 @@ def _slides_alone(structure: Structure, collapse: Collapse) -> bool:
     return bool(structure.heads.any() and np.allclose(structure.friction, push, rtol=1e-3))
 
 
-def describe_limit(case: Case, found: Collapse) -> tuple[Collapse, str]:
-    """Return the lesser result of a horizontal load in both senses, and the text on both."""
-    opposite = None
-    if found.outcome is not Outcome.INFEASIBLE:  # where the load, in either sense, plays no part
-        opposite = case.limit.solve_opposite(case.structure)
+def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tuple[Collapse, str]:
+    """Return the lesser result of a load in one and the other sense, and the text on both."""
     if opposite is None:
         return found, describe_collapse(case.structure, found, case.limit)
-    rank = "not less"
-    if np.isclose(opposite.factor, found.factor, rtol=1e-4):
-        rank = "the same"
-    elif opposite.factor < found.factor:
+    if opposite.factor < found.factor and not np.isclose(opposite.factor, found.factor, rtol=1e-4):
         found, opposite = opposite, found
     text = describe_collapse(case.structure, found, case.limit)
+    rank = _compare_senses(found, opposite)
     return found, f"{text}\nin the other sense: {opposite.sentence} ({rank})"
+
+
+def _compare_senses(found: Collapse, opposite: Collapse) -> str:
+    """Say whether a load bears more in the other sense, by results whose first is not greater."""
+    rank = "more" if opposite.factor > found.upper else "not surely more"
+    if np.isclose(opposite.factor, found.factor, rtol=1e-4):
+        rank = "the same"
+    searched = any(each.solutions and each.solutions.may_be_less for each in (found, opposite))
+    return f"{rank}; each sense is searched by itself" if searched else rank
 
 
 def describe_pushover(push: Pushover) -> str:

@@ -41,7 +41,7 @@ from archfem.cases.run import (
 from archfem.cases.structure_keys import read_survey
 from archfem.cases.toml_file import format_tables, parse_change
 from archfem.commands.cli import ExitCode
-from archfem.commands.tools import print_motions
+from archfem.commands.tools import print_motions, show_both_senses
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.motion_scaling import (
     CollapseScale,
@@ -190,12 +190,15 @@ def modes(options: argparse.Namespace) -> int:
 def limit(options: argparse.Namespace) -> int:
     """Find the collapse factor of the loads in [limit], and the mechanism."""
     case = Case.read(options.case, options.changes)
+
+    def show(found: Collapse, text: str) -> None:
+        lines = [*dict.fromkeys(doubts)]  # the other sense may have the same
+        text = "\n".join([text, *lines])
+        files = partial(results.limit_files, found, text, lines)
+        _write_results("limit", case, options.out, f"{case.title}\n{text}", files)
+
     with _record_doubts(case.structure) as doubts:
-        found, text = result_text.describe_limit(case, case.limit.solve(case.structure))
-    doubts = [*dict.fromkeys(doubts)]  # the other sense may have the same
-    text = "\n".join([text, *doubts])
-    files = partial(results.limit_files, found, text, doubts)
-    _write_results("limit", case, options.out, f"{case.title}\n{text}", files)
+        show_both_senses(case, case.limit.solve(case.structure), show)
     return _doubt_code(doubts)
 
 
@@ -206,7 +209,7 @@ def assess(options: argparse.Namespace) -> int:
     demand = case.target if case.target is not None else motion
     with _record_doubts(case.structure) as doubts:
         found = case.assessment.solve(case.structure, demand, options.parts)
-    if case.limit.strength is not None:
+    if case.limit.strength not in (None, np.inf):
         doubts.append(
             f"{result_text.NOTE_MARK}joints hinge about their edges: that stones crush at the "
             f"given {case.limit.strength / MPa:.3g} MPa would lower alpha_0; `archfem limit` with "
@@ -487,11 +490,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
         supports = len(doubts)
         for result in found:
             if isinstance(result, Collapse):
-                least, text = result_text.describe_limit(case, result)
-                of_limit = [*dict.fromkeys(doubts)]
-                text = "\n".join([text, *of_limit])
-                print(text)
-                write(results.limit_files(least, text, of_limit), folder)
+                of_limit = _print_limit(case, result, doubts, folder)
             elif isinstance(result, DeadLoadResult):
                 at_rest = result
                 print(result_text.describe_dead_load(at_rest))
@@ -515,6 +514,20 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
         _print_pairs(suite, runs, at_rest, folder)
     verdict = result_text.describe_verdicts(runs.values()) if runs else ""
     return verdict, any([of_limit, at_rest.doubts, *(run.doubts for run in runs.values())])
+
+
+def _print_limit(case: Case, first: Collapse, doubts: list[str], folder: Path) -> list[str]:
+    """Print limit analysis in both senses, write its files, and return its doubts."""
+    of_limit: list[str] = []
+
+    def show(found: Collapse, text: str) -> None:
+        of_limit.extend(dict.fromkeys(doubts))
+        text = "\n".join([text, *of_limit])
+        print(text)
+        write(results.limit_files(found, text, of_limit), folder)
+
+    show_both_senses(case, first, show)
+    return of_limit
 
 
 def _print_first_modes(at_rest: DeadLoadResult, folder: Path, max_modes: int = 4) -> None:

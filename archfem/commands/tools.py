@@ -8,13 +8,14 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from archfem import _numba, _optional
+from archfem._display import write_progress_line
 from archfem._files import path_inside, read_listed
 from archfem.cases import result_text
 from archfem.cases.case import Case
@@ -25,6 +26,7 @@ from archfem.cases.toml_file import parse_tables
 from archfem.commands.cli import ExitCode
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput, NotInstalled
+from archfem.limit.collapse import Collapse, Outcome
 from archfem.motion.suite import Suite
 
 PIP_INSTALL = f"{sys.executable} -m pip install"
@@ -39,7 +41,7 @@ def check(options: argparse.Namespace) -> int:
     print(result_text.describe_supports(case.structure))
     print(result_text.describe_depths(case.structure))
     if case.limit.live:
-        print(result_text.describe_limit(case, case.limit.solve(case.structure))[1])
+        show_both_senses(case, case.limit.solve(case.structure), lambda _, text: print(text))
     # Unreadable records are errors before the dead load is computed.
     case.check_ground()
     at_rest = DeadLoadResult.of(case)
@@ -132,6 +134,23 @@ def example(options: argparse.Namespace) -> None:
             f"`archfem example {options.name} --out DIR` copies all of them",
             file=sys.stderr,
         )
+
+
+def show_both_senses(case: Case, first: Collapse, show: Callable[[Collapse, str], None]) -> None:
+    """Show a result of limit analysis beside that of the other sense; cut short, it is kept."""
+    # where a structure does not stand, the load plays no part
+    other = None if first.outcome is Outcome.INFEASIBLE else case.limit.opposite
+    if other is None:
+        show(*result_text.describe_limit(case, first, None))
+        return
+    # a search in walls takes minutes in each sense
+    write_progress_line("limit analysis", f"{first.sentence}; the other sense follows")
+    opposite = None
+    try:
+        opposite = other.solve(case.structure)
+    finally:
+        found, text = result_text.describe_limit(case, first, opposite)
+        show(found, text if opposite else f"{text}\nin the other sense: not computed")
 
 
 def print_motions(suite: Suite) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._display import ExplainedWord, ResultDisplay
-from archfem._typing import Array, Pascals
+from archfem._typing import Array, CrushingStrength
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, logger
 from archfem.joints.resultants import check_instant, joint_dataset
@@ -172,7 +172,7 @@ def collapse_factor(
     *,
     live: Action | Settlement | Sequence[Action],
     friction: str | None = "coulomb",
-    strength: Pascals | None = None,
+    strength: CrushingStrength = None,
     fill: Fill | PlasticFill | None = None,
     dead: Sequence[Action] = (),
 ) -> Collapse:
@@ -214,9 +214,9 @@ def collapse_factor(
             None forbids sliding.
         strength: compressive strength σ of the blocks [Pa], which limits |M| to
             N h/2 - N²/(2 σ w), by a rectangular stress block. By default it is the least that the
-            materials at assessed joints have, or are given in a case; that of the preset `STONE`
-            does not count. Infinite for no limit. Joints of fill in pieces (`jointed_fill`) have
-            their own strength, and not this one.
+            materials at assessed joints have, or are given in a case; 56 MPa, the value of the
+            preset `STONE`, does not count. Infinite for no limit, "none" in a case. Joints of fill
+            in pieces (`jointed_fill`) have their own strength, and not this one.
         fill: strength of blocks softer than their joints, which become weight and pressures on the
             stones (`Fill`), with those that rest on them, or a plastic continuum (`PlasticFill`),
             for which the result has two bounds; None where there are none, or where they are cut

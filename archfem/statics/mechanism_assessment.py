@@ -295,7 +295,19 @@ class KinematicAssessment(ResultDisplay):
             changes = [event.text for event in self.path.events if event.text != self.path.end]
             lines += [f"along the path: {join_names(changes, '; ')}"] if changes else []
             lines += [self.path.end.sentence, *map(str, self.checks)]
-        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
+        return "\n".join([*lines, *(f"note: {note}" for note in [*self.notes, *self._split_note])])
+
+    @property
+    def _split_note(self) -> list[str]:
+        """Note on e* where a body of the first mechanism has several blocks: no doubt."""
+        bodies = self.path.mechanisms[0].body if self.path else np.zeros(0)
+        moving = bodies[bodies >= 0]
+        if len(moving) == len(np.unique(moving)):
+            return []
+        return [
+            "e* has the weights at the centroids of blocks: several blocks that move as one lower "
+            "it and raise both ratios; one block in their place is the safer choice"
+        ]
 
 
 @validate_arguments

@@ -109,6 +109,7 @@ def test_a_given_strength_of_the_stones_is_that_of_the_limit_analysis():
     assert strength_of(materials=given) == pytest.approx(2e6)
     assert strength_of(materials=given, limit={"friction": "none"}) == pytest.approx(2e6)
     assert strength_of(materials=given, limit={"strength": "3 MPa"}) == pytest.approx(3e6)
+    assert strength_of(materials=given, limit={"strength": "none"}) == np.inf
 
 
 def test_results_state_the_strength_with_which_joints_crush(tmp_path, capsys):

@@ -93,15 +93,20 @@ def test_limit_analysis_in_words(ring):
     both = af.collapse_factor(ring, live=[wheel, af.BodyForce(1.0)])
     assert both.sentence.endswith(f"at {both.factor:.4g} times the load")
     # the lesser of both senses is concluded with
-    for factor, rank in ((0.9, "not less"), (1.1, "not less"), (0.99999, "the same")):
+    case = SimpleNamespace(structure=ring, limit=limit)
+    for factor, rank in ((0.9, "more"), (1.1, "more"), (0.99999, "the same")):
         other = replace(mirrored, factor=factor * pushed.factor, upper=factor * pushed.factor)
-        solved = SimpleNamespace(**vars(limit), solve_opposite=lambda _, other=other: other)
-        case = SimpleNamespace(structure=ring, limit=solved)
-        least, words = describe_limit(case, pushed)
+        least, words = describe_limit(case, pushed, other)
         first, second = (other, pushed) if factor == 0.9 else (pushed, other)
         assert least is first
         assert words.startswith(f"limit analysis: {first.sentence}\n")
         assert words.endswith(f"\nin the other sense: {second.sentence} ({rank})")
+    ranged = replace(pushed, upper=1.2 * pushed.factor)  # above all that the other sense bears
+    words = describe_limit(case, ranged, replace(mirrored, factor=1.1 * pushed.factor))[1]
+    assert words.endswith(" (not surely more)")
+    least = replace(pushed, solutions=SimpleNamespace(may_be_less=True))
+    words = describe_limit(case, least, mirrored)[1]
+    assert words.endswith(" (more; each sense is searched by itself)")
     slab = af.column(breadth=4.0, heights=[1.0])  # slides before it turns
     slid, lifted = (af.collapse_factor(slab, live=af.BodyForce(*g)) for g in ((1.0,), (0.0, -1.0)))
     words = describe_collapse(slab, slid, parse_limit({})).splitlines()

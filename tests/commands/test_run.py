@@ -431,6 +431,26 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     assert "in the other sense" not in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("command", ["limit", "run"])
+def test_limit_analysis_cut_short_keeps_the_first_sense(
+    command, tmp_path, unplotted, monkeypatch, capsys
+):
+    def solve(structure, *, live, **options):
+        if live[0].horizontal < 0.0:
+            raise KeyboardInterrupt
+        return af.collapse_factor(structure, live=live, **options)
+
+    monkeypatch.setattr("archfem.cases.analysis_keys.collapse_factor", solve)
+    path, out = tmp_path / "ring.toml", tmp_path / "out"
+    path.write_text(LIMIT.replace("voussoirs = 17", "voussoirs = 7"))
+    assert af.commands.main([command, str(path), "--out", str(out)]) == 130
+    text, said = (out / "limit.txt").read_text(), capsys.readouterr()
+    assert text in said.out
+    assert text.startswith("limit analysis: the load turns it into a mechanism, at ")
+    assert "\nin the other sense: not computed" in text
+    assert "pushed to the right; the other sense follows" in said.err
+
+
 def test_an_assessment_takes_the_strength_of_a_fill():
     tables = tomllib.loads(LIMIT + '[assessment]\nfill = { friction_angle = "35 degree" }\n')
     fill = af.Case.of(tables).assessment.options["fill"]

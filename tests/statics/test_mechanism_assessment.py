@@ -526,3 +526,16 @@ def test_notes_tell_where_the_curve_is_an_upper_bound(ring):
         oscillator = mechanism_assessment._Oscillator(placed, ring.path, holds, False, *given)
         notes = oscillator.notes(share * factor)
         assert all(note.startswith(start) for note, start in zip(notes, said, strict=True))
+
+
+def test_courses_that_move_as_one_raise_both_ratios(verified):
+    """n equal courses that turn about the base have e* = 3 n² / (4 n² - 1)."""
+    whole, split = (
+        af.kinematic_assessment(af.column(breadth=0.5, heights=[1.8 / n] * n), SPECTRUM)
+        for n in (1, 8)
+    )
+    check_values(split, {"e_star": 192.0 / 255.0}, verified, "rigid block of eight courses")
+    assert split.alpha_0 == pytest.approx(whole.alpha_0)
+    assert all(b.ratio > 1.2 * a.ratio for a, b in zip(whole.checks, split.checks, strict=True))
+    assert str(split).endswith("one block in their place is the safer choice")
+    assert "weights at the centroids" not in str(whole)
