@@ -110,7 +110,7 @@ def _kind_of(hint: Any, named: tuple[type, ...]) -> Any:
 def short_repr(value: Any, max_length: int = 200) -> str:
     """Return the `repr` of any value, shortened for an error message."""
     try:
-        text = repr(value)
+        text = repr(value.item() if isinstance(value, np.number) else value)
     except Exception:  # integers of thousands of digits, or a faulty `__repr__`
         return f"<{type(value).__name__} that cannot be written>"
     if len(text) <= max_length:
