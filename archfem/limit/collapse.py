@@ -508,7 +508,7 @@ def _read_joints(
 def describe_crushing(strength: float | None) -> str:
     """Describe at which strength of the stones joints crush, if at all."""
     if strength is None or np.isinf(strength):
-        return "joints do not crush: no strength of the stones is given"
+        return "joints do not crush: no strength of the stones counts"
     return f"joints crush at {strength / MPa:.3g} MPa, the strength of the stones"
 
 
