@@ -13,7 +13,7 @@ from archfem._optional import can_film
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
-from archfem.cases.result_text import state_outcome
+from archfem.cases.result_text import compare_with_site, state_outcome
 from archfem.cases.run import (
     CASE_FILE,
     HISTORY_FILE,
@@ -179,12 +179,16 @@ def _read_case(place: Path, inputs: Path | None) -> Case:
         raise type(error)(f"{path}: {error}") from error
 
 
-def limit_files(collapse: Collapse, text: str, doubts: Sequence[str]) -> Files:
+def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[str]) -> Files:
     """Return text, joints at collapse and mechanism of a limit analysis."""
     columns = ["name", "N", "V", "M", "eccentricity"]
     joints = collapse.joints.to_dataframe()[columns].to_csv(index=False).rstrip()
-    factor = f"{collapse.factor:.4g}" if collapse.outcome is Outcome.COLLAPSES else "-"
-    given = collapse.sentence, doubts, "the given load", factor
+    demand, factor = compare_with_site(case, collapse)
+    if not factor:
+        demand, factor = "the given load", "-"
+        if collapse.outcome is Outcome.COLLAPSES:
+            factor = " to ".join(dict.fromkeys(f"{bound:.4g}" for bound in collapse.range))
+    given = collapse.sentence, doubts, demand, factor
     stated = state_outcome("limit analysis", *given).as_file("limit")
     return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot(), **stated}
 

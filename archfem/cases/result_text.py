@@ -26,6 +26,7 @@ from archfem.joints.criteria import (
     with_failure_flags,
 )
 from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
+from archfem.limit.fill_range import FillRange
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
 from archfem.masonry.loads import BodyForce
@@ -34,7 +35,8 @@ from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import Match
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity
-from archfem.statics.mechanism_assessment import AssessmentCheck, KinematicAssessment
+from archfem.statics.assessment_checks import AssessmentCheck
+from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_text, utilisation_text
 from archfem.units import STANDARD_GRAVITY, format_mm, kN
@@ -253,6 +255,8 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     if _slides_alone(structure, collapse):
         lines.append("all bed joints reach μ together: the mechanism is one of many")
     lines += [str(collapse.solutions)] if collapse.solutions else []
+    over = collapse.describe_range()
+    lines += [f"over what is assumed of the fill: {over}"] if over else []
     crushing = describe_crushing(limit.strength)
     lines += filter(None, [crushing, describe_fill(limit.fill)])
     if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES:
@@ -284,22 +288,39 @@ def _slides_alone(structure: Structure, collapse: Collapse) -> bool:
 
 def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tuple[Collapse, str]:
     """Return the lesser result of a load in one and the other sense, and the text on both."""
-    if opposite is None:
-        return found, describe_collapse(case.structure, found, case.limit)
-    if opposite.factor < found.factor and not np.isclose(opposite.factor, found.factor, rtol=1e-4):
-        found, opposite = opposite, found
-    text = describe_collapse(case.structure, found, case.limit)
-    rank = _compare_senses(found, opposite)
-    return found, f"{text}\nin the other sense: {opposite.sentence} ({rank})"
+    others = []
+    if opposite is not None:
+        close = np.allclose(opposite.range, found.range, rtol=1e-4)
+        if opposite.range[0] < found.range[0] and not close:
+            found, opposite = opposite, found
+        rank = _compare_senses(found, opposite)
+        others.append(f"in the other sense: {opposite.sentence} ({rank})")
+    demand, ratio = compare_with_site(case, found)
+    others += [f"it begins to move at {ratio} times {demand}"] if ratio else []
+    return found, "\n".join([describe_collapse(case.structure, found, case.limit), *others])
 
 
 def _compare_senses(found: Collapse, opposite: Collapse) -> str:
-    """Say whether a load bears more in the other sense, by results whose first is not greater."""
-    rank = "more" if opposite.factor > found.upper else "not surely more"
-    if np.isclose(opposite.factor, found.factor, rtol=1e-4):
+    """Say whether a load bears more in the other sense, by results whose least is the first's."""
+    rank = "more" if opposite.range[0] > found.range[1] else "their ranges overlap"
+    if np.allclose(opposite.range, found.range, rtol=1e-4):
         rank = "the same"
     searched = any(each.solutions and each.solutions.may_be_less for each in (found, opposite))
     return f"{rank}; each sense is searched by itself" if searched else rank
+
+
+def compare_with_site(case: Case, found: Collapse) -> tuple[str, str]:
+    """Return the site's ground acceleration, and its multiple at collapse; both empty if unknown.
+
+    The multiple is that of a push by the weight, over what is assumed of a fill.
+    """
+    spectrum = case.assessment.spectrum or case.target
+    if spectrum is None or not found.push or found.outcome is not Outcome.COLLAPSES:
+        return "", ""
+    ground, rock = float(spectrum.horizontal(0.0)), getattr(spectrum, "ag", None)
+    size = f"{ground:.3g} g" if rock is None else f"{rock:.3g} g × S {ground / rock:.3g}"
+    low, high = (f"{bound * abs(found.push) / ground:.3g}" for bound in found.range)
+    return f"the site's {size}", low if low == high else f"{low} to {high}"
 
 
 def describe_pushover(push: Pushover) -> str:
@@ -424,15 +445,26 @@ def state_assessments(found: Mapping[str, KinematicAssessment], doubts: list[str
     last = [str(result.checks[-1]) for result in found.values()]
     rows, sentences = [], []
     for text, (check, directions) in checks.items():
-        ways, outcome = " and ".join(directions), "passes" if check.passes else "fails"
+        ways, outcome = " and ".join(directions), check.outcome
         if check.passes and check.at_rest:
             outcome += ", for the mechanism does not begin to move"
         demand, capacity = (f"{x:.4g} {check.unit}" for x in (check.demand, check.capacity))
         name = f"assessment: {check.name}, {ways}"
-        rows.append((name, demand, f"{capacity}, {outcome}", f"{check.ratio:.3g}"))
+        rows.append((name, demand, f"{capacity}, {outcome}", check.ratios))
         sentences += [f"kinematic assessment, {ways}: {text}"] if text in last else []
+    sentences.append(describe_margin(found.values()))
     notes = (note for result in found.values() for note in result.notes)
     return Statement(sentences, rows, [*doubts, *notes])
+
+
+def describe_margin(found: Iterable[KinematicAssessment]) -> str:
+    """Describe the least ratio of the last checks, and its range over what is assumed of a fill."""
+    checks = [result.checks[-1] for result in found]
+    if ranges := [check.over_fill for check in checks if check.over_fill is not None]:
+        least = FillRange.least_of(ranges)
+        return f"least margin {least.describe(digits=3)}: {least.outcome}"
+    check = min(checks, key=lambda each: each.ratio)
+    return f"least margin {check.ratios}: {check.outcome}"
 
 
 def state_risk(found: Any) -> Statement:  # of `archfem.studies`, a room to the right

@@ -194,7 +194,7 @@ def limit(options: argparse.Namespace) -> int:
     def show(found: Collapse, text: str) -> None:
         lines = [*dict.fromkeys(doubts)]  # the other sense may have the same
         text = "\n".join([text, *lines])
-        files = partial(results.limit_files, found, text, lines)
+        files = partial(results.limit_files, case, found, text, lines)
         _write_results("limit", case, options.out, f"{case.title}\n{text}", files)
 
     with _record_doubts(case.structure) as doubts:
@@ -215,7 +215,8 @@ def assess(options: argparse.Namespace) -> int:
             f"given {case.limit.strength / MPa:.3g} MPa would lower alpha_0; `archfem limit` with "
             "horizontal = 1 or -1 in [limit] computes it so"
         )
-    texts = [f"{name}: {result}" for name, result in found.items()]
+    texts = [result_text.describe_margin(found.values())]
+    texts += [f"{name}: {result}" for name, result in found.items()]
     texts.append(describe_fill(case.assessment.options.get("fill")))
     text = "\n\n".join(filter(None, [*texts, "\n".join(dict.fromkeys(doubts))]))
 
@@ -524,7 +525,7 @@ def _print_limit(case: Case, first: Collapse, doubts: list[str], folder: Path) -
         of_limit.extend(dict.fromkeys(doubts))
         text = "\n".join([text, *of_limit])
         print(text)
-        write(results.limit_files(found, text, of_limit), folder)
+        write(results.limit_files(case, found, text, of_limit), folder)
 
     show_both_senses(case, first, show)
     return of_limit

@@ -42,7 +42,8 @@ from archfem.motion.design_spectra import registered_spectra
 from archfem.motion.hazard import MEASURES
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-from archfem.statics.mechanism_assessment import LimitState, kinematic_assessment
+from archfem.statics.assessment_checks import LimitState
+from archfem.statics.mechanism_assessment import kinematic_assessment
 from archfem.statics.newton import Newton
 from archfem.statics.pushover import Stop, pushover
 from archfem.studies.statements import Statement

@@ -4,6 +4,7 @@ from .collapse import Outcome as Outcome
 from .collapse import closed_cohesion as closed_cohesion
 from .collapse import collapse_factor as collapse_factor
 from .collapse import stands as stands
+from .fill_range import FillRange as FillRange
 from .finite_mechanism import MechanismPath as MechanismPath
 from .finite_mechanism import collapse_path as collapse_path
 from .mechanism_count import Mechanism as Mechanism

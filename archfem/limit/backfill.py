@@ -32,10 +32,6 @@ from archfem.units import in_degrees
 
 SELF_WEIGHT = BodyForce(0.0, -1.0)
 
-# Share of a factor by which the height of a fill's horizontal force may lower it unsaid [-]: less
-# than the eighth by which the best fill errs in load tests of bridges
-LEVER_TOLERANCE = 0.1
-
 
 @dataclass(frozen=True, kw_only=True)
 class Fill:
@@ -72,7 +68,7 @@ class Fill:
             stresses would carry outside of it is distributed inside.
         lever: where the horizontal force of each column acts, from 0 for its foot to 1 for its
             centroid. At 0 shear between the columns carries its moment to ends that hold the fill,
-            at 1 the stone below carries all of it. Neither is measured: state both [-].
+            at 1 the stone below carries all of it. Neither is measured: results state both [-].
         backing: level, a y coordinate, up to which there is masonry behind the haunches, not fill
             [m]; None for none. It holds the stones' faces horizontally, without tension: against
             the ground or, above a pier, against each other. It never pushes.
@@ -110,6 +106,15 @@ class Fill:
         check_choice(self.dispersal, "fill, dispersal", ("boussinesq", "uniform"))
         remedy = "give degrees from the vertical; 1 in 2 is 26.6"
         check_between(self.spread, "fill, spread [degrees]", 0.1, 80.0, ends="[]", remedy=remedy)
+
+    def changed(self, **values: Any) -> "Fill":
+        """Return a fill with other values.
+
+        Args:
+            values: of its attributes.
+        """
+        # as a bare number a small angle would be refused, which looks like radians
+        return replace(self, **{"spread": f"{self.spread!r} degree"} | values)
 
     @property
     def passive_coefficient(self) -> float:
@@ -505,20 +510,17 @@ class BlocksWithFill:
             cuts.append(at[np.append(True, np.diff(at) > near)])
         return cuts
 
-    def load(self, actions: Sequence[BodyForce | PointLoad], lever: float | None = None) -> Array:
+    def load(self, actions: Sequence[BodyForce | PointLoad]) -> Array:
         """Return the generalised forces of actions on the free stones (3 n_free,) [N, N, N m].
 
         Args:
             actions: that act on the whole structure.
-            lever: as of a `Fill`; by default its own.
         """
         total = np.zeros(3 * len(self.rigid_regions.structure.free))
         for action in actions:
             # a body force acts on the fill too, and so on the stone below each column
             if self.fill is not None and isinstance(action, BodyForce):
-                block, place, weight = self._profile.columns(
-                    self.fill.lever if lever is None else lever
-                )
+                block, place, weight = self._profile.columns(self.fill.lever)
                 pull = weight[:, None] * np.array([action.horizontal, action.vertical])
                 total += self._sum_forces(self.rigid_regions.place[block], place, pull)
             if self.fill is not None and isinstance(action, PointLoad):
@@ -606,16 +608,6 @@ class BlocksWithFill:
     def _sum_forces(self, block: Numbers, points: Array, forces: Array) -> Array:
         """Return the sum of the generalised forces of forces at points (3 n_free,)."""
         return np.asarray(self._apply_forces(block, points, forces).sum(axis=0)).ravel()
-
-
-def warn_of_lever(factor: float, raised: float, name: str = "the factor") -> None:
-    """Warn where a factor rests on horizontal forces of the fill that act below its centroid."""
-    if raised < (1.0 - LEVER_TOLERANCE) * factor:
-        logger.warning(
-            "%s of %.4g rests on horizontal forces of the fill below the centroids of its columns: "
-            "at these it is at most %.4g; state the range, by lever = 1 in fill",
-            *(name, factor, raised),
-        )
 
 
 def sum_body_forces(actions: Sequence[Action]) -> tuple[float, float]:

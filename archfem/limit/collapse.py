@@ -28,9 +28,9 @@ from archfem.limit.backfill import (
     refuse_bonds,
     self_weight_programme,
     sum_body_forces,
-    warn_of_lever,
 )
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
+from archfem.limit.fill_range import FillRange, vary_fill
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
@@ -81,6 +81,7 @@ class Collapse(ResultDisplay):
             else None.
         upper: what no state of equilibrium exceeds: the factor itself, with a `PlasticFill` the
             bound from above. `factor` is the bound from below then, and `lower` another name of it.
+        over_fill: factors over all assumptions on a `Fill` that is pushed sideways; else None.
         live: the growing actions, or the settlement.
         dead: the actions beside self-weight that do not grow.
         structure: the analysed structure; None where the result was built by hand.
@@ -96,6 +97,7 @@ class Collapse(ResultDisplay):
     soil: xr.Dataset | None = None
     fill_motion: xr.Dataset | None = None
     upper: float = np.nan
+    over_fill: FillRange | None = None
     live: tuple[Action | Settlement, ...] = ()
     dead: tuple[Action, ...] = ()
     structure: Structure | None = None
@@ -121,33 +123,54 @@ class Collapse(ResultDisplay):
         return tuple(str(self.joints["name"].values[joint]) for joint in self.sliding)
 
     @property
+    def range(self) -> tuple[float, float]:
+        """Least and largest factor: over all assumptions on a fill, or both bounds [-]."""
+        return (self.factor, self.upper) if self.over_fill is None else self.over_fill.ends
+
+    @property
+    def push(self) -> float:
+        """Horizontal body force that alone grows, at a factor of 1 [g]; else 0."""
+        load = self.live[0] if len(self.live) == 1 else None
+        return load.horizontal if isinstance(load, BodyForce) and not load.vertical else 0.0
+
+    @property
     def sentence(self) -> str:
         """The outcome, and the load at collapse where there is one."""
+        if self.outcome is Outcome.UNBOUNDED and self.over_fill and np.isfinite(self.range[0]):
+            return f"{self.outcome.sentence}, or does {self.describe_range()}"
         if self.outcome not in (Outcome.COLLAPSES, Outcome.BRACKETED):
             return self.outcome.sentence
-        load, unit = (self.live[0] if len(self.live) == 1 else None), 1.0
-        points = [action for action in self.live if isinstance(action, PointLoad)]
-        words = " times the load"
-        if isinstance(load, BodyForce) and load.horizontal and not load.vertical:
-            unit = abs(load.horizontal)
-            words = f" g, pushed to the {'right' if load.horizontal > 0.0 else 'left'}"
-        elif points and len(points) == len(self.live):
-            sizes = join_names([f"{np.hypot(*point.force) / kN:.4g}" for point in points])
-            places = join_names([f"{point.x:.4g}" for point in points])
-            words = f" times {sizes} kN at x = {places} m"
-        elif isinstance(load, Settlement):
-            words = " N m"
-        low, high = (f"{unit * bound:.4g}" for bound in (self.factor, self.upper))
-        place = f"at {low}" if low == high else f"at {low} to {high}"
+        unit = abs(self.push) or 1.0
+        ends = self.range if self.outcome is Outcome.COLLAPSES else (self.factor, self.upper)
+        low, high = (f"{unit * bound:.4g}" for bound in ends)
+        place, words = f"at {low}" if low == high else f"at {low} to {high}", self._name_load()
         if self.outcome is Outcome.BRACKETED:
             place = f"which is not below {low}, nor above {high}"
             if np.isinf(self.upper):
                 place = f"which is at least {low}"
-            elif low == high or abs(self.factor) <= 1e-9 * abs(self.upper):
+            elif low == high or (self.solutions and not self.solutions.has_lower_bound):
                 place = f"which is at most {high}"
-        elif self.outcome is Outcome.COLLAPSES and self.solutions and self.solutions.may_be_less:
-            place, words = f"at ≤ {low}", f"{words} (least found)"
+        elif self.solutions and self.solutions.may_be_less:
+            place, words = place.replace("at ", "at ≤ ", 1), f"{words} (least found)"
         return f"{self.outcome.sentence}, {place}{words}"
+
+    def _name_load(self) -> str:
+        """Return the unit of the factor and what the load is, in words."""
+        points = [action for action in self.live if isinstance(action, PointLoad)]
+        if self.push:
+            return f" g, pushed to the {'right' if self.push > 0.0 else 'left'}"
+        if points and len(points) == len(self.live):
+            sizes = join_names([f"{np.hypot(*point.force) / kN:.4g}" for point in points])
+            places = join_names([f"{point.x:.4g}" for point in points])
+            return f" times {sizes} kN at x = {places} m"
+        is_settlement = len(self.live) == 1 and isinstance(self.live[0], Settlement)
+        return " N m" if is_settlement else " times the load"
+
+    def describe_range(self) -> str:
+        """Describe both ends of the range over all assumptions on a fill; empty without one."""
+        if self.over_fill is None:
+            return ""
+        return f"at {self.over_fill.describe(abs(self.push) or 1.0, name=' g' * bool(self.push))}"
 
     def _summary(self) -> str:
         """Describe the result in one or two lines."""
@@ -164,7 +187,8 @@ class Collapse(ResultDisplay):
         )
         text = f"{self.outcome.sentence}: factor {self.factor:.4g}{bound}; hinges: {hinges}; "
         solutions = "" if self.solutions is None else f"; {self.solutions}"
-        return f"{text}sliding: {sliding}{solutions}"
+        over = f"; {self.describe_range()}" if self.over_fill else ""
+        return f"{text}sliding: {sliding}{solutions}{over}"
 
 
 def collapse_factor(
@@ -260,9 +284,11 @@ def collapse_factor(
         result = _solve_collapse(stones, programme, loads, friction)
         if result.outcome is Outcome.COLLAPSES and not isinstance(loads, Settlement):
             stones.warn_of_sliding_fill(loads, stays, result.factor)
-            if fill is not None and fill.lever < 1.0 and sum_body_forces(loads)[0]:
-                high = programme.with_load_factor(stones.load(loads, lever=1.0)).solve()
-                warn_of_lever(result.factor, np.inf if high is None else -high.value)
+        stands = result.outcome is not Outcome.INFEASIBLE
+        if fill is not None and stands and not isinstance(loads, Settlement):
+            given = structure, friction, strength
+            over_fill = _vary_assumptions(*given, fill, loads, stays, result.factor)
+            result = replace(result, over_fill=over_fill)
     if np.isinf(result.factor):
         warn_locking(structure, friction)
     if friction is None:
@@ -395,6 +421,36 @@ def _solve_collapse(
     if friction == "coulomb":
         warn_sliding(result.sliding_names, result.factor)
     return result
+
+
+def _vary_assumptions(
+    structure: Structure,
+    friction: str | None,
+    strength: float | None,
+    fill: Fill,
+    live: Sequence[Action],
+    dead: Sequence[Action],
+    factor: float,
+) -> FillRange | None:
+    """Return the factors of a push under all assumptions on a fill, that of itself being known."""
+    if not sum_body_forces([*live, *dead])[0]:
+        return None
+    values = {}
+    for assumption, (_, assumed) in vary_fill(fill).items():
+        values[assumption] = factor
+        if assumed == fill:
+            continue
+        stones, programme = self_weight_programme(structure, friction, strength, assumed, dead)
+        if not is_balanced(programme.minimise_residual(), programme):
+            values[assumption] = 0.0
+            continue
+        loaded = programme.with_load_factor(stones.load(live))
+        optimum, least = loaded.solve(), np.inf
+        if friction == "nonassociated":
+            optimum, solutions = search_nonassociated(loaded, optimum, -1.0)
+            least = solutions.bracket[0]  # where none was found
+        values[assumption] = least if optimum is None else -optimum.value
+    return FillRange(values)
 
 
 def _read_without_optimum(

@@ -228,7 +228,7 @@ class NonassociatedBounds:
         limits = f"proved: none is below {lower:.4g}, nor above {upper:.4g}"
         if np.isinf(upper):  # a load that no associated factor limits has a lower bound alone
             limits = f"proved: none is below {lower:.4g}"
-        elif abs(lower) <= GAP_TOLERANCE * abs(upper):
+        elif not self.has_lower_bound:
             limits = f"proved: none is above {upper:.4g}; no lower bound is known"
         if np.isclose(weakest, upper, rtol=1e-6):
             limits += "; the least found is the factor of 'coulomb' too"
@@ -236,6 +236,11 @@ class NonassociatedBounds:
             f"solutions without dilatancy {text} (by {successful} of {tried} starting states); "
             f"{limits}"
         )
+
+    @property
+    def has_lower_bound(self) -> bool:
+        """Whether the lower bound is above zero, beyond round-off."""
+        return abs(self.bracket[0]) > GAP_TOLERANCE * abs(self.bracket[1])
 
     @property
     def may_be_less(self) -> bool:

@@ -487,12 +487,12 @@ def _vary_fill(
         return {}
     row = tuple(load for load in moving.worst.live if isinstance(load, PointLoad))
     fills = {
-        "without_pressure": replace(fill, mobilisation=0.0, active=0.0),
-        "full_pressure": replace(fill, mobilisation=1.0),
+        "without_pressure": fill.changed(mobilisation=0.0, active=0.0),
+        "full_pressure": fill.changed(mobilisation=1.0),
     }
     if fill.backing is not None:
-        fills["without_backing"] = replace(fill, backing=None)
-        fills["without_either"] = replace(fills["without_pressure"], backing=None)
+        fills["without_backing"] = fill.changed(backing=None)
+        fills["without_either"] = fills["without_pressure"].changed(backing=None)
     factors = {}
     for name, other in fills.items():
         given = options | {"fill": other}

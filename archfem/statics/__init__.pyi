@@ -1,13 +1,13 @@
+from .assessment_checks import LIMIT_STATES as LIMIT_STATES
+from .assessment_checks import AssessmentCheck as AssessmentCheck
+from .assessment_checks import LimitState as LimitState
 from .equilibrium import Equilibrium as Equilibrium
 from .equilibrium import dead_load as dead_load
 from .equilibrium import equilibrium_under as equilibrium_under
 from .equilibrium import self_weight as self_weight
 from .free_body import FreeBody as FreeBody
 from .free_body import forces_on as forces_on
-from .mechanism_assessment import LIMIT_STATES as LIMIT_STATES
-from .mechanism_assessment import AssessmentCheck as AssessmentCheck
 from .mechanism_assessment import KinematicAssessment as KinematicAssessment
-from .mechanism_assessment import LimitState as LimitState
 from .mechanism_assessment import assess_parts as assess_parts
 from .modes import Modes as Modes
 from .newton import Newton as Newton

@@ -28,14 +28,13 @@ import xarray as xr
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
 from archfem._typing import Array
-from archfem._validation import check_between, check_choice, check_fields, validate_arguments
+from archfem._validation import check_between, check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.limit.backfill import (
     BlocksWithFill,
     Fill,
     FillProfile,
     attach_fill,
-    warn_of_lever,
 )
 from archfem.limit.collapse import collapse_factor
 from archfem.limit.displaced_blocks import (
@@ -45,6 +44,7 @@ from archfem.limit.displaced_blocks import (
     classify_motion,
     find_mechanism,
 )
+from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
@@ -67,100 +67,8 @@ from archfem.motion.design_spectra import (
 )
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import response_spectrum
+from archfem.statics.assessment_checks import LIMIT_STATES, AssessmentCheck, LimitState
 from archfem.units import STANDARD_GRAVITY
-
-
-@dataclass(frozen=True)
-class LimitState:
-    """Displacement check of a code: capacity, period and damping of the equivalent oscillator.
-
-    The capacity is d_u* = share d₀*. Its period is T = period_factor π √(d_T / a*(d_T)) with
-    d_T = secant_share d_u*, and the demand is the displacement spectrum up to T.
-
-    Attributes:
-        name: of the code and limit state.
-        share: capacity as a share of d₀* [-].
-        period_factor: factor of the period, in multiples of π; 2 is the secant period [-].
-        secant_share: displacement of the period as a share of d_u* [-].
-        damping: ratio to the critical of the demand's spectrum [-].
-        source: clause of the code, or another source.
-
-    Raises:
-        InvalidInput: a value is out of range.
-    """
-
-    name: str
-    share: float
-    period_factor: float
-    secant_share: float
-    damping: float
-    source: str
-
-    def __post_init__(self) -> None:
-        """Check that shares are up to 1 and the damping is a ratio."""
-        check_fields(self)
-        limits = {"share": 1.0, "secant_share": 1.0, "period_factor": 10.0, "damping": 0.5}
-        for key, most in limits.items():
-            options: Any = {"ends": "(]", "remedy": "give a ratio, such as 0.4 for 40 %"}
-            check_between(getattr(self, key), f"{self.name}, {key} [-]", 0.0, most, **options)
-
-
-# Sources of displacement checks; the 2019 values were read in a transcription of the Circolare.
-_CIRCOLARE_2009 = "Circolare 617/2009, C8A.4.2.2 and C8A.4.2.3, from memory: its text was not read"
-_CIRCOLARE_2019 = "Circolare 7/2019, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq."
-
-# Displacement checks by name
-LIMIT_STATES: Mapping[str, LimitState] = {
-    name: LimitState(name, *values)
-    for name, values in {
-        "NTC-2018 SLV": (0.4, 1.68, 1.0, 0.08, f"{_CIRCOLARE_2019} C8.7.1.10"),
-        "NTC-2018 SLC": (0.6, 1.56, 1.0, 0.10, f"{_CIRCOLARE_2019} C8.7.1.11"),
-        "NTC-2008 SLV": (0.4, 2.0, 0.4, 0.05, _CIRCOLARE_2009),
-    }.items()
-}
-
-
-@dataclass(frozen=True)
-class AssessmentCheck:
-    """One check: capacity against demand.
-
-    Attributes:
-        name: of the check.
-        capacity: acceleration [m/s²] or displacement [m] that is allowed.
-        demand: of the spectrum, in the same unit.
-        unit: "m/s²" or "m".
-        ratio: factor on the spectrum at which the check is just passed [-].
-        period: of the equivalent oscillator [s]; undefined (NaN) where accelerations are checked.
-        source: clause of the code.
-    """
-
-    name: str
-    capacity: float
-    demand: float
-    unit: str
-    ratio: float
-    period: float
-    source: str
-
-    @property
-    def passes(self) -> bool:
-        """Whether the spectrum as given is withstood."""
-        return self.ratio >= 1.0
-
-    @property
-    def at_rest(self) -> bool:
-        """Whether the ratio is that up to which the mechanism is not set in motion."""
-        return self.ratio > (1.0 + 1e-9) * self.capacity / self.demand  # but for round-off
-
-    def __str__(self) -> str:
-        """Describe capacity, demand and outcome in one line."""
-        period = "" if np.isnan(self.period) else f" at T = {self.period:.3f} s"
-        rest = " before the mechanism begins to move"
-        return (
-            f"{self.name}: capacity {self.capacity:.4g} {self.unit}, demand {self.demand:.4g} "
-            f"{self.unit}{period}: {'passes' if self.passes else 'fails'}, the spectrum may be "
-            f"{self.ratio:.3g} times as strong{rest if self.at_rest else ''}"
-        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -236,8 +144,26 @@ class KinematicAssessment(ResultDisplay):
 
     @property
     def passes(self) -> bool:
-        """Whether the displacement check passes, or without it the linear one."""
+        """Whether the displacement check passes, or without it the linear one.
+
+        It must pass whatever is assumed of a fill: `checks[-1].over_fill` has the range.
+        """
         return self.checks[-1].passes
+
+    def _with_ranges(
+        self, others: Mapping[FillAssumption, "KinematicAssessment | None"]
+    ) -> "KinematicAssessment":
+        """Return the assessment with its ratios by assumption on a fill; None does not stand."""
+        changed = {}
+        for name in ("linear", "displacement"):
+            # what has no motion withstands any spectrum
+            ratios = {
+                key: 0.0 if other is None else getattr(getattr(other, name), "ratio", np.inf)
+                for key, other in others.items()
+            }
+            if ratios and (check := getattr(self, name)) is not None:
+                changed[name] = replace(check, over_fill=FillRange(ratios))
+        return replace(self, **changed)
 
     def demand(self, periods: Array) -> tuple[Array, Array]:
         """Return spectral displacements [m] and accelerations [m/s²] of the demand.
@@ -266,6 +192,9 @@ class KinematicAssessment(ResultDisplay):
             rows.append((f"{check.name}: demand", check.demand, check.unit))
             rows.append((f"{check.name}: ratio", check.ratio, "-"))
         texts = [[name, f"{value:.4g}", unit] for name, value, unit in rows]
+        if self.linear.over_fill is not None:
+            for check in self.checks:
+                texts.append([f"{check.name}: ratio over the fill", check.ratios, "-"])
         return align_columns(["quantity", "value", "unit"], texts)
 
     def _summary(self) -> str:
@@ -273,7 +202,7 @@ class KinematicAssessment(ResultDisplay):
         return (
             f"KinematicAssessment of '{self.structure.name}': alpha_0 {self.alpha_0:.4g}, a_0* "
             f"{self.a_0_star:.4g} m/s², d_0* {self.d_0_star:.4g} m, "
-            f"{'passes' if self.passes else 'fails'}"
+            f"{self.checks[-1].outcome}"
         )
 
     def __str__(self) -> str:
@@ -295,6 +224,8 @@ class KinematicAssessment(ResultDisplay):
             changes = [event.text for event in self.path.events if event.text != self.path.end]
             lines += [f"along the path: {join_names(changes, '; ')}"] if changes else []
             lines += [self.path.end.sentence, *map(str, self.checks)]
+            if (over_fill := self.checks[-1].over_fill) is not None:
+                lines.append(f"the last ratio is {over_fill.describe(digits=3)}")
         return "\n".join([*lines, *(f"note: {note}" for note in [*self.notes, *self._split_note])])
 
     @property
@@ -394,34 +325,78 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         check_between(value, f"{name} [-]", 1.0, most, ends="[]")
     structure = structure_of(structure)
     _check_structure(structure, friction, loads)
-    filled = None if fill is None else attach_fill(structure, fill)
-    whole = structure if filled is None else filled.whole
+    search = _Search(
+        *(structure, spectrum, float(direction), friction, part, blocks, tuple(loads), rules),
+        *(confidence_factor, q),
+    )
     lever = fill.lever if isinstance(fill, Fill) else 0.0
-    stones, weights = _take_fill_as_loads(whole, lever)
-    joints = _select_joints(stones, part, blocks)
-    pressure = None if filled is None else _press_stones(filled)
-    placed = PlacedBlocks.at_rest(stones, (*weights, *loads), float(direction), pressure)
-    coefficient = stones.friction if friction else np.full(len(stones.joints), np.inf)
-    mechanism = _find_first_mechanism(placed, joints, coefficient, friction)
-    path, holds = None, 0
-    if mechanism is not None:
-        follower = PathFollower(placed, joints, coefficient)
-        path = follower.follow(mechanism)
-        if not path.displacements[-1].any():
-            raise DidNotConverge(
-                f"the mechanism of limit analysis, at a factor of {mechanism.factor:.4g}, cannot "
-                "move if its faces slide without dilatancy: assess fewer blocks, or forbid sliding "
-                "(friction=None)"
-            )
-        holds = follower.last_equilibrium(path)
-        if filled is not None:
-            filled.warn_of_sliding_fill([BodyForce(float(direction))], (), mechanism.factor)
-        if weights and lever < 1.0:
-            high = replace(placed, loads=(*_take_fill_as_loads(whole, 1.0)[1], *loads))
-            raised = _find_first_mechanism(high, joints, coefficient, friction)
-            warn_of_lever(mechanism.factor, raised.factor if raised else np.inf, "alpha_0")
-    given = spectrum, rules, confidence_factor
-    return _Oscillator(placed, path, holds, bool(weights), *given).assess(q)
+    found = search.assess(lever, fill)
+    if fill is not None and found.path is not None:
+        filled = attach_fill(structure, fill)
+        push = [BodyForce(search.direction)]
+        filled.warn_of_sliding_fill(push, (), found.path.mechanisms[0].factor)
+    return found._with_ranges(search.vary(lever, fill, found))
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Search for the mechanism of a structure and its finite motion, for any strength of a fill."""
+
+    structure: Structure
+    spectrum: DesignSpectrum | Motion
+    direction: float
+    friction: str | None
+    part: str | None
+    blocks: Sequence[int | str] | None
+    loads: tuple[AttachedLoad, ...]
+    rules: LimitState
+    confidence_factor: float
+    q: float
+
+    def assess(self, lever: float, fill: Fill | PlasticFill | None) -> KinematicAssessment:
+        """Return the assessment with a fill, whose horizontal forces act at a lever."""
+        filled = None if fill is None else attach_fill(self.structure, fill)
+        whole = self.structure if filled is None else filled.whole
+        stones, weights = _take_fill_as_loads(whole, lever)
+        joints = _select_joints(stones, self.part, self.blocks)
+        pressure = None if filled is None else _press_stones(filled)
+        loads = (*weights, *self.loads)
+        placed = PlacedBlocks.at_rest(stones, loads, self.direction, pressure)
+        friction = stones.friction if self.friction else np.full(len(stones.joints), np.inf)
+        mechanism = _find_first_mechanism(placed, joints, friction, self.friction)
+        path, holds = None, 0
+        if mechanism is not None:
+            follower = PathFollower(placed, joints, friction)
+            path = follower.follow(mechanism)
+            if not path.displacements[-1].any():
+                raise DidNotConverge(
+                    f"the mechanism of limit analysis, at a factor of {mechanism.factor:.4g}, "
+                    "cannot move if its faces slide without dilatancy: assess fewer blocks, or "
+                    "forbid sliding (friction=None)"
+                )
+            holds = follower.last_equilibrium(path)
+        given = self.spectrum, self.rules, self.confidence_factor
+        return _Oscillator(placed, path, holds, bool(weights), *given).assess(self.q)
+
+    def vary(
+        self, lever: float, fill: Any, found: KinematicAssessment
+    ) -> dict[FillAssumption, KinematicAssessment | None]:
+        """Return the assessment by assumption on a fill, one being known; None does not stand."""
+        others: dict[FillAssumption, KinematicAssessment | None] = {}
+        if not find_yielding_blocks(self.structure):
+            return others
+        for assumption, (place, assumed) in vary_fill(fill).items():
+            others[assumption] = found
+            if (place, assumed) != (lever, fill):
+                try:
+                    others[assumption] = self.assess(place, assumed)
+                except _DoesNotStand:
+                    others[assumption] = None
+        return others
+
+
+class _DoesNotStand(InvalidInput):
+    """The structure does not stand under its own weight and the attached loads."""
 
 
 @validate_arguments
@@ -543,7 +518,7 @@ def _find_first_mechanism(
     placed: PlacedBlocks, joints: list[int], coefficient: Array, friction: str | None
 ) -> KinematicChain | None:
     """Return the mechanism of least factor at rest; None where there is none."""
-    refusal = InvalidInput(
+    refusal = _DoesNotStand(
         f"{placed.structure.name} does not stand under its own weight and the attached loads: "
         "af.stands and `archfem check` say why"
     )
@@ -657,10 +632,11 @@ class _Oscillator:
                 "and faces slide flat here"
             )
         if self.holds < len(self.path.factors) - 1:
+            held = abs(float(self.curve["d"][self.holds]))
             found.append(
-                f"beyond d* = {float(self.curve['d'][self.holds]):.3g} m joints open or slide that "
-                "the mechanism keeps closed: there the curve is an upper bound; a time history "
-                "with large displacements can test it"
+                f"beyond d* = {held:.3g} m joints open or slide that the mechanism keeps closed: "
+                "there the curve is an upper bound; a time history with large displacements can "
+                "test it"
             )
         if self.path.end is not PathEnd.FALLS:
             found.append(

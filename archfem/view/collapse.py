@@ -312,9 +312,10 @@ def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
     axes.plot([check.demand], [slope * check.demand], "D", label=label, **style)
     style_axes(axes, "spectral displacement d* [m]", "spectral acceleration a* [m/s²]")
     axes.set(xlim=(0.0, 1.1 * max(last, check.demand)), ylim=(0.0, top))
-    outcome = "passes" if check.passes else "fails"
+    # assumptions on a fill are in the text
+    outcome = check.outcome.replace("only with", "with some assumptions,").partition(",")[0]
     rest = ", at which it begins to move" if check.at_rest else ""
-    set_title(axes, f"{check.name}: {outcome}, ratio {check.ratio:.2f}{rest}")
+    set_title(axes, f"{check.name}: {outcome}, ratio {check.ratios}{rest}")
 
 
 def draw_capacity(

@@ -93,7 +93,9 @@ def test_limit_analysis_in_words(ring):
     both = af.collapse_factor(ring, live=[wheel, af.BodyForce(1.0)])
     assert both.sentence.endswith(f"at {both.factor:.4g} times the load")
     # the lesser of both senses is concluded with
-    case = SimpleNamespace(structure=ring, limit=limit)
+    site = af.Eurocode8(ag=0.1, ground="C")
+    case = SimpleNamespace(structure=ring, limit=limit, target=None)
+    case.assessment = SimpleNamespace(spectrum=None)
     for factor, rank in ((0.9, "more"), (1.1, "more"), (0.99999, "the same")):
         other = replace(mirrored, factor=factor * pushed.factor, upper=factor * pushed.factor)
         least, words = describe_limit(case, pushed, other)
@@ -101,9 +103,20 @@ def test_limit_analysis_in_words(ring):
         assert least is first
         assert words.startswith(f"limit analysis: {first.sentence}\n")
         assert words.endswith(f"\nin the other sense: {second.sentence} ({rank})")
-    ranged = replace(pushed, upper=1.2 * pushed.factor)  # above all that the other sense bears
-    words = describe_limit(case, ranged, replace(mirrored, factor=1.1 * pushed.factor))[1]
-    assert words.endswith(" (not surely more)")
+    ranged = replace(pushed, upper=1.2 * pushed.factor)
+    between = 1.1 * pushed.factor
+    words = describe_limit(case, ranged, replace(mirrored, factor=between, upper=between))[1]
+    assert words.endswith(" (their ranges overlap)")
+    # 1.15 a_g at the surface
+    for case.target, named in (
+        (site, "0.1 g × S 1.15"),
+        (af.motion.TableSpectrum([0.0, 1.0], [0.1, 0.2]), "0.1 g"),
+    ):
+        ratio = pushed.factor / float(case.target.horizontal(0.0))
+        assert describe_limit(case, mirrored, None)[1].endswith(
+            f"\nit begins to move at {ratio:.3g} times the site's {named}"
+        )
+    case.target = None
     least = replace(pushed, solutions=SimpleNamespace(may_be_less=True))
     words = describe_limit(case, least, mirrored)[1]
     assert words.endswith(" (more; each sense is searched by itself)")

@@ -374,7 +374,7 @@ def test_a_fill_that_slides_first_is_warned_of(caplog):
     assert "the fill itself slides" not in caplog.text
 
 
-def test_a_column_turns_its_stone_about_the_height_of_its_force(caplog):
+def test_a_column_turns_its_stone_about_the_height_of_its_force():
     """A stone under a narrow column of fill rocks about its toe, by moments."""
     breadth, height, depth = 1.0, 1.0, 3.0
     parts = [
@@ -386,14 +386,11 @@ def test_a_column_turns_its_stone_about_the_height_of_its_force(caplog):
     stone, soil = (breadth * (each.material.unit_weight) for each in structure.blocks[1:])
     weights = np.array([stone * height, soil * depth])
     for lever in (0.0, 0.5, 1.0):
-        caplog.clear()
         heights = np.array([height / 2.0, height + lever * depth / 2.0])
         expected = weights.sum() * breadth / 2.0 / (weights @ heights)
         fill = af.limit.Fill(friction_angle=45.0, lever=lever)
         found = af.collapse_factor(structure, live=SIDEWAYS, friction=None, fill=fill).factor
         assert found == pytest.approx(expected, rel=1e-9)
-        highest = weights.sum() * breadth / 2.0 / (weights @ [height / 2.0, height + depth / 2.0])
-        assert (f"at most {highest:.4g}" in caplog.text) == (lever < 1.0)
 
 
 @pytest.mark.parametrize(

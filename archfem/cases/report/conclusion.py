@@ -156,7 +156,10 @@ def _list_absent(data: ReportData) -> Iterator[str]:
 
 def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) -> str:
     """Answer in three sentences: outcomes with their demand, least margin, what may change them."""
-    checks = [(float(row[3]), row) for row in rows if row[0].startswith("assessment: ")]
+    # the least of a range
+    checks = [
+        (float(row[3].partition(" ")[0]), row) for row in rows if row[0].startswith("assessment: ")
+    ]
     demand = data.case.report.get("demand", "")
     if not data.runs and not checks:
         # a load has one result, which says all
@@ -165,10 +168,13 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
     stated += [f"motions of {demand}" for name, demand, *_ in rows if name == _HISTORIES]
     lead = [f"the structure {'; it '.join(_describe_outcomes(data))}"] if data.runs else []
     if checks:
-        factor, (check, *_) = min(checks)
+        factor, (check, _, outcome, margin) = min(checks)
+        # of what is assumed of a fill
+        _, only, assumed = outcome.partition(" only with ")
+        fails = "" if factor >= 1.0 or only else ", and so fails"
         lead.append(
-            f"its least margin is {factor:g}: it passes {check.partition(': ')[2]}, up to "
-            f"{factor:g} times {name_spectrum(data)}{'' if factor >= 1.0 else ', and so fails'}"
+            f"its least margin is {margin}: it passes {check.partition(': ')[2]}{only}{assumed}, "
+            f"up to {margin} times {name_spectrum(data)}{fails}"
         )
     lead[0] = f"for {' and '.join(stated)}: {lead[0]}" if stated else lead[0]
     changes = []

@@ -37,7 +37,7 @@ from archfem.masonry.structure import Structure
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-from archfem.statics.mechanism_assessment import LIMIT_STATES, LimitState
+from archfem.statics.assessment_checks import LIMIT_STATES, LimitState
 from archfem.statics.stress import utilisation_text
 from archfem.units import MPa, kN
 from archfem.view.collapse import draw_fall

@@ -1,0 +1,113 @@
+"""Range of a result over what nobody measures of a fill: where its inertia acts, passive pressure.
+
+Horizontal forces on a fill act at the feet of its columns, from where shear carries their moment to
+ends that hold, or at the centroids, where the stones below carry all of it. Its passive pressure
+needs movement to develop. Both are assumed; a result that holds must hold whatever they are.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
+
+from archfem.limit.backfill import Fill
+
+
+class FillAssumption(NamedTuple):
+    """Words of one assumption on a fill: on its inertia, and on its passive pressure."""
+
+    inertia: str
+    pressure: str  # empty where no pressure counts
+
+    def __str__(self) -> str:
+        """Return both in words."""
+        return ", ".join(filter(None, self))
+
+
+def vary_fill(fill: Fill | None) -> dict[FillAssumption, tuple[float, Fill | None]]:
+    """Return lever and strength of a fill by each assumption; that of the fill itself is first.
+
+    Without a strength, where the fill is weight and mass alone, its inertia varies.
+    """
+    own = (0.0, 0.0) if fill is None else (fill.lever, fill.mobilisation)
+    pairs = [own, *product((1.0, 0.0), (own[1], 0.0))]
+    assumed = dict[FillAssumption, tuple[float, Fill | None]]()
+    for lever, mobilisation in pairs:
+        between = f"lever of {lever:g}"
+        place = {0.0: "columns' feet", 1.0: "columns' centroids"}.get(lever, between)
+        part = {0.0: "none", 0.333: "a third", 1.0: "all"}.get(round(mobilisation, 3))
+        pressure = f"{part or format(mobilisation, '.2g')} of its passive pressure"
+        words = f"the fill's inertia at its {place}", "" if fill is None else pressure
+        changed = fill and fill.changed(lever=lever, mobilisation=mobilisation)
+        assumed.setdefault(FillAssumption(*words), (lever, changed))
+    return assumed
+
+
+@dataclass(frozen=True)
+class FillRange:
+    """Values of one result over all assumptions on a fill.
+
+    Attributes:
+        values: by assumption, a pair of words, a factor on a load or a demand [-]; 0 where the
+            structure does not stand, infinite where nothing limits it.
+    """
+
+    values: Mapping[FillAssumption, float]
+
+    @classmethod
+    def least_of(cls, ranges: Iterable["FillRange"]) -> "FillRange":
+        """Return the least of several results under each assumption.
+
+        Args:
+            ranges: of the results, one at least.
+        """
+        values = dict[FillAssumption, float]()
+        for each in ranges:
+            values |= {key: min(x, values.get(key, x)) for key, x in each.values.items()}
+        return cls(values)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and largest value [-]."""
+        return min(self.values.values()), max(self.values.values())
+
+    def format_ends(self, unit: float = 1.0, digits: int = 4) -> str:
+        """Return both ends as text, or one where they do not differ.
+
+        Args:
+            unit: by which the values are multiplied, such as a push in g.
+            digits: significant ones.
+        """
+        low, high = (f"{value * unit:.{digits}g}" for value in self.ends)
+        return low if low == high else f"{low} to {high}"
+
+    def describe(self, unit: float = 1.0, digits: int = 4, name: str = "") -> str:
+        """Return both ends as text, each with its assumption.
+
+        Args:
+            unit: by which the values are multiplied, such as a push in g.
+            digits: significant ones.
+            name: of the unit, behind each value.
+        """
+        if " to " not in (both := self.format_ends(unit, digits)):
+            return f"{both}{name} whatever is assumed of the fill"
+        texts = []
+        for key in (choose(self.values, key=self.values.__getitem__) for choose in (min, max)):
+            falls = "" if self.values[key] else "; it does not stand"
+            texts.append(f"{self.values[key] * unit:.{digits}g}{name} ({key}{falls})")
+        return " to ".join(texts)
+
+    @property
+    def outcome(self) -> str:
+        """Return "passes", "fails", or "passes only with" the assumptions under which it does."""
+        good = [key for key, value in self.values.items() if value >= 1.0]
+        if len(good) in (0, len(self.values)):
+            return "passes" if good else "fails"
+        enough = self._find_sufficient(good)
+        rest = [" and ".join(filter(None, key)) for key in good if not {*key} & {*enough}]
+        return f"passes only with {' or '.join([*enough, *rest])}"
+
+    def _find_sufficient(self, good: Sequence[FillAssumption]) -> list[str]:
+        """Return the words, on inertia or pressure alone, with which it passes in any case."""
+        words = dict.fromkeys(word for key in good for word in key if word)
+        return [word for word in words if all(key in good for key in self.values if word in key)]

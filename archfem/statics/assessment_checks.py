@@ -1,0 +1,118 @@
+"""Checks of a kinematic assessment: rules of codes, and capacity against demand."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from archfem._validation import check_between, check_fields
+from archfem.limit.fill_range import FillRange
+
+
+@dataclass(frozen=True)
+class LimitState:
+    """Displacement check of a code: capacity, period and damping of the equivalent oscillator.
+
+    The capacity is d_u* = share d₀*. Its period is T = period_factor π √(d_T / a*(d_T)) with
+    d_T = secant_share d_u*, and the demand is the displacement spectrum up to T.
+
+    Attributes:
+        name: of the code and limit state.
+        share: capacity as a share of d₀* [-].
+        period_factor: factor of the period, in multiples of π; 2 is the secant period [-].
+        secant_share: displacement of the period as a share of d_u* [-].
+        damping: ratio to the critical of the demand's spectrum [-].
+        source: clause of the code, or another source.
+
+    Raises:
+        InvalidInput: a value is out of range.
+    """
+
+    name: str
+    share: float
+    period_factor: float
+    secant_share: float
+    damping: float
+    source: str
+
+    def __post_init__(self) -> None:
+        """Check that shares are up to 1 and the damping is a ratio."""
+        check_fields(self)
+        limits = {"share": 1.0, "secant_share": 1.0, "period_factor": 10.0, "damping": 0.5}
+        for key, most in limits.items():
+            options: Any = {"ends": "(]", "remedy": "give a ratio, such as 0.4 for 40 %"}
+            check_between(getattr(self, key), f"{self.name}, {key} [-]", 0.0, most, **options)
+
+
+# Sources of displacement checks; the 2019 values were read in a transcription of the Circolare.
+_CIRCOLARE_2009 = "Circolare 617/2009, C8A.4.2.2 and C8A.4.2.3, from memory: its text was not read"
+_CIRCOLARE_2019 = "Circolare 7/2019, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq."
+
+# Displacement checks by name
+LIMIT_STATES: Mapping[str, LimitState] = {
+    name: LimitState(name, *values)
+    for name, values in {
+        "NTC-2018 SLV": (0.4, 1.68, 1.0, 0.08, f"{_CIRCOLARE_2019} C8.7.1.10"),
+        "NTC-2018 SLC": (0.6, 1.56, 1.0, 0.10, f"{_CIRCOLARE_2019} C8.7.1.11"),
+        "NTC-2008 SLV": (0.4, 2.0, 0.4, 0.05, _CIRCOLARE_2009),
+    }.items()
+}
+
+
+@dataclass(frozen=True)
+class AssessmentCheck:
+    """One check: capacity against demand.
+
+    Attributes:
+        name: of the check.
+        capacity: acceleration [m/s²] or displacement [m] that is allowed.
+        demand: of the spectrum, in the same unit.
+        unit: "m/s²" or "m".
+        ratio: factor on the spectrum at which the check is just passed [-].
+        period: of the equivalent oscillator [s]; undefined (NaN) where accelerations are checked.
+        source: clause of the code.
+        over_fill: ratios over all assumptions on a fill; None without one.
+    """
+
+    name: str
+    capacity: float
+    demand: float
+    unit: str
+    ratio: float
+    period: float
+    source: str
+    over_fill: FillRange | None = None
+
+    @property
+    def passes(self) -> bool:
+        """Whether the spectrum as given is withstood, whatever is assumed of a fill."""
+        return self.outcome == "passes"
+
+    @property
+    def outcome(self) -> str:
+        """Whether it "passes" or "fails", or the assumptions on a fill with which alone it does."""
+        if self.over_fill is not None:
+            return self.over_fill.outcome
+        return "passes" if self.ratio >= 1.0 else "fails"
+
+    @property
+    def ratios(self) -> str:
+        """The ratio as text, or its range over all assumptions on a fill."""
+        over = self.over_fill
+        return f"{self.ratio:.3g}" if over is None else over.format_ends(digits=3)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the ratio is that up to which the mechanism is not set in motion."""
+        return self.ratio > (1.0 + 1e-9) * self.capacity / self.demand  # but for round-off
+
+    def __str__(self) -> str:
+        """Describe capacity, demand and outcome in one line."""
+        period = "" if np.isnan(self.period) else f" at T = {self.period:.3f} s"
+        rest = " before the mechanism begins to move"
+        return (
+            f"{self.name}: capacity {self.capacity:.4g} {self.unit}, demand {self.demand:.4g} "
+            f"{self.unit}{period}: {self.outcome}, the spectrum may be "
+            f"{self.ratios} times as strong{rest if self.at_rest else ''}"
+        )

@@ -1,0 +1,149 @@
+"""Range of results over what is assumed of a fill: closed forms of a stone in it, and its words."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from backfilled import SOIL, rectangle
+
+import archfem as af
+from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
+
+SITE = af.Eurocode8(ag=0.25, ground="C")
+BREADTH, HEIGHT, DEPTH = 1.0, 2.0, 1.5
+FEET, CENTROIDS = (
+    "the fill's inertia at its columns' feet",
+    "the fill's inertia at its columns' centroids",
+)
+THIRD, NONE = "a third of its passive pressure", "none of its passive pressure"
+
+
+def buried_stone():
+    """A stone on rock below a fill, and beside it, to its right."""
+    parts = [
+        rectangle(-2.0, -1.0, 9.0, 0.0, "rock", fixed=True),
+        rectangle(0.0, 0.0, BREADTH, HEIGHT, "stone", part="wall", role="pier"),
+        rectangle(0.0, HEIGHT, BREADTH, HEIGHT + DEPTH, "above", SOIL),
+        rectangle(BREADTH, 0.0, 9.0, HEIGHT + DEPTH, "beside", SOIL),
+    ]
+    return af.masonry.assembled(parts, af.masonry.SOIL_TO_STONE)
+
+
+def turning_factors(passive, mobilisation=1.0 / 3.0):
+    """Factors at which the stone turns into the fill, about its toe, by assumption; and e*."""
+    weights = np.array([HEIGHT * af.STONE.unit_weight, DEPTH * SOIL.unit_weight]) * BREADTH
+    top = HEIGHT + DEPTH
+    # of the pressure m K_p γ (top - y) on 0 < y < HEIGHT
+    moment = passive * SOIL.unit_weight * (top * HEIGHT**2 / 2.0 - HEIGHT**3 / 3.0)
+    active = SOIL.unit_weight / passive * (top * HEIGHT**2 / 2.0 - HEIGHT**3 / 3.0)
+    expected = {}
+    for lever, part in product((0.0, 1.0), (mobilisation, 0.0)):
+        heights = np.array([HEIGHT / 2.0, HEIGHT + lever * DEPTH / 2.0])
+        held = max(part * moment, active)
+        factor = (weights.sum() * BREADTH / 2.0 + held) / (weights @ heights)
+        share = (weights @ heights) ** 2 / (weights.sum() * (weights @ heights**2))
+        words = CENTROIDS if lever else FEET, THIRD if part else NONE
+        expected[FillAssumption(*words)] = factor, share
+    return expected
+
+
+def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
+    fill = af.limit.Fill(friction_angle=30.0)
+    live = af.BodyForce(1.0)
+    found = af.collapse_factor(buried_stone(), live=live, friction=None, fill=fill)
+    expected = {key: factor for key, (factor, _) in turning_factors(3.0).items()}
+    assert found.over_fill.values == pytest.approx(expected, rel=1e-9)
+    low, high = min(expected.values()), max(expected.values())
+    verified("stone in a fill: least factor over its assumptions", low, "moments", found.range[0])
+    assert found.factor == pytest.approx(high)
+    assert found.sentence.endswith(f", at {low:.4g} to {high:.4g} g, pushed to the right")
+    assert str(found).endswith(
+        f"; at {low:.4g} g ({CENTROIDS}, {NONE}) to {high:.4g} g ({FEET}, {THIRD})"
+    )
+    doubled = af.collapse_factor(
+        buried_stone(), live=af.BodyForce(2.0), friction="nonassociated", fill=fill
+    )
+    assert doubled.over_fill.values == pytest.approx(
+        {key: factor / 2.0 for key, factor in expected.items()}, rel=1e-6
+    )
+    assert doubled.sentence == found.sentence
+    # whatever is given, both ends are found
+    raised = fill.changed(lever=1.0, mobilisation=0.0)
+    raised = af.collapse_factor(buried_stone(), live=live, friction=None, fill=raised)
+    assert raised.factor == pytest.approx(low)
+    assert sorted(raised.over_fill.values.values()) == pytest.approx(
+        [low, expected[FillAssumption(FEET, NONE)]]
+    )
+    down = af.collapse_factor(buried_stone(), live=af.BodyForce(0.0, 1.0), fill=fill)
+    assert down.over_fill is None
+
+
+def test_an_assessment_passes_only_with_what_it_needs():
+    """Linear ratios by hand; the margin of the displacement check is that of each fill alone."""
+    structure, fill = buried_stone(), af.limit.Fill(friction_angle=30.0)
+    options = {"friction": None, "q": 1.0, "confidence_factor": 1.0}
+    found = af.kinematic_assessment(structure, SITE, fill=fill, **options)
+    ground = float(SITE.horizontal(0.0)) * 9.80665
+    ratios = {
+        key: factor * structure.gravity / share / ground
+        for key, (factor, share) in turning_factors(3.0).items()
+    }
+    assert found.linear.over_fill.values == pytest.approx(ratios, rel=1e-6)
+    displacement = found.displacement.over_fill.values
+    for assumption, (_, assumed) in vary_fill(fill).items():
+        alone = af.kinematic_assessment(structure, SITE, fill=assumed, **options)
+        assert displacement[assumption] == pytest.approx(alone.displacement.ratio)
+    between = np.mean(sorted(ratios.values())[1:3])
+    weaker = af.Eurocode8(ag=0.25 * between, ground="C")
+    partly = af.kinematic_assessment(structure, weaker, fill=fill, **options).linear
+    assert partly.outcome == f"passes only with {THIRD}"
+    assert not partly.passes
+    low, high = (end / between for end in (min(ratios.values()), max(ratios.values())))
+    assert f"{partly.outcome}, the spectrum may be {low:.3g} to {high:.3g} times" in str(partly)
+    # as weight and mass alone its inertia varies
+    bare = af.kinematic_assessment(structure, SITE, **options)
+    assert [*bare.linear.over_fill.values] == [
+        FillAssumption(FEET, ""),
+        FillAssumption(CENTROIDS, ""),
+    ]
+
+
+def test_what_does_not_stand_without_pressure_says_so():
+    """Two stones that lean to the right against the fill, which alone holds them."""
+    parts = [
+        rectangle(-2.0, -1.0, 9.0, 0.0, "rock", fixed=True),
+        rectangle(0.0, 0.0, 1.0, 2.0, "stone", part="wall", role="pier"),
+        rectangle(0.6, 2.0, 2.0, 4.0, "leaning", part="wall", role="pier"),
+        rectangle(2.0, 0.0, 9.0, 4.0, "beside", SOIL),
+    ]
+    structure = af.masonry.assembled(parts, af.masonry.SOIL_TO_STONE)
+    fill = af.limit.Fill(friction_angle=30.0, mobilisation=1.0, active=0.0)
+    found = af.collapse_factor(structure, live=af.BodyForce(1.0), friction=None, fill=fill)
+    assert found.factor > 0.0
+    assert found.range == (0.0, found.factor)
+    assert found.describe_range().startswith(f"at 0 g ({CENTROIDS}, {NONE}; it does not stand) to")
+    checks = af.kinematic_assessment(structure, SITE, friction=None, fill=fill).checks
+    assert [check.over_fill.ends[0] for check in checks] == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ((1.2, 1.1, 1.3, 1.0), "passes"),
+        ((0.9, 0.8, 0.7, 0.6), "fails"),
+        ((1.2, 0.9, 1.1, 0.8), f"passes only with {FEET}"),
+        ((1.2, 1.1, 0.9, 0.8), f"passes only with {THIRD}"),
+        ((1.2, 1.1, 1.1, 0.8), f"passes only with {FEET} or {THIRD}"),
+        ((1.2, 0.9, 0.9, 0.8), f"passes only with {FEET} and {THIRD}"),
+    ],
+)
+def test_outcomes_hold_over_the_range(values, words):
+    keys = (FillAssumption(i, p) for p, i in product((THIRD, NONE), (FEET, CENTROIDS)))
+    found = FillRange(dict(zip(keys, values, strict=True)))
+    assert found.outcome == words
+    low, high = min(values), max(values)
+    assert found.ends == (low, high)
+    assert found.format_ends(digits=2) == f"{low:.2g} to {high:.2g}"
+    assert FillRange(dict.fromkeys(found.values, 1.0)).describe().startswith("1 whatever is")
+    halved = FillRange({key: value / 2.0 for key, value in found.values.items()})
+    assert FillRange.least_of([found, halved]) == halved
