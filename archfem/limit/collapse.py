@@ -33,6 +33,7 @@ from archfem.limit.backfill import (
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions
+from archfem.limit.mechanism_names import name_mechanism
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
 from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.loads import Action, BodyForce, PointLoad, Settlement, list_loads
@@ -124,7 +125,7 @@ class Collapse(ResultDisplay):
     def sentence(self) -> str:
         """The outcome, and the load at collapse where there is one."""
         if self.outcome not in (Outcome.COLLAPSES, Outcome.BRACKETED):
-            return self.outcome.sentence
+            return self._headline
         load, unit = (self.live[0] if len(self.live) == 1 else None), 1.0
         points = [action for action in self.live if isinstance(action, PointLoad)]
         words = " times the load"
@@ -147,7 +148,35 @@ class Collapse(ResultDisplay):
                 place = f"which is at most {high}"
         elif self.outcome is Outcome.COLLAPSES and self.solutions and self.solutions.may_be_less:
             place, words = f"at ≤ {low}", f"{words} (least found)"
-        return f"{self.outcome.sentence}, {place}{words}"
+        return f"{self._headline}, {place}{words}"
+
+    @property
+    def mechanism_name(self) -> str:
+        """Plain name of the mechanism, as "four-hinge mechanism"; "" where nothing moves."""
+        if self.structure is None or not self.motion.any():
+            return ""
+        many = " (one of many: all bed joints reach μ)" if self._slides_anywhere else ""
+        return name_mechanism(self.structure, self.motion) + many
+
+    @property
+    def _slides_anywhere(self) -> bool:
+        """Whether stones slide at the friction of all bed joints, pushed by their weight."""
+        loads = [each for each in self.live if isinstance(each, BodyForce) and not each.vertical]
+        structure = self.structure
+        if structure is None or self.hinges or not self.sliding or len(loads) != len(self.live):
+            return False
+        push = abs(self.factor * sum(load.horizontal for load in loads))
+        level = abs(structure.normals[~structure.heads, 1]) > 1.0 - 1e-9
+        alike = np.allclose(structure.friction, push, rtol=1e-3)
+        return bool(len(level) > 1 and level.all() and alike)
+
+    @property
+    def _headline(self) -> str:
+        """The name of the mechanism in place of the outcome, or after it."""
+        name = self.mechanism_name if self.outcome is not Outcome.SETTLES else ""
+        if self.outcome is Outcome.COLLAPSES and name:
+            return name
+        return f"{self.outcome.sentence}: {name}" if name else self.outcome.sentence
 
     def _summary(self) -> str:
         """Describe the result in one or two lines."""
@@ -162,7 +191,7 @@ class Collapse(ResultDisplay):
         bound = (
             "" if self.upper == self.factor or np.isnan(self.factor) else f" to {self.upper:.4g}"
         )
-        text = f"{self.outcome.sentence}: factor {self.factor:.4g}{bound}; hinges: {hinges}; "
+        text = f"{self._headline}: factor {self.factor:.4g}{bound}; hinges: {hinges}; "
         solutions = "" if self.solutions is None else f"; {self.solutions}"
         return f"{text}sliding: {sliding}{solutions}"
 
