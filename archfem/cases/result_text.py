@@ -29,7 +29,6 @@ from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describ
 from archfem.limit.fill_range import FillRange
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
-from archfem.masonry.loads import BodyForce
 from archfem.masonry.structure import Structure, join_joint_names, join_names
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import Match
@@ -252,8 +251,6 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     lines = [f"limit analysis: {collapse.sentence}"]
     lines += [f"hinges, by the face in contact: {join_names(hinges, '; ')}"] if hinges else []
     lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
-    if _slides_alone(structure, collapse):
-        lines.append("all bed joints reach μ together: the mechanism is one of many")
     lines += [str(collapse.solutions)] if collapse.solutions else []
     over = collapse.describe_range()
     lines += [f"over what is assumed of the fill: {over}"] if over else []
@@ -275,15 +272,6 @@ def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
         cells = ["-" if np.isnan(value) else f"{value:.4g}" for value in numbers]
         rows.append([found.vehicle.name, *cells, f"{found.outcome}, {found.place}"])
     return ResultTable([*head, "outcome, and axles at the worst place"], rows)
-
-
-def _slides_alone(structure: Structure, collapse: Collapse) -> bool:
-    """Return whether a wall slides at the friction of all its joints, pushed by its weight."""
-    loads = [load for load in collapse.live if isinstance(load, BodyForce) and not load.vertical]
-    if collapse.hinges or not collapse.sliding or len(loads) != len(collapse.live):
-        return False
-    push = abs(collapse.factor * sum(load.horizontal for load in loads))
-    return bool(structure.heads.any() and np.allclose(structure.friction, push, rtol=1e-3))
 
 
 def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tuple[Collapse, str]:

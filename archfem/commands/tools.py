@@ -1,4 +1,4 @@
-"""Commands check, animate, examples, example, new, schema and doctor, without result folders.
+"""Commands without result folders: check, thickness, animate, examples, new, schema, doctor.
 
 The module does not import drawing, so that `archfem check` starts at once.
 """
@@ -26,8 +26,11 @@ from archfem.cases.toml_file import parse_tables
 from archfem.commands.cli import ExitCode
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput, NotInstalled
-from archfem.limit.collapse import Collapse, Outcome
+from archfem.limit.collapse import Collapse, Outcome, describe_crushing
+from archfem.limit.thickness import minimum_thickness
+from archfem.masonry.ring_thickness import find_ring
 from archfem.motion.suite import Suite
+from archfem.units import format_mm
 
 PIP_INSTALL = f"{sys.executable} -m pip install"
 
@@ -56,6 +59,22 @@ def check(options: argparse.Namespace) -> int:
     ready = f"in doubt, {len(at_rest.doubts)} times, as above" if at_rest.doubts else "ready"
     print(f"{options.case}: {ready}; dead load in {at_rest.dead.iterations} iterations")
     return ExitCode.DOUBTFUL if at_rest.doubts else 0
+
+
+def thickness(options: argparse.Namespace) -> None:
+    """Find the least thickness of a ring at rest, scaled about its middle line."""
+    case = Case.read(options.case, options.changes)
+    ring, limit = find_ring(case.structure, options.part), case.limit
+    least = minimum_thickness(
+        ring.with_thickness, friction=limit.friction, strength=limit.strength, tolerance=1e-5
+    )
+    print(case.title)
+    print(
+        f"least thickness at rest: {format_mm(least)} of {format_mm(ring.thickness)}, the "
+        "mean depth of its joints, about the middle line; the ring alone on fixed springings\n"
+        f"geometric factor of safety: {ring.thickness / least:.3g}; "
+        f"{describe_crushing(limit.strength)}"
+    )
 
 
 def animate(options: argparse.Namespace) -> None:

@@ -12,6 +12,7 @@
     linear_programme      rigid-block equilibrium as a linear programme
     mechanism_count       mechanisms by counting failed joints; duration and opening
     mechanism_kinematics  mechanisms verified by a rigid-block motion
+    mechanism_names       plain names of mechanisms
     nonassociated         sliding without dilatancy
     plastic_fill          strength of a plastic fill
     rating                rating for vehicles of codes

@@ -33,6 +33,7 @@ from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bou
 from archfem.limit.fill_range import FillRange, vary_fill
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions
+from archfem.limit.mechanism_names import name_mechanism
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
 from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.loads import Action, BodyForce, PointLoad, Settlement, list_loads
@@ -139,7 +140,7 @@ class Collapse(ResultDisplay):
         if self.outcome is Outcome.UNBOUNDED and self.over_fill and np.isfinite(self.range[0]):
             return f"{self.outcome.sentence}, or does {self.describe_range()}"
         if self.outcome not in (Outcome.COLLAPSES, Outcome.BRACKETED):
-            return self.outcome.sentence
+            return self._headline
         unit = abs(self.push) or 1.0
         ends = self.range if self.outcome is Outcome.COLLAPSES else (self.factor, self.upper)
         low, high = (f"{unit * bound:.4g}" for bound in ends)
@@ -152,7 +153,34 @@ class Collapse(ResultDisplay):
                 place = f"which is at most {high}"
         elif self.solutions and self.solutions.may_be_less:
             place, words = place.replace("at ", "at ≤ ", 1), f"{words} (least found)"
-        return f"{self.outcome.sentence}, {place}{words}"
+        return f"{self._headline}, {place}{words}"
+
+    @property
+    def mechanism_name(self) -> str:
+        """Plain name of the mechanism, as "four-hinge mechanism"; "" where nothing moves."""
+        if self.structure is None or not self.motion.any():
+            return ""
+        many = " (one of many: all bed joints reach μ)" if self._slides_anywhere else ""
+        return name_mechanism(self.structure, self.motion) + many
+
+    @property
+    def _slides_anywhere(self) -> bool:
+        """Whether stones slide at the friction of all bed joints, pushed by their weight."""
+        structure = self.structure
+        if structure is None or self.hinges or not self.sliding or not self.push:
+            return False
+        push = abs(self.factor * self.push)
+        level = abs(structure.normals[~structure.heads, 1]) > 1.0 - 1e-9
+        alike = np.allclose(structure.friction, push, rtol=1e-3)
+        return bool(len(level) > 1 and level.all() and alike)
+
+    @property
+    def _headline(self) -> str:
+        """The name of the mechanism in place of the outcome, or after it."""
+        name = self.mechanism_name if self.outcome is not Outcome.SETTLES else ""
+        if self.outcome is Outcome.COLLAPSES and name:
+            return name
+        return f"{self.outcome.sentence}: {name}" if name else self.outcome.sentence
 
     def _name_load(self) -> str:
         """Return the unit of the factor and what the load is, in words."""
@@ -185,7 +213,7 @@ class Collapse(ResultDisplay):
         bound = (
             "" if self.upper == self.factor or np.isnan(self.factor) else f" to {self.upper:.4g}"
         )
-        text = f"{self.outcome.sentence}: factor {self.factor:.4g}{bound}; hinges: {hinges}; "
+        text = f"{self._headline}: factor {self.factor:.4g}{bound}; hinges: {hinges}; "
         solutions = "" if self.solutions is None else f"; {self.solutions}"
         over = f"; {self.describe_range()}" if self.over_fill else ""
         return f"{text}sliding: {sliding}{solutions}{over}"

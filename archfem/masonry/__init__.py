@@ -8,6 +8,7 @@
     loads            BodyForce, PointLoad, Settlement
     materials        Material, Contact, presets
     parts            roles and axes of rings and piers
+    ring_thickness   a ring with another thickness about its middle line
     shapes           parametric structures: arches, columns, arcades and bridges from a few lengths
     stiffness_ratio  block stiffness relative to its joints
     structure        Joint, Structure, rigid motion, look-up by name

@@ -19,6 +19,8 @@ from .materials import STONE as STONE
 from .materials import STONE_TO_STONE as STONE_TO_STONE
 from .materials import Contact as Contact
 from .materials import Material as Material
+from .ring_thickness import Ring as Ring
+from .ring_thickness import find_ring as find_ring
 from .structure import Joint as Joint
 from .structure import Structure as Structure
 from .survey.circle_fit import FittedCircle as FittedCircle

@@ -48,6 +48,7 @@ from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
+from archfem.limit.mechanism_names import name_mechanism
 from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.loads import AttachedLoad, BodyForce
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
@@ -216,7 +217,8 @@ class KinematicAssessment(ResultDisplay):
             hinges = join_names([f"{names[k]} at the {end}" for k, end in self.hinges], "; ")
             sliding = join_joint_names([names[k] for k in self.sliding])
             lines += [
-                f"hinges: {hinges or 'none'}; sliding: {sliding or 'none'}",
+                f"{name_mechanism(self.structure, self.path.velocity)}; hinges: "
+                f"{hinges or 'none'}; sliding: {sliding or 'none'}",
                 f"alpha_0 = {self.alpha_0:.4g}, e* = {self.e_star:.3f}, M* = {self.M_star:.4g} kg, "
                 f"a_0* = {self.a_0_star:.4g} m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g), "
                 f"d_0* = {self.d_0_star:.4g} m, T_s = {self.T_s:.3f} s",

@@ -68,7 +68,8 @@ def test_limit_analysis_in_words(ring):
     pushed = af.collapse_factor(ring, live=af.BodyForce(1.0))
     limit = parse_limit({"strength": 2e6, "fill": {"friction_angle": 35}})
     outcome, hinges, crushing, fill = describe_collapse(ring, pushed, limit).splitlines()
-    assert outcome.endswith(f"into a mechanism, at {pushed.factor:.4g} g, pushed to the right")
+    place = f"at {pushed.factor:.4g} g, pushed to the right"
+    assert outcome == f"limit analysis: four-hinge mechanism, {place}"
     assert hinges.startswith("hinges, by the face in contact: joint 0 at the intrados; joint 6 at")
     assert crushing == "joints crush at 2 MPa, the strength of the stones"
     assert "at most 0.33 of the passive pressure, friction angle 35°, cohesion 0 kPa" in fill
@@ -85,6 +86,7 @@ def test_limit_analysis_in_words(ring):
     assert describe_fill(replace(fill, backing=0.5)).endswith("by up to 2 MPa (given)")
     mirrored = af.collapse_factor(ring, live=af.BodyForce(-2.0))
     assert mirrored.sentence == pushed.sentence.replace("right", "left")
+    assert pushed.sentence.startswith("four-hinge mechanism, at ")
     wheel = af.PointLoad(0.5, (0.0, -3e3))
     loaded = af.collapse_factor(ring, live=wheel)
     assert loaded.sentence.endswith(f"at {loaded.factor:.4g} times 3 kN at x = 0.5 m")

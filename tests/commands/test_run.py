@@ -424,7 +424,7 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     assert af.commands.main(["limit", str(path), "--set", "limit.horizontal=0.5"]) == 0
     said = capsys.readouterr().out
     assert f"at {found.factor:.4g} g, pushed to the right" in said
-    other = f"{found.outcome.sentence}, at {found.factor:.4g} g, pushed to the left"
+    other = f"four-hinge mechanism, at {found.factor:.4g} g, pushed to the left"
     assert f"in the other sense: {other}" in said
     assert "(the same)" in said
     assert af.commands.main(["limit", str(path), "--set", "limit.vertical=-1"]) == 0
@@ -446,7 +446,7 @@ def test_limit_analysis_cut_short_keeps_the_first_sense(
     assert af.commands.main([command, str(path), "--out", str(out)]) == 130
     text, said = (out / "limit.txt").read_text(), capsys.readouterr()
     assert text in said.out
-    assert text.startswith("limit analysis: the load turns it into a mechanism, at ")
+    assert text.startswith("limit analysis: four-hinge mechanism, at ")
     assert "\nin the other sense: not computed" in text
     assert "pushed to the right; the other sense follows" in said.err
 

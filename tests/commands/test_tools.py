@@ -135,3 +135,15 @@ def test_damaged_code_is_reported(monkeypatch, tmp_path):
     diagnosis = tools._diagnose_compiled_code()
     assert "1 damaged files" in diagnosis.state
     assert "archfem compile" in diagnosis.remedy
+
+
+def test_the_least_thickness_of_a_ring_is_printed(tmp_path, capsys):
+    path = tmp_path / "arch.toml"
+    shape = '[structure]\nshape = "circular_arch"\nradius = 1.0\nthickness = 0.2\n'
+    path.write_text(f"{shape}embrace = 180.0\nvoussoirs = 66\n")
+    assert af.commands.main(["thickness", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "least thickness at rest: 107 mm of 200 mm" in said  # Milankovitch: 0.1075 R
+    assert "geometric factor of safety: 1.86;" in said
+    assert af.commands.main(["thickness", str(path), "--part", "dome"]) == 1
+    assert "'dome' is no ring" in capsys.readouterr().err

@@ -1,0 +1,141 @@
+"""Names of mechanisms, by motions whose form is known: hinges, sliding, overturning, wedges."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.limit.mechanism_names import name_mechanism
+
+PUSH = af.BodyForce(1.0)
+
+
+def bonded_wall(courses, half=2.0, course=0.25, length=0.5):
+    """Build a wall of stones in running bond on the ground."""
+    ground = [(-half - 1.0, -0.5), (half + 1.0, -0.5), (half + 1.0, 0.0), (-half - 1.0, 0.0)]
+    blocks = [af.Block(ground, af.STONE, "ground", fixed=True, part="ground", role="other")]
+    for k in range(courses):
+        count = int(half / length) + 1
+        heads = [length * (i + 0.5 * (k % 2)) for i in range(-count, count + 1)]
+        places = [-half, *(x for x in heads if abs(x) < half - 0.1), half]
+        low, high = k * course, (k + 1) * course
+        for a, b in pairwise(places):
+            corners = [(a, low), (b, low), (b, high), (a, high)]
+            name = f"course {k + 1}, stone {len(blocks)}"
+            blocks.append(af.Block(corners, af.STONE, name, part="wall", role="pier"))
+    return af.masonry.assembled(blocks, af.Contact(1.48e9, 0.3e9, friction=0.6), width=0.4)
+
+
+def semicircle(voussoirs=16, thickness=0.2, **options):
+    """Build a semicircular ring of mean radius 1 m, with a joint at the crown."""
+    sizes = {"radius": 1.0 - thickness / 2.0, "thickness": thickness, "embrace": 180.0}
+    return af.circular_arch(**sizes, voussoirs=voussoirs, **options)
+
+
+def test_a_pushed_ring_has_four_hinges():
+    for embrace, voussoirs, thickness in ((159.0, 17, 0.55), (120.0, 11, 0.4), (180.0, 24, 0.7)):
+        sizes = {"radius": 2.95, "thickness": thickness, "embrace": embrace}
+        ring = af.circular_arch(**sizes, voussoirs=voussoirs)
+        found = af.collapse_factor(ring, live=PUSH, friction=None)
+        assert len(found.hinges) == 4  # Heyman: one degree of freedom
+        assert found.mechanism_name == "four-hinge mechanism"
+        assert found.sentence.startswith("four-hinge mechanism, at ")
+        assert str(found).startswith("four-hinge mechanism: factor ")
+
+
+def test_a_mechanism_and_its_mirror_image_have_five_hinges():
+    ring = semicircle()
+    found = af.collapse_factor(ring, live=af.PointLoad(0.0, (0.0, -1e3)), friction=None)
+    assert {joint for joint, _ in found.hinges} in ({4, 8, 12, 16}, {0, 4, 8, 12})
+    assert found.mechanism_name == "four-hinge mechanism"
+    # the load is symmetric: the mirror image of the motion is one too, and so is their sum
+    stones, image = list(ring.free), np.zeros_like(found.motion)
+    image[stones] = found.motion[stones[::-1]] * [-1.0, 1.0, -1.0]
+    assert name_mechanism(ring, image) == "four-hinge mechanism"
+    assert name_mechanism(ring, found.motion + image) == "five-hinge symmetric mechanism"
+
+
+def test_a_thin_semicircle_falls_by_a_symmetric_mechanism():
+    found = af.collapse_factor(semicircle(thickness=0.1), live=PUSH, friction=None)
+    assert found.outcome is af.limit.Outcome.INFEASIBLE
+    start = "it does not stand under its own weight: "
+    assert found.sentence.startswith(start)
+    assert found.sentence.endswith("-hinge symmetric mechanism")
+
+
+@pytest.mark.parametrize("friction", ["coulomb", "nonassociated"])
+def test_blocks_slide_where_friction_is_least(friction):
+    stack = af.column(breadth=1.0, heights=[0.3, 0.3, 0.3])
+    joints = list(stack.joints)
+    weak = replace(joints[1], contact=replace(joints[1].contact, friction=0.3))
+    stack = replace(stack, joints=(joints[0], weak, joints[2]))
+    found = af.collapse_factor(stack, live=PUSH, friction=friction)
+    assert found.factor == pytest.approx(0.3)  # μ
+    assert found.mechanism_name == "sliding of all above block 1"
+
+
+def test_blocks_of_equal_friction_slide_at_one_joint_of_many():
+    stack = af.column(breadth=1.0, heights=[0.3, 0.3, 0.3])
+    found = af.collapse_factor(stack, live=PUSH, friction="nonassociated")
+    assert found.factor == pytest.approx(0.6)  # μ
+    assert found.mechanism_name.startswith("sliding of all ")
+    assert found.mechanism_name.endswith(" (one of many: all bed joints reach μ)")
+
+
+def test_a_stack_and_a_wall_overturn_about_the_toe():
+    stack = af.column(breadth=1.0, heights=[1.0, 1.0, 1.0, 1.0])
+    found = af.collapse_factor(stack, live=PUSH)
+    assert found.factor == pytest.approx(0.25)  # B / H
+    assert found.mechanism_name == "overturning about the toe of block 1"
+    wall = bonded_wall(courses=12)
+    found = af.collapse_factor(wall, live=PUSH, friction=None)
+    assert found.factor == pytest.approx(4.0 / 3.0)  # B / H
+    assert found.mechanism_name == "overturning about the toe of course 1"
+
+
+def test_the_upper_part_of_a_stack_rocks_where_it_is_slender():
+    base = af.Block([(-2.0, -0.5), (2.0, -0.5), (2.0, 0.0), (-2.0, 0.0)], af.STONE, "base", True)
+    plinth = af.Block([(-1.0, 0.0), (1.0, 0.0), (1.0, 0.5), (-1.0, 0.5)], af.STONE, "plinth")
+    shaft = af.Block([(-0.1, 0.5), (0.1, 0.5), (0.1, 1.5), (-0.1, 1.5)], af.STONE, "shaft")
+    stack = af.masonry.assembled([base, plinth, shaft], af.Contact(1e9, 1e9, friction=0.6))
+    found = af.collapse_factor(stack, live=PUSH)
+    assert found.factor == pytest.approx(0.2)  # B / H of the shaft
+    assert found.mechanism_name == "rocking of all above plinth about the toe of shaft"
+
+
+@pytest.mark.parametrize("friction", ["coulomb", "nonassociated"])
+def test_a_wall_in_bond_loses_a_wedge_at_its_toe(friction):
+    found = af.collapse_factor(bonded_wall(courses=12), live=PUSH, friction=friction)
+    assert found.factor == pytest.approx(0.5, rel=0.06)  # length / (4 course) of a high wall
+    assert found.mechanism_name == "toe wedge overturning about the toe of course 1"
+
+
+def test_one_motion_may_slide_and_turn():
+    block = af.column(breadth=1.0, heights=[1.0])
+    motion = np.zeros((2, 3))
+    motion[1] = 1.0, 0.5, -1.0  # about the toe, and the same again of sliding
+    assert name_mechanism(block, motion) == "combined overturning and sliding of all on base"
+    motion[1] = 0.0, 0.0, 0.0
+    assert name_mechanism(block, motion) == ""
+
+
+def test_hinges_and_sliding_joints_of_a_ring_are_combined():
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+    found = af.collapse_factor(ring, live=af.PointLoad(0.0, (0.0, -1e4)))
+    counts = len(found.hinges), len(found.sliding)
+    assert counts == (3, 1)
+    said = "combined hinge-slide mechanism, three hinges and one sliding joint"
+    assert found.mechanism_name == said
+
+
+def test_a_mechanism_of_some_parts_names_them():
+    sizes = {"radius": 1.5, "thickness": 0.35, "voussoirs": 9, "pier_breadth": 0.7}
+    portal = af.arch_on_piers(**sizes, courses=[0.5, 0.5, 0.5])
+    found = af.collapse_factor(portal, live=PUSH)
+    assert {portal.blocks[k].part for k in np.flatnonzero(found.motion.any(axis=1))} == {
+        "arch",
+        "right pier",
+    }
+    assert found.mechanism_name == "four-hinge mechanism of arch and right pier"

@@ -1,0 +1,128 @@
+"""Drawn rings with another thickness: Milankovitch's semicircle, faces, and what is no ring."""
+
+import ezdxf
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.masonry import find_ring
+
+MILANKOVITCH = 0.1075
+"""Least t/R of a semicircle at its middle line, with hinges at 54.5° from the crown."""
+
+
+def draw_semicircle(path, stones=66, middle=1.0, depth=0.2, between=2, noise=0.0):
+    """Draw a semicircle in millimetres, with points between the corners along both faces."""
+    chance = np.random.default_rng(5)
+    angles = np.linspace(np.pi, 0.0, stones * (between + 1) + 1)
+    faces = [
+        (middle + side * depth / 2.0) * np.column_stack([np.cos(angles), np.sin(angles)])
+        for side in (-1.0, 1.0)
+    ]
+    faces = [face + noise * chance.uniform(-1.0, 1.0, face.shape) for face in faces]
+    drawing = ezdxf.new(units=ezdxf.units.MM)
+    for k in range(stones):
+        own = slice(k * (between + 1), (k + 1) * (between + 1) + 1)
+        points = 1e3 * np.concatenate([faces[0][own], faces[1][own][::-1]])
+        drawing.modelspace().add_lwpolyline(points, close=True, dxfattribs={"layer": "RING"})
+    for sign in (-1.0, 1.0):
+        ends = [face[0 if sign < 0.0 else -1] for face in faces]
+        points = 1e3 * np.array([*ends, ends[1] - [0.0, 0.2], ends[0] - [0.0, 0.2]])
+        drawing.modelspace().add_lwpolyline(points, close=True, dxfattribs={"layer": "ROCK"})
+    drawing.saveas(path)
+    return path
+
+
+def read(path, **options):
+    layers = {
+        "RING": af.masonry.Layer(part="arch", role="ring"),
+        "ROCK": af.masonry.Layer(part="rock", role="other", fixed=True),
+    }
+    return af.masonry.surveyed(path, layers=layers, **options)
+
+
+@pytest.mark.parametrize("depth", [0.2, 0.3])
+def test_a_drawn_semicircle_needs_what_milankovitch_found(tmp_path, depth):
+    drawn = read(draw_semicircle(tmp_path / "arch.dxf", depth=depth))
+    ring = find_ring(drawn)
+    assert ring.thickness == pytest.approx(depth, rel=1e-6)
+    least = af.minimum_thickness(ring.with_thickness, friction=None, tolerance=1e-5)
+    assert least == pytest.approx(MILANKOVITCH, abs=1e-4)
+
+
+def test_noise_of_a_survey_changes_it_by_little(tmp_path):
+    path = draw_semicircle(tmp_path / "arch.dxf", 33, 3.0, 0.6, between=0, noise=0.003)
+    ring = find_ring(read(path, snap=2e-3))
+    least = af.minimum_thickness(ring.with_thickness, friction=None, tolerance=1e-4)
+    assert least / 3.0 == pytest.approx(MILANKOVITCH, abs=0.002)  # 6 mm of 322
+
+
+@pytest.mark.parametrize("thickness", [0.1, 0.2, 0.35])
+def test_it_is_the_ring_of_the_same_middle_line(thickness):
+    """The radius of a shape is that of its middle line."""
+    sizes = {"radius": 1.0, "embrace": 140.0, "voussoirs": 9}
+    made = find_ring(af.circular_arch(thickness=0.2, **sizes)).with_thickness(thickness)
+    same = af.circular_arch(thickness=thickness, **sizes)
+    stones = [same.blocks[k] for k in same.free]
+    for block, expected in zip(made.blocks, stones, strict=False):
+        assert block.points == pytest.approx(expected.points, abs=1e-12)
+        assert block.area == pytest.approx(expected.area)
+    for joint, expected in zip(made.joints, same.joints, strict=True):
+        assert joint.ends == pytest.approx(expected.ends, abs=1e-12)
+    push = [af.collapse_factor(each, live=af.BodyForce(1.0)).factor for each in (made, same)]
+    assert push[0] == pytest.approx(push[1], rel=1e-9)
+
+
+def test_a_ring_on_piers_is_taken_alone():
+    sizes = {"radius": 1.5, "thickness": 0.35, "voussoirs": 9, "pier_breadth": 0.7}
+    portal = af.arch_on_piers(**sizes, courses=[0.5, 0.5])
+    alone = find_ring(portal).with_thickness(0.3)
+    assert [block.part for block in alone.blocks] == ["arch"] * 11
+    assert [block.fixed for block in alone.blocks] == [False] * 9 + [True] * 2
+    assert alone.depths == pytest.approx(0.3)
+    old = sum(block.area for block in portal.blocks if block.part == "arch")
+    new = sum(alone.blocks[k].area for k in alone.free)
+    assert new == pytest.approx(0.3 / 0.35 * old, rel=1e-6)
+
+
+def test_stones_of_unequal_depth_touch_along_what_is_common():
+    def box(left, right, low, high, name, fixed=False):
+        corners = [(left, low), (right, low), (right, high), (left, high)]
+        return af.Block(corners, af.STONE, name, fixed, part="lintel", role="ring")
+
+    blocks = [
+        box(-1.0, 0.0, 0.0, 1.0, "west", fixed=True),
+        box(0.0, 1.0, 0.0, 1.0, "one"),
+        box(1.0, 2.0, 0.1, 0.9, "two"),
+        box(2.0, 3.0, 0.1, 0.9, "east", fixed=True),
+    ]
+    lintel = af.masonry.assembled(blocks, af.Contact(1e9, 1e9, friction=0.6))
+    ring = find_ring(lintel)
+    assert ring.thickness == pytest.approx((1.0 + 0.8 + 0.8) / 3.0)
+    half = ring.with_thickness(0.5 * ring.thickness)
+    assert half.depths == pytest.approx([0.5, 0.4, 0.4])
+    assert [block.area for block in half.blocks[:2]] == pytest.approx([0.5, 0.4])
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: find_ring(af.column(breadth=1.0, heights=[1.0])), "there are 0 rings"),
+        (lambda: find_ring(ring_of_seven(), part="dome"), "'dome' is no ring"),
+        (lambda: find_ring(filled()), "has 3 joints .*one layer of stones that carry nothing"),
+        (lambda: find_ring(ring_of_seven()).with_thickness(0.0), "thickness"),
+        (lambda: find_ring(ring_of_seven()).with_thickness(2.5), "crosses or touches itself"),
+    ],
+)
+def test_what_is_no_ring_is_refused(build, message):
+    with pytest.raises(ValueError, match=message):
+        build()
+
+
+def ring_of_seven():
+    return af.circular_arch(radius=1.0, thickness=0.2, embrace=140.0, voussoirs=7)
+
+
+def filled():
+    arch = af.shapes.Arch(span=6.0, rise=1.5, thickness=0.4, voussoirs=7)
+    return af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.3))
