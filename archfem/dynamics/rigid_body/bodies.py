@@ -5,7 +5,6 @@ American Mathematical Monthly 82 (1975) 648), and triangles are merged while the
 (Hertel and Mehlhorn 1983), which gives at most four times the smallest number of pieces.
 """
 
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations, pairwise
@@ -17,12 +16,10 @@ from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem._validation import check_number
-from archfem.errors import InvalidInput, InvalidStructure
+from archfem.errors import InvalidInput, InvalidStructure, logger
 from archfem.masonry.block import Block
 from archfem.masonry.stiffness_ratio import find_soft_blocks
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
-
-logger = logging.getLogger("archfem")
 
 # Numbers of the vertices of a convex piece, anticlockwise
 Piece = tuple[int, ...]
@@ -207,24 +204,23 @@ def _friction_table(structure: Structure, default: float | None) -> Array:
             "fall: give friction"
         )
     general = smallest if default is None else check_number(default, "friction", minimum=0.0)
-    count = len(structure.blocks) + 1
-    table = np.full((count, count), inf)
-    has_joint = np.zeros((count, count), dtype=bool)
-    for (a, b), coefficient in zip(structure.pairs, structure.friction, strict=True):
-        table[a, b] = table[b, a] = min(table[a, b], coefficient)
-        has_joint[a, b] = has_joint[b, a] = True
     # infinite friction of joints that never slide becomes 1000, since kernels multiply by it
-    return np.minimum(np.where(has_joint, table, general), 1e3)
+    return np.minimum(_least_between(structure, structure.friction, general), 1e3)
 
 
 def _cohesion_table(structure: Structure) -> Array:
     """Return c w between any two bodies, the least of their joints, and zero without a joint."""
+    cohesion = np.array([joint.contact.cohesion for joint in structure.joints])
+    return _least_between(structure, structure.width * cohesion, 0.0)
+
+
+def _least_between(structure: Structure, values: Array, default: float) -> Array:
+    """Return the least value of the joints between any two bodies, or the default without any."""
     count = len(structure.blocks) + 1
-    table = np.full((count, count), inf)
-    for (a, b), joint in zip(structure.pairs, structure.joints, strict=True):
-        limit = structure.width * joint.contact.cohesion
-        table[a, b] = table[b, a] = min(table[a, b], limit)
-    return np.where(np.isinf(table), 0.0, table)
+    table = np.full((count, count), np.nan)
+    np.fmin.at(table, tuple(structure.pairs.T), values)
+    table = np.fmin(table, table.T)
+    return np.where(np.isnan(table), default, table)
 
 
 def _rocking_table(structure: Structure, ratio: float | Mapping[str, float] | None) -> Array:

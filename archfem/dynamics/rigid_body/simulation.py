@@ -3,7 +3,6 @@
 The steps themselves are in `time_stepping`.
 """
 
-import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -36,11 +35,9 @@ from archfem.dynamics.rigid_body.time_stepping import (
     advance_steps,
     kinetic_energy,
 )
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
-
-logger = logging.getLogger("archfem")
 
 # Energy gained without work, over the energy exchanged, from which a run is refused: speeds, which
 # vary with its root, then err by half a per cent [-]

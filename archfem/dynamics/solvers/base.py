@@ -29,6 +29,7 @@ class StepSolver(Protocol):
     name: ClassVar[str]  # value of `method=` that selects it
     order: NDArray[Any]  # coordinates of the model in the order of the solver's vectors (n,)
     assembled: dict[float, Any]  # systems of which no step has been taken, by length of step [s]
+    measures_faces: bool = False  # whether it measures gaps, rotations and slips of joints
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from archfem._typing import Array
 from archfem.dynamics.solvers import base
 from archfem.dynamics.solvers.equation import Equation
-from archfem.dynamics.solvers.rigid_chains import ChainSystem
 from archfem.dynamics.solvers.snes import SnesSolver
 from archfem.dynamics.state import Batch, State, Step
 from archfem.errors import DidNotConverge
@@ -176,9 +175,6 @@ class Stepper:
         iterations = np.zeros(steps, dtype=np.int64)
         if dt not in self._systems:
             self._systems[dt] = self.solver.system(dt)
-        measured = 3 if isinstance(self._systems[dt], ChainSystem) else 0
-        results = (
-            *(np.empty((steps, joints, 3)), iterations, np.empty((steps, 4))),
-            np.empty((steps, measured, joints)),
-        )
+        faces = np.empty((steps, 3 if self.solver.measures_faces else 0, joints))
+        results = np.empty((steps, joints, 3)), iterations, np.empty((steps, 4)), faces
         return series, memories, results, self.equation.ground(times, dt), self._systems[dt]

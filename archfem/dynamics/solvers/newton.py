@@ -100,6 +100,7 @@ class NewtonSolver(StepSolver):
         self.order, self.half_width = self._storage.order, self._storage.half_width
         self.has_band = self._storage.elimination is None
         self._tree = find_stone_tree(equation)
+        self.measures_faces = self._tree is not None
         if self._tree is not None:
             self.order = self._tree.order
         # a band is factorised faster than the joint law is evaluated, a sparse tangent is not

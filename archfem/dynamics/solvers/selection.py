@@ -1,7 +1,5 @@
 """Selection of the solver of a run, by the size of displacements and the width of the tangent."""
 
-import logging
-
 from archfem._threads import single_threaded
 from archfem._validation import short_repr
 from archfem.dynamics.solvers.base import StepSolver
@@ -11,10 +9,8 @@ from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.solvers.joint_law import gap_rows
 from archfem.dynamics.solvers.newton import NewtonSolver
 from archfem.dynamics.solvers.snes import SnesSolver
-from archfem.errors import InvalidInput
+from archfem.errors import InvalidInput, logger
 from archfem.statics.newton import Newton
-
-logger = logging.getLogger("archfem")
 
 
 @single_threaded

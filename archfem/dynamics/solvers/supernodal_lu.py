@@ -46,7 +46,9 @@ class Elimination:
         dominant = (ones + pattern.shape[0] * sparse.identity(pattern.shape[0])).tocsc()
         factor = splu(dominant, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
         order = np.argsort(factor.perm_c)
-        fill = _fill(dominant[order][:, order].tocsc())
+        # no entry of a dominant matrix cancels: the factor has the fill of any other one
+        lower = sparse.tril(factor.L, -1, "csc").sorted_indices()
+        fill = np.split(lower.indices, lower.indptr[1:-1])
         after = _postorder([int(rows[0]) if len(rows) else len(fill) for rows in fill])
         place = np.argsort(after)
         fill = [np.sort(place[fill[column]]) for column in after]
@@ -60,23 +62,6 @@ class Elimination:
     def group_of(self) -> Indices:
         """Group of each coordinate, in this order (n,)."""
         return np.repeat(np.arange(len(self.groups)), [end - start for start, end in self.groups])
-
-
-def _fill(matrix: sparse.csc_matrix) -> list[Indices]:
-    """Return the rows below the diagonal in each column of the factor, sorted."""
-    size = matrix.shape[0]
-    fill: list[set[int]] = []
-    children: list[list[int]] = [[] for _ in range(size)]
-    for column in range(size):
-        own = matrix.indices[matrix.indptr[column] : matrix.indptr[column + 1]]
-        rows = set(own[own > column].tolist())
-        for child in children[column]:
-            rows |= fill[child]
-        rows.discard(column)
-        fill.append(rows)
-        if rows:
-            children[min(rows)].append(column)
-    return [np.array(sorted(rows), dtype=np.int64) for rows in fill]
 
 
 def _postorder(parent: list[int]) -> Indices:
