@@ -48,12 +48,14 @@ class ResultFolder(CaseResult):
         case: the case that was run.
         runs: histories by the names of their motions.
         missing: names of the pairs of a suite without a history.
+        study: folder of a study that the report shows; None where this one has it, if any.
     """
 
     folder: Path
     case: Case
     runs: Mapping[str, History]
     missing: tuple[str, ...] = ()
+    study: Path | None = None
 
     def report(self, path: str | Path | None = None) -> Path:
         """Write an HTML report of the folder in one file, for print.
@@ -158,7 +160,10 @@ def _missing_case_message(place: Path) -> str:
     if (place / HISTORY_FILE).is_file() and (place.parent / CASE_FILE).is_file():
         return f"{text}: it is of one pair of a suite; give the suite's folder, {place.parent}"
     if (place / "study.json").is_file():
-        return f"{text}: it is of a study; a report is of one case, run by itself"
+        return (
+            f"{text}: it is of a study, which the report of a case shows: `archfem report FOLDER "
+            f"--study {place}`"
+        )
     return f"{text}: give that folder, or run the case again with `--out {place}`"
 
 

@@ -17,6 +17,7 @@ from archfem.cases.defaults import describe_defaults, explain_defaults
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import Ending, History
+from archfem.dynamics.motion_scaling import CollapseScale, MechanismScales
 from archfem.dynamics.verdict import ALL_DEFINITIONS, DOUBT_MARK, Verdict
 from archfem.joints.criteria import (
     assessed_joints,
@@ -39,6 +40,19 @@ from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_text, utilisation_text
 from archfem.units import STANDARD_GRAVITY, format_mm, kN
+
+# Results by the names of their files
+RESULTS = {
+    "limit": "limit analysis",
+    "pushover": "pushover",
+    "rating": "rating",
+    "assessment": "kinematic assessment",
+    "scale": "scale of the motion",
+    "risk": "annual rate of collapse",
+    "modes": "modes",
+    "accuracy": "comparison of models and time steps",
+    "verdict_range": "range of the verdict over uncertain properties",
+}
 
 # Before what a kinematic assessment leaves out
 NOTE_MARK = "note: "
@@ -412,6 +426,24 @@ def state_outcome(
 ) -> Statement:
     """State one outcome, which is the capacity too."""
     return Statement([f"{result}: {words}"], [(result, demand, words, factor)], doubts)
+
+
+def state_scale(
+    found: CollapseScale | MechanismScales, motion: Motion, doubts: Sequence[str]
+) -> dict[str, str]:
+    """Return the files with what is stated of a search of scales, and with its runs."""
+    demand = f"'{motion.name}', PGA {motion.pga / STANDARD_GRAVITY:.2f} g"
+    # what was run between the scales stands in the text
+    words, files = repr(found).partition(";")[0], dict[str, str]()
+    if isinstance(found, CollapseScale):
+        least = min(found.bracket(dt).upper for dt in found.searches)
+        files["scale.csv"] = ResultTable(*found.rows()).csv
+    else:
+        least = min(found[definition].upper for definition in found.definitions)
+        words += "; a fall was not computed"
+    factor = f"{least:#.3g}" if np.isfinite(least) else "-"
+    stated = state_outcome(RESULTS["scale"], words, doubts, demand, factor)
+    return {**stated.as_file("scale"), **files}
 
 
 def state_ratings(rated: Sequence[tuple[Rating, Sequence[str]]]) -> Statement:

@@ -202,6 +202,7 @@ class Run(CaseResult):
 
     # The report reads these, as of a `ResultFolder`.
     missing: ClassVar[tuple[str, ...]] = ()
+    study: ClassVar[Path | None] = None
 
     @property
     def runs(self) -> Mapping[str, History]:

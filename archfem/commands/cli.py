@@ -238,6 +238,7 @@ def _add_result_commands(commands: Any) -> None:
         "--set", action="append", default=[], metavar="report.KEY=WORDS", dest="changes", help=about
     )
     add("--inputs", metavar="DIR", help="folder of a mesh that the case names (FOLDER)")
+    add("--study", metavar="DIR", help="folder of a study that the report shows (FOLDER)")
     add("--pdf", action="store_true", help="also print it, by Chromium or Chrome")
     _add_own_code(add)
     text = (

@@ -8,13 +8,13 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from archfem._display import ProgressReport
+from archfem._display import ProgressReport, write_progress_line
 from archfem._files import (
     DRAFT_PREFIX,
     create_result_folder,
@@ -28,7 +28,7 @@ from archfem.cases import result_text
 from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults
-from archfem.cases.result_text import state_ratings
+from archfem.cases.result_text import RESULTS, state_ratings
 from archfem.cases.run import (
     RATING_FILE,
     DeadLoadResult,
@@ -58,11 +58,13 @@ from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import structure_doubts
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
-from archfem.units import STANDARD_GRAVITY, MPa
+from archfem.units import MPa
 from archfem.view.motions import draw_spectra, draw_suite
 from archfem.view.style import Files, write_files
 
 logger = logging.getLogger("archfem")
+
+Command = Callable[[argparse.Namespace], int]
 
 # Modules that import pyvista or studies, which are slow, are imported where they are needed.
 
@@ -166,6 +168,27 @@ def _record_doubts(structure: Structure) -> Iterator[list[str]]:
         logger.removeHandler(handler)
 
 
+def _keep_attempt(name: str) -> Callable[[Command], Command]:
+    """Let a command that finds no answer leave the reason in its folder, which a report states."""
+
+    def decorate(command: Command) -> Command:
+        @wraps(command)
+        def attempt(options: argparse.Namespace) -> int:
+            try:
+                return command(options)
+            except DidNotConverge as error:
+                case = Case.read(options.case, options.changes)
+                text = f"no answer: {error}"
+                stated = result_text.state_outcome(RESULTS[name], text).as_file(name)
+                files: Files = {f"{name}.txt": text, **stated}
+                _write_results(command.__name__, case, options.out, text, lambda: files)
+                raise
+
+        return attempt
+
+    return decorate
+
+
 def _doubt_code(lines: Iterable[str]) -> int:
     """Return the exit code of printed doubts and notes."""
     return ExitCode.DOUBTFUL if any(line.startswith(DOUBT_MARK) for line in lines) else 0
@@ -187,6 +210,7 @@ def modes(options: argparse.Namespace) -> int:
     return ExitCode.DOUBTFUL if at_rest.doubts else 0
 
 
+@_keep_attempt("limit")
 def limit(options: argparse.Namespace) -> int:
     """Find the collapse factor of the loads in [limit], and the mechanism."""
     case = Case.read(options.case, options.changes)
@@ -202,6 +226,7 @@ def limit(options: argparse.Namespace) -> int:
     return _doubt_code(doubts)
 
 
+@_keep_attempt("assessment")
 def assess(options: argparse.Namespace) -> int:
     """Assess the collapse mechanisms of a case against a design spectrum, in both directions."""
     case = Case.read(options.case, options.changes)
@@ -230,6 +255,7 @@ def assess(options: argparse.Namespace) -> int:
     return _doubt_code(doubts)
 
 
+@_keep_attempt("rating")
 def rate(options: argparse.Namespace) -> int:
     """Rate the bridge of a case for vehicles, by the joints and the fill of its [limit]."""
     keys = ("live", "impact", "dead", "width", "area_load")
@@ -273,7 +299,8 @@ def mesh(options: argparse.Namespace) -> None:
     print(f"wrote {options.out}")
 
 
-def accuracy(options: argparse.Namespace) -> None:
+@_keep_attempt("accuracy")
+def accuracy(options: argparse.Namespace) -> int:
     """Run a case over fidelities, meshes, quadratures and steps: table and picture."""
     from archfem.studies.convergence import case_accuracy
     from archfem.view.studies import draw_accuracy
@@ -283,8 +310,10 @@ def accuracy(options: argparse.Namespace) -> None:
     text = result_text.describe_accuracy(compared)
     files: Files = {"accuracy.txt": text, "accuracy.png": draw_accuracy(compared)}
     _write_results("accuracy", case, options.out, text, lambda: files)
+    return 0
 
 
+@_keep_attempt("risk")
 def risk(options: argparse.Namespace) -> int:
     """Compute the annual rate at which the structure of a case falls, by its [risk]."""
     from archfem.studies.collapse_risk import collapse_risk
@@ -313,6 +342,7 @@ def risk(options: argparse.Namespace) -> int:
     return ExitCode.DOUBTFUL if found.doubts else 0
 
 
+@_keep_attempt("verdict_range")
 def verdict(options: argparse.Namespace) -> int:
     """Run a case over joint rules, stiffness, friction and damping: how often does it fall?"""
     from archfem.studies.variations import verdict_range
@@ -340,6 +370,7 @@ def _choose_motion(case: Case, options: argparse.Namespace) -> Motion:
     return ground_motion(case if options.pair is None else case.alone(options.pair))
 
 
+@_keep_attempt("scale")
 def scale(options: argparse.Namespace) -> int:
     """Scale the motion of a case until it falls, or forms a mechanism in small displacements."""
     case = Case.read(options.case, options.changes)
@@ -350,9 +381,7 @@ def scale(options: argparse.Namespace) -> int:
         found = search(case.analysis, motion)
     doubts += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
     text = "\n".join([f"{motion.name}: {found}", *dict.fromkeys(doubts), "", found.table()])
-    demand = f"'{motion.name}', PGA {motion.pga / STANDARD_GRAVITY:.2f} g"
-    stated = result_text.state_outcome("scale of the motion", repr(found), doubts, demand)
-    files: Files = {"scale.txt": text, **stated.as_file("scale")}
+    files: Files = {"scale.txt": text, **result_text.state_scale(found, motion, doubts)}
     _write_results("scale", case, options.out, f"{case.title}\n{text}", lambda: files)
     if found.interrupted:
         raise KeyboardInterrupt
@@ -363,15 +392,20 @@ def report(options: argparse.Namespace) -> None:
     """Write the report of a result folder, or of a history alone."""
     if options.pdf and str(options.out).lower().endswith(".docx"):
         raise InvalidInput(f"--pdf prints the page, and {options.out} is none: give FILE.html")
+    if options.pdf:
+        write_progress_line("report", "drawing figures")
     if (history := Path(options.folder)).is_file():
         path = History.read(history).report(options.out or history.with_suffix(".html"))
     else:
         found = results.open_results(options.folder, inputs=options.inputs)
-        path = replace(found, case=found.case.signed(options.changes)).report(options.out)
+        study = None if options.study is None else Path(options.study)
+        found = replace(found, case=found.case.signed(options.changes), study=study)
+        path = found.report(options.out)
     print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
     if options.pdf:
         from archfem.view.pages.document import print_page
 
+        write_progress_line("report", "printing by the browser")
         print(f"wrote {print_page(path, path.with_suffix('.pdf'))}")
 
 

@@ -496,8 +496,8 @@ class CollapseScale:
         """
         return call_late_bound("CollapseScale.verdict_range", self, structure, motion, **options)
 
-    def table(self) -> str:
-        """Return a line per run: step, scale, state of collapse, time and residual displacement."""
+    def rows(self) -> tuple[list[str], list[list[str]]]:
+        """Return titles and cells of a row per run: step, scale, state, time, residual."""
         rows = [
             [
                 f"{1e3 * dt:g} ms",
@@ -509,7 +509,11 @@ class CollapseScale:
             for dt in self.searches
             for scale, fall in self.falls(dt)
         ]
-        return align_columns(["step", "scale", "the structure", "at", "residual"], rows)
+        return ["step", "scale", "the structure", "at", "residual"], rows
+
+    def table(self) -> str:
+        """Return a line per run: step, scale, state of collapse, time and residual displacement."""
+        return align_columns(*self.rows())
 
 
 def _disagreeing(searches: dict[float, MechanismScales]) -> tuple[float, Bracket] | None:

@@ -212,8 +212,7 @@ def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) 
     return Doubt(
         f"steps of {1e3 * dt:g} ms are long for sliding: of '{dataset['name'].values[worst]}' the "
         f"slip may be wrong by {format_mm(error)}, where the largest slip is {format_mm(largest)}",
-        f"take {1e3 * shorter:g} ms or less, `--set analysis.dt={shorter:g}`; a single run may "
-        "leave dt out",
+        f"take {1e3 * shorter:g} ms or less, `--set analysis.dt={shorter:g}`, or leave dt out",
     )
 
 

@@ -238,12 +238,19 @@ def extremes_remark(dataset: xr.Dataset) -> list[str]:
         rotation = f"largest hinge rotation {_peak_text(joints, rotations, 1e-3, 'mrad')}"
     else:
         rotation = f"no{_assessed_word(dataset)} joint hinges"
-    slip = "slip" if joints["slide"].any() else "elastic slip"
-    return [f"{rotation}, largest {slip} {_peak_text(joints, slips, mm, 'mm')}"]
+    slides = joints["slide"].values.any(axis=0)[_find_peak(slips)[1]]
+    part = "" if slides else ", elastic or of parts of the face: |V| stays below its limit there"
+    return [f"{rotation}, largest slip {_peak_text(joints, slips, mm, 'mm')}{part}"]
+
+
+def _find_peak(values: Array) -> tuple[int, int]:
+    """Return instant and joint of the largest value."""
+    instant, joint = np.unravel_index(int(values.argmax()), values.shape)
+    return int(instant), int(joint)
 
 
 def _peak_text(joints: xr.Dataset, values: Array, unit: float, name: str) -> str:
     """Return the largest of values over time and joint, with the joint and the time."""
-    instant, joint = np.unravel_index(int(values.argmax()), values.shape)
+    instant, joint = _find_peak(values)
     largest, time = float(values[instant, joint]), float(joints["time"].values[instant])
     return f"{largest / unit:.3g} {name} ({joints['name'].values[joint]}, {time:.3f} s)"

@@ -9,8 +9,8 @@ import xarray as xr
 import archfem as af
 from archfem._files import replace_results
 from archfem.cases.case import case_of
-from archfem.cases.report import conclusion, report_data, sections
-from archfem.cases.report.sections import _check_row, supported_weight_ratio
+from archfem.cases.report import conclusion, report_data, response, sections
+from archfem.cases.report.response import _check_row, supported_weight_ratio
 from archfem.cases.result_text import tabulate_joints, tabulate_motions, tabulate_runs
 
 
@@ -60,7 +60,8 @@ def test_a_part_without_a_name_has_a_dash():
     structure = af.masonry.assembled(bare, stack.joints[0].contact)
     (row,) = sections._tabulate_parts(structure).rows
     assert row[:4] == ["–", "ring", "2", "1"]
-    text, *_ = sections._build_geometry(case_of(af.Analysis(structure, fidelity="rigid")))
+    case = case_of(af.Analysis(structure, fidelity="rigid"))
+    text, *_ = sections.build_structure_section(report_data.ReportData(case, {})).pieces
     points = np.concatenate([block.points for block in structure.blocks])
     length, height = np.ptp(points, axis=0)
     assert f"{length:.3g} m long, {height:.3g} m high and 1 m wide; 1 blocks" in text.text
@@ -140,30 +141,32 @@ def test_the_pga_of_a_report_is_that_of_the_motion_and_not_of_the_steps(piers):
 def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatch):
     """A single run has the only player, and no sections below its own."""
     for name in ("draw_motion", "draw_spectra", "draw_suite"):
-        monkeypatch.setattr(sections, name, lambda *_: None)
-    monkeypatch.setattr(sections.FigureBlock, "of", lambda figure, caption: caption)
-    monkeypatch.setattr(sections, "draw_envelopes", lambda *_: [])
-    monkeypatch.setattr(sections, "build_player", lambda *given: f"one of {given[-1]} players")
+        monkeypatch.setattr(response, name, lambda *_: None)
+    monkeypatch.setattr(response.FigureBlock, "of", lambda figure, caption: caption)
+    monkeypatch.setattr(response, "draw_envelopes", lambda *_: [])
+    monkeypatch.setattr(response, "build_player", lambda *given: f"one of {given[-1]} players")
     case = SimpleNamespace(title="piers", structure=piers, suite=None, target=None)
+    monkeypatch.setattr(report_data.ReportData, "given_motions", {})
+    monkeypatch.setattr(response, "replace", lambda figure, **_: figure)
     one = report_data.ReportData(case, {"first": runs["first"]})
     assert one.dead["N"].values.tolist() == runs["first"].joints["N"].values[0].tolist()
-    assert sections.build_ground_section(one).title == "Ground motion"
-    response, mechanism = sections.build_run_sections(one)
-    assert response.pieces[0] == "one of 1 players"
-    assert (response.level, mechanism.level) == (2, 2)
+    assert response.build_ground_section(one).title == "Ground motion"
+    (section,) = response.build_run_sections(one)
+    assert section.pieces[-1] == "one of 1 players"
+    assert section.level == 2
     pairs = report_data.ReportData(SimpleNamespace(**vars(case) | {"suite": {}}), runs)
-    assert sections.build_ground_section(pairs).title == "Ground motions"
-    *_, first, second = sections.build_run_sections(pairs)
-    assert (first.pieces[0], second.pieces[0]) == ("one of 2 players",) * 2
+    assert response.build_ground_section(pairs).title == "Ground motions"
+    *_, first, second = response.build_run_sections(pairs)
+    assert (first.pieces[-1], second.pieces[-1]) == ("one of 2 players",) * 2
     assert (first.level, second.level) == (3, 3)
 
 
 def test_tables_and_figures_of_all_pairs_say_what_they_show(runs, piers, monkeypatch):
     """Definitions that no run meets are one line, and each of two figures has its part named."""
-    monkeypatch.setattr(sections.FigureBlock, "of", lambda figure, caption: caption)
-    monkeypatch.setattr(sections, "draw_envelopes", lambda *_: ["one", "other"])
+    monkeypatch.setattr(response.FigureBlock, "of", lambda figure, caption: caption)
+    monkeypatch.setattr(response, "draw_envelopes", lambda *_: ["one", "other"])
     data = report_data.ReportData(SimpleNamespace(structure=piers), runs)
-    _, ends, *captions = sections._build_suite_response(data)
+    _, ends, *captions = response._build_suite_response(data)
     assert ends.text == ("No run forms a mechanism by any definition; end: reached 0.10 s in all.")
     assert [text.rpartition("; ")[2] for text in captions] == [
         "part 1 of 2 of the motions",
@@ -172,14 +175,15 @@ def test_tables_and_figures_of_all_pairs_say_what_they_show(runs, piers, monkeyp
 
 
 def test_a_run_that_was_broken_off_is_reported_as_such(runs, piers, monkeypatch):
-    monkeypatch.setattr(sections, "draw_envelopes", lambda *_: [])
-    monkeypatch.setattr(sections, "build_player", lambda *_: "player")
+    monkeypatch.setattr(response, "draw_envelopes", lambda *_: [])
+    monkeypatch.setattr(response, "build_player", lambda *_: "player")
     whole, case = runs["first"], SimpleNamespace(title="piers", structure=piers, suite=None)
     broken = af.History(whole.dataset.assign_attrs(ended="interrupted"), piers)
     for run, said in ((whole, 0), (broken, 1)):
-        blocks = sections.build_run_sections(report_data.ReportData(case, {"run": run}))[0].pieces
-        assert blocks[said] == "player"
-    assert blocks[0].text == f"The run is not complete: {broken.outcome}."
+        blocks = response.build_run_sections(report_data.ReportData(case, {"run": run}))[0].pieces
+        assert blocks[-1] == "player"
+        texts = [getattr(block, "text", "") for block in blocks]
+        assert (f"The run is not complete: {broken.outcome}." in texts) == bool(said)
 
 
 def test_a_folder_without_a_run_has_no_files_to_report(tmp_path):
@@ -307,12 +311,12 @@ def test_motions_of_a_suite_are_shown_before_they_were_scaled_and_reduced(monkey
         seen.append(suite)
         return SimpleNamespace()
 
-    monkeypatch.setattr(sections, "draw_suite", draw)
-    monkeypatch.setattr(sections.FigureBlock, "of", lambda figure, caption: caption)
+    monkeypatch.setattr(response, "draw_suite", draw)
+    monkeypatch.setattr(response.FigureBlock, "of", lambda figure, caption: caption)
     motion = af.Motion(np.array([0.0, 1.0, -0.5]), 0.01)
     for given, factor in (({}, 1.0), ({"scale": 1.5, "reduction": 4.0}, 4.0 / 1.5)):
         case = SimpleNamespace(suite=given, target=None)
-        (caption,) = sections._build_spectra(case, [motion])
+        (caption,) = response._build_spectra(case, [motion])
         assert seen[-1].pairs[0].horizontal == pytest.approx(factor * motion.horizontal)
         assert (seen[-1].scale, seen[-1].reduction) == (
             given.get("scale", 1.0),
@@ -321,7 +325,7 @@ def test_motions_of_a_suite_are_shown_before_they_were_scaled_and_reduced(monkey
         assert ("R = 4;" in caption) == ("reduction" in given)
     for matched in (True, False):
         case = SimpleNamespace(suite={"matched": matched}, target="some")
-        assert len(sections._build_spectra(case, [motion])) == (1 if matched else 2)
+        assert len(response._build_spectra(case, [motion])) == (1 if matched else 2)
 
 
 def test_sentences_begin_with_a_capital_and_end_with_one_stop():

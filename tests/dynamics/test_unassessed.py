@@ -10,7 +10,7 @@ from portals import DRY, box, portal
 
 import archfem as af
 from archfem.cases import result_text
-from archfem.cases.report import conclusion, report_data, sections
+from archfem.cases.report import conclusion, report_data, response
 from archfem.dynamics.verdict import doubt_unassessed_joints
 from archfem.joints.criteria import describe_assessed_joints
 from archfem.studies.evaluators import of_history
@@ -176,7 +176,7 @@ def test_tables_state_what_is_assessed(other, ring):
         data = report_data.ReportData(case, {"one": run})
         facts = conclusion.list_facts(data)
         assert (("joints", SENTENCE) in facts) == said
-        grid = sections._tabulate_joints(data, run)
+        grid = response._tabulate_joints(data, run)
         assert grid.caption.endswith(f" A{SENTENCE[1:]}.") == said
 
 

@@ -4,7 +4,8 @@
     inputs       inputs with their marks
     report       HTML report of a case
     report_data  case, runs and files of a report
-    sections     sections on inputs, dead load, ground motion, response, checks and sources
+    response     sections on ground motions, runs and their checks
+    sections     the other sections: inputs, structure, capacity, further results, sources
 
 Start reading at `report`.
 """

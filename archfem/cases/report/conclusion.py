@@ -1,7 +1,7 @@
 """Head and conclusion of a report: who signs what, outcome with margin and range, doubts."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from importlib import import_module
@@ -12,8 +12,8 @@ import numpy as np
 from archfem._files import read_file_list
 from archfem.cases import result_text
 from archfem.cases.case import REPORT_KEYS
-from archfem.cases.report.report_data import RESULTS, SHOWN_RESULTS, ReportData
-from archfem.cases.result_text import Row
+from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
+from archfem.cases.result_text import RESULTS, Row
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict import NO_RANGE
@@ -23,7 +23,7 @@ from archfem.masonry.structure import join_names
 from archfem.units import STANDARD_GRAVITY, format_mm
 from archfem.view.pages.document import Grid, Section, TextBlock
 
-# Outcomes of runs as verbs
+# Outcomes of runs as verbs; small displacements end where blocks begin to move as a mechanism
 _VERBS = {
     "stands": "stands",
     "dislocated": "stands dislocated",
@@ -45,12 +45,15 @@ def describe_origin(data: ReportData) -> str:
 # matched motions exceed the target by a tenth
 MAX_RATIO_OF_PEAKS = 1.25
 
-# Results of runs: histories, and their variations, which the conclusion states together
+# Doubts of a result that the conclusion states; the others stand with the result
+MAX_DOUBTS = 3
+
+# Results of runs: histories, and their variations
 _HISTORIES, _VARIATIONS = "time histories", "variations"
 
 _FACTORS = (
     "; factor: the multiple of the demand at which a check is just passed, at which a load makes a "
-    "mechanism, or, of an annual rate, at which the structure falls with a probability of one half"
+    "mechanism or a motion a fall, or at which a fall has a probability of one half"
 )
 
 
@@ -92,6 +95,12 @@ def _peak_of_ground(run: History) -> float:
     return float(run.dataset.attrs.get("pga", recorded)) / STANDARD_GRAVITY
 
 
+def _describe_peaks(runs: Iterable[History]) -> str:
+    """Return the least and the largest peak acceleration of some runs."""
+    peaks = sorted(map(_peak_of_ground, runs))
+    return f"PGA {' to '.join(dict.fromkeys(f'{peaks[k]:.2f}' for k in (0, -1)))} g"
+
+
 def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
     """Return outcome, and doubts or range, of a run, or how many runs have each outcome."""
     verdict = runs[0].verdict
@@ -101,92 +110,90 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
         # lost blocks have a line of their own
         verdict = replace(verdict, fall=replace(verdict.fall, time=None))
     own, found = runs[0].dataset.attrs.get("motion"), data.verdict_range
+    # a run cannot know that a range was computed after it; the conclusion says what was not varied
+    text = verdict.headline.removesuffix(f"; {NO_RANGE}")
     if found is None or (len(data.runs) > 1 and found.dataset.attrs.get("motion") != own):
-        return verdict.headline
-    # a run cannot know that a range was computed after it
-    return verdict.headline.replace(NO_RANGE, f"{found.count} variations{found.unanswered}")
+        return text
+    return f"{text}; {found.count} variations{found.unanswered}"
 
 
 def build_conclusion(data: ReportData) -> Section:
-    """Build the section on outcomes in sentences, each with its doubts, on margins and range."""
-    doubts = list_doubts(data)
-    doubtful = list(dict.fromkeys(result for result, _ in doubts))
+    """Build the section on the answer in sentences, its doubts, and demands and capacities."""
+    doubts: dict[str, list[str]] = {}
+    for text, result in {text: result for result, text in reversed(list_doubts(data))}.items():
+        doubts.setdefault(result, []).insert(0, text)  # a doubt of several results is stated once
     rows = [
-        (name, demand, outcome + (" (in doubt)" if result in doubtful else ""), factor)
+        (name, demand, outcome + (" (in doubt)" if result in doubts else ""), factor)
         for result, (name, demand, outcome, factor) in _capacity_rows(data)
     ]
-    lead = _build_lead(data, rows, doubtful)
-    blocks: list[Any] = [TextBlock(lead)] if lead else []
-    of_runs = _conclude_runs(data)
-    stated = [(RESULTS[k], map(sentence, each.sentences)) for k, each in data.statements.items()]
-    shown = set[str]()
-    for result, sentences in ((_HISTORIES, of_runs), *stated):
-        text = " ".join(sentences)
-        blocks += [TextBlock(text)] if text else []
-        about_these = (result, _VARIATIONS) if result == _HISTORIES else (result,)
-        own = [doubt for about, doubt in doubts if about in about_these and doubt not in shown]
-        shown |= {*own}  # a doubt of several results is stated once
-        blocks += [TextBlock(f"In doubt: {doubt}.", "doubt") for doubt in own]
+    doubtful = list(dict.fromkeys(result for result, _ in list_doubts(data)))
+    lead = " ".join(map(sentence, _build_lead(data, rows, doubtful)))
+    texts = filter(None, [lead, " ".join(_describe_ends(data))])
+    blocks: list[Any] = [*map(TextBlock, texts)]
+    for result in filter(doubts.get, doubtful):
+        stated = [sentence(text) for text in doubts[result][:MAX_DOUBTS]]
+        if more := len(doubts[result]) - len(stated):
+            stated.append(f"{more} more stand with the result.")
+        blocks.append(TextBlock(f"In doubt, {result}: {' '.join(stated)}", "doubt"))
     if rows:
         head = ("", "demand", "capacity or outcome", "factor")
         factors = _FACTORS if any(row[3] != "-" for row in rows) else ""
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
-    blocks += map(TextBlock, _list_absent(data))
+    blocks += map(TextBlock, _list_outdated(data))
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
 
 
-def _list_absent(data: ReportData) -> Iterator[str]:
-    """Yield the sentences on results of another version or case, and on those not computed."""
-    if data.folder is None:  # a history alone has no folder of further results
-        return
-    present = [name for name in SHOWN_RESULTS if f"{name}.txt" in data.files]
-    present += data.statements
-    absent = {f"{name}.txt": each for name, each in RESULTS.items() if name not in present}
+def _list_outdated(data: ReportData) -> Iterator[str]:
+    """Yield the sentence on results that another version, or another case, has left."""
+    listed = {} if data.folder is None else read_file_list(data.folder)
+    shown = [name for name in SHOWN_RESULTS if f"{name}.txt" in data.files]
+    unstated = RESULTS.keys() - {*shown, *data.statements}
+    absent = {f"{name}.txt": RESULTS[name] for name in unstated}
     earlier = [
-        f"{absent.pop(name)} (run `archfem {command}` again)"
-        for command, group in read_file_list(data.folder).items()
+        f"{absent[name]} (run `archfem {command}` again)"
+        for command, group in listed.items()
         for name in group.files
         if name in absent
     ]
-    made = "Not stated, for an earlier version of archfem or another case made it"
-    for words, results in ((made, earlier), ("Not computed", [*absent.values()])):
-        if results:
-            yield f"{words}: {', '.join(results)}."
+    if earlier:
+        made = "Not stated, for an earlier version of archfem or another case made it"
+        yield f"{made}: {', '.join(earlier)}."
 
 
-def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) -> str:
-    """Answer in three sentences: outcomes with their demand, least margin, what may change them."""
-    # the least of a range
-    checks = [
-        (float(row[3].partition(" ")[0]), row) for row in rows if row[0].startswith("assessment: ")
-    ]
+def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) -> Iterator[str]:
+    """Yield the answer: outcomes, their range, the least margin, what may change it."""
     demand = data.case.report.get("demand", "")
-    if not data.runs and not checks:
-        # a load has one result, which says all
-        return f"The demand, as stated: {sentence(demand)}" if demand else ""
-    stated = [demand] if demand else []
-    stated += [f"motions of {demand}" for name, demand, *_ in rows if name == _HISTORIES]
-    lead = [f"the structure {'; it '.join(_describe_outcomes(data))}"] if data.runs else []
-    if checks:
-        factor, (check, _, outcome, margin) = min(checks)
-        # of what is assumed of a fill
-        _, only, assumed = outcome.partition(" only with ")
-        fails = "" if factor >= 1.0 or only else ", and so fails"
-        lead.append(
-            f"its least margin is {margin}: it passes {check.partition(': ')[2]}{only}{assumed}, "
-            f"up to {margin} times {name_spectrum(data)}{fails}"
-        )
-    lead[0] = f"for {' and '.join(stated)}: {lead[0]}" if stated else lead[0]
-    changes = []
+    outcomes = [f"the structure {each}" for each in _describe_outcomes(data)]
+    if not data.runs:
+        outcomes = [text for each in data.statements.values() for text in each.sentences]
+    yield from [f"for {demand}: {outcomes[0]}", *outcomes[1:]] if demand and outcomes else outcomes
     if data.verdict_range is not None:
+        # statistics of the sampling stand in its section
         found = data.verdict_range.sentence.partition("; of ")[0]
-        changes.append(f"variations of its properties ({found})")
-    changes += [f"the doubts given below, on {join_names(doubtful)}"] if doubtful else []
+        yield f"in variations of its properties it {found}"
+    yield from _describe_margin(data, rows)
+    if data.runs and not doubtful:
+        yield "the checks of the numbers raise no doubt"
+    changes = [f"the doubts below, on {join_names(doubtful)}"] if doubtful else []
     single = list_unvaried(data)
     changes += [f"what was not varied: {', '.join(single)}"] if single else []
-    lead += ["the checks of the numbers raise no doubt"] if data.runs and not doubtful else []
-    lead += [f"what may change this: {'; '.join(changes)}"] if changes else []
-    return " ".join(map(sentence, lead))
+    if changes:
+        yield f"what may change this: {'; '.join(changes)}"
+
+
+def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
+    """Yield the least margin of the checks, a range over what is assumed, with its demand."""
+    checks = [
+        (float(factor.partition(" ")[0]), name.partition(": ")[2], outcome, factor)
+        for name, _, outcome, factor in rows
+        if name.startswith("assessment: ") and factor != "-"
+    ]
+    if checks:
+        least, name, outcome, factor = min(checks)
+        _, only, assumed = outcome.partition(" only with ")
+        fails = "" if least >= 1.0 or only else ", which it fails"
+        margin = f"the least margin is {factor}, on {name_spectrum(data)}, by {name}"
+        yield f"{margin}{only and ', passed'}{only}{assumed}{fails}"
 
 
 def name_spectrum(data: ReportData) -> str:
@@ -222,9 +229,12 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     """Yield each result with its demand, capacity or outcome, and factor; "-" where is none."""
     if data.runs:
         verdicts = [run.verdict for run in data.runs.values()]
-        peaks = [f"{_peak_of_ground(run):.2f}" for run in data.runs.values()]
-        demand = f"PGA {' to '.join(dict.fromkeys([min(peaks), max(peaks)]))} g"
-        outcome = result_text.count_outcomes(verdicts) if len(peaks) > 1 else verdicts[0].outcome
+        demand, outcome = _describe_peaks(data.runs.values()), verdicts[0].outcome
+        outcome = result_text.count_outcomes(verdicts) if len(verdicts) > 1 else outcome
+        sizes = np.array([[each.displacement, each.residual] for each in verdicts])
+        if np.isfinite(sizes).all():
+            largest, residual = map(format_mm, sizes.max(axis=0))
+            outcome += f"; displaced by up to {largest}, {residual} at the end"
         yield _HISTORIES, (_HISTORIES, demand, outcome, "-")
     if (computed := data.verdict_range) is not None:
         motion = computed.dataset.attrs.get("motion")
@@ -237,38 +247,30 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
 
 
 def _describe_outcomes(data: ReportData) -> Iterator[str]:
-    """Yield each outcome with the motions that lead to it."""
+    """Yield each outcome with the motions that lead to it, and the largest displacement."""
     by_verb: dict[str, list[str]] = {}
     for name, run in data.runs.items():
         by_verb.setdefault(_VERBS[run.verdict.outcome], []).append(name)
-    count = len(data.runs)
     for verb, names in by_verb.items():
-        under = f"{len(names)} of {count} motions: {', '.join(names)}"
-        if len(names) == count:
-            under = f"all {count} motions" if count > 1 else f"the motion '{names[0]}'"
-        yield f"{verb} under {under}"
+        of = f"of {_describe_peaks(data.runs[name] for name in names)}"
+        under = f"{len(names)} of {len(data.runs)} motions {of}: {', '.join(names)}"
+        if len(names) == len(data.runs):
+            under = f"all {len(names)} motions {of}"
+            under = under if len(names) > 1 else f"the motion '{names[0]}' {of}"
+        fall = "; whether it falls was not computed" if verb == _VERBS["mechanism"] else ""
+        yield f"{verb} under {under}{fall}"
 
 
-def _conclude_runs(data: ReportData) -> Iterator[str]:
-    """Yield sentences on incomplete runs, on falls, displacements and mechanisms."""
-    count, verdicts = len(data.runs), [run.verdict for run in data.runs.values()]
+def _describe_ends(data: ReportData) -> Iterator[str]:
+    """Yield sentences on runs that were broken off, lost blocks, and those that still move."""
     for name, run in data.runs.items():
-        if run.verdict.incomplete:
-            yield f"The run under '{name}' {run.verdict.incomplete}."
-        if run.verdict.fall is not None and run.verdict.fall.blocks:
-            yield f"Under '{name}' it loses {describe_lost(run.verdict.fall)}."
-        if run.verdict.fall is not None and not run.verdict.fall.resting:
+        verdict = run.verdict
+        if verdict.incomplete:
+            yield f"The run under '{name}' {verdict.incomplete}."
+        if verdict.fall is not None and verdict.fall.blocks:
+            yield f"Under '{name}' it loses {describe_lost(verdict.fall)}."
+        if verdict.fall is not None and not verdict.fall.resting:
             yield f"Blocks still move at the end of '{name}'."
-    sizes = np.array([[each.displacement, each.residual] for each in verdicts]).reshape(-1, 2)
-    if np.isfinite(sizes).all() and len(sizes):
-        largest, residual = map(format_mm, sizes.max(axis=0))
-        yield f"The largest displacement of a block is {largest}, and {residual} at the end."
-    if met := [each for each in verdicts if each.mechanisms.get("verified") is not None]:
-        yield (
-            f"The stones can move as a mechanism for a while under {len(met)} of {count} motions."
-            if count > 1
-            else f"The stones can move as a mechanism for a while: {describe_mechanism(met[0])}."
-        )
 
 
 def describe_mechanism(verdict: Any) -> str:

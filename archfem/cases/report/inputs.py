@@ -13,10 +13,11 @@ from archfem.cases.defaults import (
     value_text,
 )
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
-from archfem.cases.structure_keys import shape_keys
+from archfem.cases.structure_keys import BRIDGE_PARTS, keys_of_part, list_shapes, shape_keys
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.limit.collapse import collapse_factor
 from archfem.masonry.materials import Contact, Material
+from archfem.masonry.shapes.bridge_parts import Backfill
 from archfem.motion.design_spectra import CodeSpectrum
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
@@ -32,6 +33,9 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "pushover": pushover,
     "assessment": kinematic_assessment,
 }
+
+# Arguments of shapes that have rows of their own, or no influence
+_OWN_ROWS = {"width", "gravity", "name"}
 
 _RATING_KEYS = {"live", "impact", "dead", "width", "area_load"}
 
@@ -56,7 +60,8 @@ _CAPTION = (
 
 def tabulate_inputs(data: ReportData) -> Grid:
     """Tabulate all inputs with their marks."""
-    rows = [*_structure_rows(data), *_property_rows(data), *_command_rows(data)]
+    rows = [row for row in _structure_rows(data) if row[1]]
+    rows += [*_property_rows(data), *_command_rows(data)]
     if not data.is_static:
         rows += [*_motion_rows(data), *_model_rows(data), *_criteria_rows(data)]
     return Grid((), rows, _CAPTION)
@@ -71,13 +76,31 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
     """Yield the keys of [structure]; width and gravity also where they are defaults."""
     table, structure = data.case.settings.get("structure", {}), data.case.structure
     kinds = shape_keys(table["shape"])
+    parts = {**BRIDGE_PARTS, "backfill": Backfill} if table["shape"] == "bridge" else {}
     for key, value in table.items():
-        if key not in ("material", "contact", "width", "gravity"):
-            yield key.replace("_", " "), describe_value(value, kinds.get(key)), "given"
+        if key in ("material", "contact", "width", "gravity"):
+            continue
+        yield key.replace("_", " "), describe_value(value, kinds.get(key)), "given"
+        if key in parts:
+            own = [set(each) for each in value.values() if isinstance(each, Mapping)]
+            given = set(value).union(set.intersection(*own) if own else ())
+            yield key, _list_left_out(parts[key], given), "default"
+    yield "structure", _list_left_out(list_shapes()[table["shape"]], {*table}), "default"
     yield "width", f"{structure.width:g} m", _mark("width" in table)
     yield "gravity", f"{structure.gravity:g} m/s²", _mark("gravity" in table)
     if "joints" not in table and table["shape"] in ("blocks", "outlines"):
         yield "joints", f"{len(structure.joints)}, where outlines touch", "inferred"
+
+
+def _list_left_out(declaration: Callable[..., Any], given: set[str]) -> str:
+    """List the lengths and words of a shape, or of its part, that the case leaves to defaults."""
+    kinds, found = keys_of_part(declaration), signature(declaration).parameters
+    values = {key: each.default for key, each in found.items() if key not in given | _OWN_ROWS}
+    return "; ".join(
+        f"{key.replace('_', ' ')} {describe_value(value, kinds.get(key))}"
+        for key, value in values.items()
+        if isinstance(value, int | float | str)
+    )
 
 
 def describe_value(value: Any, kind: Any = None) -> str:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import xarray as xr
 
 from archfem._files import check_listed, describe_deleted, group_of, path_inside, read_file_list
 from archfem.cases.case import Case
-from archfem.cases.result_text import NOTE_MARK, Statement, cut_remedy
+from archfem.cases.result_text import NOTE_MARK, RESULTS, Statement, cut_remedy
 from archfem.cases.run import CASE_FILE, RATING_FILE
 from archfem.cases.toml_file import Table, parse_tables
 from archfem.dynamics.history import History
@@ -28,18 +28,7 @@ from archfem.view.pages.live import LivePage, describe_arch, list_motions
 from archfem.view.pages.player import Player
 from archfem.view.pages.player_data import MAX_PACKED_BYTES, Scene
 
-# Results by the names of their files: those that the report states, and those it shows alone
-RESULTS = {
-    "limit": "limit analysis",
-    "pushover": "pushover",
-    "rating": "rating",
-    "assessment": "kinematic assessment",
-    "scale": "scale of the motion",
-    "risk": "annual rate of collapse",
-    "modes": "modes",
-    "accuracy": "comparison of models and time steps",
-    "verdict_range": "range of the verdict over uncertain properties",
-}
+# Results that the report shows, and does not state
 SHOWN_RESULTS = ("modes", "accuracy", "verdict_range")
 
 # Results of limit analysis, for which blocks are rigid
@@ -54,6 +43,7 @@ class ReportData:
     runs: Mapping[str, History]  # by the names of their motions
     folder: Path | None = None
     missing: tuple[str, ...] = ()  # names of the pairs of the suite without a run
+    study: Path | None = None  # folder of a study; that of the results may have one
 
     @cached_property
     def dead(self) -> xr.Dataset | None:
@@ -64,8 +54,25 @@ class ReportData:
 
     @cached_property
     def motions(self) -> dict[str, Motion]:
-        """Ground motions as applied, from the recorded accelerations."""
-        return {name: rebuild_motion(run, name) for name, run in self.runs.items()}
+        """Ground motions as applied: those of the case, or else those at the steps of the runs."""
+        recorded = {name: rebuild_motion(run, name) for name, run in self.runs.items()}
+        return recorded | self.given_motions
+
+    @cached_property
+    def given_motions(self) -> dict[str, Motion]:
+        """Motions of the case that the runs have followed; its files may be gone, or changed."""
+        if not self.runs:
+            return {}
+        case = self.case if self.case.suite is None else self.case.alone(*self.runs)
+        try:
+            given = [case.ground_motion()] if case.suite is None else case.ground_suite().motions
+        except ArchfemError:
+            return {}
+        return {
+            name: replace(motion, name=name)
+            for (name, run), motion in zip(self.runs.items(), given, strict=True)
+            if np.allclose(motion.at(run.time), run.dataset["ground"], atol=1e-9 * motion.pga)
+        }
 
     @cached_property
     def fidelity(self) -> str:
@@ -92,16 +99,19 @@ class ReportData:
         path = self.files.get("verdict_range.nc")
         return None if path is None else VerdictRange.read(path)
 
-    def read_result(self, name: str, caption: str, figure: str = "", table: str = "") -> list[Any]:
-        """Return text, under the caption of a table, and picture of a command, or an empty list."""
+    def read_result(
+        self, name: str, caption: str = "", figure: str = "", table: str = ""
+    ) -> list[Any]:
+        """Return text, under the caption of a table, and picture of a command, or an empty list.
+
+        Without a caption there is no picture.
+        """
         # a report shows what other commands left in the folder, and computes nothing itself
         lines = self.read_text(f"{name}.txt")
         if lines is None:
             return []
-        return [
-            TextBlock(lines, "lines", table),
-            *self.read_figure(figure or f"{name}.png", caption),
-        ]
+        drawn = self.read_figure(figure or f"{name}.png", caption) if caption else []
+        return [TextBlock(lines, "lines", table), *drawn]
 
     @cached_property
     def statements(self) -> dict[str, Statement]:

@@ -1,7 +1,8 @@
-"""Sections of a report: inputs, dead load, ground motion, response, checks, methods, sources."""
+"""Sections of a report: inputs, structure, capacity, further results, methods, sources."""
 
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import nullcontext, suppress
 from csv import reader
 from dataclasses import replace
 from hashlib import sha256
@@ -10,51 +11,40 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from archfem.cases import result_text
-from archfem.cases.case import Case
+from archfem._files import read_listed
+from archfem._netcdf import read_dataset
 from archfem.cases.report.conclusion import (
     build_conclusion,
-    describe_lost,
-    describe_mechanism,
     list_elastic_fill,
     list_varied,
     sentence,
-    summarise_outcomes,
 )
 from archfem.cases.report.inputs import describe_value, tabulate_inputs
 from archfem.cases.report.report_data import (
     ReportData,
     build_live_page,
-    build_player,
+)
+from archfem.cases.report.response import (
+    HALF_WIDTH,
+    build_check_section,
+    build_ground_section,
+    build_joint_section,
+    build_run_sections,
+    in_words,
 )
 from archfem.cases.run import DRAWING_FILE
-from archfem.dynamics.history import SIGN_CONVENTION, History
+from archfem.dynamics.history import SIGN_CONVENTION
 from archfem.dynamics.recorder import library_versions
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.joint_closing import describe_closing
-from archfem.masonry.structure import Structure
-from archfem.motion.matching import DEFAULT_BAND
-from archfem.motion.motion import Motion
-from archfem.motion.suite import Suite
+from archfem.masonry.structure import Structure, join_names
 from archfem.statics.assessment_checks import LIMIT_STATES, LimitState
-from archfem.statics.stress import utilisation_text
 from archfem.units import MPa, kN
-from archfem.view.collapse import draw_fall
-from archfem.view.histories import draw_envelopes
-from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
 from archfem.view.structure import draw_names, draw_structure
-
-# Failed joints that each definition of a mechanism needs, in the number of the criteria
-_DEFINITIONS = {
-    "any joints at once": "of any rings and piers together",
-    "one part at once": "of one ring or one pier",
-    "ring and pier at once": "of a ring and a pier together",
-    "one part over the record": "of one ring or one pier, each from its first failure on",
-    "verified": "that permit a motion of the blocks",
-    "Demirel and Aldemir": "of one ring, as worded in Buildings 11 (2021)",
-}
+from archfem.view.studies import draw_findings
+from archfem.view.style import limit_width
 
 # Of figure and table, with the file of the figure
 _RISK_CAPTIONS = (
@@ -64,6 +54,15 @@ _RISK_CAPTIONS = (
     "Annual rate of collapse, and that of each alternative, with intervals of the samples alone: "
     "hazard and model are outside of them",
 )
+
+_THRUST = "Thrust line under dead load, drawn where the resultant of each joint crosses it."
+
+MAX_SLENDERNESS = 2.6  # length over height of a structure that is legible at half the width
+MAX_WIDTH = 170.0  # of a figure of many panels [mm]
+
+# Findings of studies that a report shows, those that decide first, and the number of points
+_FINDINGS = ("factor", "without_pressure", "residual_displacement", "largest_displacement", "fall")
+MAX_POINTS = 24
 
 _PLAYER_CAPTION = "The structure at an instant, the ground acceleration, and one joint."
 
@@ -85,12 +84,14 @@ def build_sections(data: ReportData) -> list[Section]:
     sections = [
         build_conclusion(data),
         build_input_section(data),
-        Section("Structure", [*_build_geometry(data.case), *_describe_drawing(data)]),
-        *build_dead_load_sections(data),
+        build_structure_section(data),
+        *build_static_sections(data),
         build_ground_section(data),
         *build_run_sections(data),
-        Section("Scale of the motion", data.read_result("scale", "")),
+        Section("Scale of the motion", _build_scale(data)),
+        Section("Range over uncertain properties", _build_range(data)),
         Section("Annual rate of collapse", data.read_result("risk", *_RISK_CAPTIONS)),
+        Section("Study of many cases", _build_study(data)),
         build_check_section(data),
         build_joint_section(data),
         build_method_section(data),
@@ -129,11 +130,14 @@ def build_input_section(data: ReportData) -> Section:
         "monolithic": "elastic finite elements, all nodes kept, weak forms of joints",
     }
     large = data.case.analysis.discretisation.displacements == "large"
+    moved = "of any size" if large else "small: equilibrium where blocks stood"
+    if data.is_static:
+        moved = "as built in limit analysis; an assessment follows its mechanism"
     assumptions = [
         ("structure", "plane; forces are those of the whole width"),
         ("blocks", "rigid" if data.is_static else blocks.get(fidelity, f"by part: {fidelity}")),
         ("joints", _describe_joints(data)),
-        ("displacements", "of any size" if large else "small: equilibrium where blocks stood"),
+        ("displacements", moved),
         ("ground", "rigid, moves as one; abutments and foundations are fixed to it"),
         ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
         ("signs", SIGN_CONVENTION),
@@ -160,10 +164,9 @@ def _describe_joints(data: ReportData) -> str:
     return f"{law}; crushing in limit analysis alone, at {strength / MPa:.3g} MPa"
 
 
-def _build_geometry(case: Case) -> list[Any]:
-    """Build extent, figure with joint names, and table of parts."""
-    structure = case.structure
-    caption = "The structure, and the numbers of the joints that are assessed."
+def build_structure_section(data: ReportData) -> Section:
+    """Build extent, parts, names of joints, thrust line, and joints and stress under dead load."""
+    case, structure = data.case, data.case.structure
     points = np.concatenate([block.drawn() for block in structure.blocks])
     length, height = np.ptp(points, axis=0)
     extent = (
@@ -171,8 +174,30 @@ def _build_geometry(case: Case) -> list[Any]:
         f"{len(structure.free)} blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
         f"{len(structure.joints)} joints."
     )
-    figure = FigureBlock.of(draw_names(structure), caption)
-    return [TextBlock(extent), _tabulate_parts(structure), figure]
+    blocks: list[Any] = [
+        TextBlock(extent),
+        *_describe_drawing(data),
+        in_words(_tabulate_parts(structure)),
+    ]
+    beside = data.dead is not None and length < MAX_SLENDERNESS * height
+    with limit_width(HALF_WIDTH) if beside else nullcontext():
+        figures = [(draw_names(structure), "The structure, with its assessed joints.")]
+        if data.dead is not None:
+            criteria = case.analysis.failure_criteria
+            figures.append((draw_structure(structure, data.dead, criteria=criteria), _THRUST))
+    for figure, caption in figures:
+        figure.suptitle("")  # caption and head of the report say the same
+        for axes in figure.axes:
+            axes.set_title("")
+        blocks.append(replace(FigureBlock.of(figure, caption), beside=beside))
+    if data.dead is None:
+        blocks += data.read_figure("dead.png", _THRUST)
+    else:
+        blocks.append(in_words(_tabulate_dead_load(data.dead)))
+    caption = "Principal compression under dead load."
+    blocks += data.read_result("dead_stress", caption, table="Largest stresses of each part")
+    caption = "A block cut free: forces on it, and their closing."
+    return Section("Structure and dead load", blocks + data.read_figure("free_body.png", caption))
 
 
 def _describe_drawing(data: ReportData) -> list[TextBlock]:
@@ -183,10 +208,13 @@ def _describe_drawing(data: ReportData) -> list[TextBlock]:
 
 def _tabulate_parts(structure: Structure) -> Grid:
     """Tabulate the parts of a structure."""
-    rows = []
+    rows, fixed = [], list[str]()
     for part in dict.fromkeys(block.part for block in structure.blocks):
         blocks = [block for block in structure.blocks if block.part == part]
         free = [block for block in blocks if not block.fixed]
+        if not free:
+            fixed.append(part or "–")
+            continue
         depths = [joint.depth for joint in structure.joints if joint.part == part]
         weight = structure.width * sum(block.area * block.material.unit_weight for block in free)
         row = [part or "–", blocks[0].role or "–", str(len(blocks)), str(len(blocks) - len(free))]
@@ -194,28 +222,35 @@ def _tabulate_parts(structure: Structure) -> Grid:
         row.append(f"{weight / kN:.4g}")
         row.append(f"{min(depths):.3g} – {max(depths):.3g}" if depths else "–")
         rows.append(row)
-    head = ["part", "role", "blocks", "of them fixed", "material", "weight [kN]", "joints [m]"]
-    return Grid(head, rows, "Parts; the last column is the depth of their joints")
+    head = [
+        "part",
+        "role",
+        "blocks",
+        "of them fixed",
+        "material",
+        "weight [kN]",
+        "depth of joints [m]",
+    ]
+    return Grid(head, rows, f"Parts that can move ({join_names(fixed) or 'none'} fixed)")
 
 
-def build_dead_load_sections(data: ReportData) -> list[Section]:
-    """Build the sections on dead load, modes, limit analysis, pushover, rating, assessment."""
+def build_static_sections(data: ReportData) -> list[Section]:
+    """Build the sections on modes, limit analysis, pushover, rating, assessment."""
     collapse = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
     curve = "Load factor over displacement, with the joints in the order of their first hinge."
-    shapes, modes = "Shapes of the modes about dead load.", "Modes: effective masses along x and y"
+    modes = data.read_result("modes", table="Modes about dead load: effective masses along x and y")
     return [
-        Section("Dead load", _build_dead_load(data)),
-        Section("Modes", data.read_result("modes", shapes, table=modes)),
         Section("Limit analysis", data.read_result("limit", collapse, "collapse.png")),
         Section("Pushover", data.read_result("pushover", curve)),
         Section("Rating for a vehicle", _build_rating(data)),
         Section("Kinematic assessment", _build_assessment(data)),
+        Section("Modes", modes),
     ]
 
 
 def _build_rating(data: ReportData) -> list[Any]:
     """Build text and picture of a rating, below the table of several vehicles."""
-    caption = "(a) Factor along the bridge, and (b) mechanism at the worst place."
+    caption = "(a) Factor along the bridge, and (b) mechanism at the worst place"
     blocks = data.read_result("rating", caption)
     if (table := data.read_text("vehicles.csv")) is None:
         return blocks
@@ -224,29 +259,13 @@ def _build_rating(data: ReportData) -> list[Any]:
     _, worst, *others = text.text.split("\n\n")
     head, *rows = reader(table.splitlines())
     grid = Grid(head, rows, "Factors of several vehicles, the worst first", "words")
-    return [grid, TextBlock(worst, "lines"), *figures, *(TextBlock(x, "lines") for x in others)]
-
-
-def _build_dead_load(data: ReportData) -> list[Any]:
-    """Build thrust line, table by part, stress and free body."""
-    case, blocks = data.case, list[Any]()
-    thrust = (
-        "Thrust line under dead load. It is drawn where the resultant of each joint crosses it; "
-        "within the middle third the joint is closed over its whole depth."
-    )
-    if data.dead is not None:
-        figure = draw_structure(case.structure, data.dead, criteria=case.analysis.failure_criteria)
-        blocks += [FigureBlock.of(figure, thrust), _tabulate_dead_load(assessed_joints(data.dead))]
-    else:
-        blocks += data.read_figure("dead.png", thrust)
-    caption = "Principal compression under dead load."
-    blocks += data.read_result("dead_stress", caption, table="Largest stresses of each part")
-    caption = "A block cut free: forces on it, and their closing."
-    return blocks + data.read_figure("free_body.png", caption)
+    texts = (TextBlock(each, "lines") for each in (worst, *others))
+    return [grid, *texts, *(replace(each, caption=f"{caption}, of the worst") for each in figures)]
 
 
 def _tabulate_dead_load(joints: xr.Dataset) -> Grid:
     """Tabulate the extremes of the joints of each part under dead load."""
+    joints = assessed_joints(joints)
     rows, part_of_joint = [], joints["part"].values.astype(str)
     for part in dict.fromkeys(part_of_joint.tolist()):
         selected = joints.isel(joint=part_of_joint == part)
@@ -267,13 +286,15 @@ def _build_assessment(data: ReportData) -> list[Any]:
     if (text := data.read_text("assessment.txt")) is None:
         return []
     caption = "(a) Mechanism at the displacement capacity, and (b) capacity curve with demand."
+    texts = text.split("\n\n")
     names = sorted(name for name in data.files if name.startswith("assessment_"))
     stated = data.statements.get("assessment")
     if stated and len(names) == 2 and all(x.endswith("right and left") for x, *_ in stated.rows):
         names = names[:1]
-        caption = f"{caption[:-1]}, to the right; those to the left are its mirror image."
+        texts = [f"{texts[0]}\nleft: the mirror image, with the same numbers", *texts[2:]]
+        caption = f"{caption[:-1]}, to the right."
     figures = [figure for name in names for figure in data.read_figure(name, caption)]
-    return [TextBlock(text, "lines"), *figures, _define_assessment(data)]
+    return [TextBlock("\n\n".join(texts), "lines"), *figures, _define_assessment(data)]
 
 
 def _define_assessment(data: ReportData) -> Grid:
@@ -300,192 +321,55 @@ def _define_assessment(data: ReportData) -> Grid:
     return Grid((), rows, "Quantities of the assessment; Circolare 7/2019, C8.7.1.2.1")
 
 
-def build_ground_section(data: ReportData) -> Section:
-    """Build the section on ground motions and spectra."""
-    motions = list(data.motions.values())
-    if not motions:
-        return Section("Ground motion", [])
-    longest = max(float(np.diff(run.time).max(initial=0.0)) for run in data.runs.values())
-    caption = (
-        f"Measures of the motions in the steps of the runs, up to {1e3 * longest:.3g} ms: peaks "
-        "between steps are left out, and displacements drift; archfem motion measures the motion."
-    )
-    blocks: list[Any] = [Grid(*result_text.tabulate_motions(motions), caption)]
-    if data.case.suite is None:
-        applied = "Ground motion as applied: acceleration, velocity and displacement."
-        blocks += [FigureBlock.of(draw_motion(motion), applied) for motion in motions]
-    blocks += _build_spectra(data.case, motions)
-    return Section("Ground motion" if len(motions) == 1 else "Ground motions", blocks)
+def _build_scale(data: ReportData) -> list[Any]:
+    """Build the text of a search of scales, with its runs by time step and outcome."""
+    blocks = data.read_result("scale")
+    if (runs := data.read_text("scale.csv")) is None:
+        return blocks
+    scales: dict[tuple[str, str], list[str]] = {}
+    for step, scale, outcome, *_ in [*reader(runs.splitlines())][1:]:
+        scales.setdefault((step, outcome), []).append(scale)
+    rows = [(*key, ", ".join(found)) for key, found in scales.items()]
+    head = ("time step", "the structure", "at the scales [× the motion]")
+    text = blocks[0].text.rpartition("\n\n")[0]
+    return [TextBlock(text, "lines"), Grid(head, rows, "Runs of the search", "words")]
 
 
-def _build_spectra(case: Case, motions: list[Motion]) -> list[Any]:
-    """Build the response spectra, beside the target spectrum if there is one."""
-    if case.suite is None:
-        return [FigureBlock.of(draw_spectra(motions), "Response spectra, 5 % damped, as applied.")]
-    scale, reduction = case.suite.get("scale", 1.0), case.suite.get("reduction", 1.0)
-    # The suite multiplies by scale and divides by R; recorded motions are as applied.
-    pairs = tuple(motion.scaled(reduction / scale) for motion in motions)
-    suite = Suite(case.suite.get("name", "suite"), pairs, scale=scale, reduction=reduction)
-    caption = "Response spectra, 5 % damped, as applied"
-    if case.suite.get("matched", False):
-        caption += "; matched from {:g} to {:g} s".format(*DEFAULT_BAND)
-    if reduction != 1.0:
-        caption = (
-            "Response spectra, 5 % damped, before they are divided by the reduction factor "
-            f"R = {reduction:g}; motions were applied divided by it"
-        )
-    blocks: list[Any] = [FigureBlock.of(draw_suite(suite, case.target), caption)]
-    if case.target is not None and not case.suite.get("matched", False):
-        blocks.append(TextBlock("The motions were not matched to the target."))
-    return blocks
-
-
-def build_run_sections(data: ReportData) -> list[Section]:
-    """Build the sections on the response of one run, or of all pairs and of each."""
-    if not data.runs:
+def _build_study(data: ReportData) -> list[Any]:
+    """Build table and picture of a study: of a comparison of cases those that it has written."""
+    place = data.study or data.folder
+    if place is None or not (place / "study.txt").is_file():
+        if data.study is not None:
+            raise InvalidInput(f"{place} has no study.txt, which `archfem study` writes: run it")
         return []
-    absent = f"Not among the results: runs of {', '.join(data.missing)}."
-    missing = [TextBlock(absent, "missing")] if data.missing else []
-    if data.case.suite is None:
-        (name,) = data.runs
-        return [
-            Section("Response", _build_response(data, name, 1)),
-            Section("Mechanism and collapse", _build_mechanism(data, data.runs[name])),
-        ]
-    sections = [
-        Section("Response: all pairs", [*_build_suite_response(data), *missing]),
-        Section("Response: pair by pair", []),
-    ]
-    for name, run in data.runs.items():
-        blocks = [*_build_response(data, name, len(data.runs)), *_build_mechanism(data, run)]
-        sections.append(Section(name, blocks, level=3))
-    return sections
-
-
-def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
-    """Build player, envelope, criteria per joint and use of strength of one run."""
-    case, run = data.case, data.runs[name]
-    title = case.title if case.suite is None else f"{case.title}: {name}"
-    blocks: list[Any] = []
-    if not run.ending.is_complete:
-        blocks.append(TextBlock(f"The run is not complete: {run.outcome}.", "doubt"))
-    blocks.append(build_player(case, run, title, players))
-    if case.suite is None:
-        blocks += [*_build_envelopes(data), _tabulate_joints(data, run)]
-    blocks.append(TextBlock(sentence(utilisation_text(case.structure, run.joints))))
+    title, _, text = read_listed(place, "study.txt").decode("utf-8").strip().partition("\n\n")
+    table = read_dataset(place / "results.nc", "table").drop_dims("entry", errors="ignore")
+    frame = table.to_dataframe().reset_index()
+    keys = [str(name) for name in table.coords if frame[name].nunique() > 1]
+    names = [name for name in _FINDINGS if name in table.data_vars]
+    caption = f"Study: {title}"
+    if not keys or not names:
+        read_listed(place, "study.png")
+        return [TextBlock(text, "lines", caption), FigureBlock.read(place / "study.png", caption)]
+    shown = frame[[*keys, *names]].head(MAX_POINTS)
+    rows = [[f"{x:.4g}" if isinstance(x, float) else str(x) for x in row] for row in shown.values]
+    more = f"; the first {MAX_POINTS} of {len(frame)} points" if len(frame) > MAX_POINTS else ""
+    head = [_label_finding(table, name) for name in shown]
+    blocks: list[Any] = [Grid(head, rows, f"{caption}{more}")]
+    with suppress(InvalidInput), limit_width(MAX_WIDTH):  # no number differs
+        numbers = [name for name in names if table[name].dtype.kind == "f"]
+        blocks.append(FigureBlock.of(draw_findings(table[numbers], max_panels=4), f"{caption}."))
     return blocks
 
 
-def build_joint_section(data: ReportData) -> Section:
-    """Build the section of long tables: the joints of each run of a suite."""
-    runs = {} if data.case.suite is None else data.runs
-    tables = [_tabulate_joints(data, run, f" under '{name}'") for name, run in runs.items()]
-    return Section("Joints of each run", tables)
+def _label_finding(table: xr.Dataset, name: str) -> str:
+    """Return the name of a key or finding, with its unit."""
+    unit = table[name].attrs.get("units")
+    return f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
 
 
-def _build_envelopes(data: ReportData) -> list[FigureBlock]:
-    """Draw the envelopes of all runs."""
-    caption = "Least and largest eccentricity of each joint; dotted under dead load"
-    figures = draw_envelopes(data.runs, data.dead)
-    part = f"; part {{}} of {len(figures)} of the motions" if len(figures) > 1 else ""
-    return [
-        FigureBlock.of(figure, f"{caption}{part.format(number)}")
-        for number, figure in enumerate(figures, start=1)
-    ]
-
-
-def _tabulate_joints(data: ReportData, run: History, label: str = "") -> Grid:
-    """Return the table of joints without empty columns; the caption names these, and the joints."""
-    head, rows = result_text.tabulate_joints(run.joints, data.dead)
-    assessed = run.verdict.assessed
-    # Most joints neither slide nor open in most runs.
-    filled = [k for k in range(len(head)) if any(row[k] != "-" for row in rows)]
-    empty = {title.split()[0] for k, title in enumerate(head) if k not in filled}
-    notes = {"hinge": "No joint hinged.", "slide": "No joint slid.", "open": "None came apart."}
-    caption = (
-        f"Criteria per joint{label}: eccentricity under dead load, least and largest, largest "
-        "V / N, and when and how long at most the joint hinged, slid and was open."
-    )
-    caption = " ".join([caption, *(note for flag, note in notes.items() if flag in empty)])
-    caption += f" {sentence(assessed)}" if assessed else ""
-    head, cells = [head[k] for k in filled], [[row[k] for k in filled] for row in rows]
-    if len(head) <= 5 and len(cells) > 12:  # in two halves side by side
-        half = (len(cells) + 1) // 2
-        blank = [[""] * len(head)] * (2 * half - len(cells))
-        right = cells[half:] + blank
-        head, cells = [*head, *head], [a + b for a, b in zip(cells[:half], right, strict=True)]
-    return Grid(head, cells, caption)
-
-
-def _build_mechanism(data: ReportData, run: History) -> list[Any]:
-    """Build verdict and mechanism in a line each, the definitions, and the fall of a run."""
-    verdict, fall = run.verdict, run.verdict.fall
-    lines = [
-        f"Outcome: {summarise_outcomes(data, [run])}",
-        *(f"In doubt: {doubt.cause}" for doubt in verdict.doubts),
-    ]
-    if fall is not None and fall.blocks:
-        lines.append(f"lost: {describe_lost(fall, len(fall.blocks))}")
-    lines.append(f"Mechanism: {describe_mechanism(verdict)}")
-    # the assumptions name the law of closing, and whether it was varied
-    law = describe_closing(data.case.structure)
-    lines += [line for line in verdict.remarks if not law or not line.startswith(law)]
-    stated = (
-        [*map(sentence, lines)] if data.case.suite is None else [" ".join(map(sentence, lines))]
-    )
-    blocks: list[Any] = [*map(TextBlock, stated)]
-    if data.case.suite is None or any(verdict.mechanisms.values()):
-        caption = "Definitions of a mechanism: failed joints that it needs, and the first one"
-        rows = [
-            [name, _DEFINITIONS[name], "none" if found is None else str(found)]
-            for name, found in verdict.mechanisms.items()
-        ]
-        blocks.append(Grid((), rows, caption))
-    if run.fall is not None and "fall_pose" in run.dataset:
-        caption = "Blocks on their way to the ground, (a) to (d), over where they stood."
-        blocks.append(FigureBlock.of(draw_fall(run), caption))
-    return blocks
-
-
-def _build_suite_response(data: ReportData) -> list[Any]:
-    """Build the tables of all runs, and their envelopes."""
-    (head, rows), columns = result_text.tabulate_runs(data.runs), len(result_text.RUN_COLUMNS)
-    # The mechanisms have too many columns for a page: a line for each definition instead.
-    mechanisms = []
-    for title, *cells in zip(head[columns:], *(row[columns:] for row in rows[:-1]), strict=True):
-        named = [f"{row[0]}: {cell}" for row, cell in zip(rows, cells, strict=False)]
-        if not {*cells} <= {"none", "-"}:
-            text = "; ".join(named) if len({*cells}) > 1 else f"{cells[0]} in all"
-            mechanisms.append((title, _DEFINITIONS.get(title, ""), text))
-    caption = "Outcome, PGA, and the critical joint of each run"
-    by_definition = "Mechanisms by definition, the failed joints that it needs, and end"
-    table: Any = Grid([], mechanisms, by_definition)
-    if len(mechanisms) == 1:  # the end alone
-        text = f"No run forms a mechanism by any definition; end: {mechanisms[0][-1]}"
-        table = TextBlock(sentence(text))
-    return [
-        Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption),
-        table,
-        *_build_envelopes(data),
-    ]
-
-
-def build_check_section(data: ReportData) -> Section:
-    """Build the section on predicted error, energy balance and model."""
-    blocks: list[Any] = [TextBlock(data.deleted, "missing")] if data.deleted else []
-    if data.runs:
-        head = ["run", "energy drift", "support reaction", "Newton iterations", "halved steps"]
-        head += ["predicted error", "end"]
-        rows = [_check_row(data.case, name, run) for name, run in data.runs.items()]
-        caption = (
-            "Checks of each run: energy drift relative to the largest energy exchanged, reaction "
-            "of the supports under dead load, by joints in their directions as built, and most "
-            "Newton iterations between two records"
-        )
-        blocks.append(Grid(head, rows, caption))
-    caption = "Speed against error over fidelities, meshes and steps."
-    table = "Models in the order of their errors, with times"
-    blocks += data.read_result("accuracy", caption, table=table)
+def _build_range(data: ReportData) -> list[Any]:
+    """Build text and picture of the range; without a fall its table says nothing."""
     caption = (
         "Residual displacement over the properties that explain most of it, at most six; falls are "
         "above the line, and displacements below the axis at its lower end."
@@ -494,38 +378,11 @@ def build_check_section(data: ReportData) -> Section:
         "Falls by the value of each property: of k_n, k_s and damping ratio factors on the values "
         "of the case, of friction what is added"
     )
-    blocks += data.read_result("verdict_range", caption, table=table)
-    return Section("Checks of the numbers, and range of the verdict", blocks)
-
-
-def _check_row(case: Case, name: str, run: History) -> list[str]:
-    """Row of the checks of a run."""
-    attrs = run.dataset.attrs
-    predicted = attrs.get("predicted_error")
-    iterations = run.dataset["iterations"].values if "iterations" in run.dataset else np.zeros(0)
-    ratio = supported_weight_ratio(case.structure, run.joints.isel(time=0, drop=True))
-    return [
-        name,
-        f"{abs(float(attrs.get('energy_drift', np.nan))):.1e}",
-        f"{ratio:.4f} of the weight",
-        f"≤ {int(iterations.max())}" if len(iterations) else "–",
-        f"{int(attrs.get('halved_steps', 0))} steps",
-        "–" if predicted is None else f"{float(predicted):.2g} in |e|",
-        run.outcome,
-    ]
-
-
-def supported_weight_ratio(structure: Structure, joints: xr.Dataset) -> float:
-    """Return the vertical reaction of the supports relative to the weight; 1 in equilibrium [-]."""
-    # Force on the higher block of each joint (j, 2).
-    force = joints["N"].values[:, None] * structure.normals
-    force -= joints["V"].values[:, None] * structure.tangents
-    reaction = 0.0
-    for (lower, higher), (_, vertical) in zip(structure.pairs, force, strict=True):
-        # A support bears the joint's force; a joint between two supports cancels.
-        below, above = (structure.blocks[number].fixed for number in (lower, higher))
-        reaction += vertical * (int(below) - int(above))
-    return float(reaction / structure.weight)
+    blocks, found = data.read_result("verdict_range", caption, table=table), data.verdict_range
+    if found is not None and not found.falls.any():
+        words = f"{found.sentence}; varied: {', '.join(found.properties)}"
+        return [TextBlock(sentence(words.replace("_", " "))), *blocks[1:]]
+    return blocks
 
 
 def build_method_section(data: ReportData) -> Section:
@@ -557,8 +414,9 @@ def build_source_section(data: ReportData) -> Section:
     runs = data.runs.items()
     # Usually one line: all runs were computed with the same versions.
     made = sorted({str(run.dataset.attrs.get("versions", "unknown")) for _, run in runs})
+    own = library_versions()
     rows = [("computed with", text) for text in made]
-    rows.append(("report written with", library_versions()))
+    rows += [] if made == [own] else [("report written with", own)]
     rows += [
         (f"SHA-256 of case, files and program: {name}", str(run.dataset.attrs["inputs"]))
         for name, run in runs

@@ -59,6 +59,7 @@ class FigureBlock:
     caption: str  # below the figure
     inches: float  # width of the figure; it shrinks with a narrower page
     figure: Figure | None = None  # that was drawn, not read from a file
+    beside: bool = False  # whether another one stands beside it
 
     kind = "plate"
 

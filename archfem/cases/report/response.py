@@ -1,0 +1,292 @@
+"""Sections of a report on ground motions, on the response of each run, and on its checks."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from archfem.cases import result_text
+from archfem.cases.case import Case
+from archfem.cases.report.conclusion import (
+    describe_lost,
+    describe_mechanism,
+    sentence,
+    summarise_outcomes,
+)
+from archfem.cases.report.report_data import (
+    ReportData,
+    build_player,
+)
+from archfem.dynamics.history import History
+from archfem.masonry.joint_closing import describe_closing
+from archfem.masonry.structure import Structure, join_names
+from archfem.motion.matching import DEFAULT_BAND
+from archfem.motion.motion import Motion
+from archfem.motion.suite import Suite
+from archfem.statics.stress import utilisation_text
+from archfem.units import STANDARD_GRAVITY
+from archfem.view.collapse import draw_fall
+from archfem.view.histories import draw_envelopes
+from archfem.view.motions import draw_motion, draw_spectra, draw_suite
+from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
+from archfem.view.style import limit_width
+
+# Width of figures of which two stand side by side [mm]
+HALF_WIDTH = 84.0
+
+# Failed joints that each definition of a mechanism needs, in the number of the criteria
+_DEFINITIONS = {
+    "any joints at once": "of any rings and piers together",
+    "one part at once": "of one ring or one pier",
+    "ring and pier at once": "of a ring and a pier together",
+    "one part over the record": "of one ring or one pier, each from its first failure on",
+    "verified": "that permit a motion of the blocks",
+    "Demirel and Aldemir": "of one ring, as worded in Buildings 11 (2021)",
+}
+
+
+def build_ground_section(data: ReportData) -> Section:
+    """Build the section on ground motions and spectra."""
+    motions = list(data.motions.values())
+    if not motions:
+        return Section("Ground motion", [])
+    caption = "Measures of the motions as applied, at their own samples, without a correction"
+    if recorded := [name for name in data.runs if name not in data.given_motions]:
+        caption = (
+            f"Measures of the motions in the steps of the runs, for the records of "
+            f"{join_names(recorded)} are not with the case: peaks between steps are left out, and "
+            "displacements drift"
+        )
+    blocks: list[Any] = [Grid(*result_text.tabulate_motions(motions), caption)]
+    if missed := [*_list_missed_peaks(data)]:
+        blocks.append(TextBlock(f"Steps of runs miss peaks: {'; '.join(missed)}."))
+    if data.case.suite is None:
+        applied = "Ground motion as applied: acceleration, velocity and displacement."
+        with limit_width(HALF_WIDTH):
+            figures = [FigureBlock.of(draw_motion(motions[0]), applied)]
+            figures += _build_spectra(data.case, motions)
+        blocks += [replace(figure, beside=True) for figure in figures]
+    else:
+        blocks += _build_spectra(data.case, motions)
+    return Section("Ground motion" if len(motions) == 1 else "Ground motions", blocks)
+
+
+def _list_missed_peaks(data: ReportData, share: float = 0.98) -> Iterator[str]:
+    """Yield the peaks of motions that the steps of their runs do not meet."""
+    for name, motion in data.given_motions.items():
+        met = float(np.abs(data.runs[name].dataset["ground"].values[:, 0]).max())
+        # a run that ended early has not met them all
+        if met < share * motion.pga and data.runs[name].time[-1] >= motion.duration:
+            peaks = " of ".join(f"{each / STANDARD_GRAVITY:.3g}" for each in (met, motion.pga))
+            yield f"of '{name}' {peaks} g"
+
+
+def _build_spectra(case: Case, motions: list[Motion]) -> list[Any]:
+    """Build the response spectra, beside the target spectrum if there is one."""
+    if case.suite is None:
+        return [FigureBlock.of(draw_spectra(motions), "Response spectra, 5 % damped, as applied.")]
+    scale, reduction = case.suite.get("scale", 1.0), case.suite.get("reduction", 1.0)
+    # The suite multiplies by scale and divides by R; recorded motions are as applied.
+    pairs = tuple(motion.scaled(reduction / scale) for motion in motions)
+    suite = Suite(case.suite.get("name", "suite"), pairs, scale=scale, reduction=reduction)
+    caption = "Response spectra, 5 % damped, as applied"
+    if case.suite.get("matched", False):
+        caption += "; matched from {:g} to {:g} s".format(*DEFAULT_BAND)
+    if reduction != 1.0:
+        caption = (
+            "Response spectra, 5 % damped, before they are divided by the reduction factor "
+            f"R = {reduction:g}; motions were applied divided by it"
+        )
+    blocks: list[Any] = [FigureBlock.of(draw_suite(suite, case.target), caption)]
+    if case.target is not None and not case.suite.get("matched", False):
+        blocks.append(TextBlock("The motions were not matched to the target."))
+    return blocks
+
+
+def build_run_sections(data: ReportData) -> list[Section]:
+    """Build the sections on the response of one run, or of all pairs and of each."""
+    if not data.runs:
+        return []
+    absent = f"Not among the results: runs of {', '.join(data.missing)}."
+    missing = [TextBlock(absent, "missing")] if data.missing else []
+    if data.case.suite is None:
+        (name,) = data.runs
+        return [Section("Response", _build_response(data, name, 1))]
+    sections = [
+        Section("Response: all pairs", [*_build_suite_response(data), *missing]),
+        Section("Response: pair by pair", []),
+    ]
+    for name in data.runs:
+        sections.append(Section(name, _build_response(data, name, len(data.runs)), level=3))
+    return sections
+
+
+def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
+    """Build envelope, criteria per joint, use of strength, mechanism and player of one run."""
+    case, run = data.case, data.runs[name]
+    title = case.title if case.suite is None else f"{case.title}: {name}"
+    blocks: list[Any] = []
+    if not run.ending.is_complete:
+        blocks.append(TextBlock(f"The run is not complete: {run.outcome}.", "doubt"))
+    if case.suite is None:
+        blocks += [*_build_envelopes(data), _tabulate_joints(data, run)]
+    blocks.append(TextBlock(sentence(utilisation_text(case.structure, run.joints))))
+    return [*blocks, *_build_mechanism(data, run), build_player(case, run, title, players)]
+
+
+def build_joint_section(data: ReportData) -> Section:
+    """Build the section of long tables: the joints of each run of a suite."""
+    runs = {} if data.case.suite is None else data.runs
+    tables = [_tabulate_joints(data, run, f" under '{name}'") for name, run in runs.items()]
+    return Section("Joints of each run", tables)
+
+
+def _build_envelopes(data: ReportData) -> list[FigureBlock]:
+    """Draw the envelopes of all runs."""
+    caption = "Least and largest eccentricity of each joint; dotted under dead load"
+    figures = draw_envelopes(data.runs, data.dead)
+    for figure in figures:
+        figure.suptitle("")  # which the head of the report says
+    part = f"; part {{}} of {len(figures)} of the motions" if len(figures) > 1 else ""
+    return [
+        FigureBlock.of(figure, f"{caption}{part.format(number)}")
+        for number, figure in enumerate(figures, start=1)
+    ]
+
+
+def _tabulate_joints(data: ReportData, run: History, label: str = "") -> Grid:
+    """Return the table of joints without empty columns; the caption names these, and the joints."""
+    head, rows = result_text.tabulate_joints(run.joints, data.dead)
+    assessed = run.verdict.assessed
+    # Most joints neither slide nor open in most runs.
+    filled = [k for k in range(len(head)) if any(row[k] != "-" for row in rows)]
+    empty = {title.split()[0] for k, title in enumerate(head) if k not in filled}
+    notes = {
+        "hinge": "No joint hinged.",
+        "slide": "None slid as a whole.",
+        "open": "None came apart.",
+    }
+    caption = (
+        f"Criteria per joint{label}: eccentricity under dead load, least and largest, largest "
+        "V / N, and when and how long at most the joint hinged, slid as a whole (|V| at its limit) "
+        "and was open."
+    )
+    caption = " ".join([caption, *(note for flag, note in notes.items() if flag in empty)])
+    caption += f" {sentence(assessed)}" if assessed else ""
+    head, cells = [head[k] for k in filled], [[row[k] for k in filled] for row in rows]
+    if len(head) <= 5 and len(cells) > 12:  # in two halves side by side
+        half = (len(cells) + 1) // 2
+        blank = [[""] * len(head)] * (2 * half - len(cells))
+        right = cells[half:] + blank
+        head, cells = [*head, *head], [a + b for a, b in zip(cells[:half], right, strict=True)]
+    return Grid(head, cells, caption)
+
+
+def _build_mechanism(data: ReportData, run: History) -> list[Any]:
+    """Build verdict and mechanism in a line each, the definitions, and the fall of a run."""
+    verdict, fall = run.verdict, run.verdict.fall
+    lines = [
+        f"Outcome: {summarise_outcomes(data, [run])}",
+        *(f"In doubt: {doubt.cause}" for doubt in verdict.doubts),
+    ]
+    if fall is not None and fall.blocks:
+        lines.append(f"lost: {describe_lost(fall, len(fall.blocks))}")
+    lines.append(f"Mechanism: {describe_mechanism(verdict)}")
+    # the assumptions name the law of closing, and whether it was varied
+    law = describe_closing(data.case.structure)
+    lines += [line for line in verdict.remarks if not law or not line.startswith(law)]
+    blocks: list[Any] = [TextBlock(" ".join(map(sentence, lines)))]
+    if any(verdict.mechanisms.values()):
+        caption = "Definitions of a mechanism: failed joints that it needs, and the first one"
+        rows = [
+            [name, _DEFINITIONS[name], "none" if found is None else str(found)]
+            for name, found in verdict.mechanisms.items()
+        ]
+        blocks.append(Grid((), rows, caption))
+    if run.fall is not None and "fall_pose" in run.dataset:
+        caption = "Blocks on their way to the ground, (a) to (d), over where they stood."
+        blocks.append(FigureBlock.of(draw_fall(run), caption))
+    return blocks
+
+
+def _build_suite_response(data: ReportData) -> list[Any]:
+    """Build the tables of all runs, and their envelopes."""
+    (head, rows), columns = result_text.tabulate_runs(data.runs), len(result_text.RUN_COLUMNS)
+    # The mechanisms have too many columns for a page: a line for each definition instead.
+    mechanisms = []
+    for title, *cells in zip(head[columns:], *(row[columns:] for row in rows[:-1]), strict=True):
+        named = [f"{row[0]}: {cell}" for row, cell in zip(rows, cells, strict=False)]
+        if not {*cells} <= {"none", "-"}:
+            text = "; ".join(named) if len({*cells}) > 1 else f"{cells[0]} in all"
+            mechanisms.append((title, _DEFINITIONS.get(title, ""), text))
+    caption = "Outcome, PGA, and the critical joint of each run"
+    by_definition = "Mechanisms by definition, the failed joints that it needs, and end"
+    table: Any = Grid([], mechanisms, by_definition)
+    if len(mechanisms) == 1:  # the end alone
+        text = f"No run forms a mechanism by any definition; end: {mechanisms[0][-1]}"
+        table = TextBlock(sentence(text))
+    return [
+        Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption),
+        table,
+        *_build_envelopes(data),
+    ]
+
+
+def build_check_section(data: ReportData) -> Section:
+    """Build the section on predicted error, energy balance and model."""
+    blocks: list[Any] = [TextBlock(data.deleted, "missing")] if data.deleted else []
+    if data.runs:
+        head = ["run", "energy drift", "support reaction", "Newton iterations", "halved steps"]
+        head += ["predicted error", "end"]
+        rows = [_check_row(data.case, name, run) for name, run in data.runs.items()]
+        caption = (
+            "Checks of each run: energy drift relative to the largest energy exchanged, reaction "
+            "of the supports under dead load, by joints in their directions as built, and most "
+            "Newton iterations between two records"
+        )
+        blocks.append(in_words(Grid(head, rows, caption)))
+    caption = "Speed against error over fidelities, meshes and steps."
+    table = "Models in the order of their errors, with times"
+    blocks += data.read_result("accuracy", caption, table=table)
+    return Section("Checks of the numbers", blocks)
+
+
+def _check_row(case: Case, name: str, run: History) -> list[str]:
+    """Row of the checks of a run."""
+    attrs = run.dataset.attrs
+    predicted = attrs.get("predicted_error")
+    iterations = run.dataset["iterations"].values if "iterations" in run.dataset else np.zeros(0)
+    ratio = supported_weight_ratio(case.structure, run.joints.isel(time=0, drop=True))
+    return [
+        name,
+        f"{abs(float(attrs.get('energy_drift', np.nan))):.1e}",
+        f"{ratio:.4f} of the weight",
+        f"≤ {int(iterations.max())}" if len(iterations) else "–",
+        f"{int(attrs.get('halved_steps', 0))} steps",
+        "–" if predicted is None else f"{float(predicted):.2g} in |e|",
+        run.outcome,
+    ]
+
+
+def supported_weight_ratio(structure: Structure, joints: xr.Dataset) -> float:
+    """Return the vertical reaction of the supports relative to the weight; 1 in equilibrium [-]."""
+    # Force on the higher block of each joint (j, 2).
+    force = joints["N"].values[:, None] * structure.normals
+    force -= joints["V"].values[:, None] * structure.tangents
+    reaction = 0.0
+    for (lower, higher), (_, vertical) in zip(structure.pairs, force, strict=True):
+        # A support bears the joint's force; a joint between two supports cancels.
+        below, above = (structure.blocks[number].fixed for number in (lower, higher))
+        reaction += vertical * (int(below) - int(above))
+    return float(reaction / structure.weight)
+
+
+def in_words(grid: Grid) -> Grid | TextBlock:
+    """Return a table, or that of one row as a sentence."""
+    if len(grid.rows) != 1:
+        return grid
+    cells = zip(grid.head, grid.rows[0], strict=True)
+    values = "; ".join(f"{title} {cell}" for title, cell in cells if cell not in ("–", "-"))
+    return TextBlock(sentence(f"{grid.caption}: {values}"))
