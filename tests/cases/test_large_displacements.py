@@ -103,7 +103,7 @@ def test_a_run_that_stands_is_reported_so(held):
     assert held.verdict.headline.startswith("stands")
     assert "largest displacement of a corner " in str(held.verdict)
     data = ReportData(af.Case.of(tomllib.loads(CASE)), {"shake": held})
-    assert summarise_outcomes(data, [held]) == held.verdict.headline
+    assert summarise_outcomes(data, [held]) == "stands"
 
 
 def sentences_of(data):
@@ -156,7 +156,7 @@ def test_a_report_begins_with_the_number_of_lost_stones_and_lists_all_below(held
     fall = af.dynamics.CollapseState("fallen", 1.25, tuple(names), 2.0, 2.0, True)
     run = with_fall(held, fall)
     data = ReportData(af.Case.of(tomllib.loads(CASE)), {"shake": run})
-    words = "fallen; one motion, one set of properties: range not computed"
+    words = "fallen"
     assert summarise_outcomes(data, [run]) == words
     text = " ".join(sentences_of(data))
     short = "stone 1, stone 2, stone 3, …"

@@ -594,7 +594,11 @@ first = { synthetic = { seed = 1 } }
     ("command", "given", "found"),
     [
         ("rate", ["--vehicle", "LM1"], "Rating of 'a small bridge' for LM1: factor"),
-        ("limit", ["--set", "limit.horizontal=1.0"], "Limit analysis: the load turns it into a m"),
+        (
+            "limit",
+            ["--set", "limit.horizontal=1.0"],
+            "Limit analysis: combined hinge-slide mechanism, ",
+        ),
     ],
 )
 def test_a_result_without_a_time_history_has_a_report(
@@ -613,7 +617,7 @@ def test_a_result_without_a_time_history_has_a_report(
     assert found in concluded
     assert re.search(r"In doubt, (rating|limit analysis): Joints slide \(arch, joint", concluded)
     assert ("Over the pressure of the fill, at that place: " in concluded) == (command == "rate")
-    doubted = " Values marked as from memory were not compared with the text" in concluded
+    doubted = " Values marked as to be checked were not compared with the text" in concluded
     assert doubted == (command == "rate")
     factor = re.search(r"factor (?:of )?([\d.]+)", said)[1]
     assert f"{factor}" in words
@@ -681,7 +685,7 @@ def test_an_assessment_takes_the_fill_of_the_limit_analysis(undrawn, tmp_path, c
     assert pages.count("the mirror image, with the same numbers") == 1
     assert len([name for name in read_file_list(folder)["assess"].files if "png" in name]) == 2
     stated = " ".join(pages.split())
-    assert f"Its least margin is {least} to " in stated
+    assert f"The least margin is {least} to " in stated
     assert "NTC-2018 SLV capacity 0.4 d_0*; demand the displacement spectrum, 8 % damped" in stated
     assert "T 1.68 π √(d / a*(d)) at d = 0.4 d_0*, with a* divided by FC" in stated
     factors = [float(re.search(r"alpha_0 = ([\d.]+)", text)[1]) for text in (pressed, alone)]
@@ -767,3 +771,67 @@ def test_the_conclusion_states_outcomes_falls_and_the_range(kept, unplotted):
     # the remedy is not for the client
     assert "In doubt, time histories: 1 of 2 runs: it leaks." in text
     assert "raise no doubt" not in text
+
+
+def test_an_attempt_without_an_answer_states_its_reason(kept, unplotted, capsys, monkeypatch):
+    def fail(*_, **__):
+        raise af.DidNotConverge("no sample falls; raise the scales")
+
+    monkeypatch.setattr("archfem.studies.variations.verdict_range", fail)
+    given = ["verdict", str(kept / "case.toml"), "--pair", "first", "--out", str(kept)]
+    assert af.commands.main(given) == 1
+    assert "no answer: no sample falls; raise the scales" in capsys.readouterr().out
+    assert af.commands.main(["report", str(kept)]) == 0
+    words = words_of(kept / "report.html")
+    row = "range of the verdict over uncertain properties - no answer: no sample falls; raise the"
+    assert row in " ".join(words.replace("–", "-").split())
+
+
+def test_motions_are_measured_by_themselves_where_the_case_has_them(tmp_path, unplotted):
+    """A peak between two steps of the run; of a record that was changed, that of the steps."""
+    record, path = tmp_path / "record.txt", tmp_path / "case.toml"
+    np.savetxt(record, [0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    text = CASE.partition("[suite]")[0]
+    given = f'file = "{record}"\ndt = "5 ms"\nunits = "m/s2"'
+    path.write_text(f'{text}[analysis]\ndt = "10 ms"\n[motion]\n{given}\n', encoding="utf-8")
+    case, folder = af.Case.read(path), tmp_path / "out"
+    with replace_run(case, folder) as draft:
+        list(carry_out(case, draft))
+    found = af.cases.open_results(folder)
+    (motion,) = report_data.ReportData(found.case, found.runs, folder).given_motions.values()
+    assert motion.pga == 2.0
+    words = words_of(found.report())
+    assert "0.2039 g" in words
+    assert "Steps of runs miss peaks: of 'record' 0 of 0.204 g." in words
+    record.write_text(record.read_text().replace("2.0", "3.0"))
+    changed = af.cases.open_results(folder)
+    assert not report_data.ReportData(changed.case, changed.runs, folder).given_motions
+    words = words_of(changed.report())
+    assert "Measures of the motions in the steps of the runs, for the records of record" in words
+
+
+def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):
+    table = tomllib.loads(CASE)["suite"]["pairs"]["first"]["synthetic"]
+    study, folder = tmp_path / "study.toml", tmp_path / "study"
+    (tmp_path / "one.toml").write_text(
+        CASE.partition("[suite]")[0]
+        + f"[motion]\nsynthetic = {{ seed = 1, pga = {table['pga']} }}\n"
+    )
+    study.write_text(
+        'title = "Breadths"\ncase = "one.toml"\ncompute = "limit"\nset = ["limit.horizontal=1"]\n'
+        "[vary]\nstructure.breadth = [0.5, 1.0]\n"
+    )
+    assert af.commands.main(["study", str(study), "--out", str(folder), "--workers", "1"]) == 0
+    assert af.commands.main(["report", str(kept), "--study", str(folder)]) == 0
+    shown = " ".join(words_of(kept / "report.html").split("Study of many cases")[2].split())
+    assert "Study: Breadths." in shown
+    assert "structure.breadth factor 0.5 0.25 1 0.5" in shown
+    assert af.commands.main(["report", str(kept), "--study", str(tmp_path)]) == 1
+    assert "has no study.txt" in capsys.readouterr().err
+
+
+def test_parts_of_a_bridge_state_the_lengths_that_are_left_out():
+    rows = tabulate_inputs(report_data.ReportData(af.Case.of(tomllib.loads(BRIDGE)), {})).rows
+    left = {name: value for name, value, mark in rows if mark == "default"}
+    assert left["sidewalls"] == "setback 0.4 m"
+    assert left["backfill"].startswith("erosion 0 m; hump 1 m")

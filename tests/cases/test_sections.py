@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
 import archfem as af
 from archfem._files import replace_results
@@ -105,7 +106,7 @@ def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
     assert facts.get("in doubt") == ("time histories" if doubtful else None)
     assert facts["verdict"] == f"{runs['first'].verdict.outcome} in 2 of 2 runs"
     one = report_data.ReportData(data.case, {"first": runs["first"]})
-    assert dict(conclusion.list_facts(one))["verdict"] == runs["first"].verdict.headline
+    assert dict(conclusion.list_facts(one))["verdict"] == runs["first"].verdict.outcome
     none = report_data.ReportData(data.case, {})
     assert "verdict" not in dict(conclusion.list_facts(none))
 
@@ -164,7 +165,7 @@ def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatc
 def test_tables_and_figures_of_all_pairs_say_what_they_show(runs, piers, monkeypatch):
     """Definitions that no run meets are one line, and each of two figures has its part named."""
     monkeypatch.setattr(response.FigureBlock, "of", lambda figure, caption: caption)
-    monkeypatch.setattr(response, "draw_envelopes", lambda *_: ["one", "other"])
+    monkeypatch.setattr(response, "draw_envelopes", lambda *_: [Figure(), Figure()])
     data = report_data.ReportData(SimpleNamespace(structure=piers), runs)
     _, ends, *captions = response._build_suite_response(data)
     assert ends.text == ("No run forms a mechanism by any definition; end: reached 0.10 s in all.")

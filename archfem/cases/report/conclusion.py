@@ -312,7 +312,7 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
     if "assessment" in data.statements:
         doubts += [(RESULTS["assessment"], text) for text in _doubt_spectrum(data)]
     if "from memory" in (data.read_text("rating.txt") or ""):
-        text = "values marked as from memory were not compared with the text of their code"
+        text = "values marked as to be checked were not compared with the text of their code"
         doubts.append((RESULTS["rating"], text))
     return list(dict.fromkeys(doubts))
 

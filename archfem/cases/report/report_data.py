@@ -72,6 +72,7 @@ class ReportData:
             name: replace(motion, name=name)
             for (name, run), motion in zip(self.runs.items(), given, strict=True)
             if np.allclose(motion.at(run.time), run.dataset["ground"], atol=1e-9 * motion.pga)
+            and np.isclose(motion.pga, run.dataset.attrs.get("pga", motion.pga))
         }
 
     @cached_property

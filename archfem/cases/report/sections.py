@@ -132,7 +132,8 @@ def build_input_section(data: ReportData) -> Section:
     large = data.case.analysis.discretisation.displacements == "large"
     moved = "of any size" if large else "small: equilibrium where blocks stood"
     if data.is_static:
-        moved = "as built in limit analysis; an assessment follows its mechanism"
+        follows = "; an assessment follows its mechanism" * ("assessment" in data.statements)
+        moved = f"none: equilibrium as built{follows}"
     assumptions = [
         ("structure", "plane; forces are those of the whole width"),
         ("blocks", "rigid" if data.is_static else blocks.get(fidelity, f"by part: {fidelity}")),
@@ -252,6 +253,9 @@ def _build_rating(data: ReportData) -> list[Any]:
     """Build text and picture of a rating, below the table of several vehicles."""
     caption = "(a) Factor along the bridge, and (b) mechanism at the worst place"
     blocks = data.read_result("rating", caption)
+    if blocks:
+        # where a value can be looked up, for whoever signs
+        blocks[0] = replace(blocks[0], text=blocks[0].text.replace("from memory", "to be checked"))
     if (table := data.read_text("vehicles.csv")) is None:
         return blocks
     # the text begins with the same table, and the picture is of the worst vehicle
