@@ -160,25 +160,27 @@ def _list_outdated(data: ReportData) -> Iterator[str]:
         yield f"{made}: {', '.join(earlier)}."
 
 
-def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) -> Iterator[str]:
-    """Yield the answer: outcomes, their range, the least margin, what may change it."""
-    demand = data.case.report.get("demand", "")
-    outcomes = [f"the structure {each}" for each in _describe_outcomes(data)]
+def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) -> list[str]:
+    """Return the answer: outcomes, their range, the least margin, what may change it."""
+    lead = [f"the structure {each}" for each in _describe_outcomes(data)]
     if not data.runs:
-        outcomes = [text for each in data.statements.values() for text in each.sentences]
-    yield from [f"for {demand}: {outcomes[0]}", *outcomes[1:]] if demand and outcomes else outcomes
+        # the margin says what an assessment has found; one result says all
+        stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
+        lead = [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
     if data.verdict_range is not None:
         # statistics of the sampling stand in its section
         found = data.verdict_range.sentence.partition("; of ")[0]
-        yield f"in variations of its properties it {found}"
-    yield from _describe_margin(data, rows)
+        lead.append(f"in variations of its properties it {found}")
+    lead += _describe_margin(data, rows)
     if data.runs and not doubtful:
-        yield "the checks of the numbers raise no doubt"
+        lead.append("the checks of the numbers raise no doubt")
     changes = [f"the doubts below, on {join_names(doubtful)}"] if doubtful else []
     single = list_unvaried(data)
     changes += [f"what was not varied: {', '.join(single)}"] if single else []
-    if changes:
-        yield f"what may change this: {'; '.join(changes)}"
+    lead += [f"what may change this: {'; '.join(changes)}"] if changes else []
+    if demand := data.case.report.get("demand"):
+        lead[:1] = [f"for {demand}: {lead[0]}"] if lead else [f"the demand, as stated: {demand}"]
+    return lead
 
 
 def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
@@ -192,7 +194,8 @@ def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
         least, name, outcome, factor = min(checks)
         _, only, assumed = outcome.partition(" only with ")
         fails = "" if least >= 1.0 or only else ", which it fails"
-        margin = f"the least margin is {factor}, on {name_spectrum(data)}, by {name}"
+        over = " over what is assumed of the fill" * (" to " in factor)
+        margin = f"the least margin is {factor}{over}, on {name_spectrum(data)}, by {name}"
         yield f"{margin}{only and ', passed'}{only}{assumed}{fails}"
 
 

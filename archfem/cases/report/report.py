@@ -57,7 +57,7 @@ def write_report_of_history(run: History, path: str | Path) -> Path:
     # A history that was read alone has no structure: that of its case is the same.
     run = run if run.structure is not None else History(run.dataset, case.structure)
     pairs, motion = list((case.suite or {}).get("pairs", ())), run.dataset.attrs.get("motion")
-    name = str(motion) if motion in pairs else "run"
+    name = str(motion or "run")
     missing = tuple(pair for pair in pairs if pair != name)
     return write_report(ReportData(case, {name: run}, missing=missing), path)
 

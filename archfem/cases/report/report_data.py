@@ -61,16 +61,14 @@ class ReportData:
     @cached_property
     def given_motions(self) -> dict[str, Motion]:
         """Motions of the case that the runs have followed; its files may be gone, or changed."""
-        if not self.runs:
-            return {}
-        case = self.case if self.case.suite is None else self.case.alone(*self.runs)
         try:
+            case = self.case if self.case.suite is None else self.case.alone(*self.runs)
             given = [case.ground_motion()] if case.suite is None else case.ground_suite().motions
         except ArchfemError:
             return {}
         return {
             name: replace(motion, name=name)
-            for (name, run), motion in zip(self.runs.items(), given, strict=True)
+            for (name, run), motion in zip(self.runs.items(), given, strict=False)
             if np.allclose(motion.at(run.time), run.dataset["ground"], atol=1e-9 * motion.pga)
             and np.isclose(motion.pga, run.dataset.attrs.get("pga", motion.pga))
         }
