@@ -106,10 +106,7 @@ class Case:
             InvalidStructure: the lengths of the structure contradict each other.
         """
         path = Path(path)
-        settings = read_with_base(path)
-        for text in changes:
-            path_of_value, value = parse_change(text)
-            set_value(settings, complete_path(path_of_value), value)
+        settings = read_settings(path, changes)
         try:
             return cls.of(settings, path.parent)
         except ArchfemError as error:
@@ -316,6 +313,15 @@ class Case:
             left_out: keys of these that do not count.
         """
         return provenance.hash_sections(self.settings, self.folder, sections, left_out)
+
+
+def read_settings(path: Path, changes: Sequence[str] = ()) -> dict[str, Any]:
+    """Read the tables of a case file, with its base and with changed values."""
+    settings = read_with_base(path)
+    for text in changes:
+        path_of_value, value = parse_change(text)
+        set_value(settings, complete_path(path_of_value), value)
+    return settings
 
 
 def _read_report(settings: Table) -> dict[str, str]:

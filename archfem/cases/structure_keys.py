@@ -227,6 +227,18 @@ def _outline_arguments(values: dict[str, Any], settings: Table, folder: Path) ->
     return drawn
 
 
+def find_drawing(settings: Table, folder: Path) -> dict[str, Any] | None:
+    """Return path, unit, snap and ignored layers of the drawing of a case, None without one."""
+    table = settings.get("structure", {})
+    if table.get("shape") != "outlines" or "file" not in table:
+        return None
+    values = check_table(table, shape_keys("outlines"), "structure")
+    layers = values.get("layers", {}).items()
+    given = {key: values[key] for key in ("unit", "snap") if key in values}
+    ignored = [name for name, layer in layers if layer.get("ignore")]
+    return given | {"path": folder / values["file"], "ignored": ignored}
+
+
 def read_survey(settings: Table, folder: Path) -> Survey | None:
     """Read the drawing of a case alone, without joints; None where it has no drawing."""
     if (table := settings["structure"]).get("shape") != "outlines":

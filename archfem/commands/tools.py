@@ -1,6 +1,6 @@
 """Commands without result folders: check, thickness, animate, examples, new, schema, doctor.
 
-The module does not import drawing, so that `archfem check` starts at once.
+The module imports drawing within functions, so that `archfem check` starts at once.
 """
 
 import argparse
@@ -9,6 +9,7 @@ import re
 import shutil
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,14 +19,14 @@ from archfem import _numba, _optional
 from archfem._display import write_progress_line
 from archfem._files import path_inside, read_listed
 from archfem.cases import result_text
-from archfem.cases.case import Case
+from archfem.cases.case import Case, read_settings
 from archfem.cases.examples import copy_example, list_example_titles, read_example, write_new_case
 from archfem.cases.run import HISTORY_FILE, DeadLoadResult, dead_load_of_case
-from archfem.cases.structure_keys import read_survey
+from archfem.cases.structure_keys import find_drawing, read_survey
 from archfem.cases.toml_file import parse_tables
 from archfem.commands.cli import ExitCode
 from archfem.dynamics.history import History
-from archfem.errors import InvalidInput, NotInstalled
+from archfem.errors import ArchfemError, InvalidInput, NotInstalled
 from archfem.limit.collapse import Collapse, Outcome, describe_crushing
 from archfem.limit.thickness import minimum_thickness
 from archfem.masonry.ring_thickness import find_ring
@@ -36,6 +37,30 @@ PIP_INSTALL = f"{sys.executable} -m pip install"
 
 
 def check(options: argparse.Namespace) -> int:
+    """Check a case; where that fails, draw the drawing that it may have."""
+    try:
+        return _check_case(options)
+    except ArchfemError:
+        # without drawing, file or place for the picture the error is all
+        with suppress(ArchfemError, OSError):
+            if (picture := _draw_as_read(options)) is not None:
+                print(f"wrote {picture}: the drawing as it was read", file=sys.stderr)
+        raise
+
+
+def _draw_as_read(options: argparse.Namespace) -> Path | None:
+    """Draw the drawing of a case in the current folder; None where it has none."""
+    path = Path(options.case)
+    given = find_drawing(read_settings(path, options.changes), path.parent)
+    if given is None:
+        return None
+    from archfem.view.sketch import draw_outlines
+    from archfem.view.style import save
+
+    return save(draw_outlines(**given), f"{path.stem}_drawing.png")
+
+
+def _check_case(options: argparse.Namespace) -> int:
     """Read a case and its motions, and compute limit analysis and dead load."""
     case = Case.read(options.case, options.changes)
     print(case.title)

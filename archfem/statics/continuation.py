@@ -8,7 +8,7 @@ singular. Loads may depend on the coordinates where blocks rotate far.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from math import hypot
 
 import numpy as np
@@ -18,7 +18,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from archfem._typing import Array
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
+from archfem.limit.backfill import self_weight_programme
 from archfem.limit.linear_programme import RigidBlocks
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement
 from archfem.models.model import Model
@@ -150,6 +151,20 @@ class LoadPath(EquilibriumPath):
             return None
         held = None if self.held is None else self.held.rate(x[:-1])
         return x[-1] * rate if held is None else x[-1] * rate + held
+
+    @cached_property
+    def bound(self) -> float:
+        """Factor that no state exceeds by limit analysis; infinite where it cannot say [-]."""
+        if self.model.large_displacements or self.model.structure.has_own_laws:
+            return np.inf
+        dead = self.held.actions if self.held is not None else ()
+        try:
+            given = self.model.structure, "coulomb", np.inf, None, dead
+            stones, programme = self_weight_programme(*given)
+            best = programme.with_load_factor(stones.load(self.load.actions)).solve()
+        except ArchfemError:  # such as for bodies that are too soft to be rigid
+            return np.inf
+        return np.inf if best is None else -best.value
 
     @property
     def displacements(self) -> Array:

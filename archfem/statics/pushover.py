@@ -32,6 +32,9 @@ STEP_GROWTH = 1.1
 # as about a hinge that moves from joint to joint.
 STAGNATION_STEPS = 40
 
+# Steps of so little progress after which relaxation decides whether the load can grow
+FEW_STEPS = 15
+
 # Begin of the outcome of such a path
 CRAWLS = "it crawls"
 
@@ -224,10 +227,12 @@ def follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
         if control == "path" and isinstance(path, LoadPath):
             is_added = path.advance_normal(distance)
         else:
-            is_added = path.advance(border, distance) or relaxation.advance(border, distance)
+            # where the last step had to be relaxed, this one has to be, too
+            ways = [path.advance, relaxation.advance][:: -1 if relaxation.is_last else 1]
+            is_added = any(advance(border, distance) for advance in ways)
         if not is_added:
             distance /= 2.0
-            if distance < min_distance:
+            if distance < min_distance or _has_reached_bound(path):
                 reason = continue_by_relaxation(path, stop, criteria)
                 return reason or failure_message(path, control, criteria)
             continue
@@ -235,6 +240,9 @@ def follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
         direction = step / np.linalg.norm(step)
         if reason := stop_reason(path, stop, criteria, step):
             return reason
+        if _is_stagnating(path, 0.02, FEW_STEPS) and sliding_joints(path, criteria):
+            reason = continue_by_relaxation(path, stop, criteria, 0.01)
+            return reason or _crawl_message(path, FEW_STEPS, "fiftieth")
         taken.append(distance)
         is_easy = control == "path" and path.iterations[-1] <= easy_iterations
         distance *= easy_growth if is_easy else STEP_GROWTH
@@ -279,21 +287,34 @@ def stop_reason(path: Path, stop: Stop, criteria: Criteria, step: Array) -> str 
     # round-off, so that most paths that take all their steps crawl.
     is_last = len(path.states) > stop.steps
     if _is_stagnating(path, 0.1 if is_last else 0.01) and sliding_joints(path, criteria):
-        return (
-            f"{CRAWLS}: in {STAGNATION_STEPS} steps the {path.moving} moved by less than a tenth "
-            f"of {displacement:.3g} m, and the factor went no further than {path.factors[-1]:.5g}"
-        )
+        return _crawl_message(path, STAGNATION_STEPS, "tenth")
     return f"{stop.steps} steps were taken" if is_last else None
 
 
-def _is_stagnating(path: Path, share: float) -> bool:
+def _crawl_message(path: Path, steps: int, part: str) -> str:
+    """Say that a path makes no progress."""
+    return (
+        f"{CRAWLS}: in {steps} steps the {path.moving} moved by less than a {part} of "
+        f"{path.displacements[-1]:.3g} m, and the factor went no further than "
+        f"{path.factors[-1]:.5g}"
+    )
+
+
+def _is_stagnating(path: Path, share: float, steps: int = STAGNATION_STEPS) -> bool:
     """Return whether displacement and factor change too little, although each step has a state."""
-    if len(path.states) <= STAGNATION_STEPS:
+    if len(path.states) <= steps:
         return False
-    before, after = path.displacements[[-STAGNATION_STEPS, -1]]
-    first, last = np.array(path.factors)[[-STAGNATION_STEPS, -1]]
+    before, after = path.displacements[[-steps, -1]]
+    first, last = np.array(path.factors)[[-steps, -1]]
     change = abs(last - first) / max(abs(last), np.finfo(float).tiny)
     return bool(after - before <= share * after and change <= MIN_RELAXATION_LOAD_STEP)
+
+
+def _has_reached_bound(path: Path) -> bool:
+    """Return whether limit analysis proves that the load grows by less than relaxation resolves."""
+    if not isinstance(path, LoadPath) or path.factors[-1] <= 0.0:
+        return False
+    return path.bound / path.factors[-1] - 1.0 <= MIN_RELAXATION_LOAD_STEP
 
 
 def sliding_joints(path: Path, criteria: Criteria) -> list[str]:
@@ -307,12 +328,18 @@ def _last_joints(path: Path, criteria: Criteria) -> xr.Dataset:
     return joint_dataset(path.model.structure, path.joint_forces[-1], criteria=criteria)
 
 
-def continue_by_relaxation(path: Path, stop: Stop, criteria: Criteria) -> str | None:
-    """Load a structure whose joints slide further by relaxation; return the rule that ended it."""
+def continue_by_relaxation(
+    path: Path, stop: Stop, criteria: Criteria, share: float = 0.05
+) -> str | None:
+    """Load a structure whose joints slide further by relaxation; return the rule that ended it.
+
+    The first trial is by a share of the load.
+    """
     if not (isinstance(path, LoadPath) and len(path.states) > 1 and sliding_joints(path, criteria)):
         return None
-    farthest, share = stop.displacement * path.model.structure.size, 0.05  # the first trial
-    while share > MIN_RELAXATION_LOAD_STEP:
+    farthest = stop.displacement * path.model.structure.size
+    # no state is sought beyond what limit analysis proves to be the most
+    while (share := min(share, path.bound / path.factors[-1] - 1.0)) > MIN_RELAXATION_LOAD_STEP:
         if not path.advance_by_relaxation(share * path.factors[-1], farthest):
             share /= 2.0
         elif reason := stop_reason(path, stop, criteria, _last_step(path)):
@@ -344,6 +371,7 @@ class _StepRelaxation:
     farthest: float  # displacement of the load beyond which the structure has collapsed [m]
     wait: int = 0  # steps that must fail between two trials
     failed: int = 0  # steps that have failed since the last trial
+    is_last: bool = False  # whether the last step was added so
 
     def advance(self, border: Array, distance: float) -> bool:
         """Add a relaxed state under the load increment of the failed step, if joints slide."""
@@ -357,6 +385,7 @@ class _StepRelaxation:
         increment = max(increment, MIN_RELAXATION_LOAD_STEP * path.factors[-1])
         is_added = path.advance_by_relaxation(increment, self.farthest)
         self.wait, self.failed = (0 if is_added else 2 * self.wait + 1), 0
+        self.is_last = is_added
         return is_added
 
 
@@ -379,6 +408,9 @@ def _label_result(path: Path, criteria: Criteria, outcome: str) -> Pushover:
     limit, uncertainty = np.nan, np.nan
     if not outcome.startswith(CRAWLS):  # sliding has its limit at once, and no asymptote of hinges
         limit, uncertainty = _extrapolate_limit(path.displacements, factors)
+        sliding = bool(joints["slide"][-1].any())
+        if np.isnan(limit) and sliding and isinstance(path, LoadPath) and _has_reached_bound(path):
+            limit, uncertainty = path.bound, path.bound - float(factors[-1])
     return Pushover(curve, joints, *hinge_order(joints), outcome, limit, uncertainty)
 
 

@@ -8,6 +8,7 @@
     motions      accelerograms and spectra
     pages        HTML pages: the player of a run, and documents that embed it
     positions    positions of blocks over a run
+    sketch       outlines of a drawing as read, with overlaps and gaps
     springs      cells and springs of a model, forces of springs
     statics      dead load, mode shapes, free body, pushover
     stress       stress map

@@ -23,6 +23,7 @@ from .pages.live import LivePage as LivePage
 from .pages.live import page as page
 from .pages.player import Player as Player
 from .pages.player import player as player
+from .sketch import draw_outlines as draw_outlines
 from .springs import draw_mesh as draw_mesh
 from .springs import draw_spring_forces as draw_spring_forces
 from .statics import draw_dead_load as draw_dead_load

@@ -144,7 +144,8 @@ def test_soil_meets_stone_as_the_preset_says(tmp_path):
         ]
 
 
-def test_check_command(capsys):
+def test_check_command(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # which has the picture of the failed check
     changes = ["--set", "model.fidelity=rigid"]
     assert main(["check", str(SHIPPED), *changes]) == 3  # in doubt: its soil is not rigid
     assert "51 blocks, 89 joints" in capsys.readouterr().out

@@ -75,6 +75,11 @@ class Outline:
     role: str | None = None  # role of the part
     frame: Frame = Frame()  # coordinates of the drawing
 
+    @property
+    def drawn(self) -> Array:
+        """Vertices in coordinates of the drawing, y upwards (n, 2)."""
+        return self.points / self.frame.factor
+
 
 def read_drawing(
     path: str | Path,
@@ -99,6 +104,26 @@ def read_drawing(
     except InvalidInput as error:
         raise InvalidInput(f"{path}: {error}") from error
     return outlines
+
+
+def read_polylines(
+    path: Path, unit: str | None, ignored: Counter[str], snap: float
+) -> tuple[list[Outline], list[Outline]]:
+    """Read what can be drawn of a DXF file that is in error: closed outlines, and open lines."""
+    with _foreign_reader("ezdxf", "DXF drawing"):
+        read, frame = _load_dxf(path, ignored)
+    frame = frame or Frame(1.0, "units")
+    frame = frame if unit is None else _read_unit(unit)
+    closed, lines = list[Outline](), list[Outline]()
+    for entity in read:
+        points = np.array([point[:2] for point in entity.points], dtype=float) * frame.factor
+        if entity.kind in POLYLINES and len(points) > 1 and np.isfinite(points).all():
+            is_closed = entity.closed or dist(points[0], points[-1]) <= snap
+            kept = closed if is_closed and len(points) > 2 else lines
+            kept.append(Outline(points, f"{len(kept) + 1}", entity.layer, frame=frame))
+    if not (closed or lines):
+        raise InvalidInput(f"{path} has no polylines to draw")
+    return closed, lines
 
 
 @contextmanager

@@ -1,0 +1,106 @@
+"""Figure of a drawing as it was read, with what keeps it from being a structure."""
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from archfem._typing import Array, Metres
+from archfem._validation import validate_arguments
+from archfem.masonry.survey.drawings import Outline
+from archfem.masonry.survey.faults import find_faults, sketch_drawing
+from archfem.view.style import (
+    Colour,
+    Size,
+    add_legend_below,
+    add_polygons,
+    annotate,
+    new_figure,
+    set_title,
+    style_axes,
+    text_width,
+    white_halo,
+)
+
+
+@validate_arguments
+def draw_outlines(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    snap: Metres = 1e-3,
+    ignored: Collection[str] = (),
+) -> Figure:
+    """Draw the outlines of a drawing by layer, with their names or numbers.
+
+    Overlaps deeper than half of snap are red, gaps between that and five times snap are orange;
+    each has a ring around it. Polylines that are not closed are purple. The coordinates are those
+    of the drawing, y upwards.
+
+    Args:
+        path: drawing, as for `archfem.masonry.read_outlines`.
+        unit: unit of the coordinates, as there.
+        snap: tolerance of touching outlines, as there [m].
+        ignored: layers that are left out.
+
+    Returns:
+        The figure; it needs no outlines that touch.
+
+    Raises:
+        InvalidInput: the file is no drawing, or has nothing to draw.
+    """
+    closed, lines = sketch_drawing(path, unit, ignored, snap)
+    every = [*closed, *lines]
+    frame = every[0].frame
+    bounds = np.concatenate([each.drawn for each in every])
+    low, high = bounds.min(axis=0), bounds.max(axis=0)
+    scale = min(np.array([Size.PAGE - 0.8, 5.6]) / (high - low))  # [inch / unit]
+    wide, tall = scale * (high - low) + [0.8, 1.6]
+    figure = new_figure(max(0.75 * Size.COLUMN, wide), max(0.35 * Size.COLUMN, tall))
+    axes = figure.add_subplot()
+    style_axes(axes, f"x [{frame.unit}]", f"y [{frame.unit}]")
+    axes.set_aspect("equal")
+    _draw_layers(axes, closed, scale)
+    for line in lines:
+        style = {"color": Colour.LOAD, "lw": 1.8, "zorder": 4}
+        axes.plot(*line.drawn.T, "o-", ms=5.0, label="not closed", **style)
+    counts = [f"{len(closed)} closed outlines"]
+    for kind, colour, found in zip(
+        ("overlap", "gap"), (Colour.HINGE, Colour.SLIDING), find_faults(closed, snap), strict=True
+    ):
+        counts += [f"{len(found)} {kind}{'s' * (len(found) > 1)}"] if found else []
+        _mark_faults(axes, found, kind, colour)
+    counts += [f"{len(lines)} not closed"] if lines else []
+    axes.autoscale_view()
+    set_title(axes, f"{Path(path).name} as read: {', '.join(counts)}")
+    handles = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    add_legend_below(figure, handles=list(handles.values()))
+    return figure
+
+
+def _draw_layers(axes: Axes, closed: Sequence[Outline], scale: float) -> None:
+    """Draw closed outlines in the colours of their layers, each with its name or its number."""
+    layers = list(dict.fromkeys(each.layer for each in closed))
+    for number, layer in enumerate(layers):
+        own = [each.drawn for each in closed if each.layer == layer]
+        face = f"{Colour.LINES[number % len(Colour.LINES)]}40"
+        add_polygons(axes, own, face, label=f"layer '{layer}' ({len(own)})")
+    for number, outline in enumerate(closed, 1):
+        points = outline.drawn
+        room = scale * float(np.ptp(points[:, 0]))
+        names = (outline.name, outline.name.removeprefix(outline.layer).strip(), str(number))
+        text = next((t for t in names if t and text_width(len(t), Size.NOTE) < room), names[-1])
+        style = {"ha": "center", "va": "center", "zorder": 6, "path_effects": white_halo(1.5)}
+        annotate(axes, text, points.mean(axis=0), fontsize=Size.NOTE, **style)
+
+
+def _mark_faults(axes: Axes, faults: Sequence[Array], kind: str, colour: str) -> None:
+    """Fill faults, and draw a ring around each, which may be too narrow to be seen."""
+    if not faults:
+        return
+    add_polygons(axes, faults, colour, edge=colour, width=1.5, zorder=5)
+    places = np.array([fault.mean(axis=0) for fault in faults])
+    style = {"mfc": "none", "mec": colour, "ms": 13.0, "mew": 1.6, "ls": "", "zorder": 7}
+    axes.plot(*places.T, "o", label=f"{kind} ({len(faults)})", **style)

@@ -1,0 +1,118 @@
+"""The picture of a drawing that is no structure: outlines, overlaps, gaps, open lines."""
+
+import json
+
+import ezdxf
+import pytest
+
+import archfem as af
+from archfem.view import draw_outlines
+
+BESIDE = {"left": (0.0, 1.0), "right": (1.0, 2.0)}
+
+
+def draw(path, boxes=BESIDE, units=ezdxf.units.M, factor=1.0, opened=()):
+    """Write boxes between two x, one high, each on the layer of its name."""
+    drawing = ezdxf.new(units=units)
+    for name, (left, right) in boxes.items():
+        corners = [(left, 0.0), (right, 0.0), (right, 1.0), (left, 1.0)]
+        points = [(factor * x, factor * y) for x, y in corners]
+        layer = {"layer": name}
+        drawing.modelspace().add_lwpolyline(points, close=name not in opened, dxfattribs=layer)
+    drawing.saveas(path)
+    return path
+
+
+def legend(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+@pytest.mark.parametrize(
+    ("gap", "said"),
+    [
+        (0.0, []),
+        (0.004, ["gap (1)"]),
+        (0.02, []),  # beyond five times snap, an opening
+        (0.0004, []),  # within half of snap, which closes it
+        (-0.0004, []),
+        (-0.004, ["overlap (1)"]),
+        (-0.3, ["overlap (1)"]),
+    ],
+)
+def test_overlaps_and_narrow_gaps_are_marked(tmp_path, gap, said):
+    boxes = {"left": (0.0, 1.0), "right": (1.0 + gap, 2.0)}
+    figure = draw_outlines(draw(tmp_path / "two.dxf", boxes))
+    assert legend(figure) == ["layer 'left' (1)", "layer 'right' (1)", *said]
+    axes = figure.axes[0]
+    rings = [line for line in axes.lines if line.get_marker() == "o"]
+    assert len(rings) == len(said)
+    for ring in rings:
+        assert ring.get_xdata() == pytest.approx([1.0 + gap / 2.0], abs=1e-6)
+        assert ring.get_ydata() == pytest.approx([0.5])
+    texts = {text.get_text() for text in axes.texts}
+    assert texts == {"left 1", "right 1"}
+
+
+def test_coordinates_are_those_of_the_drawing(tmp_path):
+    path = draw(tmp_path / "two.dxf", units=ezdxf.units.MM, factor=1e3)
+    axes = draw_outlines(path).axes[0]
+    assert axes.get_xlabel() == "x [mm]"
+    assert axes.dataLim.x1 == pytest.approx(2000.0)
+    # a file without a unit, or with a wrong one, has a picture nevertheless
+    axes = draw_outlines(draw(tmp_path / "no.dxf", units=0, factor=1e3)).axes[0]
+    assert axes.get_xlabel() == "x [units]"
+    axes = draw_outlines(path, unit="km").axes[0]
+    assert (axes.get_xlabel(), axes.dataLim.x1) == ("x [km]", pytest.approx(2000.0))
+
+
+def test_polylines_that_are_not_closed_are_drawn_beside_the_others(tmp_path):
+    figure = draw_outlines(draw(tmp_path / "open.dxf", opened=("right",)))
+    assert legend(figure) == ["layer 'left' (1)", "not closed"]
+    title = figure.axes[0].get_title()
+    assert title == "open.dxf as read: 1 closed outlines, 1 not closed"
+    assert draw_outlines(draw(tmp_path / "open.dxf"), ignored=["right"]).axes[0].dataLim.x1 == 1.0
+
+
+def test_names_that_are_too_long_become_numbers(tmp_path):
+    boxes = {f"a very long name of a layer {k}": (k, k + 1.0) for k in range(12)}
+    axes = draw_outlines(draw(tmp_path / "row.dxf", boxes)).axes[0]
+    assert [text.get_text() for text in axes.texts][:2] in (["1", "1"], ["1", "2"])
+
+
+def test_nothing_to_draw_is_refused(tmp_path):
+    with pytest.raises(af.InvalidInput, match="no polylines to draw"):
+        draw_outlines(draw(tmp_path / "none.dxf", {}))
+    (tmp_path / "none.geojson").write_text(json.dumps({"type": "FeatureCollection"}))
+    with pytest.raises(af.InvalidInput, match="no GeoJSON FeatureCollection"):
+        draw_outlines(tmp_path / "none.geojson")
+
+
+CASE = """[structure]
+shape = "outlines"
+file = "two.dxf"
+snap = "1 mm"
+
+[structure.layers]
+left = { part = "wall", role = "pier", fixed = true }
+right = { part = "wall", role = "pier" }
+"""
+
+
+def test_a_failed_check_says_where_the_picture_is(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    draw(tmp_path / "two.dxf", {"left": (0.0, 1.0), "right": (0.9, 2.0)})
+    case, picture = tmp_path / "two.toml", tmp_path / "two_drawing.png"
+    case.write_text(CASE)
+    assert af.commands.main(["check", str(case)]) == 1
+    said = capsys.readouterr().err
+    assert f"wrote {picture.name}: the drawing as it was read" in said
+    assert "overlap by" in said
+    assert picture.stat().st_size > 1000
+    picture.unlink()
+    # a sound drawing, a missing one, and a case without one have none
+    (tmp_path / "two.dxf").unlink()
+    assert af.commands.main(["check", str(case)]) == 1
+    case.write_text('[structure]\nshape = "column"\n')
+    assert af.commands.main(["check", str(case)]) == 1
+    assert "wrote" not in capsys.readouterr().err
+    assert not picture.exists()
