@@ -18,7 +18,7 @@ from archfem import _display
 
 ROOT = Path(archfem.__file__).parent
 SUPPORT_MODULES = {"errors", "units", "_display", "_files", "_netcdf", "_numba", "_optional"}
-SUPPORT_MODULES |= {"_petsc", "_threads", "_typing", "_validation"}
+SUPPORT_MODULES |= {"_petsc", "_recent", "_threads", "_typing", "_validation"}
 ROOMS = ["motion", "masonry", "joints", "limit", "models", "statics", "dynamics", "view", "cases"]
 ROOMS += ["studies", "commands"]
 ENTRANCES = {"__init__", "__main__"}

@@ -12,6 +12,7 @@ from archfem._typing import Array, Flags
 from archfem._validation import validate_arguments
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.errors import InvalidInput
+from archfem.masonry.block import rotate
 from archfem.masonry.stiffness_ratio import find_soft_blocks, list_stones
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt
@@ -198,13 +199,6 @@ def doubt_soft_blocks(*structures: Structure) -> tuple[Doubt, ...]:
 
 def _place_corners(structure: Structure, blocks: Sequence[int]) -> Callable[[Array], Array]:
     """Return a function from poses to corners of blocks, relative to centroids as built [m]."""
-    all_blocks = structure.blocks
-    corners = [np.asarray(all_blocks[k].points) - all_blocks[k].centroid for k in blocks]
-    owner, (x, y) = np.repeat(blocks, [len(each) for each in corners]), np.concatenate(corners).T
-
-    def place(poses: Array) -> Array:
-        pose = poses[owner]
-        c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-        return pose[:, :2] + np.column_stack([c * x - s * y, s * x + c * y])
-
-    return place
+    corners = [np.asarray(structure.blocks[k].points) - structure.centroids[k] for k in blocks]
+    owner, arms = np.repeat(blocks, [len(each) for each in corners]), np.concatenate(corners)
+    return lambda poses: poses[owner, :2] + rotate(arms, poses[owner, 2])

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from archfem._files import atomic_write
 from archfem._typing import Array
 from archfem.errors import InvalidInput
+from archfem.masonry.block import rotate
 from archfem.models.export import Solids, write_collection, write_vtu
 from archfem.models.model import Model
 
@@ -87,14 +88,12 @@ def frames(solids: Solids, run: xr.Dataset) -> Iterator[FieldFrame]:
     if "fall_pose" not in run:
         return
     # loose blocks are rigid: points turn about the centroids, and stresses are zero
-    blocks = solids.model.structure.blocks
-    arm = solids.cells.places - np.array([block.centroid for block in blocks])[solids.cells.block]
+    block = solids.cells.block
+    arms = solids.cells.places - solids.model.structure.centroids[block]
     stress = None if solids.model.cells.stress is None else np.zeros((len(solids.cells.owner), 3))
     for time, poses in zip(run["fall_time"].values, run["fall_pose"].values, strict=True):
-        pose = poses[solids.cells.block]
-        c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-        turned = np.column_stack([c * arm[:, 0] - s * arm[:, 1], s * arm[:, 0] + c * arm[:, 1]])
-        yield FieldFrame(float(time), pose[:, :2] + turned - arm, stress)
+        turned = rotate(arms, poses[block, 2])
+        yield FieldFrame(float(time), poses[block, :2] + turned - arms, stress)
 
 
 def _joint_data(run: xr.Dataset, time: float) -> dict[str, NDArray[Any]]:

@@ -23,7 +23,6 @@ from scipy.integrate import trapezoid
 
 from archfem._typing import Array
 from archfem.dynamics.separation import MeetingMonitor
-from archfem.dynamics.solvers.step_scans import scan_corners
 from archfem.dynamics.state import Batch, State
 from archfem.errors import DidNotConverge, logger
 from archfem.models.model import Doubt, Model, Observer
@@ -92,25 +91,16 @@ class CornerDisplacements:
         self._start = observer.corners(observer.read(start.q))
         self.blocks, self._first = np.unique(observer.corner_blocks, return_index=True)
         self.time = np.full(len(self.blocks), start.time)  # of the largest displacement [s]
-        self._square, self._last = np.zeros((2, len(self.blocks)))
+        # displacement of the farthest corner of each block, of all steps and of the last (b,) [m]
+        self.largest, self.residual = np.zeros((2, len(self.blocks)))
 
     def add(self, times: Array, readings: Array) -> None:
         """Add the times of the next steps, and the readings of the observer at these (steps, r)."""
-        # squares are compared, since their order is that of the distances
-        steps = np.full(len(self.blocks), -1)
-        farthest = self._square, steps, self._last
-        scan_corners(self._observer.corners(readings), self._start, self._first, farthest)
-        self.time = np.where(steps >= 0, times[steps], self.time)
-
-    @property
-    def largest(self) -> Array:
-        """Largest displacement of a corner of each free block (blocks,) [m]."""
-        return np.sqrt(self._square)
-
-    @property
-    def residual(self) -> Array:
-        """Displacement of the farthest corner of each free block at the last step (blocks,) [m]."""
-        return np.sqrt(self._last)
+        moved = np.linalg.norm(self._observer.corners(readings) - self._start, axis=2)
+        farthest = np.maximum.reduceat(moved, self._first, axis=1)
+        largest, self.residual = farthest.max(axis=0), farthest[-1]
+        self.time = np.where(largest > self.largest, times[farthest.argmax(axis=0)], self.time)
+        self.largest = np.maximum(self.largest, largest)
 
 
 class RunMonitor:

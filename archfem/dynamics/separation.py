@@ -242,7 +242,7 @@ class MeetingMonitor:
         after = arms + _as_complex(corners) - np.repeat(moved, counts, axis=-1)
         # least squares: the angle of the sum of the products
         turn = np.angle(mean(np.conj(arms) * after))
-        centroids = _as_complex(np.array([structure.blocks[k].centroid for k in free]))
+        centroids = _as_complex(structure.centroids[list(free)])
         motion = moved + (np.exp(1.0j * turn) - 1.0) * (centroids - middle)
         poses = np.tile(self.model.support_motion, (len(corners), 1, 1))
         poses[:, free] = np.stack([motion.real, motion.imag, turn], axis=-1)

@@ -108,14 +108,29 @@ class Cells:
         Returns:
             Rows of the displacements along x and y (2, n).
         """
+        edge, weights = self.edge_weights(block, point)
+        return sparse.csr_matrix(weights) @ self.shapes_at(edge)
+
+    def edge_weights(self, block: int, point: Array) -> tuple[Numbers, Array]:
+        """Return the edge of a block nearest to a point, and what moves the point with its ends.
+
+        The point's offset from the edge turns with the edge, by any rotation.
+
+        Args:
+            block: number of the block.
+            point: on its surface or near it (2,) [m].
+
+        Returns:
+            Point numbers of the edge's ends (2,); and the matrix from the displacements of both
+            ends, x and y in turn, to that of the point (2, 4).
+        """
         edge, fraction, beside = self.nearest_edge(block, point)
-        ends = [self.shape_functions[2 * node : 2 * node + 2] for node in edge]
-        on_edge = (1.0 - fraction) * ends[0] + fraction * ends[1]
-        # rotation of the edge: transverse displacement of its ends over its length
         along = self.places[edge[1]] - self.places[edge[0]]
-        across = sparse.csr_matrix([[-along[1], along[0]]])
-        rotation = across @ (ends[1] - ends[0]) / (along @ along)
-        return (on_edge + sparse.csr_matrix([[-beside[1]], [beside[0]]]) @ rotation).tocsr()
+        # offset over edge as complex numbers: its product with what the edge moves by
+        turn = complex(*beside) / complex(*along)
+        rotation = np.array([[turn.real, -turn.imag], [turn.imag, turn.real]])
+        end = fraction * np.eye(2) + rotation
+        return edge, np.hstack([np.eye(2) - end, end])
 
     def nearest_edge(self, block: int, point: Array) -> tuple[Numbers, float, Array]:
         """Return the edge of a block nearest to a point, and the point's position relative to it.

@@ -16,78 +16,8 @@ from archfem.units import G
 # A corner of a polyhedron [m]
 Corner = tuple[float, float, float]
 
-OPENSEES = '''"""{name}: {blocks} rigid blocks and {joints} joints, written by archfem.
-
-SI units, x to the right, y upwards. Blocks are nodes at their centroids, from 1. A joint is
-a row of springs without tension between points that are rigidly linked to both blocks; where joints
-slide, they are bearings with Coulomb friction. Displacements are small.
-"""
-
-import openseespy.opensees as ops
-
-# x, y [m], mass [kg], moment of inertia [kg m2], whether the block is fixed
-BLOCKS = [
-{block_rows}
-]
-
-# lower and higher block, x, y [m], normal x and y, normal and shear stiffness [N/m], friction
-SPRINGS = [
-{spring_rows}
-]
-
-
-def build():
-    """Build blocks and springs."""
-    ops.wipe()
-    ops.model("basic", "-ndm", 2, "-ndf", 3)
-    for tag, (x, y, mass, inertia, fixed) in enumerate(BLOCKS, 1):
-        ops.node(tag, x, y)
-        if fixed:
-            ops.fix(tag, 1, 1, 1)
-        else:
-            ops.mass(tag, mass, mass, inertia)
-    for number, (lower, higher, x, y, nx, ny, normal, shear, friction) in enumerate(SPRINGS, 1):
-        pair = [len(BLOCKS) + 2 * number - 1, len(BLOCKS) + 2 * number]
-        for point, block in zip(pair, (lower, higher)):
-            ops.node(point, x, y)
-            ops.rigidLink("beam", block, point)
-        across = len(SPRINGS) + number
-        ops.uniaxialMaterial("ENT", number, normal)
-        axes = ["-orient", nx, ny, 0.0, -ny, nx, 0.0]
-        if friction is None:
-            ops.uniaxialMaterial("Elastic", across, shear)
-            ops.element("zeroLength", number, *pair, "-mat", number, across, "-dir", 1, 2, *axes)
-        else:
-            ops.frictionModel("Coulomb", number, friction)
-            ops.uniaxialMaterial("Elastic", across, 0.0)
-            springs = ["-P", number, "-Mz", across]
-            ops.element("flatSliderBearing", number, *pair, number, shear, *springs, *axes)
-
-
-def load_dead(steps=10):
-    """Apply the weight of the blocks in steps; return whether equilibrium was found."""
-    ops.timeSeries("Linear", 1)
-    ops.pattern("Plain", 1, 1)
-    free = [(tag, mass) for tag, (_, _, mass, _, fixed) in enumerate(BLOCKS, 1) if not fixed]
-    weights = {{tag: {gravity} * mass for tag, mass in free}}
-    for tag, weight in weights.items():
-        ops.load(tag, 0.0, -weight, 0.0)
-    ops.constraints("Transformation")
-    ops.numberer("RCM")
-    ops.system("UmfPack")
-    ops.test("NormUnbalance", 1e-8 * sum(weights.values()), 50)
-    ops.algorithm("Newton")
-    ops.integrator("LoadControl", 1.0 / steps)
-    ops.analysis("Static", "-noWarnings")
-    return ops.analyze(steps) == 0
-
-
-if __name__ == "__main__":
-    build()
-    print("stands under its weight" if load_dead() else "no equilibrium was found")
-    for tag in range(1, len(BLOCKS) + 1):
-        print(tag, *ops.nodeDisp(tag))
-'''
+# The script of OpenSees
+OPENSEES = Path(__file__).with_name("templates") / "opensees.template"
 
 
 @validate_arguments
@@ -151,7 +81,7 @@ def _write_opensees(structure: Structure, points: int) -> str:
         density = structure.density(block) * structure.width
         numbers = *block.centroid, density * block.area, density * block.polar_moment
         blocks.append((*map(float, numbers), block.fixed))
-    return OPENSEES.format(
+    return OPENSEES.read_text(encoding="utf-8").format(
         # of the docstring of the script
         name=structure.name.replace("\\", "/").replace('"', "'"),
         blocks=len(blocks),

@@ -8,7 +8,6 @@ References: Lehoucq, Sorensen and Yang, ARPACK users' guide (1998).
 """
 
 import hashlib
-from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Integral
@@ -21,6 +20,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, SuperLU, ei
 
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
+from archfem._recent import RecentResults
 from archfem._threads import single_threaded
 from archfem._typing import Array, Flags
 from archfem._validation import check_type
@@ -28,7 +28,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium, Start, Subject, resolve_start
 
-_mode_cache: OrderedDict[str, tuple[Array, Array]] = OrderedDict()
+_recent_modes = RecentResults[tuple[Array, Array]](6)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -147,20 +147,14 @@ def modes(model: Model | Subject, count: int, start: Start = None) -> Modes:
 
 
 def _find_cached_modes(
-    stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int, cache_size: int = 6
+    stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int
 ) -> tuple[Array, Array]:
     """Return the lowest ω² and their shapes, from the cache where all bits of K and M agree."""
     digest = hashlib.sha256(str((count, stiffness.shape)).encode())
     for matrix in (stiffness, mass):
         for part in (matrix.indptr, matrix.indices, matrix.data):
             digest.update(part.tobytes())
-    key = digest.hexdigest()
-    if key not in _mode_cache:
-        _mode_cache[key] = find_lowest_modes(stiffness, mass, count)
-        if len(_mode_cache) > cache_size:
-            _mode_cache.popitem(last=False)
-    _mode_cache.move_to_end(key)
-    return _mode_cache[key]
+    return _recent_modes.look_up(digest.digest(), lambda: find_lowest_modes(stiffness, mass, count))
 
 
 def find_lowest_modes(

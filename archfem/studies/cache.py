@@ -5,11 +5,11 @@ one, by the contents of its case and files, is taken from here, and has the same
 computed anew.
 """
 
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, TypeVar
 
+from archfem._recent import RecentResults
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.run import DeadLoadResult, damping_of, dead_load_of_case
@@ -22,7 +22,7 @@ from archfem.studies.shared_results import compute_once
 
 Value = TypeVar("Value")
 
-_cache: dict[str, OrderedDict[str, Any]] = {}
+_cache: dict[str, RecentResults[Any]] = {}
 
 
 @validate_arguments
@@ -113,13 +113,8 @@ def _model_key(case: Case) -> str:
 
 
 def _look_up(kind: str, key: str, make: Callable[[], Value]) -> Value:
-    """Return a cached object of a kind, or make it; the least recently used one is dropped."""
+    """Return a recent object of a kind, or make it."""
     # few objects that are as large as a model
     limit = 4 if kind in ("equilibria", "modes") else 64
-    objects = _cache.setdefault(kind, OrderedDict())
-    if key not in objects:
-        objects[key] = make()
-        while len(objects) > limit:
-            objects.popitem(last=False)
-    objects.move_to_end(key)
-    return objects[key]
+    objects: RecentResults[Value] = _cache.setdefault(kind, RecentResults(limit))
+    return objects.look_up(key, make)

@@ -101,7 +101,7 @@ class FallingBlocks:
     def places(self, points: Array, block: int | Numbers, time: float) -> Array:
         """Return the positions at a time (m, 2) [m] of points of a block, or of one block each."""
         poses = self.pose(time)[block]
-        centres = np.array([each.centroid for each in self.structure.blocks])[block]
+        centres = self.structure.centroids[block]
         return centres + poses[..., :2] + rotate(points - centres, poses[..., 2])
 
     def outlines(self, time: float) -> list[Array]:

@@ -76,6 +76,19 @@ def test_strained_blocks_that_turn_together_stay_as_strained(structures, fidelit
     np.testing.assert_allclose(found, known, atol=1e-8 * np.abs(known).max())
 
 
+def test_a_load_on_a_body_that_does_not_turn_is_linear(structures):
+    """Its work is a linear function of the coordinates, however large."""
+    model = af.build(structures["bridge"], fidelity=SOIL, displacements="large", cells=(2, 2))
+    push = af.PointLoad(0.5 * model.structure.size, (2e3, -3e3))
+    q = np.random.default_rng(4).normal(size=model.size)
+    number, place = push.place(model.structure)
+    assert model.structure.blocks[number].part == "backfill"
+    rows = model.small.cells.displacement_rows(number, place)
+    assert model.work(push, q) == pytest.approx(rows.toarray() @ q @ push.force)
+    assert model.load(push, q) == pytest.approx(rows.T @ np.array(push.force))
+    assert model.load_rate(push, q).nnz == 0
+
+
 @pytest.mark.parametrize(("name", "fidelity"), HALF)
 def test_the_tangent_of_a_step_is_the_derivative_of_its_force(structures, name, fidelity):
     """By central differences in one direction, of a step by which joints open and slide.

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy import sparse
 
 import archfem as af
 from archfem.models.large.joints import JointSegments
-from archfem.models.large.model import FramelessPoint, RotatingPoint
+from archfem.models.large.model import RotatingPoint
 
 STEP = 1e-6
 """Of central differences: they err by STEP², and by rounding of 1e-16 / STEP."""
@@ -43,14 +42,6 @@ def test_rates_of_a_point_are_its_derivatives(point):
     force = np.array([2.0, -3.0])
     bent = slopes(lambda q: made.gradient(q, 8).T @ force, q)
     assert made.force_rate(q, force, 8).toarray() == pytest.approx(bent, abs=NEAR)
-
-
-def test_a_point_of_a_body_that_does_not_turn_is_linear():
-    rows = sparse.csr_matrix([[1.0, 0.5, 0.0], [0.0, 2.0, -1.0]])
-    still, q = FramelessPoint(rows), np.array([0.1, 0.2, 0.3])
-    assert still.displacement(q) == pytest.approx(rows @ q)
-    assert still.gradient(q, 3).toarray() == pytest.approx(slopes(still.displacement, q), abs=NEAR)
-    assert still.force_rate(q, np.ones(2), 3).nnz == 0
 
 
 def test_points_of_stones_turn_and_strain_as_their_frames_do():

@@ -1,29 +1,8 @@
-"""Compiled scans of the steps of a batch: farthest corners, and what bounds the slip of joints."""
+"""Compiled scans of the steps of a batch: what bounds the slip of joints."""
 
 import numpy as np
 
 from archfem._numba import entry
-
-
-@entry
-def scan_corners(corners, start, first, farthest):  # type: ignore
-    """Find the largest displacement of any corner of each block, over steps (steps, c, 2).
-
-    It is since `start` (c, 2); blocks begin at the corners `first` (b,). `farthest` are the largest
-    squares so far (b,) [m²], the steps at which these grew (b,), and the squares of the last step.
-    """
-    squares, steps, last = farthest
-    for k in range(len(corners)):
-        for block in range(len(first)):
-            end = first[block + 1] if block + 1 < len(first) else corners.shape[1]
-            largest = 0.0
-            for corner in range(first[block], end):
-                x = corners[k, corner, 0] - start[corner, 0]
-                y = corners[k, corner, 1] - start[corner, 1]
-                largest = max(largest, x * x + y * y)
-            last[block] = largest
-            if largest > squares[block]:
-                squares[block], steps[block] = largest, k
 
 
 @entry

@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from archfem._numba import allocating_entry, entry, inlined_kernel
+from archfem._numba import entry, inlined_kernel
 from archfem._typing import Array
 
 
@@ -327,25 +327,3 @@ def rotation_stiffness(rotation, push):  # type: ignore
         0.5 * shrunk * across,
         -0.5 * shrunk * along,
     )
-
-
-@allocating_entry
-def displace_points(turns, arms, states):  # type: ignore
-    """Return the displacements of points of rigid blocks in many states (k, m, 2) [m].
-
-    A point has the number of its block's rotation, after x and y, or -1 where it is fixed (m,), and
-    its place relative to the centroid (m, 2).
-    """
-    moved = np.zeros((len(states), len(turns), 2))
-    for k in range(len(states)):
-        last, half, x, y = -1, (1.0, 0.0), 0.0, 0.0
-        for point in range(len(turns)):
-            turn, arm = turns[point], (arms[point, 0], arms[point, 1])
-            if turn < 0:
-                continue
-            if turn != last:  # points are listed block by block
-                last, half = turn, cosine_sine(0.5 * states[k, turn])
-                x, y = states[k, turn - 2], states[k, turn - 1]
-            (dx, dy), _ = _rotate_arm(arm, (0.0, 0.0), half)
-            moved[k, point, 0], moved[k, point, 1] = x + dx, y + dy
-    return moved

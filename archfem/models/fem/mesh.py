@@ -16,7 +16,6 @@ Blocks without corners take the numbers of their neighbours; on their other edge
 cells grow with the distance from those.
 """
 
-from collections import OrderedDict
 from collections.abc import Hashable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
@@ -34,6 +33,7 @@ from scipy.spatial import cKDTree
 
 from archfem._files import atomic_write, temporary_folder
 from archfem._optional import require_package
+from archfem._recent import RecentResults
 from archfem._typing import Array, Numbers
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, MeshError
@@ -569,23 +569,15 @@ def _find_joint_facets(
     return np.array(facets, dtype=np.int32), np.array(joints, dtype=np.int32)
 
 
-_recent_meshes: OrderedDict[Hashable, Mesh] = OrderedDict()
+_recent_meshes = RecentResults[Mesh](4)
 
 
-def get_mesh(structure: Structure, settings: Discretisation, max_meshes: int = 4) -> Mesh:
+def get_mesh(structure: Structure, settings: Discretisation) -> Mesh:
     """Return the mesh of a structure, or a recent one of a structure of the same shapes."""
     cells = (*settings.cells, settings.cell, settings.max_cell_size, settings.degree)
     key = (*map(_shape_key, (*structure.blocks, *structure.joints)), cells)
-    try:
-        hash(key)
-    except TypeError:  # outlines may be lists
-        return generate_mesh(structure, settings)
-    if key not in _recent_meshes:
-        _recent_meshes[key] = generate_mesh(structure, settings)
-        while len(_recent_meshes) > max_meshes:
-            _recent_meshes.popitem(last=False)
-    _recent_meshes.move_to_end(key)
-    return replace(_recent_meshes[key], structure=structure)
+    mesh = _recent_meshes.look_up(key, lambda: generate_mesh(structure, settings))
+    return replace(mesh, structure=structure)
 
 
 def _shape_key(part: object) -> Hashable:

@@ -85,9 +85,8 @@ class JointSegments:
     def fixed_poses(self, support_motion: Array) -> Array:
         """Return poses of the faces of fixed blocks, 0 of others (j, 2, 3) [m, m, rad]."""
         pairs = self.structure.pairs[self.joint]
-        centres = np.array([block.centroid for block in self.structure.blocks])
         x, y, turn = np.moveaxis(support_motion[pairs], -1, 0)
-        rx, ry = np.moveaxis(self.middles[:, None] - centres[pairs], -1, 0)
+        rx, ry = np.moveaxis(self.middles[:, None] - self.structure.centroids[pairs], -1, 0)
         # (R - I) r, with cos θ - 1 by the half angle
         less = -2.0 * np.sin(0.5 * turn) ** 2
         dx, dy = less * rx - np.sin(turn) * ry, np.sin(turn) * rx + less * ry

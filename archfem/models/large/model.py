@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 
 from archfem._typing import Array, Numbers
 from archfem.errors import InvalidInput
-from archfem.joints.large.face_kinematics import displace_points, face_pose
+from archfem.joints.large.face_kinematics import face_pose
 from archfem.joints.large.forces import (
     JointStepForces,
     allocate_step_forces,
@@ -57,7 +57,7 @@ class CorotationalCoordinates:
         # fill in one piece deforms with the blocks below: it gets no rotating frame
         soft, stones = find_yielding_blocks(small.structure), small.structure.blocks
         fill = {number for number in soft if not stones[number].grain}
-        centres = np.array([block.centroid for block in small.structure.blocks], float)
+        centres = small.structure.centroids.copy()
         for number in small.structure.free:
             columns = np.flatnonzero(small.cells.coordinate_owner == number)
             has_frame = number not in fill or len(columns) == 3
@@ -154,7 +154,7 @@ class RotatingCells(Cells):
 
     @cached_property
     def _arms(self) -> tuple[Array, sparse.csr_matrix]:
-        """Vectors from the centroids to the points (m, 2), and elastic displacements (2 m, n)."""
+        """Vectors from the centroids to the points (2, m), and elastic displacements (2 m, n)."""
         columns = self.shape_functions.tocsc()
         turn = np.unique(self.turns[self.turns >= 0])
         arms = np.zeros_like(self.places)
@@ -167,7 +167,7 @@ class RotatingCells(Cells):
         rigid[np.concatenate([turn, turn - 1, turn - 2])] = True
         elastic = (self.shape_functions @ sparse.diags((~rigid).astype(float))).tocsr()
         elastic.eliminate_zeros()
-        return arms, elastic
+        return arms.T, elastic
 
     def select(self, points: Any) -> "RotatingCells":
         """Return some of the points alone, without polygons."""
@@ -176,12 +176,7 @@ class RotatingCells(Cells):
 
     def displacement(self, q: Array) -> Array:
         """Return the displacements of all points (…, m, 2) [m]."""
-        arms, elastic = self._arms
-        if not elastic.nnz:
-            states = _plain(np.atleast_2d(q))
-            moved = displace_points(self.turns, arms, states)
-            return moved.reshape(*q.shape[:-1], *moved.shape[1:])
-        rx, ry = arms.T
+        (rx, ry), elastic = self._arms
         # once for each block, and then for its points
         frames, frame = self._frames
         turn, x, y = (np.where(frames >= 0, q[..., frames - k], 0.0) for k in (0, 2, 1))
@@ -189,9 +184,10 @@ class RotatingCells(Cells):
         c, s, less = np.cos(turn), np.sin(turn), -2.0 * np.sin(0.5 * turn) ** 2
         x, y, c, s, less = (each[..., frame] for each in (x, y, c, s, less))
         dx, dy = x + less * rx - s * ry, y + s * rx + less * ry
-        strained = np.asarray(elastic @ q.T).T.reshape(*x.shape, 2)
-        u, v = strained[..., 0], strained[..., 1]
-        dx, dy = dx + c * u - s * v, dy + s * u + c * v
+        if elastic.nnz:
+            strained = np.asarray(elastic @ q.T).T.reshape(*x.shape, 2)
+            u, v = strained[..., 0], strained[..., 1]
+            dx, dy = dx + c * u - s * v, dy + s * u + c * v
         return np.stack([dx, dy], axis=-1)
 
     @cached_property
@@ -237,25 +233,6 @@ class RotatingPoint:
         return matrix.tocsr()
 
 
-@dataclass(frozen=True, eq=False)
-class FramelessPoint:
-    """A point of a block without a rotating frame."""
-
-    rows: sparse.csr_matrix  # its displacement from coordinates (2, n)
-
-    def displacement(self, q: Array) -> Array:
-        """Return the displacement from coordinates (2,) [m]."""
-        return np.asarray(self.rows @ q)
-
-    def gradient(self, q: Array, size: int) -> sparse.csr_matrix:
-        """Return the derivative of the displacement (2, n)."""
-        return self.rows
-
-    def force_rate(self, q: Array, force: Array, size: int) -> sparse.csr_matrix:
-        """Return the derivative of the generalised forces of a force, zero (n, n)."""
-        return sparse.csr_matrix((size, size))
-
-
 class LargeDisplacementModel(Model):
     """A model in corotational coordinates of the blocks, built from one of small displacements."""
 
@@ -292,7 +269,7 @@ class LargeDisplacementModel(Model):
         self.mass_influence = self.small.mass_influence
         self.cells: RotatingCells = RotatingCells.of(self.small.cells, blocks.blocks)
         self.support_motion = self.small.support_motion
-        self._points: dict[PointLoad, RotatingPoint | FramelessPoint] = {}
+        self._points: dict[PointLoad, RotatingPoint] = {}
         self._slip = np.zeros_like(allocate_step_forces(self.joints).irreversible_slip)
 
     def with_support_motion(self, motion: Array) -> Self:
@@ -417,32 +394,32 @@ class LargeDisplacementModel(Model):
 
     def load(self, action: Action, q: Array | None = None) -> Array:
         """Return the generalised forces of an action; point loads keep their direction (n,)."""
-        if isinstance(action, BodyForce) or q is None:
+        if q is None or isinstance(action, BodyForce) or not (point := self._find_point(action)):
             return self.small.load(action)
-        return self._find_loaded_point(action).gradient(q, self.size).T @ np.array(action.force)
+        return point.gradient(q, self.size).T @ np.array(action.force)
 
     def load_rate(self, action: Action, q: Array) -> sparse.csr_matrix:
         """Return the derivative of `load` by the coordinates (n, n)."""
-        if isinstance(action, BodyForce):
+        if isinstance(action, BodyForce) or not (point := self._find_point(action)):
             return super().load_rate(action, q)
-        return self._find_loaded_point(action).force_rate(q, np.array(action.force), self.size)
+        return point.force_rate(q, np.array(action.force), self.size)
 
     def work(self, action: Action, q: Array) -> float:
         """Return the work of an action since before anything moved [J]."""
-        if isinstance(action, BodyForce):
+        if isinstance(action, BodyForce) or not (point := self._find_point(action)):
             return super().work(action, q)
-        return float(self._find_loaded_point(action).displacement(q) @ np.array(action.force))
+        return float(point.displacement(q) @ np.array(action.force))
 
-    def _find_loaded_point(self, action: PointLoad) -> RotatingPoint | FramelessPoint:
-        """Return the point at which a point load acts."""
+    def _find_point(self, action: PointLoad) -> RotatingPoint | None:
+        """Return the point at which a load acts; None where its block has no rotating frame."""
         if action in self._points:
             return self._points[action]
         block, place = action.place(self.structure)
-        rows = self.small.cells.displacement_rows(block, place)
         number = self.structure.free.index(block)
-        first, end = self.block_starts[number], self.block_starts[number + 1]
         if not self.has_frame[number]:
-            return FramelessPoint(rows)
+            return None
+        rows = self.small.cells.displacement_rows(block, place)
+        first, end = self.block_starts[number], self.block_starts[number + 1]
         # of the rigid motion, rotation gives the vector from the centroid to the point
         local = rows[:, first:end].toarray()
         point = RotatingPoint(int(first), np.array([local[1, 2], -local[0, 2]]), local[:, 3:])

@@ -74,21 +74,15 @@ class Outlines:
         """Return the matrix from displacements of the cells' points to those of the corners."""
         # a corner rotates with the nearest edge, which is exact for rigid blocks at any rotation
         cells, rows = model.cells, []
-        zero, one = sparse.csr_matrix((2, 2 * len(cells.places))), np.eye(2)
+        zero = sparse.csr_matrix((2, 2 * len(cells.places)))
         for point, number in zip(self.points, self.block.tolist(), strict=True):
             if self.structure.blocks[number].fixed:
                 rows.append(zero)
                 continue
-            edge, share, away = cells.nearest_edge(number, point)
-            along = cells.places[edge[1]] - cells.places[edge[0]]
-            across = np.array([-along[1], along[0]])
-            # components of the offset from the edge, along and across it, rotate with the edge
-            product = np.outer(away, along) + np.outer([-away[1], away[0]], across)
-            rotation = product / float(along @ along)
-            entries = np.hstack([(1.0 - share) * one - rotation, share * one + rotation])
+            edge, weights = cells.edge_weights(number, point)
             columns = np.repeat(2 * edge, 2) + np.tile([0, 1], 2)
             place = np.repeat([0, 1], 4), np.tile(columns, 2)
-            rows.append(sparse.csr_matrix((entries.ravel(), place), zero.shape))
+            rows.append(sparse.csr_matrix((weights.ravel(), place), zero.shape))
         return sparse.vstack(rows, format="csr")
 
 
