@@ -20,10 +20,10 @@ from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Se
 from archfem.masonry.structure import Structure
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
+from archfem.statics.assessment_checks import LimitState
 from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.mechanism_assessment import (
     KinematicAssessment,
-    LimitState,
     assess_parts,
     kinematic_assessment,
 )

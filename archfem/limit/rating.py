@@ -151,22 +151,13 @@ class Rating(ResultDisplay):
         )
 
     @property
-    def _spans(self) -> dict[str, tuple[float, float]]:
-        """Clear span of each ring, from its left to its right end [m]."""
-        spans: dict[str, list[float]] = {}
-        for joint in self.structure.joints:
-            if joint.role == "ring":
-                spans.setdefault(joint.part, []).append(joint.intrados[0])
-        return {part: (min(xs), max(xs)) for part, xs in spans.items()}
-
-    @property
     def place(self) -> str:
         """Where the axles over the rings that fail stand at the worst place, in words."""
         axles = parse_axles(self.vehicle.axles, self.vehicle.spacings)
         place = self.moving.direction, self.moving.position
         stand = [load.x for load in axles_on_structure(self.structure, axles, *place)]
         worst, joints = self.moving.worst, self.structure.joints
-        spans, moves = self._spans, {joints[number].part for number, _ in worst.hinges}
+        spans, moves = _clear_spans(self.structure), {joints[k].part for k, _ in worst.hinges}
         moves |= {joints[number].part for number in worst.sliding}
         over: dict[str, list[float]] = {}
         for x in stand if len(spans) > 1 else []:
@@ -210,7 +201,7 @@ class Rating(ResultDisplay):
             f"least factor driving {', '.join(least)}",
             f"{self.moving}",
             *self._describe_hinges(),
-            *self._describe_spans(),
+            f"every x is that of the case and the picture; {describe_spans(self.structure)}",
             f"geometric factor of safety at that place: {self._geometric_text()}",
             "it is Heyman's criterion, often 2 or more (from memory), which no code has",
             f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN"
@@ -267,14 +258,6 @@ class Rating(ResultDisplay):
         ends = [getattr(joints[number], side) for number, side in self.moving.worst.hinges]
         return [f"hinges at x = {', '.join(f'{x:.2f}' for x, _ in ends)} m"] if ends else []
 
-    def _describe_spans(self) -> list[str]:
-        """Return the line on where the rings are on the x axis of all places, if there are some."""
-        spans = (
-            f"from {low:.2f} to {high:.2f} m{f' ({part!r})' if len(self._spans) > 1 else ''}"
-            for part, (low, high) in self._spans.items()
-        )
-        return [f"every x is that of the case and the picture; clear span {' and '.join(spans)}"]
-
     def _source(self, factor: str) -> str:
         """Return where a factor on the vehicle comes from."""
         vehicle = self.vehicle
@@ -295,6 +278,36 @@ class Rating(ResultDisplay):
         if self.geometric < 1.0:
             text += f", below 1: joints are too thin by {100.0 * (1.0 - self.geometric):.2g} %"
         return text
+
+
+def _clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:
+    """Return the clear span of each ring, from its left to its right end [m]."""
+    spans: dict[str, list[float]] = {}
+    for joint in structure.joints:
+        if joint.role == "ring":
+            spans.setdefault(joint.part, []).append(joint.intrados[0])
+    return {part: (min(xs), max(xs)) for part, xs in spans.items()}
+
+
+def describe_spans(structure: Structure) -> str:
+    """Describe the clear span of each ring, and breadth and clear height of piers, in a line."""
+    spans, piers = _clear_spans(structure), list[str]()
+    ends = (
+        f"from {low:.2f} to {high:.2f} m{f' ({part!r})' if len(spans) > 1 else ''}"
+        for part, (low, high) in spans.items()
+    )
+    beds = [joint for joint in structure.joints if joint.role == "pier"]
+    for part in dict.fromkeys(joint.part for joint in beds):
+        own = [joint for joint in beds if joint.part == part]
+        base, parts = min(joint.intrados[1] for joint in own), structure.blocks
+        clear = [
+            joint.intrados[1] - base
+            for joint in structure.joints
+            if joint.role == "ring" and part in {parts[number].part for number in joint.blocks}
+        ]
+        high = f" and {min(clear):.3g} m high below the clear spans" if clear else ""
+        piers.append(f"'{part}' {min(joint.depth for joint in own):.4g} m broad{high}")
+    return "; ".join([f"clear span {' and '.join(ends)}" if spans else "no ring", *piers])
 
 
 @validate_arguments
