@@ -29,7 +29,7 @@ from archfem.joints.criteria import (
 from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
 from archfem.limit.fill_range import FillRange
 from archfem.limit.mechanism_count import Mechanism, duration_text
-from archfem.limit.rating import Rating
+from archfem.limit.rating import Rating, describe_spans
 from archfem.masonry.structure import Structure, join_joint_names, join_names
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import Match
@@ -248,12 +248,13 @@ def describe_supports(structure: Structure, max_names: int = 4) -> str:
 
 
 def describe_depths(structure: Structure) -> str:
-    """Describe the depths of the assessed joints, in one line."""
+    """Describe the depths of the assessed joints, and clear spans and piers, in two lines."""
     depths = np.where(structure.judged, structure.depths, np.inf)
     median = float(np.median(depths[structure.judged]))
     return (
         f"depth of joints: {format_mm(float(depths.min()))} at least, at "
-        f"{structure.joints[int(depths.argmin())].name}; median {format_mm(median)}"
+        f"{structure.joints[int(depths.argmin())].name}; median {format_mm(median)}\n"
+        f"{describe_spans(structure)}"
     )
 
 

@@ -151,22 +151,13 @@ class Rating(ResultDisplay):
         )
 
     @property
-    def _spans(self) -> dict[str, tuple[float, float]]:
-        """Clear span of each ring, from its left to its right end [m]."""
-        spans: dict[str, list[float]] = {}
-        for joint in self.structure.joints:
-            if joint.role == "ring":
-                spans.setdefault(joint.part, []).append(joint.intrados[0])
-        return {part: (min(xs), max(xs)) for part, xs in spans.items()}
-
-    @property
     def place(self) -> str:
         """Where the axles over the rings that fail stand at the worst place, in words."""
         axles = parse_axles(self.vehicle.axles, self.vehicle.spacings)
         place = self.moving.direction, self.moving.position
         stand = [load.x for load in axles_on_structure(self.structure, axles, *place)]
         worst, joints = self.moving.worst, self.structure.joints
-        spans, moves = self._spans, {joints[number].part for number, _ in worst.hinges}
+        spans, moves = _clear_spans(self.structure), {joints[k].part for k, _ in worst.hinges}
         moves |= {joints[number].part for number in worst.sliding}
         over: dict[str, list[float]] = {}
         for x in stand if len(spans) > 1 else []:
@@ -210,14 +201,14 @@ class Rating(ResultDisplay):
             f"least factor driving {', '.join(least)}",
             f"{self.moving}",
             *self._describe_hinges(),
-            *self._describe_spans(),
+            f"every x is that of the case and the picture; {describe_spans(self.structure)}",
             f"geometric factor of safety at that place: {self._geometric_text()}",
             "it is Heyman's criterion, often 2 or more (from memory), which no code has",
             f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN"
             f"{beside}; {source}",
             f"over {self.width:.3g} m of width ({rule if by_rule else 'given'})",
             f"live load by {self.live:g} ({self._source('live')})",
-            f"impact by {self.impact:g} ({self._source('impact')})",
+            f"impact by {self.impact:g}{self._impact_axle()} ({self._source('impact')})",
             f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
             describe_crushing(self.strength),
             *filter(None, [describe_fill(self.fill)]),
@@ -257,8 +248,8 @@ class Rating(ResultDisplay):
         if self._missing_factors() != "live × impact":
             return []
         return [
-            "no code's live × impact is in it: 1.62 to 1.89 by Eurocodes, 3.42 by CS 454 "
-            "(for a lorry in traffic; from memory)"
+            "no code's live × impact is in it: for a lorry in traffic 1.62 to 1.89 by Eurocodes, "
+            "1.9 by CS 454 and 3.42 on the worst axle (from memory)"
         ]
 
     def _describe_hinges(self) -> list[str]:
@@ -266,14 +257,6 @@ class Rating(ResultDisplay):
         joints = self.structure.joints
         ends = [getattr(joints[number], side) for number, side in self.moving.worst.hinges]
         return [f"hinges at x = {', '.join(f'{x:.2f}' for x, _ in ends)} m"] if ends else []
-
-    def _describe_spans(self) -> list[str]:
-        """Return the line on where the rings are on the x axis of all places, if there are some."""
-        spans = (
-            f"from {low:.2f} to {high:.2f} m{f' ({part!r})' if len(self._spans) > 1 else ''}"
-            for part, (low, high) in self._spans.items()
-        )
-        return [f"every x is that of the case and the picture; clear span {' and '.join(spans)}"]
 
     def _source(self, factor: str) -> str:
         """Return where a factor on the vehicle comes from."""
@@ -283,6 +266,21 @@ class Rating(ResultDisplay):
             return "given"
         # a vehicle of one's own has factors of 1 where it gives none
         return "none given" if value == 1.0 and source == "given" else source
+
+    def _impact_axle(self) -> str:
+        """Return which axle alone has the dynamic factor at the worst place, in words."""
+        vehicle = self.vehicle
+        if vehicle.impact_on == "all axles" or len(vehicle.axles) == 1:
+            return ""
+        sense = 1.0 if self.moving.direction == "right" else -1.0
+        live = [load for load in self.moving.worst.live if isinstance(load, PointLoad)]
+        forces = {load.x: -load.force[1] for load in reversed(live)}  # axles are the first
+        shares = [
+            forces.get(self.moving.position + sense * ahead, 0.0) / weight
+            for weight, ahead in parse_axles(vehicle.axles, vehicle.spacings).tolist()
+        ]
+        worst = int(np.argmax(shares))
+        return f" on the worst axle alone, here number {worst + 1} from the front"
 
     def _geometric_text(self) -> str:
         """Return the geometric factor of safety, in words where it is below 1."""
@@ -295,6 +293,36 @@ class Rating(ResultDisplay):
         if self.geometric < 1.0:
             text += f", below 1: joints are too thin by {100.0 * (1.0 - self.geometric):.2g} %"
         return text
+
+
+def _clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:
+    """Return the clear span of each ring, from its left to its right end [m]."""
+    spans: dict[str, list[float]] = {}
+    for joint in structure.joints:
+        if joint.role == "ring":
+            spans.setdefault(joint.part, []).append(joint.intrados[0])
+    return {part: (min(xs), max(xs)) for part, xs in spans.items()}
+
+
+def describe_spans(structure: Structure) -> str:
+    """Describe the clear span of each ring, and breadth and clear height of piers, in a line."""
+    spans, piers = _clear_spans(structure), list[str]()
+    ends = (
+        f"from {low:.2f} to {high:.2f} m{f' ({part!r})' if len(spans) > 1 else ''}"
+        for part, (low, high) in spans.items()
+    )
+    beds = [joint for joint in structure.joints if joint.role == "pier"]
+    for part in dict.fromkeys(joint.part for joint in beds):
+        own = [joint for joint in beds if joint.part == part]
+        base, parts = min(joint.intrados[1] for joint in own), structure.blocks
+        clear = [
+            joint.intrados[1] - base
+            for joint in structure.joints
+            if joint.role == "ring" and part in {parts[number].part for number in joint.blocks}
+        ]
+        high = f" and {min(clear):.3g} m high below the clear spans" if clear else ""
+        piers.append(f"'{part}' {min(joint.depth for joint in own):.4g} m broad{high}")
+    return "; ".join([f"clear span {' and '.join(ends)}" if spans else "no ring", *piers])
 
 
 @validate_arguments
@@ -325,8 +353,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         structure: the bridge, or an `archfem.Analysis` of it.
         vehicle: one of `archfem.limit.VEHICLES` by its name, or one's own.
         live: partial factor on its weight [-]; by default that of its code.
-        impact: dynamic factor on its weight [-]; by default that of its code, but 1 for LM71, whose
-            factor depends on the span.
+        impact: dynamic factor on its weight, or on that of one axle (`Vehicle.impact_on`) [-]; by
+            default that of its code, but 1 for LM71, whose factor depends on the span.
         dead: partial factor on the weights of stones and fill [-]; by default 1, as for weights
             that stabilise. Weights on one side alone are not increased.
         width: width over which one vehicle spreads [m]; by default that of the wheels and of the
@@ -361,15 +389,20 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
             f"width {width:.4g} m is not above 0 and up to that of the bridge, "
             f"{structure.width:.4g} m: give the part over which one vehicle spreads"
         )
-    weighted, code = _scale_weights(structure, dead), np.array(driven.axles) * live * impact
+    weighted, rows = _scale_weights(structure, dead), driven.factored(live, impact)
     strength = check_options(structure, friction, strength)
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
 
     def drive(width: float, area_load: float, positions: Sequence[float]) -> MovingLoad:
         # the structure is modelled over its whole width, of which a vehicle loads a part
-        axles = (structure.width / width * code).tolist()
+        share = structure.width / width
         given = options | {"spacings": driven.spacings, "area_load": live * area_load}
-        return moving_load(weighted, axles, positions=positions, **given)
+        return _least_of(
+            [
+                moving_load(weighted, (share * row).tolist(), positions=positions, **given)
+                for row in rows
+            ]
+        )
 
     is_plastic = isinstance(fill, PlasticFill)
     axles = parse_axles(driven.axles, driven.spacings)
@@ -391,6 +424,16 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
     more |= _vary_fill(weighted, moving, options)
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
+
+
+def _least_of(each: Sequence[MovingLoad]) -> MovingLoad:
+    """Return the worst of some loads, with the least factors of all at each place."""
+    worst = min(each, key=lambda moving: moving.worst.factor)
+    least = xr.concat([moving.factors["factor"] for moving in each], "load").min("load")
+    return replace(
+        worst,
+        factors=worst.factors.assign(factor=least.assign_attrs(each[0].factors["factor"].attrs)),
+    )
 
 
 def _find_vehicle(vehicle: str | Vehicle) -> Vehicle:

@@ -12,7 +12,7 @@ import xarray as xr
 
 from archfem._display import ProgressReport, ResultDisplay
 from archfem._typing import Array, Metres, Newtons, Numbers, Pascals
-from archfem._validation import check_number, check_numbers
+from archfem._validation import check_choice, check_number, check_numbers
 from archfem.errors import InvalidInput, logger
 from archfem.limit.backfill import (
     BlocksWithFill,
@@ -51,6 +51,8 @@ class Vehicle:
         live_source: code and clause of the partial factor, and its grade.
         impact: dynamic factor of the code on its weight [-].
         impact_source: code and clause of the dynamic factor, and its grade.
+        impact_on: "all axles" that the dynamic factor multiplies; or "worst axle", that one alone
+            with which the factor at collapse is least, as in BD 21.
         area_load: load of the code on the road beside and below the axles, wherever it is adverse,
             without the dynamic factor [Pa].
         wheels: width between the outer faces of the wheels, at the road [m].
@@ -73,10 +75,12 @@ class Vehicle:
     lane: Metres = 3.0
     width_source: str = "as a single axle of CS 454, and a lane of EN 1991-2, 4.2.3; from memory"
     left_out: str = ""
+    impact_on: str = "all axles"
 
     def __post_init__(self) -> None:
         """Refuse weights, spacings and factors out of range."""
         parse_axles(self.axles, self.spacings)
+        check_choice(self.impact_on, f"impact_on of {self.name}", ("all axles", "worst axle"))
         for key in ("area_load", "wheels", "lane"):
             check_number(getattr(self, key), f"{key} of {self.name}", minimum=0.0)
         longest = max(self.spacings, default=0.0)
@@ -88,6 +92,25 @@ class Vehicle:
             )
         check_factor(self.live, f"partial factor on the live load of {self.name}")
         check_factor(self.impact, f"dynamic factor of {self.name}")
+
+    def factored(self, live: float, impact: float) -> list[Array]:
+        """Return weights with both factors [N]: a row, or one for each axle that has the impact.
+
+        Mirrored rows count once, as vehicles are driven in both directions.
+
+        Args:
+            live: partial factor [-].
+            impact: dynamic factor [-].
+        """
+        weights = live * np.array(self.axles)
+        if self.impact_on == "all axles" or impact == 1.0:
+            return [impact * weights]
+        kept = dict[Any, Array]()
+        for row in weights * (1.0 + (impact - 1.0) * np.eye(len(weights))):
+            behind = tuple(row.tolist())
+            ways = (behind, self.spacings), (behind[::-1], self.spacings[::-1])
+            kept.setdefault(min(ways), row)
+        return [*kept.values()]
 
     def spread_over(self, structure: Structure) -> float:
         """Return the width over which one vehicle spreads on a bridge, by rule [m].

@@ -134,6 +134,57 @@ def test_a_distributed_load_on_an_overhang_by_hand():
     assert ", and 4 kN/m² of road where it is adverse; given" in str(found)
 
 
+@pytest.mark.parametrize(
+    ("axles", "turns", "direction", "number"),
+    [
+        ((40e3, 50e3), 1.8 * 50e3 * 1.0 + 40e3 * 0.7, "left", 2),
+        ((50e3, 40e3), 1.8 * 50e3 * 1.0 + 40e3 * 0.7, "right", 1),
+        ((20e3, 70e3, 25e3), 1.8 * 70e3 * 1.0 + 25e3 * 0.7, "right", 2),
+    ],
+)
+def test_the_impact_on_one_axle_by_hand(axles, turns, direction, number):
+    """It is on the axle, and the vehicle drives so, that the overhang turns at the least factor.
+
+    An axle stands at its edge, 1 m beyond the toe, and the next one 0.3 m nearer to that.
+    """
+    stone = column_under_axle(width=2.0)
+    resists = af.STONE.unit_weight * 2.0 * (2.0 * 0.5 - 1.0 * 0.5)
+    spacings = (0.3,) * (len(axles) - 1)
+    lorry = Vehicle("lorry", axles, spacings, live=1.9, impact=1.8, impact_on="worst axle")
+    found = af.rate(stone, lorry, width=1.0)
+    # it stands beside the edge, by micrometres
+    assert found.factor == pytest.approx(resists / (2.0 * 1.9 * turns), rel=1e-5)
+    assert found.moving.direction == direction
+    words = (
+        f"\nimpact by 1.8 on the worst axle alone, here number {number} from the front (given)\n"
+    )
+    assert words in str(found)
+    factors = found.moving.factors["factor"]
+    assert float(factors.min()) == pytest.approx(found.factor, rel=EXACT)
+    # at each place the least over the axles that may have the impact
+    for row in 1.9 * np.array(axles) * (1.0 + 0.8 * np.eye(len(axles))):
+        places = factors["position"].values.tolist()
+        own = af.moving_load(stone, (2.0 * row).tolist(), spacings=spacings, positions=places)
+        assert (factors.values <= (1.0 + EXACT) * own.factors["factor"].values).all()
+    everywhere = af.rate(stone, replace(lorry, impact_on="all axles"), width=1.0)
+    assert everywhere.factor < 0.95 * found.factor
+    assert "\nimpact by 1.8 (given)\n" in str(everywhere)
+
+
+def test_mirrored_vehicles_are_driven_once():
+    """Of three equal axles the outer ones are mirrored; unequal spacings are not."""
+    counts = {(1.3, 1.3): 2, (1.3, 1.4): 3}
+    for spacings, count in counts.items():
+        axles = Vehicle("bogie", (80e3,) * 3, spacings, impact_on="worst axle")
+        assert len(axles.factored(1.9, 1.8)) == count
+        assert [row.tolist() for row in axles.factored(1.9, 1.0)] == [pytest.approx([152e3] * 3)]
+    assert sum(VEHICLES["CS454-triple-2.6"].factored(1.9, 1.8)[1]) == pytest.approx(
+        1.9 * (2.0 + 1.8) * 78480.0
+    )
+    with pytest.raises(af.InvalidInput, match="impact_on of axle = 'one axle' is not known"):
+        Vehicle("axle", (80e3,), impact_on="one axle")
+
+
 def test_a_vehicle_spreads_over_its_wheels_and_the_fill_up_to_a_lane():
     for name, cover, width in (
         ("LM1", 0.3, 2.4 + 0.3),

@@ -10,6 +10,7 @@ import shapely
 from repeats import each_once
 
 import archfem as af
+from archfem.limit.rating import describe_spans
 
 MESHES = Path(__file__).parents[2] / "meshes"
 EXACT = 1e-9
@@ -339,6 +340,10 @@ def test_gravity_width_and_material_are_passed_on():
             {"piers": (af.shapes.Pier(gap=0.3, height=2.0),)},
             "rings do not stand side by side on a gap of 0.3",
         ),
+        (
+            {"piers": (af.shapes.Pier(breadth=0.4, height=2.0),)},
+            "rings do not stand side by side on a breadth of 0.4",
+        ),
         ({"sidewalls": walls(setback=1.9)}, "nothing is left of its length 2 m behind the ring"),
         ({"sidewalls": walls(length=0.2)}, "nothing is left of its length 0.2 m"),
         ({"chords": 0}, "chords 0 is not a whole number"),
@@ -366,6 +371,34 @@ def test_gravity_width_and_material_are_passed_on():
 def test_inconsistent_parts_are_refused(change, says):
     with pytest.raises(af.errors.InvalidStructure, match=says):
         af.bridge(**PAIR | change)
+
+
+@pytest.mark.parametrize("thickness", [0.35, 0.45])
+@pytest.mark.parametrize("measured", ["intrados", "centre line"])
+def test_a_pier_by_its_breadth_keeps_it_between_the_clear_spans(measured, thickness):
+    """Whatever the thickness of the rings; a gap is thickness × sin(embrace / 2) narrower."""
+    rings = [replace(arch, measured=measured, thickness=thickness) for arch in PAIR["arches"]]
+    made = af.bridge(
+        arches=rings, piers=[af.shapes.Pier(breadth=0.9, height=2.4)], sidewalls=walls()
+    )
+    beds = [joint for joint in made.joints if joint.part == "pier"]
+    assert [joint.depth for joint in beds] == pytest.approx([0.9] * len(beds), rel=EXACT)
+    ends = [
+        np.array([joint.intrados for joint in made.joints if joint.part == arch.name])
+        for arch in rings
+    ]
+    assert ends[1][:, 0].min() - ends[0][:, 0].max() == pytest.approx(0.9, rel=EXACT)
+    low = 2.4 + ends[0][:, 1].min()  # the springing level is above the clear springing
+    words = describe_spans(made)
+    assert words.endswith(f"; 'pier' 0.9 m broad and {low:.3g} m high below the clear spans")
+    if measured == "intrados":
+        assert np.ptp(ends[0][:, 0]) == pytest.approx(4.0, rel=EXACT)
+        assert f"{ends[0][:, 0].max() + 0.9:.2f} to " in words
+        assert low == pytest.approx(2.4 - 0.5 * thickness * (2.0**2 - 1.6**2) / (2.0**2 + 1.6**2))
+    gap = 0.9 - thickness * sin(rings[0].half)
+    other = af.bridge(arches=rings, piers=[af.shapes.Pier(gap=gap, height=2.4)], sidewalls=walls())
+    for one, two in zip(made.blocks, other.blocks, strict=True):
+        np.testing.assert_allclose(one.points, two.points, atol=EXACT)
 
 
 @pytest.mark.parametrize(("cover", "fits"), [(0.0205, True), (0.0195, False)])

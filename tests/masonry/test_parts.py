@@ -27,6 +27,8 @@ WALL = {"length": 2.0, "height": 2.3, "above": 0.8}
         (lambda: af.shapes.Arch(**RING, measured="extrados"), "measured = 'extrados' is unknown"),
         (lambda: af.shapes.Arch(**RING | {"rise": 2.1}), "rise 2.1 m is above half the span 4 m"),
         (lambda: af.shapes.Arch(**RING, measured=1), "measured = 1 is unknown"),
+        (lambda: af.shapes.Pier(height=2.0), "'pier': give either breadth, "),
+        (lambda: af.shapes.Pier(gap=1.0, breadth=1.0, height=2.0), "give either breadth, "),
         (lambda: af.shapes.Pier(gap=1.0, height=-2.0), r"'pier': height \[m\] = -2.0"),
         (
             lambda: af.shapes.Sidewall(**WALL, state="loose"),

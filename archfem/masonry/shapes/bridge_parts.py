@@ -97,8 +97,9 @@ class Pier:
     Its top course is one skewback between the two springing joints, or behind the only one.
 
     Attributes:
+        breadth: of the courses, between the clear spans beside them [m]; or
         gap: between the springings of the neighbouring centre lines, or from that of the only
-            one to the outer face [m].
+            one to the outer face [m]. Half a springing joint at each end stands on more.
         height: from foundation to springing level [m].
         course: height of a course, about; courses of a pier are equally high [m].
         name: of the part.
@@ -106,14 +107,27 @@ class Pier:
 
     role: ClassVar[str] = "pier"
 
-    gap: Metres
+    breadth: Metres | None = None
+    gap: Metres | None = None
     height: Metres
     course: Metres = 0.40
     name: str = "pier"
 
     def __post_init__(self) -> None:
         """Check the lengths."""
-        _check_lengths(self, "gap", "height", "course")
+        if (self.breadth is None) == (self.gap is None):
+            raise InvalidStructure(
+                f"'{self.name}': give either breadth, as it is measured between the clear spans, "
+                "or gap, between the springings of the centre lines"
+            )
+        _check_lengths(self, "gap" if self.breadth is None else "breadth", "height", "course")
+
+    def gap_beside(self, *reaches: float) -> float:
+        """Return the gap, where halves of springing joints reach so far over the pier [m]."""
+        if self.gap is not None:
+            return self.gap
+        assert self.breadth is not None
+        return self.breadth - sum(reaches)
 
 
 @dataclass(frozen=True, kw_only=True)

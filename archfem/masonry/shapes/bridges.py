@@ -246,13 +246,10 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
     for k, (span, *of_ring) in enumerate(zip(spans, *of_rings, strict=True), 1):
         keys = dict(zip(("thickness", "voussoirs", "rise", "embrace"), of_ring, strict=True))
         arches.append(Arch(span=span, measured=measured, name=f"arch {k}", **keys))
-    # A pier is flush with the intrados of its rings: half their springing joints stand on it.
-    reach = [0.0, *(arch.reach for arch in arches), 0.0]
     of_piers = _expand_values(count + 1, breadths=breadths, heights=heights)
-    rows = zip(*of_piers, reach[1:], reach[:-1], strict=True)
     piers = [
-        Pier(gap=broad - right - left, height=high, course=course, name=f"pier {k}")
-        for k, (broad, high, right, left) in enumerate(rows, 1)
+        Pier(breadth=broad, height=high, course=course, name=f"pier {k}")
+        for k, (broad, high) in enumerate(zip(*of_piers, strict=True), 1)
     ]
     common: dict[str, Any] = {"material": material, "contact": contact, "gravity": gravity}
     return bridge(arches=arches, piers=piers, chords=chords, width=width, **common)
@@ -306,6 +303,12 @@ def extrados_points(ring: Structure) -> list[Point]:
     return points
 
 
+def _width_text(pier: Pier) -> str:
+    """Return the width that a pier was given, in words."""
+    name, width = ("breadth", pier.breadth) if pier.gap is None else ("gap", pier.gap)
+    return f"a {name} of {width:.3g} m"
+
+
 def fill_ledge(face: Face, inward: float, walls: Sequence[Sidewall]) -> list[Point]:
     """Return the base of the fill outside an outer springing, from the end of the deck inwards."""
     x, y = face[1]
@@ -337,7 +340,9 @@ class StoneworkBuilder:
             ends, piers = (piers[0], piers[-1]), piers[1:-1]
         for number, arch in enumerate(arches):
             rings.append(build_ring(arch, x, self.material, self.contact, self.chords))
-            x += arch.centre_line_span + (piers[number].gap if number < len(piers) else 0.0)
+            x += arch.centre_line_span
+            if number < len(piers):
+                x += piers[number].gap_beside(arch.reach, arches[number + 1].reach)
         joints = [[(joint.intrados, joint.extrados) for joint in ring.joints] for ring in rings]
         springings = [(faces[0], faces[-1]) for faces in joints]
         support = self._build_end(springings[0][0], 1.0, ends[:1], "left abutment")
@@ -413,8 +418,8 @@ class StoneworkBuilder:
         step = pier.height / count_pieces(pier.height, pier.course, f"courses of '{pier.name}'")
         if not left[1][0] < right[1][0] or min(y0, y1) <= -step:
             raise InvalidStructure(
-                f"'{pier.name}': rings do not stand side by side on a gap of {pier.gap:.3g} m "
-                f"and a course of {step:.3g} m: give a wider gap or higher courses"
+                f"'{pier.name}': rings do not stand side by side on {_width_text(pier)} "
+                f"and a course of {step:.3g} m: give a wider one or higher courses"
             )
         # flush with the intrados below, along both springing joints above
         top = [right[0], right[1], left[1], left[0]]
@@ -477,12 +482,13 @@ class StoneworkBuilder:
     def _build_end_pier(self, pier: Pier, face: Face, inward: float) -> int:
         """Build a pier under a single springing at an end; return the number of its skewback."""
         (x, y), (edge, level) = face
-        outer = 0.5 * (x + edge) - inward * pier.gap
+        # from the clear springing, or from that of the centre line
+        outer = 0.5 * (x + edge) - inward * pier.gap_beside(0.5 * abs(edge - x))
         step = pier.height / max(1, round(pier.height / pier.course))
         if not inward * (edge - outer) >= 0.0 or y <= -step:
             raise InvalidStructure(
-                f"'{pier.name}': a ring does not stand on a gap of {pier.gap:.3g} m and a course "
-                f"of {step:.3g} m: give a wider gap or higher courses"
+                f"'{pier.name}': a ring does not stand on {_width_text(pier)} and a course "
+                f"of {step:.3g} m: give a wider one or higher courses"
             )
         # Behind the only springing joint the skewback is level, out to its outer face.
         top = [(x, y), (edge, level), (outer, level)]
