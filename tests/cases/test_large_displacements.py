@@ -128,7 +128,7 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     lead, stated = sentences_of(data)
     # statistics of the variations are no part of the conclusion
     changes = lead.partition("raise no doubt. What may change this: ")[2]
-    assert changes.startswith("variations of its properties (falls in 1 of 4: all with k_n")
+    assert changes.startswith("variations of its properties (falls in 1 of 4: no property")
     assert changes.endswith("); what was not varied: one motion, one model, size of motions.")
     assert not re.search("hypercube|95%", lead + stated)
     words = [piece.text for piece in _build_mechanism(data, held) if hasattr(piece, "text")]
