@@ -192,7 +192,7 @@ def test_runs_without_a_rule_rarely_get_one():
     for _ in range(60):
         columns = {name: random.random(26) for name in ("k_n", "k_s", "friction", "damping_ratio")}
         labels = random.choice(["a", "b"], (3, 26))
-        columns |= dict(zip(("joint_rule", "sign", "dt"), labels))
+        columns |= dict(zip(("joint_rule", "sign", "dt"), labels, strict=True))
         named += CHANCE not in made_up(random.permutation(26) < 6, **columns).sentence
     # 8 or more have a probability of 1 in 100
     assert named < 8
