@@ -33,7 +33,7 @@ EXIT_CODES = (
     f"understood; {ExitCode.DOUBTFUL}, an answer in doubt: each line 'in doubt: …' "
     "says why (energy that drifts, a fidelity that is wrong, fill that only tension holds, sliding "
     f"that dilates); {ExitCode.INTERRUPTED}, ended by Ctrl-C, and 143, "
-    "by SIGTERM: what was computed is kept."
+    "by SIGTERM: what was computed is kept in the folder of --out."
 )
 
 
@@ -198,7 +198,8 @@ def _add_case_commands(commands: Any) -> None:
         "--out", required=True, metavar="FILE.msh", help="the mesh file"
     )
     about = "does it fall, whatever its uncertain properties are?"
-    add_to = add("verdict", about, "folder for table and picture (none)", required=False)
+    where = "folder for runs, from which a stopped command continues, table and picture (none)"
+    add_to = add("verdict", about, where, required=False)
     add_to("--workers", type=int, default=1, help="processes for the runs (1)")
     about = "runs beside those of one changed property each (236)"
     add_to("--samples", type=int, default=236, help=about)

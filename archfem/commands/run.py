@@ -350,8 +350,15 @@ def verdict(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
     motion = _choose_motion(case, options)
     print(case.title)
-    sampling = {"workers": options.workers, "samples": options.samples}
-    computed = verdict_range(case.analysis, motion, fidelity="rigid", **sampling)
+    folder = None if options.out is None else path_inside(Path(options.out), "variations")
+    sampling = {"workers": options.workers, "samples": options.samples, "folder": folder}
+    try:
+        computed = verdict_range(case.analysis, motion, fidelity="rigid", **sampling)
+    except KeyboardInterrupt:
+        again = "run the same command again to compute those that are left"
+        kept = f"finished runs are kept: {again}" if folder else "without --out no run is kept"
+        print(kept, file=sys.stderr)
+        raise
     own: Files = {"verdict_range.nc": computed.save, "verdict_range.txt": str(computed)}
 
     def draw() -> Files:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,9 +20,10 @@ from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.models.model import Doubt, read_doubts
 
-# Gain of log-likelihood below which conditions may separate falls by chance [-]: one of four runs
-# has 2.2
-LEAST_GAIN = 2.0
+# A condition is named if at most this share of random permutations of the outcomes has one that
+# separates them as well [-], and the number of permutations
+MAX_CHANCE, PERMUTATIONS = 0.05, 999
+MAX_EDGES = 250  # conditions of each sense on one property
 
 
 @validate_methods
@@ -136,7 +138,7 @@ class VerdictRange(ResultDisplay):
             return f"{len(errors)} of {len(self.answered)} runs have no answer: {errors[0]}"
         text = self.count
         if 0 < falls.sum() < len(falls):
-            text += f": {self._describe_falls()}"
+            text += f": {self._where}"
         low, high = self.interval()
         count = int((self.answered & self.dataset["sampled"].values).sum())
         text += (
@@ -146,28 +148,26 @@ class VerdictRange(ResultDisplay):
         text += f", under '{motion}' alone" if (motion := self.dataset.attrs.get("motion")) else ""
         return text + self.unanswered
 
-    def _describe_falls(self) -> str:
-        """Return the one or two conditions that separate runs that fall from others best."""
-        rows = self.answers
-        falls, conditions = self.falls[self.answered], []
+    @cached_property
+    def _where(self) -> str:
+        """The one or two conditions that separate runs that fall from others by more than chance.
+
+        They are tested by sampled runs: those of single changes share all other properties.
+        """
+        rows, falls, conditions = self.answers, self.falls[self.answered], list[str]()
         chosen = np.ones(len(falls), dtype=bool)
         for _ in range(2):
-            best = max(
-                _list_conditions(rows, self.properties, chosen),
-                key=lambda condition: _separation(falls, chosen & condition.holds),
-                default=None,
-            )
-            before = _separation(falls, chosen)
-            if best is None or _separation(falls, chosen & best.holds) <= before + 1e-9:
+            tested = chosen & rows["sampled"].values
+            among = rows.isel(run=np.flatnonzero(tested))
+            best = _find_condition(among, self.properties, falls[tested])
+            if best is None:
                 break
             conditions.append(self._condition_text(best))
-            chosen &= best.holds
-        inside, total = int(falls[chosen].sum()), int(falls.sum())
-        none = np.ones(len(falls), dtype=bool)
-        if _separation(falls, chosen) < _separation(falls, none) + LEAST_GAIN:
-            return "no property separates them from the others"
-        where = " and ".join(conditions)
-        which = "all" if inside == total else f"{inside} of them"
+            chosen &= best.holds(rows)
+        if not conditions:
+            return "no property separates them from the others by more than chance"
+        inside, where = int(falls[chosen].sum()), " and ".join(conditions)
+        which = "all" if inside == falls.sum() else f"{inside} of them"
         return f"{which} with {where}, where {inside} of {int(chosen.sum())} fall"
 
     def _condition_text(self, condition: "Condition") -> str:
@@ -232,7 +232,13 @@ class Condition(NamedTuple):
     name: str
     value: Any
     below: bool | None
-    holds: NDArray[np.bool_]  # (runs,)
+
+    def holds(self, rows: xr.Dataset) -> NDArray[np.bool_]:
+        """Return whether runs meet the condition (runs,)."""
+        values = rows[self.name].values
+        if self.below is None:
+            return np.asarray(values == self.value)
+        return np.asarray(values < self.value if self.below else values > self.value)
 
 
 def property_text(name: str) -> str:
@@ -240,33 +246,55 @@ def property_text(name: str) -> str:
     return name if name in ("k_n", "k_s") else name.replace("_", " ")
 
 
-def _list_conditions(
-    rows: xr.Dataset, names: Sequence[str], among: NDArray[np.bool_]
-) -> Iterator[Condition]:
-    """Yield all conditions that split some runs."""
+def _list_conditions(rows: xr.Dataset, names: Sequence[str]) -> Iterator[Condition]:
+    """Yield conditions that split some runs."""
     for name in names:
         values = rows[name].values
-        present = np.unique(values[among])
+        present = np.unique(values)
         if values.dtype.kind == "f":
-            for edge in 0.5 * (present[1:] + present[:-1]):
-                yield Condition(name, float(edge), True, values < edge)
-                yield Condition(name, float(edge), False, values > edge)
-        else:
-            for value in present:
-                yield Condition(name, str(value), None, values == value)
+            edges = 0.5 * (present[1:] + present[:-1])
+            for edge in edges[:: len(edges) // MAX_EDGES + 1]:
+                yield from (Condition(name, float(edge), below) for below in (True, False))
+        elif len(present) > 1:
+            yield from (Condition(name, value, None) for value in present)
 
 
-def _separation(falls: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> float:
-    """Return the log-likelihood of the outcomes if chosen runs have their own share of falls [-].
+def _find_condition(
+    rows: xr.Dataset, names: Sequence[str], falls: NDArray[np.bool_]
+) -> Condition | None:
+    """Return the condition that separates falls best; None if chance finds one as good.
 
-    By it, unlike by the share alone, one run that falls separates less than a rule does.
+    Outcomes in random order have a best condition too, over all properties and edges. It is the
+    measure of chance: the test by maxima of Westfall and Young, Resampling-Based Multiple Testing
+    (1993), section 2.3.
     """
-    groups = [falls[chosen], falls[~chosen]] if chosen.any() and not chosen.all() else [falls]
-    if len(groups) == 2 and groups[0].mean() <= groups[1].mean():
-        return -np.inf  # it describes those that do not fall
-    shares = np.array([group.mean() for group in groups])
-    sizes = np.array([len(group) for group in groups])
-    return float(np.sum(sizes * (xlogy(shares, shares) + xlogy(1.0 - shares, 1.0 - shares))))
+    conditions = [*_list_conditions(rows, names)]
+    if not conditions:
+        return None
+    members = np.array([condition.holds(rows) for condition in conditions], dtype=float)
+    gains, random = _separation(members, falls), np.random.default_rng(0)
+    chance = [_separation(members, random.permutation(falls)).max() for _ in range(PERMUTATIONS)]
+    as_good = 1 + np.count_nonzero(np.array(chance) > gains.max() - 1e-9)
+    if as_good > MAX_CHANCE * (PERMUTATIONS + 1):
+        return None
+    return conditions[int(gains.argmax())]
+
+
+def _separation(members: Array, falls: NDArray[np.bool_]) -> Array:
+    """Return the gain of log-likelihood if the members have their own share of falls (conditions,).
+
+    By it, unlike by the share alone, one run that falls separates less than a rule does. It is zero
+    where members fall less often than the others.
+    """
+    sizes, inside = members.sum(axis=1), members @ falls
+    count, total = len(falls), falls.sum()
+
+    def likelihood(falls: Any, runs: Any) -> Any:
+        return xlogy(falls, falls / runs) + xlogy(runs - falls, 1.0 - falls / runs)
+
+    gains = likelihood(inside, sizes) + likelihood(total - inside, count - sizes)
+    more = inside / sizes > total / count
+    return np.where(more, gains - likelihood(total, count), 0.0)
 
 
 def _group_values(values: Array, groups: int = 3) -> list[tuple[str, NDArray[np.bool_]]]:

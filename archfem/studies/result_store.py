@@ -6,7 +6,7 @@ The table is an `xarray.Dataset`, written as NetCDF, CSV and Parquet.
 import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from math import inf, isfinite, isnan
@@ -25,6 +25,7 @@ from archfem import _files
 from archfem._display import PROGRESS_INTERVAL, write_progress_line
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._validation import validate_arguments
+from archfem.cases.provenance import describe_version
 from archfem.errors import InvalidInput, StudyStopped, logger
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import PAIR_KEY, Axis, StudyPoint
@@ -286,10 +287,28 @@ def evaluate_with_progress(
     find: Callable[..., Mapping[str, Any]],
     workers: int,
     name: str,
+    folder: str | Path | None = None,
 ) -> Iterator[tuple[int, Row]]:
-    """Evaluate points by a function as `evaluate_points` does, and show the progress."""
-    with closing(Progress(len(points), 0, 0, name=name)) as progress:
-        for number, row in evaluate_points(points, Evaluator(find), workers):
+    """Evaluate points by a function as `evaluate_points` does, and show the progress.
+
+    Rows are stored in the folder, if there is one, and those stored before are not computed again.
+    """
+    with ExitStack() as stack:
+        store, digests, kept = None, dict[int, str](), dict[str, Row]()
+        if folder is not None:
+            store, function = Store(Path(folder)), [describe_version(), find]
+            stack.enter_context(store.lock())
+            digests = {number: _files.hash_value([function, point]) for number, point in points}
+            kept = store.load_rows(digests.values())
+            yield from ((k, kept[digest]) for k, digest in digests.items() if digest in kept)
+        left = [each for each in points if digests.get(each[0]) not in kept]
+        done, failed = len(points) - len(left), sum(bool(row["error"]) for row in kept.values())
+        progress = stack.enter_context(
+            closing(Progress(len(points), done, failed, store, name=name))
+        )
+        for number, row in evaluate_points(left, Evaluator(find), workers):
+            if store is not None:
+                store.write_row(digests[number], row)
             progress.add(failed=bool(row["error"]))
             yield number, row
 

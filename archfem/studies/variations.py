@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -86,6 +87,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     samples: int = 236,
     seed: int = 0,
     workers: int = 1,
+    folder: str | Path | None = None,
 ) -> VerdictRange:
     """Run a structure under a motion with large displacements, for ranges of uncertain properties.
 
@@ -118,6 +120,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
             ring of 17 stones over 8 s on two cores, and gives a share of 5 % to ± 3 %.
         seed: seed of its random numbers.
         workers: number of processes.
+        folder: folder that keeps finished runs, from which the same call continues.
 
     Returns:
         All runs. A run without an equilibrium counts neither as standing nor as fallen.
@@ -138,7 +141,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     changes = [*_single_changes(ranges, neutral), *sample_changes(ranges, samples, seed)]
     variations = [Variation(analysis, motion, _resolve_labels(ranges, each)) for each in changes]
     points = list(enumerate(variations))
-    rows = dict(evaluate_with_progress(points, evaluate_variation, workers, "range"))
+    rows = dict(evaluate_with_progress(points, evaluate_variation, workers, "range", folder))
     dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], neutral)
     dataset["sampled"] = "run", np.arange(len(points)) >= len(points) - samples
     named = [each for row in ranges.values() if isinstance(row, dict) for each in row.values()]

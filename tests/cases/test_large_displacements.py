@@ -127,7 +127,7 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     assert summarise_outcomes(data, [held]) == "stands; falls in 1 of 4 variations"
     (lead,) = sentences_of(data)
     # statistics of the variations are no part of the conclusion
-    assert " In variations of its properties it falls in 1 of 4: all with k_n" in lead
+    assert " In variations of its properties it falls in 1 of 4: no property" in lead
     changes = lead.partition("raise no doubt. What may change this: ")[2]
     assert changes == "what was not varied: one motion, one model, size of motions."
     assert not re.search("hypercube|95%", lead)

@@ -1,6 +1,7 @@
 """Statistics of a range of verdicts against closed forms and made-up runs."""
 
 import json
+from math import comb
 
 import numpy as np
 import pytest
@@ -148,27 +149,62 @@ def test_a_deciding_property_explains_all_and_a_constant_one_nothing():
         (
             {"k_n": np.array([0.5, 0.8, 1.5, 2.5]), "sign": list("abab")},
             [True, True, False, False],
-            "all with k_n below 2.3 MPa/mm, where 2 of 2 fall",
+            "all with k_n below 2.3 MPa/mm, where 16 of 16 fall",
         ),
         (
             {"friction": np.array([-0.1, 0.0, 0.05, 0.1])},
             [False, False, True, True],
-            "all with friction above that given +0.025, where 2 of 2 fall",
+            "all with friction above that given +0.025, where 16 of 16 fall",
         ),
         (
             {"damping_ratio": np.array([0.5, 1.0, 1.5, 2.0])},
             [True, False, False, False],
-            "all with damping ratio below × 0.75, where 1 of 1 fall",
+            "all with damping ratio below × 0.75, where 8 of 8 fall",
         ),
         (
             {"joint_rule": ["exact", "rigid", "rigid", "exact"], "dt": list("hhgh")},
             [False, True, False, False],
-            "all with joint rule 'rigid' and dt 'h', where 1 of 1 fall",
+            "all with joint rule 'rigid' and dt 'h', where 8 of 8 fall",
         ),
     ],
 )
 def test_the_sentence_names_the_properties_that_separate_falls(columns, falls, where):
-    assert made_up(falls, **columns).sentence.split(": ")[1].split(";")[0] == where
+    columns = {name: np.tile(values, 8) for name, values in columns.items()}
+    assert made_up(np.tile(falls, 8), **columns).sentence.split(": ")[1].split(";")[0] == where
+
+
+CHANCE = "no property separates them from the others by more than chance"
+
+
+@pytest.mark.parametrize(("falls", "chance"), [(4, True), (5, False)])
+def test_a_property_is_named_if_chance_names_it_less_than_once_in_twenty(falls, chance):
+    """All falls in one of two halves of twelve: by counting subsets, in one of 16.5 and of 66."""
+    exact = 2 * comb(6, falls) / comb(12, falls)
+    assert (exact > 0.05) == chance
+    sentence = made_up(np.arange(12) < falls, sign=["a"] * 6 + ["b"] * 6).sentence
+    assert (CHANCE in sentence) == chance
+
+
+def test_runs_without_a_rule_rarely_get_one():
+    """Of ranges whose falls are drawn by chance one in twenty may name properties."""
+    random = np.random.default_rng(5)
+    named = 0
+    for _ in range(60):
+        columns = {name: random.random(26) for name in ("k_n", "k_s", "friction", "damping_ratio")}
+        labels = random.choice(["a", "b"], (3, 26))
+        columns |= dict(zip(("joint_rule", "sign", "dt"), labels, strict=True))
+        named += CHANCE not in made_up(random.permutation(26) < 6, **columns).sentence
+    # 8 or more have a probability of 1 in 100
+    assert named < 8
+
+
+def test_single_changes_test_no_property():
+    """They share all other values, so that their falls seem to be due to these."""
+    sampled = np.arange(40) >= 14
+    k_n = np.where(sampled, np.linspace(0.3, 3.0, 40), 1.0)
+    falls = ~sampled
+    falls[[15, 22, 30, 38]] = True
+    assert CHANCE in made_up(falls, sampled, k_n=k_n).sentence
 
 
 def test_a_rule_of_all_falls_separates_better_than_one_run():

@@ -405,7 +405,7 @@ def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, unplotte
     path.write_text(CASE)
     assert af.commands.main(["verdict", str(path), "--out", str(out), "--samples", "2"]) == 0
     said = capsys.readouterr().out
-    names = {"archfem.json", "case.toml"} | {
+    names = {"archfem.json", "case.toml", "variations"} | {
         f"verdict_range.{kind}" for kind in ("nc", "txt", "png")
     }
     assert names == {each.name for each in out.iterdir()}
@@ -429,3 +429,28 @@ def test_a_report_shows_the_range(tmp_path, undrawn, calls):
 
 def report(folder):
     return af.cases.open_results(folder).report().read_text(encoding="utf-8")
+
+
+def test_a_stopped_range_continues_from_its_folder(column, motion, calls, monkeypatch, tmp_path):
+    """Only runs that are left are computed, also of more samples; other arguments share none."""
+    prepare = variations.prepare_runs
+
+    def stopped(*given):
+        if len(calls) == 4:
+            raise KeyboardInterrupt
+        return prepare(*given)
+
+    vary, place = {**HELD, "k_n": (0.5, 2.0)}, tmp_path / "runs"
+    monkeypatch.setattr(variations, "prepare_runs", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        af.verdict_range(column, motion, vary=vary, samples=5, folder=place)
+    monkeypatch.setattr(variations, "prepare_runs", prepare)
+    counts = []
+    for seed, shaken in ((0, motion), (0, motion), (1, motion), (0, motion.scaled(1.1))):
+        calls.clear()
+        settings = {"vary": vary, "samples": 5, "seed": seed}
+        found = af.verdict_range(column, shaken, **settings, folder=place)
+        counts.append(len(calls))
+        assert found.dataset.identical(af.verdict_range(column, shaken, **settings).dataset)
+    # 8 runs, of which 3 are of no random number
+    assert counts == [4, 0, 5, 8]
