@@ -27,7 +27,7 @@ from archfem.cases import result_folder as results
 from archfem.cases import result_text
 from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
 from archfem.cases.case import Case
-from archfem.cases.defaults import describe_defaults
+from archfem.cases.defaults import describe_defaults, describe_fill_defaults
 from archfem.cases.result_text import state_ratings
 from archfem.cases.run import (
     RATING_FILE,
@@ -217,7 +217,8 @@ def assess(options: argparse.Namespace) -> int:
         )
     texts = [result_text.describe_margin(found.values())]
     texts += [f"{name}: {result}" for name, result in found.items()]
-    texts.append(describe_fill(case.assessment.options.get("fill")))
+    of_fill = describe_fill(case.assessment.options.get("fill"), case.structure)
+    texts.append("\n".join(filter(None, [of_fill, describe_fill_defaults(case)])))
     text = "\n\n".join(filter(None, [*texts, "\n".join(dict.fromkeys(doubts))]))
 
     def draw() -> Files:
@@ -254,7 +255,7 @@ def rate(options: argparse.Namespace) -> int:
         summary = result_text.tabulate_ratings([found for found, *_ in rated])
         texts.insert(0, summary.text)
         files["vehicles.csv"] = summary.csv
-    text = "\n\n".join(texts)
+    text = "\n\n".join(filter(None, [*texts, describe_fill_defaults(case)]))
     # the case of the folder, that of a run, may be rated for another vehicle
     files |= {RATING_FILE: format_tables({"rating": rated[0][2]}).rstrip(), "rating.txt": text}
     files |= {"rating.csv": worst.table()}

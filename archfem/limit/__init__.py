@@ -7,13 +7,13 @@
     fill_bounds           bounds of the factor with a plastic fill
     fill_mesh             triangles of a fill
     fill_range            range of a result over what is assumed of a fill
+    fill_strength         strength of a fill, by pressure or plastic
     finite_mechanism      finite motion of a mechanism, load factor along its path
     instability           why a structure does not stand
     linear_programme      rigid-block equilibrium as a linear programme
     mechanism_count       mechanisms by counting failed joints; duration and opening
     mechanism_kinematics  mechanisms verified by a rigid-block motion
     nonassociated         sliding without dilatancy
-    plastic_fill          strength of a plastic fill
     rating                rating for vehicles of codes
     support_movement      finite movement of a support
     thickness             least thickness

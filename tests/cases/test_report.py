@@ -617,7 +617,9 @@ def test_a_result_without_a_time_history_has_a_report(
     concluded = words.split("Inputs and assumptions")[1]  # between the contents and the heading
     assert found in concluded
     assert "In doubt: joints slide (arch, joint" in concluded
-    assert ("Over the pressure of the fill, at that place: " in concluded) == (command == "rate")
+    assert ("Over the pressure of the fill, each at its worst place: " in concluded) == (
+        command == "rate"
+    )
     doubted = "In doubt: values marked as from memory were not compared with the text" in concluded
     assert doubted == (command == "rate")
     factor = re.search(r"factor (?:of )?([\d.]+)", said)[1]
