@@ -59,6 +59,7 @@ from archfem.statics.equilibrium import structure_doubts
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
 from archfem.units import STANDARD_GRAVITY, MPa
+from archfem.view.collapse import draw_ratings
 from archfem.view.motions import draw_spectra, draw_suite
 from archfem.view.style import Files, write_files
 
@@ -260,8 +261,12 @@ def rate(options: argparse.Namespace) -> int:
     files |= {RATING_FILE: format_tables({"rating": rated[0][2]}).rstrip(), "rating.txt": text}
     files |= {"rating.csv": worst.table()}
     files |= state_ratings([(found, doubts) for found, doubts, _ in rated]).as_file("rating")
-    shown = f"{case.title}\n{text}"
-    _write_results("rate", case, options.out, shown, lambda: {**files, "rating.png": worst.plot()})
+
+    def draw() -> Files:
+        every = {"vehicles.png": draw_ratings([found for found, *_ in rated])}
+        return {**files, "rating.png": worst.plot(), **(every if len(rated) > 1 else {})}
+
+    _write_results("rate", case, options.out, f"{case.title}\n{text}", draw)
     return _doubt_code([doubt for _, doubts, _ in rated for doubt in doubts])
 
 

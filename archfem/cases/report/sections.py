@@ -224,7 +224,15 @@ def _build_rating(data: ReportData) -> list[Any]:
     _, worst, *others = text.text.split("\n\n")
     head, *rows = reader(table.splitlines())
     grid = Grid(head, rows, "Factors of several vehicles, the worst first", "words")
-    return [grid, TextBlock(worst, "lines"), *figures, *(TextBlock(x, "lines") for x in others)]
+    caption = "(a) Least factor of each vehicle, over its place. Others: each at its worst place."
+    every = data.read_figure("vehicles.png", caption)
+    return [
+        grid,
+        *every,
+        TextBlock(worst, "lines"),
+        *figures,
+        *(TextBlock(x, "lines") for x in others),
+    ]
 
 
 def _build_dead_load(data: ReportData) -> list[Any]:
