@@ -11,9 +11,9 @@ from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.toml_file import Table, check_table, read_object
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
-from archfem.limit.backfill import Fill, self_weight_programme
+from archfem.limit.backfill import self_weight_programme
 from archfem.limit.collapse import Collapse, collapse_factor
-from archfem.limit.plastic_fill import PlasticFill
+from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.rating import Rating, rate
 from archfem.limit.vehicles import VEHICLES_OF_CODES, Vehicle
 from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Settlement

@@ -138,6 +138,19 @@ def describe_defaults(case: Case) -> str:
     return f"defaults, where the case gives no value: {'; '.join(texts)}" if texts else ""
 
 
+def describe_fill_defaults(case: Case) -> str:
+    """Describe the values of a fill that decide and that the case does not give; or empty."""
+    values = [
+        (path.rpartition(".")[2], text, given) for path, text, given in list_fill_values(case)
+    ]
+    has = {key for key, text, _ in values if text != "none"}
+    has -= set() if has & {"backing", "backing_height"} else {"backing_strength"}
+    words = dict.fromkeys(
+        f"{key.replace('_', ' ')} {text}" for key, text, given in values if key in has and not given
+    )
+    return f"fill, by default: {', '.join(words)}" if words else ""
+
+
 def explain_defaults(case: Case) -> str:
     """Explain each default in a line: its key, its value, and where it is from."""
     lines = [f"  {each.key}: {each.words}: {each.reason}" for each in list_defaults(case)]

@@ -13,7 +13,7 @@ import xarray as xr
 from archfem._files import align_columns
 from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.case import Case
-from archfem.cases.defaults import describe_defaults, explain_defaults
+from archfem.cases.defaults import describe_defaults, describe_fill_defaults, explain_defaults
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import Ending, History
@@ -270,7 +270,7 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     over = collapse.describe_range()
     lines += [f"over what is assumed of the fill: {over}"] if over else []
     crushing = describe_crushing(limit.strength)
-    lines += filter(None, [crushing, describe_fill(limit.fill)])
+    lines += filter(None, [crushing, describe_fill(limit.fill, structure)])
     if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES:
         lines.append(
             "blocks are rigid, and elastic joints may bear less: hold a motion a tenth below"
@@ -280,12 +280,16 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
 
 def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
     """Tabulate the ratings of a bridge for several vehicles."""
-    head = ["vehicle", "factor", "without pressure", "with all of it", "geometric"]
+    columns, rated = ["factor", "without_pressure", "full_pressure"], list(ratings)
+    if any(getattr(found.fill, "backing", None) is not None for found in rated):
+        columns += ["without_backing", "without_either"]
+    columns.append("geometric")
     rows = []
-    for found in ratings:
-        numbers = found.factor, found.without_pressure, found.full_pressure, found.geometric
+    for found in rated:
+        numbers = [getattr(found, column) for column in columns]
         cells = ["-" if np.isnan(value) else f"{value:.4g}" for value in numbers]
         rows.append([found.vehicle.name, *cells, f"{found.outcome}, {found.place}"])
+    head = ["vehicle", *(column.replace("_", " ") for column in columns)]
     return ResultTable([*head, "outcome, and axles at the worst place"], rows)
 
 
@@ -298,6 +302,7 @@ def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tu
             found, opposite = opposite, found
         rank = _compare_senses(found, opposite)
         others.append(f"in the other sense: {opposite.sentence} ({rank})")
+    others += filter(None, [describe_fill_defaults(case)])
     demand, ratio = compare_with_site(case, found)
     others += [f"it begins to move at {ratio} times {demand}"] if ratio else []
     return found, "\n".join([describe_collapse(case.structure, found, case.limit), *others])

@@ -27,7 +27,7 @@ from archfem.cases import result_folder as results
 from archfem.cases import result_text
 from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
 from archfem.cases.case import Case
-from archfem.cases.defaults import describe_defaults
+from archfem.cases.defaults import describe_defaults, describe_fill_defaults
 from archfem.cases.result_text import RESULTS, state_ratings
 from archfem.cases.run import (
     RATING_FILE,
@@ -59,6 +59,7 @@ from archfem.statics.equilibrium import structure_doubts
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
 from archfem.units import MPa
+from archfem.view.collapse import draw_ratings
 from archfem.view.motions import draw_spectra, draw_suite
 from archfem.view.style import Files, write_files
 
@@ -242,7 +243,8 @@ def assess(options: argparse.Namespace) -> int:
         )
     texts = [result_text.describe_margin(found.values())]
     texts += [f"{name}: {result}" for name, result in found.items()]
-    texts.append(describe_fill(case.assessment.options.get("fill")))
+    of_fill = describe_fill(case.assessment.options.get("fill"), case.structure)
+    texts.append("\n".join(filter(None, [of_fill, describe_fill_defaults(case)])))
     text = "\n\n".join(filter(None, [*texts, "\n".join(dict.fromkeys(doubts))]))
 
     def draw() -> Files:
@@ -280,13 +282,17 @@ def rate(options: argparse.Namespace) -> int:
         summary = result_text.tabulate_ratings([found for found, *_ in rated])
         texts.insert(0, summary.text)
         files["vehicles.csv"] = summary.csv
-    text = "\n\n".join(texts)
+    text = "\n\n".join(filter(None, [*texts, describe_fill_defaults(case)]))
     # the case of the folder, that of a run, may be rated for another vehicle
     files |= {RATING_FILE: format_tables({"rating": rated[0][2]}).rstrip(), "rating.txt": text}
     files |= {"rating.csv": worst.table()}
     files |= state_ratings([(found, doubts) for found, doubts, _ in rated]).as_file("rating")
-    shown = f"{case.title}\n{text}"
-    _write_results("rate", case, options.out, shown, lambda: {**files, "rating.png": worst.plot()})
+
+    def draw() -> Files:
+        every = {"vehicles.png": draw_ratings([found for found, *_ in rated])}
+        return {**files, "rating.png": worst.plot(), **(every if len(rated) > 1 else {})}
+
+    _write_results("rate", case, options.out, f"{case.title}\n{text}", draw)
     return _doubt_code([doubt for _, doubts, _ in rated for doubt in doubts])
 
 

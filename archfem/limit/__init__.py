@@ -7,6 +7,7 @@
     fill_bounds           bounds of the factor with a plastic fill
     fill_mesh             triangles of a fill
     fill_range            range of a result over what is assumed of a fill
+    fill_strength         strength of a fill, by pressure or plastic
     finite_mechanism      finite motion of a mechanism, load factor along its path
     instability           why a structure does not stand
     linear_programme      rigid-block equilibrium as a linear programme
@@ -14,7 +15,6 @@
     mechanism_kinematics  mechanisms verified by a rigid-block motion
     mechanism_names       plain names of mechanisms
     nonassociated         sliding without dilatancy
-    plastic_fill          strength of a plastic fill
     rating                rating for vehicles of codes
     support_movement      finite movement of a support
     thickness             least thickness

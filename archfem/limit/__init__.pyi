@@ -1,10 +1,11 @@
-from .backfill import Fill as Fill
 from .collapse import Collapse as Collapse
 from .collapse import Outcome as Outcome
 from .collapse import closed_cohesion as closed_cohesion
 from .collapse import collapse_factor as collapse_factor
 from .collapse import stands as stands
 from .fill_range import FillRange as FillRange
+from .fill_strength import Fill as Fill
+from .fill_strength import PlasticFill as PlasticFill
 from .finite_mechanism import MechanismPath as MechanismPath
 from .finite_mechanism import collapse_path as collapse_path
 from .mechanism_count import Mechanism as Mechanism
@@ -17,7 +18,6 @@ from .mechanism_kinematics import Verifier as Verifier
 from .mechanism_kinematics import first_verified_mechanism as first_verified_mechanism
 from .mechanism_kinematics import verified_mechanism as verified_mechanism
 from .nonassociated import NonassociatedBounds as NonassociatedBounds
-from .plastic_fill import PlasticFill as PlasticFill
 from .rating import Rating as Rating
 from .rating import rate as rate
 from .support_movement import End as End

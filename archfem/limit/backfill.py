@@ -10,166 +10,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from math import radians, sqrt, tan
-from typing import Any, NamedTuple
+from math import radians, tan
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from archfem._typing import Array, Degrees, Flags, Metres, Numbers, Pascals
+from archfem._typing import Array, Flags, Numbers
 from archfem._validation import check_between, check_choice, check_number, check_type
 from archfem.errors import InvalidInput, logger
 from archfem.joints.rigid_kinematics import jump_rates
+from archfem.limit.fill_strength import Fill, place_backing
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
 from archfem.masonry.loads import Action, BodyForce, PointLoad
 from archfem.masonry.materials import STONE
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
-from archfem.units import in_degrees
 
 SELF_WEIGHT = BodyForce(0.0, -1.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fill:
-    """Strength of a fill, and the way in which it spreads loads that stand on it.
-
-    Limit analysis takes a fill not as a body but as an action on the stones below:
-
-    - its weight, column by column, rests on the stone below the column;
-    - it presses on the stones' faces horizontally, by anything from the active pressure to a part
-      of the passive one (Rankine, smooth faces), with the vertical stress σ of the columns above,
-
-        a max(K_a σ - 2 c √K_a, 0) <= p <= m (K_p σ + 2 c √K_p),   K_p = 1 / K_a = tan²(45° + φ/2),
-
-      so that stones which move into the fill are held back and those which move away are pushed;
-    - a load on its surface spreads down in a straight fan to the stones that it meets first.
-
-    The vertical stress is that of the weights alone: live loads do not raise the pressures, and
-    neither does a body force, as an earthquake would (Mononobe and Okabe). Shear between fill and
-    stones is neglected. Between two faces, as above a pier, fill and backing press on both equally.
-    Beside the ground the fill is long enough to bear its reactions: its own balance and failure are
-    not checked.
-
-    Attributes:
-        friction_angle: friction angle φ of the fill [degrees].
-        cohesion: cohesion c of the fill [Pa].
-        mobilisation: mobilised part m of the passive pressure, from 0 for none to 1 for all; the
-            whole of it needs more movement than a bridge may have [-].
-        active: part a of the active pressure that always acts, from 0 to 1 [-]. Neglecting it
-            is customary for arches, and wrong for walls that hold a fill back. Where some passive
-            pressure beyond it is counted on, the whole is on the safe side of any part.
-        dispersal: distribution of a load within the fan: "boussinesq", as through an elastic
-            half-plane under a line load, or "uniform", evenly on each level.
-        spread: half the angle of the fan, from the vertical [degrees]. The part that Boussinesq's
-            stresses would carry outside of it is distributed inside.
-        lever: where the horizontal force of each column acts, from 0 for its foot to 1 for its
-            centroid. At 0 shear between the columns carries its moment to ends that hold the fill,
-            at 1 the stone below carries all of it. Neither is measured: results state both [-].
-        backing: level, a y coordinate, up to which there is masonry behind the haunches, not fill
-            [m]; None for none. It holds the stones' faces horizontally, without tension: against
-            the ground or, above a pier, against each other. It never pushes.
-        backing_strength: greatest pressure of the backing [Pa]. Rubble in lime mortar has 1 to 2
-            MPa (from memory). A finite one makes factors continuous in the level of the backing.
-
-    References:
-        Gilbert, RING Theory and Modelling Guide, University of Sheffield (2005). Rankine, Phil.
-        Trans. R. Soc. 147 (1857) 9-27. Flamant, C. R. Acad. Sci. 114 (1892) 1465-1468.
-
-    Example:
-        >>> af.limit.Fill(friction_angle=30.0).mobilisation
-        0.3333333333333333
-    """
-
-    friction_angle: Degrees
-    cohesion: Pascals = 0.0
-    mobilisation: float = 1.0 / 3.0
-    active: float = 1.0
-    dispersal: str = "boussinesq"
-    spread: Degrees = 30.0
-    lever: float = 0.0
-    backing: Metres | None = None
-    backing_strength: Pascals = 1e6
-
-    def __post_init__(self) -> None:
-        """Refuse values outside their range, most of them wrong units."""
-        read_strength(self, "mobilisation", "active", "lever")
-        remedy = "with more it is masonry, to be modelled by blocks"
-        check_between(self.cohesion, "fill, cohesion [Pa]", 0.0, 1e6, ends="[]", remedy=remedy)
-        given, name = self.backing_strength, "fill, backing_strength [Pa]"
-        check_between(given, name, 1e4, 1e8, ends="[]", remedy="rubble in lime mortar has 1e6")
-        for key in ("mobilisation", "active", "lever"):
-            check_number(getattr(self, key), f"fill, {key}, a part", maximum=1.0)
-        check_choice(self.dispersal, "fill, dispersal", ("boussinesq", "uniform"))
-        remedy = "give degrees from the vertical; 1 in 2 is 26.6"
-        check_between(self.spread, "fill, spread [degrees]", 0.1, 80.0, ends="[]", remedy=remedy)
-
-    def changed(self, **values: Any) -> "Fill":
-        """Return a fill with other values.
-
-        Args:
-            values: of its attributes.
-        """
-        # as a bare number a small angle would be refused, which looks like radians
-        return replace(self, **{"spread": f"{self.spread!r} degree"} | values)
-
-    @property
-    def passive_coefficient(self) -> float:
-        """Rankine's K_p, passive over vertical stress of a fill without cohesion [-]."""
-        return tan(radians(45.0 + self.friction_angle / 2.0)) ** 2
-
-    @property
-    def edge(self) -> float:
-        """Slope of the outermost rays along which a load spreads, horizontal to vertical [-]."""
-        return tan(radians(self.spread))
-
-    def pressures(self, overburden: Array) -> tuple[Array, Array]:
-        """Return the least and the greatest horizontal pressure, shaped as the argument [Pa].
-
-        Args:
-            overburden: vertical stress σ in the fill, any shape [Pa].
-        """
-        passive = self.passive_coefficient
-        least = overburden / passive - 2.0 * self.cohesion / sqrt(passive)
-        least = self.active * np.maximum(least, 0.0)
-        most = self.mobilisation * (passive * overburden + 2.0 * self.cohesion * sqrt(passive))
-        return least, np.maximum(least, most)
-
-    def share(self, slope: Array) -> Array:
-        """Return the part of a load that spreads to the left of some rays, shaped as given [-].
-
-        Under a line load on an elastic half-plane stresses are radial (Flamant), so that the force
-        between two rays of the fan is the same on any face that it meets.
-
-        Args:
-            slope: tan θ of rays at θ from the vertical, positive to the right, any shape.
-        """
-        inside = np.clip(slope, -self.edge, self.edge)
-        if self.dispersal == "uniform":
-            return np.asarray(0.5 + 0.5 * inside / self.edge)
-        return np.asarray(0.5 + 0.5 * _flamant(inside) / _flamant(np.array(self.edge)))
-
-
-def read_strength(fill: Any, *shares: str) -> None:
-    """Convert the angles of a fill to degrees, and check its strength and some shares of it."""
-    for key in ("friction_angle", "spread"):
-        if isinstance(value := getattr(fill, key), str) or key == "spread":
-            object.__setattr__(fill, key, in_degrees(value, f"fill, {key}"))
-    for key in ("friction_angle", "cohesion", *shares, "spread"):
-        check_number(getattr(fill, key), f"fill, {key}", minimum=0.0)
-    if not (fill.friction_angle == 0.0 or 1.0 <= fill.friction_angle <= 60.0):
-        raise InvalidInput(
-            f"fill, friction_angle {fill.friction_angle:.4g}° is neither 0 nor between 1° and "
-            "60°: give degrees; gravel has about 35"
-        )
-
-
-def _flamant(slope: Array) -> Array:
-    """Return θ + sin θ cos θ, proportional to the force in the sector from vertical to ray."""
-    return np.asarray(np.arctan(slope) + slope / (1.0 + slope**2), dtype=float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,6 +156,16 @@ class FillProfile:
             if not self.stones[cut.block[k]]:
                 stress += float(self._unit_weights[k] * max(high - max(low, point[1]), 0.0))
         return stress
+
+    def fills(self, left: Array, right: Array) -> bool:
+        """Return whether there is fill all along a level line between two points."""
+        cut, height = self.slices, 0.5 * (left[1] + right[1])
+        start, end = np.maximum(cut.side[:, 0], left[0]), np.minimum(cut.side[:, 1], right[0])
+        x = 0.5 * (start + end)
+        bottom, top = (_interpolate_edge(cut.side, edge, x) for edge in (cut.bottom, cut.top))
+        covers = ~self.stones[cut.block] & (bottom < height) & (height < top) & (start < end)
+        # arcs are drawn by chords
+        return bool((end - start)[covers].sum() > 0.99 * (right[0] - left[0]))
 
     @cached_property
     def _skyline(self) -> tuple[Numbers, Array, Array]:
@@ -465,12 +336,32 @@ class BlocksWithFill:
         ends = np.array([piece.ends for piece in pieces]).reshape(-1, 2, 2)
         middle, partner = ends[:, :, 1].mean(axis=1), np.arange(len(pieces))
         least[middle < level], most[middle < level] = 0.0, self.fill.backing_strength
-        left, right = _find_facing(pieces, fixed, middle).T
+        left, right = self._drop_open(ends, _find_facing(pieces, fixed, middle), least, most).T
         partner[right] = left
         _equalise(ends, least, most, left, right)
         numbers = np.array([piece.region for piece in pieces], dtype=np.intp)
         toward = np.array([-piece.side for piece in pieces])
         return FillContacts(numbers, ends, toward, least, most, middle < level, partner)
+
+    def _drop_open(self, ends: Array, pairs: Numbers, least: Array, most: Array) -> Numbers:
+        """Return the pairs of facing pieces with fill all along between them.
+
+        Where it ends in air between them it bears no passive pressure, in place, and a warning
+        says so.
+        """
+        places = ends.mean(axis=1)
+        filled = [self._profile.fills(places[left], places[right]) for left, right in pairs]
+        is_open = ~np.array(filled, dtype=bool)
+        if is_open.any():
+            pieces = np.unique(pairs[is_open])
+            most[pieces] = least[pieces]
+            logger.warning(
+                "the fill beside x = %.4g m, y = %.4g m ends in air before the opposite face: no "
+                "passive pressure and no backing counts there; draw the fill without the gap if it "
+                "has none",
+                *places[pairs[is_open][0, 0]],
+            )
+        return pairs[~is_open]
 
     def _backing_level(self, faces: Sequence[Face]) -> float:
         """Return the level below which there is backing, -inf for none [m]."""
@@ -663,7 +554,7 @@ def attach_fill(structure: Structure, fill: object) -> BlocksWithFill:
     regions = find_rigid_regions(structure)
     if set(regions.blocks) & set(soil):
         raise InvalidInput(f"there is nothing but fill, {names}: limit analysis is of stones")
-    return BlocksWithFill(structure, fill, regions)
+    return BlocksWithFill(structure, place_backing(fill, structure), regions)
 
 
 def refuse_bonds(structure: Structure) -> None:

@@ -23,19 +23,18 @@ from archfem.errors import InvalidInput, logger
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import (
     BlocksWithFill,
-    Fill,
     is_balanced,
     refuse_bonds,
     self_weight_programme,
     sum_body_forces,
 )
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
-from archfem.limit.fill_range import FillRange, vary_fill
+from archfem.limit.fill_range import FillRange, say_part, vary_fill
+from archfem.limit.fill_strength import Fill, PlasticFill, find_clear_springing, place_backing
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions
 from archfem.limit.mechanism_names import name_mechanism
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
-from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.loads import Action, BodyForce, PointLoad, Settlement, list_loads
 from archfem.masonry.structure import (
     HasStructure,
@@ -602,27 +601,24 @@ PLASTIC_EVIDENCE = (
 )
 
 
-def describe_fill(fill: Fill | PlasticFill | None) -> str:
+def describe_fill(fill: Fill | PlasticFill | None, structure: Structure) -> str:
     """Describe how a fill acts on the stones of limit analysis; "" without its strength."""
     if fill is None:
         return ""
+    fill = place_backing(fill, structure)
     strength = f"friction angle {fill.friction_angle:g}°, cohesion {fill.cohesion / kPa:g} kPa"
     if isinstance(fill, PlasticFill):
         text = f"fill: a plastic body, {strength}, {PLASTIC_EVIDENCE}"
         holds = "stones below are fixed"
     else:
-        share = (
-            f"{fill.active:.2g} of the active and at most {fill.mobilisation:.2g} of the passive"
-        )
-        text = f"fill: weight, and {share} pressure, {strength}"
-        is_given = fill.backing_strength != Fill.backing_strength
-        source = "given" if is_given else "default, from memory"
-        holds = (
-            f"it holds faces horizontally, by up to {fill.backing_strength / MPa:g} MPa ({source})"
-        )
-    return (
-        text if fill.backing is None else f"{text}; backing up to y = {fill.backing:g} m: {holds}"
-    )
+        share = f"{say_part(fill.active)} of the active and at most {say_part(fill.mobilisation)}"
+        text = f"fill: weight, and {share} of the passive pressure, {strength}"
+        holds = f"it holds faces horizontally, by up to {fill.backing_strength / MPa:g} MPa"
+    if fill.backing is None:
+        return text
+    height = fill.backing - find_clear_springing(structure)
+    above = "" if np.isnan(height) else f", {height:.3g} m above the lowest clear springing"
+    return f"{text}; backing up to y = {fill.backing:.4g} m{above}: {holds}"
 
 
 def warn_dilatancy(structure: Structure) -> None:

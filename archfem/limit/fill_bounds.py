@@ -37,16 +37,15 @@ from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.limit.backfill import (
     SELF_WEIGHT,
     BlocksWithFill,
-    Fill,
     check_options,
     hold_backed,
     sum_body_forces,
 )
 from archfem.limit.cone_programme import Rows, solve_cones
 from archfem.limit.fill_mesh import HELD, SURFACE, FillMesh, mesh_fill
+from archfem.limit.fill_strength import Fill, PlasticFill, place_backing
 from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions
-from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.loads import Action, BodyForce, PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
@@ -511,7 +510,7 @@ def refine_bounds(
         DidNotConverge: whether it stands without live actions is not known on the finest mesh.
     """
     strength = check_options(structure, friction, strength)
-    structure = hold_backed(structure, fill.backing)
+    structure = hold_backed(structure, place_backing(fill, structure).backing)
     regions = find_rigid_regions(structure)
     soil = tuple(number for number in structure.free if number not in regions.blocks)
     if not set(soil) & set(find_yielding_blocks(structure)):

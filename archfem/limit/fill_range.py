@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
-from archfem.limit.backfill import Fill
+from archfem.limit.fill_strength import Fill, change_fill
 
 
 class FillAssumption(NamedTuple):
@@ -35,12 +35,17 @@ def vary_fill(fill: Fill | None) -> dict[FillAssumption, tuple[float, Fill | Non
     for lever, mobilisation in pairs:
         between = f"lever of {lever:g}"
         place = {0.0: "columns' feet", 1.0: "columns' centroids"}.get(lever, between)
-        part = {0.0: "none", 0.333: "a third", 1.0: "all"}.get(round(mobilisation, 3))
-        pressure = f"{part or format(mobilisation, '.2g')} of its passive pressure"
+        pressure = f"{say_part(mobilisation)} of its passive pressure"
         words = f"the fill's inertia at its {place}", "" if fill is None else pressure
-        changed = fill and fill.changed(lever=lever, mobilisation=mobilisation)
+        changed = fill and change_fill(fill, lever=lever, mobilisation=mobilisation)
         assumed.setdefault(FillAssumption(*words), (lever, changed))
     return assumed
+
+
+def say_part(mobilisation: float) -> str:
+    """Return the mobilised part of the passive pressure, in words."""
+    words = {0.0: "none", 0.333: "a third", 1.0: "all"}
+    return words.get(round(mobilisation, 3), f"{mobilisation:.2g}")
 
 
 @dataclass(frozen=True)

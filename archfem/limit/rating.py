@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -11,18 +12,22 @@ from archfem._display import ResultDisplay
 from archfem._typing import Array, Metres, Pascals
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
-from archfem.limit.backfill import Fill, check_options, is_balanced, self_weight_programme
+from archfem.limit.backfill import check_options, is_balanced, self_weight_programme
 from archfem.limit.collapse import describe_crushing, describe_fill
+from archfem.limit.fill_range import say_part
+from archfem.limit.fill_strength import Fill, PlasticFill, change_fill, place_backing
 from archfem.limit.instability import DeepenedBlocks
-from archfem.limit.plastic_fill import PlasticFill
 from archfem.limit.vehicles import (
     DRIVING_DIRECTIONS,
     VEHICLES,
+    AxleRow,
     MovingLoad,
     Vehicle,
     axles_on_structure,
     check_factor,
     collapse_factors,
+    cut_road,
+    find_worst_rows,
     moving_load,
     parse_axles,
     vehicle_positions,
@@ -59,14 +64,14 @@ class Rating(ResultDisplay):
             load, where others were given; else NaN.
         strength: compressive strength of the stones at the joints [Pa]; infinite where it does not
             count.
-        without_pressure: factor of the same loads with no pressure of a `Fill`; NaN without one,
-            and where the bridge then does not stand.
-        full_pressure: factor of the same loads with all of its passive pressure; else NaN.
+        without_pressure: least factor with no pressure of a `Fill`, at a place of its own; NaN
+            without a fill, and where the bridge then does not stand.
+        full_pressure: least factor with all of its passive pressure; else NaN.
         deepest: factor at the worst place with joints of any depth, where it is below 1 as they
             slide; else NaN. It differs from stone to stone.
-        without_backing: factor of the same loads without the backing of a `Fill`; NaN without one,
-            and where the bridge then does not stand.
-        without_either: factor of the same loads without backing and without pressure; NaN likewise.
+        without_backing: least factor without the backing of a `Fill`; NaN without one, and where
+            the bridge then does not stand.
+        without_either: least factor without backing and without pressure; NaN likewise.
         fill: strength of the fill, or None.
     """
 
@@ -110,7 +115,7 @@ class Rating(ResultDisplay):
         return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
 
     def _needs(self) -> str:
-        """Return the parts of the fill without which the bridge fails at this place, in words."""
+        """Return the parts of the fill without which the bridge fails, in words."""
         if not isinstance(self.fill, Fill):
             return ""
         without = {"pressure of the fill": self.without_pressure}
@@ -211,7 +216,7 @@ class Rating(ResultDisplay):
             f"impact by {self.impact:g}{self._impact_axle()} ({self._source('impact')})",
             f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
             describe_crushing(self.strength),
-            *filter(None, [describe_fill(self.fill)]),
+            *filter(None, [describe_fill(self.fill, self.structure)]),
         ]
         return "\n".join(lines)
 
@@ -222,12 +227,10 @@ class Rating(ResultDisplay):
         least = f"{self.without_pressure:.4g}"
         if np.isnan(self.without_pressure):
             least = "none, as the bridge does not stand,"
-        part = f"up to {self.fill.mobilisation:.2g} of the passive one"
-        if self.fill.mobilisation == Fill.mobilisation:
-            part = "up to a third of the passive one (default)"
+        part = f"up to {say_part(self.fill.mobilisation)} of the passive one"
         return [
-            f"over the pressure of the fill, at that place: {least} without it, {self.factor:.4g} "
-            f"with {part}, {self.full_pressure:.4g} with all of it"
+            f"over the pressure of the fill, each at its worst place: {least} without it, "
+            f"{self.factor:.4g} with {part}, {self.full_pressure:.4g} with all of it"
         ]
 
     def _describe_backing(self) -> list[str]:
@@ -239,7 +242,7 @@ class Rating(ResultDisplay):
             for factor in (self.without_backing, self.without_either)
         )
         return [
-            f"without the backing but with the pressure, at that place: {with_pressure}; "
+            f"without the backing but with the pressure, each at its worst place: {with_pressure}; "
             f"without either: {neither}"
         ]
 
@@ -390,7 +393,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
             f"{structure.width:.4g} m: give the part over which one vehicle spreads"
         )
     weighted, rows = _scale_weights(structure, dead), driven.factored(live, impact)
-    strength = check_options(structure, friction, strength)
+    strength, fill = check_options(structure, friction, strength), place_backing(fill, structure)
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
 
     def drive(width: float, area_load: float, positions: Sequence[float]) -> MovingLoad:
@@ -422,7 +425,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         geometric, deepest = _geometric_factor(weighted, moving, options)
     factors = live, impact, dead, width, area_load
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
-    more |= _vary_fill(weighted, moving, options)
+    axles *= [structure.width / width * live * impact, 1.0]
+    more |= _vary_fill(weighted, moving, cut_road(weighted, live * area_load), axles, options)
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
 
 
@@ -522,25 +526,38 @@ def _geometric_factor(
 
 
 def _vary_fill(
-    structure: Structure, moving: MovingLoad, options: dict[str, Any]
+    structure: Structure,
+    moving: MovingLoad,
+    strips: AxleRow,
+    vehicle: Array,
+    options: dict[str, Any],
 ) -> dict[str, float]:
-    """Return the factors of the worst loads under other pressures, with and without backing."""
-    # At the worst place alone: over all places the least factors differ by up to 0.5 %.
+    """Return the least factors under other pressures of a fill, with and without its backing."""
     if not isinstance(fill := options["fill"], Fill):
         return {}
-    row = tuple(load for load in moving.worst.live if isinstance(load, PointLoad))
     fills = {
-        "without_pressure": fill.changed(mobilisation=0.0, active=0.0),
-        "full_pressure": fill.changed(mobilisation=1.0),
+        "without_pressure": change_fill(fill, mobilisation=0.0, active=0.0),
+        "full_pressure": change_fill(fill, mobilisation=1.0),
     }
     if fill.backing is not None:
-        fills["without_backing"] = fill.changed(backing=None)
-        fills["without_either"] = fills["without_pressure"].changed(backing=None)
+        fills["without_backing"] = change_fill(fill, backing=None)
+        fills["without_either"] = change_fill(fills["without_pressure"], backing=None)
+    places = moving.factors["position"].values.tolist()
+    rows = dict.fromkeys(
+        axles_on_structure(structure, vehicle, way, x) for way in DRIVING_DIRECTIONS for x in places
+    )
+    # the fans of loads do not depend on pressure and backing
+    stones, _ = self_weight_programme(structure, **options)
+    axles = {row: stones.load(row) for row in rows if row}
+    forces = [stones.load([strip]) for strip in strips]
     factors = {}
     for name, other in fills.items():
         given = options | {"fill": other}
         stones, dead = self_weight_programme(structure, **given)
-        stands = is_balanced(dead.minimise_residual(), dead)
-        found = collapse_factors(stones, dead, {row: stones.load(row)}, given) if stands else {}
-        factors[name] = found.get(row, np.nan)
+        if not is_balanced(dead.minimise_residual(), dead):
+            continue
+        # these are worst with sliding that dilates: without, one of the next may be
+        worst = find_worst_rows(dead, axles, strips, forces)
+        worst = dict(islice(worst.items(), 1 if options["friction"] != "nonassociated" else 3))
+        factors[name] = min(collapse_factors(stones, dead, worst, given).values())
     return factors

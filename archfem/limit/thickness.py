@@ -6,8 +6,8 @@ import numpy as np
 
 from archfem._validation import check_between, check_type, validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
-from archfem.limit.backfill import Fill
 from archfem.limit.collapse import stands
+from archfem.limit.fill_strength import Fill
 from archfem.masonry.structure import Structure
 
 

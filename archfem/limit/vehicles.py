@@ -11,21 +11,15 @@ import numpy as np
 import xarray as xr
 
 from archfem._display import ProgressReport, ResultDisplay
-from archfem._typing import Array, Metres, Newtons, Numbers, Pascals
+from archfem._typing import Array, Flags, Metres, Newtons, Numbers, Pascals
 from archfem._validation import check_choice, check_number, check_numbers
 from archfem.errors import InvalidInput, logger
-from archfem.limit.backfill import (
-    BlocksWithFill,
-    Fill,
-    is_balanced,
-    refuse_bonds,
-    self_weight_programme,
-)
+from archfem.limit.backfill import BlocksWithFill, is_balanced, refuse_bonds, self_weight_programme
 from archfem.limit.collapse import Collapse, collapse_factor, read_bounds, warn_locking
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
+from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
-from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.structure import HasStructure, Structure, structure_of
 
@@ -246,7 +240,7 @@ def moving_load(
         )
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
     distinct = tuple(dict.fromkeys((*rows[0], *rows[1])))
-    strips = _cut_road(structure, check_number(area_load, "area_load [Pa]", minimum=0.0))
+    strips = cut_road(structure, check_number(area_load, "area_load [Pa]", minimum=0.0))
     laid, factor_of, bounds = _solve_rows(structure, distinct, strips, options)
     factors = np.array([[factor_of[row] for row in rows_one_way] for rows_one_way in rows])
     direction, place = _find_worst(factors, on_bridge)
@@ -325,7 +319,7 @@ def axles_on_structure(
     )
 
 
-def _cut_road(structure: Structure, area_load: float, count: int = 40) -> AxleRow:
+def cut_road(structure: Structure, area_load: float, count: int = 40) -> AxleRow:
     """Return a distributed load as a point load on each of some strips of the road."""
     points = np.concatenate([structure.blocks[number].drawn() for number in structure.free])
     edges = np.linspace(points[:, 0].min(), points[:, 0].max(), count + 1)
@@ -343,7 +337,7 @@ def _solve_rows(
     """Return each row of axles with the adverse strips, its factor and its bounds."""
     laid, fill = {row: row for row in rows}, options["fill"]
     if is_plastic := isinstance(fill, PlasticFill):
-        keys = ("friction_angle", "cohesion", "spread", "backing")
+        keys = ("friction_angle", "cohesion", "spread", "backing", "backing_height")
         fill = Fill(**{key: getattr(fill, key) for key in keys})
     if not is_plastic or strips:
         stones, dead = self_weight_programme(structure, **(options | {"fill": fill}))
@@ -368,46 +362,109 @@ def _solve_rows(
     return laid, factors, bounds
 
 
+class _RoadMechanisms:
+    """Mechanisms under loads on a road, which bound the factor of any other load from above.
+
+    By the kinematic theorem the bound is the resistance of a mechanism over the power of the axles,
+    and of the strips of a distributed load that sink in it.
+    """
+
+    def __init__(self, dead: Programme, strips: Sequence[Array]) -> None:
+        self._dead = dead
+        self.road = np.array(strips).reshape(len(strips), len(dead.load))
+        self._motions, self._resistances = list[Array](), list[float]()  # at a power of 1
+
+    def solve(self, load: Array) -> float:
+        """Return the factor of a load, infinite without any, and keep its mechanism."""
+        optimum = self._dead.with_load_factor(load).solve(forces=False) if load.any() else None
+        if optimum is None:
+            return np.inf
+        self._motions.append(optimum.multipliers)
+        self._resistances.append(-optimum.value)
+        return -optimum.value
+
+    def bound(self, loads: Array) -> tuple[Array, Flags]:
+        """Return the least bound of each load (n, 3 n_free), and which strips are adverse to it."""
+        scale = self._dead.blocks.dimensionless
+        motions = np.array(self._motions).reshape(-1, len(self._dead.load)).T
+        sinks = np.array([scale(force) for force in self.road]).reshape(-1, len(motions)) @ motions
+        power = np.array([scale(load) for load in loads]) @ motions
+        power += np.maximum(sinks, 0.0).sum(axis=0)
+        bounds = np.array(self._resistances) / np.maximum(power, 1e-300)
+        if not bounds.shape[1]:
+            return np.full(len(loads), np.inf), np.zeros((len(loads), len(self.road)), dtype=bool)
+        best = bounds.argmin(axis=1)
+        adverse = sinks > 1e-9 * sinks.max(axis=0, initial=0.0)
+        return bounds.min(axis=1), adverse.T[best]
+
+    def lay(self, axles: Array, factor: float, adverse: Flags, rounds: int = 20) -> Any:
+        """Return the least factor of axles found with sets of adverse strips, and this set."""
+        for _ in range(rounds):
+            bounds, other = self.bound(axles[None])
+            if not bounds[0] < (1.0 - 1e-5) * factor:  # crushing has endless mechanisms
+                break
+            adverse = other[0]
+            factor = self.solve(axles + self.road[adverse].sum(axis=0))
+        return factor, adverse
+
+
 def _lay_strips(
+    dead: Programme, axles: dict[AxleRow, Array], strips: AxleRow, forces: Sequence[Array]
+) -> tuple[dict[AxleRow, AxleRow], dict[AxleRow, Array]]:
+    """Return each row of axles with the strips of the least factor, and the forces of all."""
+    # At each place the best mechanism so far selects the strips; that of these is added, until none
+    # is better. The first ones are of the distributed load alone, on stretches of the road: else a
+    # search may end early.
+    known = _RoadMechanisms(dead, forces)
+    road = known.road
+    for size in (len(road) // 8, len(road) // 4, len(road) // 2):
+        for first in range(0, len(road) - size + 1, max(size // 2, 1)):
+            known.solve(road[first : first + size].sum(axis=0))
+    bare = np.zeros(len(road), dtype=bool)
+    chosen = {row: (known.solve(load), bare) for row, load in axles.items()}
+    for row in (*axles, *reversed(axles)):  # and back with the mechanisms of all places
+        chosen[row] = known.lay(axles[row], *chosen[row])
+    laid = {row: _join_row(row, strips, chosen[row][1]) for row in axles}
+    return laid, {laid[row]: axles[row] + road[chosen[row][1]].sum(axis=0) for row in axles}
+
+
+def find_worst_rows(
     dead: Programme,
     axles: dict[AxleRow, Array],
     strips: AxleRow,
     forces: Sequence[Array],
-    rounds: int = 20,
-) -> tuple[dict[AxleRow, AxleRow], dict[AxleRow, Array]]:
-    """Return each row of axles with the strips of the least factor, and the forces of all."""
-    # A mechanism bounds the factor of any load from above: by its resistance over the power of the
-    # axles, and of the strips that sink in it (kinematic theorem). At each place the best one so
-    # far selects the strips; the mechanism of these is added, until none is better. The first ones
-    # are of the distributed load alone, on stretches of the road: else a search may end early.
-    road, motions, resistances = np.array(forces), list[Array](), list[float]()
-    powers = np.array([dead.blocks.dimensionless(force) for force in road])
+    count: int = 32,
+    margin: float = 0.03,
+) -> dict[AxleRow, Array]:
+    """Return the rows of axles of least factors, the least first, with adverse strips, and forces.
 
-    def solve(load: Array) -> float:
-        optimum = dead.with_load_factor(load).solve() if load.any() else None
-        if optimum is None:
-            return np.inf
-        motions.append(optimum.multipliers)
-        resistances.append(-optimum.value)  # at a power of 1
-        return -optimum.value
+    Some rows all along the road are solved, and then those beside rows of nearly the least factor,
+    and that of the lowest bound from above, until none is left within a margin.
+    """
+    known, rows, loads = _RoadMechanisms(dead, forces), [*axles], [*axles.values()]
+    laid: dict[int, tuple[float, Flags]] = {}
+    pending = {*range(0, len(rows), max(len(rows) // count, 1))}
+    bare = np.zeros(len(strips), dtype=bool)
+    while pending:
+        for k in pending:
+            laid[k] = known.lay(loads[k], known.solve(loads[k]), bare)
+        bounds, _ = known.bound(np.array(loads))
+        near = (1.0 + margin) * min(factor for factor, _ in laid.values())
+        low = [k for k, (factor, _) in laid.items() if factor < near]
+        unsolved = {*range(len(rows))} - {*laid}
+        pending = unsolved & {k + side for k in low for side in (-1, 1)}
+        lowest = min(unsolved, key=bounds.__getitem__, default=0)
+        pending |= {lowest} & unsolved if bounds[lowest] < near else set()
+    worst = sorted(laid, key=lambda k: laid[k][0])
+    return {
+        _join_row(rows[k], strips, laid[k][1]): loads[k] + known.road[laid[k][1]].sum(axis=0)
+        for k in worst
+    }
 
-    for size in (len(road) // 8, len(road) // 4, len(road) // 2):
-        for first in range(0, len(road) - size + 1, max(size // 2, 1)):
-            solve(road[first : first + size].sum(axis=0))
-    chosen = {row: (solve(load), np.zeros(len(road), dtype=bool)) for row, load in axles.items()}
-    for row in (*axles, *reversed(axles)):  # and back with the mechanisms of all places
-        load = dead.blocks.dimensionless(axles[row])
-        for _ in range(rounds if motions else 0):
-            sinks = powers @ np.array(motions).T
-            power = load @ np.array(motions).T + np.maximum(sinks, 0.0).sum(axis=0)
-            bounds = np.array(resistances) / np.maximum(power, 1e-300)
-            best = int(bounds.argmin())
-            if bounds[best] >= (1.0 - 1e-5) * chosen[row][0]:  # crushing has endless mechanisms
-                break
-            adverse = sinks[:, best] > 1e-9 * sinks[:, best].max()
-            chosen[row] = solve(axles[row] + road[adverse].sum(axis=0)), adverse
-    laid = {row: (*row, *np.array(strips, dtype=object)[chosen[row][1]]) for row in axles}
-    return laid, {laid[row]: axles[row] + road[chosen[row][1]].sum(axis=0) for row in axles}
+
+def _join_row(row: AxleRow, strips: AxleRow, adverse: Flags) -> AxleRow:
+    """Return a row of axles with the strips that are adverse to it."""
+    return (*row, *(strip for strip, counts in zip(strips, adverse, strict=True) if counts))
 
 
 def collapse_factors(

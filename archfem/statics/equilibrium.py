@@ -12,7 +12,7 @@ rigid blocks that no thrust line within friction can hold must not be at rest: t
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from itertools import combinations
 from math import sqrt
 from typing import Literal, Protocol, runtime_checkable
@@ -554,7 +554,8 @@ def _doubt_support(structure: Structure, numbers: Sequence[int], part: str) -> D
     )
 
 
-def fill_doubts(structure: Structure) -> list[Doubt]:
+@lru_cache(maxsize=8)
+def fill_doubts(structure: Structure) -> tuple[Doubt, ...]:
     """Return a doubt where fill in one piece holds itself as no soil does.
 
     Fill in one piece carries tension. Cut into pieces whose joints carry none, with the strength of
@@ -563,22 +564,22 @@ def fill_doubts(structure: Structure) -> list[Doubt]:
     angle, cohesion = 30.0, 5e3  # [°], [Pa]
     fill = find_yielding_blocks(structure)
     if not fill or any(structure.blocks[number].grain for number in fill):
-        return []
+        return ()
     # about 150 pieces; with 50 to 300 the answer was the same for 15 bridges
     size = sqrt(8.0 / sqrt(3.0) * sum(structure.blocks[n].area for n in fill) / 100.0)
     pieces = jointed_fill(structure, size, friction_angle=angle, cohesion=cohesion)
     if _stands_as_rigid_blocks(pieces):
-        return []
+        return ()
     heights = [height for number in fill for height in _free_end_heights(structure, number)]
     ends = f", and it ends in free faces of {join_names(heights)} m" if heights else ""
-    return [
+    return (
         Doubt(
             f"fill in one piece holds itself by tension: as soil of {angle:g}° and "
             f"{cohesion / kPa:g} kPa it does not stand under its own weight{ends}",
             "hold its ends by sidewalls ([structure.sidewalls] in a case), and compare with pieces "
             '(law = "jointed", friction_angle and piece_size in [structure.fill])',
-        )
-    ]
+        ),
+    )
 
 
 def _free_end_heights(structure: Structure, number: int) -> list[str]:

@@ -30,12 +30,7 @@ from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import check_between, check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput, logger
-from archfem.limit.backfill import (
-    BlocksWithFill,
-    Fill,
-    FillProfile,
-    attach_fill,
-)
+from archfem.limit.backfill import BlocksWithFill, FillProfile, attach_fill
 from archfem.limit.collapse import collapse_factor
 from archfem.limit.displaced_blocks import (
     FillPressure,
@@ -45,11 +40,11 @@ from archfem.limit.displaced_blocks import (
     find_mechanism,
 )
 from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
+from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
 from archfem.limit.mechanism_names import name_mechanism
-from archfem.limit.plastic_fill import PlasticFill
 from archfem.masonry.loads import AttachedLoad, BodyForce
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (

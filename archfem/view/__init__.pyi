@@ -5,6 +5,7 @@ from .collapse import draw_fall as draw_fall
 from .collapse import draw_kinematic_assessment as draw_kinematic_assessment
 from .collapse import draw_moving_load as draw_moving_load
 from .collapse import draw_rating as draw_rating
+from .collapse import draw_ratings as draw_ratings
 from .films.film import film as film
 from .films.film import film_modes as film_modes
 from .films.film import picture as picture

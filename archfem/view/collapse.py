@@ -36,6 +36,7 @@ from archfem.view.style import (
     add_legend_below,
     add_polygons,
     annotate,
+    line_style,
     new_axes,
     new_figure,
     outline_bounds,
@@ -154,14 +155,66 @@ def draw_rating(found: Rating) -> Figure:
         marks where the distributed load stands.
     """
     title = f"{found.vehicle.name}: factor {found.factor:.3g}, {found.outcome}"
-    code = found.live * found.impact
-    # each axle as it was given, on its part of the width and without factors
-    share, (axles, strips) = code * found.structure.width / found.width, _split_loads(found.moving)
-    live = [replace(load, force=tuple(force / share for force in load.force)) for load in axles]
-    factors, worst = "" if code == 1.0 else f" {code:.3g} ×", found.moving.worst
-    worst = replace(worst, live=live)
+    worst, factors, strips = _take_axles_as_given(found)
     load = f"{found.vehicle.name} on {found.width:.3g} m of width"
     return _draw_factors(found.moving, worst, title, load, factors, strips, required=1.0)
+
+
+def _take_axles_as_given(found: Rating) -> tuple[Collapse, str, list[PointLoad]]:
+    """Return the worst collapse under axles as given, what multiplies them, and strips of load."""
+    code = found.live * found.impact
+    # on the vehicle's part of the width and without factors
+    share, (axles, strips) = code * found.structure.width / found.width, _split_loads(found.moving)
+    live = [replace(load, force=tuple(force / share for force in load.force)) for load in axles]
+    factors = "" if code == 1.0 else f" {code:.3g} ×"
+    return replace(found.moving.worst, live=live), factors, strips
+
+
+@validate_arguments
+def draw_ratings(ratings: Sequence[Rating]) -> Figure:
+    """Draw the factors of several vehicles along a bridge, and each vehicle at its worst place.
+
+    Args:
+        ratings: of one bridge, in the order of the panels.
+
+    Returns:
+        The figure: the lesser factor of both directions over the place of each vehicle's middle, up
+        to four times the least one, above a panel for each vehicle with its worst mechanism. The
+        first six are drawn.
+    """
+    drawn = ratings[: len(Colour.LINES)]
+    structure, top = drawn[0].structure, 4.0 * max(1.0, min(found.factor for found in drawn))
+    wide, tall = structure_figure(structure).get_size_inches()
+    # two panels a row, so that six fit a page
+    count = (len(drawn) + 1) // 2
+    figure = new_figure(wide, 2.6 + count * (0.5 * tall + 0.7))
+    ratios = [2.6] + [0.5 * tall + 0.7] * count
+    grid = figure.add_gridspec(1 + count, 2, height_ratios=ratios)
+    upper = figure.add_subplot(grid[0, :])
+    rows = [figure.add_subplot(grid[1 + k // 2, k % 2]) for k in range(len(drawn))]
+    for k, found in enumerate(drawn):
+        over = found.moving.factors["factor"].min("direction")
+        finite = over.where(np.isfinite(over))
+        upper.plot(over["position"], finite, label=found.vehicle.name, lw=1.5, **line_style(k))
+        style = {"color": line_style(k)["color"], "mec": "white", "ms": 6.5, "zorder": 5}
+        upper.plot([found.moving.position], [found.factor], "o", **style)
+    upper.axhline(1.0, color=Colour.GREY, lw=1.0)
+    upper.set_ylim(0.0, top)
+    style_axes(upper, "middle of the vehicle, x [m]", "factor [-]")
+    set_title(upper, f"{structure.name}: least factor of each vehicle, over its place")
+    upper.legend(frameon=False, fontsize=Size.LABEL, loc="lower center", ncols=3)
+    for found, axes in zip(drawn, rows, strict=True):
+        worst, factors, strips = _take_axles_as_given(found)
+        draw_structure(structure, axes=axes)
+        _draw_mechanism(axes, structure, worst, factors)
+        _mark_strips(axes, structure, strips)
+        axes.get_legend().remove()
+        set_title(axes, f"{found.vehicle.name}: {found.factor:.3g}, {found.outcome}")
+    labelled = {x.get_label(): x for axes in rows for x in axes.get_legend_handles_labels()[0]}
+    # the size of the loads is another one in each panel
+    kept = [handle for label, handle in labelled.items() if not label.startswith("live load")]
+    add_legend_below(figure, handles=kept)
+    return figure
 
 
 @validate_arguments
@@ -229,16 +282,21 @@ def _draw_factors(
     _draw_mechanism(lower, structure, worst, factors)
     if np.isfinite(worst.factor):
         set_title(lower, f"{structure.name}: a mechanism at {worst.factor:.3g} ×{factors} {load}")
-    if strips:
-        places = np.array([load.place(structure)[1] for load in strips])
-        style = {"color": Colour.LOAD, "ls": "", "marker": "v", "ms": 3.0, "zorder": 9}
-        lower.plot(*places.T, label="distributed load", **style)
+    _mark_strips(lower, structure, strips)
     # below both panels: arrows may stand anywhere in the lower one
     lower.get_legend().remove()
     add_legend_below(figure, handles=lower.get_legend_handles_labels()[0])
     margin = 0.03 * np.ptp(ends)
     lower.set_xlim(ends.min() - margin, ends.max() + margin)
     return figure
+
+
+def _mark_strips(axes: Axes, structure: Structure, strips: Sequence[PointLoad]) -> None:
+    """Mark where a distributed load stands."""
+    if strips:
+        places = np.array([load.place(structure)[1] for load in strips])
+        style = {"color": Colour.LOAD, "ls": "", "marker": "v", "ms": 3.0, "zorder": 9}
+        axes.plot(*places.T, label="distributed load", **style)
 
 
 @validate_arguments

@@ -616,7 +616,9 @@ def test_a_result_without_a_time_history_has_a_report(
     concluded = words.split("Inputs and assumptions")[1]  # between the contents and the heading
     assert found in concluded
     assert re.search(r"In doubt, (rating|limit analysis): Joints slide \(arch, joint", concluded)
-    assert ("Over the pressure of the fill, at that place: " in concluded) == (command == "rate")
+    assert ("Over the pressure of the fill, each at its worst place: " in concluded) == (
+        command == "rate"
+    )
     doubted = " Values marked as to be checked were not compared with the text" in concluded
     assert doubted == (command == "rate")
     factor = re.search(r"factor (?:of )?([\d.]+)", said)[1]

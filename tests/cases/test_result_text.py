@@ -64,6 +64,12 @@ def test_words_and_tables_obey_the_criteria_of_the_run(run):
     assert calm.verdict.headline.startswith("mechanism by verified; none by any joints at once, ")
 
 
+DEFAULTS = (
+    "fill, by default: law pressure, cohesion 0 Pa, active 1, dispersal boussinesq, spread 30 "
+)
+DEFAULTS += "degree, lever 0"
+
+
 def test_limit_analysis_in_words(ring):
     pushed = af.collapse_factor(ring, live=af.BodyForce(1.0))
     limit = parse_limit({"strength": 2e6, "fill": {"friction_angle": 35}})
@@ -72,18 +78,20 @@ def test_limit_analysis_in_words(ring):
     assert outcome == f"limit analysis: four-hinge mechanism, {place}"
     assert hinges.startswith("hinges, by the face in contact: joint 0 at the intrados; joint 6 at")
     assert crushing == "joints crush at 2 MPa, the strength of the stones"
-    assert "at most 0.33 of the passive pressure, friction angle 35°, cohesion 0 kPa" in fill
+    assert "at most a third of the passive pressure, friction angle 35°, cohesion 0 kPa" in fill
     plastic = {"law": "plastic", "friction_angle": 30, "cohesion": "5 kPa"}
     plastic = parse_limit({"fill": plastic}).fill
-    assert describe_fill(plastic).startswith(
+    assert describe_fill(plastic, ring).startswith(
         "fill: a plastic body, friction angle 30°, cohesion 5 kPa, too strong for 4 of 7 bridges"
     )
-    backed = describe_fill(replace(plastic, backing=0.5))
-    assert backed.endswith("; backing up to y = 0.5 m: stones below are fixed")
-    backed = describe_fill(replace(limit.fill, backing=0.5))
-    assert backed.endswith("it holds faces horizontally, by up to 1 MPa (default, from memory)")
-    fill = parse_limit({"fill": {"friction_angle": 35, "backing_strength": "2 MPa"}}).fill
-    assert describe_fill(replace(fill, backing=0.5)).endswith("by up to 2 MPa (given)")
+    # the clear springing of a ring is below the ends of its centre line
+    clear = min(joint.intrados[1] for joint in ring.joints)
+    for law, ends in ((plastic, "stones below are fixed"), (limit.fill, "by up to 1 MPa")):
+        by_level = describe_fill(replace(law, backing=0.5), ring)
+        above = f"{0.5 - clear:.3g} m above the lowest clear springing"
+        assert f"; backing up to y = 0.5 m, {above}: " in by_level
+        assert by_level.endswith(ends)
+        assert describe_fill(replace(law, backing_height=0.5 - clear), ring) == by_level
     mirrored = af.collapse_factor(ring, live=af.BodyForce(-2.0))
     assert mirrored.sentence == pushed.sentence.replace("right", "left")
     assert pushed.sentence.startswith("four-hinge mechanism, at ")
@@ -96,19 +104,22 @@ def test_limit_analysis_in_words(ring):
     assert both.sentence.endswith(f"at {both.factor:.4g} times the load")
     # the lesser of both senses is concluded with
     site = af.Eurocode8(ag=0.1, ground="C")
-    case = SimpleNamespace(structure=ring, limit=limit, target=None)
-    case.assessment = SimpleNamespace(spectrum=None)
+    given = {"limit": {"fill": {"friction_angle": 35, "mobilisation": 1.0 / 3.0}}}
+    case = SimpleNamespace(structure=ring, limit=limit, target=None, settings=given)
+    case.assessment = SimpleNamespace(spectrum=None, options={})
     for factor, rank in ((0.9, "more"), (1.1, "more"), (0.99999, "the same")):
         other = replace(mirrored, factor=factor * pushed.factor, upper=factor * pushed.factor)
         least, words = describe_limit(case, pushed, other)
         first, second = (other, pushed) if factor == 0.9 else (pushed, other)
         assert least is first
         assert words.startswith(f"limit analysis: {first.sentence}\n")
-        assert words.endswith(f"\nin the other sense: {second.sentence} ({rank})")
+        other = f"\nin the other sense: {second.sentence} ({rank})\n"
+        # a value is a default by the case, not by its size
+        assert words.endswith(f"{other}{DEFAULTS}")
     ranged = replace(pushed, upper=1.2 * pushed.factor)
     between = 1.1 * pushed.factor
     words = describe_limit(case, ranged, replace(mirrored, factor=between, upper=between))[1]
-    assert words.endswith(" (their ranges overlap)")
+    assert words.endswith(f" (their ranges overlap)\n{DEFAULTS}")
     # 1.15 a_g at the surface
     for case.target, named in (
         (site, "0.1 g × S 1.15"),
@@ -121,7 +132,12 @@ def test_limit_analysis_in_words(ring):
     case.target = None
     least = replace(pushed, solutions=SimpleNamespace(may_be_less=True))
     words = describe_limit(case, least, mirrored)[1]
-    assert words.endswith(" (more; each sense is searched by itself)")
+    assert words.endswith(f" (more; each sense is searched by itself)\n{DEFAULTS}")
+    given["limit"]["fill"] |= {"backing": 0.5, "backing_strength": 1e6}
+    case.limit = parse_limit(given["limit"])
+    assert "backing strength" not in describe_limit(case, pushed, None)[1]
+    del given["limit"]["fill"]["backing_strength"]
+    assert describe_limit(case, pushed, None)[1].endswith(f"{DEFAULTS}, backing strength 1e+06 Pa")
     slab = af.column(breadth=4.0, heights=[1.0])  # slides before it turns
     slid, lifted = (af.collapse_factor(slab, live=af.BodyForce(*g)) for g in ((1.0,), (0.0, -1.0)))
     words = describe_collapse(slab, slid, parse_limit({})).splitlines()

@@ -617,6 +617,7 @@ def test_vehicles_are_rated_together_the_worst_first(tmp_path, unplotted, capsys
     assert af.commands.main(["rate", str(path), "--out", str(out), *given]) == 0
     said = capsys.readouterr().out
     rows = pd.read_csv(out / "vehicles.csv")
+    assert (out / "vehicles.png").exists()
     assert {*rows["vehicle"]} == {"cart", "LM1", "HL93-tandem", "HL93-truck"}
     assert (np.diff(rows["factor"]) >= 0.0).all()
     case = af.Case.read(path)
@@ -632,7 +633,7 @@ def test_vehicles_are_rated_together_the_worst_first(tmp_path, unplotted, capsys
     assert text in said
     assert [line.split()[0] for line in text.splitlines()[1:5]] == [*rows["vehicle"]]
     assert af.commands.main(["rate", str(path), "--out", str(out)]) == 0
-    assert not (out / "vehicles.csv").exists()
+    assert not {"vehicles.csv", "vehicles.png"} & {each.name for each in out.iterdir()}
     assert "cart" in (out / "rating.toml").read_text()
 
 

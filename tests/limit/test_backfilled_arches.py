@@ -13,6 +13,7 @@ from backfilled import (
     fill_of,
     rectangle,
     retaining_wall,
+    two_walls,
 )
 from scipy.optimize import linprog
 
@@ -391,6 +392,27 @@ def test_a_column_turns_its_stone_about_the_height_of_its_force():
         fill = af.limit.Fill(friction_angle=45.0, lever=lever)
         found = af.collapse_factor(structure, live=SIDEWAYS, friction=None, fill=fill).factor
         assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_fill_that_ends_in_air_between_two_walls_holds_neither(caplog):
+    """The slender wall turns alone, at b / h; with fill all along between both turn at once."""
+    filled = two_walls()
+    fill = af.limit.Fill(friction_angle=30.0, active=0.0, mobilisation=1.0)
+    together = af.collapse_factor(filled, live=SIDEWAYS, friction=None, fill=fill)
+    assert together.factor == pytest.approx((2.0 * 0.5 + 4.0 * 1.0) / 6.0)
+    assert "ends in air" not in caplog.text
+    rock, slender, _, thick = filled.blocks
+    soils = [rectangle(*x, "soil", SOIL) for x in ((0.0, 0.0, 0.9, 2.0), (1.1, 0.0, 2.0, 2.0))]
+    soils = [replace(soil, name=f"soil {k}", part=f"soil {k}") for k, soil in enumerate(soils)]
+    parted = af.masonry.assembled(
+        [rock, slender, *soils, thick],
+        lambda a, b: (
+            af.masonry.SOIL_TO_STONE if "soil" in a.name + b.name else af.masonry.STONE_TO_STONE
+        ),
+    )
+    alone = af.collapse_factor(parted, live=SIDEWAYS, friction=None, fill=fill)
+    assert alone.factor == pytest.approx(0.5)
+    assert "beside x = 0 m, y = 0.125 m ends in air before the opposite face" in caplog.text
 
 
 @pytest.mark.parametrize(

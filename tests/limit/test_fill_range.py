@@ -1,5 +1,6 @@
 """Range of results over what is assumed of a fill: closed forms of a stone in it, and its words."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -68,7 +69,7 @@ def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
     )
     assert doubled.sentence == found.sentence
     # whatever is given, both ends are found
-    raised = fill.changed(lever=1.0, mobilisation=0.0)
+    raised = replace(fill, lever=1.0, mobilisation=0.0)
     raised = af.collapse_factor(buried_stone(), live=live, friction=None, fill=raised)
     assert raised.factor == pytest.approx(low)
     assert sorted(raised.over_fill.values.values()) == pytest.approx(

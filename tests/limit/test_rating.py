@@ -319,23 +319,67 @@ def test_words_and_table(lorry_rating):
     assert least == pytest.approx(lorry_rating.factor, rel=1e-5)  # six digits
 
 
-def test_the_range_over_the_pressure_of_the_fill_is_that_of_collapse_factors(lorry_rating):
-    """Of the same loads at the worst place, on heavier materials: none of it, and all."""
-    weighted = lorry_rating.moving.worst.structure
-    live = list(lorry_rating.moving.worst.live)
+def test_the_range_over_the_pressure_of_the_fill_is_that_of_all_places(lorry_rating):
+    """Of the same axles at all places, on heavier materials: none of it, and all."""
+    worst, vehicle = lorry_rating.moving.worst, lorry_rating.vehicle
+    loads = [load.force[1] for load in worst.live]
+    axles = np.array(vehicle.axles) * min(loads) / -max(vehicle.axles)
+    places = {"positions": lorry_rating.moving.factors["position"].values.tolist()}
     none, whole = (
-        af.collapse_factor(weighted, live=live, fill=replace(GRAVEL, **pressure)).factor
+        af.limit.moving_load(
+            worst.structure,
+            axles.tolist(),
+            spacings=vehicle.spacings,
+            fill=replace(GRAVEL, **pressure),
+            **places,
+        ).worst.factor
         for pressure in ({"mobilisation": 0.0, "active": 0.0}, {"mobilisation": 1.0})
     )
     assert lorry_rating.without_pressure == pytest.approx(none, rel=EXACT)
     assert lorry_rating.full_pressure == pytest.approx(whole, rel=EXACT)
     assert none < 0.9 * lorry_rating.factor < 0.8 * whole
-    begin = f"over the pressure of the fill, at that place: {none:.4g} without it"
-    share = "up to a third of the passive one (default)"
+    begin = f"over the pressure of the fill, each at its worst place: {none:.4g} without it"
+    share = "up to a third of the passive one"
     end = f", {whole:.4g} with all of it"
     assert f"\n{begin}, {lorry_rating.factor:.4g} with {share}{end}\n" in str(lorry_rating)
     half = replace(lorry_rating, fill=replace(lorry_rating.fill, mobilisation=0.5))
     assert half.describe_pressure()[0].endswith(f"with up to 0.5 of the passive one{end}")
+
+
+@pytest.mark.parametrize("area_load", [0.0, pytest.param(9e3, marks=pytest.mark.slow)])
+def test_other_states_of_the_fill_have_worst_places_of_their_own(area_load, monkeypatch):
+    """Against all places: with all of the pressure the axle is worst on the other span."""
+    places = np.linspace(1.0, 15.0, 43).tolist()
+    monkeypatch.setattr(rating, "_places_along", lambda *_: places)
+    bridge = af.bridge(
+        arches=[
+            af.shapes.Arch(span=5.0, rise=rise, thickness=0.45, voussoirs=9, name=f"{rise}")
+            for rise in (1.2, 2.2)
+        ],
+        piers=[af.shapes.Pier(gap=1.2, height=3.0, course=3.0, name="pier")],
+        sidewalls=[
+            af.shapes.Sidewall(length=2.0, height=1.5, state="fixed", name=f"{side} wall")
+            for side in ("left", "right")
+        ],
+        backfill=af.shapes.Backfill(cover=0.4),
+        width=3.0,
+    )
+    fill = replace(GRAVEL, backing=0.3)
+    vehicle = Vehicle("axle", (1e5,), area_load=area_load)
+    found = af.rate(bridge, vehicle, fill=fill, width=3.0)
+    states = {
+        "without_pressure": {"mobilisation": 0.0, "active": 0.0},
+        "full_pressure": {"mobilisation": 1.0},
+        "without_backing": {"backing": None},
+        "without_either": {"mobilisation": 0.0, "active": 0.0, "backing": None},
+    }
+    for name, changes in states.items():
+        given = {"positions": places, "area_load": area_load, "fill": replace(fill, **changes)}
+        expected = af.limit.moving_load(bridge, 1e5, **given).worst.factor
+        assert getattr(found, name) == pytest.approx(expected, rel=1e-4)
+    whole = replace(fill, mobilisation=1.0)
+    there = af.collapse_factor(bridge, live=found.moving.worst.live, fill=whole).factor
+    assert area_load or there > 1.3 * found.full_pressure
 
 
 def test_a_bridge_that_the_fill_holds_has_no_factor_without_it(monkeypatch):
@@ -380,7 +424,7 @@ def test_a_verdict_says_which_parts_of_the_fill_it_rests_on(lorry_rating):
     backed = replace(soft, fill=replace(GRAVEL, backing=0.5), without_backing=np.nan)
     words = "passes only with the pressure of the fill and the backing"
     assert backed.outcome.startswith(words)
-    without = "\nwithout the backing but with the pressure, at that place: "
+    without = "\nwithout the backing but with the pressure, each at its worst place: "
     assert f"{without}the bridge does not stand; without either: " in str(backed)
     either = replace(lorry_rating, fill=backed.fill, without_backing=1.01, without_either=0.8)
     assert either.outcome.startswith("passes only with the pressure of the fill or the backing if")

@@ -174,9 +174,9 @@ def descent(structure, motion, x):
 @pytest.mark.parametrize("fill", [GRAVEL, None], ids=["fill", "bare"])
 def test_a_distributed_load_stands_on_the_worst_of_all_sets_of_strips(fill, monkeypatch):
     """Against each of the 2**5 sets of strips, solved one by one with the axles."""
-    monkeypatch.setattr(vehicles._cut_road, "__defaults__", (5,))
+    monkeypatch.setattr(vehicles.cut_road, "__defaults__", (5,))
     structure, weight = arch_bridge(cover=0.3 if fill else None), 20e3
-    strips = vehicles._cut_road(structure, weight)
+    strips = vehicles.cut_road(structure, weight)
     corners = np.concatenate([structure.blocks[n].drawn() for n in structure.free])[:, 0]
     total = sum(load.force[1] for load in strips)
     assert total == pytest.approx(-weight * np.ptp(corners))

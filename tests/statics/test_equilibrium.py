@@ -353,14 +353,16 @@ def test_fill_that_only_tension_holds_is_a_doubt_with_its_free_ends():
     # radius 5.25 m, springing at cos α = 0.6: from the extrados there to the deck
     assert f"free faces of {5.8 + 0.45 - 5.8 * 0.6:.3g}, 2.77 m" in doubt.cause
     assert "sidewalls" in doubt.remedy
-    assert fill_doubts(arch_bridge(**WALLS)) == []
-    assert fill_doubts(resting().model.structure) == []
+    # limit analysis of pieces, once for all results of structures that are equal
+    assert fill_doubts(arch_bridge()) is fill_doubts(arch_bridge())
+    assert fill_doubts(arch_bridge(**WALLS)) == ()
+    assert fill_doubts(resting().model.structure) == ()
 
 
 def test_fill_in_pieces_answers_itself():
     pieces = af.masonry.jointed_fill(arch_bridge(), 1.2, friction_angle=30.0)
     assert not af.stands(pieces)
-    assert fill_doubts(pieces) == []
+    assert fill_doubts(pieces) == ()
 
 
 def test_every_answer_of_a_bridge_has_the_doubt_of_its_fill(tmp_path, capsys):

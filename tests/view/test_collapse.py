@@ -18,6 +18,7 @@ from archfem.view import (
     draw_kinematic_assessment,
     draw_moving_load,
     draw_rating,
+    draw_ratings,
     draw_structure,
 )
 from archfem.view.structure import draw_loads
@@ -188,6 +189,41 @@ def test_a_rating_marks_where_the_distributed_load_stands(coarse_ring, few_place
     np.testing.assert_allclose(marked, sinks)
     assert axle.force[1] == -5e3
     assert 0 < len(strips) < 40
+
+
+def test_several_vehicles_are_drawn_each_at_its_worst_place(coarse_ring, few_places):
+    """Of seven the first six: a line each, and a panel with its own axles."""
+    lorries = [
+        af.limit.Vehicle(f"lorry {k}", (5e3 + 1e3 * k, 5e3), (1.0,), area_load=2e3 * (k > 1))
+        for k in range(3)
+    ]
+    ratings = [af.rate(coarse_ring, lorry, friction=None) for lorry in lorries]
+    figure = draw_ratings([*ratings, *ratings, ratings[0]])
+    upper, *panels = figure.axes
+    assert len(panels) == 6
+    legend = [text.get_text() for text in upper.get_legend().get_texts()]
+    assert legend == 2 * [lorry.name for lorry in lorries]
+    points = [line.get_xydata()[0] for line in upper.lines if line.get_marker() == "o"]
+    expected = [(found.moving.position, found.factor) for found in 2 * ratings]
+    np.testing.assert_allclose(points, expected)
+    for found, axes in zip(ratings, panels[:3], strict=True):
+        assert (
+            axes.get_title()
+            .replace("\n", " ")
+            .startswith(f"{found.vehicle.name}: {found.factor:.3g}, {found.outcome}")
+        )
+        tips = [text.xy for text in axes.texts if text.arrow_patch is not None]
+        count = int(
+            found.moving.factors["axles"].sel(
+                direction=found.moving.direction, position=found.moving.position
+            )
+        )
+        loads = found.moving.worst.live[:count]
+        np.testing.assert_allclose(tips, [load.place(coarse_ring)[1] for load in loads])
+        ends = [getattr(coarse_ring.joints[k], side) for k, side in found.moving.worst.hinges]
+        np.testing.assert_allclose(lines_of(axes)["hinge"], ends)
+    (below,) = figure.legends
+    assert "distributed load" in [text.get_text() for text in below.get_texts()]
 
 
 def test_backing_is_hatched_up_to_its_level():

@@ -263,8 +263,10 @@ def _build_rating(data: ReportData) -> list[Any]:
     _, worst, *others = text.text.split("\n\n")
     head, *rows = reader(table.splitlines())
     grid = Grid(head, rows, "Factors of several vehicles, the worst first", "words")
+    every = data.read_figure("vehicles.png", "Factor of each vehicle over its place")
     texts = (TextBlock(each, "lines") for each in (worst, *others))
-    return [grid, *texts, *(replace(each, caption=f"{caption}, of the worst") for each in figures)]
+    shown = (replace(each, caption=f"{caption}, of the worst") for each in figures)
+    return [grid, *every, *texts, *shown]
 
 
 def _tabulate_dead_load(joints: xr.Dataset) -> Grid:
