@@ -184,16 +184,7 @@ def _add_case_commands(commands: Any) -> None:
     about = "kinematic assessment of the collapse mechanism against a design spectrum"
     add_to = add("assess", about, "folder for text and pictures (none)", required=False)
     add_to("--parts", action="store_true", help="each part by itself")
-    about = "rating of a bridge for vehicles by limit analysis"
-    add_to = add("rate", about, "")
-    about = "such as LM1, or Eurocode, CS454, HL93 for all of a code (that of [rating]); repeatable"
-    add_to("--vehicle", action="append", default=[], metavar="NAME", help=about, dest="vehicles")
-    add_to("--live", type=float, help="partial factor on the vehicle (of its code)")
-    add_to("--impact", type=float, help="dynamic factor on the vehicle (of its code)")
-    add_to("--dead", type=float, help="partial factor on the weights (1)")
-    add_to("--width", help="width that carries one vehicle [m] (by rule)")
-    add_to("--area-load", help="load beside the axles [Pa] (of its code)")
-    add_to("--out", metavar="DIR", help="folder for text, table and picture (none)")
+    _add_rating(add)
     add("mesh", "write the mesh of a case as a gmsh file", "")(
         "--out", required=True, metavar="FILE.msh", help="the mesh file"
     )
@@ -211,6 +202,20 @@ def _add_case_commands(commands: Any) -> None:
     add("risk", about)("--workers", type=int, default=1, help="processes for the runs (1)")
     about = "speed against error over fidelities, meshes, quadratures and steps"
     add("accuracy", about)("--workers", type=int, default=1, help="processes for settings (1)")
+
+
+def _add_rating(add: Callable[..., AddArgument]) -> None:
+    """Add `archfem rate`."""
+    about = "rating of a bridge for vehicles by limit analysis"
+    add_to = add("rate", about, "")
+    about = "such as LM1, or Eurocode, CS454, HL93 for all of a code (that of [rating]); repeatable"
+    add_to("--vehicle", action="append", default=[], metavar="NAME", help=about, dest="vehicles")
+    add_to("--live", type=float, help="partial factor on the vehicle (of its code)")
+    add_to("--impact", type=float, help="dynamic factor on the vehicle (of its code)")
+    add_to("--dead", type=float, help="partial factor on the weights (1)")
+    add_to("--width", help="width that carries one vehicle [m] (by rule)")
+    add_to("--area-load", help="load beside the axles [Pa] (of its code)")
+    add_to("--out", metavar="DIR", help="folder for text, table and picture (none)")
 
 
 def _add_changes(add_argument: AddArgument) -> None:

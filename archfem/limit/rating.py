@@ -387,11 +387,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     rule = driven.spread_over(structure)
     width = rule if width is None else width
     area_load = driven.area_load if area_load is None else area_load
-    if not 0.0 < width <= structure.width:
-        raise InvalidInput(
-            f"width {width:.4g} m is not above 0 and up to that of the bridge, "
-            f"{structure.width:.4g} m: give the part over which one vehicle spreads"
-        )
+    _check_width(width, structure)
     weighted, rows = _scale_weights(structure, dead), driven.factored(live, impact)
     strength, fill = check_options(structure, friction, strength), place_backing(fill, structure)
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
@@ -420,14 +416,23 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     if width > (1.0 + 1e-9) * rule or area_load < driven.area_load:
         least = min(width, rule), max(area_load, driven.area_load)
         by_rule = drive(*least, [moving.position]).worst.factor
-    geometric, deepest = np.nan, np.nan
-    if not is_plastic:
-        geometric, deepest = _geometric_factor(weighted, moving, options)
+    unknown = np.nan, np.nan
+    geometric, deepest = unknown if is_plastic else _geometric_factor(weighted, moving, options)
     factors = live, impact, dead, width, area_load
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
-    axles *= [structure.width / width * live * impact, 1.0]
-    more |= _vary_fill(weighted, moving, cut_road(weighted, live * area_load), axles, options)
+    # of the whole width, as the structure is modelled
+    loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in rows]
+    more |= _vary_fill(weighted, moving, cut_road(weighted, live * area_load), loads, options)
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
+
+
+def _check_width(width: float, structure: Structure) -> None:
+    """Raise an error where one vehicle spreads over more than the bridge, or over nothing."""
+    if not 0.0 < width <= structure.width:
+        raise InvalidInput(
+            f"width {width:.4g} m is not above 0 and up to that of the bridge, "
+            f"{structure.width:.4g} m: give the part over which one vehicle spreads"
+        )
 
 
 def _least_of(each: Sequence[MovingLoad]) -> MovingLoad:
@@ -529,7 +534,7 @@ def _vary_fill(
     structure: Structure,
     moving: MovingLoad,
     strips: AxleRow,
-    vehicle: Array,
+    vehicles: Sequence[Array],
     options: dict[str, Any],
 ) -> dict[str, float]:
     """Return the least factors under other pressures of a fill, with and without its backing."""
@@ -544,7 +549,10 @@ def _vary_fill(
         fills["without_either"] = change_fill(fills["without_pressure"], backing=None)
     places = moving.factors["position"].values.tolist()
     rows = dict.fromkeys(
-        axles_on_structure(structure, vehicle, way, x) for way in DRIVING_DIRECTIONS for x in places
+        axles_on_structure(structure, vehicle, way, x)
+        for vehicle in vehicles
+        for way in DRIVING_DIRECTIONS
+        for x in places
     )
     # the fans of loads do not depend on pressure and backing
     stones, _ = self_weight_programme(structure, **options)

@@ -164,7 +164,7 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
     """Return the answer: outcomes, their range, the least margin, what may change it."""
     lead = [f"the structure {each}" for each in _describe_outcomes(data)]
     if not data.runs:
-        # the margin says what an assessment has found; one result says all
+        # an assessment is stated by the margin; a result that stands alone states all of itself
         stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
         lead = [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
     if data.verdict_range is not None:
