@@ -14,10 +14,10 @@ from archfem.cases import result_text
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.result_text import RESULTS, Row
+from archfem.cases.run import SAMPLES_FILE
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict import NO_RANGE
-from archfem.joints.criteria import assessed_joints
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_names
 from archfem.units import STANDARD_GRAVITY, format_mm
@@ -78,14 +78,8 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
             for _, demand, outcome, factor in rows
         ]
         return [*signed, *([("verdict", "; ".join(factors))] if factors else []), *doubts, *blocks]
-    pga = max(map(_peak_of_ground, runs))
-    joints = [assessed_joints(run.joints) for run in runs]
-    eccentricity = max(float(abs(each["eccentricity"]).max()) for each in joints)
-    opened = " (joints came apart)" if any(bool(each["open"].any()) for each in joints) else ""
-    friction = max(float(each["friction"].max()) for each in joints)
-    sizes = [("PGA", f"{pga:.3g} g"), ("largest |e|", f"{eccentricity:.3f}{opened}")]
-    sizes.append(("largest V / N", result_text.format_ratio(friction)))
-    return [*signed, ("verdict", summarise_outcomes(data, runs)), *doubts, *blocks, *sizes]
+    peak = [("PGA", f"{max(map(_peak_of_ground, runs)):.3g} g")]
+    return [*signed, ("verdict", summarise_outcomes(data, runs)), *doubts, *blocks, *peak]
 
 
 def _peak_of_ground(run: History) -> float:
@@ -122,11 +116,11 @@ def build_conclusion(data: ReportData) -> Section:
     doubts: dict[str, list[str]] = {}
     for text, result in {text: result for result, text in reversed(list_doubts(data))}.items():
         doubts.setdefault(result, []).insert(0, text)  # a doubt of several results is stated once
+    doubtful = list(dict.fromkeys(result for result, _ in list_doubts(data)))
     rows = [
-        (name, demand, outcome + (" (in doubt)" if result in doubts else ""), factor)
+        (name, demand, outcome + " (in doubt)" * (result in doubtful), factor)
         for result, (name, demand, outcome, factor) in _capacity_rows(data)
     ]
-    doubtful = list(dict.fromkeys(result for result, _ in list_doubts(data)))
     lead = " ".join(map(sentence, _build_lead(data, rows, doubtful)))
     texts = filter(None, [lead, " ".join(_describe_ends(data))])
     blocks: list[Any] = [*map(TextBlock, texts)]
@@ -144,7 +138,7 @@ def build_conclusion(data: ReportData) -> Section:
 
 
 def _list_outdated(data: ReportData) -> Iterator[str]:
-    """Yield the sentence on results that another version, or another case, has left."""
+    """Yield sentences on results that another version, or another case, has left, or no answer."""
     listed = {} if data.folder is None else read_file_list(data.folder)
     shown = [name for name in SHOWN_RESULTS if f"{name}.txt" in data.files]
     unstated = RESULTS.keys() - {*shown, *data.statements}
@@ -155,6 +149,8 @@ def _list_outdated(data: ReportData) -> Iterator[str]:
         for name in group.files
         if name in absent
     ]
+    if data.folder and (data.folder / SAMPLES_FILE).is_file() and "risk" not in data.statements:
+        yield f"The {RESULTS['risk']} was begun and has no answer: samples are left to compute."
     if earlier:
         made = "Not stated, for an earlier version of archfem or another case made it"
         yield f"{made}: {', '.join(earlier)}."
@@ -170,7 +166,7 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
     if data.verdict_range is not None:
         # statistics of the sampling stand in its section
         found = data.verdict_range.sentence.partition("; of ")[0]
-        lead.append(f"in variations of its properties it {found}")
+        lead.append(f"in variations of its properties it {found}{data.verdict_range.unanswered}")
     lead += _describe_margin(data, rows)
     if data.runs and not doubtful:
         lead.append("the checks of the numbers raise no doubt")

@@ -22,7 +22,6 @@ from archfem.cases.report.conclusion import (
 from archfem.cases.report.inputs import describe_value, tabulate_inputs
 from archfem.cases.report.report_data import (
     ReportData,
-    build_live_page,
 )
 from archfem.cases.report.response import (
     HALF_WIDTH,
@@ -96,7 +95,6 @@ def build_sections(data: ReportData) -> list[Section]:
         build_joint_section(data),
         build_method_section(data),
         build_source_section(data),
-        *build_live_sections(data),
     ]
     # a heading of subsections has no pieces of its own
     followed = [*(section.level for section in sections[1:]), 2]
@@ -400,19 +398,6 @@ def build_method_section(data: ReportData) -> Section:
     used = [row[1:] for row in _METHODS if not row[0] or row[0] in data.files]
     used = [row for row in used if data.runs or row[0] != "joints, criteria"]
     return Section("Norms and methods", [Grid((), [*norm, *spectra, *used])])
-
-
-def build_live_sections(data: ReportData) -> list[Section]:
-    """Build the section with the arch to shake, where stones are rigid and no fill acts."""
-    try:
-        live = build_live_page(data)
-    except InvalidInput:
-        return []
-    text = (
-        "Change the arch, and shake it: rigid stones fall to the ground. `archfem page FOLDER` "
-        "writes this as a page of its own."
-    )
-    return [Section("Try it", [TextBlock(text), live], on_screen=True)]
 
 
 def build_source_section(data: ReportData) -> Section:

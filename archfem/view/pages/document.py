@@ -99,7 +99,6 @@ class Section:
     title: str  # heading
     pieces: Sequence[Any]  # `TextBlock`, `Grid`, `FigureBlock`, `Player`
     level: int = 2  # of the heading: 2, or 3 for a subsection
-    on_screen: bool = False  # whether it is left out on paper
 
 
 @dataclass(frozen=True)

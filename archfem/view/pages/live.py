@@ -38,14 +38,12 @@ class LivePage(StandalonePage):
         title: above the arch.
         arches: bodies, joints and step parameters of the structures, by `describe_arch`.
         motions: data of the ground motions.
-        kind: name of this block in the templates of documents.
     """
 
     title: str
     arches: Sequence[Mapping[str, Any]]
     motions: Sequence[Mapping[str, Any]]
 
-    kind = "live"
     frame_height = 1080.0
 
     @property

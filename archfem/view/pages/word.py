@@ -28,8 +28,6 @@ def write_word(path: str | Path, document: Document) -> Path:
     word.add_paragraph(document.subtitle)
     _add_table(word, Grid((), document.facts))
     for section in document.sections:
-        if section.on_screen:
-            continue
         word.add_heading(section.title, section.level - 1)
         for piece in section.pieces:
             if isinstance(piece, TextBlock):
