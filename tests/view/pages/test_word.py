@@ -21,7 +21,6 @@ def example(figure):
     sections = [
         Section("Results", pieces),
         Section("Pair", [TextBlock("a = 1\nb = 2", "lines")], level=3),
-        Section("Try it", [TextBlock("on the screen")], on_screen=True),
     ]
     return Document("A ring", "case 12", [("verdict", "stands")], sections, "foot")
 
@@ -35,7 +34,6 @@ def test_a_document_has_its_headings_tables_captions_and_pictures(ring, tmp_path
     titles = {"A ring": "Title", "Results": "Heading 1", "Pair": "Heading 2"}
     assert {text: texts[text].style.name for text in titles} == titles
     assert {"case 12", "Run archfem verdict.", "a = 1\nb = 2", "foot"} <= set(texts)
-    assert "on the screen" not in texts
     assert all(run.bold for run in texts["In doubt: the step."].runs)
     captions = {"Table 1. Eccentricities.", "Figure 1. The ring."}
     assert {text for text, each in texts.items() if each.style.name == "Caption"} == captions
