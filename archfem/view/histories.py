@@ -20,6 +20,7 @@ from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
+    HEAD_COORDINATE,
     Criteria,
     assessed_joints,
     describe_assessed_joints,
@@ -58,9 +59,9 @@ def draw_envelope(
     """Draw the least and largest eccentricity of each joint over runs, between the joint's faces.
 
     Each ring and pier has its own panel, with short names of its joints at the axis; piers of
-    structures that differ have the heights of their joints there. Crosses above the upper face mark
-    joints that opened at some time. Where runs have different criteria, the least |e| of a hinge is
-    shown.
+    structures that differ have the heights of their joints there, walls in bond those of beds.
+    Crosses above the upper face mark joints that opened at some time. Where runs have different
+    criteria, the least |e| of a hinge is shown.
 
     Args:
         runs: the label of each run, and the run, or runs under several motions, which share a
@@ -194,10 +195,13 @@ class PartPanel:
     axes: Axes
     part: str
     by_height: bool
+    is_wall: bool  # in bond, whose joints are sorted by beds
 
     def select(self, joints: xr.Dataset) -> tuple[Array, xr.Dataset]:
         """Return the joints of the part, and their places along the axis (n,)."""
         own = _joints_of_part(assessed_joints(joints), self.part)
+        if self.is_wall:
+            own = own.isel(joint=np.argsort(own["height"].values.round(6), kind="stable"))
         places = own["height"].values if self.by_height else np.arange(own.sizes["joint"])
         return places.astype(float), own
 
@@ -213,6 +217,13 @@ def _heights_differ(states: Iterable[xr.Dataset], part: str) -> bool:
         if own.sizes["joint"]:
             found.add(tuple(own["height"].values.round(6).tolist()))
     return len(found) > 1
+
+
+def _is_wall(joints: xr.Dataset, part: str) -> bool:
+    """Return whether a part is a wall in bond, whose joints have heights."""
+    own = _joints_of_part(joints, part)
+    has_coordinates = {HEAD_COORDINATE, "height"} <= {*own.coords}
+    return has_coordinates and bool(own[HEAD_COORDINATE].any())
 
 
 def _make_panels(
@@ -238,20 +249,32 @@ def _make_panels(
     sizes = {part: len(names[part]) for part in parts}
     drawn = _lay_out_panels(sizes) if axes is None else {parts[0]: axes}
     hinge = min(Criteria.of(joints).hinge for joints in every)
-    panels = [PartPanel(each, part, _heights_differ(every, part)) for part, each in drawn.items()]
+    panels = [
+        PartPanel(each, part, _heights_differ(every, part), all(_is_wall(j, part) for j in every))
+        for part, each in drawn.items()
+    ]
     for panel in panels:
         part, own = panel.part, panel.axes
         first = axes is not None or own.get_subplotspec().is_first_col()
         along = "height [m]" if panel.by_height else "joint [-]"
         style_axes(own, along, "eccentricity e = M / (N h) [-]" if first else "")
         _draw_faces(own, hinge)
-        if not panel.by_height:
-            _label_joints(own, [short_name(name, part) for name in names[part]])
+        _label_places(panel, [short_name(name, part) for name in names[part]], every[0])
         if len(parts) > 1:
             own.set_title(part, fontsize=Size.LABEL, color=Colour.TEXT)
             if not panel.by_height:
                 own.set_xlim(-0.7, sizes[part] - 0.3)
     return panels
+
+
+def _label_places(panel: PartPanel, names: Sequence[str], joints: xr.Dataset) -> None:
+    """Label the axis of a panel that counts joints, by their names or by beds."""
+    if panel.by_height:
+        return
+    if panel.is_wall:
+        _label_beds(panel.axes, panel.select(joints)[1]["height"].values)
+    else:
+        _label_joints(panel.axes, names)
 
 
 def _label_joints(axes: Axes, names: Sequence[str]) -> None:
@@ -262,6 +285,20 @@ def _label_joints(axes: Axes, names: Sequence[str]) -> None:
     labels = {float(k): name for k, name in enumerate(names)}
     axes.xaxis.set_major_locator(MaxNLocator(max(2, min(6, len(names) // 3)), integer=True))
     axes.xaxis.set_major_formatter(lambda place, _: labels.get(round(place, 6), ""))
+
+
+def _label_beds(axes: Axes, heights: Array, most: int = 12) -> None:
+    """Write the heights of the beds of a wall where each begins, as far as there is room."""
+    begins = np.flatnonzero(np.diff(heights, prepend=-np.inf) > 1e-6)
+    axes.set_xlabel("joints from bed to bed, by the height of the bed [m]")
+    for begin in begins[1:] if len(begins) < 40 else ():
+        axes.axvline(begin - 0.5, color=Colour.UNDEFORMED, lw=0.6, zorder=0)
+    # higher beds have fewer joints: labels at least a share of the axis apart
+    kept = [0]
+    for begin in begins:
+        if begin - kept[-1] >= len(heights) / most:
+            kept.append(int(begin))
+    axes.set_xticks(kept, [f"{heights[k]:.3g}" for k in kept])
 
 
 def _lay_out_panels(

@@ -122,9 +122,12 @@ def joint_pairs(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.in
         for block in structure.joints[number].blocks:
             touching[block].append(int(number))
     # A block passes on a single thrust if it is free, since no line runs along the ground from one
-    # pier to the next, has two joints, and is of a part whose joints are shown.
+    # pier to the next, has two joints, and is of a part whose joints are shown. Walls in bond have
+    # no line: blocks at their edges alone have two joints.
     roles = {structure.joints[number].role for number in np.flatnonzero(shown)}
-    passing = [number for number in structure.free if structure.blocks[number].role in roles]
+    walls = {structure.joints[number].part for number in np.flatnonzero(structure.heads)}
+    free = [(number, structure.blocks[number]) for number in structure.free]
+    passing = [k for k, block in free if block.role in roles and block.part not in walls]
     pairs = [touching[number] for number in passing if len(touching[number]) == 2]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 

@@ -367,12 +367,15 @@ def _number_stones(axes: Axes, structure: Structure, part: str, inch: float) -> 
     """Write the numbers of a wall's stones, as many as fit in legible type."""
     numbers = [k for k in structure.free if structure.blocks[k].part == part]
     boxes = np.array([np.ptp(structure.blocks[k].outline, axis=0) for k in numbers])
-    # a line of type takes 0.65 of the height, and a figure 0.7 of its size with the space beside
-    sizes = np.minimum(0.65 * boxes[:, 1], boxes[:, 0] / (0.7 * len(str(numbers[-1]))))
-    fitting = 72.0 * float(sizes.min()) / inch
+    # figures, without descenders, take 0.8 of the height, and 0.7 of their size with the space
+    sizes = np.minimum(0.8 * boxes[:, 1], boxes[:, 0] / (0.7 * len(str(numbers[-1]))))
+    room = (points := 72.0 * sizes / inch) >= Size.NOTE
+    if room.mean() > 0.5:  # smaller stones, as at a slope, have no number
+        numbers, points = np.array(numbers)[room].tolist(), points[room]
+    fitting = float(points.min())
     every = max(1, int(np.ceil(Size.NOTE / fitting)))
     style: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 8, "color": Colour.TEXT}
-    style["fontsize"] = min(every * fitting, Size.LABEL)
+    style["fontsize"] = Size.NOTE
     for number in numbers[::every]:
         annotate(axes, str(number), structure.centroids[number], (0.0, 0.0), **style)
 

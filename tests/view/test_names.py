@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.result_text import describe_collapse, describe_run
-from archfem.view import draw_envelope, draw_names
+from archfem.view import draw_envelope, draw_names, draw_structure
 from archfem.view.structure import short_name
 
 
@@ -91,6 +91,27 @@ def test_stones_of_a_wall_in_bond_are_numbered():
     assert "numbers of stones" in title.replace("\n", " ")
 
 
+def test_small_stones_at_a_slope_have_no_number_and_all_others_do():
+    wall = bonded(courses=6)
+    tips = [
+        af.Block(
+            ((x, 1.5), (x + 0.05, 1.5), (x, 1.55)), af.STONE, f"tip, {x}", part="wall", role="pier"
+        )
+        for x in (0.1, 2.1)
+    ]
+    wall = af.masonry.assembled([*wall.blocks, *tips], af.Contact(1.48e9, 0.3e9, friction=0.6))
+    words = [word for word, _ in written(draw_names(wall))]
+    assert words == [str(k) for k in wall.free if not wall.blocks[k].name.startswith("tip")]
+
+
+def test_walls_in_bond_have_points_of_thrust_and_no_line():
+    wall = bonded()
+    dead = af.dead_load(af.build(wall, fidelity="rigid"))
+    labels = {line.get_label() for line in draw_structure(wall, dead.joints).axes[0].lines}
+    assert "thrust at a joint" in labels
+    assert "thrust line" not in labels
+
+
 def test_a_wall_has_its_assessed_joints_alone_in_pictures_and_the_worst_in_a_table():
     wall = bonded()
     shake = af.Motion(2.0 * np.sin(40.0 * np.arange(0.0, 0.1, 0.005)), 0.005)
@@ -100,7 +121,12 @@ def test_a_wall_has_its_assessed_joints_alone_in_pictures_and_the_worst_in_a_tab
     judged = int(wall.judged.sum())
     assert len(line.get_xdata()) == judged < len(wall.joints)
     axes.figure.canvas.draw()
-    assert max(len(text.get_text()) for text in axes.get_xticklabels()) <= 3
+    # beds at 0, 0.25, … m, each from its first joint on, in order of their heights
+    labels = {text.get_position()[0]: text.get_text() for text in axes.get_xticklabels()}
+    heights = np.sort(wall.middles[wall.judged, 1])
+    assert {*labels.values()} == {"0", "0.25", "0.5", "0.75", "1", "1.25"}
+    assert all(heights[round(place)] == float(text) for place, text in labels.items())
+    assert "height of the bed" in axes.get_xlabel()
     dead = run.joints.isel(time=0)
     whole, brief = (describe_run(wall, run, dead, *count) for count in ((), (20,)))
     assert whole.count(" to course ") - brief.count(" to course ") >= judged - 20 - 10
