@@ -76,4 +76,4 @@ def select_solver(equation: Equation) -> StepSolver | None:
     # Under strong motions the compliance method takes 0.3 to 0.9 of the time up to 350 rows, as of
     # a ring of 34 elastic stones or a wall of 44 rigid ones. From 45 elastic stones that slide on,
     # which have 460 rows, it takes up to ten times as long.
-    return newton if newton.has_band and rows > 400 else ComplianceSolver.of(equation)
+    return newton if newton.is_narrow and rows > 400 else ComplianceSolver.of(equation)
