@@ -68,8 +68,8 @@ def select_solver(equation: Equation) -> StepSolver | None:
     if joints.points.stiffens:  # every row is active
         return newton
     rows = len(gap_rows(joints).offset)
-    # Chains of rigid stones have a half width of 5 to 11, and take 0.6 to 0.85 of the time of the
-    # compliance method. Short ones that never slide take up to 1.7 times as long: their equations
+    # Chains of rigid stones have a half width of 5 to 11, and take 0.8 to 0.95 of the time of the
+    # compliance method. Short ones that never slide take up to 1.3 times as long: their equations
     # in the open rows are few.
     if newton.half_width <= 12:
         return newton if joints.slides or rows > 60 else ComplianceSolver.of(equation)
