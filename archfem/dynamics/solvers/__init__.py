@@ -14,7 +14,6 @@ and SNES takes the steps at which they fail.
     joint_law          gaps of the joints, and forces released as they open and slide
     linear_step        step of a structure that is linear but for its joints
     newton             solver "newton": Newton's method on all coordinates
-    tangent_lu         its tangent in a band or in panels, and the factor
     compliance         solver "compliance": one sparse factor, and unknowns in active joint rows
     active_rows        their dense problem
     active_compliance  its compliance and workspace

@@ -1,9 +1,8 @@
 """Solver "newton": Newton's method on the whole structure, for small and large displacements.
 
 One driver serves both (`semismooth_newton`): an initial guess, the assembled tangent, points that
-reverse their slip held once, and a line search. The tangent is a band where coordinates can be
-ordered so, else it is sparse (`tangent_lu`). Small displacements (`linear_step`) solve in every
-iteration
+reverse their slip held once, and a line search. The factor of the tangent is that of
+`supernodal_lu`. Small displacements (`linear_step`) solve in every iteration
 
     (K + μ M + ν R - Gᵀ λ′ G) w = r + Gᵀ (λ - λ′ (z - z₀));
 
@@ -17,6 +16,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numba.extending import overload
+from scipy import sparse
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from archfem._numba import INNER_OPTIONS, kernel
 from archfem._typing import Array
@@ -69,8 +70,16 @@ from archfem.dynamics.solvers.sparse_products import (
     without_round_off,
 )
 from archfem.dynamics.solvers.stone_tree import find_stone_tree
-from archfem.dynamics.solvers.supernodal_lu import Indices
-from archfem.dynamics.solvers.tangent_lu import TangentStorage, factorise, solve
+from archfem.dynamics.solvers.supernodal_lu import (
+    Elimination,
+    Indices,
+    Panels,
+    add_ancestors,
+    eliminate,
+    panel_places,
+    panels_of,
+    solve_panels,
+)
 from archfem.joints.large.forces import (
     JointStepForces,
     LargeDisplacementJoints,
@@ -90,22 +99,20 @@ class NewtonSolver(StepSolver):
 
     name: ClassVar[str] = "newton"
 
-    def __init__(self, equation: Equation, max_half_width: int = 40) -> None:
+    def __init__(self, equation: Equation) -> None:
         self._equation, self.assembled = equation, {}
-        joints = equation.joints
+        pattern, joints = tangent_pattern(equation), equation.joints
+        self._elimination = Elimination.of(pattern)
+        self.order, self.half_width = self._elimination.order, narrowest_width(pattern)
         stiffens = joints is not None and joints.points.stiffens
-        if stiffens:  # their factor serves for several steps, and a wide band is solved more slowly
-            max_half_width = min(12, max_half_width)
-        self._storage = TangentStorage.of(tangent_pattern(equation), max_half_width)
-        self.order, self.half_width = self._storage.order, self._storage.half_width
-        self.has_band = self._storage.elimination is None
+        self.is_narrow = self.half_width <= (12 if stiffens else 40)
         self._tree = find_stone_tree(equation)
         self.measures_faces = self._tree is not None
         if self._tree is not None:
             self.order = self._tree.order
-        # a band is factorised faster than the joint law is evaluated, a sparse tangent is not
-        self._reduction = 0.0 if self.has_band else 0.01
-        self.keeps_factor = stiffens and not self.has_band
+        # a narrow tangent is factorised faster than the joint law is evaluated, a wide one is not
+        self._reduction = 0.0 if self.is_narrow else 0.01
+        self.keeps_factor = stiffens and not self.is_narrow
         if self.keeps_factor:
             # a factor takes as long as 4 to 10 iterations with the last one, which take off 6 to 15
             # digits at this reduction: a step needs 5 to 8
@@ -129,19 +136,24 @@ class NewtonSolver(StepSolver):
         if isinstance(system, ChainSystem):
             return constant_chain_parts(system)
         tangent = system.tangent
-        changing = "entries", "factor", "products", "changed", "image", "pivots"
+        changing = "entries", "factor", "products", "changed", "image"
         parts = [getattr(tangent, name) for name in tangent._fields if name not in changing]
         if isinstance(system, SmallSystem):
             return (*parts, *constant_parts(system.linear), system.begin, system.places)
         matrices = system.mass, system.blocks, system.viscous, system.effective
         return (*parts, *matrices, system.joints, system.places, system.weight, system.body)
 
+    def _store(self, matrix: sparse.csr_matrix, ends: Any) -> tuple[Panels, Any]:
+        """Return a matrix to be factorised, and the places of its entries (row, column) there."""
+        panels = panels_of(matrix, self._elimination, *ends)
+        return panels, panel_places(panels, *ends).astype(np.uint32)
+
     def _small_system(self, dt: float) -> "SmallSystem":
         """Return the data of steps with small displacements."""
         linear, pairs, effective = linear_system(self._equation, self.order, dt)
         law = linear.law
         begin, *ends = find_tangent_blocks(linear.gaps, pairs)
-        tangent, places = self._storage.store(effective, *ends)
+        tangent, places = self._store(effective, ends)
         widest = int(np.diff(linear.gaps[0]).max(initial=0))
         blocks = np.zeros(widest), np.zeros(widest**2)
         entries = np.zeros((len(pairs), 3), np.int64), np.zeros(len(pairs))
@@ -174,7 +186,7 @@ class NewtonSolver(StepSolver):
         place, sides = np.argsort(order), model.joints.kinematics
         forces = allocate_step_forces(model.joints)
         sides = sides._replace(index=place[sides.index])
-        tangent, places = self._storage.store(effective, *find_rate_pairs(sides))
+        tangent, places = self._store(effective, find_rate_pairs(sides))
         rates = JointRates(*(np.zeros_like(each) for each in forces.rates))
         # energy then drifts by 1e-8 of what is exchanged; reused factors round ten times as much
         balance = 1e-9 if self._reduction == 0.0 else 1e-8
@@ -200,6 +212,13 @@ class NewtonSolver(StepSolver):
             (dt, lag),
             tolerances,
         )
+
+
+def narrowest_width(pattern: sparse.csr_matrix) -> int:
+    """Return the half-width of a matrix in its own order or, if less, in Cuthill and McKee's."""
+    orders = np.arange(pattern.shape[0]), reverse_cuthill_mckee(pattern, symmetric_mode=True)
+    ends = [pattern[order][:, order].tocoo() for order in orders]
+    return min(int(np.abs(each.row - each.col).max(initial=0)) for each in ends)
 
 
 # ---- small displacements
@@ -268,7 +287,7 @@ def _small_correction(system, work, iteration, reuse, hold):  # type: ignore
         contact[1, k] = 0.0 if begin else contact[0, k]
         change[k] = right[k] if begin else 0.0
     add_rows(gaps, move, change)
-    solve(system.tangent, change)
+    solve_panels(system.tangent, change)
     # change of the gaps, and of λ: the balance holds for any share of both
     for row in range(len(move)):
         moved = row_times(gaps, row, change)
@@ -298,7 +317,7 @@ def _renew_factor(system, hold):  # type: ignore
     for k in range(len(entries)):
         entries[k] = base[k]
     subtract_derivatives(system, count)
-    regular = factorise(tangent)
+    regular = eliminate(tangent)
     number[0] = count if regular else -1
     return regular
 
@@ -488,7 +507,7 @@ def _large_correction(system, work, iteration, reuse, hold):  # type: ignore
         _renew_tangent(system)
         if not system.factored[0]:
             return False
-    solve(system.tangent, correction)
+    solve_panels(system.tangent, correction)
     return True
 
 
@@ -498,7 +517,6 @@ def _renew_tangent(system):  # type: ignore
     sides, own, new = system.joints.kinematics, system.rates, system.forces.rates
     tangent, places = system.tangent, system.places
     entries, base, changed = tangent.entries, tangent.base, tangent.changed
-    # a band is assembled anew, as its entries are those of its factor
     whole = not system.factored[0] or system.tolerances.reduction == 0.0
     for k in range(len(entries) if whole else 0):
         entries[k] = base[k]
@@ -514,7 +532,7 @@ def _renew_tangent(system):  # type: ignore
         for side in range(2):
             for k in range(sides.size[joint, side]):
                 changed[tangent.group_of[sides.index[joint, side, k]]] = True
-    system.factored[0] = factorise(system.tangent)
+    system.factored[0] = eliminate(add_ancestors(tangent))
 
 
 @kernel

@@ -68,12 +68,12 @@ def select_solver(equation: Equation) -> StepSolver | None:
     if joints.points.stiffens:  # every row is active
         return newton
     rows = len(gap_rows(joints).offset)
-    # Chains of rigid stones have a half width of 5 to 11, and take 0.6 to 0.85 of the time of the
-    # compliance method. Short ones that never slide take up to 1.7 times as long: their equations
+    # Chains of rigid stones have a half width of 5 to 11, and take 0.8 to 0.95 of the time of the
+    # compliance method. Short ones that never slide take up to 1.3 times as long: their equations
     # in the open rows are few.
     if newton.half_width <= 12:
         return newton if joints.slides or rows > 60 else ComplianceSolver.of(equation)
     # Under strong motions the compliance method takes 0.3 to 0.9 of the time up to 350 rows, as of
     # a ring of 34 elastic stones or a wall of 44 rigid ones. From 45 elastic stones that slide on,
     # which have 460 rows, it takes up to ten times as long.
-    return newton if newton.has_band and rows > 400 else ComplianceSolver.of(equation)
+    return newton if newton.is_narrow and rows > 400 else ComplianceSolver.of(equation)
