@@ -15,9 +15,9 @@ from archfem.limit.backfill import self_weight_programme
 from archfem.limit.collapse import Collapse, collapse_factor
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.rating import Rating, rate
-from archfem.limit.vehicles import VEHICLES_OF_CODES, Vehicle
+from archfem.limit.vehicles import VEHICLES, VEHICLES_OF_CODES, Vehicle
 from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Settlement
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, join_names
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.statics.assessment_checks import LimitState
@@ -141,7 +141,8 @@ def pushover_keys() -> dict[str, Any]:
 
 def rating_keys() -> dict[str, Any]:
     """Return the keys of [rating]; joints and fill are those of [limit]."""
-    return _keys_beside(rate, "friction", "strength", "fill")
+    own = {"vehicle": (str, dict, [(str, dict)])}
+    return _keys_beside(rate, "friction", "strength", "fill") | own
 
 
 def assessment_keys() -> dict[str, Any]:
@@ -242,23 +243,33 @@ def _point_load(table: Any, key: str) -> PointLoad:
 
 
 def parse_rating(table: Any) -> Table:
-    """Return the rating of a case: the arguments of `rate` that it gives."""
+    """Return the rating of a case: the arguments of `rate` that it gives, of its first vehicle."""
     options = check_table(table, rating_keys(), "rating")
-    if isinstance(vehicle := options.get("vehicle"), dict):
-        options["vehicle"] = read_object(Vehicle, vehicle, "rating.vehicle")
+    for each in reversed(list_vehicles(options)):
+        table = isinstance(each, dict)
+        options["vehicle"] = read_object(Vehicle, each, "rating.vehicle") if table else each
     return options
+
+
+def list_vehicles(rating: Table) -> list[Any]:
+    """Return the vehicles of [rating], names and tables."""
+    own = rating.get("vehicle", [])
+    return own if isinstance(own, list) else [own]
 
 
 def name_vehicles(names: Sequence[str], rating: Table) -> list[Table]:
     """Return [rating] with each of some vehicles: by name, all of a code, or the case's own."""
-    own = rating.get("vehicle")
-    named = own["name"] if isinstance(own, dict) and "name" in own else None
-    codes = {code.lower(): vehicles for code, vehicles in VEHICLES_OF_CODES.items()}
-    vehicles = [
-        vehicle
-        for name in names
-        for vehicle in ([own] if name == named else codes.get(name.lower(), [name]))
-    ]
+    own = {each["name"]: each for each in list_vehicles(rating) if "name" in each}
+    known: dict[str, Sequence[Any]] = {name: [name] for name in VEHICLES}
+    known |= {**VEHICLES_OF_CODES, **{name: [each] for name, each in own.items()}}
+    lower = {name.lower(): vehicles for name, vehicles in known.items()}
+    if missing := [name for name in names if name.lower() not in lower]:
+        yours = ", ".join([*(f"'{name}' of the case" for name in own), *VEHICLES])
+        raise InvalidInput(
+            f"vehicle {missing[0]!r} is not known: use one of {yours}; or "
+            f"{join_names([*VEHICLES_OF_CODES])}, each for all of a code"
+        )
+    vehicles = [each for name in names for each in lower[name.lower()]] or list_vehicles(rating)
     return [{**rating, "vehicle": vehicle} for vehicle in vehicles] or [rating]
 
 

@@ -16,12 +16,16 @@ HINGE_REASON = "8 % short of the edge, as in Demirel and Aldemir (2021)"
 
 _PAPER = "table 2 of Demirel and Aldemir (2021)"
 
+_OF_STRESS = (
+    "of stress alone, as only a strength that is given counts in limit analyses and ratings"
+)
+
 # Values of materials and contacts that decide: name in texts, unit as number and text, and source
 DECIDING_VALUES = {
     "materials": {
         "young": ("E", GPa, " GPa", f"{_PAPER}; unused where blocks are rigid"),
         "unit_weight": ("weight", kN, " kN/m³", f"{_PAPER}; stones weigh 16 to 27 kN/m³"),
-        "strength": ("strength", MPa, " MPa", f"{_PAPER}; no motion depends on it"),
+        "strength": ("strength", MPa, " MPa", f"{_PAPER}; {_OF_STRESS}"),
     },
     "contacts": {
         "normal_stiffness": ("k_n", 1e9, " MPa/mm", f"{_PAPER}; measured ones differ tenfold"),

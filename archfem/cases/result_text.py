@@ -453,13 +453,17 @@ def state_scale(
 
 
 def state_ratings(rated: Sequence[tuple[Rating, Sequence[str]]]) -> Statement:
-    """State the factor of each vehicle; of the worst, the first, what the pressure adds."""
-    rows = [
-        ("rating", found.vehicle.name, f"{found.outcome}, {found.place}", f"{found.factor:.4g}")
-        for found, _ in rated
-    ]
-    worst, doubts = rated[0][0], [doubt for _, own in rated for doubt in own]
-    return Statement([repr(worst), *worst.describe_pressure()], rows, doubts)
+    """State the factor of each vehicle; of the first what the pressure adds, and the worst."""
+    rows = []
+    for found, _ in rated:
+        factor = "-" if np.isnan(found.factor) else f"{found.factor:.4g}"
+        rows.append(("rating", found.vehicle.name, f"{found.outcome}, {found.place}", factor))
+    first, doubts = rated[0][0], [doubt for _, own in rated for doubt in own]
+    worst = min((found for found, _ in rated), key=lambda each: each.factor)
+    sentences = [repr(first), *first.describe_pressure()]
+    if worst.factor < first.factor:
+        sentences.append(f"least of {len(rated)} vehicles: {worst!r}")
+    return Statement(sentences, rows, doubts)
 
 
 def state_assessments(found: Mapping[str, KinematicAssessment], doubts: list[str]) -> Statement:

@@ -25,7 +25,7 @@ from archfem._files import (
 from archfem._optional import can_film
 from archfem.cases import result_folder as results
 from archfem.cases import result_text
-from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
+from archfem.cases.analysis_keys import list_vehicles, name_vehicles, parse_rating, rate_case
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults, describe_fill_defaults
 from archfem.cases.result_text import RESULTS, state_ratings
@@ -53,6 +53,7 @@ from archfem.dynamics.motion_scaling import (
 from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.limit.collapse import Collapse, describe_fill
+from archfem.limit.rating import Rating
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
@@ -273,12 +274,16 @@ def rate(options: argparse.Namespace) -> int:
         for table in tables:
             with _record_doubts(case.structure) as doubts:
                 found = rate_case(case.structure, parse_rating(table), case.limit)
+            doubts += [f"{DOUBT_MARK}{doubt}" for doubt in _rating_doubts(case, found)]
             rated.append((found, doubts, table))
-            progress.show(f"{found.vehicle.name}: factor {found.factor:.4g}", 1)
-    # the worst first: one without a factor does not stand under its weight
-    rated.sort(key=lambda each: float(np.nan_to_num(each[0].factor, nan=-1.0)))
+            progress.show(f"{found.vehicle.name}: {found.headline.partition(',')[0]}", 1)
+            if np.isnan(found.factor):  # whatever the vehicle
+                break
+    # those of the case before others, and the worst first
+    own = list_vehicles(rating)
+    rated.sort(key=lambda each: (each[2]["vehicle"] not in own, each[0].factor))
     texts = ["\n".join([str(found), *doubts]) for found, doubts, _ in rated]
-    worst, files = rated[0][0], {}
+    first, files = rated[0][0], {}
     if len(rated) > 1:
         summary = result_text.tabulate_ratings([found for found, *_ in rated])
         texts.insert(0, summary.text)
@@ -286,15 +291,29 @@ def rate(options: argparse.Namespace) -> int:
     text = "\n\n".join(filter(None, [*texts, describe_fill_defaults(case)]))
     # the case of the folder, that of a run, may be rated for another vehicle
     files |= {RATING_FILE: format_tables({"rating": rated[0][2]}).rstrip(), "rating.txt": text}
-    files |= {"rating.csv": worst.table()}
+    files |= {"rating.csv": first.table()}
     files |= state_ratings([(found, doubts) for found, doubts, _ in rated]).as_file("rating")
 
     def draw() -> Files:
         every = {"vehicles.png": draw_ratings([found for found, *_ in rated])}
-        return {**files, "rating.png": worst.plot(), **(every if len(rated) > 1 else {})}
+        return {**files, "rating.png": first.plot(), **(every if len(rated) > 1 else {})}
 
     _write_results("rate", case, options.out, f"{case.title}\n{text}", draw)
     return _doubt_code([doubt for _, doubts, _ in rated for doubt in doubts])
+
+
+def _rating_doubts(case: Case, found: Rating) -> Iterator[str]:
+    """Yield what a rating leaves in doubt: equilibrium, and the strength of the stones."""
+    if np.isnan(found.factor):
+        yield (
+            "limit analysis finds no equilibrium of the bridge under its own weight; check the "
+            "thickness of its rings and piers, and the fill"
+        )
+    elif case.limit.strength is None and found.crushing_text:
+        yield (
+            f"joints do not crush, as the case gives no strength of the stones: "
+            f"{found.crushing_text}; give strength in [materials] or [limit]"
+        )
 
 
 def mesh(options: argparse.Namespace) -> None:

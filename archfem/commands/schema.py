@@ -231,6 +231,7 @@ def _pushover() -> Schema:
 def _rating() -> Schema:
     """Return the schema of [rating]; names of vehicles are read in any case of letters."""
     vehicle = _any([{"type": "string", "examples": [*VEHICLES]}, _table_of(Vehicle)])
+    vehicle = _any([vehicle, {"type": "array", "items": vehicle}])
     return _table(analysis_keys.rating_keys(), rate, vehicle=vehicle)
 
 

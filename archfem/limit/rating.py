@@ -40,6 +40,11 @@ from archfem.masonry.structure import (
     join_names,
     structure_of,
 )
+from archfem.units import MPa
+
+# Strength of masonry where none is given [Pa]: squared stones in lime mortar have 3 to 10 MPa (from
+# memory)
+ASSUMED_STRENGTH = 5e6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,6 +77,8 @@ class Rating(ResultDisplay):
         without_backing: least factor without the backing of a `Fill`; NaN without one, and where
             the bridge then does not stand.
         without_either: least factor without backing and without pressure; NaN likewise.
+        crushing: least factor with stones of `ASSUMED_STRENGTH`, where joints do not crush; else
+            NaN, and with a plastic fill.
         fill: strength of the fill, or None.
     """
 
@@ -91,6 +98,7 @@ class Rating(ResultDisplay):
     deepest: float = np.nan
     without_backing: float = np.nan
     without_either: float = np.nan
+    crushing: float = np.nan
     fill: Fill | PlasticFill | None = None
 
     @property
@@ -106,13 +114,23 @@ class Rating(ResultDisplay):
     @property
     def outcome(self) -> str:
         """Whether it passes, on which condition, and the factor by rule where less was given."""
+        if np.isnan(self.factor):
+            return "does not stand under its own weight"
         words = "passes" if self.passes else "fails"
-        needed = self._needs() if self.passes else ""
-        words += f" only with the {needed}" if needed else ""
+        needed = [f"the {part}" for part in [self._needs()] if part]
+        needed += ["stones that do not crush"] if self.crushing < 1.0 else []
+        words += f" only with {' and '.join(needed)}" if needed and self.passes else ""
         if missing := self._missing_factors():
             words += f" if the code's {missing} is at most {self.factor:.4g}" if self.passes else ""
         words += f" without {self.vehicle.left_out}" if self.vehicle.left_out else ""
         return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
+
+    @property
+    def headline(self) -> str:
+        """Factor, place and outcome; no factor where the bridge does not stand."""
+        if np.isnan(self.factor):
+            return f"{self.outcome}, {self.place}"
+        return f"factor {self.factor:.4g} {self.place}, {self.outcome}"
 
     def _needs(self) -> str:
         """Return the parts of the fill without which the bridge fails, in words."""
@@ -150,14 +168,14 @@ class Rating(ResultDisplay):
 
     def _summary(self) -> str:
         """Describe the result in one line."""
-        return (
-            f"Rating of '{self.structure.name}' for {self.vehicle.name}: factor {self.factor:.4g} "
-            f"{self.place}, {self.outcome}"
-        )
+        vehicle = "" if np.isnan(self.factor) else f" for {self.vehicle.name}"
+        return f"Rating of '{self.structure.name}'{vehicle}: {self.headline}"
 
     @property
     def place(self) -> str:
         """Where the axles over the rings that fail stand at the worst place, in words."""
+        if np.isnan(self.factor):
+            return "and carries no vehicle"
         axles = parse_axles(self.vehicle.axles, self.vehicle.spacings)
         place = self.moving.direction, self.moving.position
         stand = [load.x for load in axles_on_structure(self.structure, axles, *place)]
@@ -197,6 +215,10 @@ class Rating(ResultDisplay):
             also = " and on the distributed load × live"
             beside = f", and {self.area_load / 1e3:g} kN/m² of road where it is adverse"
         favourable = "EN 1990:2002, Table A2.4(B), favourable; from memory"
+        of_fill = filter(None, [describe_fill(self.fill, self.structure)])
+        resistance = [self._describe_crushing(), *of_fill]
+        if np.isnan(self.factor):
+            return "\n".join([self._summary(), describe_spans(self.structure), *resistance])
         lines = [
             f"{self._summary()}",
             f"the factor is on axles × live × impact{also}; codes with partial factors require 1",
@@ -215,8 +237,7 @@ class Rating(ResultDisplay):
             f"live load by {self.live:g} ({self._source('live')})",
             f"impact by {self.impact:g}{self._impact_axle()} ({self._source('impact')})",
             f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
-            describe_crushing(self.strength),
-            *filter(None, [describe_fill(self.fill, self.structure)]),
+            *resistance,
         ]
         return "\n".join(lines)
 
@@ -245,6 +266,18 @@ class Rating(ResultDisplay):
             f"without the backing but with the pressure, each at its worst place: {with_pressure}; "
             f"without either: {neither}"
         ]
+
+    def _describe_crushing(self) -> str:
+        """Return at which strength joints crush, or the factor with an assumed one."""
+        text = describe_crushing(self.strength)
+        return f"{text}; {self.crushing_text}" if self.crushing_text else text
+
+    @property
+    def crushing_text(self) -> str:
+        """Factor with an assumed strength of the stones where none counts, in words; else empty."""
+        if np.isnan(self.crushing):
+            return ""
+        return f"at {ASSUMED_STRENGTH / MPa:g} MPa the least factor is {self.crushing:.4g}"
 
     def _describe_missing(self) -> list[str]:
         """Return the line on what codes ask of a vehicle without any factors, if it is one."""
@@ -422,7 +455,9 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
     # of the whole width, as the structure is modelled
     loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in rows]
-    more |= _vary_fill(weighted, moving, cut_road(weighted, live * area_load), loads, options)
+    if not is_plastic:
+        strips = cut_road(weighted, live * area_load)
+        more |= _rate_other_states(weighted, moving, strips, loads, options)
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
 
 
@@ -530,16 +565,13 @@ def _geometric_factor(
     return 1.0 / high, np.nan
 
 
-def _vary_fill(
-    structure: Structure,
-    moving: MovingLoad,
-    strips: AxleRow,
-    vehicles: Sequence[Array],
-    options: dict[str, Any],
-) -> dict[str, float]:
-    """Return the least factors under other pressures of a fill, with and without its backing."""
+def _other_states(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the options with other pressures of a fill, without backing, with crushing."""
+    states: dict[str, dict[str, Any]] = {}
+    if np.isinf(options["strength"]):
+        states["crushing"] = options | {"strength": ASSUMED_STRENGTH}
     if not isinstance(fill := options["fill"], Fill):
-        return {}
+        return states
     fills = {
         "without_pressure": change_fill(fill, mobilisation=0.0, active=0.0),
         "full_pressure": change_fill(fill, mobilisation=1.0),
@@ -547,6 +579,17 @@ def _vary_fill(
     if fill.backing is not None:
         fills["without_backing"] = change_fill(fill, backing=None)
         fills["without_either"] = change_fill(fills["without_pressure"], backing=None)
+    return states | {name: options | {"fill": other} for name, other in fills.items()}
+
+
+def _rate_other_states(
+    structure: Structure,
+    moving: MovingLoad,
+    strips: AxleRow,
+    vehicles: Sequence[Array],
+    options: dict[str, Any],
+) -> dict[str, float]:
+    """Return the least factor in each other state; none where the bridge does not stand in it."""
     places = moving.factors["position"].values.tolist()
     rows = dict.fromkeys(
         axles_on_structure(structure, vehicle, way, x)
@@ -554,13 +597,12 @@ def _vary_fill(
         for way in DRIVING_DIRECTIONS
         for x in places
     )
-    # the fans of loads do not depend on pressure and backing
+    # the fans of loads do not depend on pressure, backing and strength
     stones, _ = self_weight_programme(structure, **options)
     axles = {row: stones.load(row) for row in rows if row}
     forces = [stones.load([strip]) for strip in strips]
     factors = {}
-    for name, other in fills.items():
-        given = options | {"fill": other}
+    for name, given in _other_states(options).items():
         stones, dead = self_weight_programme(structure, **given)
         if not is_balanced(dead.minimise_residual(), dead):
             continue

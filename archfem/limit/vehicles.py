@@ -517,7 +517,9 @@ def _search_nonassociated(
 
 def _find_worst(factors: Array, count: Numbers) -> tuple[int, int]:
     """Return direction and position of the least factor; if none is finite, of the most axles."""
-    finite, flat = np.isfinite(factors), count.argmax()
+    # a vehicle in the middle loads some stones
+    crowded = np.flatnonzero(count[0] == count.max())
+    finite, flat = np.isfinite(factors), crowded[len(crowded) // 2]
     if finite.any():
         # of places that differ by round-off, as on a symmetric bridge, the first
         flat = (factors <= (1.0 + 1e-6) * factors[finite].min()).argmax()

@@ -162,7 +162,8 @@ def draw_rating(found: Rating) -> Figure:
 
 def _take_axles_as_given(found: Rating) -> tuple[Collapse, str, list[PointLoad]]:
     """Return the worst collapse under axles as given, what multiplies them, and strips of load."""
-    code = found.live * found.impact
+    # an impact on one axle is drawn with that axle
+    code = found.live * (found.impact if found.vehicle.impact_on == "all axles" else 1.0)
     # on the vehicle's part of the width and without factors
     share, (axles, strips) = code * found.structure.width / found.width, _split_loads(found.moving)
     live = [replace(load, force=tuple(force / share for force in load.force)) for load in axles]

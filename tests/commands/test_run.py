@@ -583,16 +583,17 @@ def test_rating_of_a_case(tmp_path, ring, capsys):
     path.write_text(LIMIT)
     given = ["--vehicle", "CS454-single", "--live", "0.1", "--width"]
     command = ["rate", str(path), *given, f"{ring.width}"]
-    assert af.commands.main([*command, "--out", str(out)]) == 0
+    assert af.commands.main([*command, "--out", str(out)]) == 3  # without a strength
     said = capsys.readouterr().out
     named = replace(ring, name="a ring pushed over")
     found = af.rate(named, "CS454-single", live=0.1)
     assert str(found) in said
-    assert af.commands.main([*command[:-1], f"{100.0 * ring.width} cm"]) == 0
+    assert f"as the case gives no strength of the stones: {found.crushing_text}; give" in said
+    assert af.commands.main([*command[:-1], f"{100.0 * ring.width} cm"]) == 3
     assert str(found) in capsys.readouterr().out
     assert af.commands.main([*command[:-1], "wide"]) == 1
     assert "rating.width = 'wide'" in capsys.readouterr().err
-    assert (out / "rating.txt").read_text().strip() == str(found)
+    assert (out / "rating.txt").read_text().startswith(str(found))
     assert (out / "rating.csv").read_text().strip() == found.table()
     assert f"wrote {out / 'rating.png'}" in said
     assert af.commands.main([*command[:3], "LM9"]) == 1
@@ -607,34 +608,68 @@ def test_rating_of_a_case(tmp_path, ring, capsys):
     assert "Thrust line at collapse" in page
 
 
-def test_vehicles_are_rated_together_the_worst_first(tmp_path, unplotted, capsys, monkeypatch):
-    """One of a code, all of another, and the case's own by its name."""
+def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
+    """The case's own first, by name, though another is worse; then the worst first."""
     path, out = tmp_path / "ring.toml", tmp_path / "out"
-    own = '[rating]\nvehicle = { name = "cart", axles = ["3 kN"] }\n'
-    path.write_text(LIMIT.replace("voussoirs = 17", "voussoirs = 7") + own)
+    own = '{ name = "cart", axles = ["3 kN"] }, { name = "van", axles = ["9 kN"] }'
+    strong = LIMIT + 'strength = "none"\n'
+    path.write_text(f"{strong.replace('= 17', '= 7')}[rating]\nvehicle = [{own}]\n")
     monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (0.9, 1.2))
-    given = [part for name in ("cart", "LM1", "hl93") for part in ("--vehicle", name)]
+    given = [part for name in ("Cart", "LM1", "hl93") for part in ("--vehicle", name)]
     assert af.commands.main(["rate", str(path), "--out", str(out), *given]) == 0
     said = capsys.readouterr().out
     rows = pd.read_csv(out / "vehicles.csv")
     assert (out / "vehicles.png").exists()
-    assert {*rows["vehicle"]} == {"cart", "LM1", "HL93-tandem", "HL93-truck"}
-    assert (np.diff(rows["factor"]) >= 0.0).all()
+    assert rows["vehicle"][0] == "cart"
+    assert {*rows["vehicle"][1:]} == {"LM1", "HL93-tandem", "HL93-truck"}
+    assert (np.diff(rows["factor"][1:]) >= 0.0).all()
+    assert rows["factor"][0] > rows["factor"][1]
     case = af.Case.read(path)
     for _, (name, factor, *_) in rows.iterrows():
         vehicle = case.rating["vehicle"] if name == "cart" else name
         found = af.rate(case.structure, vehicle)
         assert factor == float(f"{found.factor:.4g}")
         assert str(found) in said
-        if name == rows["vehicle"][0]:
+        if name == "cart":
             assert (out / "rating.csv").read_text().strip() == found.table()
-            assert tomllib.loads((out / "rating.toml").read_text())["rating"]["vehicle"] == name
+            table = tomllib.loads((out / "rating.toml").read_text())["rating"]
+            assert table["vehicle"]["name"] == name
+            first = repr(found)
+        if name == rows["vehicle"][1]:
+            worst = f"least of 4 vehicles: {found!r}"
+    # a conclusion is on the vehicle of the case, and names the worst of all
+    stated = json.loads((out / "rating.json").read_text())
+    assert stated["sentences"] == [first, worst]
+    assert [row[1] for row in stated["rows"]] == [*rows["vehicle"]]
     text = (out / "rating.txt").read_text().strip()
     assert text in said
     assert [line.split()[0] for line in text.splitlines()[1:5]] == [*rows["vehicle"]]
     assert af.commands.main(["rate", str(path), "--out", str(out)]) == 0
+    assert [*pd.read_csv(out / "vehicles.csv")["vehicle"]] == ["van", "cart"]
+    assert af.commands.main(["rate", str(path), "--vehicle", "bus"]) == 1
+    said = capsys.readouterr().err
+    assert "'bus' is not known: use one of 'cart' of the case, 'van' of the case, LM1, " in said
+    assert said.endswith("HL93-truck; or Eurocode, CS454, HL93, each for all of a code\n")
+    assert af.commands.main(["rate", str(path), "--vehicle", "van", "--out", str(out)]) == 0
     assert not {"vehicles.csv", "vehicles.png"} & {each.name for each in out.iterdir()}
-    assert "cart" in (out / "rating.toml").read_text()
+    assert "van" in (out / "rating.toml").read_text()
+
+
+def test_a_bridge_that_does_not_stand_is_rated_for_no_vehicle(tmp_path, unplotted, capsys):
+    """A ring of a tenth of the least thickness of a semicircle by Heyman."""
+    path, out = tmp_path / "ring.toml", tmp_path / "out"
+    path.write_text(LIMIT.replace("= 159", "= 180").replace("= 0.55", "= 0.03"))
+    given = ["--vehicle", "LM1", "--vehicle", "LM2", "--out", str(out)]
+    assert af.commands.main(["rate", str(path), *given]) == 3
+    _, first, *_ = capsys.readouterr().out.splitlines()
+    words = "does not stand under its own weight, and carries no vehicle"
+    assert first == f"Rating of 'a ring pushed over': {words}"
+    stated = json.loads((out / "rating.json").read_text())
+    assert stated["rows"] == [["rating", "LM1", words, "-"]]
+    assert stated["doubts"] == [
+        "limit analysis finds no equilibrium of the bridge under its own weight"
+    ]
+    assert "nan" not in (out / "rating.txt").read_text()
 
 
 @pytest.mark.parametrize("command", ["limit", "rate"])

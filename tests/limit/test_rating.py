@@ -116,6 +116,39 @@ def test_an_axle_on_an_overhang_by_hand():
         assert other.passes == (other.geometric >= 1.0) == stands
 
 
+def test_a_strength_that_is_not_given_is_stated_by_hand():
+    """The base crushes over N / (σ b) at the toe, and turns about the middle of that.
+
+    So λ Q (x - 1) = M - N² / (2 σ b) with N = W + λ Q, where M is the moment of the weight W.
+    """
+    stone, axle = column_under_axle(width=2.0), Vehicle("axle", (50e3,))
+    weight = 3.0 * 2.0 * af.STONE.unit_weight
+    moment, crushes = weight / 6.0, 1.0 / (2.0 * 5e6 * 2.0)
+    found = af.rate(stone, axle, width=2.0)
+    force = 50e3
+    arm = found.moving.position - 1.0
+    roots = np.roots(
+        [crushes * force**2, force * (2.0 * crushes * weight + arm), crushes * weight**2 - moment]
+    )
+    expected = float(roots.max())
+    assert found.crushing == pytest.approx(expected, rel=1e-4)  # by tangents
+    assert found.crushing < 0.995 * found.factor
+    words = f"counts; at 5 MPa the least factor is {expected:.4g}"
+    assert words in str(found)
+    given = af.rate(stone, axle, width=2.0, strength=5e6)
+    assert given.factor == pytest.approx(expected, rel=1e-4)
+    assert np.isnan(given.crushing)
+    soft = replace(found, live=1.35, impact=1.2, crushing=0.9)
+    assert replace(soft, moving=_scaled(soft.moving, 3.0)).outcome.startswith(
+        "passes only with stones that do not crush"
+    )
+
+
+def _scaled(moving, share):
+    """Return a moving load whose least factor is a multiple."""
+    return replace(moving, worst=replace(moving.worst, factor=share * moving.worst.factor))
+
+
 def test_a_distributed_load_on_an_overhang_by_hand():
     """It counts where it turns the stone: beyond the toe at 1 m, with its middle at 1.5 m.
 

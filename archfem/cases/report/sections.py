@@ -256,14 +256,14 @@ def _build_rating(data: ReportData) -> list[Any]:
         blocks[0] = replace(blocks[0], text=blocks[0].text.replace("from memory", "to be checked"))
     if (table := data.read_text("vehicles.csv")) is None:
         return blocks
-    # the text begins with the same table, and the picture is of the worst vehicle
+    # the text begins with the same table, and the picture is of the first vehicle
     text, *figures = blocks
-    _, worst, *others = text.text.split("\n\n")
+    _, first, *others = text.text.split("\n\n")
     head, *rows = reader(table.splitlines())
-    grid = Grid(head, rows, "Factors of several vehicles, the worst first", "words")
+    grid = Grid(head, rows, "Factors of several vehicles", "words")
     every = data.read_figure("vehicles.png", "Factor of each vehicle over its place")
-    texts = (TextBlock(each, "lines") for each in (worst, *others))
-    shown = (replace(each, caption=f"{caption}, of the worst") for each in figures)
+    texts = (TextBlock(each, "lines") for each in (first, *others))
+    shown = (replace(each, caption=f"{caption}, of the first") for each in figures)
     return [grid, *every, *texts, *shown]
 
 
