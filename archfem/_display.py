@@ -106,9 +106,12 @@ def write_progress_line(name: str, text: str) -> None:
 
 
 class ProgressReport:
-    """Progress of a search of five seconds and more: a bar on a terminal, elsewhere lines."""
+    """Progress of a search of five seconds and more: a bar on a terminal, elsewhere lines.
 
-    def __init__(self, name: str, total: int) -> None:
+    The total is None if it is unknown.
+    """
+
+    def __init__(self, name: str, total: int | None) -> None:
         layout = "{desc}: |{bar}| {n_fmt} of {total_fmt}{postfix}"
         look: dict[str, Any] = {"bar_format": layout, "desc": name, "leave": False}
         self._bar = tqdm(total=total, disable=None, delay=PROGRESS_INTERVAL, **look)

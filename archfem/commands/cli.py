@@ -189,8 +189,7 @@ def _add_case_commands(commands: Any) -> None:
         "--out", required=True, metavar="FILE.msh", help="the mesh file"
     )
     about = "does it fall, whatever its uncertain properties are?"
-    where = "folder for runs, from which a stopped command continues, table and picture (none)"
-    add_to = add("verdict", about, where, required=False)
+    add_to = add("verdict", about, "folder that keeps all runs (none)", required=False)
     add_to("--workers", type=int, default=1, help="processes for the runs (1)")
     about = "runs beside those of one changed property each (236)"
     add_to("--samples", type=int, default=236, help=about)

@@ -24,6 +24,9 @@ COLLAPSE_STATES = ("stands", "dislocated", "partly fallen", "fallen")
 # Displacement above which a structure is dislocated, over the depth of the shallowest part [-]
 DISLOCATION = 0.1
 
+# Remedy where properties or steps may change the kind
+RANGE_REMEDY = "state a range, `archfem verdict CASE.toml`"
+
 # Kinds of collapse with lost blocks
 FALLEN_STATES = COLLAPSE_STATES[2:]
 
@@ -150,7 +153,7 @@ def doubt_collapse(structure: Structure, fall: CollapseState) -> Iterator[Doubt]
             f"a corner was displaced by {format_mm(fall.displacement)}, "
             f"{fall.displacement / depth:.2g} of the depth of the shallowest part: other joints "
             "or time steps may let it fall",
-            "state a range, `verdict_range`",
+            RANGE_REMEDY,
         )
     limit = DISLOCATION * depth
     if limit / 1.5 < fall.residual < 1.5 * limit:

@@ -6,17 +6,17 @@ than one at which it falls. Hence runs also fill the gaps between scales below t
 where one falls, the search continues below it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from math import inf, sqrt
+from re import sub
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
-from archfem._display import call_late_bound
+from archfem._display import ProgressReport, call_late_bound
 from archfem._files import align_columns
 from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.analysis import Analysis, takes_analysis
@@ -29,10 +29,10 @@ from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict import MECHANISM_DEFINITIONS
 from archfem.dynamics.verdict_range import VerdictRange
-from archfem.errors import DidNotConverge, InvalidInput, logger
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_count import Mechanism
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 from archfem.motion.signal_processing import MAX_PEAK_ACCELERATION
@@ -125,7 +125,7 @@ class MechanismScales:
     def doubts(self) -> tuple[str, ...]:
         """Reasons why the scales of the first mechanism may be wrong."""
         first = min(self.definitions, key=lambda definition: self[definition].upper)
-        return _doubts_of_bracket(self, first)
+        return _doubts_of_searches({"": self}, first)
 
     def with_run(self, run: ScaledRun) -> "MechanismScales":
         """Return the search with one more run."""
@@ -249,28 +249,39 @@ def _say_scale(scale: float, pga: float | None) -> str:
 
 def _say_bracket(state: str, lower: float, pga: float | None, met: str) -> str:
     """Return a bracket in words, from the state at its lower bound to what is met above it."""
-    if not lower:
-        return f"{met}; at no smaller scale that was tried it survives"
+    if not lower:  # the smaller ones, if any were run, have no answer
+        return f"{met}; no smaller scale is known to survive"
     return f"{state} at {_say_scale(lower, pga)}, {met}"
 
 
-def _doubts_of_bracket(scales: MechanismScales, definition: str) -> tuple[str, ...]:
-    """Return reasons why a bracket may be wrong: runs broken off, not monotonic, or in doubt."""
-    bracket, doubts = scales[definition], list[str]()
-    for note, values in {
-        "it is not monotonic: it survives also": bracket.above,
-        "runs without an answer were": bracket.unanswered,
-    }.items():
-        if values:
-            doubts.append(
-                f"{note} at {', '.join(f'{value:#.3g}' for value in values)} × the motion"
-            )
-    if scales.interrupted:
-        doubts.append("the search was interrupted")
-    bounds = [run for run in scales.runs if run.scale in (bracket.lower, bracket.upper)]
-    doubts += [
-        f"at {run.scale:#.3g} × the motion: {doubt}" for run in bounds for doubt in run.doubts
-    ]
+def _doubts_of_searches(
+    searches: Mapping[str, MechanismScales], definition: str
+) -> tuple[str, ...]:
+    """Return reasons why brackets may be wrong: runs broken off, not monotonic, or in doubt.
+
+    Searches are by their settings in words. What differs in numbers alone is stated once.
+    """
+    doubts, of_runs = list[str](), dict[str, tuple[str, list[str]]]()
+    for settings, scales in searches.items():
+        bracket = scales[definition]
+        for note, values in {
+            "it is not monotonic: it survives also": bracket.above,
+            "runs without an answer were": bracket.unanswered,
+        }.items():
+            if values:
+                at = ", ".join(f"{value:#.3g}" for value in values)
+                doubts.append(f"{note} at {at} × the motion{settings}")
+        if scales.interrupted:
+            doubts.append(f"the search was interrupted after {len(scales.runs)} runs{settings}")
+        for run in scales.runs:
+            if run.scale in (bracket.lower, bracket.upper):
+                for doubt in run.doubts:
+                    kind = sub(r"[\d.]+(e[-+]\d+)?", "#", doubt)
+                    _, places = of_runs.setdefault(kind, (doubt, []))
+                    places.append(f"{run.scale:#.3g} ×{settings}")
+    for doubt, (first, *others) in of_runs.values():
+        likewise = f" (likewise at {join_names(others)})" if others else ""
+        doubts.append(f"at {first}{likewise}: {doubt}")
     return tuple(doubts)
 
 
@@ -305,15 +316,14 @@ def search_scales(
     """
     scales = found or MechanismScales(definitions)
     try:
-        with tqdm(unit="run", disable=None, leave=False, desc="scales") as bar:
+        with ProgressReport("scale", None) as progress:
             while (scale := _next_scale(scales, precision, between, begin)) is not None:
-                bar.set_postfix_str(f"× {scale:.3g}")
-                scales = scales.with_run(run_scaled(scale))
-                bar.update()
+                run = run_scaled(scale)
+                scales = scales.with_run(run)
+                result = run.fall.kind if run.fall else run.outcome
+                progress.show(f"{scale:#.3g} × the motion: {result}", 1)
     except KeyboardInterrupt:
         scales = replace(scales, interrupted=True)
-    if scales.interrupted:
-        logger.warning("interrupted after %d runs: their results are returned", len(scales.runs))
     return scales
 
 
@@ -432,10 +442,8 @@ class CollapseScale:
                 for dt, b in brackets.items()
             )
             doubts.append(f"its time steps disagree: it first falls {', '.join(found)}")
-        for dt, search in self.searches.items():
-            own = _doubts_of_bracket(search, COLLAPSE_DEFINITION)
-            doubts += [f"by a time step of {1e3 * dt:g} ms, {doubt}" for doubt in own]
-        return tuple(doubts)
+        searches = {f" by {1e3 * dt:g} ms": search for dt, search in self.searches.items()}
+        return (*doubts, *_doubts_of_searches(searches, COLLAPSE_DEFINITION))
 
     def bracket(self, dt: float) -> Bracket:
         """Return the bracket of collapse that was found with one time step.
