@@ -9,6 +9,7 @@
     export            VTU, PVD and XDMF series of a run
     fall              fall of loose blocks, from their release to rest
     history           History, its file, first mechanisms
+    loose_fill        fill that falls: grains in place of its bodies
     model_selection   build, and selection of a model by predicted error
     monitor           energy balance and validity checks of a run
     motion_scaling    scale of a motion at first mechanism or collapse

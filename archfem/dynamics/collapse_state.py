@@ -192,12 +192,19 @@ def describe_dislocation(structure: Structure) -> str:
 
 
 def doubt_soft_blocks(*structures: Structure) -> tuple[Doubt, ...]:
-    """Return the doubt of falls in which soft blocks, as fill in one piece, are rigid bodies."""
-    soft = [each.blocks[number].name for each in structures for number in find_soft_blocks(each)]
-    names = join_names([*dict.fromkeys(soft)])
-    cause = f"a fall takes soft blocks for rigid bodies, each in one piece: {names}"
+    """Return the doubts of falls with fill in one piece, or with soft stones as rigid bodies."""
+    named: tuple[list[str], list[str]] = [], []  # of fill, and of stones
+    for each in structures:
+        stones = list_stones(each)
+        for number in find_soft_blocks(each):
+            named[number in stones].append(each.blocks[number].name)
+    fill, soft = (join_names([*dict.fromkeys(names)]) for names in named)
+    causes = {
+        f"fill in one piece holds stones by tension until they are loose: {fill}": fill,
+        f"a fall takes soft blocks for rigid bodies, each in one piece: {soft}": soft,
+    }
     remedy = 'cut them with jointed_fill (law = "jointed" in a case)'
-    return (Doubt(cause, remedy),) if soft else ()
+    return tuple(Doubt(cause, remedy) for cause, names in causes.items() if names)
 
 
 def _place_corners(structure: Structure, blocks: Sequence[int]) -> Callable[[Array], Array]:

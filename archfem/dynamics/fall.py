@@ -22,6 +22,7 @@ from archfem.dynamics.collapse_state import (
     mark_lost,
 )
 from archfem.dynamics.history import Ending, History, with_fall
+from archfem.dynamics.loose_fill import Field, interpolate_field, loosen_fill
 from archfem.dynamics.rigid_body.bodies import FallFrame, LooseBlocks, masses_of
 from archfem.dynamics.rigid_body.simulation import (
     MAX_COMPARED_BLOCKS,
@@ -131,12 +132,16 @@ def simulate_fall(
     """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + 20.0
-    loose = with_sliding_joints(model.structure)
-    dt, find_lost = None if whole else TRIED_STEPS[0], mark_lost(model.structure)
-    simulation = RigidBlockSimulation(loose, dt=dt, rocking_ratio=rocking_ratio)
+    find_lost = mark_lost(model.structure)
+    structure, fields = with_sliding_joints(model.structure), _deformed_bodies(model, state)
+    loose = loosen_fill(structure, released.start, fields)
+    # grains are many, and where each of them goes depends on the step anyhow
+    dt = None if whole and loose.structure is structure else TRIED_STEPS[0]
+    simulation = RigidBlockSimulation(loose.structure, dt=dt, rocking_ratio=rocking_ratio)
     try:
         frames = []
-        for frame in simulation.frames(released.start, end, motion, spacing=0.02):
+        for each in simulation.frames(loose.start, end, motion, spacing=0.02):
+            frame = loose.restore(each)
             frames.append(frame)
             if not whole and find_lost(frame.poses).any():
                 break
@@ -146,6 +151,19 @@ def simulate_fall(
             "archfem.dynamics.RigidBlockSimulation from the start"
         ) from error
     return _fall_dataset(frames, motion, released), frames
+
+
+def _deformed_bodies(model: Model, state: State) -> dict[int, Field]:
+    """Return the fields of bodies of fill that have deformed."""
+    cells, fields = model.cells, dict[int, Field]()
+    for number in find_yielding_blocks(model.structure):
+        if np.count_nonzero(cells.coordinate_owner == number) == 3:
+            continue  # rigid
+        nodes = np.flatnonzero(cells.block == number)
+        shapes = cells.shapes_at(nodes)
+        values = [(shapes @ each).reshape(-1, 2) for each in (state.q, state.velocity)]
+        fields[number] = interpolate_field(cells.places[nodes], *values)
+    return fields
 
 
 def _fall_dataset(

@@ -24,13 +24,16 @@ from archfem._validation import check_between, check_number, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.assembly import assembled
 from archfem.masonry.block import Block
-from archfem.masonry.materials import Contact
+from archfem.masonry.materials import Contact, Material
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure
 from archfem.units import in_degrees
 
 if TYPE_CHECKING:
     from shapely import Polygon
+
+# Area of a whole piece, over the square of its longest side [-]
+TILE_AREA = sqrt(3.0) / 8.0
 
 
 class _Piece(NamedTuple):
@@ -78,7 +81,7 @@ def jointed_fill(
     fill = _FillAssembly(structure, set(soft), law, radius)
     blocks: list[Block] = []
     for number, block in enumerate(structure.blocks):
-        pieces = _cut_block(block, piece_size) if number in soft else []
+        pieces = cut_block(block, piece_size) if number in soft else []
         blocks += _create_blocks(block, pieces) if pieces else [block]
         fill.origin += [number] * max(1, len(pieces))
         fill.centres += [piece.centre for piece in pieces] or [np.zeros(2)]
@@ -103,7 +106,7 @@ def _check_fill(structure: Structure, soft: Sequence[int], size: float) -> None:
         raise InvalidInput("the fill is cut into pieces already: cut the structure it was made of")
     check_between(size, "size of the pieces [m]", 0.0, remedy="give a length in m")
     area = sum(structure.blocks[number].area for number in soft)
-    count = area / (size**2 * sqrt(3.0) / 8.0)
+    count = area / (TILE_AREA * size**2)
     if not 2.0 <= count <= 20_000:  # more cannot be solved in reasonable time
         raise InvalidInput(
             f"pieces of {size:g} m make {count:.3g} of a fill of {area:.3g} m²: give a size with "
@@ -141,7 +144,7 @@ def _incentre(corners: Array) -> Array:
     return opposite @ corners / opposite.sum()
 
 
-def _cut_block(block: Block, size: float) -> list[_Piece]:
+def cut_block(block: Block, size: float) -> list[_Piece]:
     """Cut a block into pieces; slivers are merged with their main neighbour."""
     import shapely
 
@@ -155,7 +158,7 @@ def _cut_block(block: Block, size: float) -> list[_Piece]:
         parts = (part for part in shapely.get_parts(common) if part.geom_type == "Polygon")
         pieces += [_Piece(part, _incentre(corners)) for part in parts if part.area > 0.0]
     # below 30 % of a whole piece a sliver is merged
-    return _merge_slivers(pieces, 0.3 * size**2 * sqrt(3.0) / 8.0, grid)
+    return _merge_slivers(pieces, 0.3 * TILE_AREA * size**2, grid)
 
 
 def _merge_slivers(pieces: list[_Piece], min_area: float, grid: float) -> list[_Piece]:
@@ -180,11 +183,14 @@ def _merge_slivers(pieces: list[_Piece], min_area: float, grid: float) -> list[_
     return [*pieces, *alone]
 
 
+def stiffen(material: Material) -> Material:
+    """Return the material of pieces, a thousand times stiffer: the compliance is in the joints."""
+    return replace(material, young=min(1e3 * material.young, 1e13))
+
+
 def _create_blocks(block: Block, pieces: Sequence[_Piece]) -> list[Block]:
     """Create blocks from pieces, from below upwards and from left to right."""
-    # a thousand times stiffer than the fill, whose compliance is in the joints
-    material = replace(block.material, young=min(1e3 * block.material.young, 1e13))
-    blocks = []
+    material, blocks = stiffen(block.material), list[Block]()
     for count, piece in enumerate(pieces, 1):
         ring = np.array(piece.polygon.exterior.normalize().coords)[:-1]
         x, y = ring.T

@@ -22,9 +22,8 @@ def estimate_block_stiffness(structure: Structure, number: int) -> BlockStiffnes
     # first mode: a shear wave that crosses the block twice, c_s / (2 L), L² the area
     block = structure.blocks[number]
     length = sqrt(block.area)
-    stiffest = max(
-        joint.contact.normal_stiffness for joint in structure.joints if number in joint.blocks
-    )
+    joints = [joint for joint in structure.joints if number in joint.blocks]
+    stiffest = max((joint.contact.normal_stiffness for joint in joints), default=inf)
     shear_modulus = block.material.young / (2.0 * (1.0 + block.material.poisson))
     wave = sqrt(shear_modulus / structure.density(block))
     return BlockStiffness(wave / (2.0 * length), block.material.young / length / stiffest)

@@ -1,0 +1,131 @@
+"""Fill that falls as grains: areas, overlaps and momentum by closed forms, and falls that end."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+import archfem as af
+from archfem.dynamics.collapse_state import doubt_soft_blocks
+from archfem.dynamics.loose_fill import _cut_off, interpolate_field, loosen_fill
+from archfem.dynamics.recorder import Record
+from archfem.dynamics.rigid_body.bodies import LooseBlocks
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
+from archfem.studies.variations import as_falling, prepare_runs
+
+SQUARE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+
+
+@pytest.fixture(scope="module")
+def footbridge():
+    """An arch with fill in one piece between fixed walls."""
+    wall = {"length": 1.0, "height": 0.5, "above": 0.5, "state": "fixed"}
+    return af.bridge(
+        arches=[af.shapes.Arch(span=6.0, rise=1.5, thickness=0.4, voussoirs=15)],
+        sidewalls=[af.shapes.Sidewall(**wall, name=f"{side} wall") for side in ("left", "right")],
+        backfill=af.shapes.Backfill(cover=0.3),
+        width=3.0,
+    )
+
+
+def place(block, pose):
+    """Return a block of straight edges in its place."""
+    arms, (c, s) = np.array(block.drawn()) - block.centroid, (np.cos(pose[2]), np.sin(pose[2]))
+    x, y = arms.T
+    moved = block.centroid + pose[:2] + np.column_stack([c * x - s * y, s * x + c * y])
+    return shapely.Polygon(moved)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_the_least_is_cut_off_two_squares(share):
+    other = np.add(SQUARE, (0.9, 0.3))
+    every = np.ones(4, bool)
+    one, two = _cut_off(SQUARE, other, every, share), _cut_off(other, SQUARE, every, share)
+    assert shapely.area(shapely.Polygon(one)) == pytest.approx(1.0 - 0.1 * share)
+    assert shapely.area(shapely.Polygon(two)) == pytest.approx(1.0 - 0.1 * share)
+    if share == 0.5:
+        common = shapely.intersection(shapely.Polygon(one), shapely.Polygon(two))
+        assert common.area == pytest.approx(0.0, abs=1e-12)
+    assert _cut_off(SQUARE, np.add(SQUARE, (1.0, 0.0)), every, share) is SQUARE
+
+
+def test_grains_of_fill_as_built_fill_its_place(footbridge):
+    (number,) = find_yielding_blocks(footbridge)
+    loose = loosen_fill(footbridge, LooseBlocks.as_built(footbridge), {})
+    grains = [loose.structure.blocks[k] for k in np.flatnonzero(loose.origin == number)]
+    whole = shapely.Polygon(footbridge.blocks[number].drawn())
+    assert len(grains) > 15
+    assert sum(block.area for block in grains) == pytest.approx(whole.area, rel=2e-3)
+    for grain in grains:
+        outline = shapely.Polygon(grain.points)
+        assert shapely.difference(outline, whole).area < 1e-3 * whole.area
+        assert outline.convex_hull.area == pytest.approx(outline.area, rel=1e-9)
+
+
+def test_fill_that_was_pressed_into_stones_is_cut_off(footbridge):
+    """A body that lies 0.1 m too deep loses what is in the arch, and in no grain twice."""
+    (number,) = find_yielding_blocks(footbridge)
+    start = LooseBlocks.as_built(footbridge)
+    start.poses[number] = 0.0, -0.1, 0.0
+    loose = loosen_fill(footbridge, start, {})
+    placed = [
+        place(block, pose)
+        for block, pose in zip(loose.structure.blocks, loose.start.poses, strict=True)
+    ]
+    fill, whole = loose.origin == number, shapely.Polygon(footbridge.blocks[number].drawn())
+    grains, stones = ([placed[k] for k in np.flatnonzero(which)] for which in (fill, ~fill))
+    masonry, soil = shapely.unary_union(stones), shapely.unary_union(grains)
+    inside = shapely.difference(shapely.affinity.translate(whole, 0.0, -0.1), masonry)
+    # straight cuts take a little more at corners of stones
+    assert 0.95 * inside.area < soil.area <= inside.area + 0.01
+    # stones are drawn with more chords than they are simulated with
+    assert shapely.intersection(soil, masonry).area < 0.01
+    assert sum(grain.area for grain in grains) == pytest.approx(soil.area, abs=1e-6)
+
+
+def test_grains_have_the_motion_of_their_body(footbridge):
+    """Places and velocities of a body that shears are linear; its momentum is kept."""
+    (number,) = find_yielding_blocks(footbridge)
+    outline = np.array(footbridge.blocks[number].drawn())
+    heights = outline[:, 1:]
+    zero = np.zeros_like(heights)
+    field = interpolate_field(
+        outline, np.hstack([0.02 * heights, zero]), np.hstack([heights, zero])
+    )
+    loose = loosen_fill(footbridge, LooseBlocks.as_built(footbridge), {number: field})
+    which = np.flatnonzero(loose.origin == number)
+    grains, speeds = [loose.structure.blocks[k] for k in which], loose.start.velocities[which]
+    body, areas = footbridge.blocks[number], np.array([grain.area for grain in grains])
+    assert areas @ speeds[:, 0] / areas.sum() == pytest.approx(body.centroid[1], rel=0.02)
+    middle = areas @ [grain.centroid for grain in grains] / areas.sum()
+    assert middle[0] == pytest.approx(body.centroid[0] + 0.02 * body.centroid[1], abs=2e-3)
+    moved = next(iter(loose_frames(loose)))
+    assert loose.restore(moved).velocities[number, 0] == pytest.approx(body.centroid[1], rel=0.02)
+
+
+def loose_frames(loose):
+    """Yield the frames of loose grains."""
+    simulation = af.dynamics.RigidBlockSimulation(loose.structure, dt=5e-4)
+    yield from simulation.frames(loose.start, loose.start.time + 0.02)
+
+
+def test_a_structure_without_fill_is_returned_as_it_is(ring):
+    start = LooseBlocks.as_built(ring)
+    loose = loosen_fill(ring, start, {})
+    assert loose.structure is ring
+    assert loose.start is start
+
+
+@pytest.mark.parametrize("rule", ["exact", "rigid"])
+def test_a_bridge_with_fill_in_one_piece_falls_by_elastic_and_rigid_joints(footbridge, rule):
+    """Fill as one rigid body overlapped with stones, or held them: no run had an answer."""
+    analysis = af.Analysis(
+        footbridge, fidelity={"backfill": "full", "rest": "rigid"}, damping="effective", dt=0.005
+    )
+    falling = replace(as_falling(analysis), record=Record(whole_fall=False))
+    run = prepare_runs(falling, {"joint_rule": rule})
+    motion = af.Motion.synthetic(seed=1, duration=3.0, pga=45.0)
+    assert run(motion).kind == "fallen"
+    (doubt,) = doubt_soft_blocks(footbridge)
+    assert "holds stones by tension until they are loose: backfill" in str(doubt)
