@@ -109,8 +109,8 @@ class Rating(ResultDisplay):
         words = "passes" if self.passes else "fails"
         needed = self._needs() if self.passes else ""
         words += f" only with the {needed}" if needed else ""
-        if missing := self._missing_factors():
-            words += f" if the code's {missing} is at most {self.factor:.4g}" if self.passes else ""
+        if (missing := self._missing_factors()) and self.passes:
+            words += f" if the code's {missing} is at most {self.factor:.4g}{self._say_least()}"
         words += f" without {self.vehicle.left_out}" if self.vehicle.left_out else ""
         return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
 
@@ -125,6 +125,13 @@ class Rating(ResultDisplay):
         if not needed and len(without) == 2 and not self.without_either >= 1.0:
             return " or the ".join(without)
         return " and the ".join(needed)
+
+    def _say_least(self) -> str:
+        """Return the factor with none of the fill's help, in words; "" if that is not known."""
+        has_backing = isinstance(self.fill, Fill) and self.fill.backing is not None
+        least = self.without_either if has_backing else self.without_pressure
+        help_ = "pressure and backing" if has_backing else "pressure"
+        return "" if np.isnan(least) else f" ({least:.4g} without {help_} of the fill)"
 
     def _missing_factors(self) -> str:
         """Return the factors of a code that neither the vehicle nor its user gave, in words."""
