@@ -27,6 +27,7 @@ from archfem.joints.criteria import (
 )
 from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
 from archfem.limit.fill_range import FillRange
+from archfem.limit.fill_strength import PlasticFill
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
 from archfem.masonry.loads import BodyForce
@@ -269,6 +270,8 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
 def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
     """Tabulate the ratings of a bridge for several vehicles."""
     columns, rated = ["factor", "without_pressure", "full_pressure"], list(ratings)
+    if any(isinstance(found.fill, PlasticFill) for found in rated):
+        columns.insert(1, "by_pressure")
     if any(getattr(found.fill, "backing", None) is not None for found in rated):
         columns += ["without_backing", "without_either"]
     columns.append("geometric")

@@ -15,7 +15,13 @@ from archfem.errors import InvalidInput
 from archfem.limit.backfill import check_options, is_balanced, self_weight_programme
 from archfem.limit.collapse import describe_crushing, describe_fill
 from archfem.limit.fill_range import say_part
-from archfem.limit.fill_strength import Fill, PlasticFill, change_fill, place_backing
+from archfem.limit.fill_strength import (
+    Fill,
+    PlasticFill,
+    as_pressure,
+    change_fill,
+    place_backing,
+)
 from archfem.limit.instability import DeepenedBlocks
 from archfem.limit.vehicles import (
     DRIVING_DIRECTIONS,
@@ -72,6 +78,8 @@ class Rating(ResultDisplay):
         without_backing: least factor without the backing of a `Fill`; NaN without one, and where
             the bridge then does not stand.
         without_either: least factor without backing and without pressure; NaN likewise.
+        by_pressure: least factor with a plastic fill as weight and pressure (`Fill`) of its
+            strength, which the four states above have then too; else NaN.
         fill: strength of the fill, or None.
     """
 
@@ -91,6 +99,7 @@ class Rating(ResultDisplay):
     deepest: float = np.nan
     without_backing: float = np.nan
     without_either: float = np.nan
+    by_pressure: float = np.nan
     fill: Fill | PlasticFill | None = None
 
     @property
@@ -114,12 +123,19 @@ class Rating(ResultDisplay):
         words += f" without {self.vehicle.left_out}" if self.vehicle.left_out else ""
         return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
 
+    @property
+    def _has_backing(self) -> bool:
+        """Whether masonry holds the haunches."""
+        return self.fill is not None and self.fill.backing is not None
+
     def _needs(self) -> str:
         """Return the parts of the fill without which the bridge fails, in words."""
-        if not isinstance(self.fill, Fill):
+        if self.fill is None:
             return ""
+        if isinstance(self.fill, PlasticFill) and not self.by_pressure >= 1.0:
+            return "fill as a plastic body"
         without = {"pressure of the fill": self.without_pressure}
-        if self.fill.backing is not None:
+        if self._has_backing:
             without["backing"] = self.without_backing
         needed = [part for part, factor in without.items() if not factor >= 1.0]
         if not needed and len(without) == 2 and not self.without_either >= 1.0:
@@ -128,9 +144,8 @@ class Rating(ResultDisplay):
 
     def _say_least(self) -> str:
         """Return the factor with none of the fill's help, in words; "" if that is not known."""
-        has_backing = isinstance(self.fill, Fill) and self.fill.backing is not None
-        least = self.without_either if has_backing else self.without_pressure
-        help_ = "pressure and backing" if has_backing else "pressure"
+        least = self.without_either if self._has_backing else self.without_pressure
+        help_ = "pressure and backing" if self._has_backing else "pressure"
         return "" if np.isnan(least) else f" ({least:.4g} without {help_} of the fill)"
 
     def _missing_factors(self) -> str:
@@ -238,20 +253,23 @@ class Rating(ResultDisplay):
 
     def describe_pressure(self) -> list[str]:
         """Return the line on the range of the factor over the pressure of the fill, if any."""
-        if np.isnan(self.full_pressure) or not isinstance(self.fill, Fill):
+        fill = as_pressure(self.fill)
+        if np.isnan(self.full_pressure) or fill is None:
             return []
-        least = f"{self.without_pressure:.4g}"
+        least, begin, factor = f"{self.without_pressure:.4g}", "over the pressure", self.factor
         if np.isnan(self.without_pressure):
             least = "none, as the bridge does not stand,"
-        part = f"up to {say_part(self.fill.mobilisation)} of the passive one"
+        if isinstance(self.fill, PlasticFill):
+            begin, factor = "not as a plastic body, but by the pressure", self.by_pressure
+        part = f"up to {say_part(fill.mobilisation)} of the passive one"
         return [
-            f"over the pressure of the fill, each at its worst place: {least} without it, "
-            f"{self.factor:.4g} with {part}, {self.full_pressure:.4g} with all of it"
+            f"{begin} of the fill, each at its worst place: {least} without it, "
+            f"{factor:.4g} with {part}, {self.full_pressure:.4g} with all of it"
         ]
 
     def _describe_backing(self) -> list[str]:
         """Return the line on what the backing adds, if there is some."""
-        if not isinstance(self.fill, Fill) or self.fill.backing is None:
+        if not self._has_backing:
             return []
         with_pressure, neither = (
             "the bridge does not stand" if np.isnan(factor) else f"{factor:.4g}"
@@ -400,7 +418,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     factors = live, impact, dead, width, area_load
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
     axles *= [structure.width / width * live * impact, 1.0]
-    more |= _vary_fill(weighted, moving, cut_road(weighted, live * area_load), axles, options)
+    more |= _vary_fill(weighted, positions, cut_road(weighted, live * area_load), axles, options)
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
 
 
@@ -491,27 +509,28 @@ def _geometric_factor(
 
 def _vary_fill(
     structure: Structure,
-    moving: MovingLoad,
+    places: Sequence[float],
     strips: AxleRow,
     vehicle: Array,
     options: dict[str, Any],
 ) -> dict[str, float]:
     """Return the least factors under other pressures of a fill, with and without its backing."""
-    if not isinstance(fill := options["fill"], Fill):
+    if (fill := as_pressure(options["fill"])) is None:
         return {}
     fills = {
         "without_pressure": change_fill(fill, mobilisation=0.0, active=0.0),
         "full_pressure": change_fill(fill, mobilisation=1.0),
     }
+    if fill is not options["fill"]:
+        fills["by_pressure"] = fill
     if fill.backing is not None:
         fills["without_backing"] = change_fill(fill, backing=None)
         fills["without_either"] = change_fill(fills["without_pressure"], backing=None)
-    places = moving.factors["position"].values.tolist()
     rows = dict.fromkeys(
         axles_on_structure(structure, vehicle, way, x) for way in DRIVING_DIRECTIONS for x in places
     )
     # the fans of loads do not depend on pressure and backing
-    stones, _ = self_weight_programme(structure, **options)
+    stones, _ = self_weight_programme(structure, **(options | {"fill": fill}))
     axles = {row: stones.load(row) for row in rows if row}
     forces = [stones.load([strip]) for strip in strips]
     factors = {}
