@@ -10,7 +10,7 @@ from archfem.cases.case import Case
 from archfem.cases.toml_file import Table, format_key
 from archfem.masonry.joint_closing import FINISHED_KEYS, finish_range
 from archfem.masonry.materials import Contact, Material
-from archfem.units import GPa, MPa, kN, mm
+from archfem.units import GPa, MPa, kN, kPa, mm
 
 HINGE_REASON = "8 % short of the edge, as in Demirel and Aldemir (2021)"
 
@@ -79,6 +79,8 @@ def list_fill_values(case: Case) -> Iterator[tuple[str, str, bool]]:
             value = getattr(fill, key, given.get("law", "pressure"))  # the law is a class
             number = isinstance(value, float)
             text = f"{value:.3g} {unit}".removesuffix(" 1") if number else str(value).lower()
+            if unit == "Pa" and number:
+                text = f"{value / MPa:.3g} MPa" if value >= MPa else f"{value / kPa:.3g} kPa"
             yield f"{section}.fill.{key}", text, key in given
 
 

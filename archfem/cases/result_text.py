@@ -28,6 +28,7 @@ from archfem.joints.criteria import (
 )
 from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
 from archfem.limit.fill_range import FillRange
+from archfem.limit.fill_strength import PlasticFill
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating, describe_spans
 from archfem.masonry.structure import Structure, join_joint_names, join_names
@@ -281,6 +282,8 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
 def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
     """Tabulate the ratings of a bridge for several vehicles."""
     columns, rated = ["factor", "without_pressure", "full_pressure"], list(ratings)
+    if any(isinstance(found.fill, PlasticFill) for found in rated):
+        columns.insert(1, "by_pressure")
     if any(getattr(found.fill, "backing", None) is not None for found in rated):
         columns += ["without_backing", "without_either"]
     columns.append("geometric")
@@ -311,6 +314,9 @@ def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tu
 def _compare_senses(found: Collapse, opposite: Collapse) -> str:
     """Say whether a load bears more in the other sense, by results whose least is the first's."""
     rank = "more" if opposite.range[0] > found.range[1] else "their ranges overlap"
+    if found.over_fill and opposite.over_fill:
+        least, other = found.over_fill.values, opposite.over_fill.values
+        rank = "more" if all(other[key] > least[key] for key in least) else rank
     if np.allclose(opposite.range, found.range, rtol=1e-4):
         rank = "the same"
     searched = any(each.solutions and each.solutions.may_be_less for each in (found, opposite))

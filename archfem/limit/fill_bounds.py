@@ -43,7 +43,7 @@ from archfem.limit.backfill import (
 )
 from archfem.limit.cone_programme import Rows, solve_cones
 from archfem.limit.fill_mesh import HELD, SURFACE, FillMesh, mesh_fill
-from archfem.limit.fill_strength import Fill, PlasticFill, place_backing
+from archfem.limit.fill_strength import PlasticFill, as_pressure, place_backing
 from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions
 from archfem.masonry.loads import Action, BodyForce, PointLoad
@@ -606,9 +606,7 @@ def _load_blocks(
     mesh: FillMesh,
 ) -> FilledBlocks:
     """Return stones and fill with their loads."""
-    stones = BlocksWithFill(
-        structure, Fill(friction_angle=fill.friction_angle, spread=fill.spread), regions
-    )
+    stones = BlocksWithFill(structure, as_pressure(fill), regions)  # for the fan of loads
     blocks = RigidBlocks(regions.structure)
 
     def forces(actions: Sequence[Action]) -> tuple[Array, Array]:

@@ -215,8 +215,21 @@ def read_strength(fill: Any, *shares: str) -> None:
 
 def change_fill(fill: AnyFill, **values: Any) -> AnyFill:
     """Return the strength of a fill with other values."""
-    # as a bare number a small angle would be refused, which looks like radians
-    return replace(fill, **({"spread": f"{fill.spread!r} degree"} | values))
+    return replace(fill, **({"spread": _in_words(fill.spread)} | values))
+
+
+def as_pressure(fill: Fill | PlasticFill | None) -> Fill | None:
+    """Return a plastic fill as weight and pressure of the same strength; other ones as they are."""
+    if not isinstance(fill, PlasticFill):
+        return fill
+    keys = ("friction_angle", "cohesion", "backing", "backing_height")
+    values: Any = {key: getattr(fill, key) for key in keys}
+    return Fill(spread=_in_words(fill.spread), **values)
+
+
+def _in_words(degrees: float) -> Any:
+    """Return an angle with its unit, without which a small one is refused as if in radians."""
+    return f"{degrees!r} degree"
 
 
 def find_clear_springing(structure: Structure) -> float:

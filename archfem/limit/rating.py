@@ -15,7 +15,13 @@ from archfem.errors import InvalidInput
 from archfem.limit.backfill import check_options, is_balanced, self_weight_programme
 from archfem.limit.collapse import describe_crushing, describe_fill
 from archfem.limit.fill_range import say_part
-from archfem.limit.fill_strength import Fill, PlasticFill, change_fill, place_backing
+from archfem.limit.fill_strength import (
+    Fill,
+    PlasticFill,
+    as_pressure,
+    change_fill,
+    place_backing,
+)
 from archfem.limit.instability import DeepenedBlocks
 from archfem.limit.vehicles import (
     DRIVING_DIRECTIONS,
@@ -79,6 +85,8 @@ class Rating(ResultDisplay):
         without_either: least factor without backing and without pressure; NaN likewise.
         crushing: least factor with stones of `ASSUMED_STRENGTH`, where joints do not crush; else
             NaN, and with a plastic fill.
+        by_pressure: least factor with a plastic fill as weight and pressure (`Fill`) of its
+            strength, which the four states above have then too; else NaN.
         fill: strength of the fill, or None.
     """
 
@@ -99,6 +107,7 @@ class Rating(ResultDisplay):
     without_backing: float = np.nan
     without_either: float = np.nan
     crushing: float = np.nan
+    by_pressure: float = np.nan
     fill: Fill | PlasticFill | None = None
 
     @property
@@ -117,11 +126,13 @@ class Rating(ResultDisplay):
         if np.isnan(self.factor):
             return "does not stand under its own weight"
         words = "passes" if self.passes else "fails"
-        needed = [f"the {part}" for part in [self._needs()] if part]
-        needed += ["stones that do not crush"] if self.crushing < 1.0 else []
-        words += f" only with {' and '.join(needed)}" if needed and self.passes else ""
-        if missing := self._missing_factors():
-            words += f" if the code's {missing} is at most {self.factor:.4g}" if self.passes else ""
+        if self.passes:
+            needed = [f"the {part}" for part in [self._needs()] if part]
+            needed += ["stones that do not crush"] if self.crushing < 1.0 else []
+            words += f" only with {' and '.join(needed)}" if needed else ""
+            if missing := self._missing_factors():
+                least = self._say_least()
+                words += f" if the code's {missing} is at most {self.factor:.4g}{least}"
         words += f" without {self.vehicle.left_out}" if self.vehicle.left_out else ""
         return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
 
@@ -132,17 +143,30 @@ class Rating(ResultDisplay):
             return f"{self.outcome}, {self.place}"
         return f"factor {self.factor:.4g} {self.place}, {self.outcome}"
 
+    @property
+    def _has_backing(self) -> bool:
+        """Whether masonry holds the haunches."""
+        return self.fill is not None and self.fill.backing is not None
+
     def _needs(self) -> str:
         """Return the parts of the fill without which the bridge fails, in words."""
-        if not isinstance(self.fill, Fill):
+        if self.fill is None:
             return ""
+        if isinstance(self.fill, PlasticFill) and not self.by_pressure >= 1.0:
+            return "fill as a plastic body"
         without = {"pressure of the fill": self.without_pressure}
-        if self.fill.backing is not None:
+        if self._has_backing:
             without["backing"] = self.without_backing
         needed = [part for part, factor in without.items() if not factor >= 1.0]
         if not needed and len(without) == 2 and not self.without_either >= 1.0:
             return " or the ".join(without)
         return " and the ".join(needed)
+
+    def _say_least(self) -> str:
+        """Return the factor with none of the fill's help, in words; "" if that is not known."""
+        least = self.without_either if self._has_backing else self.without_pressure
+        help_ = "pressure and backing" if self._has_backing else "pressure"
+        return "" if np.isnan(least) else f" ({least:.4g} without {help_} of the fill)"
 
     def _missing_factors(self) -> str:
         """Return the factors of a code that neither the vehicle nor its user gave, in words."""
@@ -243,20 +267,23 @@ class Rating(ResultDisplay):
 
     def describe_pressure(self) -> list[str]:
         """Return the line on the range of the factor over the pressure of the fill, if any."""
-        if np.isnan(self.full_pressure) or not isinstance(self.fill, Fill):
+        fill = as_pressure(self.fill)
+        if np.isnan(self.full_pressure) or fill is None:
             return []
-        least = f"{self.without_pressure:.4g}"
+        least, begin, factor = f"{self.without_pressure:.4g}", "over the pressure", self.factor
         if np.isnan(self.without_pressure):
             least = "none, as the bridge does not stand,"
-        part = f"up to {say_part(self.fill.mobilisation)} of the passive one"
+        if isinstance(self.fill, PlasticFill):
+            begin, factor = "not as a plastic body, but by the pressure", self.by_pressure
+        part = f"up to {say_part(fill.mobilisation)} of the passive one"
         return [
-            f"over the pressure of the fill, each at its worst place: {least} without it, "
-            f"{self.factor:.4g} with {part}, {self.full_pressure:.4g} with all of it"
+            f"{begin} of the fill, each at its worst place: {least} without it, "
+            f"{factor:.4g} with {part}, {self.full_pressure:.4g} with all of it"
         ]
 
     def _describe_backing(self) -> list[str]:
         """Return the line on what the backing adds, if there is some."""
-        if not isinstance(self.fill, Fill) or self.fill.backing is None:
+        if not self._has_backing:
             return []
         with_pressure, neither = (
             "the bridge does not stand" if np.isnan(factor) else f"{factor:.4g}"
@@ -441,7 +468,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     positions = _places_along(weighted, axles)
     moving = drive(width, area_load, positions[::5] if is_plastic else positions)
     if fill is None and (ends := _places_at_ends(weighted, axles, moving)):
-        at_ends = drive(width, area_load, ends)
+        at_ends, positions = drive(width, area_load, ends), [*positions, *ends]
         everywhere = xr.concat([moving.factors, at_ends.factors], "position").sortby("position")
         worse = min(moving, at_ends, key=lambda each: each.worst.factor)
         moving = replace(worse, factors=everywhere)
@@ -455,9 +482,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
     # of the whole width, as the structure is modelled
     loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in rows]
-    if not is_plastic:
-        strips = cut_road(weighted, live * area_load)
-        more |= _rate_other_states(weighted, moving, strips, loads, options)
+    strips = cut_road(weighted, live * area_load)
+    more |= _rate_other_states(weighted, positions, strips, loads, options)
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
 
 
@@ -568,14 +594,16 @@ def _geometric_factor(
 def _other_states(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the options with other pressures of a fill, without backing, with crushing."""
     states: dict[str, dict[str, Any]] = {}
-    if np.isinf(options["strength"]):
+    if np.isinf(options["strength"]) and not isinstance(options["fill"], PlasticFill):
         states["crushing"] = options | {"strength": ASSUMED_STRENGTH}
-    if not isinstance(fill := options["fill"], Fill):
+    if (fill := as_pressure(options["fill"])) is None:
         return states
     fills = {
         "without_pressure": change_fill(fill, mobilisation=0.0, active=0.0),
         "full_pressure": change_fill(fill, mobilisation=1.0),
     }
+    if fill is not options["fill"]:
+        fills["by_pressure"] = fill
     if fill.backing is not None:
         fills["without_backing"] = change_fill(fill, backing=None)
         fills["without_either"] = change_fill(fills["without_pressure"], backing=None)
@@ -584,13 +612,12 @@ def _other_states(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 def _rate_other_states(
     structure: Structure,
-    moving: MovingLoad,
+    places: Sequence[float],
     strips: AxleRow,
     vehicles: Sequence[Array],
     options: dict[str, Any],
 ) -> dict[str, float]:
     """Return the least factor in each other state; none where the bridge does not stand in it."""
-    places = moving.factors["position"].values.tolist()
     rows = dict.fromkeys(
         axles_on_structure(structure, vehicle, way, x)
         for vehicle in vehicles
@@ -598,7 +625,8 @@ def _rate_other_states(
         for x in places
     )
     # the fans of loads do not depend on pressure, backing and strength
-    stones, _ = self_weight_programme(structure, **options)
+    pressed = options | {"fill": as_pressure(options["fill"])}
+    stones, _ = self_weight_programme(structure, **pressed)
     axles = {row: stones.load(row) for row in rows if row}
     forces = [stones.load([strip]) for strip in strips]
     factors = {}

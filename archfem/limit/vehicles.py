@@ -17,7 +17,7 @@ from archfem.errors import InvalidInput, logger
 from archfem.limit.backfill import BlocksWithFill, is_balanced, refuse_bonds, self_weight_programme
 from archfem.limit.collapse import Collapse, collapse_factor, read_bounds, warn_locking
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
-from archfem.limit.fill_strength import Fill, PlasticFill
+from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
 from archfem.masonry.loads import PointLoad
@@ -335,12 +335,10 @@ def _solve_rows(
     structure: Structure, rows: Sequence[AxleRow], strips: AxleRow, options: dict[str, Any]
 ) -> tuple[dict[AxleRow, AxleRow], dict[AxleRow, float], dict[AxleRow, FillBounds]]:
     """Return each row of axles with the adverse strips, its factor and its bounds."""
-    laid, fill = {row: row for row in rows}, options["fill"]
-    if is_plastic := isinstance(fill, PlasticFill):
-        keys = ("friction_angle", "cohesion", "spread", "backing", "backing_height")
-        fill = Fill(**{key: getattr(fill, key) for key in keys})
+    laid, is_plastic = {row: row for row in rows}, isinstance(options["fill"], PlasticFill)
     if not is_plastic or strips:
-        stones, dead = self_weight_programme(structure, **(options | {"fill": fill}))
+        pressed = options | {"fill": as_pressure(options["fill"])}
+        stones, dead = self_weight_programme(structure, **pressed)
         stands = is_balanced(dead.minimise_residual(), dead)
         loads = {row: stones.load(row) for row in rows}
         if strips and stands:

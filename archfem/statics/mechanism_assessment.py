@@ -222,7 +222,8 @@ class KinematicAssessment(ResultDisplay):
             lines += [f"along the path: {join_names(changes, '; ')}"] if changes else []
             lines += [self.path.end.sentence, *map(str, self.checks)]
             if (over_fill := self.checks[-1].over_fill) is not None:
-                lines.append(f"the last ratio is {over_fill.describe(digits=3)}")
+                over = over_fill.describe(digits=3)
+                lines.append(f"over what is assumed of the fill: {over} times as strong")
         return "\n".join([*lines, *(f"note: {note}" for note in [*self.notes, *self._split_note])])
 
     @property

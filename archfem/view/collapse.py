@@ -184,7 +184,10 @@ def draw_ratings(ratings: Sequence[Rating]) -> Figure:
         first six are drawn.
     """
     drawn = ratings[: len(Colour.LINES)]
-    structure, top = drawn[0].structure, 4.0 * max(1.0, min(found.factor for found in drawn))
+    structure, factors_of = drawn[0].structure, [found.factor for found in drawn]
+    top = max(
+        4.0 * max(1.0, min(factors_of)), 1.5 * max(filter(np.isfinite, factors_of), default=1)
+    )
     wide, tall = structure_figure(structure).get_size_inches()
     # two panels a row, so that six fit a page
     count = (len(drawn) + 1) // 2

@@ -625,7 +625,7 @@ def test_a_result_without_a_time_history_has_a_report(
     assert f"{factor}" in words
     listed = " ".join(words.split())
     assert "limit: fill, friction angle 35 degree given" in listed
-    for value in ("law pressure", "cohesion 0 Pa", "mobilisation 0.333", "active 1"):
+    for value in ("law pressure", "cohesion 0 kPa", "mobilisation 0.333", "active 1"):
         assert f"limit: fill, {value} default" in listed
     # what rigid blocks do not use is no input; a strength that is a default neither
     inputs = words.split("Inputs and assumptions")[2].partition("Assumptions, units")[0]

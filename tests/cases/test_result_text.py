@@ -65,7 +65,7 @@ def test_words_and_tables_obey_the_criteria_of_the_run(run):
 
 
 DEFAULTS = (
-    "fill, by default: law pressure, cohesion 0 Pa, active 1, dispersal boussinesq, spread 30 "
+    "fill, by default: law pressure, cohesion 0 kPa, active 1, dispersal boussinesq, spread 30 "
 )
 DEFAULTS += "degree, lever 0"
 
@@ -137,7 +137,7 @@ def test_limit_analysis_in_words(ring):
     case.limit = parse_limit(given["limit"])
     assert "backing strength" not in describe_limit(case, pushed, None)[1]
     del given["limit"]["fill"]["backing_strength"]
-    assert describe_limit(case, pushed, None)[1].endswith(f"{DEFAULTS}, backing strength 1e+06 Pa")
+    assert describe_limit(case, pushed, None)[1].endswith(f"{DEFAULTS}, backing strength 1 MPa")
     slab = af.column(breadth=4.0, heights=[1.0])  # slides before it turns
     slid, lifted = (af.collapse_factor(slab, live=af.BodyForce(*g)) for g in ((1.0,), (0.0, -1.0)))
     words = describe_collapse(slab, slid, parse_limit({})).splitlines()

@@ -8,6 +8,7 @@ import pytest
 from backfilled import arch_bridge
 
 import archfem as af
+from archfem.cases.result_text import tabulate_ratings
 from archfem.limit import VEHICLES, Vehicle, rating
 from archfem.limit.rating import _places_along as places_along
 
@@ -260,7 +261,8 @@ def test_less_than_the_rule_is_stated_beside_the_verdict(monkeypatch):
     assert repr(rule).endswith("passes")
     train = replace(VEHICLES["LM71"], axles=(1e3,), spacings=())
     found = af.rate(bridge, train, fill=GRAVEL)
-    left = f"at most {found.factor:.4g} without the 80 kN/m beside the axles (LM71-train)"
+    left = f"at most {found.factor:.4g} ({found.without_pressure:.4g} without pressure of the fill)"
+    left += " without the 80 kN/m beside the axles (LM71-train)"
     assert repr(found).endswith(f"passes if the code's impact is {left}")
 
 
@@ -415,6 +417,28 @@ def test_other_states_of_the_fill_have_worst_places_of_their_own(area_load, monk
     assert area_load or there > 1.3 * found.full_pressure
 
 
+def test_a_plastic_fill_has_the_factors_of_its_pressure_beside_its_own(monkeypatch):
+    """Those of a rating with the fill as weight and pressure, of the same strength and backing."""
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (3.0, 3.5, 4.0, 5.5, 6.5))
+    bridge, vehicle = arch_bridge(voussoirs=9), Vehicle("axle", (1e4,))
+    strength = {"friction_angle": 30.0, "cohesion": 5e3, "spread": "5 degree"}
+    plastic = af.limit.PlasticFill(gap=0.9, backing_height=0.6, **strength)
+    found = af.rate(bridge, vehicle, fill=plastic)
+    pressed = af.rate(bridge, vehicle, fill=af.limit.Fill(backing_height=0.6, **strength))
+    assert found.by_pressure == pytest.approx(pressed.factor, rel=EXACT)
+    for state in ("without_pressure", "full_pressure", "without_backing", "without_either"):
+        assert getattr(found, state) == pytest.approx(getattr(pressed, state), rel=EXACT)
+    assert np.isnan(pressed.by_pressure)
+    begin = "\nnot as a plastic body, but by the pressure of the fill, each at its worst place: "
+    values = f"{found.without_pressure:.4g} without it, {found.by_pressure:.4g} with up to"
+    assert begin + values in str(found)
+    weak = replace(found, by_pressure=0.99).outcome
+    assert weak.startswith("passes only with the fill as a plastic body if the code's")
+    assert tabulate_ratings([found]).head[:3] == ["vehicle", "factor", "by pressure"]
+    head = ["vehicle", "factor", "without pressure", "full pressure", "without backing"]
+    assert tabulate_ratings([pressed]).head[:5] == head
+
+
 def test_a_bridge_that_the_fill_holds_has_no_factor_without_it(monkeypatch):
     monkeypatch.setattr(rating, "_places_along", lambda *_: (4.5,))
     found = af.rate(
@@ -462,7 +486,9 @@ def test_a_verdict_says_which_parts_of_the_fill_it_rests_on(lorry_rating):
     either = replace(lorry_rating, fill=backed.fill, without_backing=1.01, without_either=0.8)
     assert either.outcome.startswith("passes only with the pressure of the fill or the backing if")
     assert f"{without}1.01; without either: 0.8\n" in str(either)
-    assert replace(either, without_either=1.0).outcome.startswith("passes if")
+    least = replace(either, without_either=1.05).outcome
+    assert least.startswith("passes if")
+    assert "(1.05 without pressure and backing of the" in least
 
 
 def test_a_rating_with_backing_has_the_factor_without_it(monkeypatch):
