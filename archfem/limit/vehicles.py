@@ -515,12 +515,13 @@ def _search_nonassociated(
 
 def _find_worst(factors: Array, count: Numbers) -> tuple[int, int]:
     """Return direction and position of the least factor; if none is finite, of the most axles."""
-    # a vehicle in the middle loads some stones
-    crowded = np.flatnonzero(count[0] == count.max())
-    finite, flat = np.isfinite(factors), crowded[len(crowded) // 2]
-    if finite.any():
-        # of places that differ by round-off, as on a symmetric bridge, the first
-        flat = (factors <= (1.0 + 1e-6) * factors[finite].min()).argmax()
+    if not (finite := np.isfinite(factors)).any():
+        # the middle of such places: a vehicle there loads some stones
+        direction = int(count.max(axis=1).argmax())
+        crowded = np.flatnonzero(count[direction] == count.max())
+        return direction, int(crowded[len(crowded) // 2])
+    # of places that differ by round-off, as on a symmetric bridge, the first
+    flat = (factors <= (1.0 + 1e-6) * factors[finite].min()).argmax()
     direction, place = np.unravel_index(flat, factors.shape)
     return int(direction), int(place)
 

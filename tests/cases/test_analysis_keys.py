@@ -128,7 +128,7 @@ def test_results_state_the_strength_with_which_joints_crush(tmp_path, capsys):
             said = capsys.readouterr().out
             assert f"joints {says}" in said
             assert ("\nin doubt: joints do not crush, as the case gives no str" in said) == doubted
-            factors += re.findall(r"(?:factor|mechanism, at) (inf|[\d.]+)", said)[:1]
+            factors += re.findall(r"(?:factor|, at) (inf|[\d.]+)", said)[:1]
         assert af.commands.main(["assess", str(path)]) == 0
         note = (
             "note: joints hinge about their edges: that stones crush at the given 1 MPa would lower"
