@@ -778,6 +778,15 @@ def test_the_conclusion_states_outcomes_falls_and_the_range(kept, unplotted):
     assert "raise no doubt" not in text
 
 
+def test_results_that_were_begun_alone_are_named(kept):
+    (kept / "risk_samples.nc").touch()
+    found = af.cases.open_results(kept)
+    pieces = build_conclusion(report_data.ReportData(found.case, found.runs, kept)).pieces
+    texts = [each.text for each in pieces if each.kind == "words"]
+    begun = "The annual rate of collapse was begun and has no answer: runs are left to compute."
+    assert [text for text in texts if "begun" in text] == [begun]
+
+
 def test_an_attempt_without_an_answer_states_its_reason(kept, unplotted, capsys, monkeypatch):
     def fail(*_, **__):
         raise af.DidNotConverge("no sample falls; raise the scales")
