@@ -721,8 +721,11 @@ def test_of_several_vehicles_a_table_has_the_factors(small, undrawn):
         rows = ["vehicle,factor", "LM71,1.5", "LM1,1.9"]
         texts = "vehicle  factor", "Rating of 'it'", "Rating of other"
         files = {"rating.txt": "\n\n".join(texts), "vehicles.csv": "\n".join(rows)}
+        files["rating.toml"] = '[rating]\nvehicle = "LM71"'
         write_files(files, draft)
-    grid, *found = _build_rating(report_data.ReportData(case, {}, folder))
+    data = report_data.ReportData(case, {}, folder)
+    grid, *found = _build_rating(data)
+    assert data.read_table("rating") == {"vehicle": "LM71, LM1"}
     assert (grid.head, grid.rows) == (["vehicle", "factor"], [["LM71", "1.5"], ["LM1", "1.9"]])
     assert [each.text for each in found] == [*texts[1:]]  # without the same table
 

@@ -258,13 +258,11 @@ def _build_rating(data: ReportData) -> list[Any]:
         return blocks
     # the text begins with the same table, and the picture is of the first vehicle
     text, *figures = blocks
-    _, first, *others = text.text.split("\n\n")
+    _, *texts = text.text.split("\n\n")
     head, *rows = reader(table.splitlines())
     grid = Grid(head, rows, "Factors of several vehicles", "words")
     every = data.read_figure("vehicles.png", "Factor of each vehicle over its place")
-    texts = (TextBlock(each, "lines") for each in (first, *others))
-    shown = (replace(each, caption=f"{caption}, of the first") for each in figures)
-    return [grid, *every, *texts, *shown]
+    return [grid, *(every or figures), *(TextBlock(each, "lines") for each in texts)]
 
 
 def _tabulate_dead_load(joints: xr.Dataset) -> Grid:
