@@ -50,7 +50,6 @@ if TYPE_CHECKING:
 # Names of files in a result folder.
 CASE_FILE = "case.toml"
 DRAWING_FILE = "drawing.txt"  # file of the blocks, its unit, and how far corners were moved
-SAMPLES_FILE = "risk_samples.nc"  # of the annual rate of collapse, as they are computed
 RATING_FILE = "rating.toml"  # [rating] as `archfem rate` took it
 HISTORY_FILE = "history.nc"
 

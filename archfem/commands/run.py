@@ -31,7 +31,6 @@ from archfem.cases.defaults import describe_defaults, describe_fill_defaults
 from archfem.cases.result_text import RESULTS, state_ratings
 from archfem.cases.run import (
     RATING_FILE,
-    SAMPLES_FILE,
     DeadLoadResult,
     Result,
     Run,
@@ -358,7 +357,7 @@ def risk(options: argparse.Namespace) -> int:
         *(case.analysis, motions, case.risk.hazard),
         alternatives=alternatives or None,
         workers=options.workers,
-        out=path_inside(folder, SAMPLES_FILE),
+        out=path_inside(folder, "risk_samples.nc"),
         target=case.target,
         **case.risk.options,
     )

@@ -721,8 +721,11 @@ def test_of_several_vehicles_a_table_has_the_factors(small, undrawn):
         rows = ["vehicle,factor", "LM71,1.5", "LM1,1.9"]
         texts = "vehicle  factor", "Rating of 'it'", "Rating of other"
         files = {"rating.txt": "\n\n".join(texts), "vehicles.csv": "\n".join(rows)}
+        files["rating.toml"] = '[rating]\nvehicle = "LM71"'
         write_files(files, draft)
-    grid, *found = _build_rating(report_data.ReportData(case, {}, folder))
+    data = report_data.ReportData(case, {}, folder)
+    grid, *found = _build_rating(data)
+    assert data.read_table("rating") == {"vehicle": "LM71, LM1"}
     assert (grid.head, grid.rows) == (["vehicle", "factor"], [["LM71", "1.5"], ["LM1", "1.9"]])
     assert [each.text for each in found] == [*texts[1:]]  # without the same table
 
@@ -776,6 +779,15 @@ def test_the_conclusion_states_outcomes_falls_and_the_range(kept, unplotted):
     # the remedy is not for the client
     assert "In doubt, time histories: 1 of 2 runs: it leaks." in text
     assert "raise no doubt" not in text
+
+
+def test_results_that_were_begun_alone_are_named(kept):
+    (kept / "risk_samples.nc").touch()
+    found = af.cases.open_results(kept)
+    pieces = build_conclusion(report_data.ReportData(found.case, found.runs, kept)).pieces
+    texts = [each.text for each in pieces if each.kind == "words"]
+    begun = "The annual rate of collapse was begun and has no answer: runs are left to compute."
+    assert [text for text in texts if "begun" in text] == [begun]
 
 
 def test_an_attempt_without_an_answer_states_its_reason(kept, unplotted, capsys, monkeypatch):

@@ -14,7 +14,6 @@ from archfem.cases import result_text
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.result_text import RESULTS, Row
-from archfem.cases.run import SAMPLES_FILE
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict import NO_RANGE
@@ -50,6 +49,9 @@ MAX_DOUBTS = 3
 
 # Results of runs: histories, and their variations
 _HISTORIES, _VARIATIONS = "time histories", "variations"
+
+# What commands keep of results that they have not finished
+_BEGUN = {RESULTS["risk"]: "risk_samples.nc", RESULTS["verdict_range"]: "variations"}
 
 _FACTORS = (
     "; factor: the multiple of the demand at which a check is just passed, at which a load makes a "
@@ -149,8 +151,9 @@ def _list_outdated(data: ReportData) -> Iterator[str]:
         for name in group.files
         if name in absent
     ]
-    if data.folder and (data.folder / SAMPLES_FILE).is_file() and "risk" not in data.statements:
-        yield f"The {RESULTS['risk']} was begun and has no answer: samples are left to compute."
+    for name in _BEGUN.keys() & absent.values():
+        if data.folder and (data.folder / _BEGUN[name]).exists():
+            yield f"The {name} was begun and has no answer: runs are left to compute."
     if earlier:
         made = "Not stated, for an earlier version of archfem or another case made it"
         yield f"{made}: {', '.join(earlier)}."
@@ -186,7 +189,13 @@ def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
         for name, _, outcome, factor in rows
         if name.startswith("assessment: ") and factor != "-"
     ]
-    if checks:
+    if not checks:
+        # of a push alone, where the ground acceleration of the site is known
+        begin = (
+            row for row in rows if row[0] == RESULTS["limit"] and row[1].startswith("the site")
+        )
+        yield from (f"it begins to move at {factor} times {site}" for _, site, _, factor in begin)
+    else:
         least, name, outcome, factor = min(checks)
         _, only, assumed = outcome.partition(" only with ")
         fails = "" if least >= 1.0 or only else ", which it fails"

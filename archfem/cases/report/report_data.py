@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from csv import reader
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -82,7 +83,9 @@ class ReportData:
     def read_table(self, section: str) -> Table:
         """Return a section of the case; that of a rating is as the command took it."""
         if section == "rating" and (text := self.read_text(RATING_FILE)) is not None:
-            return dict(parse_tables(text)["rating"])
+            table = dict(parse_tables(text)["rating"])
+            names = [row[0] for row in reader((self.read_text("vehicles.csv") or "").splitlines())]
+            return table | ({"vehicle": ", ".join(names[1:])} if names else {})
         return dict(self.case.settings.get(section, {}))
 
     @property

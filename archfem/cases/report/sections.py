@@ -21,6 +21,7 @@ from archfem.cases.report.conclusion import (
 )
 from archfem.cases.report.inputs import describe_value, tabulate_inputs
 from archfem.cases.report.report_data import (
+    STATIC_RESULTS,
     ReportData,
 )
 from archfem.cases.report.response import (
@@ -129,9 +130,11 @@ def build_input_section(data: ReportData) -> Section:
     }
     large = data.case.analysis.discretisation.displacements == "large"
     moved = "of any size" if large else "small: equilibrium where blocks stood"
+    follows = "; an assessment follows its mechanism" * ("assessment" in data.statements)
     if data.is_static:
-        follows = "; an assessment follows its mechanism" * ("assessment" in data.statements)
         moved = f"none: equilibrium as built{follows}"
+    elif data.statements.keys() & {*STATIC_RESULTS}:
+        moved += f"; in limit analysis none: equilibrium as built{follows}"
     assumptions = [
         ("structure", "plane; forces are those of the whole width"),
         ("blocks", "rigid" if data.is_static else blocks.get(fidelity, f"by part: {fidelity}")),
@@ -258,13 +261,13 @@ def _build_rating(data: ReportData) -> list[Any]:
         return blocks
     # the text begins with the same table, and the picture is of the first vehicle
     text, *figures = blocks
-    _, first, *others = text.text.split("\n\n")
+    _, *texts = text.text.split("\n\n")
     head, *rows = reader(table.splitlines())
     grid = Grid(head, rows, "Factors of several vehicles", "words")
-    every = data.read_figure("vehicles.png", "Factor of each vehicle over its place")
-    texts = (TextBlock(each, "lines") for each in (first, *others))
-    shown = (replace(each, caption=f"{caption}, of the first") for each in figures)
-    return [grid, *every, *texts, *shown]
+    every = data.read_figure(
+        "vehicles.png", "(a) Factor of each vehicle over its place, (b) and on: each at its worst"
+    )
+    return [grid, *(every or figures), *(TextBlock(each, "lines") for each in texts)]
 
 
 def _tabulate_dead_load(joints: xr.Dataset) -> Grid:

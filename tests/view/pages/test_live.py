@@ -185,7 +185,6 @@ def test_a_result_folder_has_its_page(small, tmp_path, capsys):
     assert af.commands.main(["page", str(out)]) == 0
     assert "page.html" in capsys.readouterr().out
     assert "a column under two pairs" in (out / "page.html").read_text(encoding="utf-8")
-    assert "Try it" in af.cases.open_results(out).report().read_text(encoding="utf-8")
     # the page is of this run: another one removes it
     other = ["--set", 'title="another"']
     assert af.commands.main(["run", str(small), "--out", str(out), *other]) in (0, 3)
