@@ -176,8 +176,8 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert texts[0] == (
         "For 0.25 g, 475 years: the structure forms no mechanism under all 2 motions of PGA "
         "0.05 g. The least margin is 0.5, on the spectrum of the motion, by a code, right and "
-        "left, which it fails. What may change this: the doubts below, on limit analysis, kinematic "
-        "assessment; what was not varied: one set of properties, one model and time step."
+        "left, which it fails. What may change this: the doubts below, on limit analysis, "
+        "kinematic assessment; what was not varied: one set of properties, one model and time step."
     )
     assert texts[1:] == [
         "In doubt, limit analysis: A made one.",
