@@ -34,8 +34,9 @@ def source_keys() -> dict[str, Any]:
 
 def motion_keys() -> dict[str, Any]:
     """Return the keys of one motion."""
-    own = declared_keys(Motion.cut) | {"vertical": (str, dict), "resample": "s"}
-    return source_keys() | own | {"scale": "1", "reversed": bool}
+    own = declared_keys(Motion.cut) | declared_keys(Motion.with_rest)
+    own |= {"vertical": (str, dict), "resample": "s", "scale": "1", "reversed": bool}
+    return source_keys() | own
 
 
 def suite_keys() -> dict[str, Any]:
@@ -62,7 +63,7 @@ def parse_motion(table: Any, section: str = "motion") -> dict[str, Any]:
 
 
 def build_motion(settings: Table, folder: Path = Path(), section: str = "motion") -> Motion:
-    """Read or synthesise a motion, then resample, cut, reverse and scale it, in this order."""
+    """Read or synthesise a motion, then resample, cut, extend, reverse and scale it, in turn."""
     motion = _build_source(settings, folder)
     step = settings.get("resample")
     motion = motion if step is None else motion.resampled(step)
@@ -78,6 +79,7 @@ def build_motion(settings: Table, folder: Path = Path(), section: str = "motion"
     # Times of the case are those of the resampled motion, before it is reversed.
     if "start" in settings or "end" in settings:
         motion = motion.cut(settings.get("start", 0.0), settings.get("end"))
+    motion = motion.with_rest(settings.get("rest", 0.0))
     motion = motion.reversed() if settings.get("reversed", False) else motion
     return motion.scaled(settings.get("scale", 1.0))
 

@@ -448,12 +448,12 @@ def state_scale(
     # what was run between the scales stands in the text
     words, files = repr(found).partition(";")[0], dict[str, str]()
     if isinstance(found, CollapseScale):
-        least = min(found.bracket(dt).upper for dt in found.searches)
+        lower = found.lower
         files["scale.csv"] = ResultTable(*found.rows()).csv
     else:
-        least = min(found[definition].upper for definition in found.definitions)
+        lower = min((found[each] for each in found.definitions), key=lambda x: x.upper).lower
         words += "; a fall was not computed"
-    factor = f"{least:#.3g}" if np.isfinite(least) else "-"
+    factor = f"{lower:#.3g}" if lower else "-"
     stated = state_outcome(RESULTS["scale"], words, doubts, demand, factor)
     return {**stated.as_file("scale"), **files}
 

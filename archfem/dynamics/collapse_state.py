@@ -167,7 +167,7 @@ def doubt_collapse(structure: Structure, fall: CollapseState) -> Iterator[Doubt]
         yield Doubt(
             f"blocks still move at the end: they may come back from {format_mm(fall.residual)}, or "
             "go farther",
-            "add seconds without acceleration to the end of the motion",
+            "let the ground rest at the end, `--set motion.rest=10`",
         )
 
 

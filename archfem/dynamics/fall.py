@@ -32,7 +32,7 @@ from archfem.dynamics.rigid_body.simulation import (
 )
 from archfem.dynamics.rigid_body.time_stepping import MAX_ENERGY_GAIN
 from archfem.dynamics.schemes import StiffnessDamping, Viscous
-from archfem.dynamics.separation import is_overturning, is_resting
+from archfem.dynamics.separation import is_overturning, is_resting, swings_little
 from archfem.dynamics.state import State
 from archfem.errors import DidNotConverge
 from archfem.masonry.stiffness_ratio import find_yielding_blocks, mark_stone_joints
@@ -111,6 +111,7 @@ def follow_fall(
     else:
         frame = LooseBlocks(state.time, *model.rigid_motions(state.q, state.velocity))
         resting = is_resting(model, state, shaken=ending is not Ending.FINISHED)
+        resting = resting or swings_little(history)
         fall = replace(classify_collapse(structure, [frame], origin), resting=resting)
     doubts += doubt_collapse(structure, fall)
     if fall.kind in FALLEN_STATES and whole:

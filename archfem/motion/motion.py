@@ -253,6 +253,18 @@ class Motion(ResultDisplay):
         part = self._map_components(lambda row: row[kept] if len(row[kept]) else np.zeros(1))
         return replace(part, start_time=begin)
 
+    def with_rest(self, rest: Seconds) -> "Motion":
+        """Return the motion followed by ground at rest, on which blocks come to rest.
+
+        Args:
+            rest: length of the rest [s].
+
+        Raises:
+            InvalidInput: rest is negative or infinite.
+        """
+        zeros = np.zeros(round(check_number(rest, "rest [s]", minimum=0.0) / self.dt))
+        return self._map_components(np.append, zeros)
+
     def significant(self, low: float = 0.05, high: float = 0.95) -> "Motion":
         """Return the part of significant duration, after Trifunac and Brady (1975).
 

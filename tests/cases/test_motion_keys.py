@@ -190,3 +190,10 @@ def test_a_component_of_a_later_time_is_selected_and_read_at_its_time(tmp_path):
     (tmp_path / "r0.UD").write_text("# m/s2\n# time UD\n100.00 1.0\n100.01 -1.0\n100.02 0.0\n")
     with pytest.raises(af.InvalidInput, match=r"r0.NS: .*no time in common \(horizontal from 7 s"):
         af.select_records(tmp_path, af.Eurocode8(0.25, "B"), 0.3, count=3, rule=rule)
+
+
+def test_a_motion_of_a_case_is_cut_and_then_rests():
+    samples = {"samples": [1.0, 2.0, 3.0, 4.0], "dt": "0.01 s"}
+    keys = {"end": "0.02 s", "rest": "0.02 s", "scale": 2.0}
+    motion = build_motion(parse_motion(samples | keys))
+    assert motion.horizontal.tolist() == [2.0, 4.0, 6.0, 0.0, 0.0]

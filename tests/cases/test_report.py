@@ -156,7 +156,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         *(
             (
                 f"assessment: {name}, right and left",
-                f"{demand} of the motion",
+                f"{demand} of the spectrum of the motion",
                 f"{capacity} (in doubt)",
                 factor,
             )
@@ -175,9 +175,9 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     texts = [each.text for each in sentences if each.kind == "words"]
     assert texts[0] == (
         "For 0.25 g, 475 years: the structure forms no mechanism under all 2 motions of PGA "
-        "0.05 g. The least margin is 0.5, on the motion, by a code, right and left, which it "
-        "fails. What may change this: the doubts below, on limit analysis, kinematic "
-        "assessment; what was not varied: one set of properties, one model and time step."
+        "0.05 g. The least margin is 0.5, on the spectrum of the motion, by a code, right and "
+        "left, which it fails. What may change this: the doubts below, on limit analysis, "
+        "kinematic assessment; what was not varied: one set of properties, one model and time step."
     )
     assert texts[1:] == [
         "In doubt, limit analysis: A made one.",
@@ -189,9 +189,10 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     alone = report_data.ReportData(case, {}, found.folder)
     lead = build_conclusion(alone).pieces[0].text
     assert lead.startswith("For 0.25 g, 475 years: limit analysis: it turns, at 4.8 times the load")
-    assert "The least margin is 0.5, on the motion, by a code, right and left, which it" in lead
+    assert "The least margin is 0.5, on the spectrum of the motion, by a code, right and" in lead
     outcomes = "the given load: it turns, at 4.8 times the load, factor 4.8; LM1: passes without "
-    outcomes += "all, factor 1.25; 2.844 m/s² of the motion: 8.212 m/s², passes, factor 2.89; "
+    outcomes += "all, factor 1.25; 2.844 m/s² of the spectrum of the motion: 8.212 m/s², passes, "
+    outcomes += "factor 2.89; "
     assert dict(list_facts(alone))["verdict"].startswith(outcomes)
     assert signatures.rows == [("author", "A. Mason", "", ""), ("checked by", "", "", "")]
 

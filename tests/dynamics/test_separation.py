@@ -391,3 +391,26 @@ def test_vibration_that_counts_as_rest_cannot_overturn_a_slender_column():
     slope = np.arctan(1.0 / 20.0)
     to_edge = 0.5 * BREADTH / np.sin(slope)
     assert to_edge * (1.0 - np.cos(slope - 0.02)) > 20 * 2e-4 * BREADTH
+
+
+@pytest.mark.parametrize(
+    ("swing", "shaken_until", "spacing", "rests"),
+    [
+        (0.9e-3, 2.0, 0.01, True),
+        (1.1e-3, 2.0, 0.01, False),  # a twentieth of 40 mrad, peak to peak
+        (0.9e-3, 2.5, 0.01, False),
+        (0.9e-3, 2.0, 0.2, False),  # too few records to see a swing
+        (0.0, 0.0, 0.01, True),
+    ],
+)
+def test_a_small_swing_about_open_hinges_is_a_rest(swing, shaken_until, spacing, rests):
+    time = np.arange(0.0, 3.2, spacing)
+    rotation = np.outer(40e-3 + swing * np.cos(40.0 * time), [1.0, -0.5])
+    rotation[time < 2.0] = 0.0  # earlier swings do not count
+    ground = np.where(time < shaken_until, 1.0, 0.0)[:, None]
+    run = SimpleNamespace(
+        time=time,
+        joints={"rotation": SimpleNamespace(values=rotation)},
+        dataset={"ground": SimpleNamespace(values=ground)},
+    )
+    assert separation.swings_little(run) is rests

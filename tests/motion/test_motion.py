@@ -211,3 +211,13 @@ def test_cuts_fall_on_samples_to_a_millionth_of_one(shaking):
         last = 199 if off == -1e-3 else 200
         assert part.horizontal.tolist() == shaking.horizontal[first : last + 1].tolist()
     assert len(shaking.cut(100 * dt, 100 * dt).horizontal) == 1
+
+
+def test_ground_rests_behind_a_motion():
+    motion = af.Motion([1.0, -2.0, 0.5], 0.01, vertical=[0.3, 0.2, 0.1])
+    rested = motion.with_rest(0.02)
+    assert rested.horizontal.tolist() == [1.0, -2.0, 0.5, 0.0, 0.0]
+    assert rested.vertical.tolist() == [0.3, 0.2, 0.1, 0.0, 0.0]
+    assert rested.duration == pytest.approx(motion.duration + 0.02)
+    with pytest.raises(af.InvalidInput, match="rest"):
+        motion.with_rest(-1.0)

@@ -54,8 +54,9 @@ _HISTORIES, _VARIATIONS = "time histories", "variations"
 _BEGUN = {RESULTS["risk"]: "risk_samples.nc", RESULTS["verdict_range"]: "variations"}
 
 _FACTORS = (
-    "; factor: the multiple of the demand at which a check is just passed, at which a load makes a "
-    "mechanism or a motion a fall, or at which a fall has a probability of one half"
+    "; factor: the multiple of the demand at which a check is just passed or a load makes a "
+    "mechanism, up to which a scaled motion fells nothing, or at which a fall has a probability of "
+    "one half"
 )
 
 
@@ -116,8 +117,11 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
 def build_conclusion(data: ReportData) -> Section:
     """Build the section on the answer in sentences, its doubts, and demands and capacities."""
     doubts: dict[str, list[str]] = {}
-    for text, result in {text: result for result, text in reversed(list_doubts(data))}.items():
-        doubts.setdefault(result, []).insert(0, text)  # a doubt of several results is stated once
+    stated = {text: result for result, text in reversed(list_doubts(data))}
+    for text, result in stated.items():
+        # a doubt of several results is stated once, without the scales of which it is true, too
+        if text.partition("×")[2].partition(": ")[2] not in stated:
+            doubts.setdefault(result, []).insert(0, text)
     doubtful = list(dict.fromkeys(result for result, _ in list_doubts(data)))
     rows = [
         (name, demand, outcome + " (in doubt)" * (result in doubtful), factor)
@@ -127,10 +131,10 @@ def build_conclusion(data: ReportData) -> Section:
     texts = filter(None, [lead, " ".join(_describe_ends(data))])
     blocks: list[Any] = [*map(TextBlock, texts)]
     for result in filter(doubts.get, doubtful):
-        stated = [sentence(text) for text in doubts[result][:MAX_DOUBTS]]
-        if more := len(doubts[result]) - len(stated):
-            stated.append(f"{more} more stand with the result.")
-        blocks.append(TextBlock(f"In doubt, {result}: {' '.join(stated)}", "doubt"))
+        shown = [sentence(text) for text in doubts[result][:MAX_DOUBTS]]
+        if more := len(doubts[result]) - len(shown):
+            shown.append(f"{more} more stand with the result.")
+        blocks.append(TextBlock(f"In doubt, {result}: {' '.join(shown)}", "doubt"))
     if rows:
         head = ("", "demand", "capacity or outcome", "factor")
         factors = _FACTORS if any(row[3] != "-" for row in rows) else ""
@@ -183,7 +187,12 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
 
 
 def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the least margin of the checks, a range over what is assumed, with its demand."""
+    """Yield the margin on the scaled motion, and the least of the checks, maybe as a range."""
+    for name, demand, outcome, factor in rows:
+        if name == RESULTS["scale"] and factor != "-":
+            met = "forms a mechanism" if "mechanism" in outcome else "falls"
+            fails = "" if float(factor) >= 1.0 else ", which it fails"
+            yield f"the margin on {demand}, is {factor}{fails}: up to there it {met} in no run"
     checks = [
         (float(factor.partition(" ")[0]), name.partition(": ")[2], outcome, factor)
         for name, _, outcome, factor in rows
@@ -208,7 +217,7 @@ def name_spectrum(data: ReportData) -> str:
     """Name the demand of kinematic assessments, with its peak acceleration."""
     code = read_spectrum(data).get("code")
     if code is None:
-        return "the motion"
+        return "the spectrum of the motion"
     return f"the {code} spectrum of PGA {_peak_of_spectrum(data):.3g} g"
 
 
