@@ -514,6 +514,9 @@ def state_risk(found: Any) -> Statement:  # of `archfem.studies`, a room to the 
     outcome = f"median {name} {median:.3g} {unit}, falls at {rate.rate:.2g} a year"
     factors = zip(sizes, years, strict=True)
     factor = ", ".join(f"{median / size:.3g} on {each:.4g} years" for size, each in factors)
-    text = f"the structure falls at {rate}; in half of the cases from {median:.3g} {unit} of {name}"
+    text = (
+        f"the structure falls at {rate}; in half of the cases from {median:.3g} {unit} of {name}; "
+    )
+    text += hazard.origin
     row = "annual rate", demand, outcome, factor
     return Statement([text], [row], list(map(str, found.doubts)))

@@ -23,6 +23,7 @@ HAZARD_KEYS: dict[str, Any] = {
     "site": int,
     "measure": str,
     "period": "s",
+    "source": str,  # where the curve is from
 }
 RISK_KEYS: dict[str, Any] = {
     "hazard": dict,
@@ -64,11 +65,15 @@ def parse_risk(table: Any, folder: Path) -> RiskSettings:
 def parse_hazard(table: Any, folder: Path) -> Hazard:
     """Return a hazard curve from its table."""
     values = check_table(table, HAZARD_KEYS, "risk.hazard")
-    options = {key: values.pop(key) for key in ("measure", "period") if key in values}
+    source = values.pop("source", "")
+    options: dict[str, Any] = {
+        key: values.pop(key) for key in ("measure", "period") if key in values
+    }
     if set(values) <= {"file", "site"} and "file" in values:
         if options:
             raise InvalidInput("risk.hazard: a file names its measure and period: leave them out")
-        return Hazard.read(folder / values["file"], values.get("site", 0))
+        return Hazard.read(folder / values["file"], values.get("site", 0), source)
+    options["source"] = source
     if set(values) == {"factor", "exponent"}:
         return Hazard.power(values["factor"], values["exponent"], **options)
     unit = MEASURES.get(options.get("measure", "pga"), "m/s²").replace("²", "**2")

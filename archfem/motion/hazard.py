@@ -53,6 +53,7 @@ class Hazard:
             from 0.2 to 3 times that of the structure (Eads, Miranda and Lignos, Earthq. Eng.
             Struct. Dyn. 44 (2015) 2057-2073).
         period: of "sa" [s]; None takes that of the structure.
+        source: where the curve is from, such as a map with its edition; "" if that is not known.
 
     Raises:
         InvalidInput: fewer than two points, or they do not ascend and descend, or are not above 0.
@@ -67,6 +68,7 @@ class Hazard:
     rate: Array
     measure: str = field(default="pga", kw_only=True)
     period: float | None = field(default=None, kw_only=True)
+    source: str = field(default="", kw_only=True)
 
     def __post_init__(self) -> None:
         """Check that the curve falls."""
@@ -92,25 +94,27 @@ class Hazard:
         object.__setattr__(self, "intensity", x)
         object.__setattr__(self, "rate", y)
 
+    @property
+    def origin(self) -> str:
+        """Where the curve is from, in words."""
+        return f"hazard of the site: {self.source or 'source not given'}"
+
     @classmethod
     @validate_arguments
-    def power(
-        cls, factor: float, exponent: float, *, measure: str = "pga", period: float | None = None
-    ) -> "Hazard":
+    def power(cls, factor: float, exponent: float, **options: object) -> "Hazard":
         """Return the curve rate = factor · intensity^(-exponent), by points at 475 and 2475 years.
 
         Args:
             factor: annual rate at intensity 1 in SI units [1/year].
             exponent: slope in double logarithm, above 0; 2 to 4 at most sites [-].
-            measure: as of the class.
-            period: as of the class.
+            options: `measure`, `period` and `source`.
         """
         if not (factor > 0.0 and exponent > 0.0):
             raise InvalidInput(f"hazard {factor} · a^-{exponent}: give two numbers above 0")
         periods = np.array([DESIGN_PERIOD, LONGEST_PERIOD])
         with np.errstate(over="ignore"):  # an infinite intensity is refused
             points = (factor * periods) ** (1.0 / exponent)
-        return cls(points, 1.0 / periods, measure=measure, period=period)
+        return cls(points, 1.0 / periods, **options)  # type: ignore[arg-type]
 
     @classmethod
     @validate_arguments
@@ -119,7 +123,7 @@ class Hazard:
 
         Args:
             points: intensity by return period [year]; two or more.
-            options: `measure` and `period`.
+            options: `measure`, `period` and `source`.
         """
         periods = sorted(points)
         if not periods or min(periods) <= 0.0:
@@ -129,13 +133,14 @@ class Hazard:
 
     @classmethod
     @validate_arguments
-    def read(cls, path: str | Path, site: int = 0) -> "Hazard":
+    def read(cls, path: str | Path, site: int = 0, source: str = "") -> "Hazard":
         """Read a hazard curve of OpenQuake, a CSV file of probabilities of exceedance.
 
         Args:
             path: file whose first line names `investigation_time` and `imt`, and whose columns
                 `poe-…` are the probabilities at intensities, of a site in each row.
             site: number of the row.
+            source: as of the class; by default the name of the file and the row.
 
         Raises:
             InvalidInput: there is no such file, row, or column.
@@ -169,8 +174,9 @@ class Hazard:
         # a rate of zero has no logarithm; of equal probabilities the largest intensity has the rate
         rates = -np.log1p(-np.minimum(poe, 1.0 - 1e-12)) / float(years.group(1))
         kept = (rates > 0.0) & (np.diff(rates, append=-1.0) < 0.0)
-        period = measure.group(3)
-        return cls(x[kept], rates[kept], measure=name, period=float(period) if period else None)
+        period = float(measure.group(3)) if measure.group(3) else None
+        origin = source or f"{Path(path).name}, row {site}"
+        return cls(x[kept], rates[kept], measure=name, period=period, source=origin)
 
     def rate_of(self, intensity: float | Sequence[float] | Array) -> Array:
         """Return the annual rate at which intensities are exceeded [1/year].

@@ -13,10 +13,10 @@ References:
 import json
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from math import exp, inf, nan, sqrt
+from math import exp, inf, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -52,15 +52,22 @@ from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium, fill_doubts
 from archfem.statics.modes import modes
-from archfem.studies.fragility import Fragility, Rate, fit_brackets, fragility, integrate_rates
+from archfem.studies.fragility import (
+    Fragility,
+    Rate,
+    fit_brackets,
+    fragility,
+    integrate_rates,
+    variance_component,
+)
 from archfem.studies.result_store import evaluate_with_progress
 from archfem.studies.variations import (
     DEFAULT_RANGES,
     Variation,
     as_falling,
     check_ranges,
+    draw_samples,
     prepare_runs,
-    sample_changes,
 )
 from archfem.units import STANDARD_GRAVITY
 
@@ -90,6 +97,16 @@ LARGEST_EXTRAPOLATED_SHARE = 1.0 / 3.0
 # Difference from the target spectrum at 475 years from which a hazard is in doubt [-]: soil factors
 # of codes begin at 1.1 to 1.2, and rates go with the third power or so
 HAZARD_TOLERANCE = 0.1
+
+# Number of records below which a rate is in doubt [-]
+FEWEST_RECORDS = 7
+
+# Dispersion of the spectra of records below which they count as matched [-]: of three motions
+# matched to a spectrum it was 0.05, of synthetic ones of one generator 0.13 to 0.15
+MATCHED_DISPERSION = 0.1
+
+# Dispersion from record to record that matched ones lack, 0.2 to 0.4 in FEMA P-695 (2009) [-]
+USUAL_RECORD_DISPERSION = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +212,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
     ranges = _check_varied(vary or {})
     weights = {label: weight for label, (weight, *_) in tree.items()}
     blocks = _size_blocks(out, samples)
-    parts = [_draw_samples(ranges, weights, len(records), *block, seed) for block in blocks]
+    parts = [draw_samples(ranges, weights, len(records), *block, seed) for block in blocks]
     draws = [row for part in parts for row in part[0]]
     labels, order = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     table = _describe_samples(ranges, draws, labels, order)
@@ -238,22 +255,6 @@ def _size_blocks(out: str | Path | None, samples: int) -> list[tuple[int, int]]:
             )
         sizes += [added] if added else []
     return [(sum(sizes[:k]), size) for k, size in enumerate(sizes)]
-
-
-def _draw_samples(
-    ranges: Mapping[str, Any],
-    weights: Mapping[str, float],
-    records: int,
-    begin: int,
-    size: int,
-    seed: int,
-) -> tuple[list[dict[str, Any]], Any, Any]:
-    """Return properties, alternative and record of the samples of one hypercube."""
-    # that of samples added later has a seed of its own, and leaves those before as they are
-    own = int(np.random.SeedSequence([seed, begin]).generate_state(1)[0]) if begin else seed
-    random = np.random.default_rng(own)
-    labels = _draw_labels(weights, size, random)
-    return sample_changes(ranges, size, own), labels, _deal_records(records, size, random)
 
 
 def _describe_inputs(
@@ -317,19 +318,6 @@ def _resolve_alternatives(
         # a structure that does not stand is refused before any run
         tree[label] = weight / sum(weights), falling, falling.dead_load()
     return tree
-
-
-def _draw_labels(weights: Mapping[str, float], count: int, random: np.random.Generator) -> Any:
-    """Return alternatives in proportion to their weights, in random order (count,)."""
-    shares = (random.permutation(count) + random.random(count)) / count
-    places = np.searchsorted(np.cumsum([*weights.values()])[:-1], shares, side="right")
-    return np.array([*weights])[places]
-
-
-def _deal_records(records: int, count: int, random: np.random.Generator) -> Any:
-    """Return the record of each sample, all of them in random order before any again (count,)."""
-    rounds = -(-count // records)
-    return np.concatenate([random.permutation(records) for _ in range(rounds)])[:count]
 
 
 def _measure_records(
@@ -548,6 +536,15 @@ class CollapseRisk(ResultDisplay):
         """Rates that were computed, by alternative; None is all."""
         return {}
 
+    def _integrate(self, drawn: Any, groups: Sequence[Any], variance: float = 0.0) -> Array:
+        """Return the rates by resampled samples (k, n) of groups, with more variance (k,)."""
+        rates = np.zeros(len(drawn))
+        for group in groups:
+            middle, deviation = self._fits(drawn, group)
+            wide = np.sqrt(deviation**2 + variance)
+            rates += group.mean() * integrate_rates(middle, wide, self.hazard)
+        return rates / float(np.sum([group.mean() for group in groups]))
+
     def rate(self, alternative: str | None = None) -> Rate:
         """Return the annual rate of collapse with its 90 % interval.
 
@@ -571,11 +568,7 @@ class CollapseRisk(ResultDisplay):
         groups = self._groups if alternative is None else [own]
         drawn = np.vstack([np.arange(len(labels)), self._resampled])
         drawn = drawn[np.all([group[drawn].any(axis=1) for group in groups], axis=0)]
-        parts = [
-            group.mean() * integrate_rates(*self._fits(drawn, group), self.hazard)
-            for group in groups
-        ]
-        rates = np.sum(parts, axis=0) / np.sum([group.mean() for group in groups])
+        rates = self._integrate(drawn, groups)
         # Quantiles of the bootstrap are too narrow where records are few: with 7 they contain the
         # rate in three of four cases, and Student's t of its logarithm in 83 %.
         freedom = max(len(np.unique(self._of_answered("record_number")[own])) - 1, 1)
@@ -600,7 +593,7 @@ class CollapseRisk(ResultDisplay):
         rounding = float(np.mean(np.log(np.where(bounded, high / low, 1.0)) ** 2)) / 12.0
         total = max(float(np.var(logs, ddof=1)) - rounding, 0.0)
         parts = {
-            name: _variance_component(logs, self._of_answered(name))
+            name: variance_component(logs, self._of_answered(name))
             for name in ("record_number", "alternative")
         }
         rest = float(np.maximum(total - sum(parts.values()), 0.0))  # nan remains
@@ -643,11 +636,33 @@ class CollapseRisk(ResultDisplay):
                 f"{1.0 / self.hazard.rate[-1]:.4g} years, where the hazard is extrapolated"
             )
             doubts.append(Doubt(cause, "give its points at longer return periods"))
+        doubts += self._doubt_records()
         count = len(self.dataset["sample"])
         # a twentieth of all is what the 90 % interval leaves out at each of its ends
         if count - len(self.answered) > 0.05 * count:
             doubts.append(Doubt(f"the rate is that of some: {self._describe_missing()}", ""))
         return tuple(doubts)
+
+    def _doubt_records(self) -> Iterator[Doubt]:
+        """Yield a doubt where records are few, or hardly differ in their spectra."""
+        records = np.unique(self._of_answered("record_number"))
+        mean, peak = (self.dataset[f"unscaled_{name}"].values for name in ("sa_avg", "pga"))
+        spread = float(np.log(mean / peak)[records].std(ddof=1)) if len(records) > 1 else 0.0
+        alike = spread < MATCHED_DISPERSION
+        if len(records) >= FEWEST_RECORDS and not alike:
+            return
+        known = float(np.nan_to_num(self.dispersions()["records"]))
+        lacking = max(USUAL_RECORD_DISPERSION**2 - known**2, 0.0)
+        every = np.arange(len(self.answered))[None]
+        wider = float(self._integrate(every, self._groups, lacking)[0])
+        matched = f", of spectra as of matched ones (dispersion {spread:.2f})" if alike else ""
+        yield Doubt(
+            f"{len(records)} records{matched}: the interval is that of these, without other "
+            f"records, hazard and model. With the usual dispersion of {USUAL_RECORD_DISPERSION:g} "
+            f"from record to record, in place of {known:.2f}, the rate is "
+            f"{wider / self.rate().rate:.2g} times as large",
+            f"take {FEWEST_RECORDS} records or more that are scaled, and not matched",
+        )
 
     @property
     def sentence(self) -> str:
@@ -682,9 +697,9 @@ class CollapseRisk(ResultDisplay):
         return align_columns(["alternative", "samples", "falls"], rows)
 
     def __str__(self) -> str:
-        """Sentence, doubts and table."""
+        """Sentence, source of the hazard, doubts and table."""
         doubts = [f"{DOUBT_MARK}{doubt}" for doubt in self.doubts]
-        return "\n".join([self.sentence, *doubts, self.table()])
+        return "\n".join([self.sentence, self.hazard.origin, *doubts, self.table()])
 
     def _summary(self) -> str:
         rate, median, *_ = self.sentence.split("; ")
@@ -716,18 +731,3 @@ def draw_risk_result(found: CollapseRisk) -> Any:
     from archfem.view.studies import draw_collapse_risk  # matplotlib is slow to import
 
     return draw_collapse_risk(found)
-
-
-def _variance_component(values: Array, groups: Any) -> float:
-    """Return the variance between groups by a one-way analysis of variance, at least 0 or nan."""
-    kinds, place = np.unique(groups, return_inverse=True)
-    counts = np.bincount(place)
-    if len(kinds) < 2:
-        return 0.0
-    if len(values) <= len(kinds):
-        return nan
-    means = np.bincount(place, values) / counts
-    within = float(np.sum((values - means[place]) ** 2)) / (len(values) - len(kinds))
-    between = float(np.sum(counts * (means - values.mean()) ** 2)) / (len(kinds) - 1)
-    size = (len(values) - float(np.sum(counts**2)) / len(values)) / (len(kinds) - 1)
-    return max((between - within) / size, 0.0)

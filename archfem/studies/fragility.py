@@ -11,7 +11,7 @@ References:
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from math import hypot
+from math import hypot, nan
 from typing import Any
 
 import numpy as np
@@ -364,6 +364,21 @@ def integrate_rates(means: Array, deviations: Array, hazard: Hazard) -> Array:
     falls = ndtr((np.log(middle) - means[:, None]) / deviations[:, None])
     # beyond the last intensity all fall
     return np.asarray((falls * -np.diff(rates, axis=1)).sum(axis=1) + rates[:, -1])
+
+
+def variance_component(values: Array, groups: Any) -> float:
+    """Return the variance between groups by a one-way analysis of variance, at least 0 or nan."""
+    kinds, place = np.unique(groups, return_inverse=True)
+    counts = np.bincount(place)
+    if len(kinds) < 2:
+        return 0.0
+    if len(values) <= len(kinds):
+        return nan
+    means = np.bincount(place, values) / counts
+    within = float(np.sum((values - means[place]) ** 2)) / (len(values) - len(kinds))
+    between = float(np.sum(counts * (means - values.mean()) ** 2)) / (len(kinds) - 1)
+    size = (len(values) - float(np.sum(counts**2)) / len(values)) / (len(kinds) - 1)
+    return max((between - within) / size, 0.0)
 
 
 def _bracket(samples: Array, ends: Array) -> Array:

@@ -262,6 +262,35 @@ def sample_changes(ranges: Mapping[str, Any], samples: int, seed: int) -> list[d
     ]
 
 
+def draw_samples(
+    ranges: Mapping[str, Any],
+    weights: Mapping[str, float],
+    records: int,
+    begin: int,
+    size: int,
+    seed: int,
+) -> tuple[list[dict[str, Any]], Any, Any]:
+    """Return properties, alternative and record of the samples of one hypercube."""
+    # that of samples added later has a seed of its own, and leaves those before as they are
+    own = int(np.random.SeedSequence([seed, begin]).generate_state(1)[0]) if begin else seed
+    random = np.random.default_rng(own)
+    labels = _draw_labels(weights, size, random)
+    return sample_changes(ranges, size, own), labels, _deal_records(records, size, random)
+
+
+def _draw_labels(weights: Mapping[str, float], count: int, random: np.random.Generator) -> Any:
+    """Return alternatives in proportion to their weights, in random order (count,)."""
+    shares = (random.permutation(count) + random.random(count)) / count
+    places = np.searchsorted(np.cumsum([*weights.values()])[:-1], shares, side="right")
+    return np.array([*weights])[places]
+
+
+def _deal_records(records: int, count: int, random: np.random.Generator) -> Any:
+    """Return the record of each sample, all of them in random order before any again (count,)."""
+    rounds = -(-count // records)
+    return np.concatenate([random.permutation(records) for _ in range(rounds)])[:count]
+
+
 def _resolve_labels(
     ranges: Mapping[str, Any], changes: Mapping[str, Any]
 ) -> tuple[tuple[str, Any], ...]:

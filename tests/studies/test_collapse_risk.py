@@ -21,13 +21,14 @@ from archfem.studies.collapse_risk import CollapseRisk, RiskSample, bracket_capa
 SITE = af.Hazard.power(2e-3, 2.5)
 
 
-def risk_of(capacity, record, alternative=None, width=0.01):
+def risk_of(capacity, record, alternative=None, width=0.01, spectra=2.0):
     """A risk whose samples fall in brackets about given capacities, PGA in m/s²."""
     count, records = len(capacity), int(np.max(record)) + 1
     values = asdict(SITE)
     values |= {name: values[name].tolist() for name in ("intensity", "rate")}
     unscaled = {f"unscaled_{name}": ("record", np.ones(records)) for name in ("pga", "pgv")}
-    unscaled |= {f"unscaled_{name}": ("record", np.ones(records)) for name in ("sa", "sa_avg")}
+    unscaled["unscaled_sa"] = "record", np.ones(records)
+    unscaled["unscaled_sa_avg"] = "record", np.geomspace(1.0 / spectra, spectra, records)
     samples = {
         "lower": capacity * (1.0 - 0.5 * width),
         "upper": capacity * (1.0 + 0.5 * width),
@@ -80,6 +81,36 @@ def test_a_rate_from_beyond_the_last_point_of_the_hazard_is_in_doubt(last):
         assert not risk.doubts
     else:
         assert f"{share:.0%} of the rate comes from intensities above {last:g}" in str(risk)
+
+
+@pytest.mark.parametrize(
+    ("records", "spectra", "words"),
+    [
+        (20, 2.0, None),
+        (7, 2.0, None),
+        (6, 2.0, "6 records: the interval is that of these"),
+        (20, 1.05, "20 records, of spectra as of matched ones (dispersion 0.03): the interval"),
+        (3, 1.05, "3 records, of spectra as of matched ones (dispersion 0.05): the interval"),
+    ],
+)
+def test_few_or_matched_records_are_doubted_with_the_rate_of_usual_ones(records, spectra, words):
+    """Of rates k a^-b a dispersion d in place of c gives exp(b² (d² - c²) / 2) times the rate."""
+    shares = (np.arange(400) + 0.5) / 400
+    mixed = np.random.default_rng(0).permutation(400)
+    capacity = 5.0 * np.exp(0.2 * norm.ppf(shares))[mixed]
+    risk = risk_of(capacity, np.arange(400) % records, spectra=spectra)
+    risk.dataset.attrs["hazard"] = json.dumps(
+        {"intensity": [1.0, 50.0], "rate": SITE.rate_of([1.0, 50.0]).tolist(), "measure": "pga"}
+    )
+    if words is None:
+        assert not risk.doubts
+        return
+    (doubt,) = map(str, risk.doubts)
+    assert words in doubt
+    known = risk.dispersions()["records"]
+    factor = np.exp(0.5 * 2.5**2 * (0.3**2 - known**2))
+    assert f"in place of {known:.2f}, the rate is {factor:.2g} times as large" in doubt
+    assert known < 0.05
 
 
 @pytest.mark.parametrize(("factor", "doubted"), [(2e-3, True), (0.05, False)])
@@ -455,7 +486,7 @@ damping = { ratio = 0.05, modes = "effective" }
 [risk]
 samples = 16
 precision = 0.05
-hazard = { rates = [0.02, 0.001], intensities = ["1 m/s**2", "0.4 g_0"] }
+hazard = { rates = [0.02, 0.001], intensities = ["1 m/s**2", "0.4 g_0"], source = "a test" }
 alternatives.slender = {}
 alternatives.slenderer = { weight = 1.0, set = ["structure.breadth=0.22"] }
 """
@@ -471,10 +502,38 @@ alternatives.slenderer = { weight = 1.0, set = ["structure.breadth=0.22"] }
     report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "Annual rate of collapse</h2>" in report
     concluded = report.partition("Inputs and assumptions</h2>")[0]
-    median = f"from {found.fragility().median:.3g} m/s² of PGA."
+    median = f"from {found.fragility().median:.3g} m/s² of PGA; hazard of the site: a test."
     assert f"The structure falls at {found.rate()}; in half of the cases {median}" in concluded
-    assert "dispersion" not in concluded  # statistics are in their section
+    assert "\nhazard of the site: a test\n" in printed
+    assert "dispersion 0" not in concluded  # statistics are in their section
     assert "Cornell et al." in report
+
+
+def test_a_risk_without_a_rate_is_reported_with_the_reason(tmp_path, capsys, monkeypatch):
+    path = tmp_path / "block.toml"
+    path.write_text(
+        """
+title = "Slender block"
+structure = { shape = "column", breadth = 0.25, heights = [1.5] }
+model = { fidelity = "rigid" }
+suite.name = "short"
+suite.pairs.a = { synthetic = { seed = 0, duration = 2.0, pga = 3.0 } }
+suite.pairs.b = { synthetic = { seed = 1, duration = 2.0, pga = 3.0 } }
+analysis = { dt = 0.005 }
+risk = { samples = 8, hazard = { factor = 0.01, exponent = 2.0 } }
+"""
+    )
+
+    def fail(*_):
+        raise af.DidNotConverge("blocks overlap by 3 mm", last=None)
+
+    monkeypatch.setattr(af.studies.collapse_risk, "prepare_runs", fail)
+    assert main(["risk", str(path), "--out", str(tmp_path / "out")]) not in (0, 3)
+    words = "8 of 8 samples have no answer because blocks overlap by 3 mm"
+    assert f"no answer: {words}" in capsys.readouterr().out
+    main(["report", str(tmp_path / "out")])
+    report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert f"nnual rate of collapse: no answer: {words}" in report
 
 
 def test_a_hazard_is_a_power_law_points_or_a_row_of_a_file(tmp_path):
@@ -489,8 +548,12 @@ def test_a_hazard_is_a_power_law_points_or_a_row_of_a_file(tmp_path):
     (tmp_path / "curves.csv").write_text(head + "".join(rows))
     for words, probability in (("", 0.4), (", site = 1", 0.3)):
         hazard = parse(f"{{ file = 'curves.csv'{words} }}")
+        assert hazard.origin == f"hazard of the site: curves.csv, row {int(probability < 0.4)}"
         rate = -np.log(1.0 - probability) / 50.0
         assert hazard.rate_of(0.1 * 9.80665) == pytest.approx(rate)
+    assert parse("{ factor = 0.01, exponent = 2.0, source = 'map' }").origin.endswith(": map")
+    assert points.origin == "hazard of the site: source not given"
+    assert parse("{ file = 'curves.csv', source = 'map' }").origin.endswith(": map")
     with pytest.raises(af.InvalidInput, match="a file names its measure"):
         parse("{ file = 'curves.csv', period = 0.2 }")
 
@@ -504,7 +567,7 @@ def test_every_form_of_a_hazard_in_the_guide_is_read(tmp_path):
     tables = [tomllib.loads(f"hazard = {{ {form} }}")["hazard"] for form in forms]
     rates = [risk_keys.parse_hazard(table, tmp_path).rate_of(4.5) for table in tables]
     assert rates[:3] == pytest.approx([1 / 475, 2.1e-3, 2e-3 * 4.5**-2.5])
-    assert set().union(*tables) | {"measure", "period"} == set(risk_keys.HAZARD_KEYS)
+    assert set().union(*tables) | {"measure", "period", "source"} == set(risk_keys.HAZARD_KEYS)
 
 
 @pytest.mark.parametrize("hazard", ["{ rates = [0.1] }", "{ factor = 1.0 }", "{}"])
