@@ -453,12 +453,33 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     geometric, deepest = unknown if is_plastic else _geometric_factor(weighted, moving, options)
     factors = live, impact, dead, width, area_load
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
-    # of the whole width, as the structure is modelled
-    loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in rows]
-    if not is_plastic:
-        strips = cut_road(weighted, live * area_load)
-        more |= _rate_other_states(weighted, moving, strips, loads, options)
+    if (states := _other_states(options)) and not is_plastic:
+        # of the whole width, as the structure is modelled
+        loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in rows]
+        places = moving.factors["position"].values.tolist()
+        road = cut_road(weighted, live * area_load)
+        more |= _find_least_factors(weighted, places, road, loads, states)
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
+
+
+def rate_again(found: Rating, structure: Structure, width: float | None, **options: Any) -> float:
+    """Return the factor of a rated vehicle over another bridge, or of other stones and fill.
+
+    Width and places are those by rule where they were for the rating; NaN without equilibrium.
+    """
+    vehicle, options = found.vehicle, dict(options)
+    options["strength"] = check_options(structure, options["friction"], options["strength"])
+    options["fill"] = place_backing(options["fill"], structure)
+    by_rule = np.isclose(found.width, vehicle.spread_over(found.structure))
+    usual = vehicle.spread_over(structure) if by_rule else found.width
+    share = structure.width / (usual if width is None else width)
+    weighted = _scale_weights(structure, found.dead)
+    axles = parse_axles(vehicle.axles, vehicle.spacings)
+    rows = vehicle.factored(found.live, found.impact)
+    loads = [np.column_stack([share * row, axles[:, 1]]) for row in rows]
+    places, road = _places_along(weighted, axles), cut_road(weighted, found.live * found.area_load)
+    factors = _find_least_factors(weighted, places, road, loads, {"": options})
+    return factors.get("", np.nan)
 
 
 def _check_width(width: float, structure: Structure) -> None:
@@ -582,15 +603,14 @@ def _other_states(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return states | {name: options | {"fill": other} for name, other in fills.items()}
 
 
-def _rate_other_states(
+def _find_least_factors(
     structure: Structure,
-    moving: MovingLoad,
+    places: Sequence[float],
     strips: AxleRow,
     vehicles: Sequence[Array],
-    options: dict[str, Any],
+    states: dict[str, dict[str, Any]],
 ) -> dict[str, float]:
-    """Return the least factor in each other state; none where the bridge does not stand in it."""
-    places = moving.factors["position"].values.tolist()
+    """Return the least factor in each state; none where the structure does not stand in it."""
     rows = dict.fromkeys(
         axles_on_structure(structure, vehicle, way, x)
         for vehicle in vehicles
@@ -598,16 +618,16 @@ def _rate_other_states(
         for x in places
     )
     # the fans of loads do not depend on pressure, backing and strength
-    stones, _ = self_weight_programme(structure, **options)
+    stones, _ = self_weight_programme(structure, **next(iter(states.values())))
     axles = {row: stones.load(row) for row in rows if row}
     forces = [stones.load([strip]) for strip in strips]
     factors = {}
-    for name, given in _other_states(options).items():
+    for name, given in states.items():
         stones, dead = self_weight_programme(structure, **given)
         if not is_balanced(dead.minimise_residual(), dead):
             continue
         # these are worst with sliding that dilates: without, one of the next may be
         worst = find_worst_rows(dead, axles, strips, forces)
-        worst = dict(islice(worst.items(), 1 if options["friction"] != "nonassociated" else 3))
+        worst = dict(islice(worst.items(), 1 if given["friction"] != "nonassociated" else 3))
         factors[name] = min(collapse_factors(stones, dead, worst, given).values())
     return factors
