@@ -275,13 +275,13 @@ def rate(options: argparse.Namespace) -> int:
         summary = result_text.tabulate_ratings([found for found, *_ in rated])
         texts.insert(0, summary.text)
         files["vehicles.csv"] = summary.csv
-    stated = state_ratings([(found, doubts) for found, doubts, _ in rated])
+    stated, varied = state_ratings([(found, doubts) for found, doubts, _ in rated]), ""
     if options.vary:
         from archfem.studies.variations import vary_rating
 
         rows, range_text = vary_rating(case, rated[0][2], first)
-        texts[-len(rated)] += f"\n{range_text}\n{rows.text}"
-        files["rating_variations.csv"] = rows.csv
+        texts[-len(rated)] += f"\n{range_text}"
+        files["rating_variations.csv"], varied = rows.csv, f"\n\n{rows.text}"
         stated = stated._replace(sentences=[*stated.sentences, range_text])
     text = "\n\n".join(filter(None, [*texts, describe_fill_defaults(case)]))
     # the case of the folder, that of a run, may be rated for another vehicle
@@ -292,7 +292,7 @@ def rate(options: argparse.Namespace) -> int:
         every = {"vehicles.png": draw_ratings([found for found, *_ in rated])}
         return {**files, "rating.png": first.plot(), **(every if len(rated) > 1 else {})}
 
-    _write_results("rate", case, options.out, f"{case.title}\n{text}", draw)
+    _write_results("rate", case, options.out, f"{case.title}\n{text}{varied}", draw)
     return _doubt_code([doubt for _, doubts, _ in rated for doubt in doubts])
 
 

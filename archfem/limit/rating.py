@@ -197,7 +197,9 @@ class Rating(ResultDisplay):
         where = f"{first} to {others[-1]}" if len(stand) > 4 else where
         count = f"{len(stand)} axle{'s'[: len(others)]}"
         count += f" of {len(axles)}" if len(axles) > len(stand) else ""
-        name = f" over {join_names(list(over))}" if over else ""
+        ends = np.array([*spans.values()])
+        beside = over and not all(((x >= ends[:, 0]) & (x <= ends[:, 1])).any() for x in stand)
+        name = f" over {'or beside ' if beside else ''}{join_names(list(over))}" if over else ""
         return f"with {count}{name} at x = {where} m"
 
     def __str__(self) -> str:

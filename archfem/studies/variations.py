@@ -6,6 +6,7 @@ falls, and the properties that decide it.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
@@ -30,7 +31,7 @@ from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.dynamics.rigid_body.simulation import RigidBlockSimulation
 from archfem.dynamics.schemes import Conserving, EffectiveDamping, Viscous, interpret_damping
 from archfem.dynamics.verdict_range import VerdictRange
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput, InvalidStructure
 from archfem.limit.fill_strength import PlasticFill
 from archfem.limit.rating import Rating, rate_again
 from archfem.masonry.joint_closing import FINISHES, with_finish
@@ -402,9 +403,11 @@ def vary_rating(case: Case, rating: Mapping[str, Any], found: Rating) -> tuple[R
     changes, factors = dict(_list_rating_changes(case, found)), dict[str, float]()
     with ProgressReport("rating, varied", len(changes)) as progress:
         for name, changed in changes.items():
-            other = Point.of(case, changed.items()).case
-            given = other.rating.get("width"), other.limit.resistance
-            factors[name] = rate_again(found, other.structure, given[0], **given[1])
+            factors[name] = np.nan
+            with suppress(InvalidStructure):  # rings may not fit on a narrower pier
+                other = Point.of(case, changed.items()).case
+                given = other.rating.get("width"), other.limit.resistance
+                factors[name] = rate_again(found, other.structure, given[0], **given[1])
             progress.show(f"{name}: {factors[name]:.4g}", 1)
     factors |= {"no pressure of the fill": found.without_pressure}
     factors |= {"all of its passive pressure": found.full_pressure}
