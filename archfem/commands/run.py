@@ -268,6 +268,38 @@ def rate(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
     rating = {**case.settings.get("rating", {}), **given}
     tables = name_vehicles(options.vehicles, rating)
+    rated = _rate_each(case, tables, list_vehicles(rating))
+    texts = ["\n".join([str(found), *doubts]) for found, doubts, _ in rated]
+    first, files = rated[0][0], {}
+    if len(rated) > 1:
+        summary = result_text.tabulate_ratings([found for found, *_ in rated])
+        texts.insert(0, summary.text)
+        files["vehicles.csv"] = summary.csv
+    stated, varied = state_ratings([(found, doubts) for found, doubts, _ in rated]), ""
+    if options.vary:
+        from archfem.studies.variations import vary_rating
+
+        rows, range_text = vary_rating(case, rated[0][2], first)
+        texts[-len(rated)] += f"\n{range_text}"
+        files["rating_variations.csv"], varied = rows.csv, f"\n\n{rows.text}"
+        stated = stated._replace(sentences=[*stated.sentences, range_text])
+    text = "\n\n".join(filter(None, [*texts, describe_fill_defaults(case)]))
+    # the case of the folder, that of a run, may be rated for another vehicle
+    files |= {RATING_FILE: format_tables({"rating": rated[0][2]}).rstrip(), "rating.txt": text}
+    files |= {"rating.csv": first.table(), **stated.as_file("rating")}
+
+    def draw() -> Files:
+        every = {"vehicles.png": draw_ratings([found for found, *_ in rated])}
+        return {**files, "rating.png": first.plot(), **(every if len(rated) > 1 else {})}
+
+    _write_results("rate", case, options.out, f"{case.title}\n{text}{varied}", draw)
+    return _doubt_code([doubt for _, doubts, _ in rated for doubt in doubts])
+
+
+def _rate_each(
+    case: Case, tables: Sequence[Mapping[str, Any]], own: Sequence[Any]
+) -> list[tuple[Rating, list[str], Mapping[str, Any]]]:
+    """Return rating, doubts and table of each vehicle: the case's own first, then the worst."""
     rated = []
     with ProgressReport("rating", len(tables)) as progress:
         for table in tables:
@@ -278,27 +310,7 @@ def rate(options: argparse.Namespace) -> int:
             progress.show(f"{found.vehicle.name}: {found.headline.partition(',')[0]}", 1)
             if np.isnan(found.factor):  # whatever the vehicle
                 break
-    # those of the case before others, and the worst first
-    own = list_vehicles(rating)
-    rated.sort(key=lambda each: (each[2]["vehicle"] not in own, each[0].factor))
-    texts = ["\n".join([str(found), *doubts]) for found, doubts, _ in rated]
-    first, files = rated[0][0], {}
-    if len(rated) > 1:
-        summary = result_text.tabulate_ratings([found for found, *_ in rated])
-        texts.insert(0, summary.text)
-        files["vehicles.csv"] = summary.csv
-    text = "\n\n".join(filter(None, [*texts, describe_fill_defaults(case)]))
-    # the case of the folder, that of a run, may be rated for another vehicle
-    files |= {RATING_FILE: format_tables({"rating": rated[0][2]}).rstrip(), "rating.txt": text}
-    files |= {"rating.csv": first.table()}
-    files |= state_ratings([(found, doubts) for found, doubts, _ in rated]).as_file("rating")
-
-    def draw() -> Files:
-        every = {"vehicles.png": draw_ratings([found for found, *_ in rated])}
-        return {**files, "rating.png": first.plot(), **(every if len(rated) > 1 else {})}
-
-    _write_results("rate", case, options.out, f"{case.title}\n{text}", draw)
-    return _doubt_code([doubt for _, doubts, _ in rated for doubt in doubts])
+    return sorted(rated, key=lambda each: (each[2]["vehicle"] not in own, each[0].factor))
 
 
 def _rating_doubts(case: Case, found: Rating) -> Iterator[str]:

@@ -221,7 +221,9 @@ class Rating(ResultDisplay):
         where = f"{first} to {others[-1]}" if len(stand) > 4 else where
         count = f"{len(stand)} axle{'s'[: len(others)]}"
         count += f" of {len(axles)}" if len(axles) > len(stand) else ""
-        name = f" over {join_names(list(over))}" if over else ""
+        ends = np.array([*spans.values()])
+        beside = over and not all(((x >= ends[:, 0]) & (x <= ends[:, 1])).any() for x in stand)
+        name = f" over {'or beside ' if beside else ''}{join_names(list(over))}" if over else ""
         return f"with {count}{name} at x = {where} m"
 
     def __str__(self) -> str:
@@ -480,11 +482,32 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     geometric, deepest = unknown if is_plastic else _geometric_factor(weighted, moving, options)
     factors = live, impact, dead, width, area_load
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
-    # of the whole width, as the structure is modelled
-    loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in rows]
-    strips = cut_road(weighted, live * area_load)
-    more |= _rate_other_states(weighted, positions, strips, loads, options)
+    if states := _other_states(options):
+        # of the whole width, as the structure is modelled
+        loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in rows]
+        road = cut_road(weighted, live * area_load)
+        more |= _find_least_factors(weighted, positions, road, loads, states)
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
+
+
+def rate_again(found: Rating, structure: Structure, width: float | None, **options: Any) -> float:
+    """Return the factor of a rated vehicle over another bridge, or of other stones and fill.
+
+    Width and places are those by rule where they were for the rating; NaN without equilibrium.
+    """
+    vehicle, options = found.vehicle, dict(options)
+    options["strength"] = check_options(structure, options["friction"], options["strength"])
+    options["fill"] = place_backing(options["fill"], structure)
+    by_rule = np.isclose(found.width, vehicle.spread_over(found.structure))
+    usual = vehicle.spread_over(structure) if by_rule else found.width
+    share = structure.width / (usual if width is None else width)
+    weighted = _scale_weights(structure, found.dead)
+    axles = parse_axles(vehicle.axles, vehicle.spacings)
+    rows = vehicle.factored(found.live, found.impact)
+    loads = [np.column_stack([share * row, axles[:, 1]]) for row in rows]
+    places, road = _places_along(weighted, axles), cut_road(weighted, found.live * found.area_load)
+    factors = _find_least_factors(weighted, places, road, loads, {"": options})
+    return factors.get("", np.nan)
 
 
 def _check_width(width: float, structure: Structure) -> None:
@@ -610,14 +633,14 @@ def _other_states(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return states | {name: options | {"fill": other} for name, other in fills.items()}
 
 
-def _rate_other_states(
+def _find_least_factors(
     structure: Structure,
     places: Sequence[float],
     strips: AxleRow,
     vehicles: Sequence[Array],
-    options: dict[str, Any],
+    states: dict[str, dict[str, Any]],
 ) -> dict[str, float]:
-    """Return the least factor in each other state; none where the bridge does not stand in it."""
+    """Return the least factor in each state; none where the structure does not stand in it."""
     rows = dict.fromkeys(
         axles_on_structure(structure, vehicle, way, x)
         for vehicle in vehicles
@@ -625,17 +648,16 @@ def _rate_other_states(
         for x in places
     )
     # the fans of loads do not depend on pressure, backing and strength
-    pressed = options | {"fill": as_pressure(options["fill"])}
-    stones, _ = self_weight_programme(structure, **pressed)
+    stones, _ = self_weight_programme(structure, **next(iter(states.values())))
     axles = {row: stones.load(row) for row in rows if row}
     forces = [stones.load([strip]) for strip in strips]
     factors = {}
-    for name, given in _other_states(options).items():
+    for name, given in states.items():
         stones, dead = self_weight_programme(structure, **given)
         if not is_balanced(dead.minimise_residual(), dead):
             continue
         # these are worst with sliding that dilates: without, one of the next may be
         worst = find_worst_rows(dead, axles, strips, forces)
-        worst = dict(islice(worst.items(), 1 if options["friction"] != "nonassociated" else 3))
+        worst = dict(islice(worst.items(), 1 if given["friction"] != "nonassociated" else 3))
         factors[name] = min(collapse_factors(stones, dead, worst, given).values())
     return factors

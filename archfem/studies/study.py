@@ -142,12 +142,13 @@ class Study:
 
         Args:
             path: path of a file with `case`, the file of a case, or with tables [cases."name"] of
-                `case`, a file, and `set`, a list of "section.key=value"; `set` above the tables
-                changes all cases, before their own. `vary`, `samples` and `compute` are as for a
-                `Study`; with [cases] nothing need vary, and `compute` is
-                "comparison" by default. Histories, scales and comparisons of cases with a suite are
-                computed under each of its pairs, or those that `pairs` names. `scales` is the
-                search for scales in a comparison: true, or a table of `precision` and `range`.
+                `case`, a file, and `set`, a list of "section.key=value"; above the tables `case` is
+                that of tables without one, and `set` changes all cases, before their own. `vary`,
+                `samples` and `compute` are as for a `Study`; with [cases] nothing need vary, and
+                `compute` is "comparison" by default. Histories, scales and comparisons of cases
+                with a suite are computed under each of its pairs, or those that `pairs` names.
+                `scales` is the search for scales in a comparison: true, or a table of `precision`
+                and `range`.
             changes: changes to every case, "section.key=value".
             own_code: whether `compute` may name a function of a module of the user. By default it
                 may not, since the file may come from anywhere and the module would run.
@@ -364,11 +365,10 @@ def _read_study(
     settings = check_table(tables, STUDY_KEYS, "study")
     missing = [] if {"case", "cases"} & set(settings) else ["case"]
     missing += [] if {"cases", "vary"} & set(settings) else ["vary"]
-    if missing or {"case", "cases"} <= set(settings):
-        reason = f"says nothing of {missing[0]}" if missing else "has both case and cases"
+    if missing:
         raise InvalidInput(
-            f'it {reason}: write case = "file.toml" and vary, keys of the case with lists of '
-            'values or distributions; or tables [cases."name"] of several cases'
+            f'it says nothing of {missing[0]}: write case = "file.toml" and vary, keys of the case '
+            'with lists of values or distributions; or tables [cases."name"] of several cases'
         )
     asked = _parse_evaluator(settings, own_code)
     cases = _read_cases(settings, path.parent, changes)
@@ -420,12 +420,13 @@ def _read_cases(
     settings: Mapping[str, Any], folder: Path, changes: Sequence[str]
 ) -> dict[str, Case]:
     """Read the cases of a study file by name; a single case has none."""
-    tables = settings.get("cases", {"": {"case": settings.get("case")}})
+    common = {key: settings[key] for key in ("case",) if key in settings}
+    tables = settings.get("cases", {"": common})
     columns = settings.get("columns", {"": []})
     columns = check_table(columns, {key: [str] for key in columns}, "columns")
     cases = {}
     for name, table in tables.items():
-        case = check_table(table, STUDIED_CASE_KEYS, f"cases.{name}")
+        case = common | check_table(table, STUDIED_CASE_KEYS, f"cases.{name}")
         if "case" not in case:
             raise InvalidInput(f"cases.{name} names no case file")
         for column, own in columns.items():

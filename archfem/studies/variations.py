@@ -5,7 +5,8 @@ and all together, by a Latin hypercube. The result is the share of runs in which
 falls, and the properties that decide it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
@@ -16,7 +17,11 @@ import numpy as np
 import xarray as xr
 from scipy.stats import qmc
 
+from archfem._display import ProgressReport
 from archfem._validation import check_integer, check_number, validate_arguments
+from archfem.cases.case import Case
+from archfem.cases.result_text import ResultTable
+from archfem.cases.toml_file import format_key
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import CollapseState, classify_collapse, doubt_soft_blocks
 from archfem.dynamics.damping import damping_kind, resolve_effective_damping, vary_damping
@@ -27,7 +32,9 @@ from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.dynamics.rigid_body.simulation import RigidBlockSimulation
 from archfem.dynamics.schemes import Conserving, EffectiveDamping, Viscous, interpret_damping
 from archfem.dynamics.verdict_range import VerdictRange
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput, InvalidStructure
+from archfem.limit.fill_strength import PlasticFill
+from archfem.limit.rating import Rating, rate_again
 from archfem.masonry.joint_closing import FINISHES, with_finish
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
@@ -35,8 +42,9 @@ from archfem.models.model import Doubt, write_doubts
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import fill_doubts
 from archfem.studies.evaluators import PreparedRuns
-from archfem.studies.parameter_space import WholePoint
+from archfem.studies.parameter_space import Point, WholePoint
 from archfem.studies.result_store import evaluate_with_progress
+from archfem.units import in_unit
 
 # What is varied by default: values, of which numbers are the ends of a range
 DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
@@ -412,3 +420,78 @@ def _build_dataset(
         columns[name] = "run", values, {"units": unit}
     columns["error"] = "run", np.array([str(row["error"]) for row in rows])
     return xr.Dataset(columns, attrs={"properties": list(ranges)})
+
+
+def vary_rating(case: Case, rating: Mapping[str, Any], found: Rating) -> tuple[ResultTable, str]:
+    """Rate the bridge of a case with other properties, one at a time, and state the range.
+
+    Args:
+        case: case of the bridge.
+        rating: [rating] of one vehicle.
+        found: rating with the properties of the case.
+
+    Returns:
+        Table of properties and factors, and the least and the greatest factor in words.
+
+    Raises:
+        InvalidInput: the fill is a plastic one.
+    """
+    if isinstance(found.fill, PlasticFill):
+        raise InvalidInput('a rating is varied with fill of law "pressure", not with "plastic"')
+    case = Case.of({**case.settings, "rating": dict(rating)}, case.folder)
+    changes, factors = dict(_list_rating_changes(case, found)), dict[str, float]()
+    with ProgressReport("rating, varied", len(changes)) as progress:
+        for name, changed in changes.items():
+            factors[name] = np.nan
+            with suppress(InvalidStructure):  # rings may not fit on a narrower pier
+                other = Point.of(case, changed.items()).case
+                given = other.rating.get("width"), other.limit.resistance
+                factors[name] = rate_again(found, other.structure, given[0], **given[1])
+            progress.show(f"{name}: {factors[name]:.4g}", 1)
+    factors |= {"no pressure of the fill": found.without_pressure}
+    factors |= {"all of its passive pressure": found.full_pressure}
+    factors |= {"stones of 5 MPa that crush": found.crushing}
+    known = {name: value for name, value in factors.items() if np.isfinite(value)}
+    rows = [[name, f"{known[name]:.4g}" if name in known else "-"] for name in factors]
+    rows = [row for row in rows if row[0] in changes or row[0] in known]
+    least, most = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
+    text = (
+        f"one property at a time changes the factor of {found.factor:.4g} to {known[least]:.4g} "
+        f"({least}) at least and {known[most]:.4g} ({most}) at most"
+    )
+    return ResultTable(["with", "factor"], rows), text
+
+
+def _list_rating_changes(case: Case, found: Rating) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield what is varied beside a rating, in words, and the keys of the case with new values."""
+    lengths = dict(_list_lengths(case.settings["structure"], "structure"))
+    breadth = min((x.depth for x in found.structure.joints if x.role == "pier"), default=0.0)
+    rows: tuple[tuple[str, str, Callable[[float, float], float]], ...] = (
+        ("thickness", "rings a tenth thinner, rings a tenth thicker", lambda x, by: x + by * x),
+        ("breadth", "piers a tenth narrower, piers a tenth broader", lambda x, by: x + by * x),
+        ("gap", "piers a tenth narrower, piers a tenth broader", lambda x, by: x + by * breadth),
+        ("cover", "0.1 m less cover, 0.1 m more cover", lambda x, by: max(x + by, 0.02)),
+    )
+    for key, names, change in rows:
+        paths = {path: x for path, x in lengths.items() if path.endswith(f".{key}")}
+        for name, by in zip(names.split(", "), (-0.1, 0.1), strict=True) if paths else ():
+            yield name, {path: change(x, by) for path, x in paths.items()}
+    if np.isfinite(found.strength):
+        yield "half the strength of the stones", {"limit.strength": 0.5 * found.strength}
+    if found.fill is not None:
+        for sign in (-1.0, 1.0):
+            angle = found.fill.friction_angle + 5.0 * sign
+            yield f"fill of {angle:.3g}°", {"limit.fill.friction_angle": f"{angle:.17g} degree"}
+    for share in (0.9, 1.1):
+        width = min(share * found.width, found.structure.width)
+        yield f"a vehicle on {width:.3g} m", {"rating.width": width}
+
+
+def _list_lengths(table: Mapping[str, Any], path: str) -> Iterator[tuple[str, float]]:
+    """Yield path and value of each length in the tables of a structure [m]."""
+    for key, value in table.items():
+        place = f"{path}.{format_key(key)}"
+        if isinstance(value, Mapping) and key != "paving":
+            yield from _list_lengths(value, place)
+        elif key in ("thickness", "breadth", "gap", "cover"):
+            yield place, in_unit(value, "m", place)

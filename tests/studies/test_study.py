@@ -564,6 +564,18 @@ def test_values_may_be_an_array(small_ring):
     assert [dict(point.changes)["structure.thickness"] for point in study.points] == [0.5, 0.6]
 
 
+def test_a_case_above_the_tables_is_that_of_those_that_name_none(tmp_path):
+    for name, thickness in (("ring", 0.5), ("thin", 0.4)):
+        text = f'[structure]\nshape = "circular_arch"\nradius = 2.0\nthickness = {thickness}\n'
+        (tmp_path / f"{name}.toml").write_text(f"{text}embrace = 150.0\nvoussoirs = 5\n")
+    tables = (
+        '[cases.a]\n[cases.b]\ncase = "thin.toml"\n[cases.c]\nset = ["structure.thickness=0.3"]'
+    )
+    (tmp_path / "study.toml").write_text(f'case = "ring.toml"\ncompute = "limit"\n{tables}\n')
+    points = af.Study.read(tmp_path / "study.toml").points
+    assert [point.case.structure.depths.max() for point in points] == pytest.approx([0.5, 0.4, 0.3])
+
+
 GOOD = 'case = "ring.toml"\ncompute = "dead load"\n'
 RANDOM = "vary.structure.thickness = { distribution = 'norm', loc = 0.5, scale = 0.01 }\n"
 
@@ -572,7 +584,8 @@ RANDOM = "vary.structure.thickness = { distribution = 'norm', loc = 0.5, scale =
     ("text", "says"),
     [
         (GOOD, 'study.toml: it says nothing of vary: write case = "file.toml" and vary'),
-        (f"{GOOD}[cases]", "study.toml: it has both case and cases"),
+        (f"{GOOD}[cases]", r'study.toml: it has no cases: write \[cases."name"\] with case ='),
+        ("[cases.a]", "study.toml: cases.a names no case file"),
         ("[structure]", "study.toml: this is a case: name it in the file of a study"),
         (f"{GOOD}find = 'limit'", "study.toml: unknown key 'find'"),
         (f"{GOOD}scales = true\nvary.title = ['a']", "scales is the search of a comparison"),

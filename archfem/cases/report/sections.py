@@ -257,6 +257,9 @@ def _build_rating(data: ReportData) -> list[Any]:
     if blocks:
         # where a value can be looked up, for whoever signs
         blocks[0] = replace(blocks[0], text=blocks[0].text.replace("from memory", "to be checked"))
+    if (table := data.read_text("rating_variations.csv")) is not None:
+        head, *rows = reader(table.splitlines())
+        blocks.insert(1, Grid(head, rows, "Factor with one property changed at a time", "words"))
     if (table := data.read_text("vehicles.csv")) is None:
         return blocks
     # the text begins with the same table, and the picture is of the first vehicle

@@ -1,0 +1,97 @@
+"""Ratings with one changed property at a time: against whole ratings of changed cases."""
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import archfem as af
+from archfem.cases.analysis_keys import rate_case
+from archfem.studies.variations import vary_rating
+
+SEARCHED = 0.005
+"""Relative: varied ratings search the places of least bounds, whole ones all of them."""
+
+CASE = """
+title = "two spans"
+[structure]
+shape = "bridge"
+width = "3 m"
+[structure.arches]
+thickness = "0.4 m"
+voussoirs = 5
+left = { span = "3 m", rise = "1 m" }
+right = { span = "3 m", rise = "1 m", thickness = "0.45 m" }
+[structure.piers]
+PIER
+height = "1.5 m"
+course = "0.75 m"
+pier = {}
+[structure.backfill]
+cover = "0.3 m"
+[structure.paving]
+thickness = "0.1 m"
+[materials.stone]
+unit_weight = "22 kN/m³"
+strength = "4 MPa"
+[limit]
+fill = { friction_angle = "35 degree" }
+[rating]
+vehicle = { name = "cart", axles = ["40 kN", "60 kN"], spacings = ["1.2 m"], live = 1.35 }
+"""
+
+
+@pytest.mark.slow
+def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(
+        CASE.replace("PIER", 'breadth = "0.86 m"').replace(
+            '[structure.paving]\nthickness = "0.1 m"\n', ""
+        )
+    )
+    case = af.Case.read(path)
+    found = rate_case(case.structure, case.rating, case.limit)
+    rows, words = vary_rating(case, case.settings["rating"], found)
+    cells = dict(rows.rows)
+    assert cells.pop("piers a tenth narrower") == "-"  # on which the rings do not fit
+    factors = {name: float(cell) for name, cell in cells.items()}
+    thin = ["structure.arches.thickness=0.36", "structure.arches.right.thickness=0.405"]
+    for name, changes in {
+        "rings a tenth thinner": thin,
+        "piers a tenth broader": ["structure.piers.breadth=0.946"],
+        "0.1 m less cover": ["structure.backfill.cover=0.2"],
+        "half the strength of the stones": ["limit.strength=2e6"],
+        "fill of 40°": ["limit.fill.friction_angle=40 degree"],
+    }.items():
+        other = af.Case.read(path, changes)
+        whole = rate_case(other.structure, other.rating, other.limit)
+        assert factors[name] == pytest.approx(whole.factor, rel=SEARCHED), name
+    # in proportion to the width, which is that of the wheels and the cover
+    for share in (0.9, 1.1):
+        width = f"a vehicle on {share * 1.8:.3g} m"
+        assert factors[width] == pytest.approx(share * found.factor, rel=SEARCHED)
+    assert factors["no pressure of the fill"] == pytest.approx(found.without_pressure, rel=1e-3)
+    least, most = min(factors, key=factors.get), max(factors, key=factors.get)
+    ends = f"to {factors[least]:.4g} ({least}) at least and {factors[most]:.4g} ({most}) at most"
+    assert words == f"one property at a time changes the factor of {found.factor:.4g} {ends}"
+
+
+@pytest.mark.slow
+def test_a_rating_of_the_command_is_varied(tmp_path, unplotted, capsys, monkeypatch):
+    """By a gap too, whose pier is a tenth of its breadth broader; the paving stays."""
+    path, out = tmp_path / "case.toml", tmp_path / "out"
+    path.write_text(CASE.replace("PIER", 'gap = "0.6 m"'))
+    changed = []
+    keep = af.Case.of
+    monkeypatch.setattr(af.Case, "of", lambda *given: changed.append(given[0]) or keep(*given))
+    assert af.commands.main(["rate", str(path), "--vary", "--out", str(out)]) == 3  # free ends
+    said = capsys.readouterr().out
+    assert "\none property at a time changes the factor of " in said
+    rows = pd.read_csv(out / "rating_variations.csv")
+    assert {"piers a tenth narrower", "0.1 m more cover"} <= {*rows["with"]}
+    assert (np.diff(rows["factor"][rows["with"].str.startswith("rings")]) > 0.0).all()
+    gaps = [each["structure"]["piers"]["gap"] for each in changed]
+    breadth = float(re.search(r"'pier' ([\d.]+) m broad", said)[1])
+    assert max(x for x in gaps if isinstance(x, float)) == pytest.approx(0.6 + 0.1 * breadth, 1e-3)
+    assert {each["structure"]["paving"]["thickness"] for each in changed} == {"0.1 m"}
