@@ -125,7 +125,7 @@ def unplotted(undrawn, monkeypatch):
     from matplotlib.figure import Figure
 
     report = "cases.report.sections", "cases.report.response"
-    for room in ("cases.result_folder", *report, "commands.run"):
+    for room in ("cases.result_folder", *report, "commands.run", "commands.records"):
         module = importlib.import_module(f"archfem.{room}")
         for name in [name for name in vars(module) if name.startswith("draw_")]:
             made = [Figure()] if name == "draw_envelopes" else Figure()

@@ -1,11 +1,11 @@
 """Command line: arguments, exit codes and printed results.
 
-    cli     argument parser, exit codes
-    run     run, modes, limit, assess, rate, mesh, accuracy, risk, verdict, report, page, motion,
-            select, compile
-    study   study
-    tools   check, animate, examples, example, new, schema, doctor
-    schema  JSON schema of case files
+    cli      argument parser, exit codes
+    records  motion, select
+    run      run, modes, limit, assess, rate, mesh, accuracy, risk, verdict, report, page, compile
+    study    study
+    tools    check, animate, examples, example, new, schema, doctor
+    schema   JSON schema of case files
 
 Imports all rooms. Start reading at `cli`.
 """

@@ -312,7 +312,7 @@ def _add_motion_commands(commands: Any) -> None:
     """Add `archfem motion` and `archfem select`."""
     text = "Print the measures of records, draw them, their integrals and spectra."
     about = "measures and pictures of ground motions"
-    add = _add_command(commands, "motion", about, "run", description=text)
+    add = _add_command(commands, "motion", about, "records", description=text)
     add("files", nargs="+", metavar="FILE", help="a record")
     add("--column", type=int, help="component or plain column, counted from 1")
     add("--units", help="of columns, miniSEED or SAC: g, m/s2, cm/s2 or gal")
@@ -320,7 +320,7 @@ def _add_motion_commands(commands: Any) -> None:
     add("--response", metavar="XML", help="StationXML of counts in miniSEED, SAC")
     add("--out", default="out/motions", metavar="DIR", help="folder for the pictures")
     about = "select recorded motions by the rule of a code"
-    add = _add_command(commands, "select", about, "run", description=about)
+    add = _add_command(commands, "select", about, "records", description=about)
     add("folder", metavar="FOLDER", help="folder of the records")
     about = 'design spectrum, as target of a case: \'{ code = "EC8", ag = 0.3, ground = "B" }\''
     add("--spectrum", required=True, metavar="TABLE", help=about)

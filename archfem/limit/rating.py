@@ -458,12 +458,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         # the structure is modelled over its whole width, of which a vehicle loads a part
         share = structure.width / width
         given = options | {"spacings": driven.spacings, "area_load": live * area_load}
-        return _least_of(
-            [
-                moving_load(weighted, (share * row).tolist(), positions=positions, **given)
-                for row in rows
-            ]
-        )
+        loaded = ((share * row).tolist() for row in rows)
+        return _least_of([moving_load(weighted, x, positions=positions, **given) for x in loaded])
 
     is_plastic = isinstance(fill, PlasticFill)
     axles = parse_axles(driven.axles, driven.spacings)
@@ -657,7 +653,7 @@ def _find_least_factors(
         if not is_balanced(dead.minimise_residual(), dead):
             continue
         # these are worst with sliding that dilates: without, one of the next may be
-        worst = find_worst_rows(dead, axles, strips, forces)
+        worst = find_worst_rows(dead, axles, strips, forces, 32 * len(vehicles))
         worst = dict(islice(worst.items(), 1 if given["friction"] != "nonassociated" else 3))
         factors[name] = min(collapse_factors(stones, dead, worst, given).values())
     return factors

@@ -431,14 +431,16 @@ def find_worst_rows(
     axles: dict[AxleRow, Array],
     strips: AxleRow,
     forces: Sequence[Array],
-    count: int = 32,
+    count: int,
     margin: float = 0.03,
 ) -> dict[AxleRow, Array]:
     """Return the rows of axles of least factors, the least first, with adverse strips, and forces.
 
-    Some rows all along the road are solved, and then those beside rows of nearly the least factor,
-    and that of the lowest bound from above, until none is left within a margin.
+    Some rows all along the road, a count, are solved, and then those beside rows of nearly the
+    least factor, and that of the lowest bound from above, until none is left within a margin.
     """
+    # With 32 for both ways of a vehicle, no least factor was missed in 52 states of 13 random
+    # bridges, for a fourth of the time of all rows; with 24 by up to 3.5 %.
     known, rows, loads = _RoadMechanisms(dead, forces), [*axles], [*axles.values()]
     laid: dict[int, tuple[float, Flags]] = {}
     pending = {*range(0, len(rows), max(len(rows) // count, 1))}
