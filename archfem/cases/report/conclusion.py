@@ -171,9 +171,7 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
         stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
         lead = [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
     if data.verdict_range is not None:
-        # statistics of the sampling stand in its section
-        found = data.verdict_range.sentence.partition("; of ")[0]
-        lead.append(f"in variations of its properties it {found}{data.verdict_range.unanswered}")
+        lead.append(f"in variations of its properties it {data.verdict_range.sentence}")
     lead += _describe_margin(data, rows)
     if data.runs and not doubtful:
         lead.append("the checks of the numbers raise no doubt")
