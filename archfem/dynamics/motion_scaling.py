@@ -399,17 +399,24 @@ class CollapseScale:
 
     def __repr__(self) -> str:
         """Return the scales around the fall in one line; a dislocated structure has not fallen."""
-        falls = [fall for dt in self.searches for at, fall in self.falls(dt) if at == self.lower]
-        parted = any(fall is not None and fall.kind == "dislocated" for fall in falls)
-        state = "dislocated, not fallen," if parted else "stands"
+        made = [(at, fall.kind) for dt in self.searches for at, fall in self.falls(dt) if fall]
         least = min(self.bracket(dt).upper for dt in self.searches)
         met = "falls at no scale that was tried"
         if least < inf:
             met = f"falls at {_say_scale(least, self.pga)}"
+        elif unanswered := [s for each in self.searches for s in self.bracket(each).unanswered]:
+            none = f"{len(unanswered)} have none, the first at {min(unanswered):#.3g} ×"
+            met = f"falls in no run that has an answer ({none})"
         if least < self.upper:
             at = f"first falls at {self.upper:#.3g} ×" if self.upper < inf else "falls at no scale"
             met = f"{met}, {'the other' if len(self.searches) == 2 else 'the last'} time step {at}"
-        return _say_bracket(state, self.lower, self.pga, met) + self._say_tested()
+        state, first = "stands", self.lower
+        if (self.lower, "dislocated") in made:
+            first = min(at for at, kind in made if kind == "dislocated")
+            below = max((at for at, kind in made if kind == "stands" and at < first), default=0.0)
+            state = f"stands at {below:#.3g} ×, " * bool(below) + "dislocated, not fallen,"
+            met = f"and up to {self.lower:#.3g} ×, {met}" if first < self.lower else met
+        return _say_bracket(state, first, self.pga, met) + self._say_tested()
 
     def _say_tested(self) -> str:
         """Return in words how closely scales were run up to `lower`; "" where none stands."""
@@ -458,8 +465,11 @@ class CollapseScale:
 
     @property
     def lower(self) -> float:
-        """Largest scale up to which the structure stood with all time steps [-]."""
-        return min(self.bracket(dt).lower for dt in self.searches)
+        """Largest scale up to which all runs had an answer, and the structure never fell [-]."""
+        lower, unknown = min(self.bracket(dt).lower for dt in self.searches), self.unanswered
+        made = (run.scale for search in self.searches.values() for run in search.runs)
+        below = [scale for scale in made if scale <= lower and scale < min(unknown, default=inf)]
+        return max(below, default=0.0)
 
     @property
     def upper(self) -> float:

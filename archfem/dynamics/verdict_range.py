@@ -139,14 +139,18 @@ class VerdictRange(ResultDisplay):
         text = self.count
         if 0 < falls.sum() < len(falls):
             text += f": {self._where}"
-        low, high = self.interval()
-        count = int((self.answered & self.dataset["sampled"].values).sum())
-        text += (
-            f"; of {count} in a Latin hypercube {self.share:.0%} fall "
-            f"({low:.0%} to {high:.0%} at 95%)"
-        )
+        text += self._count_groups()
         text += f", under '{motion}' alone" if (motion := self.dataset.attrs.get("motion")) else ""
         return text + self.unanswered
+
+    def _count_groups(self) -> str:
+        """Return the falls of runs that vary one property, and of the sample with its interval."""
+        falls, sampled = self.falls, self.dataset["sampled"].values
+        words, (low, high) = [], self.interval()
+        for name, group in ("one property", ~sampled), ("all", sampled):
+            if own := int((self.answered & group).sum()):
+                words.append(f"of {own} that vary {name} {int(falls[self.answered & group].sum())}")
+        return f"; {', '.join(words)} ({low:.0%} to {high:.0%} at 95%)"
 
     @cached_property
     def _where(self) -> str:

@@ -357,6 +357,24 @@ def test_smaller_scales_at_which_it_is_dislocated_are_said():
     assert "; stands at every smaller scale that was run" in str(bound)
 
 
+def test_scales_without_an_answer_bound_what_is_known():
+    """It stands to 2, is dislocated at 3 and 4, and beyond 5 one step or none has an answer."""
+    found, kinds = fallen(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0), ["stands"] * 2 + ["dislocated"] * 4
+    runs = [
+        replace(run, fall=replace(run.fall, kind=kind))
+        for run, kind in zip(found.runs, kinds, strict=False)
+    ]
+    runs.append(replace(found.runs[-1], fall=None))
+    part = [replace(run, fall=None) if run.scale == 5.0 else run for run in runs]
+    both = {dt: replace(found, runs=tuple(own)) for dt, own in ((0.01, runs), (0.005, part))}
+    said = CollapseScale(both, pga=0.5 * 9.80665)
+    assert (said.lower, said.upper, said.unanswered) == (4.0, inf, (5.0, 7.0))
+    assert str(said).partition(";")[0] == (
+        "stands at 2.00 ×, dislocated, not fallen, at 1.50 g (3.00 × the motion), and up to 4.00 "
+        "×, falls in no run that has an answer (3 have none, the first at 5.00 ×)"
+    )
+
+
 @pytest.mark.parametrize(
     ("kind", "scales", "says"),
     [

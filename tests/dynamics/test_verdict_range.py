@@ -42,7 +42,7 @@ def test_runs_beside_the_sample_count_for_the_sentence_alone():
     found = made_up([True, False, False, True], [False, False, True, True], sign=list("aabb"))
     assert found.share == 0.5
     assert found.sentence.startswith("falls in 2 of 4: ")
-    assert "; of 2 in a Latin hypercube 50% fall (1% to 99% at 95%)" in found.sentence
+    assert "; of 2 that vary one property 1, of 2 that vary all 1 (1% to 99% at 95%)" in found.sentence
 
 
 def test_no_share_of_the_damage_is_given_where_nothing_falls():
@@ -73,7 +73,7 @@ def test_doubts_follow_the_sentence_and_are_kept(tmp_path):
 def test_the_sentence_names_the_only_motion():
     """An interval of one motion holds for that motion; without a name motions are varied."""
     found = made_up([False] * 4, sign=list("aabb"))
-    assert found.sentence == "falls in 0 of 4; of 4 in a Latin hypercube 0% fall (0% to 60% at 95%)"
+    assert found.sentence == "falls in 0 of 4; of 4 that vary all 0 (0% to 60% at 95%)"
     found.dataset.attrs["motion"] = "synthetic 1"
     assert found.sentence.endswith("(0% to 60% at 95%), under 'synthetic 1' alone")
 

@@ -171,9 +171,7 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
         stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
         lead = [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
     if data.verdict_range is not None:
-        # statistics of the sampling stand in its section
-        found = data.verdict_range.sentence.partition("; of ")[0]
-        lead.append(f"in variations of its properties it {found}{data.verdict_range.unanswered}")
+        lead.append(f"in variations of its properties it {data.verdict_range.sentence}")
     lead += _describe_margin(data, rows)
     if data.runs and not doubtful:
         lead.append("the checks of the numbers raise no doubt")
@@ -187,30 +185,27 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
 
 
 def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the margin on the scaled motion, and the least of the checks, maybe as a range."""
+    """Yield the least factor on the demand of an earthquake, maybe as a range, and the others."""
+    checks, others = [], []
     for name, demand, outcome, factor in rows:
-        if name == RESULTS["scale"] and factor != "-":
-            met = "forms a mechanism" if "mechanism" in outcome else "falls"
-            fails = "" if float(factor) >= 1.0 else ", which it fails"
-            yield f"the margin on {demand}, is {factor}{fails}: up to there it {met} in no run"
-    checks = [
-        (float(factor.partition(" ")[0]), name.partition(": ")[2], outcome, factor)
-        for name, _, outcome, factor in rows
-        if name.startswith("assessment: ") and factor != "-"
-    ]
-    if not checks:
-        # of a push alone, where the ground acceleration of the site is known
-        begin = (
-            row for row in rows if row[0] == RESULTS["limit"] and row[1].startswith("the site")
-        )
-        yield from (f"it begins to move at {factor} times {site}" for _, site, _, factor in begin)
-    else:
-        least, name, outcome, factor = min(checks)
-        _, only, assumed = outcome.partition(" only with ")
-        fails = "" if least >= 1.0 or only else ", which it fails"
+        if factor == "-":
+            continue
+        least, check = float(factor.partition(" ")[0]), name.partition("assessment: ")[2]
+        fails = ", which it fails" * (least < 1.0)
         over = " over what is assumed of the fill" * (" to " in factor)
-        margin = f"the least margin is {factor}{over}, on {name_spectrum(data)}, by {name}"
-        yield f"{margin}{only and ', passed'}{only}{assumed}{fails}"
+        if name == RESULTS["scale"]:
+            met = "forms a mechanism" if "mechanism" in outcome else "falls"
+            words = f"{factor} on {demand}{fails}: up to there it {met} in no run"
+            others.append((least, words))
+        elif name == RESULTS["limit"] and demand.startswith("the site"):
+            others.append((least, f"{factor}{over}, for a push by {demand} to begin to move it"))
+        elif check:
+            _, only, assumed = outcome.partition(" only with ")
+            only = f", passed only with {assumed}" if only else fails
+            words = f"{factor}{over}, on {name_spectrum(data)}, by {check}{only}"
+            checks.append((least, words))
+    for k, (_, words) in enumerate(sorted([*others, *sorted(checks)[:1]])):
+        yield f"the {'next' if k else 'least'} margin is {words}"
 
 
 def name_spectrum(data: ReportData) -> str:
