@@ -495,12 +495,15 @@ def state_assessments(found: Mapping[str, KinematicAssessment], doubts: list[str
 
 def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     """Describe the least ratio of the last checks, and its range over what is assumed of a fill."""
-    checks = [result.checks[-1] for result in found]
+    results = [*found]
+    checks = [result.checks[-1] for result in results]
     if ranges := [check.over_fill for check in checks if check.over_fill is not None]:
         least = FillRange.least_of(ranges)
         return f"least margin {least.describe(digits=3)}: {least.outcome}"
     check = min(checks, key=lambda each: each.ratio)
-    return f"least margin {check.ratios}: {check.outcome}"
+    wholes = [(result.of_bodies or result).checks[-1].ratio for result in results]
+    whole = f" ({min(wholes):.3g} with one weight a body)" * (min(wholes) < 0.999 * check.ratio)
+    return f"least margin {check.ratios}{whole}: {check.outcome}"
 
 
 def state_risk(found: Any) -> Statement:  # of `archfem.studies`, a room to the right

@@ -94,6 +94,8 @@ class KinematicAssessment(ResultDisplay):
         control: name of the block whose centroid is the control point.
         path: finite motion of the mechanism; None where nothing moves.
         notes: what the result leaves out, and how far the curve holds.
+        of_bodies: the same with one weight for each body that moves as one, at its centroid, which
+            raises e* and lowers both ratios; None of an assessment with such weights.
     """
 
     structure: Structure
@@ -113,6 +115,7 @@ class KinematicAssessment(ResultDisplay):
     control: str
     path: MechanismPath | None
     notes: tuple[str, ...]
+    of_bodies: "KinematicAssessment | None"
 
     @property
     def hinges(self) -> tuple[tuple[int, str], ...]:
@@ -228,14 +231,13 @@ class KinematicAssessment(ResultDisplay):
 
     @property
     def _split_note(self) -> list[str]:
-        """Note on e* where a body of the first mechanism has several blocks: no doubt."""
-        bodies = self.path.mechanisms[0].body if self.path else np.zeros(0)
-        moving = bodies[bodies >= 0]
-        if len(moving) == len(np.unique(moving)):
+        """Note on the weights where a body has several blocks: no doubt."""
+        if not ((whole := self.of_bodies) and whole.e_star > 1.001 * self.e_star):
             return []
+        ratios = join_names([f"{check.ratio:.3g} by {check.name}" for check in whole.checks])
         return [
-            "e* has the weights at the centroids of blocks: several blocks that move as one lower "
-            "it and raise both ratios; one block in their place is the safer choice"
+            "weights are at the centroids of blocks; one for each body that moves as one gives "
+            f"e* = {whole.e_star:.3f}, and the spectrum may be as strong as {ratios}"
         ]
 
 
@@ -559,18 +561,25 @@ class _Oscillator:
     spectrum: DesignSpectrum | Motion
     rules: LimitState
     confidence_factor: float
+    by_body: bool = False  # whether each body that moves as one has one weight
 
     @cached_property
     def weights(self) -> tuple[Array, Array]:
         """Weights that move [N], and their virtual displacements along the forces [m/s]."""
         assert self.path is not None
         speed, _, turn = self.path.velocity.T
-        weights, speeds = [], []
+        weights, speeds, bodies = [], [], []
         for k, place, weight in self.placed.masses:
-            if self.path.mechanisms[0].body[k] >= 0:
+            if (body := self.path.mechanisms[0].body[k]) >= 0:
                 weights.append(weight)
                 speeds.append(speed[k] - turn[k] * (place[1] - self.placed.centroids[k, 1]))
-        return np.array(weights), self.placed.direction * np.array(speeds)
+                bodies.append(body)
+        moved = self.placed.direction * np.array(speeds)
+        if not self.by_body:
+            return np.array(weights), moved
+        _, own = np.unique(bodies, return_inverse=True)
+        of_bodies = np.bincount(own, weights).astype(float)
+        return of_bodies, np.bincount(own, weights * moved) / of_bodies
 
     @cached_property
     def control(self) -> int:
@@ -679,6 +688,7 @@ class _Oscillator:
             control,
             path,
             tuple(self.notes(alpha_0)),
+            None if self.by_body else replace(self, by_body=True).assess(q),
         )
 
     def _secant_period(self, displacement: float) -> float:

@@ -466,8 +466,8 @@ fidelity = "rigid"
 """
     )
     line = (
-        "drawing: 1 × 2 m, read in mm, corners moved by up to 1.5 mm; ignored outlines: 1 on "
-        "'NOTE'\n"
+        "drawing: 1 × 2 m, read in mm, corners moved by up to 1.5 mm; ignored layers: "
+        "'NOTE' with 1 outlines\n"
     )
     assert af.commands.main(["run", str(tmp_path / "a.toml"), "--out", str(tmp_path / "out")]) == 0
     assert line in capsys.readouterr().out

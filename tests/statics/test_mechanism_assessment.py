@@ -537,5 +537,11 @@ def test_courses_that_move_as_one_raise_both_ratios(verified):
     check_values(split, {"e_star": 192.0 / 255.0}, verified, "rigid block of eight courses")
     assert split.alpha_0 == pytest.approx(whole.alpha_0)
     assert all(b.ratio > 1.2 * a.ratio for a, b in zip(whole.checks, split.checks, strict=True))
-    assert str(split).endswith("one block in their place is the safer choice")
-    assert "weights at the centroids" not in str(whole)
+    assert whole.of_bodies.e_star == whole.e_star == 1.0
+    check_values(split.of_bodies, {"e_star": 1.0}, verified, "eight courses as one rigid block")
+    # the control point is higher up in eight courses
+    found = [check.ratio for check in split.of_bodies.checks]
+    assert found == pytest.approx([check.ratio for check in whole.checks], rel=0.01)
+    stated = f"as strong as {found[0]:.3g} by linear, q = 2, FC = 1.35, {found[1]:.3g} by NTC-2018"
+    assert f"gives e* = 1.000, and the spectrum may be {stated}" in str(split)
+    assert "weights are at the centroids" not in str(whole)

@@ -77,10 +77,13 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
     table, structure = data.case.settings.get("structure", {}), data.case.structure
     kinds = shape_keys(table["shape"])
     parts = {**BRIDGE_PARTS, "backfill": Backfill} if table["shape"] == "bridge" else {}
+    drawn = ("blocks", "joints") if "drawing.txt" in data.files else ()
     for key, value in table.items():
         if key in ("material", "contact", "width", "gravity"):
             continue
-        yield key.replace("_", " "), describe_value(value, kinds.get(key)), "given"
+        mark = "inferred" if key in drawn else "given"
+        text = "outlines" if drawn and key == "shape" else describe_value(value, kinds.get(key))
+        yield key.replace("_", " "), text, mark
         if key in parts:
             own = [set(each) for each in value.values() if isinstance(each, Mapping)]
             given = set(value).union(set.intersection(*own) if own else ())

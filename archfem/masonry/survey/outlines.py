@@ -96,11 +96,11 @@ class Survey:
     ignored: Mapping[str, int]
 
     def __str__(self) -> str:
-        counts = [f"{count} on '{layer}'" for layer, count in self.ignored.items() if count]
+        counts = [f"'{layer}' with {count} outlines" for layer, count in self.ignored.items()]
         moved = self.frame.length(round(self.moved, 9))  # less than a nanometre is round-off
         return (
             f"drawing: {_say_size(self.size)}, read in {self.frame.unit}, corners moved by up to "
-            f"{moved}; ignored outlines: {', '.join(counts) or 'none'}"
+            f"{moved}; ignored layers: {', '.join(counts) or 'none'}"
         )
 
 
