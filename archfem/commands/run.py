@@ -4,11 +4,12 @@ import argparse
 import io
 import logging
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from functools import partial, wraps
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 

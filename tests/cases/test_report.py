@@ -110,7 +110,8 @@ CHECKS = [
 
 def state_each(hazard):
     """Statements by command and file, of results that were made up."""
-    assessed = SimpleNamespace(checks=CHECKS, notes=("an upper bound; compare it with a run",))
+    notes = ("an upper bound; compare it with a run",)
+    assessed = SimpleNamespace(checks=CHECKS, notes=notes, of_bodies=None)
     place = "passes without all, with 2 axles at -0.1, 1.1 m"
     found = SimpleNamespace(hazard=hazard, doubts=(), sentence="falls at 0.002 a year")
     found.rate = lambda: Rate(0.002, 0.001, 0.003)
