@@ -145,6 +145,7 @@ def test_rigid_blocks_have_shorter_steps_and_time_to_settle(column, motion, monk
 
         def frames(self, bodies, end, motion, spacing):
             given.update(end=end, spacing=spacing)
+            return []
 
     standing = CollapseState("stands", None, (), 0.0, 0.0, True)
     monkeypatch.setattr(variations, "RigidBlockSimulation", Simulation)
