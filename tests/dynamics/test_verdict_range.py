@@ -42,7 +42,9 @@ def test_runs_beside_the_sample_count_for_the_sentence_alone():
     found = made_up([True, False, False, True], [False, False, True, True], sign=list("aabb"))
     assert found.share == 0.5
     assert found.sentence.startswith("falls in 2 of 4: ")
-    assert "; of 2 that vary one property 1, of 2 that vary all 1 (1% to 99% at 95%)" in found.sentence
+    assert (
+        "; of 2 that vary one property 1, of 2 that vary all 1 (1% to 99% at 95%)" in found.sentence
+    )
 
 
 def test_no_share_of_the_damage_is_given_where_nothing_falls():
