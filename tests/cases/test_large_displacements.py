@@ -1,7 +1,6 @@
 """Cases whose displacements may be large: refused settings, and all files of a run."""
 
 import json
-import re
 import tomllib
 
 import numpy as np
