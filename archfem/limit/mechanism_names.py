@@ -102,7 +102,9 @@ class NamedMotion:
 
     @property
     def is_chain(self) -> bool:
-        """Whether bodies meet at single joints, as those of rings and piers do."""
+        """Whether bodies meet at single joints, as those of rings and piers, not of walls."""
+        if self.structure.heads[abs(self.gaps).max(axis=0) > self.least].any():
+            return False
         pairs = np.sort(self.bodies[self.structure.pairs[self.touching]], axis=1)
         return len(np.unique(pairs, axis=0)) == len(pairs)
 
@@ -193,7 +195,9 @@ class NamedMotion:
             return f"sliding at {self._list_joints(self.sliding)}"
         subject, is_low, is_whole = self._describe_moving(beds or base)
         if is_slide:
-            return f"sliding of {subject}"
+            # what rocks together carries the blocks above it without turning them
+            rocks = self.turning[[number for number, *_ in beds]].any()
+            return f"{'sway' if rocks else 'sliding'} of {subject}"
         toe, mover, _ = min(base, key=lambda row: np.hypot(*self.contacts[row[0]] - mean.centre))
         places = mean.centre, mean.middle
         slip, reach = (np.hypot(*self.contacts[toe] - place) for place in places)
@@ -214,6 +218,8 @@ class NamedMotion:
         left = list({*self.structure.free} - {*self.moving})
         is_whole = not (self.structure.centroids[left, 1] > heights.min()).any()
         moving = "all" if is_whole else count(len(self.moving), "block")
+        if len(self.moving) == 1 and not is_whole:
+            moving = self.structure.blocks[self.moving[0]].name
         return f"{moving} {'on' if is_low else 'above'} {self._label(below)}", is_low, is_whole
 
     @property

@@ -376,7 +376,9 @@ def describe_spans(structure: Structure) -> str:
         f"from {low:.2f} to {high:.2f} m{f' ({part!r})' if len(spans) > 1 else ''}"
         for part, (low, high) in spans.items()
     )
-    beds = [joint for joint in structure.joints if joint.role == "pier"]
+    # the beds of a wall in bond are parts of its breadth
+    walls = {structure.joints[number].part for number in np.flatnonzero(structure.heads)}
+    beds = [j for j in structure.joints if j.role == "pier" and j.part not in walls]
     for part in dict.fromkeys(joint.part for joint in beds):
         own = [joint for joint in beds if joint.part == part]
         base, parts = min(joint.intrados[1] for joint in own), structure.blocks

@@ -105,6 +105,45 @@ def test_one_motion_may_slide_and_turn():
     assert name_mechanism(block, motion) == ""
 
 
+def test_piers_that_rock_together_sway_and_do_not_slide():
+    def box(name, left, right, low, high, fixed=False):
+        corners = [(left, low), (right, low), (right, high), (left, high)]
+        return af.Block(corners, af.STONE, name, fixed, part="wall", role="pier")
+
+    stones = {
+        "one": (0.0, 0.5, 0.0, 2.0),
+        "two": (1.5, 2.0, 0.0, 2.0),
+        "slab": (0.0, 2.0, 2.0, 2.2),
+    }
+    blocks = [box("ground", -1.0, 3.0, -0.5, 0.0, fixed=True)]
+    blocks += [box(name, *sizes) for name, sizes in stones.items()]
+    frame = af.masonry.assembled(blocks, af.Contact(1e9, 1e9, friction=0.6))
+    motion = np.zeros((4, 3))
+    turn = -1.0  # both piers turn about their right toes, and the slab moves with their left tops
+    for k, toe in ((1, 0.5), (2, 2.0)):
+        x, y = frame.centroids[k] - [toe, 0.0]
+        motion[k] = -turn * y, turn * x, turn
+    motion[3] = 2.0, 0.5, 0.0
+    assert name_mechanism(frame, motion) == "four-hinge mechanism"
+    # the stones of a course rock under a wall that they carry
+    wall = bonded_wall(courses=6, half=1.0)
+    motion = np.zeros((len(wall.blocks), 3))
+    for k in wall.free:
+        points = wall.blocks[k].points
+        motion[k] = 0.25, 0.5, 0.0  # as the left top of a stone of course 1
+        if points[:, 1].min() == 0.0:
+            x, y = wall.centroids[k] - [points[:, 0].max(), 0.0]
+            motion[k] = -turn * y, turn * x, turn
+    assert name_mechanism(wall, motion) == "sway of all on ground"
+
+
+def test_one_stone_has_its_name():
+    wall = bonded_wall(courses=3)
+    motion = np.zeros((len(wall.blocks), 3))
+    motion[-1, 0] = 1.0
+    assert name_mechanism(wall, motion) == f"sliding of {wall.blocks[-1].name} above course 2"
+
+
 def test_hinges_and_sliding_joints_of_a_ring_are_combined():
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
     found = af.collapse_factor(ring, live=af.PointLoad(0.0, (0.0, -1e4)))
