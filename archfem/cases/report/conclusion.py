@@ -175,10 +175,9 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
     lead += _describe_margin(data, rows)
     if data.runs and not doubtful:
         lead.append("the checks of the numbers raise no doubt")
-    changes = [f"the doubts below, on {join_names(doubtful)}"] if doubtful else []
+    lead += [f"the doubts below, on {join_names(doubtful)}, may change this"] if doubtful else []
     single = list_unvaried(data)
-    changes += [f"what was not varied: {', '.join(single)}"] if single else []
-    lead += [f"what may change this: {'; '.join(changes)}"] if changes else []
+    lead += [f"not varied: {', '.join(single)}"] if single else []
     if demand := data.case.report.get("demand"):
         lead[:1] = [f"for {demand}: {lead[0]}"] if lead else [f"the demand, as stated: {demand}"]
     return lead
