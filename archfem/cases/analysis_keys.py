@@ -13,6 +13,7 @@ from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.backfill import self_weight_programme
 from archfem.limit.collapse import Collapse, collapse_factor
+from archfem.limit.fill_range import vary_fill
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.rating import Rating, rate
 from archfem.limit.vehicles import VEHICLES, VEHICLES_OF_CODES, Vehicle
@@ -92,6 +93,21 @@ class LimitAnalysis:
                 'point = { x = "1.4 m", force = ["0 kN", "-1 kN"] }'
             )
         return collapse_factor(structure, live=self.live, dead=self.dead, **self.resistance)
+
+    def solve_least(self, structure: Structure, found: Collapse) -> Collapse:
+        """Return the result, with its range, under the assumption on a fill with the least factor.
+
+        Args:
+            structure: structure of the case.
+            found: result under the assumption that is given; it is returned where it is the least,
+                or where nothing stands under the least.
+        """
+        if (over := found.over_fill) is None or over.ends[0] in (0.0, found.factor):
+            return found
+        assumed = vary_fill(self.fill)[min(over.values, key=over.values.__getitem__)][1]
+        resistance = self.resistance | {"fill": assumed}
+        least = collapse_factor(structure, live=found.live, dead=found.dead, **resistance)
+        return replace(least, over_fill=over)
 
     @property
     def opposite(self) -> "LimitAnalysis | None":
@@ -299,7 +315,7 @@ class AssessmentSettings:
     def solve(
         self, structure: Structure, demand: DesignSpectrum | Motion | None, parts: bool = False
     ) -> dict[str, KinematicAssessment]:
-        """Assess the structure, or each part by itself, in each direction."""
+        """Assess the structure, or each part by itself, in each direction, with the least fill."""
         spectrum = self.spectrum if self.spectrum is not None else demand
         if spectrum is None:
             raise InvalidInput(
@@ -315,7 +331,7 @@ class AssessmentSettings:
                 found |= {f"{name or 'part'}, {side}": result for name, result in each.items()}
             else:
                 found[side] = kinematic_assessment(structure, spectrum, **options)
-        return found
+        return {name: result.least or result for name, result in found.items()}
 
 
 def parse_assessment(table: Any, fill: Fill | PlasticFill | None = None) -> AssessmentSettings:

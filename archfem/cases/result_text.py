@@ -269,7 +269,11 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []
     over = collapse.describe_range()
-    lines += [f"over what is assumed of the fill: {over}"] if over else []
+    if over:
+        least = "; all else is of the least" * (
+            collapse.factor == collapse.range[0] != collapse.range[1]
+        )
+        lines.append(f"over what is assumed of the fill: {over}{least}")
     crushing = describe_crushing(limit.strength)
     lines += filter(None, [crushing, describe_fill(limit.fill, structure)])
     if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES:
@@ -297,7 +301,7 @@ def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
 
 
 def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tuple[Collapse, str]:
-    """Return the lesser result of a load in one and the other sense, and the text on both."""
+    """Return the lesser result of a load in both senses, at its least end, and the text on both."""
     others = []
     if opposite is not None:
         close = np.allclose(opposite.range, found.range, rtol=1e-4)
@@ -305,6 +309,7 @@ def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tu
             found, opposite = opposite, found
         rank = _compare_senses(found, opposite)
         others.append(f"in the other sense: {opposite.sentence} ({rank})")
+    found = case.limit.solve_least(case.structure, found)
     others += filter(None, [describe_fill_defaults(case)])
     demand, ratio = compare_with_site(case, found)
     others += [f"it begins to move at {ratio} times {demand}"] if ratio else []

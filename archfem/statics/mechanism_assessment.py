@@ -94,6 +94,7 @@ class KinematicAssessment(ResultDisplay):
         control: name of the block whose centroid is the control point.
         path: finite motion of the mechanism; None where nothing moves.
         notes: what the result leaves out, and how far the curve holds.
+        least: that under the assumption on a fill that has the least ratio; None without a fill.
         of_bodies: the same with one weight for each body that moves as one, at its centroid, which
             raises e* and lowers both ratios; None of an assessment with such weights.
     """
@@ -153,16 +154,26 @@ class KinematicAssessment(ResultDisplay):
         self, others: Mapping[FillAssumption, "KinematicAssessment | None"]
     ) -> "KinematicAssessment":
         """Return the assessment with its ratios by assumption on a fill; None does not stand."""
-        changed = {}
+        ranges = {}
         for name in ("linear", "displacement"):
             # what has no motion withstands any spectrum
             ratios = {
                 key: 0.0 if other is None else getattr(getattr(other, name), "ratio", np.inf)
                 for key, other in others.items()
             }
-            if ratios and (check := getattr(self, name)) is not None:
-                changed[name] = replace(check, over_fill=FillRange(ratios))
-        return replace(self, **changed)
+            if ratios and getattr(self, name) is not None:
+                ranges[name] = FillRange(ratios)
+        if not ranges:
+            return self
+        found = []
+        values = [*ranges.values()][-1].values
+        for each in (self, others[min(values, key=values.__getitem__)] or self):
+            checks = {name: getattr(each, name) for name in ranges}
+            changed = {
+                k: check and replace(check, over_fill=ranges[k]) for k, check in checks.items()
+            }
+            found.append(replace(each, **changed))
+        return replace(found[0], least=found[1])
 
     def demand(self, periods: Array) -> tuple[Array, Array]:
         """Return spectral displacements [m] and accelerations [m/s²] of the demand.
@@ -227,6 +238,8 @@ class KinematicAssessment(ResultDisplay):
             if (over_fill := self.checks[-1].over_fill) is not None:
                 over = over_fill.describe(digits=3)
                 lines.append(f"over what is assumed of the fill: {over} times as strong")
+                own = (k for k, x in over_fill.values.items() if x == self.checks[-1].ratio)
+                lines += [f"all else is under one assumption: {key}" for key in [*own][:1]]
         return "\n".join([*lines, *(f"note: {note}" for note in [*self.notes, *self._split_note])])
 
     @property
