@@ -388,13 +388,7 @@ def verdict(options: argparse.Namespace) -> int:
     print(case.title)
     folder = None if options.out is None else path_inside(Path(options.out), "variations")
     sampling = {"workers": options.workers, "samples": options.samples, "folder": folder}
-    try:
-        computed = verdict_range(case.analysis, motion, fidelity="rigid", **sampling)
-    except KeyboardInterrupt:
-        again = "run the same command again to compute those that are left"
-        kept = f"finished runs are kept: {again}" if folder else "without --out no run is kept"
-        print(kept, file=sys.stderr)
-        raise
+    computed = verdict_range(case.analysis, motion, fidelity="rigid", **sampling)
     own: Files = {"verdict_range.nc": computed.save, "verdict_range.txt": str(computed)}
 
     def draw() -> Files:

@@ -306,11 +306,16 @@ def evaluate_with_progress(
         progress = stack.enter_context(
             closing(Progress(len(points), done, failed, store, name=name))
         )
-        for number, row in evaluate_points(left, Evaluator(find), workers):
+        try:
+            for number, row in evaluate_points(left, Evaluator(find), workers):
+                if store is not None:
+                    store.write_row(digests[number], row)
+                progress.add(failed=bool(row["error"]))
+                yield number, row
+        except KeyboardInterrupt:
             if store is not None:
-                store.write_row(digests[number], row)
-            progress.add(failed=bool(row["error"]))
-            yield number, row
+                logger.warning("finished runs are kept in %s: run the same again", folder)
+            raise
 
 
 @validate_arguments

@@ -432,7 +432,9 @@ def report(folder):
     return af.cases.open_results(folder).report().read_text(encoding="utf-8")
 
 
-def test_a_stopped_range_continues_from_its_folder(column, motion, calls, monkeypatch, tmp_path):
+def test_a_stopped_range_continues_from_its_folder(
+    column, motion, calls, monkeypatch, tmp_path, caplog
+):
     """Only runs that are left are computed, also of more samples; other arguments share none."""
     prepare = variations.prepare_runs
 
@@ -445,6 +447,7 @@ def test_a_stopped_range_continues_from_its_folder(column, motion, calls, monkey
     monkeypatch.setattr(variations, "prepare_runs", stopped)
     with pytest.raises(KeyboardInterrupt):
         af.verdict_range(column, motion, vary=vary, samples=5, folder=place)
+    assert f"finished runs are kept in {place}" in caplog.text
     monkeypatch.setattr(variations, "prepare_runs", prepare)
     counts = []
     for seed, shaken in ((0, motion), (0, motion), (1, motion), (0, motion.scaled(1.1))):
