@@ -300,6 +300,36 @@ def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
     return ResultTable([*head, "outcome, and axles at the worst place"], rows)
 
 
+def describe_ratings(
+    case: Case, rated: Sequence[tuple[Rating, Sequence[str]]], varied: ResultTable | None = None
+) -> tuple[str, dict[str, str]]:
+    """Return the text of ratings and their doubts, and this and its tables as files."""
+    texts = ["\n".join([str(found), *doubts]) for found, doubts in rated]
+    files = {"rating.csv": rated[0][0].table()}
+    if len(rated) > 1:
+        summary = tabulate_ratings([found for found, _ in rated])
+        texts.insert(0, summary.text)
+        files["vehicles.csv"] = summary.csv
+    texts.append(describe_fill_defaults(case))
+    files["rating.txt"] = "\n\n".join(filter(None, texts))
+    if varied is None:
+        return files["rating.txt"], files
+    files["rating_variations.csv"] = varied.csv
+    return f"{files['rating.txt']}\n\n{varied.text}", files
+
+
+def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:
+    """Return what a rating leaves in doubt: equilibrium, and a strength of the stones left out."""
+    if np.isnan(found.factor):
+        words = "limit analysis finds no equilibrium of the bridge under its own weight; check the "
+        return [f"{DOUBT_MARK}{words}thickness of its rings and piers, and the fill"]
+    if limit.strength is not None or not found.crushing_text:
+        return []
+    words = "joints do not crush, as the case gives no strength of the stones"
+    remedy = "give strength in [materials] or [limit]"
+    return [f"{DOUBT_MARK}{words}: {found.crushing_text}; {remedy}"]
+
+
 def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tuple[Collapse, str]:
     """Return the lesser result of a load in both senses, at its least end, and the text on both."""
     others = []

@@ -267,63 +267,42 @@ def rate(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
     rating = {**case.settings.get("rating", {}), **given}
     tables = name_vehicles(options.vehicles, rating)
-    rated = _rate_each(case, tables, list_vehicles(rating))
-    texts = ["\n".join([str(found), *doubts]) for found, doubts, _ in rated]
-    first, files = rated[0][0], {}
-    if len(rated) > 1:
-        summary = result_text.tabulate_ratings([found for found, *_ in rated])
-        texts.insert(0, summary.text)
-        files["vehicles.csv"] = summary.csv
-    stated, varied = state_ratings([(found, doubts) for found, doubts, _ in rated]), ""
-    if options.vary:
+    ratings, table = _rate_each(case, tables, list_vehicles(rating))
+    (first, lines), stated, varied = ratings[0], state_ratings(ratings), None
+    if options.vary and not np.isnan(first.factor):
         from archfem.studies.variations import vary_rating
 
-        rows, range_text = vary_rating(case, rated[0][2], first)
-        texts[-len(rated)] += f"\n{range_text}"
-        files["rating_variations.csv"], varied = rows.csv, f"\n\n{rows.text}"
-        stated = stated._replace(sentences=[*stated.sentences, range_text])
-    text = "\n\n".join(filter(None, [*texts, describe_fill_defaults(case)]))
+        varied, sentence = vary_rating(case, table, first)
+        lines.insert(0, sentence)
+        stated = stated._replace(sentences=[*stated.sentences, sentence])
+    text, files = result_text.describe_ratings(case, ratings, varied)
     # the case of the folder, that of a run, may be rated for another vehicle
-    files |= {RATING_FILE: format_tables({"rating": rated[0][2]}).rstrip(), "rating.txt": text}
-    files |= {"rating.csv": first.table(), **stated.as_file("rating")}
+    files |= {RATING_FILE: format_tables({"rating": table}).rstrip(), **stated.as_file("rating")}
 
     def draw() -> Files:
-        every = {"vehicles.png": draw_ratings([found for found, *_ in rated])}
-        return {**files, "rating.png": first.plot(), **(every if len(rated) > 1 else {})}
+        every = {"vehicles.png": draw_ratings([found for found, _ in ratings])}
+        return {**files, "rating.png": first.plot(), **(every if len(ratings) > 1 else {})}
 
-    _write_results("rate", case, options.out, f"{case.title}\n{text}{varied}", draw)
-    return _doubt_code([doubt for _, doubts, _ in rated for doubt in doubts])
+    _write_results("rate", case, options.out, f"{case.title}\n{text}", draw)
+    return _doubt_code([doubt for _, doubts in ratings for doubt in doubts])
 
 
 def _rate_each(
     case: Case, tables: Sequence[Mapping[str, Any]], own: Sequence[Any]
-) -> list[tuple[Rating, list[str], Mapping[str, Any]]]:
-    """Return rating, doubts and table of each vehicle: the case's own first, then the worst."""
+) -> tuple[list[tuple[Rating, list[str]]], Mapping[str, Any]]:
+    """Return ratings with doubts, the case's own first and then the worst; table of the first."""
     rated = []
     with ProgressReport("rating", len(tables)) as progress:
         for table in tables:
             with _record_doubts(case.structure) as doubts:
                 found = rate_case(case.structure, parse_rating(table), case.limit)
-            doubts += [f"{DOUBT_MARK}{doubt}" for doubt in _rating_doubts(case, found)]
+            doubts += result_text.doubt_rating(found, case.limit)
             rated.append((found, doubts, table))
             progress.show(f"{found.vehicle.name}: {found.headline.partition(',')[0]}", 1)
             if np.isnan(found.factor):  # whatever the vehicle
                 break
-    return sorted(rated, key=lambda each: (each[2]["vehicle"] not in own, each[0].factor))
-
-
-def _rating_doubts(case: Case, found: Rating) -> Iterator[str]:
-    """Yield what a rating leaves in doubt: equilibrium, and the strength of the stones."""
-    if np.isnan(found.factor):
-        yield (
-            "limit analysis finds no equilibrium of the bridge under its own weight; check the "
-            "thickness of its rings and piers, and the fill"
-        )
-    elif case.limit.strength is None and found.crushing_text:
-        yield (
-            f"joints do not crush, as the case gives no strength of the stones: "
-            f"{found.crushing_text}; give strength in [materials] or [limit]"
-        )
+    rated.sort(key=lambda each: (each[2]["vehicle"] not in own, each[0].factor))
+    return [(found, doubts) for found, doubts, _ in rated], rated[0][2]
 
 
 def mesh(options: argparse.Namespace) -> None:

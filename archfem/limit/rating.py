@@ -26,7 +26,6 @@ from archfem.limit.instability import DeepenedBlocks
 from archfem.limit.vehicles import (
     DRIVING_DIRECTIONS,
     VEHICLES,
-    AxleRow,
     MovingLoad,
     Vehicle,
     axles_on_structure,
@@ -458,10 +457,10 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
 
     def drive(width: float, area_load: float, positions: Sequence[float]) -> MovingLoad:
         # the structure is modelled over its whole width, of which a vehicle loads a part
-        share = structure.width / width
         given = options | {"spacings": driven.spacings, "area_load": live * area_load}
-        loaded = ((share * row).tolist() for row in rows)
-        return _least_of([moving_load(weighted, x, positions=positions, **given) for x in loaded])
+        given["positions"] = positions
+        spread = [(structure.width / width * row).tolist() for row in rows]
+        return _least_of([moving_load(weighted, row, **given) for row in spread])
 
     is_plastic = isinstance(fill, PlasticFill)
     axles = parse_axles(driven.axles, driven.spacings)
@@ -483,8 +482,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     if states := _other_states(options):
         # of the whole width, as the structure is modelled
         loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in rows]
-        road = cut_road(weighted, live * area_load)
-        more |= _find_least_factors(weighted, positions, road, loads, states)
+        more |= _find_least_factors(weighted, positions, loads, live * area_load, states)
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
 
 
@@ -503,9 +501,9 @@ def rate_again(found: Rating, structure: Structure, width: float | None, **optio
     axles = parse_axles(vehicle.axles, vehicle.spacings)
     rows = vehicle.factored(found.live, found.impact)
     loads = [np.column_stack([share * row, axles[:, 1]]) for row in rows]
-    places, road = _places_along(weighted, axles), cut_road(weighted, found.live * found.area_load)
-    factors = _find_least_factors(weighted, places, road, loads, {"": options})
-    return factors.get("", np.nan)
+    area_load, states = found.live * found.area_load, {"": options}
+    places = _places_along(weighted, axles)
+    return _find_least_factors(weighted, places, loads, area_load, states).get("", np.nan)
 
 
 def _check_width(width: float, structure: Structure) -> None:
@@ -634,8 +632,8 @@ def _other_states(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
 def _find_least_factors(
     structure: Structure,
     places: Sequence[float],
-    strips: AxleRow,
     vehicles: Sequence[Array],
+    area_load: float,
     states: dict[str, dict[str, Any]],
 ) -> dict[str, float]:
     """Return the least factor in each state; none where the structure does not stand in it."""
@@ -648,8 +646,8 @@ def _find_least_factors(
     # the fans of loads do not depend on pressure, backing and strength
     stones, _ = self_weight_programme(structure, **next(iter(states.values())))
     axles = {row: stones.load(row) for row in rows if row}
+    strips, factors = cut_road(structure, area_load), dict[str, float]()
     forces = [stones.load([strip]) for strip in strips]
-    factors = {}
     for name, given in states.items():
         stones, dead = self_weight_programme(structure, **given)
         if not is_balanced(dead.minimise_residual(), dead):
