@@ -348,14 +348,14 @@ def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tu
 
 def _compare_senses(found: Collapse, opposite: Collapse) -> str:
     """Say whether a load bears more in the other sense, by results whose least is the first's."""
-    rank = "more" if opposite.range[0] > found.range[1] else "their ranges overlap"
+    rank = "higher" if opposite.range[0] > found.range[1] else "their ranges overlap"
     if found.over_fill and opposite.over_fill:
         least, other = found.over_fill.values, opposite.over_fill.values
-        rank = "more" if all(other[key] > least[key] for key in least) else rank
+        rank = "higher" if all(other[key] > least[key] for key in least) else rank
     if np.allclose(opposite.range, found.range, rtol=1e-4):
         rank = "the same"
     searched = any(each.solutions and each.solutions.may_be_less for each in (found, opposite))
-    return f"{rank}; each sense is searched by itself" if searched else rank
+    return f"{rank}, as far as a search can tell" if searched else rank
 
 
 def compare_with_site(case: Case, found: Collapse) -> tuple[str, str]:

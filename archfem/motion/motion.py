@@ -28,7 +28,8 @@ class Motion(ResultDisplay):
     Components of one file or several that state when they begin are shifted, by whole steps.
 
     Args:
-        horizontal: accelerations along the arch (n,) [m/s²].
+        horizontal: accelerations along the arch (n,) [m/s²]; of the ground to the right above 0,
+            which pushes stones to the left.
         dt: time between samples [s].
         vertical: accelerations upwards (m,) [m/s²], or None.
         name: what to call it.

@@ -107,7 +107,7 @@ def test_limit_analysis_in_words(ring):
     given = {"limit": {"fill": {"friction_angle": 35, "mobilisation": 1.0 / 3.0}}}
     case = SimpleNamespace(structure=ring, limit=limit, target=None, settings=given)
     case.assessment = SimpleNamespace(spectrum=None, options={})
-    for factor, rank in ((0.9, "more"), (1.1, "more"), (0.99999, "the same")):
+    for factor, rank in ((0.9, "higher"), (1.1, "higher"), (0.99999, "the same")):
         other = replace(mirrored, factor=factor * pushed.factor, upper=factor * pushed.factor)
         least, words = describe_limit(case, pushed, other)
         first, second = (other, pushed) if factor == 0.9 else (pushed, other)
@@ -132,7 +132,7 @@ def test_limit_analysis_in_words(ring):
     case.target = None
     least = replace(pushed, solutions=SimpleNamespace(may_be_less=True))
     words = describe_limit(case, least, mirrored)[1]
-    assert words.endswith(f" (more; each sense is searched by itself)\n{DEFAULTS}")
+    assert words.endswith(f" (higher, as far as a search can tell)\n{DEFAULTS}")
     given["limit"]["fill"] |= {"backing": 0.5, "backing_strength": 1e6}
     case.limit = parse_limit(given["limit"])
     assert "backing strength" not in describe_limit(case, pushed, None)[1]
