@@ -46,7 +46,7 @@ vehicle = { name = "cart", axles = ["40 kN", "60 kN"], spacings = ["1.2 m"], liv
 def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(
-        CASE.replace("PIER", 'breadth = "0.955 m"').replace(
+        CASE.replace("PIER", 'breadth = "0.87 m"').replace(
             '[structure.paving]\nthickness = "0.1 m"\n', ""
         )
     )
@@ -59,7 +59,7 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     thin = ["structure.arches.thickness=0.36", "structure.arches.right.thickness=0.405"]
     for name, changes in {
         "rings a tenth thinner": thin,
-        "piers a tenth broader": ["structure.piers.breadth=1.0505"],
+        "piers a tenth broader": ["structure.piers.breadth=0.957"],
         "0.1 m less cover": ["structure.backfill.cover=0.2"],
         "half the strength of the stones": ["limit.strength=2e6"],
         "fill of 40°": ["limit.fill.friction_angle=40 degree"],
