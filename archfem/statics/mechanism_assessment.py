@@ -117,6 +117,7 @@ class KinematicAssessment(ResultDisplay):
     path: MechanismPath | None
     notes: tuple[str, ...]
     of_bodies: "KinematicAssessment | None"
+    least: "KinematicAssessment | None" = None
 
     @property
     def hinges(self) -> tuple[tuple[int, str], ...]:
