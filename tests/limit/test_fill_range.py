@@ -8,6 +8,7 @@ import pytest
 from backfilled import SOIL, rectangle
 
 import archfem as af
+from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
 
 SITE = af.Eurocode8(ag=0.25, ground="C")
@@ -75,6 +76,11 @@ def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
     assert sorted(raised.over_fill.values.values()) == pytest.approx(
         [low, expected[FillAssumption(FEET, NONE)]]
     )
+    # what is drawn is the lower end
+    settings = LimitAnalysis((live,), None, fill=fill)
+    least = settings.solve_least(buried_stone(), settings.solve(buried_stone()))
+    assert (least.factor, *least.range) == pytest.approx((low, low, high))
+    assert settings.solve_least(buried_stone(), least) is least
     down = af.collapse_factor(buried_stone(), live=af.BodyForce(0.0, 1.0), fill=fill)
     assert down.over_fill is None
 
@@ -94,6 +100,12 @@ def test_an_assessment_passes_only_with_what_it_needs():
     for assumption, (_, assumed) in vary_fill(fill).items():
         alone = af.kinematic_assessment(structure, SITE, fill=assumed, **options)
         assert displacement[assumption] == pytest.approx(alone.displacement.ratio)
+        if displacement[assumption] == min(displacement.values()):
+            assert found.least.alpha_0 == pytest.approx(alone.alpha_0)
+            assert found.least.displacement.capacity == pytest.approx(alone.displacement.capacity)
+            assert f"all else is under one assumption: {assumption}" in str(found.least)
+    assert found.least.displacement.over_fill.values == displacement
+    assert found.least.alpha_0 < 0.99 * found.alpha_0
     between = np.mean(sorted(ratios.values())[1:3])
     weaker = af.Eurocode8(ag=0.25 * between, ground="C")
     partly = af.kinematic_assessment(structure, weaker, fill=fill, **options).linear
