@@ -102,11 +102,12 @@ class LimitAnalysis:
             found: result under the assumption that is given; it is returned where it is the least,
                 or where nothing stands under the least.
         """
-        if (over := found.over_fill) is None or over.ends[0] in (0.0, found.factor):
+        over, fill = found.over_fill, self.fill
+        if over is None or isinstance(fill, PlasticFill) or over.ends[0] in (0.0, found.factor):
             return found
-        assumed = vary_fill(self.fill)[min(over.values, key=over.values.__getitem__)][1]
-        resistance = self.resistance | {"fill": assumed}
-        least = collapse_factor(structure, live=found.live, dead=found.dead, **resistance)
+        assumed = vary_fill(fill)[min(over.values, key=over.values.__getitem__)][1]
+        given = self.resistance | {"fill": assumed, "live": found.live, "dead": found.dead}
+        least = collapse_factor(structure, **given)
         return replace(least, over_fill=over)
 
     @property

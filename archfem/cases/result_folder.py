@@ -191,7 +191,9 @@ def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[str]
     demand, factor = compare_with_site(case, collapse)
     if not factor:
         demand, factor = "the given load", "-"
-        if collapse.outcome is Outcome.COLLAPSES:
+        if collapse.push:  # a factor would be read as one on a demand
+            demand = "none given"
+        elif collapse.outcome is Outcome.COLLAPSES:
             factor = " to ".join(dict.fromkeys(f"{bound:.4g}" for bound in collapse.range))
     given = collapse.sentence, doubts, demand, factor
     stated = state_outcome("limit analysis", *given).as_file("limit")

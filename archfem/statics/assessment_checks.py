@@ -1,13 +1,13 @@
 """Checks of a kinematic assessment: rules of codes, and capacity against demand."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from archfem._validation import check_between, check_fields
-from archfem.limit.fill_range import FillRange
+from archfem.limit.fill_range import FillAssumption, FillRange
 
 
 @dataclass(frozen=True)
@@ -116,3 +116,30 @@ class AssessmentCheck:
             f"{self.unit}{period}: {self.outcome}, the spectrum may be "
             f"{self.ratios} times as strong{rest if self.at_rest else ''}"
         )
+
+
+def add_fill_ranges(found: Any, others: Mapping[FillAssumption, Any]) -> Any:
+    """Return a `KinematicAssessment` with its ratios by assumption on a fill, and the least one.
+
+    Args:
+        found: assessment under the assumption that is given.
+        others: assessments by assumption; None does not stand.
+    """
+    ranges = {}
+    for name in ("linear", "displacement"):
+        # what has no motion withstands any spectrum
+        ratios = {
+            key: 0.0 if other is None else getattr(getattr(other, name), "ratio", np.inf)
+            for key, other in others.items()
+        }
+        if ratios and getattr(found, name) is not None:
+            ranges[name] = FillRange(ratios)
+    if not ranges:
+        return found
+    values = [*ranges.values()][-1].values
+    least = others[min(values, key=values.__getitem__)] or found
+    changed = [
+        {k: replace(getattr(each, k), over_fill=ranges[k]) for k in ranges if getattr(each, k)}
+        for each in (found, least)
+    ]
+    return replace(found, **changed[0], least=replace(least, **changed[1]))

@@ -17,7 +17,7 @@ References:
     Circolare 21 January 2019 n. 7 C.S.LL.PP. on the NTC 2018, C8.7.1.2.1.1 to C8.7.1.2.1.8.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -39,7 +39,7 @@ from archfem.limit.displaced_blocks import (
     classify_motion,
     find_mechanism,
 )
-from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
+from archfem.limit.fill_range import FillAssumption, vary_fill
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
 from archfem.limit.linear_programme import NoEquilibrium
@@ -63,7 +63,12 @@ from archfem.motion.design_spectra import (
 )
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import response_spectrum
-from archfem.statics.assessment_checks import LIMIT_STATES, AssessmentCheck, LimitState
+from archfem.statics.assessment_checks import (
+    LIMIT_STATES,
+    AssessmentCheck,
+    LimitState,
+    add_fill_ranges,
+)
 from archfem.units import STANDARD_GRAVITY
 
 
@@ -150,31 +155,6 @@ class KinematicAssessment(ResultDisplay):
         It must pass whatever is assumed of a fill: `checks[-1].over_fill` has the range.
         """
         return self.checks[-1].passes
-
-    def _with_ranges(
-        self, others: Mapping[FillAssumption, "KinematicAssessment | None"]
-    ) -> "KinematicAssessment":
-        """Return the assessment with its ratios by assumption on a fill; None does not stand."""
-        ranges = {}
-        for name in ("linear", "displacement"):
-            # what has no motion withstands any spectrum
-            ratios = {
-                key: 0.0 if other is None else getattr(getattr(other, name), "ratio", np.inf)
-                for key, other in others.items()
-            }
-            if ratios and getattr(self, name) is not None:
-                ranges[name] = FillRange(ratios)
-        if not ranges:
-            return self
-        found = []
-        values = [*ranges.values()][-1].values
-        for each in (self, others[min(values, key=values.__getitem__)] or self):
-            checks = {name: getattr(each, name) for name in ranges}
-            changed = {
-                k: check and replace(check, over_fill=ranges[k]) for k, check in checks.items()
-            }
-            found.append(replace(each, **changed))
-        return replace(found[0], least=found[1])
 
     def demand(self, periods: Array) -> tuple[Array, Array]:
         """Return spectral displacements [m] and accelerations [m/s²] of the demand.
@@ -349,7 +329,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         filled = attach_fill(structure, fill)
         push = [BodyForce(search.direction)]
         filled.warn_of_sliding_fill(push, (), found.path.mechanisms[0].factor)
-    return found._with_ranges(search.vary(lever, fill, found))
+    return add_fill_ranges(found, search.vary(lever, fill, found))
 
 
 @dataclass(frozen=True, eq=False)
@@ -654,10 +634,12 @@ class _Oscillator:
             )
         if self.holds < len(self.path.factors) - 1:
             held = abs(float(self.curve["d"][self.holds]))
+            place, bound = f"beyond d* = {held:.3g} m", "there the curve"
+            if not self.holds:
+                place, bound = "from rest", "the whole curve, and each ratio,"
             found.append(
-                f"beyond d* = {held:.3g} m joints open or slide that the mechanism keeps closed: "
-                "there the curve is an upper bound; a time history with large displacements can "
-                "test it"
+                f"{place} joints open or slide that the mechanism keeps closed: {bound} is an "
+                "upper bound; a time history with large displacements can test it"
             )
         if self.path.end is not PathEnd.FALLS:
             found.append(

@@ -186,7 +186,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     ]
     facts = dict(list_facts(data))
     assert facts["in doubt"] == "limit analysis, kinematic assessment"
-    assert facts["verdict"] == "no mechanism in 2 of 2 runs"
+    assert facts["verdict"] == "no mechanism in 2 of 2 runs; fails a code, right and left"
     alone = report_data.ReportData(case, {}, found.folder)
     lead = build_conclusion(alone).pieces[0].text
     assert lead.startswith("For 0.25 g, 475 years: limit analysis: it turns, at 4.8 times the load")
@@ -696,7 +696,7 @@ def test_an_assessment_takes_the_fill_of_the_limit_analysis(undrawn, tmp_path, c
     assert "NTC-2018 SLV capacity 0.4 d_0*; demand the displacement spectrum, 8 % damped" in stated
     assert "T 1.68 π √(d / a*(d)) at d = 0.4 d_0*, with a* divided by FC" in stated
     factors = [float(re.search(r"alpha_0 = ([\d.]+)", text)[1]) for text in (pressed, alone)]
-    assert factors[0] > 1.05 * factors[1]
+    assert factors[0] > 1.01 * factors[1]  # by its active pressure alone
 
 
 def test_a_fill_is_stated_as_elastic_and_not_varied(kept):

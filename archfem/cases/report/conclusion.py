@@ -74,15 +74,28 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     doubtful = list(dict.fromkeys(result for result, _ in list_doubts(data)))
     doubts = [("in doubt", ", ".join(doubtful))] if doubtful else []
     if not runs:
-        rows = (row for _, row in _capacity_rows(data) if row[3] != "-")
         # the place of a vehicle is in the conclusion
         factors = [
-            f"{demand}: {outcome.partition(', with')[0]}, factor {factor}"
-            for _, demand, outcome, factor in rows
+            f"{demand}: {outcome.partition(', with')[0]}, factor {factor}".removesuffix(
+                ", factor -"
+            )
+            for _, (_, demand, outcome, factor) in _capacity_rows(data)
+            if factor != "-" or demand == "none given"
         ]
         return [*signed, *([("verdict", "; ".join(factors))] if factors else []), *doubts, *blocks]
     peak = [("PGA", f"{max(map(_peak_of_ground, runs)):.3g} g")]
-    return [*signed, ("verdict", summarise_outcomes(data, runs)), *doubts, *blocks, *peak]
+    verdict = "; ".join([summarise_outcomes(data, runs), *_list_failed_checks(data)])
+    return [*signed, ("verdict", verdict), *doubts, *blocks, *peak]
+
+
+def _list_failed_checks(data: ReportData) -> Iterator[str]:
+    """Yield the checks of a norm that are not passed; the linear one is no verdict of its own."""
+    stated = data.statements.get("assessment")
+    rows = [*stated.rows] if stated else []
+    for name, _, outcome, _ in [x for x in rows if "linear, q" not in x[0]] or rows:
+        if "passes" not in outcome or "only with" in outcome:
+            some = " under some assumptions on the fill" * ("only with" in outcome)
+            yield f"fails {name.partition(': ')[2]}{some}"
 
 
 def _peak_of_ground(run: History) -> float:
@@ -254,6 +267,8 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for name, demand, *others in statement.rows:
+            if data.runs and demand == "none given":
+                of = f"; beside it motions of {_describe_peaks(data.runs.values())}"
             yield RESULTS[result], (name, f"{demand}{of}", *others)
 
 
@@ -319,9 +334,8 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
             )
             doubts.append((_VARIATIONS, text))
     for name, stated in data.statements.items():
-        doubts += [(RESULTS[name], doubt) for doubt in stated.doubts]
-    if "assessment" in data.statements:
-        doubts += [(RESULTS["assessment"], text) for text in _doubt_spectrum(data)]
+        of_spectrum = _doubt_spectrum(data) if name == "assessment" else ()
+        doubts += [(RESULTS[name], doubt) for doubt in [*of_spectrum, *stated.doubts]]
     if "from memory" in (data.read_text("rating.txt") or ""):
         text = "values marked as to be checked were not compared with the text of their code"
         doubts.append((RESULTS["rating"], text))

@@ -239,6 +239,8 @@ def _tabulate_parts(structure: Structure) -> Grid:
 def build_static_sections(data: ReportData) -> list[Section]:
     """Build the sections on modes, limit analysis, pushover, rating, assessment."""
     collapse = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
+    if "; all else is of the least" in (data.read_text("limit.txt") or ""):
+        collapse = f"{collapse[:-1]}, under the assumption on the fill that has the least factor."
     curve = "Load factor over displacement, with the joints in the order of their first hinge."
     modes = data.read_result("modes", table="Modes about dead load: effective masses along x and y")
     return [
@@ -303,6 +305,8 @@ def _build_assessment(data: ReportData) -> list[Any]:
         names = names[:1]
         texts = [f"{texts[0]}\nleft: the mirror image, with the same numbers", *texts[2:]]
         caption = f"{caption[:-1]}, to the right."
+    if "all else is under one assumption: " in text:
+        caption = f"{caption[:-1]}, under the assumption on the fill that has the least margin."
     figures = [figure for name in names for figure in data.read_figure(name, caption)]
     return [TextBlock("\n\n".join(texts), "lines"), *figures, _define_assessment(data)]
 
