@@ -332,14 +332,14 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:
 
 def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tuple[Collapse, str]:
     """Return the lesser result of a load in both senses, at its least end, and the text on both."""
-    others = []
+    others, found = [], case.limit.solve_least(case.structure, found)
     if opposite is not None:
+        opposite = case.limit.solve_least(case.structure, opposite)
         close = np.allclose(opposite.range, found.range, rtol=1e-4)
         if opposite.range[0] < found.range[0] and not close:
             found, opposite = opposite, found
         rank = _compare_senses(found, opposite)
         others.append(f"in the other sense: {opposite.sentence} ({rank})")
-    found = case.limit.solve_least(case.structure, found)
     others += filter(None, [describe_fill_defaults(case)])
     demand, ratio = compare_with_site(case, found)
     others += [f"it begins to move at {ratio} times {demand}"] if ratio else []
