@@ -713,8 +713,17 @@ def test_a_fill_is_stated_as_elastic_and_not_varied(kept):
     assert "pga 2.94199 m/s²" in words["motion, synthetic, before matching", "default"]
     stated = ", ".join(conclusion.list_unvaried(data))
     assert "one set of properties, stiffness and strength of the fill, one model" in stated
+    concluded = build_conclusion(data).pieces
+    assert " is elastic in the runs and carries tension, which soil does not. " in concluded[0].text
+    assert not any("of the template" in getattr(piece, "text", "") for piece in concluded)
     vars(data)["fidelity"] = "rigid"
     assert "fill" not in ", ".join(conclusion.list_unvaried(data))
+    assert "carries tension" not in build_conclusion(data).pieces[0].text
+    template = (Path(af.cases.__file__).parent / "new" / "bridge.toml").read_text(encoding="utf-8")
+    named = {"report": {"project": re.search(r'project = "(.+)"', template)[1]}}
+    data = report_data.ReportData(af.Case.of(tables | named), data.runs)
+    words = [getattr(piece, "text", "") for piece in build_conclusion(data).pieces]
+    assert any(text.startswith("The name of the project is that of the template") for text in words)
 
 
 def test_of_several_vehicles_a_table_has_the_factors(small, undrawn):

@@ -53,6 +53,9 @@ _HISTORIES, _VARIATIONS = "time histories", "variations"
 # What commands keep of results that they have not finished
 _BEGUN = {RESULTS["risk"]: "risk_samples.nc", RESULTS["verdict_range"]: "variations"}
 
+# Project in the templates of new cases
+PLACEHOLDER = "Name of the project"
+
 _FACTORS = (
     "; factor: the multiple of the demand at which a check is just passed or a load makes a "
     "mechanism, up to which a scaled motion fells nothing, or at which a fall has a probability of "
@@ -171,6 +174,8 @@ def _list_outdated(data: ReportData) -> Iterator[str]:
     for name in _BEGUN.keys() & absent.values():
         if data.folder and (data.folder / _BEGUN[name]).exists():
             yield f"The {name} was begun and has no answer: runs are left to compute."
+    if data.case.report.get("project") == PLACEHOLDER:
+        yield "The name of the project is that of the template: fill in [report] of the case."
     if earlier:
         made = "Not stated, for an earlier version of archfem or another case made it"
         yield f"{made}: {', '.join(earlier)}."
@@ -185,6 +190,9 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
         lead = [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
     if data.verdict_range is not None:
         lead.append(f"in variations of its properties it {data.verdict_range.sentence}")
+    if fill := list_elastic_fill(data):
+        carries = "is elastic in the runs and carries tension, which soil does not"
+        lead.append(f"{join_names(fill)} {carries}")
     lead += _describe_margin(data, rows)
     if data.runs and not doubtful:
         lead.append("the checks of the numbers raise no doubt")
