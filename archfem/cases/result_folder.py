@@ -192,7 +192,7 @@ def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[str]
     if not factor:
         demand, factor = "the given load", "-"
         if collapse.push:  # a factor would be read as one on a demand
-            demand = "none given"
+            demand = "no demand given"
         elif collapse.outcome is Outcome.COLLAPSES:
             factor = " to ".join(dict.fromkeys(f"{bound:.4g}" for bound in collapse.range))
     given = collapse.sentence, doubts, demand, factor

@@ -83,7 +83,7 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
                 ", factor -"
             )
             for _, (_, demand, outcome, factor) in _capacity_rows(data)
-            if factor != "-" or demand == "none given"
+            if factor != "-" or demand == "no demand given"
         ]
         return [*signed, *([("verdict", "; ".join(factors))] if factors else []), *doubts, *blocks]
     peak = [("PGA", f"{max(map(_peak_of_ground, runs)):.3g} g")]
@@ -275,7 +275,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for name, demand, *others in statement.rows:
-            if data.runs and demand == "none given":
+            if data.runs and demand == "no demand given":
                 of = f"; beside it motions of {_describe_peaks(data.runs.values())}"
             yield RESULTS[result], (name, f"{demand}{of}", *others)
 
