@@ -149,7 +149,7 @@ def build_conclusion(data: ReportData) -> Section:
     for result in filter(doubts.get, doubtful):
         shown = [sentence(text) for text in doubts[result][:MAX_DOUBTS]]
         if more := len(doubts[result]) - len(shown):
-            shown.append(f"{more} more stand with the result.")
+            shown.append(f"{more} more stand{'s' * (more == 1)} with the result.")
         blocks.append(TextBlock(f"In doubt, {result}: {' '.join(shown)}", "doubt"))
     if rows:
         head = ("", "demand", "capacity or outcome", "factor")
