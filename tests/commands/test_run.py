@@ -718,8 +718,10 @@ def test_each_file_of_a_folder_swapped_is_refused_and_made_anew(kind, small, tmp
                 assert af.commands.main(command[name, scale]) in (0, 3)
 
     def files(folder):
+        # finished variations have a seal each: a changed one is computed again
         paths = (path for path in folder.rglob("*") if path.is_file())
-        return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+        kept = (path for path in paths if "variations" not in path.parts)
+        return {path.relative_to(folder).as_posix(): path.read_bytes() for path in kept}
 
     first, second = map(files, folders.values())
     differing = [name for name in first if first[name] != second[name]]
