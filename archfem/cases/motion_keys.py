@@ -147,11 +147,15 @@ def build_spectrum(table: Table, section: str) -> DesignSpectrum:
 
 
 def build_pairs(settings: Table, folder: Path = Path()) -> tuple[Motion, ...]:
-    """Return the pairs of a suite under their names, before spectral matching."""
+    """Return the pairs of a suite under their names, before spectral matching and rest."""
     files = folder / settings.get("folder", "")
     return tuple(
         # Without the transverse component, which plane structures do not feel.
-        replace(build_motion(pair, files, f"suite.pairs.{name}"), name=name, transverse=None)
+        replace(
+            build_motion(pair | {"rest": 0.0}, files, f"suite.pairs.{name}"),
+            name=name,
+            transverse=None,
+        )
         for name, pair in settings["pairs"].items()
     )
 
@@ -166,6 +170,10 @@ def build_suite(settings: Table, folder: Path = Path()) -> Suite:
     )
     target = build_target_spectrum(settings)
     suite = suite.matched(target) if target and settings.get("matched", False) else suite
+    # matching would shake the ground at rest
+    rests = [pair.get("rest", 0.0) for pair in settings["pairs"].values()]
+    rested = (pair.with_rest(rest) for pair, rest in zip(suite.pairs, rests, strict=True))
+    suite = replace(suite, pairs=tuple(rested))
     return suite.reversed() if settings.get("reversed", False) else suite
 
 

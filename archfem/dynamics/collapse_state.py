@@ -167,7 +167,7 @@ def doubt_collapse(structure: Structure, fall: CollapseState) -> Iterator[Doubt]
         yield Doubt(
             f"blocks still move at the end: they may come back from {format_mm(fall.residual)}, or "
             "go farther",
-            "let the ground rest at the end, `--set motion.rest=10`",
+            "let the ground rest at the end, `--set motion.rest=10`, or suite.pairs.NAME.rest=10",
         )
 
 

@@ -41,6 +41,23 @@ def test_a_suite_is_matched_on_request_of_the_case():
     assert match.motion.name == "one"
 
 
+def test_ground_rests_behind_a_matched_motion_as_it_was_matched():
+    """Matching with the rest would shake the ground there."""
+    target = {"code": "EC8", "ag": 0.25, "ground": "B"}
+    suites = []
+    for rest in (0.0, 2.0):
+        one = {"synthetic": {"seed": 1, "duration": 5.0}, "rest": rest}
+        settings = {"matched": True, "target": target, "pairs": {"one": one}}
+        suites.append(build_suite(parse_suite(settings)))
+    bare, rested = (suite.pairs[0] for suite in suites)
+    count = len(bare.horizontal)
+    assert rested.duration == pytest.approx(bare.duration + 2.0)
+    for name in ("horizontal", "vertical"):
+        found = rested.component(name)
+        np.testing.assert_array_equal(found[:count], bare.component(name))
+        assert not found[count:].any()
+
+
 @pytest.mark.parametrize(
     ("target", "expected"),
     [
