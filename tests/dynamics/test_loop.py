@@ -28,6 +28,7 @@ class Sliding:
 
     name = "sliding"
     order = np.arange(3)
+    measures_faces = False
 
     def __init__(self, equation):
         self.mass = equation.model.mass[0, 0]
