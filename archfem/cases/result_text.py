@@ -494,14 +494,14 @@ def state_scale(
 
 
 def state_ratings(rated: Sequence[tuple[Rating, Sequence[str]]]) -> Statement:
-    """State the factor of each vehicle; of the first what the pressure adds, and the worst."""
+    """State the factor of each vehicle; of the first what pressure and backing add; the worst."""
     rows = []
     for found, _ in rated:
         factor = "-" if np.isnan(found.factor) else f"{found.factor:.4g}"
         rows.append(("rating", found.vehicle.name, f"{found.outcome}, {found.place}", factor))
     first, doubts = rated[0][0], [doubt for _, own in rated for doubt in own]
     worst = min((found for found, _ in rated), key=lambda each: each.factor)
-    sentences = [repr(first), *first.describe_pressure()]
+    sentences = [repr(first), *first.describe_pressure(), *first.describe_backing()]
     if worst.factor < first.factor:
         sentences.append(f"least of {len(rated)} vehicles: {worst!r}")
     return Statement(sentences, rows, doubts)

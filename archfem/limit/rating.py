@@ -249,7 +249,7 @@ class Rating(ResultDisplay):
             f"the factor is on axles × live × impact{also}; codes with partial factors require 1",
             *self._describe_missing(),
             *self.describe_pressure(),
-            *self._describe_backing(),
+            *self.describe_backing(),
             f"least factor driving {', '.join(least)}",
             f"{self.moving}",
             *self._describe_hinges(),
@@ -282,7 +282,7 @@ class Rating(ResultDisplay):
             f"{factor:.4g} with {part}, {self.full_pressure:.4g} with all of it"
         ]
 
-    def _describe_backing(self) -> list[str]:
+    def describe_backing(self) -> list[str]:
         """Return the line on what the backing adds, if there is some."""
         if not self._has_backing:
             return []
