@@ -269,7 +269,8 @@ def rate(options: argparse.Namespace) -> int:
     tables = name_vehicles(options.vehicles, rating)
     ratings, table = _rate_each(case, tables, list_vehicles(rating))
     (first, lines), stated, varied = ratings[0], state_ratings(ratings), None
-    if options.vary and not np.isnan(first.factor):
+    interrupted = len(ratings) < len(tables) and not np.isnan(first.factor)
+    if options.vary and not interrupted and not np.isnan(first.factor):
         from archfem.studies.variations import vary_rating
 
         varied, sentence = vary_rating(case, table, first)
@@ -284,18 +285,30 @@ def rate(options: argparse.Namespace) -> int:
         return {**files, "rating.png": first.plot(), **(every if len(ratings) > 1 else {})}
 
     _write_results("rate", case, options.out, f"{case.title}\n{text}", draw)
+    if interrupted:
+        raise KeyboardInterrupt
     return _doubt_code([doubt for _, doubts in ratings for doubt in doubts])
 
 
 def _rate_each(
     case: Case, tables: Sequence[Mapping[str, Any]], own: Sequence[Any]
 ) -> tuple[list[tuple[Rating, list[str]]], Mapping[str, Any]]:
-    """Return ratings with doubts, the case's own first and then the worst; table of the first."""
-    rated = []
+    """Return ratings with doubts, the case's own first and then the worst; table of the first.
+
+    Those before Ctrl-C are returned, if there are any.
+    """
+    rated = list[tuple[Rating, list[str], Mapping[str, Any]]]()
     with ProgressReport("rating", len(tables)) as progress:
         for table in tables:
-            with _record_doubts(case.structure) as doubts:
-                found = rate_case(case.structure, parse_rating(table), case.limit)
+            try:
+                with _record_doubts(case.structure) as doubts:
+                    found = rate_case(case.structure, parse_rating(table), case.limit)
+            except KeyboardInterrupt:
+                if not rated:
+                    raise
+                left = f"{len(tables) - len(rated)} of {len(tables)} vehicles were not rated"
+                rated[-1][1].append(f"{DOUBT_MARK}interrupted: {left}; run the same command again")
+                break
             doubts += result_text.doubt_rating(found, case.limit)
             rated.append((found, doubts, table))
             progress.show(f"{found.vehicle.name}: {found.headline.partition(',')[0]}", 1)

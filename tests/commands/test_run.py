@@ -607,6 +607,26 @@ def test_rating_of_a_case(tmp_path, ring, capsys):
     assert "Thrust line at collapse" in page
 
 
+def test_a_rating_that_is_stopped_keeps_the_vehicles_before(tmp_path, unplotted, monkeypatch):
+    path, out = tmp_path / "ring.toml", tmp_path / "out"
+    path.write_text(LIMIT.replace("= 17", "= 7"))
+    monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (0.9, 1.2))
+    whole = af.cases.analysis_keys.rate_case
+
+    def stop(structure, rating, limit):
+        if rating["vehicle"] == "LM71":
+            raise KeyboardInterrupt
+        return whole(structure, rating, limit)
+
+    monkeypatch.setattr("archfem.commands.run.rate_case", stop)
+    given = [part for name in ("LM1", "LM2", "LM71") for part in ("--vehicle", name)]
+    assert af.commands.main(["rate", str(path), "--out", str(out), *given]) == 130
+    assert set(pd.read_csv(out / "vehicles.csv")["vehicle"]) == {"LM1", "LM2"}
+    assert (
+        "in doubt: interrupted: 1 of 3 vehicles were not rated" in (out / "rating.txt").read_text()
+    )
+
+
 def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
     """The case's own first, by name, though another is worse; then the worst first."""
     path, out = tmp_path / "ring.toml", tmp_path / "out"
