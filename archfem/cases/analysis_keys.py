@@ -12,8 +12,7 @@ from archfem.cases.toml_file import Table, check_table, read_object
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.backfill import self_weight_programme
-from archfem.limit.collapse import Collapse, collapse_factor
-from archfem.limit.fill_range import vary_fill
+from archfem.limit.collapse import Collapse, collapse_factor, solve_least
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.rating import Rating, rate
 from archfem.limit.vehicles import VEHICLES, VEHICLES_OF_CODES, Vehicle
@@ -94,21 +93,15 @@ class LimitAnalysis:
             )
         return collapse_factor(structure, live=self.live, dead=self.dead, **self.resistance)
 
-    def solve_least(self, structure: Structure, found: Collapse) -> Collapse:
-        """Return the result, with its range, under the assumption on a fill with the least factor.
+    def solve_least(self, found: Collapse) -> Collapse:
+        """Return a result, with its range, under the assumption on a fill with the least factor.
 
         Args:
-            structure: structure of the case.
             found: result under the assumption that is given; it is returned where it is the least,
                 or where nothing stands under the least.
         """
-        over, fill = found.over_fill, self.fill
-        if over is None or isinstance(fill, PlasticFill) or over.ends[0] in (0.0, found.factor):
-            return found
-        assumed = vary_fill(fill)[min(over.values, key=over.values.__getitem__)][1]
-        given = self.resistance | {"fill": assumed, "live": found.live, "dead": found.dead}
-        least = collapse_factor(structure, **given)
-        return replace(least, over_fill=over)
+        fill = None if isinstance(self.fill, PlasticFill) else self.fill  # that has no range
+        return solve_least(found, self.friction, self.strength, fill)
 
     @property
     def opposite(self) -> "LimitAnalysis | None":

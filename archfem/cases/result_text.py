@@ -331,10 +331,9 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:
 
 
 def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tuple[Collapse, str]:
-    """Return the lesser result of a load in both senses, at its least end, and the text on both."""
-    others, found = [], case.limit.solve_least(case.structure, found)
+    """Return the lesser result of a load in both senses, and the text on both."""
+    others = []
     if opposite is not None:
-        opposite = case.limit.solve_least(case.structure, opposite)
         close = np.allclose(opposite.range, found.range, rtol=1e-4)
         if opposite.range[0] < found.range[0] and not close:
             found, opposite = opposite, found

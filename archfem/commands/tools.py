@@ -181,20 +181,23 @@ def example(options: argparse.Namespace) -> None:
 
 
 def show_both_senses(case: Case, first: Collapse, show: Callable[[Collapse, str], None]) -> None:
-    """Show a result of limit analysis beside that of the other sense; cut short, it is kept."""
+    """Show a result of limit analysis beside that of the other sense, each at its least end.
+
+    Where the rest is cut short, the result is shown.
+    """
     # where a structure does not stand, the load plays no part
     other = None if first.outcome is Outcome.INFEASIBLE else case.limit.opposite
-    if other is None:
-        show(*result_text.describe_limit(case, first, None))
-        return
-    # a search in walls takes minutes in each sense
-    write_progress_line("limit analysis", f"{first.sentence}; the other sense follows")
-    opposite = None
+    opposite, left = None, "\nin the other sense: not computed" if other else ""
     try:
-        opposite = other.solve(case.structure)
+        first = case.limit.solve_least(first)
+        if other is not None:
+            # a search in walls takes minutes in each sense
+            write_progress_line("limit analysis", f"{first.sentence}; the other sense follows")
+            opposite = case.limit.solve_least(other.solve(case.structure))
+            left = ""
     finally:
         found, text = result_text.describe_limit(case, first, opposite)
-        show(found, text if opposite else f"{text}\nin the other sense: not computed")
+        show(found, f"{text}{left}")
 
 
 def print_motions(suite: Suite) -> None:

@@ -299,6 +299,40 @@ def collapse_factor(
     if isinstance(loads, Settlement):
         refuse_bonds(structure)
     stays = tuple(list_loads(dead)) if dead else ()
+    result = _solve_loads(structure, loads, stays, friction, strength, fill)
+    stood = result.outcome is not Outcome.INFEASIBLE
+    if isinstance(fill, Fill) and stood and not isinstance(loads, Settlement):
+        given = structure, friction, strength
+        over_fill = _vary_assumptions(*given, fill, loads, stays, result.factor)
+        result = replace(result, over_fill=over_fill)
+    return result
+
+
+def solve_least(
+    found: Collapse, friction: str | None, strength: float | None, fill: Fill | None
+) -> Collapse:
+    """Return a result, with its range, under the assumption on a fill with the least factor.
+
+    The result itself is returned where it is the least, or where nothing stands under the least.
+    """
+    structure, over = found.structure, found.over_fill
+    if structure is None or over is None or over.ends[0] in (0.0, found.factor):
+        return found
+    _, assumed = vary_fill(fill)[min(over.values, key=over.values.__getitem__)]
+    loads = [action for action in found.live if not isinstance(action, Settlement)]
+    given = structure, loads, found.dead, friction, strength, assumed
+    return replace(_solve_loads(*given), over_fill=over)
+
+
+def _solve_loads(
+    structure: Structure,
+    loads: Settlement | list[Action],
+    stays: tuple[Action, ...],
+    friction: str | None,
+    strength: float | None,
+    fill: Fill | PlasticFill | None,
+) -> Collapse:
+    """Return the result of `collapse_factor` without its range over a fill."""
     if isinstance(fill, PlasticFill):
         result = _bound_collapse(structure, loads, stays, friction, strength, fill)
     else:
@@ -311,11 +345,6 @@ def collapse_factor(
         result = _solve_collapse(stones, programme, loads, friction)
         if result.outcome is Outcome.COLLAPSES and not isinstance(loads, Settlement):
             stones.warn_of_sliding_fill(loads, stays, result.factor)
-        stands = result.outcome is not Outcome.INFEASIBLE
-        if fill is not None and stands and not isinstance(loads, Settlement):
-            given = structure, friction, strength
-            over_fill = _vary_assumptions(*given, fill, loads, stays, result.factor)
-            result = replace(result, over_fill=over_fill)
     if np.isinf(result.factor):
         warn_locking(structure, friction)
     if friction is None:

@@ -78,9 +78,9 @@ def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
     )
     # what is drawn is the lower end
     settings = LimitAnalysis((live,), None, fill=fill)
-    least = settings.solve_least(buried_stone(), settings.solve(buried_stone()))
+    least = settings.solve_least(settings.solve(buried_stone()))
     assert (least.factor, *least.range) == pytest.approx((low, low, high))
-    assert settings.solve_least(buried_stone(), least) is least
+    assert settings.solve_least(least) is least
     down = af.collapse_factor(buried_stone(), live=af.BodyForce(0.0, 1.0), fill=fill)
     assert down.over_fill is None
 
