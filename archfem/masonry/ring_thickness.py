@@ -122,7 +122,10 @@ def _follow_ring(
         if not {*structure.joints[number].blocks} <= stones
     ]
     if len(springings) != 2:
-        raise InvalidInput(f"the ring has {len(springings)} springings, and needs two")
+        raise InvalidInput(
+            f"the ring has {len(springings)} springings, and needs two: draw its stones from one "
+            "fixed support to another"
+        )
     number, stone = min(springings)
     joints, order = [number], [stone]
     while True:
@@ -142,7 +145,9 @@ def _scale_stone(
     corners = [[_nearest(points, end) for end in joint.ends] for joint in joints]
     (first_in, first_out), (last_in, last_out) = corners
     if len({*corners[0], *corners[1]}) < 4:
-        raise InvalidInput(f"'{block.name}' has no four corners at its two joints")
+        raise InvalidInput(
+            f"'{block.name}' has no four corners at its two joints: draw it from joint to joint"
+        )
     inner = _walk(len(points), first_in, last_in, {first_out, last_out})
     outer = _walk(len(points), first_out, last_out, {first_in, last_in})
     new = points.copy()
@@ -175,7 +180,9 @@ def _walk(count: int, start: int, end: int, forbidden: set[int]) -> Numbers:
         walk = (start + step * np.arange(length + 1)) % count
         if not forbidden & {*walk.tolist()}:
             return walk
-    raise InvalidInput("the joints of a stone of the ring do not lie on two opposite sides")
+    raise InvalidInput(
+        "the joints of a stone of the ring do not lie on two opposite sides: draw both across it"
+    )
 
 
 def _shares(path: Array) -> Array:
@@ -192,7 +199,9 @@ def _join_faces(joint: Joint, faces: Sequence[Array]) -> Joint:
     along = [np.sort((face - joint.middle) @ joint.tangent) for face in faces]
     low, high = max(span[0] for span in along), min(span[1] for span in along)
     if low >= high:
-        raise InvalidStructure(f"the stones at {joint.name} do not touch any more")
+        raise InvalidStructure(
+            f"the stones at {joint.name} do not touch any more: take a thickness nearer to theirs"
+        )
     ends = joint.middle + np.outer([low, high], joint.tangent)
     return replace(joint, intrados=as_point(ends[0]), extrados=as_point(ends[1]))
 

@@ -34,7 +34,7 @@ from archfem.dynamics.schemes import Conserving, EffectiveDamping, Viscous, inte
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput, InvalidStructure
 from archfem.limit.fill_strength import PlasticFill
-from archfem.limit.rating import Rating, rate_again
+from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate_again
 from archfem.masonry.joint_closing import FINISHES, with_finish
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
@@ -44,7 +44,7 @@ from archfem.statics.equilibrium import fill_doubts
 from archfem.studies.evaluators import PreparedRuns
 from archfem.studies.parameter_space import Point, WholePoint
 from archfem.studies.result_store import evaluate_with_progress
-from archfem.units import in_unit
+from archfem.units import MPa, in_unit
 
 # What is varied by default: values, of which numbers are the ends of a range
 DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
@@ -450,7 +450,7 @@ def vary_rating(case: Case, rating: Mapping[str, Any], found: Rating) -> tuple[R
             progress.show(f"{name}: {factors[name]:.4g}", 1)
     factors |= {"no pressure of the fill": found.without_pressure}
     factors |= {"all of its passive pressure": found.full_pressure}
-    factors |= {"stones of 5 MPa that crush": found.crushing}
+    factors |= {f"stones of {ASSUMED_STRENGTH / MPa:g} MPa that crush": found.crushing}
     known = {name: value for name, value in factors.items() if np.isfinite(value)}
     rows = [[name, f"{known[name]:.4g}" if name in known else "-"] for name in factors]
     rows = [row for row in rows if row[0] in changes or row[0] in known]

@@ -133,12 +133,13 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
 def build_conclusion(data: ReportData) -> Section:
     """Build the section on the answer in sentences, its doubts, and demands and capacities."""
     doubts: dict[str, list[str]] = {}
-    stated = {text: result for result, text in reversed(list_doubts(data))}
+    every = list_doubts(data)
+    stated = {text: result for result, text in reversed(every)}
     for text, result in stated.items():
         # a doubt of several results is stated once, without the scales of which it is true, too
         if text.partition("×")[2].partition(": ")[2] not in stated:
             doubts.setdefault(result, []).insert(0, text)
-    doubtful = list(dict.fromkeys(result for result, _ in list_doubts(data)))
+    doubtful = list(dict.fromkeys(result for result, _ in every))
     rows = [
         (name, demand, outcome + " (in doubt)" * (result in doubtful), factor)
         for result, (name, demand, outcome, factor) in _capacity_rows(data)
@@ -275,9 +276,10 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for name, demand, *others in statement.rows:
+            beside = of
             if data.runs and demand == "no demand given":
-                of = f"; beside it motions of {_describe_peaks(data.runs.values())}"
-            yield RESULTS[result], (name, f"{demand}{of}", *others)
+                beside = f"; beside it motions of {_describe_peaks(data.runs.values())}"
+            yield RESULTS[result], (name, f"{demand}{beside}", *others)
 
 
 def _describe_outcomes(data: ReportData) -> Iterator[str]:
