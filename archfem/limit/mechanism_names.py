@@ -16,7 +16,7 @@ import numpy as np
 from archfem._typing import Array, Flags, Numbers
 from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.mechanism_kinematics import LoopCheck, find_rigid_regions
-from archfem.masonry.structure import Structure, join_joint_names
+from archfem.masonry.structure import Structure, join_joint_names, join_words
 
 # Motions below this share of the largest are round-off, or do not count for a name [-]
 STILL = 1e-4
@@ -121,7 +121,7 @@ class NamedMotion:
             return f"sliding at {self._list_joints(self.sliding)}"
         parts = list(dict.fromkeys(self.structure.blocks[k].part for k in self.moving))
         whole = {self.structure.blocks[k].part for k in self.structure.free} == set(parts)
-        of = "" if whole else f" of {' and '.join(parts)}"
+        of = "" if whole else f" of {join_words(parts)}"
         if slides:
             counts = f"{count(hinges, 'hinge')} and {count(slides, 'sliding joint')}"
             return f"combined hinge-slide mechanism{of}, {counts}"

@@ -55,6 +55,11 @@ def join_names(names: Sequence[str], comma: str = ", ") -> str:
     return _shorten_list(names, comma.join, comma)
 
 
+def join_words(words: Sequence[str]) -> str:
+    """Join words to "a, b and c"."""
+    return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
+
+
 def join_joint_names(names: Sequence[str]) -> str:
     """Join names of joints, as in "north pier, base; main arch, joints 0, 5 and 11"."""
     return _shorten_list(names, _group_by_stem, "; ")
