@@ -6,14 +6,16 @@ and `report` are therefore bound when they are called, through one table that a 
 
 import io
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from enum import StrEnum
 from html import escape
 from importlib import import_module
 from time import monotonic
-from typing import Any, Self
+from typing import Any, ClassVar, Self, TypeVar
 
 from tqdm import tqdm
+
+Item = TypeVar("Item")
 
 # Time between lines of progress where the output is no terminal [s]
 PROGRESS_INTERVAL = 5.0
@@ -108,25 +110,40 @@ def write_progress_line(name: str, text: str) -> None:
 class ProgressReport:
     """Progress of a search of five seconds and more: a bar on a terminal, elsewhere lines.
 
-    The total is None if it is unknown.
+    The total is None if it is unknown. A line of a search within another one begins with the texts
+    of the outer ones, and is written however short the inner one is.
     """
+
+    _open: ClassVar[list["ProgressReport"]] = []  # from the outermost to the innermost
 
     def __init__(self, name: str, total: int | None) -> None:
         layout = "{desc}: |{bar}| {n_fmt} of {total_fmt}{postfix}"
         look: dict[str, Any] = {"bar_format": layout, "desc": name, "leave": False}
         self._bar = tqdm(total=total, disable=None, delay=PROGRESS_INTERVAL, **look)
-        self._name, self._shown = name, monotonic()
+        self._name, self._text, self._shown = name, "", monotonic()
 
     def __enter__(self) -> Self:
+        self._open.append(self)
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._open.remove(self)
         self._bar.close()
 
     def show(self, text: str, done: int = 0) -> None:
         """Show a text, and count what is done since the last one."""
         self._bar.update(done)
         self._bar.set_postfix_str(text)
-        if self._bar.disable and monotonic() - self._shown >= PROGRESS_INTERVAL:
-            write_progress_line(self._name, text)
-            self._shown = monotonic()
+        self._text, first = text, (*self._open, self)[0]
+        if self._bar.disable and monotonic() - first._shown >= PROGRESS_INTERVAL:
+            inner = [f"{each._name}: {each._text}" for each in self._open[1:] if each._text]
+            write_progress_line(first._name, "; ".join(filter(None, [first._text, *inner])))
+            first._shown = monotonic()
+
+
+def track_progress(name: str, items: Collection[Item]) -> Iterator[Item]:
+    """Yield items, and show how many of them are done."""
+    with ProgressReport(name, len(items)) as progress:
+        for number, item in enumerate(items):
+            yield item
+            progress.show(f"{number + 1} of {len(items)}", 1)

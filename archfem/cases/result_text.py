@@ -500,7 +500,8 @@ def state_ratings(rated: Sequence[tuple[Rating, Sequence[str]]]) -> Statement:
         rows.append(("rating", found.vehicle.name, f"{found.outcome}, {found.place}", factor))
     first, doubts = rated[0][0], [doubt for _, own in rated for doubt in own]
     worst = min((found for found, _ in rated), key=lambda each: each.factor)
-    sentences = [repr(first), *first.describe_pressure(), *first.describe_backing()]
+    sentences = [repr(first), *first.describe_codes()]
+    sentences += [*first.describe_pressure(), *first.describe_backing()]
     if worst.factor < first.factor:
         sentences.append(f"least of {len(rated)} vehicles: {worst!r}")
     return Statement(sentences, rows, doubts)

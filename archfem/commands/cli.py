@@ -33,7 +33,8 @@ EXIT_CODES = (
     f"understood; {ExitCode.DOUBTFUL}, an answer in doubt: each line 'in doubt: …' "
     "says why (energy that drifts, a fidelity that is wrong, fill that only tension holds, sliding "
     f"that dilates); {ExitCode.INTERRUPTED}, ended by Ctrl-C, and 143, "
-    "by SIGTERM: what was computed is kept in the folder of --out."
+    "by SIGTERM: what was computed is kept in the folder of --out, of `rate` whole vehicles and "
+    "variations alone."
 )
 
 

@@ -268,14 +268,14 @@ def rate(options: argparse.Namespace) -> int:
     rating = {**case.settings.get("rating", {}), **given}
     tables = name_vehicles(options.vehicles, rating)
     ratings, table = _rate_each(case, tables, list_vehicles(rating))
-    (first, lines), stated, varied = ratings[0], state_ratings(ratings), None
+    (first, lines), varied, stated = ratings[0], None, state_ratings(ratings)
     interrupted = len(ratings) < len(tables) and not np.isnan(first.factor)
     if options.vary and not interrupted and not np.isnan(first.factor):
-        from archfem.studies.variations import vary_rating
-
-        varied, sentence = vary_rating(case, table, first)
-        lines.insert(0, sentence)
-        stated = stated._replace(sentences=[*stated.sentences, sentence])
+        varied, sentence, doubts = _vary(case, table, first, options.out)
+        interrupted = len(doubts) > 0
+        lines[:0] = [sentence, *doubts]
+        every = [*stated.doubts, *doubts]
+        stated = stated._replace(sentences=[*stated.sentences, sentence], doubts=every)
     text, files = result_text.describe_ratings(case, ratings, varied)
     # the case of the folder, that of a run, may be rated for another vehicle
     files |= {RATING_FILE: format_tables({"rating": table}).rstrip(), **stated.as_file("rating")}
@@ -290,6 +290,21 @@ def rate(options: argparse.Namespace) -> int:
     return _doubt_code([doubt for _, doubts in ratings for doubt in doubts])
 
 
+def _vary(
+    case: Case, table: Mapping[str, Any], first: Rating, out: str | None
+) -> tuple[result_text.ResultTable, str, list[str]]:
+    """Return table and sentence of the variations of a rating, and what Ctrl-C left out."""
+    from archfem.studies.variations import vary_rating
+
+    folder = None if out is None else path_inside(Path(out), "rating_variations")
+    varied, sentence, left = vary_rating(case, table, first, folder)
+    remedy = "give --out, which keeps the others"
+    if folder is not None:
+        remedy = f"run the same command again, which continues from {folder}"
+    words = f"interrupted: {left} variations of the rating were not computed; {remedy}"
+    return varied, sentence, [f"{DOUBT_MARK}{words}"] if left else []
+
+
 def _rate_each(
     case: Case, tables: Sequence[Mapping[str, Any]], own: Sequence[Any]
 ) -> tuple[list[tuple[Rating, list[str]]], Mapping[str, Any]]:
@@ -297,17 +312,19 @@ def _rate_each(
 
     Those before Ctrl-C are returned, if there are any.
     """
-    rated = list[tuple[Rating, list[str], Mapping[str, Any]]]()
-    with ProgressReport("rating", len(tables)) as progress:
-        for table in tables:
+    rated, count = list[tuple[Rating, list[str], Mapping[str, Any]]](), len(tables)
+    with ProgressReport("rating", count) as progress:
+        for number, table in enumerate(tables):
+            progress.show(f"vehicle {number + 1} of {count}")
             try:
                 with _record_doubts(case.structure) as doubts:
                     found = rate_case(case.structure, parse_rating(table), case.limit)
             except KeyboardInterrupt:
                 if not rated:
+                    write_progress_line("rating", "no vehicle was rated, and nothing is kept")
                     raise
-                left = f"{len(tables) - len(rated)} of {len(tables)} vehicles were not rated"
-                rated[-1][1].append(f"{DOUBT_MARK}interrupted: {left}; run the same command again")
+                left = f"interrupted: {count - number} of {count} vehicles were not rated"
+                rated[-1][1].append(f"{DOUBT_MARK}{left}; a new command rates all of its own")
                 break
             doubts += result_text.doubt_rating(found, case.limit)
             rated.append((found, doubts, table))

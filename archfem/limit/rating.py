@@ -1,6 +1,6 @@
 """Rating of bridges for vehicles of codes: partial factors, widths, geometric factor of safety."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from archfem._display import ResultDisplay
+from archfem._display import ResultDisplay, track_progress
 from archfem._typing import Array, Metres, Pascals
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
@@ -51,6 +51,10 @@ from archfem.units import MPa
 # memory)
 ASSUMED_STRENGTH = 5e6
 
+# Partial times dynamic factor on a lorry in traffic by EN 1990 and EN 1991-2, on a good and on a
+# fair road [-] (from memory)
+EUROCODE_FACTORS = 1.35 * 1.2, 1.35 * 1.4
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Rating(ResultDisplay):
@@ -66,12 +70,13 @@ class Rating(ResultDisplay):
         area_load: distributed load of the code, where it is adverse, without factors [Pa].
         moving: factors at all places in both directions, on the factored vehicle over factored
             weights, and the collapse at the worst place.
-        geometric: geometric factor of safety at the worst place [-]: depth of the joints over the
-            least share of it, about their middles, that carries the factored vehicle; below 1 where
-            only deeper joints would. Undefined (NaN) where joints of any depth do not carry it,
-            infinite where hinges alone do. Not searched, and NaN, with a plastic fill.
-        by_rule: factor at the worst place with the width by rule and all of the code's distributed
-            load, where others were given; else NaN.
+        geometric: geometric factor of safety at the worst place, with the fill as given [-]: depth
+            of the joints over the least share of it, about their middles, that carries the factored
+            vehicle; below 1 where only deeper joints would. Undefined (NaN) where joints of any
+            depth do not carry it, infinite where hinges alone do. Not searched, and NaN, with a
+            plastic fill.
+        by_rule: factor at the worst place, with the fill as given, over the width by rule and with
+            all of the code's distributed load, where others were given; else NaN.
         strength: compressive strength of the stones at the joints [Pa]; infinite where it does not
             count.
         without_pressure: least factor with no pressure of a `Fill`, at a place of its own; NaN
@@ -86,6 +91,8 @@ class Rating(ResultDisplay):
             NaN, and with a plastic fill.
         by_pressure: least factor with a plastic fill as weight and pressure (`Fill`) of its
             strength, which the four states above have then too; else NaN.
+        by_cs454: least factor of a vehicle of one's own with the factors of CS 454 [-]: 1.9, and
+            1.8 on the worst axle; else NaN, and with a plastic fill.
         fill: strength of the fill, or None.
     """
 
@@ -107,6 +114,7 @@ class Rating(ResultDisplay):
     without_either: float = np.nan
     crushing: float = np.nan
     by_pressure: float = np.nan
+    by_cs454: float = np.nan
     fill: Fill | PlasticFill | None = None
 
     @property
@@ -130,8 +138,8 @@ class Rating(ResultDisplay):
             needed += ["stones that do not crush"] if self.crushing < 1.0 else []
             words += f" only with {' and '.join(needed)}" if needed else ""
             if missing := self._missing_factors():
-                least = self._say_least()
-                words += f" if the code's {missing} is at most {self.factor:.4g}{least}"
+                words += f" if the code's {missing} is at most {self.factor:.4g}"
+        words += self._say_range()
         words += f" without {self.vehicle.left_out}" if self.vehicle.left_out else ""
         return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
 
@@ -147,6 +155,11 @@ class Rating(ResultDisplay):
         """Whether masonry holds the haunches."""
         return self.fill is not None and self.fill.backing is not None
 
+    @property
+    def _as_given(self) -> str:
+        """Of which state of the fill a number alone is, in words."""
+        return ", with the fill as given" if self.fill is not None else ""
+
     def _needs(self) -> str:
         """Return the parts of the fill without which the bridge fails, in words."""
         if self.fill is None:
@@ -161,11 +174,15 @@ class Rating(ResultDisplay):
             return " or the ".join(without)
         return " and the ".join(needed)
 
-    def _say_least(self) -> str:
-        """Return the factor with none of the fill's help, in words; "" if that is not known."""
-        least = self.without_either if self._has_backing else self.without_pressure
-        help_ = "pressure and backing" if self._has_backing else "pressure"
-        return "" if np.isnan(least) else f" ({least:.4g} without {help_} of the fill)"
+    def _say_range(self) -> str:
+        """Return the least and the greatest factor over the states of the fill, in words."""
+        if np.isnan(self.full_pressure):
+            return ""
+        factors = [self.factor, self.without_pressure, self.full_pressure]
+        factors += [self.without_backing, self.without_either] if self._has_backing else []
+        factors += [self.by_pressure] if isinstance(self.fill, PlasticFill) else []
+        least = "none" if np.isnan(factors).any() else f"{min(factors):.4g}"
+        return f" ({least} to {np.nanmax(factors):.4g} over what is assumed of the fill)"
 
     def _missing_factors(self) -> str:
         """Return the factors of a code that neither the vehicle nor its user gave, in words."""
@@ -176,7 +193,8 @@ class Rating(ResultDisplay):
         """Return the factor with the width by rule and the whole load of the code."""
         rule, code = self.vehicle.spread_over(self.structure), self.vehicle.area_load
         load = f" and {code / 1e3:g} kN/m² beside the axles" if code else ""
-        return f"over {rule:.3g} m of width{load}, by rule, {self.by_rule:.4g} at this place"
+        width = f"over {rule:.3g} m of width{load}, by rule"
+        return f"{width}, {self.by_rule:.4g} at this place{self._as_given}"
 
     def table(self) -> str:
         """Return factors [-], axles and loaded road at all places [m], as rows of CSV."""
@@ -215,15 +233,16 @@ class Rating(ResultDisplay):
             stand = [x for here in over.values() for x in here]
         if not (spans and stand):
             return f"at x = {self.moving.position:.3g} m (the vehicle's middle)"
-        first, *others = (f"{x:.2f}" for x in sorted(stand))
-        where = " and ".join([", ".join([first, *others[:-1]]), *others[-1:]])
-        where = f"{first} to {others[-1]}" if len(stand) > 4 else where
-        count = f"{len(stand)} axle{'s'[: len(others)]}"
+        sense = 1.0 if self.moving.direction == "right" else -1.0
+        every = {float(self.moving.position + sense * ahead) for ahead in axles[:, 1]}
+        others = _name_places(every - {*stand})
+        count = f"{len(stand)} axle{'s'[: len(stand) - 1]}"
         count += f" of {len(axles)}" if len(axles) > len(stand) else ""
         ends = np.array([*spans.values()])
         beside = over and not all(((x >= ends[:, 0]) & (x <= ends[:, 1])).any() for x in stand)
         name = f" over {'or beside ' if beside else ''}{join_names(list(over))}" if over else ""
-        return f"with {count}{name} at x = {where} m"
+        others = f" (the other{'s'[: len(every) - len(stand) - 1]} at {others} m)" if others else ""
+        return f"with {count}{name} at x = {_name_places(stand)} m{others}"
 
     def __str__(self) -> str:
         """Describe outcome, worst places, mechanism, factors and sources, a line each."""
@@ -247,14 +266,14 @@ class Rating(ResultDisplay):
         lines = [
             f"{self._summary()}",
             f"the factor is on axles × live × impact{also}; codes with partial factors require 1",
-            *self._describe_missing(),
+            *self.describe_codes(),
             *self.describe_pressure(),
             *self.describe_backing(),
             f"least factor driving {', '.join(least)}",
             f"{self.moving}",
             *self._describe_hinges(),
             f"every x is that of the case and the picture; {describe_spans(self.structure)}",
-            f"geometric factor of safety at that place: {self._geometric_text()}",
+            f"geometric factor of safety at that place{self._as_given}: {self._geometric_text()}",
             "it is Heyman's criterion, often 2 or more (from memory), which no code has",
             f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN"
             f"{beside}; {source}",
@@ -307,14 +326,28 @@ class Rating(ResultDisplay):
             return ""
         return f"at {ASSUMED_STRENGTH / MPa:g} MPa the least factor is {self.crushing:.4g}"
 
-    def _describe_missing(self) -> list[str]:
-        """Return the line on what codes ask of a vehicle without any factors, if it is one."""
-        if self._missing_factors() != "live × impact":
+    def describe_codes(self) -> list[str]:
+        """Return the line on the factors of codes for a vehicle of one's own, if it is one."""
+        vehicle, code, factors = self.vehicle, VEHICLES["CS454-single"], list[str]()
+        if vehicle.grade != "given" or np.isnan(self.factor):
             return []
-        return [
-            "no code's live × impact is in it: for a lorry in traffic 1.62 to 1.89 by Eurocodes, "
-            "1.9 by CS 454 and 3.42 on the worst axle (from memory)"
-        ]
+        words, product = "no code's live × impact is in it", self.live * self.impact
+        # the dynamic factor is not on a distributed load, and may be on one axle alone
+        if self.impact == 1.0 or (not self.area_load and vehicle.impact_on == "all axles"):
+            if self._missing_factors() != "live × impact":
+                given = f"live × impact {product:.4g} given"
+                words = f"bare axles {product * self.factor:.4g}, {given}"
+            if not self.area_load:
+                high, low = (product * self.factor / by for by in EUROCODE_FACTORS)
+                by = " to ".join(f"{factor:.3g}" for factor in EUROCODE_FACTORS[::-1])
+                factors.append(f"{low:.4g} to {high:.4g} by Eurocodes ({by})")
+        elif self._missing_factors() != "live × impact":
+            words = f"live {self.live:g} and impact {self.impact:g} given"
+        if not np.isnan(self.by_cs454):
+            on_axle = f"{code.live:g}, and {code.live * code.impact:.3g} on the worst axle"
+            factors.append(f"{self.by_cs454:.4g} by CS 454 ({on_axle})")
+        beside = f"; as a lorry in traffic {', and '.join(factors)}, from memory" if factors else ""
+        return [f"{words}{beside}"]
 
     def _describe_hinges(self) -> list[str]:
         """Return the line on where the hinges of the worst place are, if there are some."""
@@ -357,6 +390,14 @@ class Rating(ResultDisplay):
         if self.geometric < 1.0:
             text += f", below 1: joints are too thin by {100.0 * (1.0 - self.geometric):.2g} %"
         return text
+
+
+def _name_places(places: Collection[float]) -> str:
+    """Return some places in words, of many the first and the last; "" for none [m]."""
+    each = [f"{x:.2f}" for x in sorted(places)]
+    if len(each) > 4:
+        return f"{each[0]} to {each[-1]}"
+    return " and ".join(filter(None, [", ".join(each[:-1]), *each[-1:]]))
 
 
 def _clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:
@@ -479,10 +520,16 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     geometric, deepest = unknown if is_plastic else _geometric_factor(weighted, moving, options)
     factors = live, impact, dead, width, area_load
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
-    if states := _other_states(options):
+    searches = [(rows, live, _other_states(options), 32 * len(rows))]
+    if driven.grade == "given" and not is_plastic:
+        code = VEHICLES["CS454-single"]
+        other = replace(driven, impact_on=code.impact_on).factored(code.live, code.impact)
+        # mechanisms are much the same whichever axle has the impact
+        searches.append((other, code.live, {"by_cs454": options}, 32))
+    for each, by, states, count in searches:
         # of the whole width, as the structure is modelled
-        loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in rows]
-        more |= _find_least_factors(weighted, positions, loads, live * area_load, states)
+        loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in each]
+        more |= _find_least_factors(weighted, positions, loads, by * area_load, states, count)
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
 
 
@@ -503,7 +550,8 @@ def rate_again(found: Rating, structure: Structure, width: float | None, **optio
     loads = [np.column_stack([share * row, axles[:, 1]]) for row in rows]
     area_load, states = found.live * found.area_load, {"": options}
     places = _places_along(weighted, axles)
-    return _find_least_factors(weighted, places, loads, area_load, states).get("", np.nan)
+    count = 32 * len(rows)
+    return _find_least_factors(weighted, places, loads, area_load, states, count).get("", np.nan)
 
 
 def _check_width(width: float, structure: Structure) -> None:
@@ -635,25 +683,31 @@ def _find_least_factors(
     vehicles: Sequence[Array],
     area_load: float,
     states: dict[str, dict[str, Any]],
+    count: int,
 ) -> dict[str, float]:
-    """Return the least factor in each state; none where the structure does not stand in it."""
+    """Return the least factor in each state; none where the structure does not stand in it.
+
+    A count of rows of axles, of all vehicles together, is solved first.
+    """
     rows = dict.fromkeys(
         axles_on_structure(structure, vehicle, way, x)
         for vehicle in vehicles
         for way in DRIVING_DIRECTIONS
         for x in places
     )
+    if not states:
+        return {}
     # the fans of loads do not depend on pressure, backing and strength
     stones, _ = self_weight_programme(structure, **next(iter(states.values())))
     axles = {row: stones.load(row) for row in rows if row}
     strips, factors = cut_road(structure, area_load), dict[str, float]()
     forces = [stones.load([strip]) for strip in strips]
-    for name, given in states.items():
+    for name, given in track_progress("other states", states.items()):
         stones, dead = self_weight_programme(structure, **given)
         if not is_balanced(dead.minimise_residual(), dead):
             continue
         # these are worst with sliding that dilates: without, one of the next may be
-        worst = find_worst_rows(dead, axles, strips, forces, 32 * len(vehicles))
+        worst = find_worst_rows(dead, axles, strips, forces, count)
         worst = dict(islice(worst.items(), 1 if given["friction"] != "nonassociated" else 3))
         factors[name] = min(collapse_factors(stones, dead, worst, given).values())
     return factors

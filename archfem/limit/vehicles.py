@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from archfem._display import ProgressReport, ResultDisplay
+from archfem._display import ProgressReport, ResultDisplay, track_progress
 from archfem._typing import Array, Flags, Metres, Newtons, Numbers, Pascals
 from archfem._validation import check_choice, check_number, check_numbers
 from archfem.errors import InvalidInput, logger
@@ -419,8 +419,10 @@ def _lay_strips(
         for first in range(0, len(road) - size + 1, max(size // 2, 1)):
             known.solve(road[first : first + size].sum(axis=0))
     bare = np.zeros(len(road), dtype=bool)
-    chosen = {row: (known.solve(load), bare) for row, load in axles.items()}
-    for row in (*axles, *reversed(axles)):  # and back with the mechanisms of all places
+    places = track_progress("places", axles)
+    chosen = {row: (known.solve(axles[row]), bare) for row in places}
+    # and back with the mechanisms of all places
+    for row in track_progress("places with distributed load", (*axles, *reversed(axles))):
         chosen[row] = known.lay(axles[row], *chosen[row])
     laid = {row: _join_row(row, strips, chosen[row][1]) for row in axles}
     return laid, {laid[row]: axles[row] + road[chosen[row][1]].sum(axis=0) for row in axles}
@@ -446,7 +448,7 @@ def find_worst_rows(
     pending = {*range(0, len(rows), max(len(rows) // count, 1))}
     bare = np.zeros(len(strips), dtype=bool)
     while pending:
-        for k in pending:
+        for k in track_progress("places", pending):
             laid[k] = known.lay(loads[k], known.solve(loads[k]), bare)
         bounds, _ = known.bound(np.array(loads))
         near = (1.0 + margin) * min(factor for factor, _ in laid.values())
@@ -478,7 +480,8 @@ def collapse_factors(
         for row, load in loads.items()
         if np.abs(load).max() > 1e-9 * -sum(axle.force[1] for axle in row)
     }
-    associated = {row: programme.solve() for row, programme in programmes.items()}
+    each = track_progress("places", programmes.items())
+    associated = {row: programme.solve() for row, programme in each}
     searched = options["friction"] == "nonassociated"
     states = _search_nonassociated(programmes, associated) if searched else associated
     for row, state in states.items():

@@ -17,7 +17,6 @@ import numpy as np
 import xarray as xr
 from scipy.stats import qmc
 
-from archfem._display import ProgressReport
 from archfem._validation import check_integer, check_number, validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.result_text import ResultTable
@@ -32,7 +31,7 @@ from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.dynamics.rigid_body.simulation import RigidBlockSimulation
 from archfem.dynamics.schemes import Conserving, EffectiveDamping, Viscous, interpret_damping
 from archfem.dynamics.verdict_range import VerdictRange
-from archfem.errors import DidNotConverge, InvalidInput, InvalidStructure
+from archfem.errors import DidNotConverge, InvalidInput, InvalidStructure, logger
 from archfem.limit.fill_strength import PlasticFill
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate_again
 from archfem.masonry.joint_closing import FINISHES, with_finish
@@ -422,16 +421,37 @@ def _build_dataset(
     return xr.Dataset(columns, attrs={"properties": list(ranges)})
 
 
-def vary_rating(case: Case, rating: Mapping[str, Any], found: Rating) -> tuple[ResultTable, str]:
+@dataclass(frozen=True, eq=False)
+class RatingVariation(WholePoint):
+    """A rated bridge, and the keys of its case with other values."""
+
+    inputs: str  # digest of all that the rating as given depends on
+    changes: tuple[tuple[str, Any], ...]
+    base: Case = field(repr=False, compare=False)  # with [rating] of one vehicle
+    found: Rating = field(repr=False, compare=False)
+
+
+def evaluate_rating_variation(variation: RatingVariation) -> dict[str, float]:
+    """Return the factor of a bridge with changed properties."""
+    other = Point.of(variation.base, variation.changes).case
+    given = other.rating.get("width"), other.limit.resistance
+    return {"factor": rate_again(variation.found, other.structure, given[0], **given[1])}
+
+
+def vary_rating(
+    case: Case, rating: Mapping[str, Any], found: Rating, folder: str | Path | None = None
+) -> tuple[ResultTable, str, int]:
     """Rate the bridge of a case with other properties, one at a time, and state the range.
 
     Args:
         case: case of the bridge.
         rating: [rating] of one vehicle.
         found: rating with the properties of the case.
+        folder: folder that keeps finished variations, from which the same call continues.
 
     Returns:
-        Table of properties and factors, and the least and the greatest factor in words.
+        Table of properties and factors; the least and the greatest factor in words; and how many
+        variations are left after Ctrl-C.
 
     Raises:
         InvalidInput: the fill is a plastic one.
@@ -440,26 +460,31 @@ def vary_rating(case: Case, rating: Mapping[str, Any], found: Rating) -> tuple[R
         raise InvalidInput('a rating is varied with fill of law "pressure", not with "plastic"')
     case = Case.of({**case.settings, "rating": dict(rating)}, case.folder)
     changes, factors = dict(_list_rating_changes(case, found)), dict[str, float]()
-    with ProgressReport("rating, varied", len(changes)) as progress:
-        for name, changed in changes.items():
-            factors[name] = np.nan
-            with suppress(InvalidStructure):  # rings may not fit on a narrower pier
-                other = Point.of(case, changed.items()).case
-                given = other.rating.get("width"), other.limit.resistance
-                factors[name] = rate_again(found, other.structure, given[0], **given[1])
-            progress.show(f"{name}: {factors[name]:.4g}", 1)
+    names, inputs = [*changes], case.hash_inputs()
+    given = [RatingVariation(inputs, tuple(changes[name].items()), case, found) for name in names]
+    evaluate = partial(evaluate_with_progress, name="variations of the rating", folder=folder)
+    with suppress(KeyboardInterrupt):
+        for k, row in evaluate([*enumerate(given)], evaluate_rating_variation, 1):
+            factors[names[k]] = row["found"].get("factor", np.nan)
+            # rings may not fit on a narrower pier
+            if row["error"] and not row["error"].startswith(InvalidStructure.__name__):
+                logger.warning("%s: %s", names[k], row["error"])
+    left = len(changes) - len(factors)
+    factors = {name: factors[name] for name in names if name in factors}
     factors |= {"no pressure of the fill": found.without_pressure}
     factors |= {"all of its passive pressure": found.full_pressure}
     factors |= {f"stones of {ASSUMED_STRENGTH / MPa:g} MPa that crush": found.crushing}
-    known = {name: value for name, value in factors.items() if np.isfinite(value)}
+    known = {"the values of the case": found.factor}
+    known |= {name: value for name, value in factors.items() if np.isfinite(value)}
     rows = [[name, f"{known[name]:.4g}" if name in known else "-"] for name in factors]
     rows = [row for row in rows if row[0] in changes or row[0] in known]
     least, most = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
+    missing = f"; {left} of {len(changes)} variations were interrupted" if left else ""
     text = (
         f"one property at a time changes the factor of {found.factor:.4g} to {known[least]:.4g} "
-        f"({least}) at least and {known[most]:.4g} ({most}) at most"
+        f"({least}) at least and {known[most]:.4g} ({most}) at most{missing}"
     )
-    return ResultTable(["with", "factor"], rows), text
+    return ResultTable(["with", "factor"], rows), text, left
 
 
 def _list_rating_changes(case: Case, found: Rating) -> Iterator[tuple[str, dict[str, Any]]]:
