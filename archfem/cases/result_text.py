@@ -30,8 +30,8 @@ from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describ
 from archfem.limit.fill_range import FillRange
 from archfem.limit.fill_strength import PlasticFill
 from archfem.limit.mechanism_count import Mechanism, duration_text
-from archfem.limit.rating import Rating, describe_spans
-from archfem.masonry.structure import Structure, join_joint_names, join_names
+from archfem.limit.rating import Rating
+from archfem.masonry.structure import Structure, describe_spans, join_joint_names, join_names
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import Match
 from archfem.motion.motion import Motion

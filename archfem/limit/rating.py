@@ -1,6 +1,6 @@
 """Rating of bridges for vehicles of codes: partial factors, widths, geometric factor of safety."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
@@ -42,6 +42,8 @@ from archfem.masonry.structure import (
     CONTACT_TOLERANCE,
     HasStructure,
     Structure,
+    describe_spans,
+    find_clear_spans,
     join_names,
     structure_of,
 )
@@ -221,7 +223,7 @@ class Rating(ResultDisplay):
         place = self.moving.direction, self.moving.position
         stand = [load.x for load in axles_on_structure(self.structure, axles, *place)]
         worst, joints = self.moving.worst, self.structure.joints
-        spans, moves = _clear_spans(self.structure), {joints[k].part for k, _ in worst.hinges}
+        spans, moves = find_clear_spans(self.structure), {joints[k].part for k, _ in worst.hinges}
         moves |= {joints[number].part for number in worst.sliding}
         over: dict[str, list[float]] = {}
         for x in stand if len(spans) > 1 else []:
@@ -400,38 +402,6 @@ def _name_places(places: Collection[float]) -> str:
     return " and ".join(filter(None, [", ".join(each[:-1]), *each[-1:]]))
 
 
-def _clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:
-    """Return the clear span of each ring, from its left to its right end [m]."""
-    spans: dict[str, list[float]] = {}
-    for joint in structure.joints:
-        if joint.role == "ring":
-            spans.setdefault(joint.part, []).append(joint.intrados[0])
-    return {part: (min(xs), max(xs)) for part, xs in spans.items()}
-
-
-def describe_spans(structure: Structure) -> str:
-    """Describe the clear span of each ring, and breadth and clear height of piers, in a line."""
-    spans, piers = _clear_spans(structure), list[str]()
-    ends = (
-        f"from {low:.2f} to {high:.2f} m{f' ({part!r})' if len(spans) > 1 else ''}"
-        for part, (low, high) in spans.items()
-    )
-    # the beds of a wall in bond are parts of its breadth
-    walls = {structure.joints[number].part for number in np.flatnonzero(structure.heads)}
-    beds = [j for j in structure.joints if j.role == "pier" and j.part not in walls]
-    for part in dict.fromkeys(joint.part for joint in beds):
-        own = [joint for joint in beds if joint.part == part]
-        base, parts = min(joint.intrados[1] for joint in own), structure.blocks
-        clear = [
-            joint.intrados[1] - base
-            for joint in structure.joints
-            if joint.role == "ring" and part in {parts[number].part for number in joint.blocks}
-        ]
-        high = f" and {min(clear):.3g} m high below the clear spans" if clear else ""
-        piers.append(f"'{part}' {min(joint.depth for joint in own):.4g} m broad{high}")
-    return "; ".join([f"clear span {' and '.join(ends)}" if spans else "no ring", *piers])
-
-
 @validate_arguments
 def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridge)
     structure: Structure | HasStructure,
@@ -520,13 +490,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     geometric, deepest = unknown if is_plastic else _geometric_factor(weighted, moving, options)
     factors = live, impact, dead, width, area_load
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
-    searches = [(rows, live, _other_states(options), 32 * len(rows))]
-    if driven.grade == "given" and not is_plastic:
-        code = VEHICLES["CS454-single"]
-        other = replace(driven, impact_on=code.impact_on).factored(code.live, code.impact)
-        # mechanisms are much the same whichever axle has the impact
-        searches.append((other, code.live, {"by_cs454": options}, 32))
-    for each, by, states, count in searches:
+    for each, by, states, count in _further_searches(driven, rows, live, options):
         # of the whole width, as the structure is modelled
         loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in each]
         more |= _find_least_factors(weighted, positions, loads, by * area_load, states, count)
@@ -658,6 +622,19 @@ def _geometric_factor(
     return 1.0 / high, np.nan
 
 
+def _further_searches(
+    driven: Vehicle, rows: Sequence[Array], live: float, options: dict[str, Any]
+) -> Iterator[tuple[Sequence[Array], float, dict[str, dict[str, Any]], int]]:
+    """Yield rows of weights, partial factor, states and rows solved first of further factors."""
+    if states := _other_states(options):
+        yield rows, live, states, 32 * len(rows)
+    if driven.grade == "given" and not isinstance(options["fill"], PlasticFill):
+        code = VEHICLES["CS454-single"]
+        other = replace(driven, impact_on=code.impact_on).factored(code.live, code.impact)
+        # mechanisms are much the same whichever axle has the impact
+        yield other, code.live, {"by_cs454": options}, 32
+
+
 def _other_states(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the options with other pressures of a fill, without backing, with crushing."""
     states: dict[str, dict[str, Any]] = {}
@@ -695,8 +672,6 @@ def _find_least_factors(
         for way in DRIVING_DIRECTIONS
         for x in places
     )
-    if not states:
-        return {}
     # the fans of loads do not depend on pressure, backing and strength
     stones, _ = self_weight_programme(structure, **next(iter(states.values())))
     axles = {row: stones.load(row) for row in rows if row}

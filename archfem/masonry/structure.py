@@ -524,3 +524,35 @@ def largest_displacement(outlines: Sequence[Array], centroids: Array, motion: Ar
         for points, centroid, of_block in zip(outlines, centroids, motion, strict=True)
     ]
     return max(float(np.linalg.norm(each, axis=1).max()) for each in moved)
+
+
+def find_clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:
+    """Return the clear span of each ring, from its left to its right end [m]."""
+    spans: dict[str, list[float]] = {}
+    for joint in structure.joints:
+        if joint.role == "ring":
+            spans.setdefault(joint.part, []).append(joint.intrados[0])
+    return {part: (min(xs), max(xs)) for part, xs in spans.items()}
+
+
+def describe_spans(structure: Structure) -> str:
+    """Describe the clear span of each ring, and breadth and clear height of piers, in a line."""
+    spans, piers = find_clear_spans(structure), list[str]()
+    ends = (
+        f"from {low:.2f} to {high:.2f} m{f' ({part!r})' if len(spans) > 1 else ''}"
+        for part, (low, high) in spans.items()
+    )
+    # the beds of a wall in bond are parts of its breadth
+    walls = {structure.joints[number].part for number in np.flatnonzero(structure.heads)}
+    beds = [j for j in structure.joints if j.role == "pier" and j.part not in walls]
+    for part in dict.fromkeys(joint.part for joint in beds):
+        own = [joint for joint in beds if joint.part == part]
+        base, parts = min(joint.intrados[1] for joint in own), structure.blocks
+        clear = [
+            joint.intrados[1] - base
+            for joint in structure.joints
+            if joint.role == "ring" and part in {parts[number].part for number in joint.blocks}
+        ]
+        high = f" and {min(clear):.3g} m high below the clear spans" if clear else ""
+        piers.append(f"'{part}' {min(joint.depth for joint in own):.4g} m broad{high}")
+    return "; ".join([f"clear span {' and '.join(ends)}" if spans else "no ring", *piers])

@@ -10,7 +10,7 @@ import shapely
 from repeats import each_once
 
 import archfem as af
-from archfem.limit.rating import describe_spans
+from archfem.masonry.structure import describe_spans
 
 MESHES = Path(__file__).parents[2] / "meshes"
 EXACT = 1e-9
