@@ -12,9 +12,9 @@ from archfem.cases.toml_file import Table, check_table, read_object
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.backfill import self_weight_programme
-from archfem.limit.collapse import Collapse, collapse_factor, solve_least
+from archfem.limit.collapse import Collapse, collapse_factor, describe_crushing, solve_least
 from archfem.limit.fill_strength import Fill, PlasticFill
-from archfem.limit.rating import Rating, rate
+from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate
 from archfem.limit.vehicles import VEHICLES, VEHICLES_OF_CODES, Vehicle
 from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Settlement
 from archfem.masonry.structure import Structure, join_names
@@ -28,6 +28,7 @@ from archfem.statics.mechanism_assessment import (
     kinematic_assessment,
 )
 from archfem.statics.pushover import Pushover, Stop, pushover
+from archfem.units import MPa
 
 # Words of [limit] and [assessment]: laws of the joints, and of the fill
 FRICTION_LAWS = ("coulomb", "nonassociated", "none")
@@ -102,6 +103,21 @@ class LimitAnalysis:
         """
         fill = None if isinstance(self.fill, PlasticFill) else self.fill  # that has no range
         return solve_least(found, self.friction, self.strength, fill)
+
+    def describe_crushing(self, structure: Structure) -> str:
+        """Describe at which strength joints crush; of point loads without any, by an assumed one.
+
+        Args:
+            structure: structure of the case.
+        """
+        words, fill = describe_crushing(self.strength), self.fill
+        has_points = any(isinstance(load, PointLoad) for load in self.live)
+        # a search of sliding without dilatancy in walls takes minutes
+        takes_long = isinstance(fill, PlasticFill) or self.friction == "nonassociated"
+        if self.strength is not None or not has_points or takes_long:
+            return words
+        weaker = replace(self, strength=ASSUMED_STRENGTH).solve(structure)
+        return f"{words}; with {ASSUMED_STRENGTH / MPa:g} MPa, {weaker.sentence}"
 
     @property
     def opposite(self) -> "LimitAnalysis | None":

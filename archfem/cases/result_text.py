@@ -26,7 +26,7 @@ from archfem.joints.criteria import (
     longest_duration,
     with_failure_flags,
 )
-from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
+from archfem.limit.collapse import Collapse, Outcome, describe_fill
 from archfem.limit.fill_range import FillRange
 from archfem.limit.fill_strength import PlasticFill
 from archfem.limit.mechanism_count import Mechanism, duration_text
@@ -274,7 +274,7 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
             collapse.factor == collapse.range[0] != collapse.range[1]
         )
         lines.append(f"over what is assumed of the fill: {over}{least}")
-    crushing = describe_crushing(limit.strength)
+    crushing = limit.describe_crushing(structure)
     lines += filter(None, [crushing, describe_fill(limit.fill, structure)])
     if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES:
         lines.append(

@@ -470,13 +470,16 @@ def vary_rating(
             if row["error"] and not row["error"].startswith(InvalidStructure.__name__):
                 logger.warning("%s: %s", names[k], row["error"])
     left = len(changes) - len(factors)
-    factors = {name: factors[name] for name in names if name in factors}
+    factors = {name: factors.get(name, np.nan) for name in names}
     factors |= {"no pressure of the fill": found.without_pressure}
     factors |= {"all of its passive pressure": found.full_pressure}
     factors |= {f"stones of {ASSUMED_STRENGTH / MPa:g} MPa that crush": found.crushing}
     known = {"the values of the case": found.factor}
     known |= {name: value for name, value in factors.items() if np.isfinite(value)}
-    rows = [[name, f"{known[name]:.4g}" if name in known else "-"] for name in factors]
+    empty = {name: "not computed" for name in names[len(names) - left :]}
+    rows = [
+        [name, f"{known[name]:.4g}" if name in known else empty.get(name, "-")] for name in factors
+    ]
     rows = [row for row in rows if row[0] in changes or row[0] in known]
     least, most = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
     missing = f"; {left} of {len(changes)} variations were interrupted" if left else ""
