@@ -459,9 +459,32 @@ def vary_rating(
     if isinstance(found.fill, PlasticFill):
         raise InvalidInput('a rating is varied with fill of law "pressure", not with "plastic"')
     case = Case.of({**case.settings, "rating": dict(rating)}, case.folder)
+    names = list(dict(_list_rating_changes(case, found)))
+    computed = _rate_changed(case, found, folder)
+    late = [name for name in names if name not in computed]
+    factors = {name: computed.get(name, np.nan) for name in names}
+    factors |= {"no pressure of the fill": found.without_pressure}
+    factors |= {"all of its passive pressure": found.full_pressure}
+    factors |= {f"stones of {ASSUMED_STRENGTH / MPa:g} MPa that crush": found.crushing}
+    known = {"the values of the case": found.factor}
+    known |= {name: value for name, value in factors.items() if np.isfinite(value)}
+    rows = [[name, f"{known[name]:.4g}"] if name in known else [name, "-"] for name in factors]
+    rows = [row for row in rows if row[0] in {*names, *known}]
+    rows = [[name, "not computed" if name in late else cell] for name, cell in rows]
+    least, most = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
+    missing = f"; {len(late)} of {len(names)} variations were not computed" if late else ""
+    text = (
+        f"one property at a time changes the factor of {found.factor:.4g} to {known[least]:.4g} "
+        f"({least}) at least and {known[most]:.4g} ({most}) at most{missing}"
+    )
+    return ResultTable(["with", "factor"], rows), text, len(late)
+
+
+def _rate_changed(case: Case, found: Rating, folder: str | Path | None) -> dict[str, float]:
+    """Return the factor with each change by its name, up to Ctrl-C; NaN where there is none."""
     changes, factors = dict(_list_rating_changes(case, found)), dict[str, float]()
     names, inputs = [*changes], case.hash_inputs()
-    given = [RatingVariation(inputs, tuple(changes[name].items()), case, found) for name in names]
+    given = [RatingVariation(inputs, tuple(each.items()), case, found) for each in changes.values()]
     evaluate = partial(evaluate_with_progress, name="variations of the rating", folder=folder)
     with suppress(KeyboardInterrupt):
         for k, row in evaluate([*enumerate(given)], evaluate_rating_variation, 1):
@@ -469,25 +492,7 @@ def vary_rating(
             # rings may not fit on a narrower pier
             if row["error"] and not row["error"].startswith(InvalidStructure.__name__):
                 logger.warning("%s: %s", names[k], row["error"])
-    left = len(changes) - len(factors)
-    factors = {name: factors.get(name, np.nan) for name in names}
-    factors |= {"no pressure of the fill": found.without_pressure}
-    factors |= {"all of its passive pressure": found.full_pressure}
-    factors |= {f"stones of {ASSUMED_STRENGTH / MPa:g} MPa that crush": found.crushing}
-    known = {"the values of the case": found.factor}
-    known |= {name: value for name, value in factors.items() if np.isfinite(value)}
-    empty = {name: "not computed" for name in names[len(names) - left :]}
-    rows = [
-        [name, f"{known[name]:.4g}" if name in known else empty.get(name, "-")] for name in factors
-    ]
-    rows = [row for row in rows if row[0] in changes or row[0] in known]
-    least, most = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
-    missing = f"; {left} of {len(changes)} variations were interrupted" if left else ""
-    text = (
-        f"one property at a time changes the factor of {found.factor:.4g} to {known[least]:.4g} "
-        f"({least}) at least and {known[most]:.4g} ({most}) at most{missing}"
-    )
-    return ResultTable(["with", "factor"], rows), text, left
+    return factors
 
 
 def _list_rating_changes(case: Case, found: Rating) -> Iterator[tuple[str, dict[str, Any]]]:

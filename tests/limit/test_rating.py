@@ -8,7 +8,7 @@ import pytest
 from backfilled import arch_bridge
 
 import archfem as af
-from archfem.cases.result_text import tabulate_ratings
+from archfem.cases.result_text import state_ratings, tabulate_ratings
 from archfem.limit import VEHICLES, Vehicle, rating
 from archfem.limit.rating import _places_along as places_along
 
@@ -256,14 +256,15 @@ def test_less_than_the_rule_is_stated_beside_the_verdict(monkeypatch):
         assert found.moving.position == rule.moving.position
         assert found.by_rule == pytest.approx(rule.factor, rel=EXACT)
         by_rule = f"over 2.1 m of width and 3 kN/m² beside the axles, by rule, {rule.factor:.4g}"
-        assert f"passes; {by_rule} at this place" in repr(found)
+        assert f"; {by_rule} at this place, with the fill as given" in repr(found)
     assert np.isnan(rule.by_rule)
-    assert repr(rule).endswith("passes")
+    ends = f"{rule.without_pressure:.4g} to {rule.full_pressure:.4g}"
+    assert repr(rule).endswith(f"passes ({ends} over what is assumed of the fill)")
     train = replace(VEHICLES["LM71"], axles=(1e3,), spacings=())
     found = af.rate(bridge, train, fill=GRAVEL)
-    left = f"at most {found.factor:.4g} ({found.without_pressure:.4g} without pressure of the fill)"
-    left += " without the 80 kN/m beside the axles (LM71-train)"
-    assert repr(found).endswith(f"passes if the code's impact is {left}")
+    ends = f"({found.without_pressure:.4g} to {found.full_pressure:.4g} over what is assumed of the"
+    left = f"at most {found.factor:.4g} {ends} fill) without the 80 kN/m beside the axles"
+    assert repr(found).endswith(f"passes if the code's impact is {left} (LM71-train)")
 
 
 def test_places_are_a_hundredth_of_the_bridge_apart():
@@ -328,7 +329,7 @@ def test_words_and_table(lorry_rating):
     places = sorted(lorry_rating.moving.position + sense * np.array([1.6, -1.6]))
     (beside,) = (x for x in places if not 0.0 < x < 9.0)  # ends of the fill
     (x,) = {*places} - {beside}
-    stands = f"1 axle of 2 at x = {x:.2f} m, "
+    stands = f"1 axle of 2 at x = {x:.2f} m (the other at {beside:.2f} m), "
     assert f"factor {lorry_rating.factor:.4g} with {stands}" in repr(lorry_rating)
     assert ("passes" in repr(lorry_rating)) == (lorry_rating.factor >= 1.0)
     head, *rows = lorry_rating.table().splitlines()
@@ -468,6 +469,9 @@ def test_places_of_axles_are_of_the_span_that_is_loaded(monkeypatch):
     (fails,) = {bridge.joints[k].part for k, _ in found.moving.worst.hinges}
     assert len(found.moving.worst.live) == 3
     assert f"with 2 axles of 3 over '{fails}' at x = " in repr(found)
+    sense = 1.0 if found.moving.direction == "right" else -1.0
+    tractor = found.moving.position + 2.5 * sense
+    assert f" m (the other at {tractor:.2f} m), " in repr(found)
     monkeypatch.setattr(rating, "_places_along", lambda *_: (min(inner) - 20.0,))
     found = af.rate(bridge, Vehicle("long", (1e3, 1e3, 1e3), (2.0, 40.0)))
     assert f"with 1 axle of 3 over 'right arch' at x = {min(inner) + 1.0:.2f} m" in repr(found)
@@ -486,9 +490,13 @@ def test_a_verdict_says_which_parts_of_the_fill_it_rests_on(lorry_rating):
     either = replace(lorry_rating, fill=backed.fill, without_backing=1.01, without_either=0.8)
     assert either.outcome.startswith("passes only with the pressure of the fill or the backing if")
     assert f"{without}1.01; without either: 0.8\n" in str(either)
-    least = replace(either, without_either=1.05).outcome
-    assert least.startswith("passes if")
-    assert "(1.05 without pressure and backing of the" in least
+    # with neither it is the least, and may be far below that without one of them
+    least = replace(either, without_either=1.005, full_pressure=np.inf)
+    assert least.outcome.startswith("passes if")
+    assert "(1.005 to inf over what is assumed of the fill)" in least.outcome
+    none = replace(least, without_pressure=np.nan, full_pressure=7.5).outcome
+    assert "(none to 7.5 over what is assumed of the fill)" in none
+    assert "over what is assumed" not in replace(least, full_pressure=np.nan).outcome
 
 
 def test_a_rating_with_backing_has_the_factor_without_it(monkeypatch):
@@ -526,6 +534,45 @@ def test_a_vehicle_without_factors_passes_on_a_condition(vehicle, given, missing
     (live, impact) = (line for line in str(found).splitlines() if line[:6] in ("live l", "impact"))
     assert ("(none" in live) == ("live" in missing)
     assert ("(none" in impact) == ("impact" in missing)
+
+
+def _say_codes(found):
+    """Return the line of a rating on the factors of codes."""
+    (line,) = (line for line in str(found).splitlines() if "in traffic" in line)
+    return line
+
+
+def test_factors_of_codes_are_stated_beside_given_ones():
+    """Against ratings with these factors; those of CS 454 search the axle that has the impact."""
+    bridge, fill = arch_bridge(width=3.0, voussoirs=9), replace(GRAVEL, mobilisation=0.5)
+    lorry = Vehicle("lorry", (60e3, 115e3, 80e3), (2.2, 1.3), live=1.35, impact=1.4)
+    on_worst_axle = replace(lorry, live=1.9, impact=1.8, impact_on="worst axle")
+    given, bare, good, by_cs454 = (
+        af.rate(bridge, each, fill=fill, **factors)
+        for each, factors in (
+            (lorry, {}),
+            (replace(lorry, live=1.0, impact=1.0), {}),
+            (lorry, {"impact": 1.2}),
+            (on_worst_axle, {}),
+        )
+    )
+    assert given.by_cs454 == pytest.approx(by_cs454.factor, rel=1e-3)  # nearest bounds alone
+    assert by_cs454.by_cs454 == pytest.approx(by_cs454.factor, rel=1e-3)
+    assert by_cs454.factor < 0.7 * bare.factor / 1.9  # the impact counts
+    by_eurocodes = f"{given.factor:.4g} to {good.factor:.4g} by Eurocodes (1.89 to 1.62)"
+    by = f"{given.by_cs454:.4g} by CS 454 (1.9, and 3.42 on the worst axle), from memory"
+    codes = f"; as a lorry in traffic {by_eurocodes}, and {by}"
+    assert _say_codes(given) == f"bare axles {bare.factor:.4g}, live × impact 1.89 given{codes}"
+    assert _say_codes(bare) == f"no code's live × impact is in it{codes}"
+    assert _say_codes(by_cs454).startswith("live 1.9 and impact 1.8 given; as a lorry in traffic ")
+    assert "Eurocodes" not in _say_codes(by_cs454)  # another axle may be the worst
+    assert repr(given) in state_ratings([(given, [])]).sentences
+    assert _say_codes(given) in state_ratings([(given, [])]).sentences
+    # the impact is not on a distributed load, so that no multiple of the factor is that of a code
+    beside = replace(given, area_load=1e3)
+    assert _say_codes(beside).startswith("live 1.35 and impact 1.4 given; as a lorry in traffic ")
+    assert "Eurocodes" not in _say_codes(beside)
+    assert "in traffic" not in str(replace(given, vehicle=VEHICLES["LM2"]))
 
 
 def test_a_bridge_that_is_too_weak_would_carry_with_deeper_joints():

@@ -8,6 +8,7 @@ import pytest
 
 import archfem as af
 from archfem.cases.analysis_keys import rate_case
+from archfem.studies import variations
 from archfem.studies.variations import vary_rating
 
 SEARCHED = 0.005
@@ -52,7 +53,8 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     )
     case = af.Case.read(path)
     found = rate_case(case.structure, case.rating, case.limit)
-    rows, words = vary_rating(case, case.settings["rating"], found)
+    rows, words, left = vary_rating(case, case.settings["rating"], found)
+    assert left == 0
     cells = dict(rows.rows)
     assert cells.pop("piers a tenth narrower") == "-"  # on which the rings do not fit
     factors = {name: float(cell) for name, cell in cells.items()}
@@ -75,6 +77,42 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     least, most = min(factors, key=factors.get), max(factors, key=factors.get)
     ends = f"to {factors[least]:.4g} ({least}) at least and {factors[most]:.4g} ({most}) at most"
     assert words == f"one property at a time changes the factor of {found.factor:.4g} {ends}"
+
+
+def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monkeypatch):
+    """The same command computes only those that are left; another rating computes all."""
+    path, out = tmp_path / "case.toml", tmp_path / "out"
+    path.write_text(CASE.replace("PIER", 'breadth = "0.87 m"'))
+    monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (1.5, 2.0))
+    again, seen, stop = variations.rate_again, [], [3]
+
+    def rate_again(*given, **options):
+        seen.append(given)
+        if len(seen) == stop[0]:
+            raise KeyboardInterrupt
+        return again(*given, **options)
+
+    monkeypatch.setattr(variations, "rate_again", rate_again)
+    command = ["rate", str(path), "--vary", "--out", str(out)]
+    assert af.commands.main(command) == 130
+    rows = pd.read_csv(out / "rating_variations.csv").set_index("with")["factor"]
+    late = rows[rows == "not computed"]
+    assert len(late) == 11 - 3  # rings, and a narrower pier, which is refused before it is rated
+    assert float(rows["rings a tenth thinner"]) < float(rows["rings a tenth thicker"])
+    text = (out / "rating.txt").read_text()
+    assert f"in doubt: interrupted: {len(late)} variations of the rating were not computed" in text
+    assert f"; {len(late)} of 11 variations were not computed" in text
+    stop[0] = 0
+    assert af.commands.main(command) == 3
+    assert len(seen) == 10 + 1  # all but the narrower pier, and the interrupted one twice
+    second = pd.read_csv(out / "rating_variations.csv").set_index("with")["factor"]
+    assert "not computed" not in set(second)
+    assert second["rings a tenth thinner"] == rows["rings a tenth thinner"]
+    assert "interrupted" not in (out / "rating.txt").read_text()
+    seen.clear()
+    af.commands.main([*command, "--live", "1.5"])
+    assert len(seen) == 10
+    capsys.readouterr()
 
 
 @pytest.mark.slow
