@@ -147,6 +147,22 @@ def test_limit_analysis_in_words(ring):
     assert describe_collapse(slab, lifted, parse_limit({})).splitlines() == [first, last]
 
 
+def test_point_loads_without_a_strength_are_stated_by_an_assumed_one_too(ring):
+    """A strength that is given as none, or the search without dilatancy, has no such number."""
+    point = {"x": 1.4, "force": (0.0, -1e3)}
+    limit = parse_limit({"point": point})
+    crushed = af.collapse_factor(ring, live=limit.live, strength=5e6)
+    whole = limit.solve(ring)
+    assert crushed.factor < 0.99 * whole.factor
+    last = describe_collapse(ring, whole, limit).splitlines()[-1]
+    words = "joints do not crush: no strength of the stones counts"
+    assert last == f"{words}; with 5 MPa, {crushed.sentence}"
+    for given in ({"strength": "none"}, {"friction": "nonassociated"}):
+        without = parse_limit({"point": point, **given})
+        assert without.describe_crushing(ring) == words
+    assert parse_limit({"horizontal": 1.0}).describe_crushing(ring) == words
+
+
 def test_verdicts_of_several_runs_are_counted(run):
     assert describe_verdicts([run]) == run.verdict.headline
     outcome, doubtful = run.verdict.outcome, "2" if run.verdict.doubts else "none"

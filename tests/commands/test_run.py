@@ -627,6 +627,30 @@ def test_a_rating_that_is_stopped_keeps_the_vehicles_before(tmp_path, unplotted,
     )
 
 
+def test_a_rating_that_is_stopped_at_once_keeps_nothing(tmp_path, monkeypatch, capfd):
+    """It says so; lines of progress name the vehicle and the place."""
+    path, out = tmp_path / "ring.toml", tmp_path / "out"
+    path.write_text(LIMIT.replace("= 17", "= 7"))
+    monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (0.9, 1.2))
+    monkeypatch.setattr("archfem._display.PROGRESS_INTERVAL", 0.0)
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("archfem.limit.rating._geometric_factor", stop)
+    with open(tmp_path / "errors", "w") as errors:
+        monkeypatch.setattr("sys.stderr", errors)
+        command = ["rate", str(path), "--out", str(out), "--vehicle", "LM2", "--vehicle", "LM1"]
+        assert af.commands.main(command) == 130
+    lines = (tmp_path / "errors").read_text().splitlines()
+    assert "rating: vehicle 1 of 2; places: 2 of 2" in lines
+    assert lines[-2:] == [
+        "rating: no vehicle was rated, and nothing is kept",
+        "archfem: interrupted",
+    ]
+    assert not out.exists()
+
+
 def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
     """The case's own first, by name, though another is worse; then the worst first."""
     path, out = tmp_path / "ring.toml", tmp_path / "out"
@@ -653,12 +677,12 @@ def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
             assert (out / "rating.csv").read_text().strip() == found.table()
             table = tomllib.loads((out / "rating.toml").read_text())["rating"]
             assert table["vehicle"]["name"] == name
-            first = repr(found)
+            first = [repr(found), *found.describe_codes()]
         if name == rows["vehicle"][1]:
             worst = f"least of 4 vehicles: {found!r}"
     # a conclusion is on the vehicle of the case, and names the worst of all
     stated = json.loads((out / "rating.json").read_text())
-    assert stated["sentences"] == [first, worst]
+    assert stated["sentences"] == [*first, worst]
     assert [row[1] for row in stated["rows"]] == [*rows["vehicle"]]
     text = (out / "rating.txt").read_text().strip()
     assert text in said
