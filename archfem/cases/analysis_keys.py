@@ -103,6 +103,21 @@ class LimitAnalysis:
         fill = None if isinstance(self.fill, PlasticFill) else self.fill  # that has no range
         return solve_least(found, self.friction, self.strength, fill)
 
+    def crushing_share(self, structure: Structure, direction: float) -> float:
+        """Return the share of a horizontal push that is left where stones crush [-].
+
+        Args:
+            structure: structure of the case.
+            direction: sense of the push along x, 1 or -1.
+        """
+        given: dict[str, Any] = {"live": BodyForce(direction), "fill": self.fill}
+        given["friction"] = self.friction and "coulomb"  # as assessments slide
+        crushing, without = (
+            collapse_factor(structure, strength=strength, **given).factor
+            for strength in (self.strength, np.inf)
+        )
+        return crushing / without
+
     @property
     def opposite(self) -> "LimitAnalysis | None":
         """The analysis with the load in the other sense; None unless all of it is horizontal."""

@@ -169,8 +169,12 @@ def _describe_joints(data: ReportData) -> str:
 def build_structure_section(data: ReportData) -> Section:
     """Build extent, parts, names of joints, thrust line, and joints and stress under dead load."""
     case, structure = data.case, data.case.structure
-    points = np.concatenate([block.drawn() for block in structure.blocks])
-    length, height = np.ptp(points, axis=0)
+    # the ground is no part of its size
+    moving = [structure.blocks[number] for number in structure.free]
+    (length, height), drawn = (
+        np.ptp(np.concatenate([block.drawn() for block in blocks]), axis=0)
+        for blocks in (moving, structure.blocks)
+    )
     extent = (
         f"{length:.3g} m long, {height:.3g} m high and {structure.width:g} m wide; "
         f"{len(structure.free)} blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
@@ -181,7 +185,7 @@ def build_structure_section(data: ReportData) -> Section:
         *_describe_drawing(data),
         in_words(_tabulate_parts(structure)),
     ]
-    beside = data.dead is not None and length < MAX_SLENDERNESS * height
+    beside = data.dead is not None and drawn[0] < MAX_SLENDERNESS * drawn[1]
     with limit_width(HALF_WIDTH) if beside else nullcontext():
         figures = [(draw_names(structure), "The structure, with its assessed joints.")]
         if data.dead is not None:
@@ -256,9 +260,6 @@ def _build_rating(data: ReportData) -> list[Any]:
     """Build text and picture of a rating, below the table of several vehicles."""
     caption = "(a) Factor along the bridge, and (b) mechanism at the worst place"
     blocks = data.read_result("rating", caption)
-    if blocks:
-        # where a value can be looked up, for whoever signs
-        blocks[0] = replace(blocks[0], text=blocks[0].text.replace("from memory", "to be checked"))
     if (table := data.read_text("rating_variations.csv")) is not None:
         head, *rows = reader(table.splitlines())
         blocks.insert(1, Grid(head, rows, "Factor with one property changed at a time", "words"))
@@ -303,7 +304,8 @@ def _build_assessment(data: ReportData) -> list[Any]:
     stated = data.statements.get("assessment")
     if stated and len(names) == 2 and all(x.endswith("right and left") for x, *_ in stated.rows):
         names = names[:1]
-        texts = [f"{texts[0]}\nleft: the mirror image, with the same numbers", *texts[2:]]
+        mirrored = "\nleft: the mirror image, with the same numbers"
+        texts = [texts[0], texts[1] + mirrored, *texts[3:]]
         caption = f"{caption[:-1]}, to the right."
     if "all else is under one assumption: " in text:
         caption = f"{caption[:-1]}, under the assumption on the fill that has the least margin."
