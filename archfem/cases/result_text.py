@@ -272,7 +272,7 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
             collapse.factor == collapse.range[0] != collapse.range[1]
         )
         lines.append(f"over what is assumed of the fill: {over}{least}")
-    crushing = describe_crushing(limit.strength)
+    crushing = describe_crushing(limit.strength, structure)
     lines += filter(None, [crushing, describe_fill(limit.fill, structure)])
     if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES:
         lines.append(

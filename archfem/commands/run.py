@@ -138,10 +138,11 @@ def _replace_files(command: str, case: Case, out: str | None, draw: Callable[[],
     if out is None:
         return
     folder = create_result_folder(out)
-    has_run = "run" in intact_file_list(folder)
+    run = intact_file_list(folder).get("run")
     with _replace_results(command, case, folder) as draft:
         files = draw()
-        if not has_run:  # which has the case of the folder
+        # a run has the case of the folder, in which [report] may have changed
+        if run is None or run.inputs == case.hash_inputs():
             files = {**case_files(case), **files}
         write(files, draft)
 

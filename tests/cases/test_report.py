@@ -657,6 +657,22 @@ def test_a_result_without_a_time_history_has_a_report(
         assert "rating: vehicle LM1 given rating: live 1.2 given rating: area load, dead" in words
 
 
+@pytest.mark.parametrize(("changed", "author"), [("1.0", "B. Wright"), ("2.0", "A. Mason")])
+def test_a_command_renews_who_signs_the_case_of_a_run(changed, author, undrawn, tmp_path):
+    """That of the same case: another load makes it another case, which is not the run's."""
+    path, folder = tmp_path / "case.toml", tmp_path / "out"
+    limit = CASE + '[limit]\nhorizontal = 1.0\n[report]\nauthor = "A. Mason"\n'
+    path.write_text(limit, encoding="utf-8")
+    with replace_run(af.Case.read(path), folder):
+        pass
+    path.write_text(limit.replace("A. Mason", "B. Wright").replace("= 1.0\n[r", f"= {changed}\n[r"))
+    assert af.commands.main(["limit", str(path), "--out", str(folder)]) == 0
+    listed = read_file_list(folder)
+    assert "case.toml" in listed["run"].files
+    assert "case.toml" not in listed["limit"].files
+    assert af.cases.open_results(folder).case.report == {"author": author}
+
+
 def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path, capsys):
     path, folder = tmp_path / "case.toml", tmp_path / "out"
     spectrum = BRIDGE.partition("[assessment]")[2].partition("[suite")[0]
@@ -878,4 +894,4 @@ def test_parts_of_a_bridge_state_the_lengths_that_are_left_out():
     rows = tabulate_inputs(report_data.ReportData(af.Case.of(tomllib.loads(BRIDGE)), {})).rows
     left = {name: value for name, value, mark in rows if mark == "default"}
     assert left["sidewalls"] == "setback 0.4 m"
-    assert left["backfill"].startswith("erosion 0 m; hump 1 m")
+    assert left["backfill"].startswith("erosion 0 m; length without erosion to either")

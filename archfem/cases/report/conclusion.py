@@ -86,7 +86,7 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
             if factor != "-" or demand == "no demand given"
         ]
         return [*signed, *([("verdict", "; ".join(factors))] if factors else []), *doubts, *blocks]
-    peak = [("PGA", f"{max(map(_peak_of_ground, runs)):.3g} g")]
+    peak = [("motions" if len(runs) > 1 else "motion", _describe_peaks(runs))]
     verdict = "; ".join([summarise_outcomes(data, runs), *_list_failed_checks(data)])
     return [*signed, ("verdict", verdict), *doubts, *blocks, *peak]
 

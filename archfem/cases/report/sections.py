@@ -30,7 +30,6 @@ from archfem.cases.report.response import (
     build_ground_section,
     build_joint_section,
     build_run_sections,
-    in_words,
 )
 from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.history import SIGN_CONVENTION
@@ -42,7 +41,7 @@ from archfem.masonry.structure import Structure, join_names
 from archfem.statics.assessment_checks import LIMIT_STATES, LimitState
 from archfem.units import MPa, kN
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
-from archfem.view.structure import draw_names, draw_structure
+from archfem.view.structure import draw_names, draw_structure, list_numbers
 from archfem.view.studies import draw_findings
 from archfem.view.style import limit_width
 
@@ -183,11 +182,12 @@ def build_structure_section(data: ReportData) -> Section:
     blocks: list[Any] = [
         TextBlock(extent),
         *_describe_drawing(data),
-        in_words(_tabulate_parts(structure)),
+        _tabulate_parts(structure),
     ]
     beside = data.dead is not None and drawn[0] < MAX_SLENDERNESS * drawn[1]
     with limit_width(HALF_WIDTH) if beside else nullcontext():
-        figures = [(draw_names(structure), "The structure, with its assessed joints.")]
+        named = "; ".join(["The structure, with its assessed joints", *list_numbers(structure)])
+        figures = [(draw_names(structure), f"{named}.")]
         if data.dead is not None:
             criteria = case.analysis.failure_criteria
             figures.append((draw_structure(structure, data.dead, criteria=criteria), _THRUST))
@@ -199,7 +199,7 @@ def build_structure_section(data: ReportData) -> Section:
     if data.dead is None:
         blocks += data.read_figure("dead.png", _THRUST)
     else:
-        blocks.append(in_words(_tabulate_dead_load(data.dead)))
+        blocks.append(_tabulate_dead_load(data.dead))
     caption = "Principal compression under dead load."
     blocks += data.read_result("dead_stress", caption, table="Largest stresses of each part")
     caption = "A block cut free: forces on it, and their closing."
@@ -221,12 +221,14 @@ def _tabulate_parts(structure: Structure) -> Grid:
         if not free:
             fixed.append(part or "–")
             continue
-        depths = [joint.depth for joint in structure.joints if joint.part == part]
+        assessed = zip(structure.joints, structure.judged, strict=True)
+        depths = [joint.depth for joint, own in assessed if own and joint.part == part]
         weight = structure.width * sum(block.area * block.material.unit_weight for block in free)
         row = [part or "–", blocks[0].role or "–", str(len(blocks)), str(len(blocks) - len(free))]
         row.append(", ".join(dict.fromkeys(block.material.name for block in blocks)))
         row.append(f"{weight / kN:.4g}")
-        row.append(f"{min(depths):.3g} – {max(depths):.3g}" if depths else "–")
+        ends = dict.fromkeys(f"{choose(depths):.3g}" for choose in (min, max) if depths)
+        row.append(" – ".join(ends) or "–")
         rows.append(row)
     head = [
         "part",
